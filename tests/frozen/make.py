@@ -13,8 +13,8 @@ Made with commit ec0567c6, in an environment of constraints.txt::
     tactbench run --task slip --task contact-location --sensor biotac --repeats 1 --out kinds
     python tests/frozen/make.py freeze default beyond eflesh eflesh-slip kinds
 
-`compare` in place of `freeze` compares folders of the same names, made by the same commands, and exits with 1 if a number
-differs by more than a relative 1e-9, which is what other kinds of processor change.
+`compare` in place of `freeze` compares folders of the same names, made by the same commands, and exits with 1 if a
+number differs by more than a relative 1e-9, which is what other kinds of processor change.
 """
 
 import json
@@ -27,8 +27,10 @@ import numpy as np
 from tactbench.core.matrix.store import Store
 
 HERE = Path(__file__).parent
-KEYS = ("status", "metric", "score", "ci_low", "ci_high", "reference_floor", "score_beyond_floor", "true_score", "n_train",
-        "n_test", "split", "n_recordings", "chosen")  # fmt: skip
+KEYS = (
+    "status", "metric", "score", "ci_low", "ci_high", "reference_floor", "score_beyond_floor", "true_score", "n_train",
+    "n_test", "split", "n_recordings", "chosen",
+)  # fmt: skip
 RELATIVE = 1e-9
 KINDS = {
     "regression": ("eflesh", "eflesh/force/replay/deployable:session/forest,n_estimators=100/1"),

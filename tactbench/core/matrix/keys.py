@@ -7,8 +7,9 @@ data. A key is the digest of its sections; ``tactbench why`` compares the sectio
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
 
 from tactbench.core.matrix.plan import Cell, task_of
@@ -34,11 +35,11 @@ class Keys:
     _answers: dict[tuple[str, str], Sections] = field(default_factory=dict)
     _makers: dict[tuple[str, ...], Sections] = field(default_factory=dict)
 
-    def of_cell(self, cell: Cell, data: Mapping[str, str]) -> tuple[str, Sections]:
+    def of_cell(self, cell: Cell, data: Mapping[Path, str]) -> tuple[str, Sections]:
         """Return the key of a cell's result and its sections; `data` are the content digests of its recordings."""
-        sections = {**self._answering(cell), "configuration": configuration_of(cell), "data": dict(data)}
-        decisive = {**sections, "data": list(data.values())}
-        return digest_of(_canonical(decisive)), sections
+        sections = {**self._answering(cell), "configuration": configuration_of(cell)}
+        key = digest_of(_canonical({**sections, "data": list(data.values())}))
+        return key, {**sections, "data": {path.stem: digest for path, digest in data.items()}}
 
     def _answering(self, cell: Cell) -> Sections:
         pair = cell.task_key, cell.estimator
@@ -128,13 +129,3 @@ def differences(before: Mapping[str, Any], now: Mapping[str, Any], within: str =
 def _short(value: Any) -> str:
     text = "nothing" if value is None else value if isinstance(value, str) else _canonical(value)
     return text if len(text) <= 60 else f"{text[:59]}…"
-
-
-def names_of(scenes: Sequence[str]) -> list[str]:
-    """Return names of recordings, each once: the second of a name is numbered."""
-    seen: dict[str, int] = {}
-    found = []
-    for scene in scenes:
-        seen[scene] = seen.get(scene, 0) + 1
-        found.append(scene if seen[scene] == 1 else f"{scene} ({seen[scene]})")
-    return found

@@ -56,7 +56,9 @@ class Recorder:
         return acquired.content_digest
 
 
-def recorder_for(requests: Sequence[RecordingRequest], registry: Registry) -> Recorder:
+def recorder_for(
+    requests: Sequence[RecordingRequest], registry: Registry, operator: Operator | None = None
+) -> Recorder:
     """Return a recorder that knows what `requests` name, and no other plugins' effects and indenters."""
     sensors = dict.fromkeys(request.sensor for request in requests)
     effects = {
@@ -73,15 +75,12 @@ def recorder_for(requests: Sequence[RecordingRequest], registry: Registry) -> Re
         profiles=registry.profiles.names(),
         devices=registry.devices.names(),
     )
-    return Recorder(named)
+    return Recorder(named, operator)
 
 
 def is_computed(request: RecordingRequest, registry: Registry) -> bool:
     """Return whether a scene needs nothing but this machine, and no wall clock."""
-    if registry.rigs[request.rig].simulated:
-        return True
-    if not request.rig_file:
-        return False
+    if registry.rigs[request.rig].simulated or not request.rig_file:
+        return registry.rigs[request.rig].simulated
     devices = RigFile.model_validate_json(request.rig_file)
-    used = [devices.sensors.get(request.sensor), devices.force, *devices.devices.values()]
-    return devices.emulation.time == "virtual" and all(entry is None or entry.emulated for entry in used)
+    return devices.emulation.time == "virtual" and all(entry.emulated for entry in devices.entries().values())

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
 from pathlib import Path
 
-from tactbench.core.matrix.keys import Keys, differences, names_of
+from tactbench.core.matrix.keys import Keys, differences
 from tactbench.core.matrix.plan import Cell
 from tactbench.core.matrix.plan_recordings import RecordingPlan, request_key, requests_for
 from tactbench.core.matrix.progress import Progress
@@ -60,7 +60,7 @@ def compute_again(
         old, new = ({name: one.get(name) for name in decided} for one in (before, row))
         found = differences(old, new)
         if done:
-            names = names_of([path.stem for path in plan.paths[need]])
+            names = [path.stem for path in plan.paths[need]]
             old, new = (dict(zip(names, one["digests"], strict=False)) for one in (before, row))
             found += differences(old, new, "recording ")
             found += _answers(store.answers(before["key"]), again.answers(row["key"]))

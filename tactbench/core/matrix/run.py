@@ -10,11 +10,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, get_args
 
 from tactbench.core.errors import PluginContractError, UnwritableError, UsageError
-from tactbench.core.matrix.keys import Keys, Sections, names_of
+from tactbench.core.matrix.keys import Keys, Sections
 from tactbench.core.matrix.plan import Cell, task_of
 from tactbench.core.matrix.plan_recordings import RecordingPlan, RecordingRequest, RequestKey, plan_run, request_key
 from tactbench.core.matrix.progress import Progress, Silence
-from tactbench.core.matrix.record import GRACE_S, Recorder, is_computed, recorder_for
+from tactbench.core.matrix.record import GRACE_S, is_computed, recorder_for
 from tactbench.core.matrix.solve import Job, published, solve, unanswered
 from tactbench.core.matrix.store import Row, Store
 from tactbench.core.matrix.summary import fill_baselines
@@ -191,11 +191,8 @@ class Run:
         total = len(missing) + later + sum(map(len, ready))
         if not total:
             return
-        several = {cell.repeat for cell in self.cells}
-        numbers = sorted({cell.repeat for cell in cells})
-        which = f"{numbers[0]}" + (f" to {numbers[-1]}" if len(numbers) > 1 else "")
         stage = "recording and evaluating" if missing else "evaluating"
-        self.progress.begin(f"replicate {which} of {len(several)}: {stage}" if len(several) > 1 else stage, total)
+        self.progress.begin(f"{stage}, timed" if alone else stage, total)
         computed = all(is_computed(request, self.registry) for request in missing)
         engine = self.choice.engine(1 if alone else self.choice.processes)
         at_once = 1 if alone or isinstance(engine, InProcess) else self.choice.processes
@@ -241,10 +238,7 @@ class Run:
         for piece in pieces.values():
             for part in range(parts):
                 if requests := piece[part::parts]:
-                    work = recorder_for(requests, self.registry)
-                    if isinstance(recorder, InProcess):
-                        work = Recorder(self.registry, self.operator)
-                    recorder.submit(work, requests)
+                    recorder.submit(recorder_for(requests, self.registry, self.operator), requests)
 
     def _recorded(self, request: RecordingRequest, outcome: Any) -> None:
         if isinstance(outcome, UnwritableError):
@@ -271,8 +265,7 @@ class Run:
                     raise trouble
                 paths = self.plan.paths[need]
                 digests = {path: self.store.about(path)["digest"] for path in paths}
-                data = dict(zip(names_of([path.stem for path in paths]), digests.values(), strict=True))
-                key, sections = self.keys.of_cell(cell, data)
+                key, sections = self.keys.of_cell(cell, digests)
             except Exception as error:
                 self._keys[cell.name] = "", {}
                 self._stopped(cell, task, error)

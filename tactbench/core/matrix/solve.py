@@ -6,7 +6,7 @@ import json
 import os
 import random
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -127,7 +127,8 @@ def solve(job: Job, concurrency: int = 1, progress: Callable[[str], None] | None
         "host": host_id(),
     }
     row["remarks"] += [*result.remarks, *([TIMED] if cell.timed else [])]
-    return json.loads(json.dumps(row, allow_nan=False)), {str(role): one for role, one in result.sets.items()}
+    plain: Row = json.loads(json.dumps(row, allow_nan=False, default=_plain))
+    return plain, {str(role): answers for role, answers in result.sets.items()}
 
 
 def check_content(job: Job) -> None:
@@ -213,7 +214,7 @@ def _assumed(metas: Sequence[RecordingMeta]) -> dict[str, Scalar]:
 
 def _scored(result: CellResult) -> Row:
     """Return what was measured, as plain data: the result's names are those of the row."""
-    row = {name: _plain(getattr(result, name)) for name in RowModel.model_fields if hasattr(result, name)}
+    row = {name: getattr(result, name) for name in RowModel.model_fields if hasattr(result, name)}
     del row["remarks"]
     if result.beyond is not None:
         row |= {"reference_floor": result.beyond.floor, "score_beyond_floor": result.beyond.score}
@@ -223,8 +224,4 @@ def _scored(result: CellResult) -> Row:
 
 
 def _plain(value: Any) -> Any:
-    if isinstance(value, Mapping):
-        return {name: _plain(one) for name, one in value.items()}
-    if isinstance(value, tuple | list):
-        return [_plain(one) for one in value]
-    return value.tolist() if hasattr(value, "tolist") else value
+    return value.tolist() if hasattr(value, "tolist") else dict(value)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from tactbench.core.errors import TactbenchError
-from tactbench.core.matrix.keys import Keys, differences, names_of
+from tactbench.core.matrix.keys import Keys, differences
 from tactbench.core.matrix.plan import Cell
 from tactbench.core.matrix.store import Row, Store
 
@@ -40,11 +40,11 @@ def explain(cell: Cell, paths: Sequence[Path], keys: Keys, store: Store, row: Ro
         reasons = [f"{text}: they were never made, removed, or are made otherwise now"]
     there = [path for path in paths if path.exists()]
     try:
-        digests = [store.about(path)["digest"] for path in there]
+        digests = {path: store.about(path)["digest"] for path in there}
         before = store.cell(row).sections if row is not None else {}
     except TactbenchError as error:
         return Explanation("", False, (str(error),))
-    key, now = keys.of_cell(cell, dict(zip(names_of([path.stem for path in there]), digests, strict=True)))
+    key, now = keys.of_cell(cell, digests)
     if paths and not missing and store.finished(key) is not None:
         return Explanation(key, True, ())
     if row is None:

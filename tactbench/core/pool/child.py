@@ -8,7 +8,6 @@ import os
 import signal
 import sys
 import threading
-import time
 import traceback
 from collections.abc import Callable, Sequence
 from contextlib import suppress
@@ -60,26 +59,27 @@ def run_child(
         for stream in (sys.stdout, sys.stderr):
             with suppress(Exception):
                 stream.flush()
-        connection.send(outcome)
+        try:
+            connection.send(outcome)
+        except Exception as error:  # it cannot be pickled
+            connection.send(("error", plain_error(error)))
     with suppress(EOFError, OSError):
         connection.recv()  # the parent ends this process together with its group
 
 
-def _carry_out(work: Callable[[Any], Any], item: Any, limits: Limits) -> tuple[str, Any, float]:
-    """Return what came of an item, and the seconds it took."""
+def _carry_out(work: Callable[[Any], Any], item: Any, limits: Limits) -> tuple[str, Any]:
+    """Return what came of an item."""
     if limits.timeout_s is not None:  # the stacks at the end of its time go to the log
         faulthandler.dump_traceback_later(limits.timeout_s)
-    began = time.perf_counter()
     try:
         with data_limit(limits.memory_mb):
-            value = work(item)
-        return "value", value, time.perf_counter() - began
+            return "value", work(item)
     except _Terminated:
         os._exit(0)
     except MemoryError as error:
-        return "error", out_of_memory(limits, error), time.perf_counter() - began
+        return "error", out_of_memory(limits, error)
     except BaseException as error:
-        return "error", plain_error(error), time.perf_counter() - began
+        return "error", plain_error(error)
     finally:
         faulthandler.cancel_dump_traceback_later()
 

@@ -7,12 +7,13 @@ import os
 import signal
 import sys
 import tempfile
+import threading
 import time
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from contextlib import contextmanager, suppress
-from multiprocessing.connection import wait
+from contextlib import suppress
 from pathlib import Path
+from queue import Empty, SimpleQueue
 from typing import Any, TypeVar
 
 import psutil
@@ -27,7 +28,7 @@ R = TypeVar("R")
 START_S = 60.0
 """Seconds within which a process must begin with its first item; with `spawn` it imports libraries first."""
 POLL_S = 0.05
-"""Seconds between two looks at the memory and time of children."""
+"""Seconds between two looks at the memory and time of a child."""
 KILL_DELAY_S = 0.2
 """Seconds beyond its time limit after which an item is ended: it writes its stacks at the limit."""
 LOG_BYTES = 2**16
@@ -53,6 +54,7 @@ class Pool:
     -----
     Processes come from the fork server of `multiprocessing`, or are spawned where there is none or `spawn` is the start
     method. Work, items and results are pickled; results must be of types of the standard library, numpy or tactbench.
+    A thread of this process watches each child.
     """
 
     def __init__(self, jobs: int = 1, limits: Limits = UNLIMITED) -> None:
@@ -60,45 +62,43 @@ class Pool:
         self.log = ""
         """What the item had printed whose outcome was yielded last, the end of it."""
         self._waiting: deque[tuple[Callable[[Any], Any], Sequence[Any]]] = deque()
-        self._busy: list[_Worker] = []
+        self._ended: SimpleQueue[tuple[Any, Any, str] | None] = SimpleQueue()
+        """Item, outcome and log; None: a piece is through."""
+        self._threads: list[threading.Thread] = []
+        self._abandoned = threading.Event()
 
     def __enter__(self) -> Pool:
         return self
 
     def __exit__(self, *_: object) -> None:
         """End every process that is at work."""
-        for worker in self._busy:
-            worker.terminate()
-        for worker in self._busy:
-            worker.end()
-        self._busy.clear()
         self._waiting.clear()
+        self._abandoned.set()
+        for thread in self._threads:
+            thread.join()
 
     def submit(self, work: Callable[[Any], Any], items: Sequence[Any]) -> None:
         """Queue a piece of work; may be called while `outcomes` is iterated."""
-        if items:
-            self._waiting.append((work, items))
+        self._waiting.append((work, items))
 
     def outcomes(self) -> Iterator[tuple[Any, Any]]:
         """Yield every submitted item with its result or the error that stopped it, in the order in which they end."""
-        while self._waiting or self._busy:
-            while self._waiting and len(self._busy) < self.jobs:
-                work, items = self._waiting.popleft()
-                try:
-                    self._busy.append(_Worker(work, items, self.limits))
-                except Exception as error:  # it cannot be pickled, or the system starts no more processes
-                    for item in items:
-                        yield item, plain_error(error)
-            wait([source for worker in self._busy for source in worker.waits_on], POLL_S)
-            for worker in list(self._busy):
-                for item, outcome in worker.poll():
-                    self.log = worker.log()
-                    yield item, outcome
-                if worker.over:
-                    worker.end()
-                    self._busy.remove(worker)
-                    if left := worker.items[worker.index :]:
-                        self._waiting.appendleft((worker.work, left))
+        running = 0
+        while self._waiting or running:
+            while self._waiting and running < self.jobs:
+                thread = threading.Thread(target=self._carry_out, args=self._waiting.popleft(), daemon=True)
+                self._threads.append(thread)
+                thread.start()
+                running += 1
+            try:
+                ended = self._ended.get(timeout=1.0)  # on Windows, Ctrl-C does not interrupt a wait without end
+            except Empty:
+                continue
+            if ended is None:
+                running -= 1
+            else:
+                item, outcome, self.log = ended
+                yield item, outcome
 
     def each(
         self, work: Callable[[T], R], items: Iterable[T], *, together: bool = False
@@ -110,9 +110,30 @@ class Pool:
                 self.submit(work, piece)
             yield from self.outcomes()
 
+    def _carry_out(self, work: Callable[[Any], Any], items: Sequence[Any]) -> None:
+        """Carry out a piece in one child process after the other, until each of its items has an outcome."""
+        left = deque(items)
+        try:
+            while left and not self._abandoned.is_set():
+                child = _Child(work, list(left), self.limits)
+                try:
+                    while left and not child.over and not self._abandoned.is_set():
+                        outcome, log = child.outcome(self._abandoned)
+                        if outcome is not _ABANDONED:
+                            self._ended.put((left.popleft(), outcome, log))
+                finally:
+                    child.end(unfinished=bool(left))
+        except Exception as error:  # it cannot be pickled, or the system starts no more processes
+            for item in left:
+                self._ended.put((item, plain_error(error), ""))
+        finally:
+            self._ended.put(None)
+
 
 class InProcess:
     """Carries out items in this process, without limits: for a debugger. Ctrl-C ends it."""
+
+    log = ""
 
     def __init__(self) -> None:
         self._waiting: deque[tuple[Callable[[Any], Any], Any]] = deque()
@@ -145,118 +166,102 @@ class InProcess:
         yield from self.outcomes()
 
 
-class _Worker:
-    """A child process with its piece of work."""
+_ABANDONED = object()
+"""In place of an outcome: nobody waits for it."""
+_starting = threading.Lock()
+
+
+class _Child:
+    """A child process with its items."""
 
     def __init__(self, work: Callable[[Any], Any], items: Sequence[Any], limits: Limits) -> None:
-        self.work, self.items, self.index, self.over = work, items, 0, False
+        self.over = False
+        """Whether the process is of no more use."""
         self._limits = limits
         context = _context()
         self._connection, theirs = context.Pipe()
-        handle, log = tempfile.mkstemp(prefix="tactbench-", suffix=".log")
+        handle, name = tempfile.mkstemp(prefix="tactbench-", suffix=".log")
         os.close(handle)
-        self._log: str | None = log
-        self._printed = ""
-        arguments = (work, items, theirs, log, str(Path.cwd()), limits)
+        self._log = Path(name)
         try:
+            arguments = (work, items, theirs, name, str(Path.cwd()), limits)
             self._process = context.Process(target=run_child, args=arguments)
-            with _without_main():
-                self._process.start()
+            _start(self._process.start)
         except BaseException:
             self._connection.close()
-            Path(log).unlink(missing_ok=True)
+            self._log.unlink()
             raise
         finally:
             theirs.close()
-        self._began_s, self._begun, self._shared_mb = time.monotonic(), False, 0.0
 
-    @property
-    def waits_on(self) -> tuple[Any, ...]:
-        return self._connection, self._process.sentinel
-
-    def poll(self) -> Iterator[tuple[Any, Any]]:
-        """Yield what has come of items; set `over` once the process is of no more use."""
-        ended = not self._process.is_alive()  # before the pipe is read: what it sent last is not missed
-        while not self.over:
+    def outcome(self, abandoned: threading.Event) -> tuple[Any, str]:
+        """Wait for the next item; return its result or the error that stopped it, and what it printed."""
+        began_s, shared_mb = time.monotonic(), None
+        while not abandoned.is_set():
             try:
-                if not self._connection.poll():
-                    break
-                kind, value, *spent_s = self._connection.recv()
+                if self._connection.poll(POLL_S):
+                    kind, value = self._connection.recv()
+                    if kind == "begun":
+                        began_s, shared_mb = time.monotonic(), value
+                        continue
+                    return self._told(value, began_s)
+                stopped = self._beyond_limits(time.monotonic() - began_s, shared_mb)
             except (EOFError, OSError):  # it has ended, or closed what is not its own
-                self._process.join(START_S if ended else 1.0)
-                ended = True
-                break
-            if kind == "begun":
-                self._began_s, self._begun, self._shared_mb = time.monotonic(), True, value
-                continue
-            if isinstance(value, CellStopped):
-                value.log, value.spent_s = self.log(), spent_s[0]
-            yield self._next(), value
-            self.over = self.index == len(self.items)
-        if self.over:
-            return
-        stopped = self._crashed() if ended else self._beyond_limits()
-        if stopped is not None:
-            stopped.spent_s = time.monotonic() - self._began_s
-            self.over = True
-            self.end()
-            stopped.log = self.log()
-            yield self._next(), stopped
+                self._process.join(1.0)
+                stopped = self._crashed()
+            if stopped is not None:
+                self._kill(unfinished=True)
+                self.over = True
+                return self._told(stopped, began_s)
+        return _ABANDONED, ""
 
-    def _next(self) -> Any:
-        item = self.items[self.index]
-        self.index += 1
-        self._begun = False
-        self._began_s = time.monotonic()
-        return item
+    def _told(self, value: Any, began_s: float) -> tuple[Any, str]:
+        with self._log.open("rb") as file:
+            file.seek(max(0, file.seek(0, os.SEEK_END) - LOG_BYTES))
+            log = file.read().decode(errors="replace")
+        if isinstance(value, CellStopped):
+            value.log, value.spent_s = log, time.monotonic() - began_s
+            marks = [mark for mark in ("Fatal Python error", "Timeout (") if mark in log]
+            if marks and not value.traceback_text:  # of Python's fault handler
+                value.traceback_text = marks[0] + log.rpartition(marks[0])[2]
+        return value, log
 
-    def _beyond_limits(self) -> CellStopped | None:
+    def _beyond_limits(self, spent_s: float, shared_mb: float | None) -> CellStopped | None:
         """Return why the item at work must be ended; None if it need not."""
-        if self._log and Path(self._log).stat().st_size > MOST_LOG_BYTES:
+        if self._log.stat().st_size > MOST_LOG_BYTES:
             os.truncate(self._log, 0)
-        spent_s = time.monotonic() - self._began_s
-        if not self._begun:
+        timeout_s, memory_mb = self._limits.timeout_s, self._limits.memory_mb
+        if shared_mb is None:  # it has not begun
             late = Crashed(f"Its process did not begin within {START_S:g} s.", hint="Run fewer at once (--jobs).")
             return late if spent_s > START_S else None
-        timeout_s, memory_mb = self._limits.timeout_s, self._limits.memory_mb
         if timeout_s is not None and spent_s > timeout_s + KILL_DELAY_S:
             text = f"It was stopped: it took longer than {timeout_s:g} s."
-            return TimedOut(text, hint="Allow more with --timeout SECONDS.", traceback_text=_stacks(self.log()))
-        if memory_mb is not None and resident_mb(self._process.pid) - self._shared_mb > memory_mb:
+            return TimedOut(text, hint="Allow more with --timeout SECONDS.")
+        if memory_mb is not None and resident_mb(self._process.pid) - shared_mb > memory_mb:
             return out_of_memory(self._limits)
         return None
 
     def _crashed(self) -> Crashed:
         code = self._process.exitcode or 0
         if code >= 0:
-            return Crashed(f"Its process ended with exit code {code} and gave no result.",
-                           hint="Something in it calls os._exit or closes what is not its own.")  # fmt: skip
+            text = f"Its process ended with exit code {code} and gave no result."
+            return Crashed(text, hint="Something in it calls os._exit or closes what is not its own.")
         name = next((one.name for one in signal.Signals if one == -code), "unknown")
         hint = "What it printed last may say where."
         if name == "SIGKILL":
             hint = "If memory was short, run fewer at once (--jobs) or limit each (--memory MB)."
-        return Crashed(f"Its process was ended by signal {-code} ({name}).", hint=hint, signal=-code,
-                       traceback_text=_stacks(self.log()))  # fmt: skip
+        return Crashed(f"Its process was ended by signal {-code} ({name}).", hint=hint, signal=-code)
 
-    def log(self) -> str:
-        """Return the end of what the item at work has printed."""
-        if self._log is None:
-            return self._printed
-        with open(self._log, "rb") as file:  # noqa: PTH123  (seek from the end)
-            file.seek(max(0, file.seek(0, os.SEEK_END) - LOG_BYTES))
-            return file.read().decode(errors="replace")
+    def end(self, *, unfinished: bool) -> None:
+        """End the process and its group; if `unfinished`, after the time that it has to close its devices."""
+        if not self.over:
+            self._kill(unfinished=unfinished)
+        self._connection.close()
+        self._log.unlink(missing_ok=True)
 
-    def terminate(self) -> None:
-        """Send SIGTERM if it has time to close its devices."""
-        if self._limits.grace_s and self._process.is_alive():
+    def _kill(self, *, unfinished: bool) -> None:
+        if self._limits.grace_s and unfinished:
             self._process.terminate()
-
-    def end(self) -> None:
-        """End the process and everything in its group, after the time that it has to close its devices."""
-        if self._log is None:
-            return
-        if self._limits.grace_s and self.index < len(self.items):
-            self.terminate()
             self._process.join(self._limits.grace_s)
         below: list[psutil.Process] = []
         with suppress(psutil.Error):
@@ -268,17 +273,6 @@ class _Worker:
             with suppress(psutil.Error, OSError):
                 one.kill()
         self._process.join()
-        self._connection.close()
-        self._printed, log, self._log = self.log(), self._log, None
-        Path(log).unlink(missing_ok=True)
-
-
-def _stacks(log: str) -> str:
-    """Return what Python's fault handler wrote at the end of a log."""
-    for mark in ("Fatal Python error", "Timeout ("):
-        if mark in log:
-            return mark + log.rpartition(mark)[2]
-    return ""
 
 
 def _context() -> Any:
@@ -298,20 +292,17 @@ def start_server(*modules: str) -> None:
     if _context().get_start_method() == "forkserver":
         from multiprocessing import forkserver
 
-        with _without_main():
-            forkserver.ensure_running()
+        _start(forkserver.ensure_running)
 
 
-@contextmanager
-def _without_main() -> Iterator[None]:
-    """Hide the main module, which children would import anew: a script need not guard what it does."""
+def _start(start: Callable[[], None]) -> None:
+    """Start a process while the main module is hidden, which it would import anew: a script need not guard it."""
     main = sys.modules["__main__"]
-    hidden = {name: getattr(main, name) for name in ("__file__", "__spec__") if hasattr(main, name)}
-    try:
-        main.__spec__ = None
-        with suppress(AttributeError):
-            del main.__file__
-        yield
-    finally:
-        for name, value in hidden.items():
-            setattr(main, name, value)
+    with _starting:
+        hidden = {name: getattr(main, name) for name in ("__file__", "__spec__") if hasattr(main, name)}
+        try:
+            main.__spec__ = None
+            main.__dict__.pop("__file__", None)
+            start()
+        finally:
+            vars(main).update(hidden)

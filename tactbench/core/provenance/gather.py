@@ -42,7 +42,7 @@ def gather(registry: Registry, **circumstances: Any) -> dict[str, Any]:
         "host": host_id(),
         "threads": next((os.environ[name] for name in _THREADS if name in os.environ), "as many as cores"),
         "plugins": list(_plugins(registry)),
-        "distributions": {name: version_of(name) for name in (*RELEVANT, "h5py", "pydantic")},
+        "distributions": {name: version_of(name) for name in RELEVANT},
         **circumstances,
     }
 
@@ -98,35 +98,21 @@ def foot(several: Sequence[Mapping[str, Any]]) -> tuple[str, ...]:
     several
         What `gather` returned for each of the runs that the rows come from; keys may be missing.
     """
-    texts = [*map(_software, several), *(text for one in several for text in _plugin_texts(one)), *map(_place, several)]
+    texts = [text for one in several for text in _sentences(one)]
     hosts = {str(one["host"]) for one in several if one.get("host")}
     if len(hosts) > 1:
         texts.append(f"{len(hosts)} hosts: times of one are not to be compared with times of another.")
-    return tuple(dict.fromkeys(text for text in texts if text))
+    return tuple(dict.fromkeys(texts))
 
 
-def _software(one: Mapping[str, Any]) -> str:
-    if "tactbench" not in one:
-        return ""
-    state, _, changes = str(one.get("commit", "")).partition("+")
-    commit = f" ({state}{', with changes' if changes else ''})" if state else ""
-    installed_versions = one.get("distributions", {})
-    libraries = [f"{name} {installed_versions[name]}" for name in RELEVANT if name in installed_versions]
-    if "threads" in one:
-        libraries.append(f"BLAS threads: {one['threads']}")
-    return f"tactbench {one['tactbench']}{commit}, Python {one.get('python', '?')}, {', '.join(libraries)}."
-
-
-def _plugin_texts(one: Mapping[str, Any]) -> Iterator[str]:
+def _sentences(one: Mapping[str, Any]) -> Iterator[str]:
+    if "tactbench" in one:
+        commit = f" ({one['commit']})" if one.get("commit") else ""
+        libraries = ", ".join(f"{name} {version}" for name, version in one.get("distributions", {}).items())
+        threads = f"BLAS threads: {one.get('threads', '?')}"
+        yield f"tactbench {one['tactbench']}{commit}, Python {one.get('python', '?')}, {libraries}, {threads}."
     for plugin in one.get("plugins", ()):
-        source = str(plugin.get("source", ""))[:12]
-        yield f"Plugin {plugin.get('distribution')} {plugin.get('version')} (source {source})."
-
-
-def _place(one: Mapping[str, Any]) -> str:
-    if not one.get("host"):
-        return ""
-    facts = [str(one.get("cpu", "unknown processor")), f"{one.get('cores')} cores"]
-    if one.get("memory_mb"):
-        facts.append(f"{one['memory_mb'] / 1024:.0f} GiB")
-    return f"Host {one['host']}: {', '.join(facts)}."
+        yield f"Plugin {plugin['distribution']} {plugin['version']} (source {plugin['source'][:12]})."
+    if one.get("host"):
+        memory = f", {one['memory_mb'] / 1024:.0f} GiB" if one.get("memory_mb") else ""
+        yield f"Host {one['host']}: {one.get('cpu', 'unknown processor')}, {one.get('cores')} cores{memory}."
