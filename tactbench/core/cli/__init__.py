@@ -27,7 +27,6 @@ VERBS = {
     "import": ("import_", "Turn foreign tables, or a log of a sensor's own tools, into recordings."),
     "twin": ("twin", "Look into the simulated rig: its plans, its errors, its likeness to real sensors."),
     "cost": ("cost", "Show what accuracy costs in time."),
-    "calibrate": ("calibrate", "Draw what no source states, and hold simulations against published numbers."),
     "report": ("report", "Make one page of all results, with figures and the published numbers beside ours."),
     "why": ("why", "Say why a cell would be reused or computed again, and how it ended."),
     "rerun": ("rerun", "Compute one cell again and say whether it comes out the same, bit for bit."),
@@ -120,7 +119,7 @@ def _too_few_files() -> str:
 def _interrupted(arguments: list[str] | None) -> int:
     words = sys.argv[1:] if arguments is None else arguments
     kept = "Nothing is kept."
-    if words[:1] in (["run"], ["calibrate"]):
+    if words[:1] == ["run"]:
         kept = "What was finished is kept; the same command goes on from there."
     elif words[:1] == ["cost"] and "--twin" not in words:
         kept = "Recordings and scores are kept, times are not: the same command measures them anew."

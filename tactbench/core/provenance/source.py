@@ -28,9 +28,9 @@ PACKAGE = "tactbench"
 _DOORS = frozenset({"tactbench", "tactbench.plugin", "tactbench.testing"})
 
 SHOWING = (
-    "core/calibration/", "core/choosing/", "core/cli/", "core/conformance/", "core/cost/", "core/leaderboard/",
+    "core/choosing/", "core/cli/", "core/conformance/", "core/cost/", "core/leaderboard/",
     "core/report/", "core/statistics/", "core/tables/", "core/matrix/progress.py", "core/matrix/store",
-    "core/provenance/", "__main__.py", "testing.py", "benchmarks.yaml", "matrices/", "calibration.yaml", "calibration/",
+    "core/provenance/", "__main__.py", "testing.py", "benchmarks.yaml", "matrices/",
 )  # fmt: skip
 """Rooms of tactbench that show, keep or compare what was computed: a new colour in a table computes nothing again.
 Of the core: the floors above the matrix, and the matrix's own keeping. In doubt, a room counts."""
