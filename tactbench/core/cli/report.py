@@ -49,16 +49,13 @@ def command(
     """
     keep_threads()
     from tactbench.core.cli.progress import progress
+    from tactbench.core.cli.results import opened
     from tactbench.core.cli.screen import remark
-    from tactbench.core.errors import UsageError
-    from tactbench.core.matrix.store import Store
     from tactbench.core.plugins.registry import load_registry
     from tactbench.core.report.making import make_report
     from tactbench.core.report.results import open_results
 
-    if not (folder / "index.jsonl").is_file():
-        raise UsageError(f"There are no results in {folder}.", hint="Make some with `tactbench run --out DIR`.")
-    store = Store(folder, recordings=recordings)
+    store = opened(folder, recordings)
     results = open_results(store, load_registry())
     for sentence in store.troubles:
         remark(f"{folder}: {sentence}")

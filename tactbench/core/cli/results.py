@@ -18,14 +18,16 @@ def is_results(folder: Path) -> bool:
     return (folder / "cells").is_dir()
 
 
-def opened(folder: Path) -> Store:
-    """Return a result folder; raises UsageError if there is none."""
+def opened(folder: Path, recordings: tuple[Path, ...] = ()) -> Store:
+    """Return a result folder, whose recordings may also lie in others; raises UsageError if there is none."""
     from tactbench.core.errors import UsageError
     from tactbench.core.matrix.store import Store
 
+    if folder.exists() and not folder.is_dir():
+        raise UsageError(f"{folder} is no folder.", hint="Name the folder that `tactbench run --out DIR` wrote.")
     if not is_results(folder):
         raise UsageError(f"There are no results in {folder}.", hint="Make some with `tactbench run --out DIR`.")
-    return Store(folder)
+    return Store(folder, recordings=recordings)
 
 
 def shown_rows(store: Store) -> list[dict[str, Any]]:
