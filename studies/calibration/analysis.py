@@ -40,26 +40,19 @@ def parameter_values(draws: Sequence[Draw], name: str) -> FloatArray:
     return np.array([draw.parameters[name] for draw in draws])
 
 
-def accept(draws: Sequence[Draw], targets: Sequence[Mapping[str, Any]], tolerance: float, at_least: int) -> Accepted:
-    """Return the draws within `tolerance` scales of all targets, or the `at_least` nearest where fewer are."""
+def accept(procedure: Procedure, draws: Sequence[Draw], targets: Sequence[Mapping[str, Any]]) -> Accepted:
+    """Return the draws within the tolerance of all targets, or as many of the nearest as are wanted at least."""
     away = np.max(
         [np.abs(output_values(draws, one["output"]) - one["value"]) / one["scale"] for one in targets], axis=0
     )
-    near = int(np.sum(away <= tolerance))
-    places = sorted(np.argsort(away, kind="stable")[: max(near, at_least)].tolist())
+    near = int(np.sum(away <= procedure["tolerance"]))
+    places = sorted(np.argsort(away, kind="stable")[: max(near, procedure["at_least"])].tolist())
     return Accepted(tuple(draws[place] for place in places), near, float(max(away[places], default=0.0)))
 
 
 def by_fitted(procedure: Procedure, draws: Sequence[Draw]) -> Accepted:
     """Return the draws that the fitted numbers accept."""
-    targets = [one for one in procedure["published"] if one["use"] == "fitted"]
-    return accept(draws, targets, procedure["tolerance"], procedure["at_least"])
-
-
-def by_all_others(procedure: Procedure, draws: Sequence[Draw], output: str) -> Accepted:
-    """Return the draws that all published numbers but one accept."""
-    targets = [one for one in procedure["published"] if one["output"] != output]
-    return accept(draws, targets, procedure["tolerance"], procedure["at_least"])
+    return accept(procedure, draws, [one for one in procedure["published"] if one["use"] == "fitted"])
 
 
 def middle(values: FloatArray) -> tuple[float, float, float] | None:

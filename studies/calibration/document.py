@@ -10,7 +10,6 @@ from scipy.stats import spearmanr
 
 from studies.calibration.analysis import (
     accept,
-    by_all_others,
     by_fitted,
     holds,
     middle,
@@ -54,7 +53,7 @@ def _acceptance(procedure: Procedure, draws: Sequence[Draw]) -> str:
     return (
         f"{kept.near} of {len(draws)} draws lie within {tolerance:g} scales of every fitted number; {chosen} and reach "
         f"{kept.reach:.1f} scales. Within {tolerance:g} scales of all {len(published)} published numbers at once: "
-        f"{accept(draws, published, tolerance, 0).near}."
+        f"{accept(procedure, draws, published).near}."
     )
 
 
@@ -64,7 +63,7 @@ def _published(procedure: Procedure, draws: Sequence[Draw]) -> TextTable:
     lines = []
     for one in procedure["published"]:
         name, value = one["output"], one["value"]
-        others = by_all_others(procedure, draws, name)
+        others = accept(procedure, draws, [other for other in procedure["published"] if other is not one])
         before, after, by_others = (output_values(some, name) for some in (draws, kept, others.draws))
         lines.append((
             titles[name], one["use"], f"{value:g}" + (f" {units[name]}" if units[name] != "1" else ""),

@@ -78,7 +78,7 @@ def test_the_page_has_the_tables_of_the_stored_results_and_every_prior():
 def test_near_draws_are_accepted_and_the_nearest_where_they_are_few():
     draws = [Draw(number, 0, {}, {"a": float(number)}) for number in range(10)]
     target = {"output": "a", "value": 4.0, "scale": 0.5, "use": "fitted"}
-    near = accept(draws, [target], tolerance=2.0, at_least=0)
+    near = accept({"tolerance": 2.0, "at_least": 0}, draws, [target])
     assert ([draw.number for draw in near.draws], near.near, near.reach) == ([3, 4, 5], 3, 2.0)
     few = by_fitted({"published": [target], "tolerance": 0.5, "at_least": 5}, draws)
     assert ([draw.number for draw in few.draws], few.near, few.reach) == ([2, 3, 4, 5, 6], 1, 4.0)
