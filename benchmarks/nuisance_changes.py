@@ -22,15 +22,15 @@ import tempfile
 import time
 import warnings
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 from threadpoolctl import threadpool_limits
 
 from tactbench.core.acquisition import acquire
-from tactbench.core.calibration.readoff import thinned
 from tactbench.core.evaluation.cell import CellContext, evaluate
-from tactbench.core.evaluation.dataset import load_dataset
+from tactbench.core.evaluation.dataset import Dataset, load_dataset
 from tactbench.core.spec.scene import Simulation
 from tactbench.core.spec.task import PlannedScene, in_drawn_order
 from tactbench.plugin import (
@@ -116,6 +116,21 @@ def scenes_in(task: str, undone: frozenset[str], seed: int) -> tuple[PlannedScen
         )
         for item in planned
     )
+
+
+def thinned(data: Dataset, every: int) -> Dataset:
+    """Return every `every`-th row of each recording; rows keep their index."""
+    return replace(
+        data,
+        tables=tuple(
+            replace(
+                table, X=table.X[::every], y=table.y[::every], labelled=table.labelled[::every],
+                force=None if table.force is None else table.force[::every], time_s=table.time_s[::every],
+                row=table.row[::every], groups={name: column[::every] for name, column in table.groups.items()},
+            )
+            for table in data.tables
+        ),
+    )  # fmt: skip
 
 
 def score(sensor: str, task: str, undone: frozenset[str], seed: int, *, full: bool, rig: object) -> float:

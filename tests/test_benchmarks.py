@@ -1,4 +1,4 @@
-"""Benchmarks and scripts are run by hand: here it is held that what they import is there."""
+"""Benchmarks, studies and scripts are run by hand: here it is held that what they import is there."""
 
 import ast
 import importlib
@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 CHECKOUT = Path(__file__).parents[1]
-SCRIPTS = [*(CHECKOUT / "benchmarks").rglob("*.py"), *(CHECKOUT / "docs").rglob("*.py")]
+SCRIPTS = [path for folder in ("benchmarks", "docs", "studies") for path in (CHECKOUT / folder).rglob("*.py")]
 
 
 @pytest.mark.parametrize("script", SCRIPTS, ids=lambda path: path.stem)

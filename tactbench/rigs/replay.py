@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -34,17 +35,21 @@ class RecordingFolder(ReplayRig):
             If there is no such folder, or nothing in it.
         """
         if not self.folder.is_dir():
-            raise MissingRecordingError(f"There is no folder {self.folder}.", hint=_HINT)
-        found = [path for path in self.folder.rglob(f"*{ENDING}") if path.is_file() and not self._hidden(path)]
+            what = f"{self.folder} is no folder" if self.folder.exists() else f"There is no folder {self.folder}"
+            raise MissingRecordingError(f"{what}.", hint=_HINT)
+        found, unfinished = [], 0
+        for below, folders, names in os.walk(self.folder):  # passes over what vanishes meanwhile, or may not be read
+            folders[:] = [name for name in folders if not name.startswith(".")]
+            for name in names:
+                unfinished += name.endswith(f"{ENDING}.partial")
+                path = Path(below, name)
+                if name.endswith(ENDING) and not name.startswith(".") and path.is_file():
+                    found.append(path)
         if not found:
-            unfinished = sum(1 for _ in self.folder.rglob(f"*{ENDING}.partial"))
             left = f" ({unfinished} unfinished ones, `….partial`, are not replayed)" if unfinished else ""
             raise MissingRecordingError(f"There is no recording (*{ENDING}) in {self.folder}{left}.", hint=_HINT)
         # By parts, not by text: the order must not depend on how a separator sorts.
         return sorted(found, key=lambda path: path.relative_to(self.folder).parts)
-
-    def _hidden(self, path: Path) -> bool:
-        return any(part.startswith(".") for part in path.relative_to(self.folder).parts)
 
 
 def build(context: RigContext) -> RecordingFolder:

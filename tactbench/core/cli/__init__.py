@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import errno
 import gc
 import importlib
+import os
 import sys
 from typing import Any
 
@@ -27,7 +29,6 @@ VERBS = {
     "import": ("import_", "Turn foreign tables, or a log of a sensor's own tools, into recordings."),
     "twin": ("twin", "Look into the simulated rig: its plans, its errors, its likeness to real sensors."),
     "cost": ("cost", "Show what accuracy costs in time."),
-    "calibrate": ("calibrate", "Draw what no source states, and hold simulations against published numbers."),
     "report": ("report", "Make one page of all results, with figures and the published numbers beside ours."),
     "why": ("why", "Say why a cell would be reused or computed again, and how it ended."),
     "rerun": ("rerun", "Compute one cell again and say whether it comes out the same, bit for bit."),
@@ -82,8 +83,13 @@ def main(arguments: list[str] | None = None) -> None:
     if too_few:
         click.echo(too_few, err=True)
         sys.exit(2)
+    if sys.stdout is None:
+        # The next file that is opened would take its number, and whatever writes to that would write into the file.
+        click.echo("Error: Standard output is closed.\n  Redirect it instead: > FILE, or > /dev/null.", err=True)
+        sys.exit(1)
     try:
         code: Any = cli.main(args=arguments, prog_name="tactbench", standalone_mode=False)
+        sys.stdout.flush()  # what is still held back may be refused as well
     except (click.exceptions.Abort, KeyboardInterrupt):
         code = _interrupted(arguments)
     except click.ClickException as error:
@@ -92,6 +98,7 @@ def main(arguments: list[str] | None = None) -> None:
     except BrokenPipeError:
         # The reader of our output went away (`| head`): nothing to tell anybody.
         sys.stderr.close()
+        _discard_output()
         code = 1
     except Exception as error:
         code = _tell(error)
@@ -120,7 +127,7 @@ def _too_few_files() -> str:
 def _interrupted(arguments: list[str] | None) -> int:
     words = sys.argv[1:] if arguments is None else arguments
     kept = "Nothing is kept."
-    if words[:1] in (["run"], ["calibrate"]):
+    if words[:1] == ["run"]:
         kept = "What was finished is kept; the same command goes on from there."
     elif words[:1] == ["cost"] and "--twin" not in words:
         kept = "Recordings and scores are kept, times are not: the same command measures them anew."
@@ -132,10 +139,23 @@ def _interrupted(arguments: list[str] | None) -> int:
     return 130
 
 
+_REFUSALS = frozenset(getattr(errno, name, 0) for name in ("ENOSPC", "EDQUOT", "EFBIG", "EIO", "EBADF"))
+"""Of a write to standard output, which has no name of a file: the disk is full, the terminal gone."""
+
+
+def _discard_output() -> None:
+    """Lead standard output nowhere, so that what it still holds is not refused once more when Python ends."""
+    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+
+
 def _tell(error: Exception) -> int:
     from tactbench.core.errors import TactbenchError
     from tactbench.core.tables.text import visible_lines
 
+    if isinstance(error, OSError) and error.filename is None and error.errno in _REFUSALS:
+        click.echo(f"Error: The output cannot be written: {error.strerror}.", err=True)
+        _discard_output()
+        return 1
     if not isinstance(error, TactbenchError):
         raise error
     click.secho("Error: ", fg="red", bold=True, nl=False, err=True)

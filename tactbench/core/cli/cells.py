@@ -66,7 +66,8 @@ def find_cell(out: Path, given: str, options: Mapping[str, Any] | None = None) -
     from tactbench.core.plugins.registry import installed
 
     if not out.is_dir():
-        raise UsageError(f"There is no folder {out}.", hint="Name one that `tactbench run --out DIR` wrote.")
+        what = f"{out} is no folder" if out.exists() else f"There is no folder {out}"
+        raise UsageError(f"{what}.", hint="Name one that `tactbench run --out DIR` wrote.")
     store = Store(out)
     rows = {row["cell"]: row for row in store.rows()}
     registry = with_declared_of(installed(), rows.values())

@@ -8,7 +8,9 @@ from typing import TYPE_CHECKING
 
 import click
 
+from tactbench.core.cli.options import FiniteRange
 from tactbench.core.cli.threads import keep_threads
+from tactbench.core.spec.bounds import MOST_SECONDS
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -31,7 +33,7 @@ _KINDS = ("sensor", "rig", "device", "task", "estimator", "effect", "indenter", 
               help="Which devices stand on which lines, for --invasive.")  # fmt: skip
 @click.option("--yes", is_flag=True, help="Do not ask before something is opened or moves.")
 @click.option("--all", "every", is_flag=True, help="Also list the checks that passed.")
-@click.option("--timeout", type=click.FloatRange(min=1), default=30.0, show_default=True, metavar="S",
+@click.option("--timeout", type=FiniteRange(min=1, max=MOST_SECONDS), default=30.0, show_default=True, metavar="S",
               help="Seconds that one check may take.")  # fmt: skip
 @click.option("--out", type=click.Path(path_type=Path, exists=True, file_okay=False), metavar="FOLDER",
               help="Keep the level in this result folder: its tables show it beside the sensor.")  # fmt: skip

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import json
-import math
 from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
+from tactbench.core.cli.options import FiniteRange
 from tactbench.core.cli.results import is_results, opened, shown_rows
 
 if TYPE_CHECKING:
@@ -24,14 +24,7 @@ _PREFERRED = "deployable"
 
 
 def _positive(option: str, words: str) -> Callable[[Any], Any]:
-    kind = click.FloatRange(min=0, min_open=True)
-    return click.option(option, type=kind, metavar="X", callback=_finite, help=words)
-
-
-def _finite(context: click.Context, option: click.Parameter, value: float | None) -> float | None:
-    if value is not None and not math.isfinite(value):
-        raise click.BadParameter(f"{value} is no finite number.", context, option)
-    return value
+    return click.option(option, type=FiniteRange(min=0, min_open=True), metavar="X", help=words)
 
 
 @click.command(name="choose")

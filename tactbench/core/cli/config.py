@@ -1,9 +1,8 @@
-"""Where what came with tactbench lies: the default matrix and calibration, matrices by name, results."""
+"""Where what came with tactbench lies: the default matrix, matrices by name, results."""
 
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import tactbench
 from tactbench.core.errors import ConfigError, UnknownNameError
@@ -11,9 +10,6 @@ from tactbench.core.spec.matrix import MatrixSpec
 from tactbench.core.spec.yaml_file import load_yaml
 
 _ENDINGS = (".yaml", ".yml")
-
-if TYPE_CHECKING:
-    from tactbench.core.spec.calibration import CalibrationSpec
 
 
 def shipped(name: str, in_checkout: str, hint: str) -> Path:
@@ -36,15 +32,6 @@ def default_matrix() -> MatrixSpec:
     own = Path("benchmarks.yaml")
     hint = "Give a matrix with --config FILE."
     return load_yaml(own if own.is_file() else shipped(own.name, own.name, hint), MatrixSpec)
-
-
-def default_calibration() -> CalibrationSpec:
-    """Return ``calibration.yaml`` of this folder, else the one that came with tactbench; raises ConfigError."""
-    from tactbench.core.spec.calibration import CalibrationSpec
-
-    own = Path("calibration.yaml")
-    hint = "Give a procedure with --config FILE."
-    return load_yaml(own if own.is_file() else shipped(own.name, own.name, hint), CalibrationSpec)
 
 
 def packaged_matrices() -> dict[str, Path]:

@@ -7,7 +7,9 @@ from typing import Any
 
 import click
 
+from tactbench.core.cli.options import FiniteRange
 from tactbench.core.cli.threads import keep_threads
+from tactbench.core.spec.bounds import MOST_REPEATS
 
 
 @click.command(name="cost")
@@ -32,13 +34,13 @@ from tactbench.core.cli.threads import keep_threads
 @click.option("--protocol", metavar="NAME", help="How recordings become X and y; default: the task's first.")
 @click.option("--split", metavar="NAME", help="What is kept apart; default: the task's first that fits.")
 @click.option("--seed", type=click.IntRange(min=0), default=1, show_default=True, metavar="N")
-@click.option("--repeats", type=click.IntRange(min=1), default=1, show_default=True, metavar="N",
+@click.option("--repeats", type=click.IntRange(min=1, max=MOST_REPEATS), default=1, show_default=True, metavar="N",
               help="Replicates that scores are over, five or more for intervals; times are of the first.")  # fmt: skip
 @click.option("--rounds", type=click.IntRange(min=1), default=5, show_default=True, metavar="N",
               help="How often everything is timed, turn and turn about.")  # fmt: skip
 @click.option("--threads", type=click.IntRange(min=1), default=1, show_default=True, metavar="N",
               help="Threads that estimators and BLAS may use while they are timed.")  # fmt: skip
-@click.option("--budget", type=click.FloatRange(min=0), default=20.0, show_default=True, metavar="SECONDS",
+@click.option("--budget", type=FiniteRange(min=0), default=20.0, show_default=True, metavar="SECONDS",
               help="What took longer once is not timed again in later rounds; its row says so.")  # fmt: skip
 @click.option("--out", type=click.Path(path_type=Path), metavar="DIR",
               help="Result folder, as of `run`; files and cells go into its folder cost. Default: tactbench-results. "

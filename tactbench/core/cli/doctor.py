@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+from tactbench.core.cli.options import FiniteRange
 from tactbench.core.tables.text import json_text
 
 if TYPE_CHECKING:
@@ -24,7 +25,7 @@ Rows = list[tuple[str, ...]]
 @click.option("--rig-file", type=click.Path(path_type=Path), metavar="FILE",
               help="Also open the devices of this rig, and read them while nothing touches them.")  # fmt: skip
 @click.option("--sensor", metavar="NAME", help="Of the rig's sensors, this one alone.")
-@click.option("--seconds", type=click.FloatRange(min=0.1, max=600), default=3.0, show_default=True, metavar="T",
+@click.option("--seconds", type=FiniteRange(min=0.1, max=600), default=3.0, show_default=True, metavar="T",
               help="How long each device is read.")  # fmt: skip
 @click.option("--format", "shape", type=click.Choice(("table", "json")), default="table", show_default=True)
 @click.pass_context

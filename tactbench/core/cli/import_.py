@@ -35,7 +35,9 @@ PAIRS = "KEY=VALUE"
 @click.option("--role", type=click.Choice(("train", "validation", "test")), help="Of the log, in a split by roles.")
 @click.option("--label", "labels", multiple=True, metavar=PAIRS,
               help="Of the log: what was pressed, such as cap_radius_mm=4; may be repeated.")  # fmt: skip
+@click.pass_context
 def command(
+    ctx: click.Context,
     source: Path,
     root: Path | None,
     out: Path | None,
@@ -48,13 +50,13 @@ def command(
 ) -> None:
     """Turn foreign tables into recordings, as MAPPING (a YAML file) says, or with --sensor a LOG into one.
 
-    All of them are written, or none. What was marked as "no sample" is counted. See docs/mappings.md.
+    All of them are written, or none. What was marked as "no sample" is counted. Exit code 1 if a finding is an error,
+    as of `tactbench inspect`. See docs/mappings.md.
     """
     if sensor is None:
         if options or labels or session is not None or role is not None:
             raise click.UsageError("--option, --session, --role and --label are for logs: name the --sensor.")
-        _import_tables(source, root, out, replace)
-        return
+        ctx.exit(1 if _import_tables(source, root, out, replace) else 0)
     if root is not None:
         raise click.UsageError("--root is for mappings: leave it out, or --sensor.")
     from tactbench.core.plugins.registry import load_registry
@@ -69,9 +71,11 @@ def command(
     for line in log_summary(made, target):
         click.echo(visible(line))
     remark(f"See what is in it:  {command_line('tactbench', 'inspect', str(target))}")
+    ctx.exit(1 if any(finding.severity == "error" for finding in made.findings) else 0)
 
 
-def _import_tables(mapping: Path, root: Path | None, out: Path | None, replace: bool) -> None:
+def _import_tables(mapping: Path, root: Path | None, out: Path | None, replace: bool) -> bool:
+    """Import tables, print what became of them, and return whether a finding is an error."""
     from tactbench.core.cli.progress import progress
     from tactbench.core.recording.mapping import import_tables
 
@@ -89,6 +93,7 @@ def _import_tables(mapping: Path, root: Path | None, out: Path | None, replace: 
         report = import_tables(mapping, root=root, out=target, progress=tell, replace=replace)
     for line in summary(report, target):
         click.echo(visible(line))
+    return any(finding.severity == "error" for one in report.recordings for finding in one.findings)
 
 
 def _pairs(option: str, given: tuple[str, ...]) -> dict[str, Any]:

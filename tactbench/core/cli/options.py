@@ -2,12 +2,26 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from typing import Any
 
 import click
 
+from tactbench.core.spec.bounds import MOST_MEMORY_MB, MOST_SECONDS
+
 Command = Callable[..., Any]
+
+
+class FiniteRange(click.FloatRange):
+    """A range of numbers without NaN, which compares as inside of every range, and without infinity."""
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        """Return the number; fails with a usage error."""
+        number = super().convert(value, param, ctx)
+        if not math.isfinite(number):
+            self.fail(f"{value} is no finite number.", param, ctx)
+        return number
 
 
 def options(*several: Callable[[Command], Command]) -> Callable[[Command], Command]:
@@ -33,14 +47,14 @@ ENGINE = (
     ),
     click.option(
         "--timeout",
-        type=click.FloatRange(min=0, min_open=True),
+        type=FiniteRange(min=0, min_open=True, max=MOST_SECONDS),
         metavar="SECONDS",
         help="What one cell, or one recording, may take. Default: no limit, since a slow estimator on much data may "
         "rightly take hours.",
     ),
     click.option(
         "--memory",
-        type=click.IntRange(min=1),
+        type=click.IntRange(min=1, max=MOST_MEMORY_MB),
         metavar="MB",
         help="Memory that one cell, or one recording, may take beyond the libraries that all share. "
         "Default: no limit; if the system runs out of it, cells are ended first.",

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from tactbench.core.cli.options import options
+from tactbench.core.cli.options import FiniteRange, options
 from tactbench.core.cli.scenes import PRESS, indenter_of, profile_of, scene_of
 from tactbench.core.cli.simulation import SIMULATION, simulation_of
 from tactbench.core.tables.text import command_line
@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 @click.option("--rig", metavar="NAME", help="What presses; default: the rig file's rig, or else twin.")
 @click.option("--rig-file", metavar="FILE", help="Devices and links of a rig of real or emulated devices.")
 @options(*PRESS)
-@click.option("--slide-mm-s", type=click.FloatRange(min=0, min_open=True), metavar="V",
+@click.option("--slide-mm-s", type=FiniteRange(min=0, min_open=True), metavar="V",
               help="Slide towards the tip at this speed, from the middle on; vibration is recorded too.")  # fmt: skip
 @options(*SIMULATION)
 @click.option("--seed", type=click.IntRange(min=0), default=1, show_default=True, metavar="N")

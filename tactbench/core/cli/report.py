@@ -10,7 +10,6 @@ import click
 from tactbench.core.cli.threads import keep_threads
 
 if TYPE_CHECKING:
-    from tactbench.core.report.calibrated import Calibrated
     from tactbench.core.report.making import Drawer, Report
 
 
@@ -51,7 +50,7 @@ def command(ctx: click.Context, folder: Path, out: Path | None, shown: str, shap
     for sentence in store.troubles:
         remark(f"{folder}: {sentence}")
     with progress() as display:
-        made = make_report(results, out or folder / "report", display, draw=_drawer(), calibrated=_calibrated(folder))
+        made = make_report(results, out or folder / "report", display, draw=_drawer())
     _print(made, shape)
     for sentence in made.missing:
         remark(f"Left out: {sentence}")
@@ -68,19 +67,6 @@ def _drawer() -> Drawer:
     from tactbench.core.report.figures import draw_figures
 
     return draw_figures
-
-
-def _calibrated(folder: Path) -> Calibrated | None:
-    """Return what the calibration of these results has found; one that is damaged is told of and left out."""
-    from tactbench.core.cli.screen import remark
-    from tactbench.core.errors import FormatError
-    from tactbench.core.report.calibrated import load_calibrated
-
-    try:
-        return load_calibrated(folder)
-    except FormatError as error:
-        remark(f"Failed: {error}")
-        return None
 
 
 def _print(made: Report, shape: str) -> None:

@@ -23,6 +23,8 @@ def opened(folder: Path) -> Store:
     from tactbench.core.errors import UsageError
     from tactbench.core.matrix.store import Store
 
+    if folder.exists() and not folder.is_dir():
+        raise UsageError(f"{folder} is no folder.", hint="Name the folder that `tactbench run --out DIR` wrote.")
     if not is_results(folder):
         raise UsageError(f"There are no results in {folder}.", hint="Make some with `tactbench run --out DIR`.")
     return Store(folder)

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from tactbench.core.cli.simulation import SIMULATION, simulation_of
+from tactbench.core.spec.bounds import MOST_REPEATS
 
 if TYPE_CHECKING:
     from tactbench.core.plugins.registry import Registry
@@ -27,7 +28,7 @@ SELECTING = (
     click.option("--estimator", "estimators", multiple=True, metavar="NAME",
                  help="What answers; may be repeated. all: every one for this kind of question."),
     click.option("--config", metavar="FILE", help="A matrix like benchmarks.yaml, or the name of a packaged one."),
-    click.option("--repeats", type=click.IntRange(min=1), metavar="N",
+    click.option("--repeats", type=click.IntRange(min=1, max=MOST_REPEATS), metavar="N",
                  help="Replicates: record and answer everything N times, each with another seed. Default: 8 simulated "
                  "ones; of recordings 1, whose sessions are the replicates."),
     click.option("--seed", type=click.IntRange(min=0), metavar="N", help="Seed of the first replicate."),

@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from tactbench.core.cli.options import FiniteRange
+
 if TYPE_CHECKING:
     from tactbench.core.plugins.registry import Registry
     from tactbench.core.spec.scene import Simulation
@@ -21,7 +23,7 @@ SIMULATION = (
                  help="Effects to include or leave out whatever the plan says: +creep,-drift. +all, -all. Without a "
                  "sign the plan decides: an effect of another package takes part only where it is named."),
     click.option("--rung", metavar="NAME", help="Rung of the ladder of contact solvers; see docs/twin.md."),
-    click.option("--tolerance", type=click.FloatRange(min=0, min_open=True), metavar="X",
+    click.option("--tolerance", type=FiniteRange(min=0, min_open=True), metavar="X",
                  help="Largest error of a simulated channel, in its unit: the cheapest rung that keeps it."),
     click.option("--set", "nuisances", multiple=True, metavar="NAME=X",
                  help="Another value of a nuisance, in the unit of its name: placement_scatter_mm=0.3; may be "

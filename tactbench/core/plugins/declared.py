@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterable, Mapping
 from contextlib import suppress
 from dataclasses import replace
@@ -29,10 +30,12 @@ def declared_in(folder: Path | None) -> tuple[DeclaredTask, ...]:
         If two files mean different tasks by one name.
     """
     found: dict[str, tuple[DeclaredTask, Path]] = {}
-    paths = sorted(folder.rglob(FILE)) if folder is not None else []
-    for path in paths:
-        if folder is None or any(part.startswith(".") for part in path.relative_to(folder).parts):
-            continue
+    paths = []
+    for below, folders, names in os.walk(folder) if folder is not None else ():
+        # A folder that vanishes meanwhile, or may not be read, is passed over.
+        folders[:] = [name for name in folders if not name.startswith(".")]
+        paths += [Path(below, FILE)] if FILE in names else []
+    for path in sorted(paths):
         for task in load_yaml(path, TaskFile).tasks:
             known, where = found.setdefault(task.name, (task, path))
             if known != task:

@@ -1,4 +1,4 @@
-"""What the paper found, and how often it comes out so; linear answers against non-linear ones."""
+"""Linear answers against non-linear ones."""
 
 from __future__ import annotations
 
@@ -8,11 +8,10 @@ from typing import Any
 
 from tactbench.core.leaderboard.names import LOWER_IS_BETTER, sensor_name
 from tactbench.core.plugins.registry import Registry
-from tactbench.core.report.calibrated import Share
 from tactbench.core.report.published import row_interval
 from tactbench.core.report.section import ReportData, Section
 from tactbench.core.tables.numbers import score, score_with_unit
-from tactbench.core.tables.text_table import ABSENT, Entry, TextTable, text_table
+from tactbench.core.tables.text_table import Entry, TextTable, text_table
 
 Row = Mapping[str, Any]
 _SAME = ("sensor", "task", "rig", "protocol", "split", "repeat")
@@ -73,50 +72,15 @@ def _best(rows: Sequence[Row]) -> Row:
 
 
 def findings_section(subject: ReportData) -> Section:
-    """Return the section of findings."""
-    linear = _linear_table(subject)
-    tables = [table for table in (_frequencies(subject), linear) if table is not None]
-    lacks = []
-    if not (subject.calibrated and subject.calibrated.findings):
-        lacks.append("How often the paper's findings come out is not here: `tactbench calibrate` counts.")
-    if linear is None:
-        lacks.append(
-            "No task was answered both linearly and otherwise: add `--estimator` to `tactbench run`, twice; "
-            "`tactbench list estimators` has them."
-        )
-    if subject.calibrated is not None:
-        tables += subject.calibrated.tables
-    if not tables:
-        return Section("findings", "The paper's findings", missing=tuple(lacks))
-    notes = subject.calibrated.notes if subject.calibrated else ()
-    return Section("findings", "The paper's findings", missing=tuple(lacks), tables=tuple(tables), notes=notes)
-
-
-def _frequencies(subject: ReportData) -> TextTable | None:
-    if subject.calibrated is None or not subject.calibrated.findings:
-        return None
-    lines = [
-        (
-            Entry(one.statement),
-            _share_text(one.accepted),
-            _share_text(one.prior),
-            Entry(one.reference),
-            Entry(one.reason),
-        )
-        for one in subject.calibrated.findings
-    ]
-    return text_table(
-        "Findings: share of the draws in which they come out, with its 95 % interval",
-        ("finding", "accepted draws", "all draws", "stated by", "what is asked of a draw"),
-        lines,
-        numeric=("accepted draws", "all draws"),
+    """Return the section that compares linear with non-linear answers."""
+    table = _linear_table(subject)
+    if table is not None:
+        return Section("findings", "Linear and non-linear estimators", tables=(table,))
+    lacks = (
+        "No task was answered both linearly and otherwise: add `--estimator` to `tactbench run`, twice; "
+        "`tactbench list estimators` has them."
     )
-
-
-def _share_text(one: Share | None) -> Entry:
-    if one is None:
-        return Entry(ABSENT)
-    return Entry(f"{one.share:.0%} ({one.low:.0%} … {one.high:.0%}) of {one.draws}", one.share)
+    return Section("findings", "Linear and non-linear estimators", missing=(lacks,))
 
 
 def _linear_table(subject: ReportData) -> TextTable | None:

@@ -10,8 +10,6 @@ from typing import Any
 from tactbench.core.errors import UnwritableError, UsageError
 from tactbench.core.files import replace_file
 from tactbench.core.matrix.progress import Progress
-from tactbench.core.report.calibrated import Calibrated
-from tactbench.core.report.figures.saving import draw_sensitivity
 from tactbench.core.report.page import make_page
 from tactbench.core.report.published import published_table, records, reproduce
 from tactbench.core.report.results import Results, SavedFigure
@@ -35,22 +33,13 @@ class Report:
     broken: tuple[str, ...]
 
 
-def make_report(
-    results: Results,
-    out: Path,
-    progress: Progress,
-    *,
-    draw: Drawer | None = None,
-    calibrated: Calibrated | None = None,
-) -> Report:
+def make_report(results: Results, out: Path, progress: Progress, *, draw: Drawer | None = None) -> Report:
     """Draw the figures and write the page: ``index.html`` and ``figures/`` in `out`.
 
     Parameters
     ----------
     draw
         Draws the figures; None: the page has none.
-    calibrated
-        What a calibration has found, if there was one.
 
     Raises
     ------
@@ -72,9 +61,7 @@ def make_report(
         (out / "figures").mkdir(parents=True, exist_ok=True)
         undrawn: list[str] = []
         drawn, trouble = _drawn(results, out / "figures", progress, draw, undrawn.append)
-        if draw is not None and calibrated is not None:
-            drawn = [*drawn, *draw_sensitivity(calibrated, out / "figures")]
-        subject = ReportData(results, drawn, calibrated, (*undrawn, *trouble))
+        subject = ReportData(results, drawn, (*undrawn, *trouble))
         page = make_page(subject)
         # A lone surrogate, which JSON may hold, is no UTF-8: a question mark then.
         replace_file(out / "index.html", page.html.encode("utf-8", "replace"))
@@ -88,7 +75,7 @@ def make_report(
     return Report(
         page=out / "index.html",
         reproduction=published_table(subject),
-        records=records(reproduce(results.registry, readable, calibrated)),
+        records=records(reproduce(results.registry, readable)),
         missing=(*lacking, *rows_left_out),
         broken=(*page.broken, *trouble),
     )

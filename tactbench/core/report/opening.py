@@ -37,8 +37,8 @@ def answers_section(subject: ReportData) -> Section:
 
 def _published(subject: ReportData) -> list[Highlight]:
     """Return how many published numbers lie in the interval of ours."""
-    lines = [one for one in reproduce(subject.results.registry, subject.rows, subject.calibrated)
-             if one.row is not None and one.row["status"] == "done"]  # fmt: skip
+    found = reproduce(subject.results.registry, subject.rows)
+    lines = [one for one in found if one.row is not None and one.row["status"] == "done"]
     if not lines:
         return []
     with_interval = [one for one in lines if one.verdict != "no interval"]

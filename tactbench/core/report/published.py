@@ -10,11 +10,10 @@ from typing import Any, Literal
 from tactbench.core.leaderboard.columns import row_interval as row_interval
 from tactbench.core.leaderboard.names import LOWER_IS_BETTER
 from tactbench.core.plugins.registry import Registry
-from tactbench.core.report.calibrated import Calibrated, PredictiveRange
 from tactbench.core.report.section import ReportData, Section
 from tactbench.core.spec.task import Published, TaskSpec
 from tactbench.core.statistics.median import counted, percent
-from tactbench.core.tables.numbers import interval, score, score_with_unit
+from tactbench.core.tables.numbers import score, score_with_unit
 from tactbench.core.tables.text import command_line
 from tactbench.core.tables.text_table import ABSENT, Entry, TextTable, finite, text_table
 
@@ -37,13 +36,12 @@ class Reproduction:
     unit: str
     row: Row | None
     """What stands beside it; None: nothing has been run."""
-    predicted: PredictiveRange | None
     verdict: Verdict
     """`inside`: the published number lies in the interval of our score; `no interval`: too few replicates have one."""
     sentence: str
 
 
-def reproduce(registry: Registry, rows: Sequence[Row], calibrated: Calibrated | None = None) -> list[Reproduction]:
+def reproduce(registry: Registry, rows: Sequence[Row]) -> list[Reproduction]:
     """Return a line for each published number of each task, and each row that it may stand beside.
 
     A number without any row gets one line that names the command to run, unless it takes recordings made elsewhere
@@ -57,12 +55,10 @@ def reproduce(registry: Registry, rows: Sequence[Row], calibrated: Calibrated | 
         for published in task.published:
             beside = [row for row in rows if stands_beside(row, task, published)]
             for row in beside:
-                predicted = calibrated.range_for(name, row["sensor"], published.score) if calibrated else None
-                compared = verdict(row, published.score, predicted)
-                lines.append(_beside(task, published, row, predicted, *compared))
+                lines.append(_beside(task, published, row, *verdict(row, published.score)))
             if not beside and not _needs_recordings(task, published, registry):
                 command = _command(task, published, registry)
-                lines.append(_beside(task, published, None, None, "no answer", f"not run: `{command}`"))
+                lines.append(_beside(task, published, None, "no answer", f"not run: `{command}`"))
     return lines
 
 
@@ -90,7 +86,7 @@ def stands_beside(row: Row, task: TaskSpec, published: Published) -> bool:
     return task.published_for(row["sensor"], row["protocol"], row["estimator"], row["split"]) == published
 
 
-def verdict(row: Row, published: float, predicted: PredictiveRange | None) -> tuple[Verdict, str]:
+def verdict(row: Row, published: float) -> tuple[Verdict, str]:
     """Return how a row compares with a published number, and one sentence that says so.
 
     Parameters
@@ -99,8 +95,6 @@ def verdict(row: Row, published: float, predicted: PredictiveRange | None) -> tu
         A row of any status.
     published
         In the unit of the row's metric.
-    predicted
-        Where the calibrated twin can put this number; None if nobody has looked.
     """
     if row["status"] != "done":
         return "no answer", f"{row['status']}: {row['reason']}"
@@ -108,10 +102,7 @@ def verdict(row: Row, published: float, predicted: PredictiveRange | None) -> tu
         few = f"{_replicates(row)}: too few for an interval, so whether it is reproduced cannot be said"
         return "no interval", f"{few}; {_difference(row, published)}"
     if row["ci_low"] <= published <= row["ci_high"]:
-        sentence = f"inside: the published lies in our {_level(row)} interval{_over(row)}"
-        if predicted is not None and not predicted.low <= published <= predicted.high:
-            sentence += f"; but {_of_calibration(predicted, published, row['unit'])}"
-        return "inside", sentence
+        return "inside", f"inside: the published lies in our {_level(row)} interval{_over(row)}"
     end = "below" if published < row["ci_low"] else "above"
     parts = [
         f"outside: {_difference(row, published)}, and the published lies {end} our {_level(row)} interval{_over(row)}"
@@ -119,10 +110,6 @@ def verdict(row: Row, published: float, predicted: PredictiveRange | None) -> tu
     if row.get("replicate_unit") != "replicate":
         method = re.sub(r" \([^)]*\)", "", row["ci_method"])
         parts.append(f"the interval is by {method}")
-    if predicted is not None:
-        parts.append(_of_calibration(predicted, published, row["unit"]))
-    elif row["simulated"]:
-        parts.append("what the twin cannot know may account for it or not: `tactbench calibrate` tells")
     return "outside", "; ".join(parts)
 
 
@@ -151,22 +138,7 @@ def _difference(row: Row, published: float) -> str:
     return f"ours is {score_with_unit(by, unit)}{share} {where} the published, which is {word}"
 
 
-def _of_calibration(predicted: PredictiveRange, published: float, unit: str) -> str:
-    inside = predicted.low <= published <= predicted.high
-    sentence = f"the published lies {'inside' if inside else 'outside'} the calibrated range ({predicted.use})"
-    if not inside:
-        edge = predicted.low if published < predicted.low else predicted.high
-        sentence += f" by {score_with_unit(abs(published - edge), unit)}"
-    if predicted.goes_with:
-        named = " and ".join(f"{name} ({value:+.2f})" for name, value in predicted.goes_with.items())
-        sentence += f"; of what is not known the number goes most with {named}"
-    return sentence
-
-
-def _beside(
-    task: TaskSpec, published: Published, row: Row | None, predicted: PredictiveRange | None, word: Verdict,
-    sentence: str,
-) -> Reproduction:  # fmt: skip
+def _beside(task: TaskSpec, published: Published, row: Row | None, word: Verdict, sentence: str) -> Reproduction:
     return Reproduction(
         title=_title(task, published, row["sensor"] if row else None),
         task=task.name,
@@ -178,7 +150,6 @@ def _beside(
         remark=published.remark,
         unit=task.unit,
         row=row,
-        predicted=predicted,
         verdict=word,
         sentence=sentence,
     )
@@ -209,12 +180,11 @@ def records(lines: Iterable[Reproduction]) -> list[dict[str, Any]]:
     about = ("title", "task", "sensor", "protocol", "estimator", "unit", "published", "reference", "remark")
     found = []
     for line in lines:
-        row, predicted = line.row or {}, line.predicted
+        row = line.row or {}
         found.append(
             {name: getattr(line, name) for name in about}
             | {"cell": row.get("cell"), "simulated": bool(row["simulated"]) if row else None}
             | {name: row.get(name) for name in ("score", "ci_low", "ci_high")}
-            | {f"predicted_{name}": getattr(predicted, name, None) for name in ("low", "high", "level", "use")}
             | {"verdict": line.verdict, "sentence": line.sentence}
         )
     return found
@@ -225,16 +195,8 @@ def interval_text(line: Reproduction) -> str:
     return row_interval(line.row) if line.row is not None and line.row["status"] == "done" else "–"
 
 
-def range_text(line: Reproduction) -> str:
-    """Return the calibrated range as text: bounds, share of the draws, fitted or held out."""
-    one = line.predicted
-    if one is None:
-        return "–"
-    return f"{interval(one.low, one.high, line.unit)} ({one.level:.0%}, {one.use})"
-
-
-COLUMNS = ("number", "published", "ours", "95 % interval", "calibrated range", "verdict")
-NUMERIC = ("published", "ours", "95 % interval", "calibrated range")
+COLUMNS = ("number", "published", "ours", "95 % interval", "verdict")
+NUMERIC = ("published", "ours", "95 % interval")
 
 
 def published_section(subject: ReportData) -> Section:
@@ -244,25 +206,20 @@ def published_section(subject: ReportData) -> Section:
         return Section("reproduction", "Published numbers, and ours", missing=("No task installed here states any.",))
     paragraphs = (
         "Each number is held against the 95 % interval of our score over its replicates: inside, it is reproduced as "
-        "far as they can tell. The calibrated range is where the simulation can put the number, over everything it "
-        "cannot know.",
+        "far as they can tell.",
     )
-    missing = () if subject.calibrated else ("There is no calibrated range yet: `tactbench calibrate` finds it.",)
-    return Section(
-        "reproduction", "Published numbers, and ours", paragraphs=paragraphs, tables=(table,), missing=missing
-    )
+    return Section("reproduction", "Published numbers, and ours", paragraphs=paragraphs, tables=(table,))
 
 
 def published_table(subject: ReportData) -> TextTable:
     """Return the reproduction table of all tasks that are installed."""
-    lines = reproduce(subject.results.registry, subject.rows, subject.calibrated)
+    lines = reproduce(subject.results.registry, subject.rows)
     titles: dict[str, list[str]] = {}
     for line in lines:
         if line.remark:
             titles.setdefault(line.remark, []).append(line.title)
     notes = [f"{', '.join(dict.fromkeys(whose))}: {remark}." for remark, whose in titles.items()]
     notes += unasked(subject.results.registry, subject.rows)
-    notes += subject.calibrated.notes if subject.calibrated else ()
     return text_table(
         "Reproduction",
         COLUMNS,
@@ -274,7 +231,7 @@ def published_table(subject: ReportData) -> TextTable:
 
 
 def _entries(line: Reproduction, subject: ReportData) -> tuple[Entry, ...]:
-    row, predicted = line.row, line.predicted
+    row = line.row
     anchor = subject.anchors[row["cell"]] if row else ""
     ours = ABSENT
     if row is not None and row["score"] is not None:
@@ -285,6 +242,5 @@ def _entries(line: Reproduction, subject: ReportData) -> tuple[Entry, ...]:
         Entry(digits, line.published, anchor),
         Entry(ours, finite(row["score"]) if row else None, anchor),
         Entry(interval_text(line), finite(row["ci_low"]) if row else None, anchor),
-        Entry(range_text(line), predicted.low if predicted else None, anchor),
         Entry(line.sentence),
     )

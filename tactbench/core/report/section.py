@@ -11,7 +11,6 @@ from typing import Any
 
 from tactbench.core.leaderboard.names import answer_name
 from tactbench.core.leaderboard.table import Table, build_table
-from tactbench.core.report.calibrated import Calibrated
 from tactbench.core.report.results import Results, SavedFigure
 from tactbench.core.tables.text_table import Entry, TextTable
 
@@ -25,7 +24,6 @@ class ReportData:
 
     results: Results
     drawn: Sequence[SavedFigure] = ()
-    calibrated: Calibrated | None = None
     undrawn: tuple[str, ...] = ()
     """Why figures are missing, a sentence each."""
 

@@ -6,6 +6,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field, model_validator
 
+from tactbench.core.spec.bounds import MOST_MEMORY_MB, MOST_REPEATS, MOST_SECONDS
 from tactbench.core.spec.quantity import Frozen
 from tactbench.core.spec.scene import Simulation
 
@@ -72,7 +73,7 @@ class MatrixSpec(Frozen):
 
     version: Literal[1] = 1
     seed: int = Field(default=1, ge=0)
-    repeats: int | None = Field(default=None, ge=1)
+    repeats: int | None = Field(default=None, ge=1, le=MOST_REPEATS)
     """Replicates: how often everything is recorded and answered anew, each time with another seed. None: eight on a
     simulated rig; on recordings one, whose sessions are the replicates."""
     rig: str = "twin"
@@ -80,9 +81,9 @@ class MatrixSpec(Frozen):
     """Folder of recordings for rigs that replay; relative to where tactbench is run."""
     rig_file: str | None = None
     """File of a rig of real or emulated devices (:class:`~tactbench.core.spec.rig_file.RigFile`); relative likewise."""
-    timeout_s: float | None = Field(default=None, gt=0)
+    timeout_s: float | None = Field(default=None, gt=0, le=MOST_SECONDS)
     """Seconds that one cell or one recording may take."""
-    memory_mb: int | None = Field(default=None, ge=1)
+    memory_mb: int | None = Field(default=None, ge=1, le=MOST_MEMORY_MB)
     """MB (2**20 bytes) that one cell or one recording may take beyond what all share."""
     probe: bool = False
     """Also run the cells that show what recordings give away; see docs/real-recordings.md."""

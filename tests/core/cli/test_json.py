@@ -28,7 +28,6 @@ VERBS = {
     "why": (CELL,),
     "rerun": (CELL,),
     "cost": ("--sensor", "ideal", "--task", "force", "--estimator", "ols", "--rounds", "1"),
-    "calibrate": ("--show",),
     "twin explain": ("--sensor", "icub", "--task", "force", "--rounds", "0"),
     "twin verify": ("--only", "friction"),
 }

@@ -52,6 +52,11 @@ def test_import_then_inspect(tables):
     assert about[0]["content_sha256"] != about[1]["content_sha256"]
 
 
+def test_an_import_with_an_error_among_its_findings_does_not_exit_0(tables):
+    (tables.folder / "two.csv").write_text("t,a,b,f\n0,1,2,3\n0.02,2,3,4\n0.01,3,4,5\n")
+    assert "error: time runs backwards" in tables("import", "mapping.yaml", code=1).stdout
+
+
 def test_a_wrong_table_is_one_clear_screen(tables):
     with (tables.folder / "two.csv").open("a") as file:
         file.write("0.6,x,1,2\n")

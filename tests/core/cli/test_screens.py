@@ -30,6 +30,13 @@ def assert_one_clear_screen(done, *says):
         (("run", "--rig", "replay"), "--recordings"),
         (("run", "--rig", "replay", "--recordings", "nowhere"), "nowhere"),
         (("run", "--repeats", "0"), "--repeats"),
+        (("run", "--repeats", "1000000000"), "--repeats"),
+        (("run", "--timeout", "nan"), "nan is no finite number"),
+        (("run", "--timeout", "inf"), "--timeout"),
+        (("run", "--memory", "99999999999999999999"), "--memory"),
+        (("run", "--task", "force", "--recordings", os.devnull), f"{os.devnull} is no folder"),
+        (("report", os.devnull), f"{os.devnull} is no folder"),
+        (("leaderboard", os.devnull), f"{os.devnull} is no folder"),
         (("runn",), "Did you mean 'run'"),
         (("show", "biotak"), "Did you mean 'biotac'"),
         (("inspect", "nowhere.h5"), "nowhere.h5"),
@@ -53,6 +60,9 @@ def test_a_wrong_word_leaves_no_result_behind(shell):
         ("tasks: [force]\nsensor: [biotac]\n", "matrix.yaml:2: the key 'sensor' is not known"),
         ("tasks: [force]\nrepeats: three\n", "matrix.yaml:2: repeats"),
         ("tasks: [force\n", "matrix.yaml:2"),
+        ("tasks: [force]\nrepeats: 1000000000\n", "matrix.yaml:2: repeats"),
+        ("tasks: [force]\ntimeout_s: .nan\n", "matrix.yaml:2: timeout_s"),
+        ("tasks: [force]\nmemory_mb: 99999999999999999999\n", "matrix.yaml:2: memory_mb"),
     ],
 )
 def test_a_wrong_matrix_names_file_and_line(verbs, text, says):
@@ -104,6 +114,14 @@ def test_table_one_of_the_paper(verbs):
     assert "12" in rows["# taxels"]
     assert "capacitive" in rows["measurement principle"]
     assert rows["DC Pressure Range"].rstrip().endswith("-")
+
+
+@pytest.mark.parametrize(("where", "says"), [("> /dev/full", "No space left on device"), (">&-", "is closed")])
+def test_standard_output_that_cannot_be_written_is_one_error(tmp_path, where, says):
+    command = f"{shlex.quote(sys.executable)} -m tactbench list {where}"
+    done = subprocess.run(["bash", "-c", command], cwd=tmp_path, capture_output=True, text=True, timeout=60)
+    assert done.returncode == 1
+    assert_one_clear_screen(done, says)
 
 
 @pytest.mark.parametrize("files", [6, 8])

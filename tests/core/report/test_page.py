@@ -11,7 +11,6 @@ import pytest
 from tactbench.core.leaderboard.columns import NUMERIC, OF_ROWS
 from tactbench.core.matrix.store import Store
 from tactbench.core.plugins.registry import load_registry
-from tactbench.core.report.calibrated import Calibrated, Finding, Share
 from tactbench.core.report.costs import read_table
 from tactbench.core.report.page import make_page
 from tactbench.core.report.results import Results, SavedFigure, open_results
@@ -129,7 +128,7 @@ def test_every_column_of_numbers_has_something_to_be_sorted_by():
 
 def test_what_is_missing_is_said_with_the_command_that_makes_it(material):
     missing = "\n".join(make_page(ReportData(material)).missing)
-    for command in ("tactbench calibrate", "tactbench cost --sensor icub --task force", "tactbench run"):
+    for command in ("tactbench cost --sensor icub --task force", "tactbench run"):
         assert f"`{command}`" in missing
 
 
@@ -142,11 +141,8 @@ def test_a_section_that_cannot_be_made_takes_no_other_with_it(material, tmp_path
     assert f"{lasso['score']:.4f} †" in page.html
 
 
-def test_findings_of_a_calibration_and_linear_against_non_linear(material):
-    often = Share(0.84, 0.78, 0.89, 200)
-    finding = Finding("The iCub is better at curvature.", Share(0.5, 0.4, 0.6, 400), often, "section IV", "by .05")
-    text = Reader(make_page(ReportData(material, calibrated=Calibrated(findings=(finding,)))).html).text
-    assert "The iCub is better at curvature. 84% (78% … 89%) of 200 50% (40% … 60%) of 400 section IV by .05" in text
+def test_linear_against_non_linear(material):
+    text = Reader(make_page(ReportData(material)).html).text
     assert re.search(r"icub SIM, force, karl2016, roles lasso 0\.\d{4} \(.*?\) forest 0\.\d{4}", text)
 
 

@@ -1,8 +1,7 @@
 import pytest
 
 from tactbench.core.plugins.registry import load_registry
-from tactbench.core.report.calibrated import Calibrated, PredictiveRange
-from tactbench.core.report.published import records, reproduce, verdict
+from tactbench.core.report.published import reproduce, verdict
 from tests.core.leaderboard.rows import row
 
 METHOD = "block bootstrap in time within 1 recording (blocks of 17 rows): spread between sessions is not in it"
@@ -18,14 +17,10 @@ def force_row(sensor="icub", estimator="lasso", score=0.68, **more):
     )
 
 
-def predicted(low, high, **more):
-    return PredictiveRange("force", "icub", 0.7659, low, high, 0.9, "held out", **more)
-
-
 @pytest.mark.parametrize("published", [0.58, 0.68, 0.78])
 def test_inside_the_interval_is_inside_bounds_included(published):
     row = force_row(ci_low=0.58, ci_high=0.78, n_replicates=8, replicate_unit="replicate")
-    assert verdict(row, published, None) == (
+    assert verdict(row, published) == (
         "inside",
         "inside: the published lies in our 95 % interval over 8 replicates",
     )
@@ -36,7 +31,7 @@ def test_inside_the_interval_is_inside_bounds_included(published):
 )
 def test_too_few_replicates_for_an_interval_are_said_in_its_place(count, unit, says):
     row = force_row(ci_low=None, ci_high=None, n_replicates=count, replicate_unit=unit)
-    word, sentence = verdict(row, 0.88, None)
+    word, sentence = verdict(row, 0.88)
     assert word == "no interval"
     assert sentence.startswith(says)
     assert "ours is 0.2000 N (22.7 %) below the published" in sentence
@@ -44,7 +39,7 @@ def test_too_few_replicates_for_an_interval_are_said_in_its_place(count, unit, s
 
 def test_a_miss_says_on_which_side_of_the_interval_the_published_lies():
     row = force_row(ci_low=0.58, ci_high=0.78, n_replicates=8, replicate_unit="replicate")
-    above, below = (verdict(row, published, predicted(0.1, 1.0))[1] for published in (0.9, 0.5))
+    above, below = (verdict(row, published)[1] for published in (0.9, 0.5))
     assert "the published lies above our 95 % interval over 8 replicates" in above
     assert "the published lies below our 95 % interval over 8 replicates" in below
 
@@ -60,50 +55,25 @@ def test_a_miss_says_on_which_side_of_the_interval_the_published_lies():
     ],
 )
 def test_a_miss_says_by_how_much_and_which_way_is_better(metric, unit, published, says):
-    word, sentence = verdict(force_row(metric=metric, unit=unit), published, None)
+    word, sentence = verdict(force_row(metric=metric, unit=unit), published)
     assert word == "outside"
     assert sentence.startswith(f"outside: {says}, and the published lies")
 
 
 def test_a_miss_says_what_is_not_in_its_interval_by_the_interval_s_own_words():
-    assert "spread between sessions is not in it" in verdict(force_row(ci_method=METHOD), 0.9, None)[1]
-    over_sessions = verdict(force_row(ci_method="jackknife over 12 sessions"), 0.9, None)[1]
+    assert "spread between sessions is not in it" in verdict(force_row(ci_method=METHOD), 0.9)[1]
+    over_sessions = verdict(force_row(ci_method="jackknife over 12 sessions"), 0.9)[1]
     assert "spread" not in over_sessions
     assert "jackknife over 12 sessions" in over_sessions
 
 
-def test_a_calibration_says_whether_it_reaches_the_number_and_what_the_number_goes_with():
-    reaching = verdict(force_row(), 0.9, predicted(0.6, 1.0, goes_with={"drift_scale": -0.52, "warmth": 0.3}))[1]
-    assert "the published lies inside the calibrated range (held out)" in reaching
-    assert reaching.endswith("of what is not known the number goes most with drift_scale (-0.52) and warmth (+0.30)")
-    missing = verdict(force_row(), 0.9, predicted(0.6, 0.85))[1]
-    assert "the published lies outside the calibrated range (held out) by 0.0500 N" in missing
-    below = verdict(force_row(), 0.4, predicted(0.6, 0.85))[1]
-    assert "by 0.2000 N" in below
-    assert "goes most with" not in below
-
-
 def test_the_blocks_of_an_interval_are_the_rows_to_tell():
     row = force_row(ci_method="block bootstrap in time within 1 recording (blocks of 17 rows): no spread in it")
-    assert (
-        "the interval is by block bootstrap in time within 1 recording: no spread in it" in verdict(row, 0.9, None)[1]
-    )
-
-
-def test_only_a_simulated_row_asks_for_a_calibration():
-    assert "tactbench calibrate" in verdict(force_row(), 0.9, None)[1]
-    assert "tactbench calibrate" not in verdict(force_row(simulated=False), 0.9, None)[1]
-    assert "tactbench calibrate" not in verdict(force_row(), 0.9, predicted(0.6, 1.0))[1]
-
-
-def test_inside_by_chance_is_said_when_the_calibration_does_not_reach_it():
-    word, sentence = verdict(force_row(score=0.7), 0.7659, predicted(0.6, 0.7))
-    assert word == "inside"
-    assert "outside the calibrated range" in sentence
+    assert "the interval is by block bootstrap in time within 1 recording: no spread in it" in verdict(row, 0.9)[1]
 
 
 def test_a_cell_without_an_answer_gives_its_reason():
-    assert verdict(force_row(status="failed", reason="the plug was pulled"), 0.7, None) == (
+    assert verdict(force_row(status="failed", reason="the plug was pulled"), 0.7) == (
         "no answer",
         "failed: the plug was pulled",
     )
@@ -137,12 +107,3 @@ def test_a_number_of_no_certain_sensor_has_a_line_for_each_sensor_s_recordings()
         (0.6875, "force, RMSE of the time index (biotac)"),
         (0.6875, "force, RMSE of the time index (icub)"),
     ]
-
-
-def test_records_join_row_and_calibrated_range():
-    calibrated = Calibrated(ranges=(predicted(0.6, 1.0),))
-    found = [one for one in records(reproduce(load_registry(), [force_row()], calibrated)) if one["cell"]]
-    assert [(one["published"], one["score"], one["predicted_high"], one["predicted_use"]) for one in found] == [
-        (0.7659, 0.68, 1.0, "held out")
-    ]
-    assert len({tuple(one) for one in records(reproduce(load_registry(), [force_row()]))}) == 1

@@ -1,4 +1,4 @@
-"""A figure as PDF and PNG, the same bytes every time; the calibration's, which is drawn elsewhere."""
+"""A figure as PDF and PNG, the same bytes every time."""
 
 from __future__ import annotations
 
@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from tactbench.core.files import replace_file
-from tactbench.core.report.calibrated import Calibrated
 from tactbench.core.report.figures.sketch import Sketch
 from tactbench.core.report.results import SavedFigure
 
@@ -47,27 +46,3 @@ def write(figure: Figure, name: str, folder: Path) -> tuple[Path, Path]:
     for ending, content_ in contents.items():
         replace_file(folder / f"{name}.{ending}", content_)
     return folder / f"{name}.png", folder / f"{name}.pdf"
-
-
-_NAME = "calibration-sensitivity"
-
-
-def draw_sensitivity(calibrated: Calibrated, folder: Path) -> list[SavedFigure]:
-    """Save the figure as PDF and PNG; none if the calibration has none.
-
-    Raises
-    ------
-    OSError
-        If `folder` cannot be written.
-    """
-    if calibrated.sensitivity is None:
-        return []
-    png, pdf = write(calibrated.sensitivity(), _NAME, folder)
-    caption = (
-        "Partial rank correlation of each published number, as simulated, with each nuisance that the simulation "
-        "cannot know; a panel a number. Bars: 95 %, bootstrap over draws; filled circles: the interval leaves "
-        "out 0. SIM. "
-    )
-    return [
-        SavedFigure(_NAME, "What decides the published numbers", caption + " ".join(calibrated.notes), png, pdf, ())
-    ]

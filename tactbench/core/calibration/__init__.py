@@ -1,1 +1,0 @@
-"""What the simulated rig cannot know, drawn from priors and held against published numbers."""

@@ -1,0 +1,103 @@
+"""The study of what the simulated rig cannot know: one draw, its analysis, and the page that has its result."""
+
+import sys
+
+import numpy as np
+import pytest
+import yaml
+
+from tests.conftest import ROOT
+
+sys.path.append(str(ROOT))  # behind everything installed
+
+from studies.calibration.__main__ import DOCUMENT, HERE, RESULTS, calibrate, document
+from studies.calibration.analysis import accept, by_fitted, partial_rank_correlations, share
+from studies.calibration.draws import Draw, parameters_of, read, roughness, write
+
+PROCEDURE = yaml.safe_load("""
+seed: 3
+rig: twin
+protocol: karl2016
+nuisances:
+  - {name: force_noise_n, prior: {kind: uniform, low: 0.2, high: 1.0}}
+  - {name: noise, sets: noise_scale, sensors: [ideal], prior: {kind: log-uniform, low: 0.1, high: 10}}
+outputs:
+  - {name: ramp, sensor: ideal, task: force, estimator: {name: time-index}}
+  - {name: ols, sensor: ideal, task: force, estimator: &ols {name: ols}, every: 2}
+  - {name: band, sensor: ideal, task: force, estimator: *ols, every: 2, figure: {kind: band, low_n: 1, high_n: 2}}
+  - {name: rough, sensor: ideal, task: force, estimator: *ols, every: 2, figure: {kind: roughness, lag: 20}}
+  - {name: first, sensor: ideal, task: force, estimator: {name: mean}, only_first: 1}
+variations:
+  - name: quiet
+    outputs: [ramp]
+    seeds: 1
+    settings: [{given: [{name: force_noise_n, value: 0.1}]}]
+""")
+
+
+def test_draws_and_settings_are_carried_out_written_and_read_back(tmp_path):
+    result = calibrate(PROCEDURE, draws=2, jobs=2)
+    write(result, tmp_path)
+    assert read(tmp_path).draws == result.draws
+    assert read(tmp_path).variations == result.variations
+    first, second = result.draws
+    assert set(first.outputs) - set(second.outputs) == {"first"}
+    for draw in result.draws:
+        # The error of the time index is the noise of the force sensor, and so is a fit's on a quiet sensor.
+        assert draw.outputs["ramp"] == pytest.approx(draw.parameters["force_noise_n"], rel=0.1)
+        assert draw.outputs["band"] != draw.outputs["ols"]
+        assert 0 <= draw.outputs["rough"] < draw.outputs["ols"]
+    (quiet,) = result.variations["quiet", 1]
+    assert (quiet.seed, quiet.outputs["ramp"]) == (first.seed, pytest.approx(0.1, rel=0.1))
+
+
+def test_a_draw_is_the_same_alone_and_with_one_nuisance_more():
+    another = {"name": "since_power_on_s", "prior": {"kind": "log-uniform", "low": 60, "high": 90}}
+    more = {**PROCEDURE, "nuisances": [another, *PROCEDURE["nuisances"]]}
+    seed, values = parameters_of(PROCEDURE, 5)
+    again, others = parameters_of(more, 5)
+    assert (again, {**others, **values}) == (seed, others)
+    assert parameters_of(PROCEDURE, 6)[0] != seed
+
+
+def test_stored_draws_are_those_of_the_stored_procedure():
+    procedure, result = yaml.safe_load((HERE / "calibration.yaml").read_text(encoding="utf-8")), read(RESULTS)
+    for draw in result.draws[:20]:
+        assert parameters_of(procedure, draw.number) == (draw.seed, draw.parameters)
+    assert [one["name"] for one in procedure["outputs"]] == [one["name"] for one in result.procedure["outputs"]]
+    assert procedure["nuisances"][0]["reason"] == result.procedure["nuisances"][0]["reason"]
+
+
+def test_the_page_has_the_tables_of_the_stored_results_and_every_prior():
+    text = DOCUMENT.read_text(encoding="utf-8")
+    assert document() == text
+    priors = [one["prior"] for one in read(RESULTS).procedure["nuisances"]]
+    assert [one for one in priors if f"{one['low']:g} to {one['high']:g}" not in text] == []
+
+
+def test_near_draws_are_accepted_and_the_nearest_where_they_are_few():
+    draws = [Draw(number, 0, {}, {"a": float(number)}) for number in range(10)]
+    target = {"output": "a", "value": 4.0, "scale": 0.5, "use": "fitted"}
+    near = accept({"tolerance": 2.0, "at_least": 0}, draws, [target])
+    assert ([draw.number for draw in near.draws], near.near, near.reach) == ([3, 4, 5], 3, 2.0)
+    few = by_fitted({"published": [target], "tolerance": 0.5, "at_least": 5}, draws)
+    assert ([draw.number for draw in few.draws], few.near, few.reach) == ([2, 3, 4, 5, 6], 1, 4.0)
+
+
+def test_partial_rank_correlations_hold_the_other_nuisances():
+    rng = np.random.default_rng(1)
+    X = rng.normal(size=(400, 3))
+    found = partial_rank_correlations(X, np.column_stack([np.exp(X[:, 0]) - 0.01 * X[:, 1], rng.normal(size=400)]))
+    assert found[0, 0] > 0.99
+    assert abs(found[0, 2]) < 0.15
+    assert np.abs(found[1]).max() < 0.15
+
+
+def test_shares_have_wilsons_interval():
+    assert share([True] * 18 + [False] * 2) == pytest.approx((0.9, 0.699, 0.972), abs=1e-3)
+
+
+def test_roughness_is_the_white_noise_of_predictions_and_of_no_rise():
+    rng, rise = np.random.default_rng(1), np.linspace(0.0, 5.0, 4000)
+    predicted = np.concatenate([rise, 3.0 + rise]) + rng.normal(0, 0.1, 8000)
+    assert roughness(predicted, np.repeat([0, 1], 4000), 41) == pytest.approx(0.1, rel=0.05)
