@@ -28,15 +28,12 @@ def at(path, t_s):
     return np.interp(t_s, *path.corners)
 
 
-def test_a_staircase_goes_up_and_down_in_equal_steps():
+def test_a_staircase_goes_up_and_down_in_equal_steps_and_a_press_is_held_and_released():
     path = path_of("staircase", peak=3, steps=3, dwell=2, rise=0.5, hold=1, rate=10)
     middles = 1 + 2.5 * np.arange(6) + 1.5  # of every dwell
     np.testing.assert_allclose(at(path, middles), [1, 2, 3, 2, 1, 0])
     assert (path.hold_s, path.times_s[-1], path.samples) == (1.0, 16.0, 160)
     assert staircase(steps=1, peak=2).forces_n == (0.0, 0.0, 2.0, 2.0, 0.0, 0.0)
-
-
-def test_a_press_is_held_and_released():
     path = path_of("press-hold-release", peak=4, rise=1, dwell=5, release=2, rest=3, hold=1)
     assert path.corners == ((0.0, 1.0, 2.0, 7.0, 9.0, 12.0), (0.0, 0.0, 4.0, 4.0, 0.0, 0.0))
 

@@ -133,22 +133,14 @@ def test_what_nothing_emulates_is_said():
 
 
 def test_what_was_opened_is_closed_when_a_later_device_fails():
-    file = rig_file()
-    opened = []
-
     def fails():
         raise LinkError("no cable")
 
-    with EmulatedDevices(emulators_of(file, REGISTRY, "pad", sense)) as devices:
-
-        def opens():
-            opened.append(devices.open_link("pad"))
-            return opened[-1]
-
+    with EmulatedDevices(emulators_of(rig_file(), REGISTRY, "pad", sense)) as devices:
+        links = {"pad": devices.opener("pad"), "force": fails}
         with pytest.raises(LinkError, match="entry 'force': no cable"):
-            drivers_of(file, REGISTRY, "pad", {"pad": opens, "force": fails}, devices.clock)
-        with devices.open_link("pad"):  # it can be opened only if it was closed
-            assert len(opened) == 1
+            drivers_of(rig_file(), REGISTRY, "pad", links, devices.clock)
+        devices.open_link("pad").close()  # it can be opened only if it was closed
 
 
 @pytest.mark.parametrize(
