@@ -317,14 +317,12 @@ def check_api_version(module: str, written_for: object) -> None:
     spoken = hookspecs.API_VERSION
     if type(written_for) is int and written_for == spoken:
         return
+    stated = "no TACTBENCH_API" if written_for is None else f"TACTBENCH_API = {written_for!r}"
     if type(written_for) is not int:
-        stated = "no TACTBENCH_API" if written_for is None else f"TACTBENCH_API = {written_for!r}"
-        what, hint = f"states {stated}", f"Write TACTBENCH_API = {spoken} in it."
-    elif written_for > spoken:
-        what, hint = f"was written for the later interface {written_for}", "Update tactbench."
+        hint = f"Write TACTBENCH_API = {spoken} in it."
     else:
-        what, hint = f"was written for the interface {written_for}", "Update the plugin: see docs/stability.md."
-    raise PluginContractError(f"{module} {what}; the plugin interface here is {spoken}.", hint=hint)
+        hint = f"Update {'tactbench' if written_for > spoken else 'the plugin'}: see docs/stability.md."
+    raise PluginContractError(f"{module} states {stated}; the plugin interface here is {spoken}.", hint=hint)
 
 
 @lru_cache
