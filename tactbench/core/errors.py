@@ -115,10 +115,6 @@ class PluginError(TactbenchError):
     """A plugin cannot be used."""
 
 
-class PluginDeprecationWarning(DeprecationWarning):
-    """A plugin uses a name that a later release takes away: shown by `tactbench plugins`, no error."""
-
-
 class DuplicateNameError(PluginError):
     """Two distributions give one name to two things of one kind."""
 

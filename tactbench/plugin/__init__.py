@@ -118,9 +118,4 @@ __all__ = [
     "staircase",
 ]
 
-__getattr__ = on_demand(
-    __name__,
-    {
-        "tactbench.core.samples": ("FloatArray",),
-    },
-)
+__getattr__ = on_demand(__name__)

@@ -12,7 +12,7 @@ from tactbench.core.plugins.interfaces import DeviceAcquisition, Operator
 from tactbench.core.spec.recording import Emulation, StreamClock, StreamCounts
 from tactbench.core.spec.rig import DeviceDescriptor
 from tactbench.core.spec.rig_file import FORCE, DeviceEntry, ForceEntry, NamedDevice, RigFile
-from tactbench.plugin.on_demand import Renamed, on_demand
+from tactbench.plugin.on_demand import on_demand
 
 if TYPE_CHECKING:
     from tactbench.core.plugins.rig_devices import (
@@ -107,67 +107,4 @@ __all__ = [
     "with_sensor",
 ]
 
-__getattr__ = on_demand(
-    __name__,
-    {
-        "tactbench.core.plugins.rig_devices": (
-            "PressingForce",
-            "ask_operator",
-            "drivers_of",
-            "emulation_of",
-            "emulators_of",
-            "physics_of",
-            "with_sensor",
-        ),
-        "tactbench.devices.driver": (
-            "Driver",
-            "DriverSettings",
-        ),
-        "tactbench.devices.emulation.emulated_devices": (
-            "EmulatedDevice",
-            "EmulatedDevices",
-        ),
-        "tactbench.devices.emulation.scene_samples": ("SceneSamples",),
-        "tactbench.devices.emulator": (
-            "DeviceEmulator",
-            "EmulatorSettings",
-            "Senses",
-            "Sent",
-            "SpiDeviceEmulator",
-        ),
-        "tactbench.devices.fault": (
-            "Fault",
-            "fault_concerns",
-        ),
-        "tactbench.devices.log": ("DeviceLog",),
-        "tactbench.devices.reading": ("Reading",),
-        "tactbench.devices.row_driver": ("RowDriver", "Sample"),
-        "tactbench.devices.row_emulator": ("RowEmulator",),
-        "tactbench.devices.sequence": ("SequenceCheck", "Unwrap"),
-        "tactbench.links.address": ("open_link",),
-        "tactbench.links.bridge_frame": (
-            "Frame",
-            "FrameDecoder",
-            "encode_frame",
-        ),
-        "tactbench.links.byte_link": ("ByteLink",),
-        "tactbench.links.can_link": (
-            "CanFrame",
-            "CanLink",
-        ),
-        "tactbench.links.can_log": ("CanLog",),
-        "tactbench.links.datagram_link": ("DatagramLink",),
-        "tactbench.links.link": (
-            "Clock",
-            "Link",
-            "Received",
-        ),
-        "tactbench.links.spi_bridge": ("SpiBridge",),
-        "tactbench.links.spi_link": (
-            "SpiLink",
-            "SpiReply",
-            "SpiStep",
-        ),
-    },
-    {"Row": Renamed("Sample", "0.2")},
-)
+__getattr__ = on_demand(__name__)

@@ -1,45 +1,34 @@
-"""Names of a door that are imported when somebody asks for them."""
+"""Names of a door that are imported when they are first used."""
 
+import ast
 import sys
-import warnings
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
+from functools import cache
 from importlib import import_module
-from typing import Any, NamedTuple
+from pathlib import Path
+from typing import Any
 
 
-class Renamed(NamedTuple):
-    """A name that a door will lose. It works, with a warning, in at least one release."""
-
-    now: str
-    """The name of the same door to use instead."""
-    until: str
-    """The first release without the old one."""
-
-
-def on_demand(
-    door: str, places: Mapping[str, Sequence[str]], renamed: Mapping[str, Renamed] | None = None
-) -> Callable[[str], Any]:
-    """Return the ``__getattr__`` of module `door` for names by the module they are in, and for those it is to lose.
+def on_demand(door: str) -> Callable[[str], Any]:
+    """Return the ``__getattr__`` of module `door`: it imports what the module imports under ``if TYPE_CHECKING``.
 
     What stands on numpy, and links, are imported so: a plugin that is only listed need not have them.
     """
-    module_of = {name: module for module, names in places.items() for name in names}
 
     def imported(name: str) -> Any:
-        if renamed is not None and name in renamed:
-            from tactbench.core.errors import PluginDeprecationWarning
-
-            now, until = renamed[name]
-            warnings.warn(
-                f"{door}.{name} is called {now} now; {name} is gone from tactbench {until} on.",
-                PluginDeprecationWarning,
-                stacklevel=2,
-            )
-            return getattr(sys.modules[door], now)
-        if name not in module_of:
+        if name not in _modules(door):
             raise AttributeError(f"module {door!r} has no attribute {name!r}")
-        found = getattr(import_module(module_of[name]), name)
+        found = getattr(import_module(_modules(door)[name]), name)
         setattr(sys.modules[door], name, found)
         return found
 
     return imported
+
+
+@cache
+def _modules(door: str) -> Mapping[str, str]:
+    """Return the modules that a door's source imports names from under a condition."""
+    tree = ast.parse(Path(sys.modules[door].__file__ or "").read_text(encoding="utf-8"))
+    conditions = [node for node in tree.body if isinstance(node, ast.If)]
+    imports = [node for one in conditions for node in one.body if isinstance(node, ast.ImportFrom)]
+    return {alias.name: node.module or "" for node in imports for alias in node.names}

@@ -64,12 +64,4 @@ __all__ = [
     "rig_context",
 ]
 
-__getattr__ = on_demand(
-    __name__,
-    {
-        "tactbench.core.recording.reader": (
-            "Recording",
-            "open_recording",
-        ),
-    },
-)
+__getattr__ = on_demand(__name__)

@@ -40,9 +40,6 @@ def command(ctx: click.Context, shape: str) -> None:
             click.secho(f"{row.entry_point:<{width}}  ", nl=False, bold=True)
             click.secho(f"{row.status:<7}", nl=False, fg="green" if row.status == "loaded" else "red")
             click.echo(f"{row.distribution} {row.version}  {brought}")
-            for remark in row.remarks:
-                click.secho(f"{'':<{width}}  remark ", nl=False, fg="yellow")
-                click.echo(remark)
         for text in refused:
             click.secho(text, fg="red")
     ctx.exit(1 if registry.failures or refused else 0)

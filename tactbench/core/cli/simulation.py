@@ -83,8 +83,11 @@ def simulation_of(
         )
     known = {name for effect in registry.effects for name in (effect.name, *effect.groups)} | {"all"}
     for word in change.get("effects", ()):
-        if word.lstrip("+-") not in known:
-            raise UnknownNameError("effect", word.lstrip("+-"), sorted(known))
+        name = word.lstrip("+-")
+        if name not in known:
+            raise UnknownNameError("effect", name, sorted(known))
+        if word == name and (name not in registry.effects or registry.effects.owned(name).ours):
+            raise UsageError(f"--effects {word!r} lacks its sign.", hint=f"Write +{word} or -{word}.")
     simulation = Simulation.model_validate({**(stated or Simulation()).model_dump(), **change})
     _check_nuisances(simulation, [registry.sensors[name].spec for name in sensors])
     return simulation

@@ -99,8 +99,7 @@ def carried_out(rig: Any, descriptor: RigDescriptor, sensor: SensorDescriptor, s
 
 def simulated_rig(subject: Subject) -> tuple[Any, RigDescriptor]:
     """Return the first simulated rig, built, those that come with this package before others."""
-    registry = subject.registry
-    owned = [registry.rigs.owned(name) for name in registry.rigs.names()]
+    owned = subject.registry.rigs.all_owned()
     simulated = sorted((one for one in owned if one.descriptor.simulated), key=lambda one: not one.ours)
     if not simulated:
         skip("no simulated rig is installed")
@@ -110,9 +109,8 @@ def simulated_rig(subject: Subject) -> tuple[Any, RigDescriptor]:
 
 def simulated_sensors(subject: Subject) -> Sequence[SensorDescriptor]:
     """Return sensors that a simulation can press: of this package, the cheapest first, then of the plugin's own."""
-    sensors = subject.registry.sensors
     able = []
-    for owned in (sensors.owned(name) for name in sensors.names()):
+    for owned in subject.registry.sensors.all_owned():
         skin = owned.descriptor.spec.skin
         if skin is not None and owned.descriptor.transducer is not None:
             cost = len(owned.descriptor.spec.channels()) * math.prod(skin.sheet.cells)
@@ -183,7 +181,6 @@ def first_that_goes(
 
 def _giving_to(subject: Subject) -> list[str]:
     """Return the effects of an effect's own distribution that produce what it consumes."""
-    effects = subject.registry.effects
-    siblings = [one for one in map(effects.owned, effects.names()) if one.distribution == subject.distribution]
+    siblings = [one for one in subject.registry.effects.all_owned() if one.distribution == subject.distribution]
     consumed = set(subject.descriptor.consumes)
     return [one.descriptor.name for one in siblings if consumed.intersection(one.descriptor.produces)]

@@ -58,8 +58,8 @@ def with_declared(registry: Registry, tasks: Iterable[DeclaredTask]) -> Registry
     if not each:
         return registry
     family: Family[TaskDescriptor] = Family("task")
-    for name in registry.tasks.names():
-        family.add(registry.tasks.owned(name))
+    for owned in registry.tasks.all_owned():
+        family.add(owned)
     for name, task in each.items():
         if name in registry.tasks:
             raise UsageError(

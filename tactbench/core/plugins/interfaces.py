@@ -248,10 +248,3 @@ class RigContext:
     """The file given by ``--rig-file``."""
     operator: Operator | None = None
     """None: nobody is there."""
-
-
-class RigFactory(Protocol):
-    """What ``RigDescriptor.where`` names."""
-
-    def __call__(self, context: RigContext) -> Rig | ReplayRig:
-        """Return the rig; raises UsageError when `context` lacks something it needs."""

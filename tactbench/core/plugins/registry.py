@@ -9,13 +9,10 @@ from __future__ import annotations
 
 import importlib
 import re
-import traceback
-import warnings
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import lru_cache
-from importlib.metadata import EntryPoint, entry_points
-from pathlib import Path
+from importlib.metadata import Distribution, EntryPoint, entry_points
 from types import ModuleType
 from typing import Any, Generic, Literal, TypeVar, cast
 
@@ -24,7 +21,6 @@ import pluggy
 from tactbench.core.errors import (
     DuplicateNameError,
     PluginContractError,
-    PluginDeprecationWarning,
     PluginError,
     UnknownNameError,
 )
@@ -65,8 +61,6 @@ class PluginRow:
     status: Literal["loaded", "failed"]
     brings: tuple[str, ...] = ()
     reason: str = ""
-    remarks: tuple[str, ...] = ()
-    """What it uses that a later release takes away, with what to use instead."""
 
 
 @dataclass(frozen=True)
@@ -109,10 +103,9 @@ class Family(Generic[D]):
         """
         if name not in self._found:
             raise UnknownNameError(self.kind, name, self.names())
-        owners = self._found[name]
-        if len(owners) > 1:
-            raise DuplicateNameError(self.kind, name, [f"{owner.distribution} ({owner.module})" for owner in owners])
-        return owners[0]
+        if len(self._found[name]) > 1:
+            raise self._refusal(name)
+        return self._found[name][0]
 
     def __getitem__(self, name: str) -> D:
         return self.owned(name).descriptor
@@ -121,20 +114,23 @@ class Family(Generic[D]):
         return name in self._found
 
     def __iter__(self) -> Iterator[D]:
-        return (owners[0].descriptor for _, owners in sorted(self._found.items()) if len(owners) == 1)
+        return (owned.descriptor for owned in self.all_owned())
+
+    def all_owned(self) -> list[Owned[D]]:
+        """Return the descriptors that may be asked for, with their owners, sorted by name."""
+        return [owners[0] for _, owners in sorted(self._found.items()) if len(owners) == 1]
 
     def names(self) -> list[str]:
         """Return the names that may be asked for."""
-        return sorted(name for name, owners in self._found.items() if len(owners) == 1)
+        return [descriptor.name for descriptor in self]
 
     def refused(self) -> list[DuplicateNameError]:
         """Return one error for every name that is given twice."""
-        refused = []
-        for name, owners in sorted(self._found.items()):
-            if len(owners) > 1:
-                where = [f"{owner.distribution} ({owner.module})" for owner in owners]
-                refused.append(DuplicateNameError(self.kind, name, where))
-        return refused
+        return [self._refusal(name) for name, owners in sorted(self._found.items()) if len(owners) > 1]
+
+    def _refusal(self, name: str) -> DuplicateNameError:
+        where = [f"{owner.distribution} ({owner.module})" for owner in self._found[name]]
+        return DuplicateNameError(self.kind, name, where)
 
 
 @dataclass
@@ -153,16 +149,7 @@ class Registry:
 
     def families(self) -> Mapping[str, Family[Any]]:
         """Return the families by the name of their hook's plural."""
-        return {
-            "sensors": self.sensors,
-            "rigs": self.rigs,
-            "devices": self.devices,
-            "tasks": self.tasks,
-            "estimators": self.estimators,
-            "effects": self.effects,
-            "indenters": self.indenters,
-            "profiles": self.profiles,
-        }
+        return {name: getattr(self, name) for name in _KINDS}
 
     def only(self, **names: Iterable[str]) -> Registry:
         """Return a registry of what is named, by family: what a child process needs of it."""
@@ -184,15 +171,9 @@ class Registry:
 
 
 _KINDS: dict[str, type[Any]] = {
-    "sensors": SensorDescriptor,
-    "rigs": RigDescriptor,
-    "devices": DeviceDescriptor,
-    "tasks": TaskDescriptor,
-    "estimators": EstimatorDescriptor,
-    "effects": EffectDescriptor,
-    "indenters": IndenterDescriptor,
-    "profiles": ProfileDescriptor,
+    f"{kind.__name__.removesuffix('Descriptor').lower()}s": kind for kind in D.__constraints__
 }
+"""By the plural that hooks and families are named after: ``sensors`` -> SensorDescriptor."""
 
 
 ENTRY_POINT_S = 20.0
@@ -216,18 +197,11 @@ def load_registry(points: Iterable[EntryPoint] | None = None, *, timeout_s: floa
     """
     registry = Registry()
     found = entry_points(group=hookspecs.GROUP) if points is None else points
-    owners: dict[int, tuple[str, str]] = {}
-    unique = {}
-    for point in found:
-        # Reading who owns an entry point parses a file, and a distribution has many of them.
-        if id(point.dist) not in owners:
-            owners[id(point.dist)] = _owner(point)
-        owner = owners[id(point.dist)]
-        unique[point.name, point.value, owner[0]] = point, owner
-    several = [unique[key] for key in sorted(unique)]
-    answers = _described_in_children([point for point, _ in several if not _is_built_in(point.module)], timeout_s)
-    for point, owner in several:
-        _add(registry, point, owner, answers.get((point.name, point.value)))
+    unique = {(point.name, point.value, _owner(point.dist)): point for point in found}
+    foreign = [(point.name, point.value) for point in unique.values() if not _is_built_in(point.module)]
+    answers = _described_in_children(sorted(foreign), timeout_s)
+    for (name, module, owner), point in sorted(unique.items()):
+        _add(registry, point, owner, answers.get((name, module)))
     return registry
 
 
@@ -243,71 +217,42 @@ def _is_built_in(module: str) -> bool:
 
 def _add(registry: Registry, point: EntryPoint, owner: tuple[str, str], reply: Any) -> None:
     """Add what a plugin brings: `reply` of a child process, or what it answers here if it is one of ours."""
-    distribution, version = owner
     try:
         if isinstance(reply, BaseException):
             raise reply
-        remarks = () if reply is None else tuple(reply.pop(REMARKS))
         offered = ask_plugin(point) if reply is None else _described(reply)
     except Exception as error:
         reason = str(error) if isinstance(error, PluginError) else getattr(error, "message", None)
         reason = f"{reason or f'{type(error).__name__}: {error}'}{_line_in(point.module, error)}"
-        registry.plugins.append(PluginRow(point.name, point.value, distribution, version, "failed", (), reason))
+        registry.plugins.append(PluginRow(point.name, point.value, *owner, "failed", (), reason))
         return
-    brings: list[str] = []
     for family, descriptors in offered.items():
         for descriptor in descriptors:
-            registry.families()[family].add(Owned(descriptor, point.value, distribution, version))
-            brings.append(f"{family[:-1]} {descriptor.name}")
-    registry.plugins.append(
-        PluginRow(point.name, point.value, distribution, version, "loaded", tuple(brings), "", remarks)
-    )
+            registry.families()[family].add(Owned(descriptor, point.value, *owner))
+    brings = tuple(f"{family[:-1]} {one.name}" for family, descriptors in offered.items() for one in descriptors)
+    registry.plugins.append(PluginRow(point.name, point.value, *owner, "loaded", brings))
 
 
 def _line_in(module: str, error: Exception) -> str:
     """Return `` (file, line N)`` of the innermost line of a plugin's own package; "" if the error is not from there."""
-    package = module.partition(".")[0]
-    text = getattr(error, "traceback_text", "") or "".join(traceback.format_exception(error))
-    own = [
-        (Path(file), line)
-        for file, line in re.findall(r'File "([^"]+)", line (\d+)', text)
-        if package in (*Path(file).parts[:-1], Path(file).stem)
-    ]
-    if not own or _is_built_in(module):
-        return ""
-    file, line = own[-1]
-    return f" ({'/'.join(file.parts[-2:])}, line {line})"
+    package, text = re.escape(module.partition(".")[0]), getattr(error, "traceback_text", "")
+    own = re.findall(rf'File "[^"]*/({package}[/.][^"]*)", line (\d+)', text)
+    return f" ({own[-1][0]}, line {own[-1][1]})" if own else ""
 
 
-def _described_in_children(points: Sequence[EntryPoint], timeout_s: float) -> dict[tuple[str, str], Any]:
+def _described_in_children(points: Sequence[tuple[str, str]], timeout_s: float) -> dict[tuple[str, str], Any]:
     """Ask each plugin in a child process; return what it describes, or what stopped it, by name and module."""
     if not points:
         return {}
     from tactbench.core.pool import Limits, Pool
 
-    pool = Pool(1, Limits(timeout_s=timeout_s))
-    return dict(pool.each(_describe, [(point.name, point.value) for point in points], together=True))
-
-
-REMARKS = "remarks"
-"""Beside the families in what a child process answers."""
+    return dict(Pool(1, Limits(timeout_s=timeout_s)).each(_describe, points, together=True))
 
 
 def _describe(point: tuple[str, str]) -> dict[str, Any]:
-    """Ask a plugin; return its descriptors as JSON has them, and what it uses that is deprecated."""
-    with warnings.catch_warnings(record=True) as warned:
-        warnings.simplefilter("always", PluginDeprecationWarning)
-        offered = ask_plugin(EntryPoint(*point, group=hookspecs.GROUP))
-    remarks = []
-    for one in warned:
-        if issubclass(one.category, PluginDeprecationWarning):
-            remarks.append(str(one.message))
-        else:
-            warnings.showwarning(one.message, one.category, one.filename, one.lineno)
-    described: dict[str, Any] = {
-        family: [_plain(descriptor) for descriptor in several] for family, several in offered.items()
-    }
-    return {**described, REMARKS: list(dict.fromkeys(remarks))}  # `from … import` asks twice for a name
+    """Ask a plugin; return its descriptors as JSON has them."""
+    offered = ask_plugin(EntryPoint(*point, group=hookspecs.GROUP))
+    return {family: [_plain(descriptor) for descriptor in several] for family, several in offered.items()}
 
 
 def _plain(descriptor: Any) -> dict[str, Any]:
@@ -375,24 +320,18 @@ def check_api_version(module: str, written_for: object) -> None:
     spoken = hookspecs.API_VERSION
     if type(written_for) is int and written_for == spoken:
         return
-    if written_for is None:
-        what = f"states no TACTBENCH_API; this tactbench speaks {spoken}"
+    stated = "no TACTBENCH_API" if written_for is None else f"TACTBENCH_API = {written_for!r}"
+    if type(written_for) is not int:
         hint = f"Write TACTBENCH_API = {spoken} in it."
-    elif type(written_for) is not int:
-        what = f"states TACTBENCH_API = {written_for!r}, which is no whole number; this tactbench speaks {spoken}"
-        hint = f"Write TACTBENCH_API = {spoken} in it."
-    elif written_for > spoken:
-        what = f"states TACTBENCH_API = {written_for}, a later version than this tactbench speaks, {spoken}"
-        hint = "Update tactbench, or install an older version of the plugin."
     else:
-        what = f"states TACTBENCH_API = {written_for}, which is no longer spoken; this tactbench speaks {spoken}"
-        hint = "Update the plugin: docs/stability.md says what has changed."
-    raise PluginContractError(f"{module} {what}.", hint=hint)
+        hint = f"Update {'tactbench' if written_for > spoken else 'the plugin'}: see docs/stability.md."
+    raise PluginContractError(f"{module} states {stated}; the plugin interface here is {spoken}.", hint=hint)
 
 
-def _owner(point: EntryPoint) -> tuple[str, str]:
-    dist = point.dist
-    return (dist.name, dist.version) if dist is not None else ("unknown", "")
+@lru_cache
+def _owner(distribution: Distribution | None) -> tuple[str, str]:
+    """Return name and version, which are read from a file."""
+    return ("unknown", "") if distribution is None else (distribution.name, distribution.version)
 
 
 def load_object(where: str) -> Any:

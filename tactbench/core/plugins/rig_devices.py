@@ -8,7 +8,7 @@ from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
-from tactbench.core.errors import PluginContractError, RigError, TactbenchError, UsageError
+from tactbench.core.errors import RigError, TactbenchError, UsageError
 from tactbench.core.plugins.interfaces import Operator, Rig
 from tactbench.core.plugins.registry import Registry, load_object
 from tactbench.core.plugins.taking_part import rig_context
@@ -29,23 +29,14 @@ _PRESSED = "normal"
 
 
 class PressingForce:
-    """The force sensor of a rig as it is recorded: the pressing force has a name and a sign of its own.
-
-    Parameters
-    ----------
-    entry
-        Of the rig file.
-    streams
-        Of the force sensor.
+    """The force sensor of a rig as it is recorded: pressing makes the channel of the rig file's `entry` rise.
 
     Attributes
     ----------
     streams
-        The same, the pressing channel with sign 1, and called `normal` where it is not plain `fz`.
+        Of the force sensor, the pressing channel with sign 1, and called `normal` where it is not plain `fz`.
     stream, column, sign
         Where the pressing force is, and 1 or -1: pressing makes the device's channel rise or fall.
-    mounting
-        What of this is worth recording.
 
     Raises
     ------
@@ -54,32 +45,30 @@ class PressingForce:
     """
 
     def __init__(self, entry: ForceEntry, streams: tuple[StreamSpec, ...]) -> None:
-        plain = (entry.channel, entry.sign) == ("fz", 1)
-        self.sign = entry.sign
-        self.mounting: dict[str, Scalar] = (
-            {} if plain else {"normal force": f"{'-' if entry.sign < 0 else ''}{entry.channel} of {entry.device}"}
-        )
-        for stream in streams:
-            names = [channel.name for channel in stream.channels]
-            if entry.channel not in names:
-                continue
-            self.stream, self.column = stream.name, names.index(entry.channel)
-            channels = list(stream.channels)
-            update = {"sign": 1} if plain else {"sign": 1, "name": _PRESSED}
-            channels[self.column] = ChannelSpec.model_validate({**dict(channels[self.column]), **update})
-            pressed = stream.model_copy(update={"channels": tuple(channels)})
-            self.streams = tuple(pressed if one is stream else one for one in streams)
-            return
-        known = ", ".join(channel.name for stream in streams for channel in stream.channels)
-        raise UsageError(
-            f"The force sensor {entry.device!r} has no channel {entry.channel!r}; it has {known}.",
-            hint="Correct `channel:` under `force:` in the rig file.",
-        )
+        self._entry, self.sign = entry, entry.sign
+        self._plain = (entry.channel, entry.sign) == ("fz", 1)
+        names = {stream.name: [channel.name for channel in stream.channels] for stream in streams}
+        having = [stream for stream in streams if entry.channel in names[stream.name]]
+        if not having:
+            known = ", ".join(name for several in names.values() for name in several)
+            raise UsageError(
+                f"The force sensor {entry.device!r} has no channel {entry.channel!r}; it has {known}.",
+                hint="Correct `channel:` under `force:` in the rig file.",
+            )
+        stream = having[0]
+        self.stream, self.column = stream.name, names[stream.name].index(entry.channel)
+        channels = list(stream.channels)
+        update = {"sign": 1} if self._plain else {"sign": 1, "name": _PRESSED}
+        channels[self.column] = ChannelSpec.model_validate({**dict(channels[self.column]), **update})
+        pressed = stream.model_copy(update={"channels": tuple(channels)})
+        self.streams = tuple(pressed if one is stream else one for one in streams)
 
     def about(self, zero: Mapping[str, FloatArray]) -> dict[str, Scalar]:
-        """Return what of the mounting and of the `zero` taken off, by stream, is worth recording."""
-        zeros = {f"zero of {name}": ", ".join(f"{value:.6g}" for value in values) for name, values in zero.items()}
-        return {**zeros, **self.mounting}
+        """Return what a recording says of the mounting and of the `zero` taken off, by stream."""
+        said = {f"zero of {name}": ", ".join(f"{value:.6g}" for value in values) for name, values in zero.items()}
+        if not self._plain:
+            said["normal force"] = f"{'-' if self.sign < 0 else ''}{self._entry.channel} of {self._entry.device}"
+        return dict(said)
 
     def turned(self, block: Block, zero: Mapping[str, FloatArray]) -> Block:
         """Return a block with forces from the unloaded sensor's `zero`, by stream, and positive when pressing."""
@@ -141,10 +130,7 @@ def ask_operator(file: RigFile, operator: Operator | None, doing: str, text: str
 def emulation_of(file: RigFile, identity: Mapping[str, Mapping[str, str]]) -> Emulation | None:
     """Return what a recording says of a rig's emulated devices; None: there are none.
 
-    Parameters
-    ----------
-    identity
-        By device: what it says of itself. An emulator says that it is one where a rig file forgets to.
+    `identity` is what each device says of itself: an emulator says that it is one where a rig file forgets to.
     """
     entries = file.entries()
     names = tuple(
@@ -166,21 +152,11 @@ def emulation_of(file: RigFile, identity: Mapping[str, Mapping[str, str]]) -> Em
 
 
 def emulators_of(file: RigFile, registry: Registry, sensor: str, senses: Senses) -> dict[str, EmulatedDevice]:
-    """Return the emulated devices of a rig with one sensor, by the names of :meth:`RigFile.entries`.
+    """Return the emulated devices of a rig with one of its sensors, by the names of :meth:`RigFile.entries`.
 
-    Parameters
-    ----------
-    sensor
-        The one that is used; the file's other sensors are left out.
-    senses
-        What the channels read. Of the force sensor, its entry's channel gets the pressing force (``fz``) with the
-        entry's sign, and all its other channels are at rest.
-
-    Returns
-    -------
-    dict
-        Devices that the file says are real are not in it. Each draws from a generator of its own, made of the file's
-        seed and its name: a further device changes nothing for the others.
+    `senses` is what the channels read. Of the force sensor, its entry's channel gets the pressing force (``fz``) with
+    the entry's sign, and all its other channels are at rest. Each device draws from a generator of its own, made of the
+    file's seed and its name: a further device changes nothing for the others.
 
     Raises
     ------
@@ -208,15 +184,10 @@ def emulated_device(
     from tactbench.devices.emulation.scene_samples import PRESSING_FORCE
     from tactbench.devices.emulator import EmulatorSettings
 
-    if descriptor.emulator is None:
+    if descriptor.emulator is None or descriptor.emulated_link is None:
         raise UsageError(
-            f"{descriptor.name} has no emulator.",
+            f"{descriptor.name} has no emulator{' on a kind of link' if descriptor.emulator else ''}.",
             hint="Give the address of a real one under `link:`, or leave it out.",
-        )
-    if descriptor.emulated_link is None:
-        raise PluginContractError(
-            f"{descriptor.name} has an emulator, but does not say on which kind of link.",
-            hint="Its plugin's descriptor needs emulated_link.",
         )
     own = senses
     if isinstance(entry, ForceEntry):
@@ -241,7 +212,7 @@ def drivers_of(
     clock: Clock,
     names: Collection[str] | None = None,
 ) -> dict[str, Driver]:
-    """Open devices of a rig; which of its further ones, is its own business.
+    """Open devices of a rig; return their drivers by the names of :meth:`RigFile.entries`. Close each.
 
     Parameters
     ----------
@@ -251,11 +222,6 @@ def drivers_of(
         The host's.
     names
         Which ones; None: the sensor, and the force sensor if the file has one.
-
-    Returns
-    -------
-    dict
-        By the names of :meth:`RigFile.entries`. Close each.
 
     Raises
     ------

@@ -17,8 +17,7 @@ from tactbench.core.spec.scene import Scene
 def taking_part(registry: Registry, sensor: SensorDescriptor, scene: Scene) -> list[Owned[EffectDescriptor]]:
     """Return the effects that are candidates for a scene with a sensor, with their owners, sorted by name."""
     named = effect_names(sensor, scene)
-    owned = (registry.effects.owned(name) for name in registry.effects.names())
-    return [one for one in owned if one.ours or one.descriptor.name in named]
+    return [one for one in registry.effects.all_owned() if one.ours or one.descriptor.name in named]
 
 
 def effect_names(sensor: SensorDescriptor, scene: Scene) -> set[str]:
@@ -31,7 +30,7 @@ def effect_names(sensor: SensorDescriptor, scene: Scene) -> set[str]:
 
 def rig_context(registry: Registry, **given: Any) -> RigContext:
     """Return what a rig is built from: the registry's effects and indenters, and what else is `given`."""
-    owned = [registry.effects.owned(name) for name in registry.effects.names()]
+    owned = registry.effects.all_owned()
     return RigContext(
         effects=tuple(one.descriptor for one in owned if one.ours),
         named_effects=tuple(one.descriptor for one in owned if not one.ours),

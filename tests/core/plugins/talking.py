@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+from typing import ClassVar
 
 import numpy as np
 
@@ -13,32 +14,24 @@ from tactbench.sensors.ideal import SPEC
 
 TACTBENCH_API = 1
 HERE = "tests.core.plugins.talking"
+WHERE = {"driver": f"{HERE}:TalkingDriver", "emulator": f"{HERE}:build_emulator", "emulated_link": "datagram"}
 
 
 @hookimpl
 def tactbench_sensors():
-    where = {"driver": f"{HERE}:build_driver", "emulator": f"{HERE}:build_emulator", "emulated_link": "datagram"}
     pad = SPEC.model_copy(update={"name": "pad"})
     return [
-        SensorDescriptor(spec=pad, transducer="tactbench.sensors.ideal.transduction:build", **where),
+        SensorDescriptor(spec=pad, transducer="tactbench.sensors.ideal.transduction:build", **WHERE),
         SensorDescriptor(spec=pad.model_copy(update={"name": "mute"})),
     ]
 
 
 @hookimpl
 def tactbench_devices():
-    where = {"driver": f"{HERE}:build_driver", "emulated_link": "datagram"}
     return [
-        DeviceDescriptor(
-            name="scale",
-            title="a scale",
-            kind="force",
-            emulator=f"{HERE}:build_emulator",
-            emulated_options={"unit": "N"},
-            **where,
-        ),
-        DeviceDescriptor(name="bare-scale", title="a scale", kind="force", driver=f"{HERE}:build_driver"),
-        DeviceDescriptor(name="screw", title="a motor", kind="motor", emulator=f"{HERE}:build_emulator", **where),
+        DeviceDescriptor(name="scale", title="a scale", kind="force", emulated_options={"unit": "N"}, **WHERE),
+        DeviceDescriptor(name="bare-scale", title="a scale", kind="force", driver=f"{HERE}:TalkingDriver"),
+        DeviceDescriptor(name="screw", title="a motor", kind="motor", **WHERE),
     ]
 
 
@@ -46,16 +39,14 @@ class Talker:
     """Sends what it senses every 10 ms, with a drawn number."""
 
     def __init__(self, settings):
-        self._settings = settings
-        self._sent = 0
+        self._settings, self._sent = settings, 0
 
     def feed(self, piece, now_s):
         return self.poll(now_s)
 
     def poll(self, now_s):
         out = []
-        while self.next_s() <= now_s:
-            t_s = self.next_s()
+        while (t_s := self.next_s()) <= now_s:
             said = {"senses": dict(self._settings.senses(t_s)), "drawn": int(self._settings.rng.integers(1 << 30))}
             out.append((t_s, json.dumps(said).encode()))
             self._sent += 1
@@ -74,24 +65,18 @@ def build_emulator(settings):
 class TalkingDriver(Driver):
     """Reads them."""
 
+    streams = ()
+    counts: ClassVar = {}
+
     def __init__(self, settings):
         if set(settings.options) - {"silent", "baud", "unit"}:
             raise UsageError(f"It has no option {next(iter(settings.options))!r}.")
         if not settings.streams and "unit" not in settings.options:
             raise UsageError("A scale needs the option 'unit'.")
         fz = StreamSpec(name="scale", channels=(ChannelSpec(name="fz", kind="force", unit="N"),))
-        self._streams = settings.streams or (fz,)
-        self._clock = settings.clock
+        self.streams = settings.streams or (fz,)
         self._link = settings.open_link()
         assert isinstance(self._link, DatagramLink)
-
-    @property
-    def streams(self):
-        return self._streams
-
-    @property
-    def counts(self):
-        return {}
 
     def identify(self):
         return {}
@@ -105,21 +90,11 @@ class TalkingDriver(Driver):
         except LinkTimeout:
             return []
         senses = json.loads(came.data)["senses"]
-        return [
-            Block(
-                stream.name,
-                np.array([came.t_ns]),
-                np.array([[senses.get(channel.name, math.nan) for channel in stream.channels]]),
-            )
-            for stream in self.streams
-        ]
+        rows = {one.name: [[senses.get(channel.name, math.nan) for channel in one.channels]] for one in self.streams}
+        return [Block(name, np.array([came.t_ns]), np.array(row)) for name, row in rows.items()]
 
     def stop(self):
         pass
 
     def close(self):
         self._link.close()
-
-
-def build_driver(settings):
-    return TalkingDriver(settings)

@@ -28,14 +28,12 @@ def at(path, t_s):
     return np.interp(t_s, *path.corners)
 
 
-def test_a_staircase_goes_up_and_down_in_equal_steps():
+def test_a_staircase_goes_up_and_down_in_equal_steps_and_a_press_is_held_and_released():
     path = path_of("staircase", peak=3, steps=3, dwell=2, rise=0.5, hold=1, rate=10)
     middles = 1 + 2.5 * np.arange(6) + 1.5  # of every dwell
     np.testing.assert_allclose(at(path, middles), [1, 2, 3, 2, 1, 0])
     assert (path.hold_s, path.times_s[-1], path.samples) == (1.0, 16.0, 160)
-
-
-def test_a_press_is_held_and_released():
+    assert staircase(steps=1, peak=2).forces_n == (0.0, 0.0, 2.0, 2.0, 0.0, 0.0)
     path = path_of("press-hold-release", peak=4, rise=1, dwell=5, release=2, rest=3, hold=1)
     assert path.corners == ((0.0, 1.0, 2.0, 7.0, 9.0, 12.0), (0.0, 0.0, 4.0, 4.0, 0.0, 0.0))
 
@@ -78,20 +76,13 @@ def backwards(*, start):
     return ForcePath(times_s=(0.0, start), forces_n=(0.0, -1.0), samples=1, source=Source(tag="assumed", reference="t"))
 
 
-def number(*, start):
-    return start
-
-
 @pytest.mark.parametrize(
     ("where", "says"),
-    [("backwards", r"makes no force path of \{'start': 1.0\}: forces_n.1: .*0"), ("number", "returned a float")],
-)
+    [(f"{__name__}:backwards", r"makes no force path of \{'start': 1.0\}: forces_n.1: .*0"),
+     ("builtins:dict", "returned a dict")],
+)  # fmt: skip
 def test_what_is_no_force_path_is_the_plugins_fault(where, says):
     start = Parameter(default=1.0, unit="s", text="a time")
-    odd = ProfileDescriptor(name="odd", title="odd", where=f"{__name__}:{where}", parameters={"start": start})
+    odd = ProfileDescriptor(name="odd", title="odd", where=where, parameters={"start": start})
     with pytest.raises(PluginContractError, match=says):
         force_path(odd, {}, "a test")
-
-
-def test_a_staircase_of_one_step_is_a_press():
-    assert staircase(steps=1, peak=2).forces_n == (0.0, 0.0, 2.0, 2.0, 0.0, 0.0)

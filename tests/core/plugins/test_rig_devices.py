@@ -8,7 +8,7 @@ from importlib.metadata import EntryPoint
 import numpy as np
 import pytest
 
-from tactbench.core.errors import LinkError, TactbenchError, UnknownNameError, UsageError
+from tactbench.core.errors import LinkError, UnknownNameError, UsageError
 from tactbench.core.plugins.registry import load_registry
 from tactbench.plugin.devices import (
     DatagramLink,
@@ -49,11 +49,8 @@ def drawn(file):
         return said
 
 
-def test_one_sensor_and_every_other_device_have_emulators():
+def test_one_sensor_and_every_other_emulated_device_have_emulators():
     assert list(emulators_of(rig_file(), REGISTRY, "pad", sense)) == ["pad", "force", "motor"]
-
-
-def test_real_devices_have_none():
     file = rig_file(force={"device": "scale", "link": "udp://127.0.0.1:9"})
     assert list(emulators_of(file, REGISTRY, "pad", sense)) == ["pad", "motor"]
 
@@ -74,21 +71,15 @@ def test_devices_draw_from_generators_of_their_own():
     assert drawn(rig_file(emulation={"seed": 2}))["pad"]["drawn"] != here["pad"]["drawn"]
 
 
-def test_faults_of_the_link_do_not_reach_the_device_and_those_of_the_device_do():
-    file = rig_file(sensors={"pad": {"link": "emulated", "faults": ["late:delay_s=0.2", "unplug:start_s=3"]}})
-    device = emulators_of(file, REGISTRY, "pad", sense)["pad"]
-    assert [(fault.name, fault.delay_s, fault.start_s) for fault in device.faults] == [
-        ("late", 0.2, -np.inf),
-        ("unplug", 0.05, 3.0),
-    ]
+def test_faults_of_the_link_and_its_pace_do_not_reach_the_device_and_its_own_faults_do():
+    entry = {"link": "emulated", "faults": ["late:delay_s=0.2", "unplug:start_s=3"], "options": {"baud": 9600}}
+    device = emulators_of(rig_file(sensors={"pad": entry}), REGISTRY, "pad", sense)["pad"]
+    faults = [(fault.name, fault.delay_s, fault.start_s) for fault in device.faults]
+    assert faults == [("late", 0.2, -np.inf), ("unplug", 0.05, 3.0)]
+    assert device.baud == 9600
     file = rig_file(sensors={"pad": {"link": "emulated", "faults": ["parity"]}})
     with pytest.raises(UsageError, match="entry 'pad': It has no fault 'parity'"):
         emulators_of(file, REGISTRY, "pad", sense)
-
-
-def test_a_baud_rate_among_the_options_is_the_pace_of_the_line():
-    file = rig_file(sensors={"pad": {"link": "emulated", "options": {"baud": 9600}}})
-    assert emulators_of(file, REGISTRY, "pad", sense)["pad"].baud == 9600
 
 
 def test_drivers_read_what_the_emulators_sense():
@@ -106,73 +97,50 @@ def test_drivers_read_what_the_emulators_sense():
             assert block.data[0, 0] == pytest.approx(0.1)
 
 
-@pytest.mark.parametrize(
-    ("changed", "sensor", "error", "said"),
-    [
-        ({}, "biotac", UsageError, "no entry for the sensor 'biotac'; it has pad, mute"),
-        ({"sensors": {"pda": {"link": "emulated"}}}, "pda", UnknownNameError, "entry 'pda'.*'pad'"),
-        ({"force": {"device": "scael", "link": "emulated"}}, "pad", UnknownNameError, "entry 'force'.*'scale'"),
-        ({"force": {"device": "screw", "link": "emulated"}}, "pad", UsageError, "no force sensor.*bare-scale, scale"),
-        ({}, "mute", UsageError, "mute has no driver"),
-        (
-            {"sensors": {"pad": {"link": "emulated", "options": {"board": 1}}}},
-            "pad",
-            UsageError,
-            "entry 'pad'.*'board'",
-        ),
-        ({"sensors": {"pad": {"link": "udp:/1"}}}, "pad", UsageError, "entry 'pad'.*not the address"),
-    ],
-)
-def test_errors_of_drivers_name_the_entry_and_the_next_step(changed, sensor, error, said):
-    file = rig_file(**changed)
-    with EmulatedDevices({}) as devices, pytest.raises(error, match=said):
-        drivers_of(file, REGISTRY, sensor, dict.fromkeys(("pad", "force"), lambda: None), devices.clock)
-
-
-def test_options_of_the_emulated_device_hold_for_it_alone():
-    """An emulated scale has its unit; of a real one nobody knows it but the rig file."""
-    file = rig_file(force={"device": "scale", "link": "udp://127.0.0.1:9"})
-    with (
-        EmulatedDevices(emulators_of(file, REGISTRY, "pad", sense)) as devices,
-        pytest.raises(UsageError, match=r"entry 'force'.*needs the option 'unit'"),
-    ):
-        drivers_of(file, REGISTRY, "pad", {"pad": devices.opener("pad")}, devices.clock)
-
-
-def test_an_emulated_device_that_nothing_emulates_is_said():
-    with pytest.raises(UsageError, match=r"nothing emulates it here.*tactbench emulate"):
-        drivers_of(rig_file(), REGISTRY, "pad", {}, lambda: 0)
+REAL_SCALE = {"force": {"device": "scale", "link": "udp://127.0.0.1:9"}}
 
 
 @pytest.mark.parametrize(
     ("changed", "sensor", "said"),
     [
-        ({}, "mute", "mute has no emulator"),
-        ({"force": {"device": "bare-scale", "link": "emulated"}}, "pad", "entry 'force': bare-scale has no emulator"),
+        ({}, "biotac", "no entry for the sensor 'biotac'; it has pad, mute"),
+        ({"sensors": {"pda": {"link": "emulated"}}}, "pda", "entry 'pda'.*'pad'"),
+        ({"force": {"device": "scael", "link": "emulated"}}, "pad", "entry 'force'.*'scale'"),
+        ({"force": {"device": "screw", "link": "emulated"}}, "pad", "no force sensor.*bare-scale, scale"),
+        ({}, "mute", "mute has no driver"),
+        ({"sensors": {"pad": {"link": "emulated", "options": {"board": 1}}}}, "pad", "entry 'pad'.*'board'"),
+        ({"sensors": {"pad": {"link": "udp:/1"}}}, "pad", "entry 'pad'.*not the address"),
+        # An emulated scale has its unit; of a real one nobody knows it but the rig file.
+        (REAL_SCALE, "pad", r"entry 'force'.*needs the option 'unit'"),
     ],
 )
-def test_devices_without_an_emulator_are_said(changed, sensor, said):
-    with pytest.raises(TactbenchError, match=said):
-        emulators_of(rig_file(**changed), REGISTRY, sensor, sense)
+def test_errors_of_drivers_name_the_entry_and_the_next_step(changed, sensor, said):
+    file = rig_file(**changed)
+    emulators = emulators_of(file, REGISTRY, "pad", sense) if changed is REAL_SCALE else {}
+    with EmulatedDevices(emulators) as devices:
+        links = {"pad": devices.opener("pad")} if emulators else dict.fromkeys(("pad", "force"), lambda: None)
+        with pytest.raises((UsageError, UnknownNameError), match=said):
+            drivers_of(file, REGISTRY, sensor, links, devices.clock)
+
+
+def test_what_nothing_emulates_is_said():
+    with pytest.raises(UsageError, match=r"nothing emulates it here.*tactbench emulate"):
+        drivers_of(rig_file(), REGISTRY, "pad", {}, lambda: 0)
+    with pytest.raises(UsageError, match="mute has no emulator"):
+        emulators_of(rig_file(), REGISTRY, "mute", sense)
+    with pytest.raises(UsageError, match="entry 'force': bare-scale has no emulator"):
+        emulators_of(rig_file(force={"device": "bare-scale", "link": "emulated"}), REGISTRY, "pad", sense)
 
 
 def test_what_was_opened_is_closed_when_a_later_device_fails():
-    file = rig_file()
-    opened = []
-
     def fails():
         raise LinkError("no cable")
 
-    with EmulatedDevices(emulators_of(file, REGISTRY, "pad", sense)) as devices:
-
-        def opens():
-            opened.append(devices.open_link("pad"))
-            return opened[-1]
-
+    with EmulatedDevices(emulators_of(rig_file(), REGISTRY, "pad", sense)) as devices:
+        links = {"pad": devices.opener("pad"), "force": fails}
         with pytest.raises(LinkError, match="entry 'force': no cable"):
-            drivers_of(file, REGISTRY, "pad", {"pad": opens, "force": fails}, devices.clock)
-        with devices.open_link("pad"):  # it can be opened only if it was closed
-            assert len(opened) == 1
+            drivers_of(rig_file(), REGISTRY, "pad", links, devices.clock)
+        devices.open_link("pad").close()  # it can be opened only if it was closed
 
 
 @pytest.mark.parametrize(
