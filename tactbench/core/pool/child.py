@@ -18,8 +18,11 @@ from types import FrameType
 from typing import Any
 
 from tactbench.core import errors
-from tactbench.core.errors import OutOfMemory, Raised, TactbenchError
+from tactbench.core.errors import CellStopped, OutOfMemory, Raised, TactbenchError
 from tactbench.core.pool.limits import Limits, data_limit, resident_mb
+
+LOG_BYTES = 2**16
+"""Length of the end of a log that is kept."""
 
 
 def run_child(
@@ -54,13 +57,15 @@ def run_child(
     for item in items:
         os.ftruncate(1, 0)  # of what is printed, only that of one item is kept
         connection.send(("begun", resident_mb(me)))
-        outcome = _carry_out(work, item, limits)
+        kind, value, spent_s = _carry_out(work, item, limits)
         if os.getpid() != me:
             os._exit(0)  # a child that the work forked and that returned from it
         for stream in (sys.stdout, sys.stderr):
             with suppress(Exception):
                 stream.flush()
-        connection.send(outcome)
+        if isinstance(value, CellStopped):
+            value.log, value.spent_s = end_of(log), spent_s
+        connection.send((kind, value))
     with suppress(EOFError, OSError):
         connection.recv()  # the parent ends this process together with its group
 
@@ -89,6 +94,13 @@ def _redirect(log: str) -> None:
     for descriptor in (1, 2):
         os.dup2(opened, descriptor)
     os.close(opened)
+
+
+def end_of(log: str) -> str:
+    """Return the end of what the item at work has printed."""
+    with open(log, "rb") as file:  # noqa: PTH123  (seek from the end)
+        file.seek(max(0, file.seek(0, os.SEEK_END) - LOG_BYTES))
+        return file.read().decode(errors="replace")
 
 
 class _Terminated(BaseException):

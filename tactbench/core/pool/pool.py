@@ -18,7 +18,7 @@ from typing import Any, TypeVar
 import psutil
 
 from tactbench.core.errors import CellStopped, Crashed, TimedOut
-from tactbench.core.pool.child import out_of_memory, plain_error, run_child
+from tactbench.core.pool.child import end_of, out_of_memory, plain_error, run_child
 from tactbench.core.pool.limits import UNLIMITED, Limits, resident_mb
 
 T = TypeVar("T")
@@ -30,8 +30,6 @@ POLL_S = 0.05
 """Seconds between two looks at the memory and time of children."""
 KILL_DELAY_S = 0.2
 """Seconds beyond its time limit after which an item is ended: it writes its stacks at the limit."""
-LOG_BYTES = 2**16
-"""Length of the end of a log that is kept."""
 MOST_LOG_BYTES = 2**24
 """A log that grows beyond this is emptied."""
 
@@ -177,7 +175,7 @@ class _Worker:
             try:
                 if not self._connection.poll():
                     break
-                kind, value, *spent_s = self._connection.recv()
+                kind, value = self._connection.recv()
             except (EOFError, OSError):  # it has ended, or closed what is not its own
                 self._process.join(START_S if ended else 1.0)
                 ended = True
@@ -185,8 +183,6 @@ class _Worker:
             if kind == "begun":
                 self._began_s, self._begun, self._shared_mb = time.monotonic(), True, value
                 continue
-            if isinstance(value, CellStopped):
-                value.log, value.spent_s = self.log(), spent_s[0]
             yield self._next(), value
             self.over = self.index == len(self.items)
         if self.over:
@@ -236,11 +232,7 @@ class _Worker:
 
     def log(self) -> str:
         """Return the end of what the item at work has printed."""
-        if self._log is None:
-            return self._printed
-        with open(self._log, "rb") as file:  # noqa: PTH123  (seek from the end)
-            file.seek(max(0, file.seek(0, os.SEEK_END) - LOG_BYTES))
-            return file.read().decode(errors="replace")
+        return self._printed if self._log is None else end_of(self._log)
 
     def terminate(self) -> None:
         """Send SIGTERM if it has time to close its devices."""
