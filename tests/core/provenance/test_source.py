@@ -1,0 +1,112 @@
+"""Real packages, edited: every byte of those that take part counts, and nothing else does."""
+
+import importlib
+
+import pytest
+
+from tactbench.core.provenance import source
+from tactbench.core.provenance.source import ANSWERING, RECORDING, source_digest, sources_of, versions
+from tests.conftest import ROOT
+from tests.core.matrix.plugin_packages import write_package
+
+
+@pytest.fixture
+def package(tmp_path, monkeypatch):
+    monkeypatch.syspath_prepend(str(tmp_path))
+    return write_package(tmp_path, "some_plugin", {"__init__.py": "from some_plugin.law import LAW\n",
+                                                   "law.py": "LAW = 3\n"})  # fmt: skip
+
+
+def digest(module="some_plugin.anything:at_all", own=()):
+    importlib.invalidate_caches()
+    source_digest.cache_clear()
+    return sources_of([module], own)
+
+
+@pytest.mark.parametrize(
+    "name", ["law.py", "more.py", "gains.npz", "deep/er/table.yaml", "_fast.cpython-311-x86_64-linux-gnu.so"]
+)
+def test_every_byte_of_the_package_counts(package, name):
+    before = digest()
+    path = package / name
+    original = path.read_bytes() if path.exists() else None
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_bytes(b"1")
+    changed = digest()
+    path.write_bytes(b"2")
+    assert len({str(one) for one in (before, changed, digest())}) == 3
+    path.unlink()
+    if original is not None:
+        path.write_bytes(original)
+    assert digest() == before
+
+
+def test_byte_code_and_hidden_files_do_not_count(package):
+    before = digest()
+    for name in ("__pycache__/law.cpython-311.pyc", ".law.py.swp", ".git/HEAD"):
+        (package / name).parent.mkdir(exist_ok=True)
+        (package / name).write_bytes(b"x")
+    assert digest() == before
+
+
+def test_a_module_of_its_own_counts_and_what_it_imports_does_not(tmp_path, monkeypatch):
+    (tmp_path / "lone_plugin.py").write_text("from lone_filters import LAW\n")
+    (tmp_path / "lone_filters.py").write_text("LAW = 3\n")
+    monkeypatch.syspath_prepend(str(tmp_path))
+    before = digest("lone_plugin:at_all")
+    assert set(before) == {"lone_plugin"}
+    (tmp_path / "lone_filters.py").write_text("LAW = 4\n")
+    assert digest("lone_plugin:at_all") == before
+    (tmp_path / "lone_plugin.py").write_text("LAW = 5\n")
+    assert digest("lone_plugin:at_all") != before
+    assert digest("nobody_has_it:at_all") == digest("nobody_has_it:at_all")
+
+
+def test_of_a_namespace_every_portion_counts(tmp_path, monkeypatch):
+    for place in ("one", "two"):
+        write_package(tmp_path / place, "shared_name", {f"{place}/__init__.py": "LAW = 3\n"})
+        monkeypatch.syspath_prepend(str(tmp_path / place))
+    before = digest("shared_name.one:at_all")
+    (tmp_path / "two" / "shared_name" / "two" / "__init__.py").write_text("LAW = 4\n")
+    assert digest("shared_name.one:at_all") != before
+
+
+ROOMS = {
+    "tasks/force.py": (True, False),
+    "core/evaluation/splits.py": (True, False),
+    "core/matrix/solve.py": (True, False),
+    "core/spec/row.py": (True, True),
+    "core/recording/reader.py": (True, True),
+    "core/acquisition.py": (False, True),
+    "rigs/twin/rig.py": (False, True),
+    "core/matrix/run.py": (False, False),
+    "core/cli/run.py": (False, False),
+    "core/leaderboard/table.py": (False, False),
+    "core/report/making.py": (False, False),
+    "sensors/icub.py": (False, False),
+}
+"""Files of tactbench, and whether they count for an answer and for a recording by the twin."""
+
+
+@pytest.mark.parametrize(("file", "counts"), ROOMS.items(), ids=[*ROOMS])
+def test_of_tactbench_itself_counts_what_takes_part(file, counts):
+    path = ROOT / "tactbench" / file
+    assert path.exists() or path.with_suffix("").is_dir() or path.parent.is_dir()
+    answer, recording = sources_of([], ANSWERING), sources_of(["tactbench.rigs.twin:anything"], RECORDING)
+    for sources, expected in zip((answer, recording), counts, strict=True):
+        places = [name.partition(".")[2].replace(".", "/") for name in sources]
+        assert any(file.startswith(f"{place}/") or file == f"{place}.py" for place in places) == expected
+
+
+def test_each_place_of_tactbench_that_takes_part_is_there():
+    for place in (*ANSWERING, *RECORDING):
+        assert (ROOT / "tactbench" / place).exists(), place
+        assert source_digest("tactbench", place) != source_digest("tactbench", "nowhere")
+
+
+def test_versions_of_what_computes_are_there_and_missing_ones_say_so():
+    import numpy
+
+    found = versions(("no-such-distribution",))
+    assert set(found) == {"python", *source.RELEVANT, "no-such-distribution"}
+    assert (found["no-such-distribution"], found["numpy"]) == ("missing", numpy.__version__)
