@@ -9,13 +9,12 @@ import os
 import signal
 import subprocess
 import sys
-from multiprocessing import forkserver
 from pathlib import Path
 
 import pytest
 from hypothesis import settings
 
-from tactbench.core.pool.worker import PRELOAD
+from tactbench.core.pool import start_server
 
 # A shared machine is slow at times: a deadline would test the machine. Continuous integration draws the same examples
 # every time, so that a red run means a change; people's own runs keep exploring.
@@ -42,9 +41,8 @@ os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 
 # There is one fork server for each process, and it keeps what it was started with. Without scikit-learn every cell of
 # every test would import that again, which takes five times as long as the cell: so it is started before any test
-# module is imported, since some look for plugins then, in children that need less.
-forkserver.set_forkserver_preload(list(PRELOAD))
-forkserver.ensure_running()
+# module is imported.
+start_server("tactbench.core.matrix.preloaded")
 
 # A shell's background jobs are deaf to Ctrl-C, and so is all that they start: tests that send one would wait for ever.
 if signal.getsignal(signal.SIGINT) == signal.SIG_IGN:
@@ -91,16 +89,12 @@ class Shell:
 class Verbs:
     """Calls the command line in this process, for what needs no fresh interpreter.
 
-    Cells have processes of their own all the same, forked by a server that knows no plugin of others: to compute with
-    one takes a `Shell`, or `here`.
-
     Parameters
     ----------
     folder
         Where the commands are called.
     here
-        Recordings and cells are made in this process too, with the plugins of others as well, which it forgets
-        afterwards: for what is not about processes, limits or several jobs.
+        Recordings and cells are made in this process too: for what is not about processes, limits or several jobs.
     """
 
     def __init__(self, folder: Path, *, here: bool = False) -> None:
@@ -131,7 +125,6 @@ class Verbs:
             for name in plugins:
                 patch.syspath_prepend(THIRD_PARTY / name)
             if plugins:
-                forkserver.ensure_running()
                 installed.cache_clear()
             try:
                 with pytest.raises(SystemExit) as ended:

@@ -186,7 +186,7 @@ class Run:
             need: {request.path for request in self.plan.requests.get(need, ()) if not request.path.exists()}
             for need in by_need
         }
-        ready = [self._jobs(members) for need, members in by_need.items() if not lacking[need]]
+        ready = [self._jobs(members, begun=False) for need, members in by_need.items() if not lacking[need]]
         later = sum(len(by_need[need]) for need in by_need if lacking[need])
         total = len(missing) + later + sum(map(len, ready))
         if not total:
@@ -253,7 +253,7 @@ class Run:
 
     # Cells
 
-    def _jobs(self, cells: Iterable[Cell]) -> list[Job]:
+    def _jobs(self, cells: Iterable[Cell], *, begun: bool = True) -> list[Job]:
         """Return what is to be computed of `cells` that need the same recordings; the others have their row then."""
         jobs = []
         for cell in cells:
@@ -268,7 +268,7 @@ class Run:
                 key, sections = self.keys.of_cell(cell, digests)
             except Exception as error:
                 self._keys[cell.name] = "", {}
-                self._stopped(cell, task, error)
+                self._stopped(cell, task, error, advance=begun)
                 continue
             found = self.store.finished(key)
             if found is None:
@@ -316,11 +316,13 @@ class Run:
             return
         self._done(job.cell, kept, advance=True)
 
-    def _stopped(self, cell: Cell, task: Any, why: BaseException, *, counted: bool = False) -> None:
+    def _stopped(
+        self, cell: Cell, task: Any, why: BaseException, *, counted: bool = False, advance: bool = True
+    ) -> None:
         self.computed += not counted
         row = unanswered(cell, task, why, simulated=self.registry.rigs[cell.rig].simulated)
         key, sections = self._keys[cell.name]
-        self._done(cell, self.store.keep({**row, "key": key}, sections), advance=True)
+        self._done(cell, self.store.keep({**row, "key": key}, sections), advance=advance)
 
     def _done(self, cell: Cell, row: Row, *, advance: bool = False) -> None:
         """Take the row of a cell; show all complete replicates if it completes one."""

@@ -20,6 +20,9 @@ from tactbench.core import errors
 from tactbench.core.errors import OutOfMemory, Raised, TactbenchError
 from tactbench.core.pool.limits import Limits, data_limit, resident_mb
 
+LOG_BYTES = 2**16
+"""Length of the end of a log that is kept."""
+
 
 def run_child(
     work: Callable[[Any], Any],
@@ -52,19 +55,26 @@ def run_child(
     me = os.getpid()
     for item in items:
         os.ftruncate(1, 0)  # of what is printed, only that of one item is kept
-        connection.send(("begun", resident_mb(me)))
-        outcome = _carry_out(work, item, limits)
+        connection.send(("begun", resident_mb(me), ""))
+        kind, value = _carry_out(work, item, limits)
         if os.getpid() != me:
             os._exit(0)  # a child that the work forked and that returned from it
         for stream in (sys.stdout, sys.stderr):
             with suppress(Exception):
                 stream.flush()
         try:
-            connection.send(outcome)
+            connection.send((kind, value, end_of(log)))
         except Exception as error:  # it cannot be pickled
-            connection.send(("error", plain_error(error)))
+            connection.send(("error", plain_error(error), end_of(log)))
     with suppress(EOFError, OSError):
         connection.recv()  # the parent ends this process together with its group
+
+
+def end_of(log: str) -> str:
+    """Return the end of what the item at work has printed."""
+    with open(log, "rb") as file:  # noqa: PTH123  (seek from the end)
+        file.seek(max(0, file.seek(0, os.SEEK_END) - LOG_BYTES))
+        return file.read().decode(errors="replace")
 
 
 def _carry_out(work: Callable[[Any], Any], item: Any, limits: Limits) -> tuple[str, Any]:

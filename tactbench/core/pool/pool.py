@@ -19,7 +19,7 @@ from typing import Any, TypeVar
 import psutil
 
 from tactbench.core.errors import CellStopped, Crashed, TimedOut
-from tactbench.core.pool.child import out_of_memory, plain_error, run_child
+from tactbench.core.pool.child import end_of, out_of_memory, plain_error, run_child
 from tactbench.core.pool.limits import UNLIMITED, Limits, resident_mb
 
 T = TypeVar("T")
@@ -31,8 +31,6 @@ POLL_S = 0.05
 """Seconds between two looks at the memory and time of a child."""
 KILL_DELAY_S = 0.2
 """Seconds beyond its time limit after which an item is ended: it writes its stacks at the limit."""
-LOG_BYTES = 2**16
-"""Length of the end of a log that is kept."""
 MOST_LOG_BYTES = 2**24
 """A log that grows beyond this is emptied."""
 
@@ -182,14 +180,14 @@ class _Child:
         self._connection, theirs = context.Pipe()
         handle, name = tempfile.mkstemp(prefix="tactbench-", suffix=".log")
         os.close(handle)
-        self._log = Path(name)
+        self._log = name
         try:
             arguments = (work, items, theirs, name, str(Path.cwd()), limits)
             self._process = context.Process(target=run_child, args=arguments)
             _start(self._process.start)
         except BaseException:
             self._connection.close()
-            self._log.unlink()
+            Path(name).unlink()
             raise
         finally:
             theirs.close()
@@ -200,11 +198,11 @@ class _Child:
         while not abandoned.is_set():
             try:
                 if self._connection.poll(POLL_S):
-                    kind, value = self._connection.recv()
+                    kind, value, log = self._connection.recv()
                     if kind == "begun":
                         began_s, shared_mb = time.monotonic(), value
                         continue
-                    return self._told(value, began_s)
+                    return _told(value, log, began_s)
                 stopped = self._beyond_limits(time.monotonic() - began_s, shared_mb)
             except (EOFError, OSError):  # it has ended, or closed what is not its own
                 self._process.join(1.0)
@@ -212,23 +210,12 @@ class _Child:
             if stopped is not None:
                 self._kill(unfinished=True)
                 self.over = True
-                return self._told(stopped, began_s)
+                return _told(stopped, end_of(self._log), began_s)
         return _ABANDONED, ""
-
-    def _told(self, value: Any, began_s: float) -> tuple[Any, str]:
-        with self._log.open("rb") as file:
-            file.seek(max(0, file.seek(0, os.SEEK_END) - LOG_BYTES))
-            log = file.read().decode(errors="replace")
-        if isinstance(value, CellStopped):
-            value.log, value.spent_s = log, time.monotonic() - began_s
-            marks = [mark for mark in ("Fatal Python error", "Timeout (") if mark in log]
-            if marks and not value.traceback_text:  # of Python's fault handler
-                value.traceback_text = marks[0] + log.rpartition(marks[0])[2]
-        return value, log
 
     def _beyond_limits(self, spent_s: float, shared_mb: float | None) -> CellStopped | None:
         """Return why the item at work must be ended; None if it need not."""
-        if self._log.stat().st_size > MOST_LOG_BYTES:
+        if Path(self._log).stat().st_size > MOST_LOG_BYTES:
             os.truncate(self._log, 0)
         timeout_s, memory_mb = self._limits.timeout_s, self._limits.memory_mb
         if shared_mb is None:  # it has not begun
@@ -257,7 +244,7 @@ class _Child:
         if not self.over:
             self._kill(unfinished=unfinished)
         self._connection.close()
-        self._log.unlink(missing_ok=True)
+        Path(self._log).unlink(missing_ok=True)
 
     def _kill(self, *, unfinished: bool) -> None:
         if self._limits.grace_s and unfinished:
@@ -273,6 +260,16 @@ class _Child:
             with suppress(psutil.Error, OSError):
                 one.kill()
         self._process.join()
+
+
+def _told(value: Any, log: str, began_s: float) -> tuple[Any, str]:
+    """Return an outcome and its log; an error also gets them, with the stacks that Python's fault handler wrote."""
+    if isinstance(value, CellStopped):
+        value.log, value.spent_s = log, time.monotonic() - began_s
+        marks = [mark for mark in ("Fatal Python error", "Timeout (") if mark in log]
+        if marks and not value.traceback_text:
+            value.traceback_text = marks[0] + log.rpartition(marks[0])[2]
+    return value, log
 
 
 def _context() -> Any:

@@ -1,9 +1,13 @@
-"""Works that go wrong in every way, for engines to carry out: real forks, real signals."""
+"""Works that go wrong in every way, for pools to carry out: real processes, real signals."""
 
+import importlib
 import os
 import signal
+import subprocess
 import sys
-import time
+import threading
+from contextlib import contextmanager
+from pathlib import Path
 
 import numpy as np
 
@@ -12,11 +16,26 @@ from tactbench.core.errors import NotApplicable
 
 def work(what):
     """Do `what`, and return it if that is possible at all."""
-    return getattr(sys.modules[__name__], what)()
+    name, _, argument = what.partition(" ")
+    return getattr(sys.modules[__name__], name)(*argument.split())
 
 
-def fine():
-    return "fine"
+def fine(*words):
+    return " ".join(("fine", *words))
+
+
+def whoami(*_):
+    return os.getpid()
+
+
+def neighbours(folder, number):
+    """Return how many items are at work, this one included."""
+    here = Path(folder)
+    (here / f"begun-{number}").touch()
+    (here / f"work-{number}").touch()
+    others = len(list(here.glob("work-*")))
+    (here / f"work-{number}").unlink()
+    return others
 
 
 def raises():
@@ -43,16 +62,20 @@ def vanishes():
     os._exit(0)
 
 
-def hangs():
-    print("about to hang")
-    while True:
-        time.sleep(60)
+def terminates():
+    os.kill(os.getpid(), signal.SIGKILL)
 
 
-def deaf():
-    for number in (signal.SIGTERM, signal.SIGALRM, signal.SIGUSR2, signal.SIGHUP):
-        signal.signal(number, signal.SIG_IGN)
-    hangs()
+def kills():
+    os.killpg(0, signal.SIGKILL)
+
+
+def closes():
+    os.closerange(3, 256)
+
+
+def unspeakable():
+    return lambda: None
 
 
 def eats():
@@ -61,27 +84,36 @@ def eats():
         eaten.append(np.ones(2**17))
 
 
-def terminates():
-    os.kill(os.getpid(), signal.SIGTERM)
-    time.sleep(60)
-
-
-def kills():
-    os.killpg(0, signal.SIGKILL)
+def hangs(begun=None):
+    """Wait for ever; tell in a file who does."""
+    print("about to hang", flush=True)
+    if begun is not None:
+        tell(begun, str(os.getpid()))
+    threading.Event().wait()
 
 
 def prints():
     print("from Python")
     os.write(1, b"from below\n")
     os.system("echo from a child")
-    return "printed"
+    raise ValueError("printed")
 
 
 def chatters():
     for _ in range(40):
         os.write(1, b"x" * 2**17)
     os.write(1, b"the end\n")
-    return "chattered"
+    raise ValueError("chattered")
+
+
+def floods():
+    while True:
+        os.write(1, b"x" * 2**16)
+
+
+def feeds_a_child():
+    """Have a process of its own take memory, which no limit of this process can refuse."""
+    subprocess.run([sys.executable, "-c", "import threading; a = bytearray(200 * 2**20); threading.Event().wait()"])
 
 
 def forks():
@@ -91,35 +123,27 @@ def forks():
 
 def leaves():
     """Leave a process behind; tell its number."""
-    child = os.fork()
-    if child == 0:
-        time.sleep(600)
-        os._exit(0)
-    return child
+    return subprocess.Popen([sys.executable, "-c", "import time; time.sleep(600)"]).pid
 
 
-def flees():
-    """Leave a process behind that has left group and parent; tell its number."""
-    reading, writing = os.pipe()
-    if os.fork() == 0:
-        os.setsid()
-        grandchild = os.fork()
-        if grandchild:
-            os.write(writing, str(grandchild).encode())
-            os._exit(0)
-        time.sleep(600)
-        os._exit(0)
-    return int(os.read(reading, 20))
+@contextmanager
+def device(path):
+    try:
+        yield
+    finally:
+        Path(path).write_text("closed")
 
 
-def unspeakable():
-    return lambda: None
+def holds(path):
+    with device(path):
+        hangs()
 
 
-def whoami():
-    return os.getpid()
+def imports_and_fails(module):
+    importlib.import_module(module).fail()
 
 
-def closes():
-    os.closerange(3, 256)
-    return "closed"
+def tell(path, text):
+    aside = Path(f"{path}.aside")
+    aside.write_text(text)
+    aside.rename(path)

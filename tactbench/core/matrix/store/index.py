@@ -66,32 +66,29 @@ class Index:
             found = {path.name: path for path in (self.folder / "cells").glob("[!.]*.h5")}
         known = dict(self._all("SELECT file, size || ' ' || modified_ns FROM cells"))
         changed = {name: path for name, path in found.items() if known.get(name) != "{} {}".format(*signature(path))}
-        lost = [(name,) for name in known.keys() - found.keys()]
+        lost = known.keys() - found.keys()
         if not changed and not lost:
             return
-        with self._database:
-            self._database.executemany("DELETE FROM cells WHERE file = ?", lost)
-            for name, path in sorted(changed.items()):
-                try:
-                    self.put(path, read_cell(path))
-                except FormatError as error:
-                    self._database.execute("DELETE FROM cells WHERE file = ?", (name,))
-                    self.troubles.append(str(error))
+        for name in lost:
+            self.drop(name)
+        for name, path in sorted(changed.items()):
+            try:
+                self.put(path, read_cell(path))
+            except FormatError as error:
+                self.drop(name)
+                self.troubles.append(str(error))
 
     def put(self, path: Path, cell: CellFile) -> None:
         """Enter what the file of a cell holds."""
         row = cell.row
         values = [row.get(name) for name in COLUMNS]
         facts = (path.name, *signature(path), cell.ended_ns, *values, json.dumps(row))
-        with self._database:
-            self._database.execute(f"REPLACE INTO cells VALUES ({', '.join('?' * len(facts))})", facts)
-            pair = row.get("made_by", ""), json.dumps(cell.provenance)
-            self._database.execute("INSERT OR IGNORE INTO provenance VALUES (?, ?)", pair)
+        self._all(f"REPLACE INTO cells VALUES ({', '.join('?' * len(facts))})", *facts)
+        self._all("INSERT OR IGNORE INTO provenance VALUES (?, ?)", row.get("made_by", ""), json.dumps(cell.provenance))
 
     def drop(self, name: str) -> None:
         """Take a file out."""
-        with self._database:
-            self._database.execute("DELETE FROM cells WHERE file = ?", (name,))
+        self._all("DELETE FROM cells WHERE file = ?", name)
 
     def files_of(self, cell: str) -> list[tuple[str, str, str]]:
         """Return file, key and status of the files of a cell, the latest first."""
@@ -124,8 +121,7 @@ class Index:
             return dict(zip(("digest", "sensor", "scene"), found[0], strict=True))
         facts = read(path)
         values = (place, size, modified_ns, facts["digest"], facts["sensor"], facts["scene"])
-        with self._database:
-            self._database.execute("REPLACE INTO recordings VALUES (?, ?, ?, ?, ?, ?)", values)
+        self._all("REPLACE INTO recordings VALUES (?, ?, ?, ?, ?, ?)", *values)
         return facts
 
     def close(self) -> None:
@@ -133,7 +129,18 @@ class Index:
         self._database.close()
 
     def _all(self, query: str, *values: Any) -> list[Any]:
-        return self._database.execute(query, values).fetchall()
+        """Return what a statement finds; if the disk is full or the index damaged, go on with one in memory."""
+        try:
+            with self._database:
+                return self._database.execute(query, values).fetchall()
+        except sqlite3.Error as error:
+            self.close()
+            if not isinstance(error, sqlite3.OperationalError):  # damaged: the next command makes it anew
+                with suppress(OSError):
+                    (self.folder / "results.sqlite").unlink()
+            self._database = _in_memory()
+            self.refresh()
+            return self._database.execute(query, values).fetchall()
 
 
 def signature(path: Path) -> tuple[int, int]:
@@ -165,6 +172,10 @@ def _opened(path: Path) -> sqlite3.Connection:
                     path.unlink(missing_ok=True)
                 except OSError:
                     break
+    return _in_memory()
+
+
+def _in_memory() -> sqlite3.Connection:
     database = sqlite3.connect(":memory:")
     database.executescript(_SCHEMA)
     return database

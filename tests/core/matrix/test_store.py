@@ -1,0 +1,382 @@
+"""The result folder: what is kept comes back, what is damaged is told, and no file of the index is needed."""
+
+import json
+import math
+import re
+import resource
+import shutil
+import signal
+import sqlite3
+import subprocess
+import sys
+from contextlib import closing, contextmanager
+from dataclasses import fields
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from tactbench.core.errors import FolderError, FormatError
+from tactbench.core.matrix.store import Store
+from tactbench.core.matrix.store import cell_file as format_of_cells
+from tactbench.core.samples import Answers
+from tests.conftest import ROOT
+from tests.core.pool.patience import ending
+
+from .made import SECTIONS, answers, kept, key, record, row
+
+
+def told(store):
+    return " ".join(store.troubles)
+
+
+def file_of(folder, cell):
+    return folder / "cells" / f"{key(cell)}.h5"
+
+
+def test_rows_answers_and_what_the_key_is_made_of_come_back_bit_for_bit(tmp_path):
+    with Store(tmp_path).hold() as store:
+        name = store.begin({"cpu": "a", "distributions": {"numpy": "2"}})
+        given = kept(store, "a/1", n=5000, remarks=["π ≈ 3"], counts={"kept": 3}, score=0.1 + 0.2)
+        store.begin({"cpu": "b"})
+        kept(store, "b/1", "failed")
+    found = Store(tmp_path)
+    first, second = found.rows()
+    assert first == given == {**row("a/1", "done", 0.1 + 0.2, remarks=["π ≈ 3"], counts={"kept": 3}), "made_by": name}
+    assert (second["cell"], second["status"]) == ("b/1", "failed")
+    assert found.cell(first).sections == SECTIONS
+    assert found.finished(key("a/1")) == first
+    wanted, (role, came) = answers(5000), *found.answers(key("a/1")).items()
+    assert role == "test"
+    for column in fields(Answers):
+        one, other = getattr(wanted, column.name), getattr(came, column.name)
+        assert (one.dtype, one.tobytes()) == (other.dtype, other.tobytes())
+    assert found.provenance(name) == {"cpu": "a", "distributions": {"numpy": "2"}}
+    assert found.provenance(second["made_by"]) == {"cpu": "b"}
+    assert found.provenance("unknown") == {}
+
+
+def test_rows_come_in_the_order_of_names_and_of_replicates_as_numbers(tmp_path):
+    store = Store(tmp_path)
+    with store.hold():
+        for name in ("b/1", "a/10", "a/2"):
+            kept(store, name, repeat=int(name[2:]))
+    assert [one["cell"] for one in Store(tmp_path).rows()] == ["a/2", "a/10", "b/1"]
+
+
+def test_the_latest_of_a_name_counts(tmp_path):
+    with Store(tmp_path).hold() as store:
+        kept(store, "a", key=key(1), repeats=1)
+        kept(store, "a", "failed", key=key(2))
+        assert [one["status"] for one in store.rows()] == ["failed"]
+        # Found again by its key: it is the latest now, as it is asked for today; the one that failed is gone.
+        again = {**store.finished(key(1)), "repeats": 3}
+        store.reuse(again)
+        assert store.rows() == [again]
+        assert len(list((tmp_path / "cells").glob("*.h5"))) == 1
+        written = (tmp_path / "cells" / f"{key(1)}.h5").stat().st_mtime_ns
+        store.reuse(again)
+        assert (tmp_path / "cells" / f"{key(1)}.h5").stat().st_mtime_ns == written, "nothing new to say"
+        # Two finished ones of one name: the other stays for the version that made it.
+        kept(store, "a", key=key(3), score=2.0)
+    found = Store(tmp_path)
+    assert [one["key"] for one in found.rows()] == [key(3)]
+    assert len(found.answers(key(1))["test"]) == 3
+    assert found.finished(key(1))["repeats"] == 3
+
+
+def test_an_unfinished_cell_is_replaced_by_the_finished_one(tmp_path):
+    with Store(tmp_path).hold() as store:
+        kept(store, "a", "failed")
+        kept(store, "a", "timeout", key=key("a"))
+        kept(store, "b", "skipped")
+        assert store.finished(key("a")) is None
+        kept(store, "a")
+    assert [(one["cell"], one["status"]) for one in Store(tmp_path).rows()] == [("a", "done"), ("b", "skipped")]
+    assert len(list((tmp_path / "cells").glob("*.h5"))) == 2
+
+
+def _of_another_version(path):
+    import h5py
+
+    with h5py.File(path, "a") as file:
+        file.attrs["format"] = "tactbench-cell 1"
+
+
+DAMAGES = {
+    "cut": lambda path: path.write_bytes(path.read_bytes()[:-1]),
+    "empty": lambda path: path.write_bytes(b""),
+    "of another version": _of_another_version,
+    "no HDF5": lambda path: path.write_text("a, b, c"),
+}
+
+
+@pytest.mark.parametrize("damage", DAMAGES)
+def test_a_damaged_file_is_told_left_out_and_replaced(tmp_path, damage):
+    store = Store(tmp_path)
+    with store.hold():
+        kept(store, "a")
+        kept(store, "b")
+    DAMAGES[damage](file_of(tmp_path, "a"))
+    found = Store(tmp_path)
+    assert [one["cell"] for one in found.rows()] == ["b"]
+    assert found.finished(key("a")) is None
+    assert found.answers(key("a")) == {}
+    assert file_of(tmp_path, "a").name in told(found)
+    with pytest.raises(FormatError):
+        found.cell(row("a"))
+    with Store(tmp_path).hold() as again:
+        kept(again, "a", score=2.0)
+    assert Store(tmp_path).finished(key("a"))["score"] == 2.0
+    assert not Store(tmp_path).troubles
+
+
+@pytest.fixture(scope="module")
+def sound(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("sound")
+    with Store(folder).hold() as store:
+        made = kept(store, "a")
+    return made, file_of(folder, "a").read_bytes(), folder / "changed.h5"
+
+
+@given(place=st.floats(0, 1, exclude_max=True), flip=st.integers(1, 255))
+def test_a_changed_byte_is_seen_or_changes_nothing(sound, place, flip):
+    made, content, path = sound
+    where = int(place * len(content))
+    path.write_bytes(content[:where] + bytes([content[where] ^ flip]) + content[where + 1 :])
+    try:
+        found = format_of_cells.read_cell(path)
+    except FormatError:
+        return
+    assert (found.row, found.sections) == (made, SECTIONS)
+    assert found.answers["test"].y_pred.tobytes() == answers(3).y_pred.tobytes()
+
+
+def _older(index, folder):
+    index.unlink()
+    shutil.copy(folder / "older.sqlite", index)
+
+
+def _in_the_way(index, folder):
+    index.unlink()
+    index.mkdir()
+
+
+def _of_version_99(index, _):
+    with sqlite3.connect(index) as database:
+        database.execute("PRAGMA user_version = 99")
+    database.close()
+
+
+INDEXES = {
+    "lost": lambda index, _: index.unlink(),
+    "damaged": lambda index, _: index.write_bytes(b"no database" * 1000),
+    "damaged in the middle": lambda index, _: index.write_bytes(index.read_bytes()[:4096] + b"\xff" * 4096 * 20),
+    "of another version": _of_version_99,
+    "older than the files": _older,
+    "cannot be written": _in_the_way,
+}
+
+
+@pytest.mark.parametrize("what", INDEXES)
+def test_without_a_usable_index_the_rows_are_the_same(tmp_path, what):
+    with Store(tmp_path).hold() as store:
+        store.begin({"cpu": "a"})
+        kept(store, "a")
+        kept(store, "b", "failed", log="x" * 100_000 + "the end")
+        kept(store, "c", "timeout", key=key("c"))
+        shutil.copy(tmp_path / "results.sqlite", tmp_path / "older.sqlite")
+        kept(store, "c", key=key("other"))
+        before = store.rows()
+    assert len(before[1]["log"]) < 70_000
+    assert before[1]["log"].endswith("the end")
+    INDEXES[what](tmp_path / "results.sqlite", tmp_path)
+    found = Store(tmp_path)
+    assert found.rows() == before
+    assert found.troubles == ()
+    assert found.finished(key("a")) == before[0]
+    assert found.provenance(before[0]["made_by"]) == {"cpu": "a"}
+
+
+def test_a_file_added_or_taken_away_by_hand_counts(tmp_path):
+    for name in ("one", "two"):
+        with Store(tmp_path / name).hold() as store:
+            kept(store, name)
+    shutil.copy(file_of(tmp_path / "two", "two"), tmp_path / "one" / "cells")
+    assert [one["cell"] for one in Store(tmp_path / "one").rows()] == ["one", "two"]
+    file_of(tmp_path / "one", "one").unlink()
+    assert [one["cell"] for one in Store(tmp_path / "one").rows()] == ["two"]
+
+
+def test_reading_a_folder_that_is_not_there_makes_nothing(tmp_path):
+    store = Store(tmp_path / "none")
+    assert store.rows() == []
+    assert store.finished(key(1)) is None
+    assert store.answers(key(1)) == {}
+    assert not (tmp_path / "none").exists()
+
+
+@pytest.mark.parametrize("value", [math.nan, math.inf, {1}, object(), lambda: None], ids=repr)
+def test_what_is_no_plain_data_writes_nothing(tmp_path, value):
+    with Store(tmp_path).hold() as store:
+        with pytest.raises((TypeError, ValueError)):
+            kept(store, "a", chosen={"alpha": value})
+        assert list((tmp_path / "cells").iterdir()) == []
+        assert store.rows() == []
+
+
+def test_what_a_recording_says_is_read_again_when_its_file_has_changed(tmp_path):
+    path = record(tmp_path / "recordings" / "made" / "scene.h5")
+    with Store(tmp_path).hold() as store:
+        first = store.about(path)
+        assert (first["sensor"], first["scene"]) == ("made", None)
+        assert dict(Store(tmp_path).about(path)) == dict(first)
+        path.unlink()
+        record(path, seconds=9.0)
+        assert store.about(path) == first, "how long it took is no part of its content"
+        path.unlink()
+        record(path, reading=2.0)
+        assert store.about(path)["digest"] != first["digest"]
+    assert store.beside(path) == "recordings/made/scene.h5"
+    assert store.recordings({"recordings": ["recordings/made/scene.h5", "gone.h5"]}) == [
+        ("recordings/made/scene.h5", path), ("gone.h5", None),
+    ]  # fmt: skip
+
+
+def test_a_found_cell_imports_neither_hdf5_nor_numpy(tmp_path):
+    with Store(tmp_path).hold() as store:
+        kept(store, "a")
+    code = (
+        "import sys\nfrom pathlib import Path\nfrom tactbench.core.matrix.store import Store\n"
+        "with Store(Path(sys.argv[1])).hold() as store:\n"
+        "    store.reuse(store.finished(sys.argv[2]))\n"
+        "assert len(store.rows()) == 1\n"
+        "assert not {'h5py', 'numpy'} & set(sys.modules), sorted({'h5py', 'numpy'} & set(sys.modules))\n"
+    )
+    subprocess.run([sys.executable, "-c", code, str(tmp_path), key("a")], check=True, cwd=ROOT)
+
+
+# One run at a time
+
+HOLDER = """
+import sys
+from pathlib import Path
+from tactbench.core.matrix.store import Store
+with Store(Path(sys.argv[1])).hold():
+    print("held", flush=True)
+    sys.stdin.readline()
+"""
+
+
+@contextmanager
+def holder(folder):
+    pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "text": True}
+    with ending([sys.executable, "-c", HOLDER, str(folder)], cwd=ROOT, **pipes) as process:
+        assert process.stdout.readline() == "held\n"
+        yield process
+
+
+def test_a_second_run_is_refused_reading_is_not_and_kill_9_lets_go(tmp_path):
+    with Store(tmp_path).hold() as store, store.hold():
+        kept(store, "a")
+        with pytest.raises(FolderError), Store(tmp_path).hold():
+            pass
+    with holder(tmp_path) as process:
+        with pytest.raises(FolderError, match=r"Another run is at work.*--out DIR") as error, Store(tmp_path).hold():
+            pass
+        assert error.value.exit_code == 2
+        assert [one["cell"] for one in Store(tmp_path).rows()] == ["a"]
+        left = tmp_path / "cells" / f".{key('b')}.h5.1.partial"
+        left.write_bytes(b"half")
+        process.send_signal(signal.SIGKILL)
+        process.wait()
+    with Store(tmp_path).hold() as store:
+        assert not left.exists()
+        kept(store, "b")
+
+
+# A disk that refuses
+
+
+def test_a_folder_removed_or_moved_in_between_is_told_and_not_made_again(tmp_path):
+    store = Store(tmp_path / "out")
+    with store.hold():
+        kept(store, "a")
+        (tmp_path / "out").rename(tmp_path / "moved")
+        for write in (lambda: kept(store, "b"), lambda: store.write("x", "")):
+            with pytest.raises(FolderError, match="was removed or moved") as error:
+                write()
+            assert str(tmp_path / "out") in str(error.value)
+    assert not (tmp_path / "out").exists()
+    assert [one["cell"] for one in Store(tmp_path / "moved").rows()] == ["a"]
+
+
+def test_a_full_disk_keeps_what_was_finished_and_goes_on_when_there_is_room(tmp_path):
+    disk = tmp_path / "disk"
+    disk.mkdir()
+    if subprocess.run(["mount", "-t", "tmpfs", "-o", "size=900k", "test", str(disk)], capture_output=True).returncode:
+        pytest.skip("a file system can be mounted by root only")
+    try:
+        store = Store(disk / "out")
+        finished = []
+
+        def fill():
+            for number in range(1000):
+                kept(store, f"c/{number}", n=200, repeat=number)
+                finished.append(f"c/{number}")
+
+        with store.hold(), pytest.raises(FolderError, match="the disk is full"):
+            fill()
+        assert len(finished) > 5
+        assert not list(disk.rglob("*.partial"))
+        assert [one["cell"] for one in Store(disk / "out").rows()] == finished
+        subprocess.run(["mount", "-o", "remount,size=4m", str(disk)], check=True, capture_output=True)
+        with Store(disk / "out").hold() as again:
+            kept(again, "d", n=200)
+        found = Store(disk / "out")
+        assert [one["cell"] for one in found.rows()] == [*finished, "d"]
+        assert all(len(found.answers(one["key"])["test"]) == 200 for one in found.rows())
+    finally:
+        subprocess.run(["umount", "-l", str(disk)], check=True)
+
+
+def test_a_file_that_may_not_grow_is_told(tmp_path):
+    with Store(tmp_path).hold() as store:
+        kept(store, "a")
+        before, ignored = resource.getrlimit(resource.RLIMIT_FSIZE), signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+        resource.setrlimit(resource.RLIMIT_FSIZE, (10_000, before[1]))
+        try:
+            with pytest.raises(FolderError, match="larger than this process may write"):
+                kept(store, "b", n=5000)
+        finally:
+            resource.setrlimit(resource.RLIMIT_FSIZE, before)
+            signal.signal(signal.SIGXFSZ, ignored)
+    assert [one["cell"] for one in Store(tmp_path).rows()] == ["a"]
+
+
+@pytest.mark.parametrize("taken", ["out", "out/cells"])
+def test_a_folder_that_cannot_be_made_is_refused(tmp_path, taken):
+    (tmp_path / taken).parent.mkdir(exist_ok=True)
+    (tmp_path / taken).write_text("a file")
+    with pytest.raises(FolderError, match="cannot be written"), Store(tmp_path / "out").hold():
+        pass
+
+
+# docs/results.md
+
+
+def test_the_queries_of_the_page_run(tmp_path):
+    page = (ROOT / "docs" / "results.md").read_text()
+    with Store(tmp_path / "tactbench-results").hold() as store:
+        for repeat in (1, 2):
+            kept(store, f"a/{repeat}", repeat=repeat, score=float(repeat))
+        kept(store, "b/1", "failed")
+    found = []
+    with closing(sqlite3.connect(tmp_path / "tactbench-results" / "results.sqlite")) as database:
+        for query in re.findall(r"```sql\n(.*?)```", page, re.DOTALL) + re.findall(r'read_sql\("(.*?)"', page):
+            found.append(database.execute(query).fetchall())
+    means, stopped, everything = found
+    assert means == [("icub", "force", "mean", 1.5, 2)]
+    assert stopped == [("b/1", "failed", "a test says so")]
+    assert [line[0] for line in everything] == ["a/1", "a/2", "b/1"]
+    assert json.loads(everything[0][-1])["cell"] == "a/1"
