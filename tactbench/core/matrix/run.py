@@ -26,6 +26,7 @@ from tactbench.core.pool.limits import can_refuse_memory
 from tactbench.core.provenance.gather import gather, usable_cores
 from tactbench.core.spec.matrix import MatrixSpec
 from tactbench.core.spec.status import STOPPED
+from tactbench.core.spec.task import TaskSpec
 
 if TYPE_CHECKING:
     from tactbench.core.matrix.dask import Dask
@@ -169,6 +170,8 @@ class Run:
     recorded: int = 0
     _keys: dict[str, tuple[str, Sections]] = field(default_factory=dict)
     """Key and sections of the cells at work, by name."""
+    _begun: bool = False
+    """Whether a stage of the progress was begun."""
 
     def carry_out(self, cells: Sequence[Cell], *, alone: bool) -> None:
         """Record what `cells` lack and evaluate them; `alone`: one cell at a time, with nothing else at work.
@@ -186,11 +189,12 @@ class Run:
             need: {request.path for request in self.plan.requests.get(need, ()) if not request.path.exists()}
             for need in by_need
         }
-        ready = [self._jobs(members, begun=False) for need, members in by_need.items() if not lacking[need]]
+        ready = [self._jobs(members) for need, members in by_need.items() if not lacking[need]]
         later = sum(len(by_need[need]) for need in by_need if lacking[need])
         total = len(missing) + later + sum(map(len, ready))
         if not total:
             return
+        self._begun = True
         stage = "recording and evaluating" if missing else "evaluating"
         self.progress.begin(f"{stage}, timed" if alone else stage, total)
         computed = all(is_computed(request, self.registry) for request in missing)
@@ -253,7 +257,7 @@ class Run:
 
     # Cells
 
-    def _jobs(self, cells: Iterable[Cell], *, begun: bool = True) -> list[Job]:
+    def _jobs(self, cells: Iterable[Cell]) -> list[Job]:
         """Return what is to be computed of `cells` that need the same recordings; the others have their row then."""
         jobs = []
         for cell in cells:
@@ -268,7 +272,7 @@ class Run:
                 key, sections = self.keys.of_cell(cell, digests)
             except Exception as error:
                 self._keys[cell.name] = "", {}
-                self._stopped(cell, task, error, advance=begun)
+                self._stopped(cell, task, error)
                 continue
             found = self.store.finished(key)
             if found is None:
@@ -280,7 +284,7 @@ class Run:
             naming = {"cell": cell.name, "repeat": cell.repeat, "repeats": cell.repeats}
             row = {**found, **naming, **published(cell, task, found["split"])}
             self.store.reuse(row)
-            self._done(cell, row)
+            self._done(cell, row, computed=False)
         return jobs
 
     def _submit_cells(self, engine: Pool | InProcess | Dask, groups: Sequence[Sequence[Job]], at_once: int) -> None:
@@ -296,9 +300,8 @@ class Run:
                 engine.submit(work, piece)
 
     def _evaluated(self, job: Job, outcome: Any, log: str) -> None:
-        self.computed += 1
         if isinstance(outcome, BaseException):
-            self._stopped(job.cell, job.task, outcome, counted=True)
+            self._stopped(job.cell, job.task, outcome)
             return
         row, answers = outcome
         key, sections = self._keys[job.cell.name]
@@ -308,26 +311,21 @@ class Run:
         try:
             kept = self.store.keep(row, sections, answers)
         except (TypeError, ValueError) as error:
-            hint = "Its estimator or task is at fault."
-            self._stopped(
-                job.cell, job.task, PluginContractError(f"The cell's row is no plain data: {error}.", hint=hint),
-                counted=True,
-            )  # fmt: skip
+            why = PluginContractError(f"The cell's row is no plain data: {error}.", hint="Its task is at fault.")
+            self._stopped(job.cell, job.task, why)
             return
-        self._done(job.cell, kept, advance=True)
+        self._done(job.cell, kept)
 
-    def _stopped(
-        self, cell: Cell, task: Any, why: BaseException, *, counted: bool = False, advance: bool = True
-    ) -> None:
-        self.computed += not counted
+    def _stopped(self, cell: Cell, task: TaskSpec, why: BaseException) -> None:
         row = unanswered(cell, task, why, simulated=self.registry.rigs[cell.rig].simulated)
         key, sections = self._keys[cell.name]
-        self._done(cell, self.store.keep({**row, "key": key}, sections), advance=advance)
+        self._done(cell, self.store.keep({**row, "key": key}, sections))
 
-    def _done(self, cell: Cell, row: Row, *, advance: bool = False) -> None:
+    def _done(self, cell: Cell, row: Row, *, computed: bool = True) -> None:
         """Take the row of a cell; show all complete replicates if it completes one."""
         self.rows[cell.name] = row
-        if not advance:
+        self.computed += computed
+        if not (computed and self._begun):
             return
         self.progress.advance(cell.name, stopped=row["status"] in STOPPED)
         if self.shown is None or any(one.name not in self.rows for one in self.cells if one.repeat == cell.repeat):

@@ -162,7 +162,8 @@ def _opened(path: Path) -> sqlite3.Connection:
                 (version,) = database.execute("PRAGMA user_version").fetchone()
                 if version not in (0, VERSION):
                     raise sqlite3.DatabaseError(f"version {version}")
-                database.execute("PRAGMA synchronous = OFF")  # what a power cut takes is read from the files again
+                # What a crash or a power cut takes is read from the files again.
+                database.executescript("PRAGMA synchronous = OFF; PRAGMA journal_mode = MEMORY;")
                 database.executescript(_SCHEMA)
                 return database
             except sqlite3.Error:
