@@ -3,7 +3,7 @@
 Made with commit ec0567c6, in an environment of constraints.txt::
 
     tactbench run --out default
-    tactbench run --config beyond --repeats 8 --out beyond
+    tactbench run --config beyond --repeats 2 --out beyond
     tactbench import examples/mappings/eflesh-normal.yaml --root DATA/eflesh --out recordings/eflesh/normal
     tactbench import examples/mappings/eflesh-normal-raw.yaml --root DATA/eflesh --out recordings/eflesh/normal-raw
     tactbench import examples/mappings/eflesh-shear.yaml --root DATA/eflesh --out recordings/eflesh/shear

@@ -3,12 +3,13 @@
 import subprocess
 import sys
 from dataclasses import replace
+from pathlib import Path
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tactbench.core.matrix.keys import Keys, differences, names_of
+from tactbench.core.matrix.keys import Keys, differences
 from tactbench.core.matrix.plan import Cell
 from tactbench.core.plugins.registry import installed, load_registry
 from tactbench.core.provenance.source import source_digest
@@ -16,7 +17,7 @@ from tactbench.core.spec.scene import Indenter, Scene, Simulation
 from tests.conftest import ROOT
 
 CELL = Cell("ideal", "force", "twin", "deployable", "session", "lasso", (("lambda_", 0.2),), False, 1, 3, 5)
-DATA = {"flat": "d1", "round": "d2"}
+DATA = {Path("flat.h5"): "d1", Path("round.h5"): "d2"}
 
 
 @pytest.fixture(scope="module")
@@ -129,11 +130,12 @@ def test_the_indenter_counts_where_a_scene_names_it(keys):
 
 def test_keys_are_the_same_in_another_process(keys):
     text = """
+from pathlib import Path
 from tactbench.core.matrix.keys import Keys
 from tactbench.core.matrix.plan import Cell
 from tactbench.core.plugins.registry import installed
 cell = Cell("ideal", "force", "twin", "deployable", "session", "lasso", (("lambda_", 0.2),), False, 1, 3, 5)
-print(Keys(installed()).of_cell(cell, {"flat": "d1", "round": "d2"})[0])
+print(Keys(installed()).of_cell(cell, {Path("flat.h5"): "d1", Path("round.h5"): "d2"})[0])
 """
     found = {
         subprocess.run([sys.executable, "-c", text], env={"PYTHONHASHSEED": seed}, capture_output=True, text=True,
@@ -154,4 +156,3 @@ def test_what_differs_is_said_in_words():
     ]
     assert differences(now, now) == []
     assert len(differences({"text": "x" * 900}, {})[0]) < 90
-    assert names_of(["a", "b", "a", "a"]) == ["a", "b", "a (2)", "a (3)"]
