@@ -37,7 +37,7 @@ class RecordingFolder(ReplayRig):
             raise MissingRecordingError(f"There is no folder {self.folder}.", hint=_HINT)
         found = [path for path in self.folder.rglob(f"*{ENDING}") if path.is_file() and not self._hidden(path)]
         if not found:
-            unfinished = sum(1 for _ in self.folder.rglob(f"*{ENDING}.partial"))
+            unfinished = sum(1 for _ in self.folder.rglob(f"*{ENDING}*.partial"))
             left = f" ({unfinished} unfinished ones, `….partial`, are not replayed)" if unfinished else ""
             raise MissingRecordingError(f"There is no recording (*{ENDING}) in {self.folder}{left}.", hint=_HINT)
         # By parts, not by text: the order must not depend on how a separator sorts.

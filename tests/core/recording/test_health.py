@@ -63,7 +63,7 @@ def test_saturated_at_either_end_or_said_so(write):
     quality = np.zeros((N, 3), dtype=np.uint8)
     quality[20, 1] = Quality.SATURATED
     assert found(write(data, force=np.arange(N), quality=quality))["saturated"].message == (
-        f"t1 saturated in 11 of {N} samples"
+        f"taxel t1 saturated in 11 of {N} samples"
     )
 
 
@@ -129,7 +129,7 @@ def test_another_rate_than_stated(write, make_meta):
 
     meta = make_meta(reference=())
     meta = meta.model_copy(update={"sensor": meta.sensor.model_copy(update={"streams": (stream,)})})
-    with RecordingWriter(path, meta) as writer:
+    with RecordingWriter(path, meta, replace=True) as writer:
         writer.append(Block("taxels", np.arange(N) * 10_000_000, readings()))
     assert found(path)["rate"].message == "taxels runs at 100 Hz; 200 Hz are stated"
 

@@ -18,7 +18,6 @@ from tactbench.core.errors import FormatError
 from tactbench.core.matrix.store import limits
 from tactbench.core.matrix.store.image import SEE
 from tactbench.core.matrix.store.rows import Row, fault_in_row, too_deep
-from tactbench.core.recording import trust
 from tactbench.core.samples import Answers
 from tactbench.core.spec.scene import Role
 
@@ -127,7 +126,16 @@ def _opened(path: Path, image: bytes) -> tuple[str, dict[str, Answers]]:
                 raise FormatError(f"{path} does not hold what was written: its digest differs.", hint=SEE)
     except FormatError:
         raise
-    except (*trust.READ_FAILURES, MemoryError) as error:
+    except (
+        OSError,
+        LookupError,
+        RuntimeError,
+        ValueError,
+        TypeError,
+        AttributeError,
+        OverflowError,
+        MemoryError,
+    ) as error:
         raise _damaged(path, error) from error
     return row, {role: Answers(**{name: table[name].copy() for name in _COLUMNS}) for role, table in tables.items()}
 
@@ -136,14 +144,13 @@ def _text(path: Path, file: Any, name: str) -> str:
     """Return a text that is an attribute, or a dataset where it is a long one; empty if it is not there."""
     value = file.attrs.get(name)
     if value is None:
-        dataset = trust.numbers(path, file, name, "S", 0, strict=True)
-        value = b"" if dataset is None else dataset[()]
+        value = file[name][()] if name in file else b""
     return value.decode() if isinstance(value, bytes) else str(value)
 
 
 def _read(path: Path, file: Any, role: str) -> npt.NDArray[Any]:
     """Return the table of a role, looked at before it is read."""
-    dataset = trust.numbers(path, file, role, "V", 1, strict=True)
+    dataset = file[role]
     kinds = {dataset.dtype[name].base.kind for name in dataset.dtype.names or ()}
     if dataset.dtype.names != _COLUMNS or not kinds <= set("iuf"):
         raise _damaged(path, f"{role} holds {dataset.dtype}")
