@@ -71,7 +71,8 @@ def import_log(
             hint="Describe the log's tables in a mapping (docs/mappings.md), or add `log_reader` to its descriptor.",
         )
     if not log.is_file():
-        raise MissingRecordingError(f"There is no log {log}.", hint="Check its name.")
+        what = f"{log} is no regular file." if log.exists() else f"There is no log {log}."
+        raise MissingRecordingError(what, hint="Check its name.")
     if out.suffix != ENDING:
         raise UsageError(f"{out} is no name for a recording.", hint=f"Give --out a file that ends in {ENDING}.")
     if out.exists() and not replace:
@@ -97,7 +98,7 @@ def import_log(
         origin=log.name,
         counts=dict(found.counts),
     )
-    with RecordingWriter(out, meta) as writer:
+    with RecordingWriter(out, meta, replace=replace) as writer:
         for block in found.blocks:
             writer.append(block)
     with open_recording(out) as written:

@@ -19,7 +19,6 @@ from tactbench.core.spec.sensor import StreamSpec
 FORMAT = "tactbench-recording"
 VERSION = 3
 """Written; every version from 1 on is read."""
-ENDING = ".h5"
 PARTIAL = ".partial"
 """Ending of the journal of a recording that is being made."""
 COMPLETING = ".completing"
