@@ -239,19 +239,16 @@ class RecordingWriter:
                 f"A block of stream {block.stream!r} came; the recording has {', '.join(sorted(self._specs))}.",
                 hint="Declare the stream in the sensor's spec or the rig's reference.",
             )
-        if block.data.ndim != 2 or block.data.shape[1] != len(spec.channels):
-            raise RigError(
-                f"A block of stream {block.stream!r} has shape {block.data.shape}, not (n, {len(spec.channels)}).",
-                hint="A block is rows by channels, in the order of the stream's spec.",
-            )
-        for name, values in (
-            ("t_ns", block.t_ns), ("sequence", block.sequence), ("device_ns", block.device_ns),
-            ("quality", block.quality),
+        rows, wide = len(block.data), len(spec.channels)
+        for name, values, shape in (
+            ("data", block.data, (rows, wide)), ("quality", block.quality, (rows, wide)), ("t_ns", block.t_ns, (rows,)),
+            ("sequence", block.sequence, (rows,)), ("device_ns", block.device_ns, (rows,)),
         ):  # fmt: skip
-            if values is not None and len(values) != len(block.data):
+            if values is not None and np.shape(values) != shape:
                 raise RigError(
-                    f"A block of stream {block.stream!r} has {len(block.data)} rows but {len(values)} of {name}.",
-                    hint="Give one of each a row.",
+                    f"A block of stream {block.stream!r} has {name} of shape {np.shape(values)}, not (n, {wide})"
+                    f"{'' if name == 'data' else f' or (n,) with n = {rows}'}.",
+                    hint="A block is rows by channels, in the order of the stream's spec; give one time a row.",
                 )
         if (block.t_ns is None) != (self.meta.clock == "none"):
             has = "no times" if block.t_ns is None else "times"
@@ -268,14 +265,8 @@ def _columns(block: Block, spec: StreamSpec) -> Columns:
     for name, numbers in (("t_ns", block.t_ns), ("sequence", block.sequence), ("device_ns", block.device_ns)):
         if numbers is not None:
             columns[name] = _whole(np.asarray(numbers), name, spec)
-    if block.quality is not None:
-        if block.quality.shape != block.data.shape:
-            raise RigError(
-                f"A block of stream {spec.name!r} has data {block.data.shape} and quality {block.quality.shape}.",
-                hint="Give one quality a sample of each channel.",
-            )
-        if block.quality.any():
-            columns["quality"] = np.asarray(block.quality, dtype=np.uint8)
+    if block.quality is not None and block.quality.any():
+        columns["quality"] = np.asarray(block.quality, dtype=np.uint8)
     return columns
 
 

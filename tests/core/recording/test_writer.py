@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 
 from tactbench.core.errors import FormatError, RecordingError, RigError
+from tactbench.core.recording.clock_fit import HostTimes
 from tactbench.core.recording.health import examine
 from tactbench.core.recording.reader import open_recording
 from tactbench.core.recording.salvage import REMARK, rescue, salvage
-from tactbench.core.recording.times import recomputed_t_ns
 from tactbench.core.recording.writer import RecordingWriter
 from tactbench.core.samples import Block, Quality
 from tests.core.pool.patience import ending
@@ -90,7 +90,7 @@ def test_kill_9_loses_at_most_the_block_in_flight(tmp_path, make_meta, rows, aft
         assert "broke off" in recording.meta.remarks[-1]
         rescued = recording.read("taxels")
         assert np.array_equal(rescued.data, taxels.data)
-        assert np.array_equal(rescued.t_ns, recomputed_t_ns(rescued, recording.meta.clocks["taxels"]))
+        assert np.array_equal(rescued.t_ns, HostTimes(recording.meta.clocks["taxels"])(rescued.device_ns))
         assert (recording.meta.labels, recording.meta.counts) == ({"object": "ball"}, {"boards": 2})
     n = np.arange(len(taxels.data))
     assert len(n) >= written * rows
