@@ -17,7 +17,7 @@ from tactbench.core.recording import format as layout
 from tactbench.core.recording import image
 from tactbench.core.recording.partial import Annotations, Columns, Partial, read_blocks
 from tactbench.core.recording.times import with_clock_fits
-from tactbench.core.samples import Block
+from tactbench.core.samples import Block, Quality
 from tactbench.core.spec.recording import RecordingMeta
 from tactbench.core.spec.sensor import StreamSpec
 
@@ -51,6 +51,10 @@ class RecordingWriter:
         self.meta = meta
         self._replace = replace
         self._specs = layout.specs_by_name(meta)
+        self._forces = {
+            stream.name: [place for place, one in enumerate(stream.channels) if one.kind in ("force", "torque")]
+            for stream in meta.reference
+        }
         self.content_digest = ""
         """Digest of what was written, once the recording is complete."""
         self._annotations: Annotations = {}
@@ -164,7 +168,8 @@ class RecordingWriter:
         ------
         RigError
             If the block does not fit its stream: unknown name, wrong number of channels or of times, a clock where
-            there is none, readings that do not fit the stored type.
+            there is none, readings that do not fit the stored type, a force of the reference that is NaN and not marked
+            as missing.
         RecordingError
             If the disk refuses it.
         """
@@ -249,6 +254,16 @@ class RecordingWriter:
                     f"A block of stream {block.stream!r} has {name} of shape {np.shape(values)}, not (n, {wide})"
                     f"{'' if name == 'data' else f' or (n,) with n = {rows}'}.",
                     hint="A block is rows by channels, in the order of the stream's spec; give one time a row.",
+                )
+        for place in self._forces.get(block.stream, ()):
+            empty = ~np.isfinite(block.data[:, place])
+            if block.quality is not None:
+                empty &= (block.quality[:, place] & Quality.MISSING) == 0
+            if empty.any():
+                raise RigError(
+                    f"The reference {spec.channels[place].name!r} of {block.stream!r} is NaN in {int(empty.sum())} "
+                    "rows that are not marked as missing.",
+                    hint="Mark rows without a sample by the quality MISSING.",
                 )
         if (block.t_ns is None) != (self.meta.clock == "none"):
             has = "no times" if block.t_ns is None else "times"

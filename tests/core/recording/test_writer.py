@@ -265,6 +265,7 @@ def test_interrupted_anywhere_while_appending_the_rows_so_far_are_completed(tmp_
         ({"data": np.full((ROWS, 3), -1)}, "without loss"),
         ({"data": np.full((ROWS, 3), 65536)}, "without loss"),
         ({"data": np.full((ROWS, 3), np.nan)}, "without loss"),
+        ({"stream": "force_torque", "data": np.full((ROWS, 1), np.nan)}, "not marked as missing"),
     ],
 )
 def test_a_block_that_does_not_fit_is_refused(tmp_path, make_meta, wrong, says):
