@@ -67,10 +67,11 @@ def command(
     from tactbench.core.acquisition import acquire
     from tactbench.core.cli.operator import TerminalOperator
     from tactbench.core.cli.screen import remark
-    from tactbench.core.errors import TactbenchError, UsageError
+    from tactbench.core.errors import TactbenchError
     from tactbench.core.plugins.registry import load_registry
     from tactbench.core.plugins.rig_files import load_rig_file
     from tactbench.core.provenance.gather import gather
+    from tactbench.core.recording.image import require_free
 
     registry = load_registry()
     descriptor = registry.sensors[sensor]
@@ -86,8 +87,8 @@ def command(
     )
     if simulation is not None:
         scene = scene.simulated_as(simulation)
-    if out.exists() and not replace:
-        raise UsageError(f"{out} exists already.", hint="Give another name with --out, or replace it with --replace.")
+    if not replace:
+        require_free(out)
     provenance = gather()
     try:
         with ExitStack() as stack:

@@ -108,18 +108,11 @@ def specs_by_name(meta: RecordingMeta) -> dict[str, StreamSpec]:
 
 
 def channel_attributes(spec: StreamSpec) -> Iterable[tuple[str, Any]]:
-    """Yield the attributes that let an ordinary HDF5 viewer name and scale the columns."""
+    """Yield the attributes that let an ordinary HDF5 viewer name the columns."""
     if len(spec.channels) > MAX_LISTED_CHANNELS:
         return
-    nan = float("nan")
     yield "channel_names", [channel.name for channel in spec.channels]
-    yield "channel_kinds", [channel.kind for channel in spec.channels]
     yield "channel_units", [channel.unit for channel in spec.channels]
-    yield "channel_lower", np.array([nan if c.lower is None else c.lower for c in spec.channels])
-    yield "channel_upper", np.array([nan if c.upper is None else c.upper for c in spec.channels])
-    yield "channel_scale", np.array([nan if c.scale is None else c.scale.value for c in spec.channels])
-    yield "channel_signs", np.array([channel.sign for channel in spec.channels], dtype=np.int8)
-    yield "channel_position_m", np.array([channel.position_m or (nan, nan, nan) for channel in spec.channels])
 
 
 def partial_path(path: Path, attempt: int = 1) -> Path:

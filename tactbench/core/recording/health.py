@@ -14,6 +14,7 @@ from tactbench.core.recording.clock_fit import HostTimes
 from tactbench.core.recording.reader import LazyStream, Recording
 from tactbench.core.samples import Quality
 from tactbench.core.spec.recording import StreamClock, StreamCounts
+from tactbench.core.spec.sensor import ChannelSpec
 
 Severity = Literal["error", "warning", "info"]
 
@@ -54,15 +55,7 @@ class _Stream:
         self.lost_before = self.other_times = 0
         self.labels: dict[str, set[Any]] = {name: set() for name in stream.annotations}
         digests = [hashlib.sha256() for _ in channels]
-        # A temperature of a room or a position at a stop may equal a stated limit; a converter's end is what counts.
-        ends = [one.unit == "count" or one.kind in ("force", "torque") for one in channels]
-        top = np.array([
-            one.upper if end and one.upper is not None else np.inf for one, end in zip(channels, ends, strict=True)
-        ])  # fmt: skip
-        bottom = np.array([
-            one.lower if end and one.lower is not None and (one.lower != 0 or one.unit == "count") else -np.inf
-            for one, end in zip(channels, ends, strict=True)
-        ])  # fmt: skip
+        bottom, top = np.array([_ends(one) for one in channels]).T
         host = None if clock is None else HostTimes(clock)
         for block in stream.blocks():
             values = block.data.astype(np.float64) + 0.0  # -0 and 0 are one
@@ -102,6 +95,19 @@ class _Stream:
         if all(one.kind == "taxel" for one in self.spec.channels if one.name in names):
             return f"taxel{'s' if len(names) > 1 else ''} {listed}"
         return listed
+
+
+def _ends(spec: ChannelSpec) -> tuple[float, float]:
+    """Return the readings from which on a channel is saturated.
+
+    A temperature of a room or a position at a stop may equal a stated limit; a converter's end is what counts.
+    """
+    low, high = spec.lower, spec.upper
+    if spec.unit != "count" and (spec.kind not in ("force", "torque") or low == 0):
+        low = None
+    if spec.unit != "count" and spec.kind not in ("force", "torque"):
+        high = None
+    return -np.inf if low is None else low, np.inf if high is None else high
 
 
 def examine(recording: Recording) -> list[Finding]:

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from tactbench.core.errors import RecordingError, UnwritableError
+from tactbench.core.errors import UnwritableError
 from tactbench.core.recording import format as layout
 from tactbench.core.recording.partial import Annotations, Columns
 from tactbench.core.recording.reader import Recording, open_recording
@@ -78,9 +78,11 @@ def store(
 
 
 def require_free(path: Path) -> None:
-    """Raise RecordingError if there is a recording already."""
+    """Raise UnwritableError if there is a recording already."""
     if path.exists():
-        raise RecordingError(f"{path} exists already.", hint="Give another name, or move the old recording away.")
+        raise UnwritableError(
+            f"{path} exists already.", hint="Give another name with --out, or replace it with --replace."
+        )
 
 
 def cannot_write(path: Path, error: OSError) -> UnwritableError:

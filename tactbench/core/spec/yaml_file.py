@@ -92,12 +92,12 @@ def _look(node: Any, at: Path_, lines: dict[Path_, int], file: str) -> None:
             if key in seen:
                 raise ConfigError(file, line, f"the key {key!r} stands here twice.", hint="Remove one of them.")
             seen.add(key)
-            place = (*at, int(key) if number else key)
+            place: Path_ = (*at, int(key) if number else key)
             lines[place] = line
             _look(value_node, place, lines, file)
     elif isinstance(node, yaml.SequenceNode):
-        for place, item in enumerate(node.value):
-            _look(item, (*at, place), lines, file)
+        for index, item in enumerate(node.value):
+            _look(item, (*at, index), lines, file)
     elif node.tag in (_INT, _FLOAT) and _ODD_NUMBER.match(node.value):
         written = node.value[:80]
         raise ConfigError(
@@ -117,11 +117,11 @@ def _explain(
     at, line = _deepest(loc, lines)
     name = ".".join(str(part) for part in at) or "the file"
     if first["type"] == "extra_forbidden":
-        known = _siblings(error, loc, model)
-        close = nearest(str(loc[-1]), known)
-        meant = f"Did you mean {' or '.join(repr(word) for word in close)}? " if close else ""
-        listing = f"Known here: {', '.join(sorted(known))}." if known else ""
-        return ConfigError(file, line, f"the key {str(loc[-1])!r} is not known.", hint=f"{meant}{listing}".strip())
+        schema = model.model_json_schema()
+        parts = (schema, *schema.get("$defs", {}).values())
+        close = nearest(str(loc[-1]), {key for part in parts for key in part.get("properties", {})})
+        meant = f"Did you mean {' or '.join(repr(word) for word in close)}?" if close else "Remove it."
+        return ConfigError(file, line, f"the key {str(loc[-1])!r} is not known.", hint=meant)
     if first["type"] == "missing":
         return ConfigError(file, line, f"the key {str(loc[-1])!r} is missing in {name}.", hint="Add it.")
     text = _written(root, at)
@@ -150,33 +150,3 @@ def _written(node: yaml.Node, at: Path_) -> str:
     if not isinstance(node, yaml.ScalarNode):
         return ""
     return repr(node.value) if node.tag == _TEXT else str(node.value)
-
-
-def _siblings(error: ValidationError, loc: Path_, model: type[BaseModel]) -> set[str]:
-    """Return the keys that the model of the unknown key's parent knows."""
-    current: Any = model
-    for part in loc[:-1]:
-        current = _step(current, part)
-        if current is None:
-            return set()
-    inside = [argument for argument in getattr(current, "__args__", ()) if hasattr(argument, "model_fields")]
-    fields = getattr(inside[0] if len(inside) == 1 else current, "model_fields", {})
-    return {field.alias or name for name, field in fields.items()}
-
-
-def _step(current: Any, part: str | int) -> Any:
-    """Return the model found under `part`, looking through unions, lists and dicts."""
-    fields = getattr(current, "model_fields", None)
-    if fields is not None:
-        by_alias = {field.alias or name: field for name, field in fields.items()}
-        return by_alias[str(part)].annotation if str(part) in by_alias else current
-    arguments = [argument for argument in getattr(current, "__args__", ()) if argument is not type(None)]
-    models = [argument for argument in arguments if hasattr(argument, "model_fields")]
-    if isinstance(part, str) and len(models) > 1:
-        for candidate in models:
-            tags = [field.default for field in candidate.model_fields.values()]
-            if part in tags or part == candidate.__name__:
-                return candidate
-    if arguments:
-        return _step(arguments[-1], part) if not models else models[0]
-    return None

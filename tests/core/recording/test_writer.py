@@ -9,7 +9,7 @@ from functools import partial
 import numpy as np
 import pytest
 
-from tactbench.core.errors import FormatError, RecordingError, RigError
+from tactbench.core.errors import FormatError, RecordingError, RigError, UnwritableError
 from tactbench.core.recording.clock_fit import HostTimes
 from tactbench.core.recording.health import examine
 from tactbench.core.recording.reader import open_recording
@@ -193,15 +193,15 @@ def test_each_attempt_has_its_own_journal_and_no_recording_is_overwritten_unaske
     with pytest.raises(RigError):
         record(path, make_meta(), appending(rows=3), fail)
     kept = (tmp_path / "x.h5.partial").read_bytes()
-    with pytest.raises(RecordingError, match="exists already"):
+    with pytest.raises(UnwritableError, match="exists already"):
         record(path, make_meta(), appending(rows=5), meanwhile)
     assert [one.name for one in sorted(tmp_path.iterdir())] == ["x.h5", "x.h5.2.partial", "x.h5.partial"]
     assert (tmp_path / "x.h5.partial").read_bytes() == kept
     with open_recording(path) as recording, salvage(tmp_path / "x.h5.2.partial") as late:
         assert (len(recording.stream("taxels")), len(late.stream("taxels"))) == (ROWS, 5)
-    with pytest.raises(RecordingError, match="exists already"):
+    with pytest.raises(UnwritableError, match="exists already"):
         rescue(tmp_path / "x.h5.2.partial", path)
-    with pytest.raises(RecordingError, match="exists already"):
+    with pytest.raises(UnwritableError, match="exists already"):
         record(path, make_meta())
 
 
