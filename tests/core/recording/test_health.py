@@ -136,14 +136,3 @@ def test_another_rate_than_stated(write, make_meta):
 
 def test_an_empty_stream(write):
     assert found(write(np.zeros((0, 3), dtype=int), reference=()))["empty"].severity == "error"
-
-
-def test_the_worst_comes_first(write):
-    data = readings()
-    data[:, 0] = 5
-    times = np.arange(N) * 10_000_000
-    times[5] = 0
-    with open_recording(write(data, t_ns=times, clock="device")) as recording:
-        severities = [finding.severity for finding in examine(recording)]
-    assert severities == sorted(severities, key=["error", "warning", "info"].index)
-    assert severities[0] == "error"

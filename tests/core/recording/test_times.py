@@ -85,14 +85,6 @@ def test_where_the_device_is_not_the_clock_times_are_as_they_came(tmp_path, make
     assert read.host_ns is None
 
 
-def test_device_times_in_some_blocks_only_are_refused(tmp_path, make_meta):
-    n = np.arange(5)
-    with RecordingWriter(tmp_path / "x.h5", make_meta()) as writer:
-        writer.append(Block("taxels", n, np.ones((5, 3)), device_ns=n))
-        with pytest.raises(RigError, match="device times"):
-            writer.append(Block("taxels", n + 5, np.ones((5, 3))))
-
-
 def test_a_block_after_the_labels_is_refused(tmp_path, make_meta):
     n = np.arange(5)
     with RecordingWriter(tmp_path / "x.h5", make_meta()) as writer:

@@ -218,11 +218,6 @@ def test_archives_that_do_not_fit(run, tmp_path, arrays, says):
     refused(run, tmp_path, says, **NPZ)
 
 
-def test_an_archive_that_is_none(run, put, tmp_path):
-    put("x.npz", "PK\x03\x04 not an archive")
-    refused(run, tmp_path, "x.npz", **NPZ)
-
-
 MAT = {**NPZ, "tables__table": {"files": "*.mat", "read": {**NPZ["tables__table"]["read"], "format": "mat"}}}
 
 
@@ -364,6 +359,7 @@ def test_two_tables_row_by_row_each_with_its_clock(run, put):
     ("files", "says"),
     [
         ({"1_probe/states.csv": states(39)}, "39 rows"),
+        ({"1_probe/sensor.csv": rows(41), "1_probe/states.csv": states(41)}, "41 rows: not a whole number of 20"),
         ({"1_probe/states.csv": states(late_ms=5.5)}, "5.5 ms from that of 1_probe/sensor.csv:1"),
         ({}, "No file matches '*/states.csv'"),
         ({"2_probe/states.csv": states()}, "1_probe/sensor.csv needs one file of table 'states' (start 1)"),
@@ -375,12 +371,6 @@ def test_tables_that_do_not_belong_together(run, put, tmp_path, files, says):
     for name, text in files.items():
         put(name, text)
     refused(run, tmp_path, says, **JOINED)
-
-
-def test_presses_must_come_out_even(run, put, tmp_path):
-    put("1_probe/sensor.csv", rows(41))
-    put("1_probe/states.csv", states(41))
-    refused(run, tmp_path, "41 rows: not a whole number of 20", **JOINED)
 
 
 def test_one_file_of_several_sessions(run, put):
@@ -437,11 +427,6 @@ def test_a_header_of_numbers_is_a_row(run, put, tmp_path, name):
     assert run(tables__table__read={"format": name, "header": False}).rows == 40
 
 
-def test_named_columns_are_read_by_place_too(run, put):
-    put("press.csv", "t,a,b,c,f\n" + rows())
-    assert run(tables__table__read={"format": "csv", "header": True}).rows == 40
-
-
 @pytest.mark.parametrize(("kind", "unit"), [("force", "kg"), ("force", "mm"), ("force", "count"), ("torque", "N")])
 def test_a_target_in_a_unit_of_something_else_is_refused(run, put, tmp_path, kind, unit):
     put("press.csv", rows())
@@ -478,11 +463,6 @@ def test_words_for_no_sample(run, put):
 def test_tables_that_do_not_fit(run, put, tmp_path, text, says):
     put("press.csv", text)
     assert isinstance(refused(run, tmp_path, *says), MappingError)
-
-
-def test_a_table_that_is_no_text(run, tmp_path):
-    (tmp_path / "data" / "press.csv").write_bytes(b"\xff\xfe\x00")
-    refused(run, tmp_path, "press.csv is not UTF-8")
 
 
 def test_a_missing_name_offers_the_nearest(run, put, tmp_path):
@@ -571,16 +551,6 @@ def test_again(run, put, tmp_path):
     assert report.rows == 41
     with open_recording(first.path) as recording:
         assert len(recording.stream("taxels")) == 41
-
-
-def test_progress_is_told(put, run, tmp_path):
-    for name in "abc":
-        put(f"{name}.csv", rows())
-    (tmp_path / "mapping.yaml").write_text(yaml.safe_dump(mapping()))
-    told = []
-    import_tables(tmp_path / "mapping.yaml", root=tmp_path / "data", out=tmp_path / "out",
-                  progress=lambda done, total, what: told.append((done, total, what)))  # fmt: skip
-    assert told == [(1, 3, "a.csv"), (2, 3, "b.csv"), (3, 3, "c.csv")]
 
 
 def test_a_folder_that_cannot_be_written(run, put, tmp_path):
