@@ -96,7 +96,7 @@ def import_log(
         origin=log.name,
         counts=dict(found.counts),
     )
-    with RecordingWriter(out, meta, replace=replace) as writer:
+    with RecordingWriter(out, meta, replace=replace, keep=False) as writer:
         for block in found.blocks:
             writer.append(block)
     with open_recording(out) as written:

@@ -39,6 +39,9 @@ class RecordingWriter:
         What it says about itself; :meth:`revise` changes it until the end.
     replace
         Whether a file that is there is replaced, at the end and not before.
+    keep
+        Whether the journal stays of a recording that could not be completed; False where it can be made again, from a
+        table or a log.
 
     Raises
     ------
@@ -46,10 +49,11 @@ class RecordingWriter:
         If there is a file and it is not to be replaced, the disk refuses, or `meta` cannot be stored.
     """
 
-    def __init__(self, path: Path, meta: RecordingMeta, *, replace: bool = False) -> None:
+    def __init__(self, path: Path, meta: RecordingMeta, *, replace: bool = False, keep: bool = True) -> None:
         self.path = path
         self.meta = meta
         self._replace = replace
+        self._keep = keep
         self._specs = layout.specs_by_name(meta)
         self._forces = {
             stream.name: [place for place, one in enumerate(stream.channels) if one.kind in ("force", "torque")]
@@ -118,10 +122,10 @@ class RecordingWriter:
             )
 
     def _leave(self, error: BaseException | None) -> None:
-        """Close the journal; remove it unless rows of a real device are in it and nowhere else."""
+        """Close the journal; remove it unless it holds rows that are nowhere else."""
         journal, self._partial = self._open, None
         journal.close()
-        if not self.content_digest and any(journal.rows.values()) and not self.meta.simulated:
+        if not self.content_digest and any(journal.rows.values()) and self._keep and not self.meta.simulated:
             self.journal = journal.path
             found = recovery(journal.path, self.path)
             if isinstance(error, TactbenchError):

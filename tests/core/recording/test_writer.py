@@ -27,9 +27,9 @@ def block(first=0, rows=ROWS, **change):
     return Block(**{"stream": "taxels", "t_ns": n * 1000, "data": data.astype(np.uint16), **change})
 
 
-def record(path, meta, *steps, replace=False):
+def record(path, meta, *steps, **options):
     """Write a recording step by step; return the writer."""
-    with RecordingWriter(path, meta, replace=replace) as writer:
+    with RecordingWriter(path, meta, **options) as writer:
         for step in steps:
             step(writer)
     return writer
@@ -178,6 +178,13 @@ def test_an_exception_leaves_the_old_file_alone_and_the_journal_of_a_real_device
     assert f"tactbench inspect {path}.partial --rescue" in said
     with salvage(tmp_path / "press.h5.partial") as recording:
         assert len(recording.stream("taxels")) == 3
+
+
+def test_nothing_is_kept_of_what_can_be_made_again(tmp_path, make_meta):
+    wrong = lambda writer: writer.append(block(t_ns=None))  # noqa: E731
+    with pytest.raises(RigError):
+        record(tmp_path / "x.h5", make_meta(), appending(), wrong, keep=False)
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_each_attempt_has_its_own_journal_and_no_recording_is_overwritten_unasked(tmp_path, make_meta):

@@ -176,7 +176,7 @@ def _write(
         for name, table in raw.tables.items()
         if (time := mapping.tables[name].time) is not None
     }
-    with RecordingWriter(path, meta) as writer:
+    with RecordingWriter(path, meta, keep=False) as writer:
         for name, stream in streams.items():
             table = raw.tables[stream.source.table]
             read_in = samples(stream, table)
