@@ -23,7 +23,7 @@ from collections.abc import Callable
 import numpy as np
 import numpy.typing as npt
 
-from tactbench.core.recording.clock_fit import STRETCH_NS, ClockFit, HostTimes, two_way
+from tactbench.core.recording.clock_fit import STRETCH_NS, ClockFit, HostTimes
 from tactbench.core.spec.recording import StreamClock
 
 Times = npt.NDArray[np.int64]
@@ -119,27 +119,6 @@ def row(
     return missed, float(error.max())
 
 
-def two_way_row(seeds: range, seconds: float, extra_s: float) -> int:
-    """Print one line of polls at 10 Hz; return how many runs the bound missed."""
-    errors, bounds = [], []
-    for seed in seeds:
-        rng = np.random.default_rng([seed, 2])
-        device, true = clocks(rng, seconds, 10.0, 0.0, 600.0)
-        way = 0.2e-3 + rng.exponential(0.5e-3, (2, len(device)))
-        fit = ClockFit(two_way)
-        sent, came = (np.rint(one * 1e9).astype(np.int64) for one in (way[0] + extra_s, way[1]))
-        fit.add(device, true - sent, true + came)
-        segments = fit.segments()
-        given = HostTimes(StreamClock(source="device", segments=segments))(device)
-        errors.append(float(np.abs(given - true).max()) / 1e3)
-        bounds.append(max(segment.bound_ns or 0 for segment in segments) / 1e3)
-    missed = sum(error > bound for error, bound in zip(errors, bounds, strict=True))
-    print(f"two-way, {seconds:.0f} s, 10 Hz, asymmetry {extra_s * 1e3:.1f} ms: {len(errors)} runs, {missed} missed, "
-          f"error median {np.median(errors):.0f} worst {max(errors):.0f} us, "
-          f"bound median {np.median(bounds):.0f} largest {max(bounds):.0f} us")  # fmt: skip
-    return missed
-
-
 def main() -> int:
     """Print the tables; 1 if a bound was missed."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
@@ -161,9 +140,6 @@ def main() -> int:
         for ppm, period in ((1.0, 600.0), (2.0, 300.0), (0.5, 120.0)):
             missed += row("exponential", few, 600, 100, wander_ppm=ppm, period_s=period)[0]
             row("exponential", few, 600, 100, wander_ppm=ppm, period_s=period, stretch_ns=one_line)
-    for seconds in (60.0, 600.0):
-        for extra in (0.0, 1e-3):
-            missed += two_way_row(range(max(4, asked.runs // 4)), seconds, extra)
     print(f"missed: {missed} (records with wander on one line not counted)")
     return 1 if missed else 0
 

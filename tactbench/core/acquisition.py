@@ -11,7 +11,7 @@ from pathlib import Path
 from types import FrameType
 from typing import Any, NamedTuple
 
-from tactbench.core.errors import LinkError, RigError
+from tactbench.core.errors import RigError
 from tactbench.core.plugins.interfaces import Acquisition, Rig
 from tactbench.core.recording.writer import RecordingWriter
 from tactbench.core.samples import Block
@@ -40,7 +40,9 @@ def acquire(
     clock: Callable[[], float],
     provenance: Mapping[str, Any],
     watch: Callable[[Block], None] | None = None,
-    interrupted: Path | None = None,
+    name: str = "",
+    replace: bool = False,
+    complete_interrupted: bool = False,
 ) -> Acquired:
     """Carry out `scene` and write what the rig yields to `path`.
 
@@ -57,9 +59,14 @@ def acquire(
         ``provenance["acquisition_s"]`` otherwise. Writing the file is not counted.
     watch
         Called with every block, once it is written.
-    interrupted
-        Where a recording that was cut short on a real rig is completed, excluded from every evaluation, before the
-        error goes on; None, or a simulated rig: nothing is left behind.
+    name
+        Of the recording; empty: that of the scene.
+    replace
+        Whether a recording that is there already is replaced.
+    complete_interrupted
+        Whether a recording that was cut short on a real rig is completed, excluded from every evaluation, before the
+        error goes on. Otherwise its journal stays, and the error names the command that makes a recording of it. Of a
+        simulation nothing is left behind.
 
     Raises
     ------
@@ -76,10 +83,10 @@ def acquire(
         _one_interrupt() as ignore_interrupts,
         rig.open(sensor, scene, seed=seed) as acquisition,
     ):
-        meta = _meta(acquisition, sensor, descriptor, scene, role, seed)
+        meta = _meta(acquisition, sensor, descriptor, scene, role, seed, name or scene.name)
         spent = clock() - began
         key = "sim_s" if descriptor.simulated else "acquisition_s"
-        with RecordingWriter(path, meta) as writer:
+        with RecordingWriter(path, meta, replace=replace) as writer:
             try:
                 blocks = iter(acquisition)
                 while True:
@@ -98,12 +105,13 @@ def acquire(
                         hint="Look at the rig, and record it again.",
                     )
                 _check_not_silent(acquisition, writer.rows)
-            except (KeyboardInterrupt, LinkError, RigError) as error:
+            except BaseException as error:
                 ignore_interrupts()
                 alarm = _stopped(acquisition, error)
-                if interrupted is not None and not descriptor.simulated and any(writer.rows.values()):
+                if not descriptor.simulated and any(writer.rows.values()):
                     _conclude(writer, acquisition, descriptor, {**provenance, key: spent}, _why(error))
-                    writer.complete_at(interrupted)
+                    if complete_interrupted:
+                        writer.complete()
                 if alarm and isinstance(error, KeyboardInterrupt):
                     raise RigError(f"It was interrupted, and the rig is not as it should be: {alarm}.") from error
                 raise
@@ -164,7 +172,7 @@ def _conclude(
     provenance: dict[str, Any],
     why: str = "",
 ) -> None:
-    """Write down what is known at the end; `why` it was cut short, if it was."""  # fmt: skip
+    """Write down what is known at the end; `why` it was cut short, if it was."""
     remarks = tuple(str(text) for name, text in acquisition.drawn.items() if name.startswith("remark "))
     writer.revise(
         plan=tuple(acquisition.plan),
@@ -184,7 +192,7 @@ def _stopped(acquisition: Acquisition, error: BaseException) -> str:
 
 
 def _why(error: BaseException) -> str:
-    return "stopped by hand" if isinstance(error, KeyboardInterrupt) else str(error)
+    return "stopped by hand" if isinstance(error, KeyboardInterrupt) else str(error) or type(error).__name__
 
 
 def _settled(counts: StreamCounts, written: int, cut_short: bool) -> StreamCounts:
@@ -220,11 +228,12 @@ def _meta(
     scene: Scene,
     role: Role | None,
     seed: int,
+    name: str,
 ) -> RecordingMeta:
     recorded_hz = {stream.name: stream.rate_hz for stream in acquisition.streams}
     own_hz = {stream.name: stream.rate_hz for stream in sensor.spec.streams if stream.rate_hz is not None}
     return RecordingMeta(
-        name=scene.name,
+        name=name,
         sensor=sensor.spec.model_copy(update={"streams": tuple(acquisition.streams)}),
         own_rates_hz={name: rate for name, rate in own_hz.items() if recorded_hz.get(name, rate) != rate},
         reference=tuple(acquisition.reference),

@@ -41,7 +41,7 @@ class RecordingFolder(ReplayRig):
         for below, folders, names in os.walk(self.folder):  # passes over what vanishes meanwhile, or may not be read
             folders[:] = [name for name in folders if not name.startswith(".")]
             for name in names:
-                unfinished += name.endswith(f"{ENDING}.partial")
+                unfinished += name.endswith(".partial")
                 path = Path(below, name)
                 if name.endswith(ENDING) and not name.startswith(".") and path.is_file():
                     found.append(path)

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from tactbench.core.acquisition import acquire
-from tactbench.core.errors import LinkUnplugged, RecordingError, RigError
+from tactbench.core.errors import LinkUnplugged, RigError
 from tactbench.core.recording.reader import content_digest, open_recording
 from tactbench.core.recording.salvage import rescue
 from tactbench.core.samples import Block
@@ -135,11 +135,19 @@ def test_a_rig_that_fails_leaves_nothing(tmp_path, fails_at):
     assert rig.closed
 
 
-def test_the_same_seed_says_the_same(tmp_path):
-    for name in ("a", "b"):
-        run(tmp_path / f"{name}.h5", Weights())
-    with open_recording(tmp_path / "a.h5") as a, open_recording(tmp_path / "b.h5") as b:
-        assert a.content_digest() == b.content_digest()
+def test_the_seed_and_the_scene_decide_the_content_and_not_the_name(tmp_path):
+    """What was computed on the way is provenance: it may differ in the last bit between processors."""
+
+    class Elsewhere(Weights):
+        plan = (PlanEntry(effect="creep", included=False, reason="nobody looks", change=1e-9),)
+
+        def __iter__(self):
+            yield from super().__iter__()
+            self.drawn = {"solver_residual": 1e-9}
+
+    digests = [run(tmp_path / f"{name}.h5", rig, name=name).content_digest
+               for name, rig in (("a", Weights()), ("b", Weights()), ("c", Elsewhere()))]  # fmt: skip
+    assert len(set(digests)) == 1
 
 
 class Devices(Weights):
@@ -213,26 +221,34 @@ def test_emulated_devices_in_real_time_have_their_clocks_fitted(tmp_path):
 STOPS = [
     (KeyboardInterrupt(), KeyboardInterrupt, "stopped by hand"),
     (LinkUnplugged("the cable is gone"), LinkUnplugged, "the cable is gone"),
-    (RigError("the driver gave up"), RigError, "the driver gave up"),
+    (ValueError("a bug of the driver"), ValueError, "a bug of the driver"),
     ("the force sensor is unplugged", RigError, "the force sensor is unplugged"),
 ]
 
 
+@pytest.mark.parametrize("complete", [True, False])
 @pytest.mark.parametrize(("stops", "raised", "says"), STOPS)
-def test_what_a_real_rig_had_recorded_is_kept_where_asked(tmp_path, stops, raised, says):
-    kept = tmp_path / "kept" / "r.h5"
-    with pytest.raises(raised, match=None if raised is KeyboardInterrupt else says):
-        run(tmp_path / "r.h5", Devices(stops=stops), simulated=False, interrupted=kept)
-    assert [path.name for path in tmp_path.iterdir()] == ["kept"]
-    with open_recording(kept) as recording:
+def test_what_a_real_rig_had_recorded_is_kept(tmp_path, stops, raised, says, complete):
+    """As a recording where that is asked for, or else as a journal that a command makes a recording of."""
+    path = tmp_path / "r.h5"
+    with pytest.raises(raised) as caught:
+        run(path, Devices(stops=stops), simulated=False, complete_interrupted=complete)
+    said = " ".join([str(caught.value), *getattr(caught.value, "__notes__", ())])
+    if not complete:
+        assert [one.name for one in tmp_path.iterdir()] == ["r.h5.partial"]
+        assert "r.h5.partial --rescue" in said
+        rescue(tmp_path / "r.h5.partial", path)
+        (tmp_path / "r.h5.partial").unlink()
+    assert [one.name for one in tmp_path.iterdir()] == ["r.h5"]
+    with open_recording(path) as recording:
         recording.verify()
         meta = recording.meta
         assert len(recording.stream("taxels")) == 160
     assert meta.excluded.startswith("interrupted: ")
     assert says in meta.excluded
-    assert says in meta.remarks[-1]
+    assert any(says in remark for remark in meta.remarks)
     assert meta.clocks["taxels"].segments
-    assert meta.streams["taxels"].written == 160
+    assert meta.streams["taxels"] == StreamCounts(received=162, written=160, dropped=2)
     assert meta.provenance["acquisition_s"] > 0
 
 
@@ -252,7 +268,7 @@ class Moving(Devices):
 def test_what_moves_is_stopped_before_anything_is_completed(tmp_path, stops, raised, says):
     rig = Moving(tmp_path / "kept.h5", stops=stops)
     with pytest.raises(raised):
-        run(tmp_path / "r.h5", rig, simulated=False, interrupted=rig.kept)
+        run(rig.kept, rig, simulated=False, complete_interrupted=True)
     ((why, kept),) = rig.told
     assert says in why
     assert not kept
@@ -277,7 +293,7 @@ class Impatient(Moving):
 def test_further_interrupts_do_not_cost_what_the_first_one_keeps(tmp_path, stops):
     rig = Impatient(tmp_path / "kept.h5", stops=stops)
     with pytest.raises(KeyboardInterrupt if stops is None else LinkUnplugged):
-        run(tmp_path / "r.h5", rig, simulated=False, interrupted=rig.kept,
+        run(rig.kept, rig, simulated=False, complete_interrupted=True,
             watch=None if stops else lambda block: os.kill(os.getpid(), signal.SIGINT))  # fmt: skip
     with open_recording(rig.kept) as recording:
         recording.verify()
@@ -287,40 +303,20 @@ def test_further_interrupts_do_not_cost_what_the_first_one_keeps(tmp_path, stops
 def test_an_interrupt_after_which_it_still_moves_is_an_error_that_says_so(tmp_path):
     rig = Moving(tmp_path / "kept.h5", "stand clear", stops=KeyboardInterrupt())
     with pytest.raises(RigError, match=r"interrupted, .* stand clear\."):
-        run(tmp_path / "r.h5", rig, simulated=False, interrupted=rig.kept)
+        run(rig.kept, rig, simulated=False, complete_interrupted=True)
     assert rig.kept.exists()
 
 
-@pytest.mark.parametrize(("stops", "raised", "says"), STOPS)
-@pytest.mark.parametrize(("simulated", "asked"), [(True, True), (False, False)])
-def test_nothing_is_kept_of_a_simulation_or_unasked(tmp_path, stops, raised, says, simulated, asked):
-    with pytest.raises(raised, match=None if raised is KeyboardInterrupt else says):
-        run(
-            tmp_path / "r.h5", Devices(stops=stops), simulated=simulated,
-            interrupted=tmp_path / "kept.h5" if asked else None,
-        )  # fmt: skip
+def test_nothing_is_kept_of_a_simulation(tmp_path):
+    with pytest.raises(RigError):
+        run(tmp_path / "r.h5", Devices(stops="gone"), complete_interrupted=True)
     assert list(tmp_path.iterdir()) == []
 
 
 def test_interrupted_before_the_first_row_there_is_nothing_to_keep(tmp_path):
     with pytest.raises(RigError, match="fell off"):
-        run(tmp_path / "r.h5", Weights(fails_at=0), simulated=False, interrupted=tmp_path / "kept.h5")
+        run(tmp_path / "r.h5", Weights(fails_at=0), simulated=False, complete_interrupted=True)
     assert list(tmp_path.iterdir()) == []
-
-
-def test_an_interrupted_recording_that_cannot_be_completed_leaves_its_journal(tmp_path):
-    (tmp_path / "taken").write_text("a file")
-    with pytest.raises(RecordingError, match="cannot be written"):
-        run(
-            tmp_path / "r.h5", Devices(stops=RigError("gone")), simulated=False, interrupted=tmp_path / "taken" / "r.h5"
-        )
-    rescue(tmp_path / "r.h5.partial", tmp_path / "rescued.h5")
-    with open_recording(tmp_path / "rescued.h5") as recording:
-        recording.verify()
-        meta = recording.meta
-    assert "gone" in meta.excluded
-    assert meta.streams["taxels"] == StreamCounts(received=162, written=160, dropped=2)
-    assert meta.clocks["taxels"].method == "hull-1way"
 
 
 def test_a_simulation_says_the_same_whatever_number_of_threads_blas_was_started_with(tmp_path):

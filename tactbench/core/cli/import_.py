@@ -11,7 +11,10 @@ from tactbench.core.cli.screen import remark
 from tactbench.core.tables.text import command_line, visible
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable
+
     from tactbench.core.recording.device_log import ImportedLog
+    from tactbench.core.recording.health import Finding
     from tactbench.core.recording.mapping import ImportReport
     from tactbench.core.spec.scene import Role
 
@@ -50,13 +53,14 @@ def command(
 ) -> None:
     """Turn foreign tables into recordings, as MAPPING (a YAML file) says, or with --sensor a LOG into one.
 
-    All of them are written, or none. What was marked as "no sample" is counted. Exit code 1 if a finding is an error,
-    as of `tactbench inspect`. See docs/mappings.md.
+    All of them are written, or none. What was marked as "no sample" is counted. See docs/mappings.md. Exit code 1 if
+    what was written has an error, as `inspect` finds them.
     """
     if sensor is None:
         if options or labels or session is not None or role is not None:
             raise click.UsageError("--option, --session, --role and --label are for logs: name the --sensor.")
-        ctx.exit(1 if _import_tables(source, root, out, replace) else 0)
+        sound = _import_tables(source, root, out, replace)
+        ctx.exit(0 if sound else 1)
     if root is not None:
         raise click.UsageError("--root is for mappings: leave it out, or --sensor.")
     from tactbench.core.plugins.registry import load_registry
@@ -71,11 +75,15 @@ def command(
     for line in log_summary(made, target):
         click.echo(visible(line))
     remark(f"See what is in it:  {command_line('tactbench', 'inspect', str(target))}")
-    ctx.exit(1 if any(finding.severity == "error" for finding in made.findings) else 0)
+    ctx.exit(0 if _sound(made.findings) else 1)
+
+
+def _sound(findings: Iterable[Finding]) -> bool:
+    return all(finding.severity != "error" for finding in findings)
 
 
 def _import_tables(mapping: Path, root: Path | None, out: Path | None, replace: bool) -> bool:
-    """Import tables, print what became of them, and return whether a finding is an error."""
+    """Return whether no recording has an error."""
     from tactbench.core.cli.progress import progress
     from tactbench.core.recording.mapping import import_tables
 
@@ -93,7 +101,7 @@ def _import_tables(mapping: Path, root: Path | None, out: Path | None, replace: 
         report = import_tables(mapping, root=root, out=target, progress=tell, replace=replace)
     for line in summary(report, target):
         click.echo(visible(line))
-    return any(finding.severity == "error" for one in report.recordings for finding in one.findings)
+    return _sound(finding for recording in report.recordings for finding in recording.findings)
 
 
 def _pairs(option: str, given: tuple[str, ...]) -> dict[str, Any]:

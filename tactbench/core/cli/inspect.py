@@ -54,14 +54,12 @@ def describe(recording: Recording) -> dict[str, Any]:
     from tactbench.core.recording.health import examine
 
     findings = [asdict(finding) for finding in examine(recording)]
-    if recording.complete:
-        recording.verify()
     meta = recording.meta
     own = {stream.name for stream in meta.sensor.streams}
     return {
         "file": str(recording.path),
         "complete": recording.complete,
-        "content_sha256": recording.content_digest(),
+        "content_sha256": recording.verify() if recording.complete else recording.content_digest(),
         "meta": meta.model_dump(mode="json", exclude={"sensor", "reference"}),
         "sensor": meta.sensor.name,
         "streams": [
@@ -73,23 +71,23 @@ def describe(recording: Recording) -> dict[str, Any]:
 
 
 def _stream(recording: Recording, name: str) -> dict[str, Any]:
-    data = recording.read(name)
-    seconds, rate = None, None
-    if data.t_ns is not None and len(data.t_ns) > 1:
-        seconds = float(data.t_ns[-1] - data.t_ns[0]) * 1e-9
-        rate = (len(data.t_ns) - 1) / seconds if seconds > 0 else None
+    stream = recording.stream(name)
+    t_ns, seconds, rate = stream.times(), None, None
+    if t_ns is not None and len(t_ns) > 1:
+        seconds = float(t_ns[-1] - t_ns[0]) * 1e-9
+        rate = (len(t_ns) - 1) / seconds if seconds > 0 else None
     kinds: dict[tuple[str, str], list[str]] = {}
-    for channel in data.spec.channels:
+    for channel in stream.spec.channels:
         kinds.setdefault((channel.kind, channel.unit), []).append(channel.name)
     return {
         "stream": name,
-        "rows": len(data.data),
-        "dtype": str(data.data.dtype),
+        "rows": len(stream),
+        "dtype": stream.spec.dtype,
         "seconds": seconds,
         "mean_rate_hz": rate,
-        "stated_rate_hz": data.spec.rate_hz,
+        "stated_rate_hz": stream.spec.rate_hz,
         "channels": [{"kind": kind, "unit": unit, "names": names} for (kind, unit), names in kinds.items()],
-        "annotations": sorted(data.annotations),
+        "annotations": sorted(stream.annotations),
     }
 
 

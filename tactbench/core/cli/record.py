@@ -67,15 +67,17 @@ def command(
     from tactbench.core.acquisition import acquire
     from tactbench.core.cli.operator import TerminalOperator
     from tactbench.core.cli.screen import remark
-    from tactbench.core.errors import TactbenchError, UsageError
+    from tactbench.core.errors import TactbenchError
     from tactbench.core.plugins.registry import load_registry
     from tactbench.core.plugins.rig_files import load_rig_file
     from tactbench.core.provenance.gather import gather
+    from tactbench.core.recording.image import require_free
 
     registry = load_registry()
     descriptor = registry.sensors[sensor]
     shape, path = indenter_of(registry, indenter), profile_of(registry, profile)
-    scene = scene_of(out.stem, cap_mm, force_n, seconds, descriptor, shape, path)
+    # The name of the scene decides its draws: the seed alone shall, and not the name of the file.
+    scene = scene_of("press", cap_mm, force_n, seconds, descriptor, shape, path)
     if slide_mm_s is not None:
         scene = _sliding(scene, slide_mm_s, descriptor)
     devices = load_rig_file(Path(rig_file), registry) if rig_file else None
@@ -85,8 +87,8 @@ def command(
     )
     if simulation is not None:
         scene = scene.simulated_as(simulation)
-    if out.exists() and not replace:
-        raise UsageError(f"{out} exists already.", hint="Give another name with --out, or replace it with --replace.")
+    if not replace:
+        require_free(out)
     provenance = gather(registry)
     try:
         with ExitStack() as stack:
@@ -105,13 +107,14 @@ def command(
                 built = view.beside(built)
             made = acquire(
                 built, descriptor, registry.rigs[rig], scene, role=None, seed=seed, path=out, clock=time.perf_counter,
-                provenance=provenance, watch=watch, interrupted=out,
+                provenance=provenance, watch=watch, name=out.stem, replace=replace, complete_interrupted=True,
             )  # fmt: skip
     except (KeyboardInterrupt, TactbenchError) as error:
-        if out.exists() and _interrupted(out):
+        notes = getattr(error, "__notes__", ())
+        if _interrupted(out):
             remark(f"What was recorded until then is in {out}, and is left out of every evaluation.")
         elif isinstance(error, KeyboardInterrupt):
-            remark("Nothing is kept.")
+            remark("\n".join(notes) or "Nothing is kept.")
         raise
     meta = made.meta
     spent = float(meta.provenance.get("sim_s", meta.provenance.get("acquisition_s", 0.0)))
@@ -138,7 +141,7 @@ def _interrupted(path: Path) -> bool:
     """Whether there is a recording that was cut short."""
     from tactbench.core.recording.reader import read_meta
 
-    return read_meta(path).excluded.startswith("interrupted")
+    return path.exists() and read_meta(path).excluded.startswith("interrupted")
 
 
 def _built(registry: Registry, name: str, devices: RigFile | None, operator: Operator) -> Rig:

@@ -10,11 +10,11 @@ dual of their linear program [derived].
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 
-from tactbench.core.errors import FormatError, RecordingError
+from tactbench.core.errors import FormatError
 from tactbench.core.samples import FloatArray, IntArray
 from tactbench.core.spec.recording import ClockSegment, StreamClock
 
@@ -31,12 +31,10 @@ _SLACK_NS = 1e-3
 """A residual below minus this is below the line; float64 holds residuals of a stretch to 1e-5 ns [derived]."""
 
 Columns = tuple[IntArray, ...]
-Fit = Callable[[int, Columns], ClockSegment]
-"""Number of the run, and (n,) columns of a stretch, the device's times first and in order, to a line."""
 
 
 def one_way(run: int, columns: Columns) -> ClockSegment:
-    """Return the line below all of (device_ns, host_ns), n >= 1.
+    """Return the line of a run below all of its (device_ns, host_ns), n >= 1, in order.
 
     Notes
     -----
@@ -61,55 +59,6 @@ def one_way(run: int, columns: Columns) -> ClockSegment:
     )
 
 
-def two_way(run: int, columns: Columns) -> ClockSegment:
-    """Return the line between requests and replies: (device_ns, sent_ns, received_ns), n >= 1.
-
-    The device's time was read after the request was sent and before the reply was there, so that the line lies above
-    all sent - device and below all received - device. The bound holds for every such line, whatever the delays are;
-    that the clock is linear over the stretch remains assumed.
-
-    Raises
-    ------
-    RecordingError
-        If no line lies between them: a time is wrong, or the clock is not linear.
-
-    Notes
-    -----
-    Of all such lines, the highest and lowest value at either end are taken; the line through their middles errs by at
-    most half their distance at the worse end, since the distance is convex between the ends [derived].
-    """
-    device, sent, received = columns
-    x, middle = _centred(device)
-    below, first = _from_first(sent - device)
-    above = (received - device - first).astype(np.float64)
-    low, high = _hull(x, -below), _hull(x, above)
-    px, py = np.concatenate([x[low], x[high]]), np.concatenate([below[low], above[high]])
-    if x[0] == x[-1]:
-        value, slope = float(below.max() + above.min()) / 2, 0.0
-        half = float(above.min() - below.max()) / 2
-    else:
-        i, j = np.nonzero(px[:, None] < px[None, :])
-        slopes = (py[j] - py[i]) / (px[j] - px[i])
-        starts = py[i] - slopes * px[i]
-        values = starts[:, None] + slopes[:, None] * px
-        fits = (values[:, : len(low)] >= py[: len(low)] - _SLACK_NS).all(axis=1)
-        fits &= (values[:, len(low) :] <= py[len(low) :] + _SLACK_NS).all(axis=1)
-        ends = [starts[fits] + slopes[fits] * end for end in (x[0], x[-1])]
-        half = max((float(np.ptp(end)) / 2 for end in ends), default=-1.0) if fits.any() else -1.0
-        left, right = ((float(end.max() + end.min()) / 2 if fits.any() else 0.0) for end in ends)
-        slope = (right - left) / float(x[-1] - x[0])
-        value = left - slope * float(x[0])
-    if half < 0:
-        raise RecordingError(
-            f"No linear clock lies between {len(x)} requests and their replies.",
-            hint="Were the stamps taken before sending and after receiving, by one clock?",
-        )
-    return ClockSegment(
-        run=run, middle_ns=middle, offset_ns=first + round(value), drift=slope, bound_ns=int(np.ceil(half)) + 1,
-        points=len(x),
-    )  # fmt: skip
-
-
 class ClockFit:
     """Lines from stamps, given piece by piece; it keeps at most 37.5 s of them.
 
@@ -118,14 +67,11 @@ class ClockFit:
 
     Parameters
     ----------
-    fit
-        :func:`one_way` or :func:`two_way`.
     stretch_ns
         What one line is fitted to.
     """
 
-    def __init__(self, fit: Fit = one_way, stretch_ns: int = STRETCH_NS) -> None:
-        self._fit = fit
+    def __init__(self, stretch_ns: int = STRETCH_NS) -> None:
         self._stretch_ns = stretch_ns
         self._runs = RunCounter()
         self._done: list[ClockSegment] = []
@@ -139,7 +85,7 @@ class ClockFit:
         return self._runs.breaks
 
     def add(self, *columns: IntArray) -> None:
-        """Take further rows: (n,) times of the device and of the host, as `fit` wants them, in order."""
+        """Take further rows: (n,) times of the device and of the host, in order."""
         run = self._runs.count(columns[0])
         for cut in np.split(np.arange(len(run)), np.flatnonzero(np.diff(run)) + 1):
             if len(cut):
@@ -150,7 +96,7 @@ class ClockFit:
         return (*self._done, *self._last())
 
     def _last(self) -> list[ClockSegment]:
-        return [self._fit(self._run, _joined(self._waiting))] if self._waiting else []
+        return [one_way(self._run, _joined(self._waiting))] if self._waiting else []
 
     def _extend(self, run: int, columns: Columns) -> None:
         if run != self._run or not self._waiting:
@@ -162,7 +108,7 @@ class ClockFit:
         while int(columns[0][-1]) - self._start_ns >= self._stretch_ns * 5 // 4:
             waiting = _joined(self._waiting)
             end = int(np.searchsorted(waiting[0], self._start_ns + self._stretch_ns))
-            self._done.append(self._fit(self._run, tuple(column[:end] for column in waiting)))
+            self._done.append(one_way(self._run, tuple(column[:end] for column in waiting)))
             self._start_ns += self._stretch_ns // 2
             half = int(np.searchsorted(waiting[0], self._start_ns))
             self._waiting = [tuple(column[half:] for column in waiting)]
@@ -272,21 +218,3 @@ def _edge_below(x: FloatArray, y: FloatArray) -> tuple[float, float]:
             i = lowest
         else:
             j = lowest
-
-
-def _hull(x: Iterable[float], y: Iterable[float]) -> IntArray:
-    """Return the places of the lower convex hull's corners (Andrew's monotone chain); x in order."""
-    chain: list[tuple[float, float, int]] = []
-    for place, (px, py) in enumerate(zip(x, y, strict=True)):
-        while chain and chain[-1][0] == px and chain[-1][1] >= py:
-            chain.pop()
-        if chain and chain[-1][0] == px:
-            continue
-        while len(chain) > 1 and _turns_down(chain[-2], chain[-1], (px, py)):
-            chain.pop()
-        chain.append((px, py, place))
-    return np.array([place for *_, place in chain], dtype=np.int64)
-
-
-def _turns_down(a: tuple[float, float, int], b: tuple[float, float, int], c: tuple[float, float]) -> bool:
-    return (b[0] - a[0]) * (c[1] - a[1]) <= (b[1] - a[1]) * (c[0] - a[0])

@@ -61,9 +61,9 @@ def import_log(
         If there is no such log.
     UsageError
         If the sensor has no reader for logs, the file is no such log, an option is not known, or `out` is no name for a
-        recording or exists.
+        recording.
     RecordingError
-        If `out` cannot be written.
+        If `out` exists or cannot be written.
     """
     if sensor.log_reader is None:
         raise UsageError(
@@ -71,11 +71,10 @@ def import_log(
             hint="Describe the log's tables in a mapping (docs/mappings.md), or add `log_reader` to its descriptor.",
         )
     if not log.is_file():
-        raise MissingRecordingError(f"There is no log {log}.", hint="Check its name.")
+        what = f"{log} is no regular file." if log.exists() else f"There is no log {log}."
+        raise MissingRecordingError(what, hint="Check its name.")
     if out.suffix != ENDING:
         raise UsageError(f"{out} is no name for a recording.", hint=f"Give --out a file that ends in {ENDING}.")
-    if out.exists() and not replace:
-        raise UsageError(f"{out} exists already.", hint="Give another name with --out, or replace it with --replace.")
     try:
         found = load_object(sensor.log_reader)(log, options)
     except (DataError, LinkError) as error:  # no fault of this machine: another file, or other options, are needed
@@ -97,7 +96,7 @@ def import_log(
         origin=log.name,
         counts=dict(found.counts),
     )
-    with RecordingWriter(out, meta) as writer:
+    with RecordingWriter(out, meta, replace=replace, keep=False) as writer:
         for block in found.blocks:
             writer.append(block)
     with open_recording(out) as written:

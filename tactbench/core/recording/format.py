@@ -4,32 +4,57 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
+from tactbench.core.errors import FormatError
 from tactbench.core.spec.recording import RecordingMeta
 from tactbench.core.spec.sensor import StreamSpec
 
 FORMAT = "tactbench-recording"
-VERSION = 2
+VERSION = 3
 """Written; every version from 1 on is read."""
 PARTIAL = ".partial"
-"""Added to the name while a recording is being made."""
+"""Ending of the journal of a recording that is being made."""
 COMPLETING = ".completing"
-"""Added to the name while the finished file is written, moments before it is renamed."""
+"""Ending of the finished file until it has been read back and is renamed."""
 
 CHUNK_ROWS = 1024
-MAX_META_CHARACTERS = 16 * 2**20
-"""A longer meta text is refused: files from strangers are data."""
 MAX_LISTED_CHANNELS = 1000
 """Streams with more channels have no channel attributes: an attribute of HDF5 holds 64 KiB. The meta has them all."""
 
-NOT_CONTENT = ("provenance",)
-"""Fields of the meta that are not part of the content digest: when and where it was written, at what cost."""
+SEE = "See docs/format.md."
+
+
+def not_content(version: int) -> tuple[str, ...]:
+    """Return the fields of the meta that are not part of the content digest.
+
+    The rig computes `plan` and `drawn` on the way to the samples: processors may differ in their last bit.
+    """
+    return ("provenance",) if version < 3 else ("name", "plan", "drawn", "provenance")
+
+
+@contextmanager
+def readable(path: Path) -> Iterator[None]:
+    """Raise FormatError, naming `path`, for what bytes that make no sense raise."""
+    try:
+        yield
+    except FormatError:
+        raise
+    except (OSError, LookupError, RuntimeError, ValueError, TypeError, AttributeError, OverflowError) as error:
+        raise FormatError(
+            f"{path} is damaged: {error}.", hint="Get it again from its source, or record it again."
+        ) from error
+
+
+def piece_rows(channels: int) -> int:
+    """Return how many rows of a stream are read or compressed at a time: whole chunks, some two million values."""
+    return min(max(2**21 // channels // CHUNK_ROWS, 1), 16) * CHUNK_ROWS
 
 
 def canonical(content: Any) -> str:
@@ -55,7 +80,7 @@ class ContentDigest:
 
     def __init__(self, text: str, version: int = VERSION) -> None:
         content = json.loads(text)
-        for name in NOT_CONTENT:
+        for name in not_content(version):
             content.pop(name, None)
         self._sha = hashlib.sha256(f"{FORMAT} {version}\n{canonical(content)}\n".encode())
 
@@ -83,25 +108,18 @@ def specs_by_name(meta: RecordingMeta) -> dict[str, StreamSpec]:
 
 
 def channel_attributes(spec: StreamSpec) -> Iterable[tuple[str, Any]]:
-    """Yield the attributes that let an ordinary HDF5 viewer name and scale the columns."""
+    """Yield the attributes that let an ordinary HDF5 viewer name the columns."""
     if len(spec.channels) > MAX_LISTED_CHANNELS:
         return
-    nan = float("nan")
     yield "channel_names", [channel.name for channel in spec.channels]
-    yield "channel_kinds", [channel.kind for channel in spec.channels]
     yield "channel_units", [channel.unit for channel in spec.channels]
-    yield "channel_lower", np.array([nan if c.lower is None else c.lower for c in spec.channels])
-    yield "channel_upper", np.array([nan if c.upper is None else c.upper for c in spec.channels])
-    yield "channel_scale", np.array([nan if c.scale is None else c.scale.value for c in spec.channels])
-    yield "channel_signs", np.array([channel.sign for channel in spec.channels], dtype=np.int8)
-    yield "channel_position_m", np.array([channel.position_m or (nan, nan, nan) for channel in spec.channels])
 
 
-def partial_path(path: Path) -> Path:
-    """Return where a recording lies while it is being written."""
-    return path.with_name(path.name + PARTIAL)
+def partial_path(path: Path, attempt: int = 1) -> Path:
+    """Return the journal of an attempt to make a recording: ``x.h5.partial``, ``x.h5.2.partial`` and so on."""
+    return path.with_name(f"{path.name}{'' if attempt == 1 else f'.{attempt}'}{PARTIAL}")
 
 
 def completing_path(path: Path) -> Path:
-    """Return where the finished file of a recording lies until it is renamed."""
-    return path.with_name(path.name + COMPLETING)
+    """Return where the finished file lies until it is renamed, by the journal it is made from, or the recording."""
+    return path.with_name(path.name.removesuffix(PARTIAL) + COMPLETING)

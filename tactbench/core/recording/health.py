@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+import hashlib
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any, Literal
 
 import numpy as np
 import numpy.typing as npt
 
-from tactbench.core.recording.reader import Recording
-from tactbench.core.recording.times import recomputed_t_ns
-from tactbench.core.samples import FloatArray, Quality, StreamData
+from tactbench.core.recording.clock_fit import HostTimes
+from tactbench.core.recording.reader import LazyStream, Recording
+from tactbench.core.samples import Quality
 from tactbench.core.spec.recording import StreamClock, StreamCounts
 from tactbench.core.spec.sensor import ChannelSpec
 
@@ -21,6 +22,8 @@ GAP = 5.0
 """A step longer than this many median steps is a gap."""
 JITTER = 0.2
 """Steps whose 5th to 95th percentile spans more than this share of the median make a clock irregular."""
+MOST_LISTED = 6
+"""Channels that are named one by one."""
 RATE_TOLERANCE = 0.05
 """Relative difference between the stated and the measured rate that is remarked on."""
 
@@ -40,19 +43,71 @@ class Finding:
     message: str
 
 
-@dataclass(frozen=True)
-class _Column:
-    """One channel: its numbers where there are any."""
+class _Stream:
+    """What the checks need to know of a stream, gathered in one pass; arrays are (channels,)."""
 
-    spec: ChannelSpec
-    values: FloatArray
-    missing: npt.NDArray[np.bool_]
-    saturated: npt.NDArray[np.bool_]
-    suspect: npt.NDArray[np.bool_]
+    def __init__(self, stream: LazyStream, clock: StreamClock | None) -> None:
+        self.name, self.spec, self.rows = stream.spec.name, stream.spec, len(stream)
+        channels = self.spec.channels
+        self.t_ns = stream.times()
+        self.missing, self.saturated, self.suspect = (np.zeros(len(channels), dtype=np.int64) for _ in range(3))
+        self.low, self.high = np.full(len(channels), np.inf), np.full(len(channels), -np.inf)
+        self.lost_before = self.other_times = 0
+        self.labels: dict[str, set[Any]] = {name: set() for name in stream.annotations}
+        digests = [hashlib.sha256() for _ in channels]
+        bottom, top = np.array([_ends(one) for one in channels]).T
+        host = None if clock is None else HostTimes(clock)
+        for block in stream.blocks():
+            values = block.data.astype(np.float64) + 0.0  # -0 and 0 are one
+            flags = np.zeros((1, len(channels)), dtype=np.uint8) if block.quality is None else block.quality
+            missing = ~np.isfinite(values) | ((flags & Quality.MISSING) != 0)
+            saturated = ((flags & Quality.SATURATED) != 0) | (values >= top) | (values <= bottom)
+            self.missing += missing.sum(axis=0)
+            self.saturated += (saturated & ~missing).sum(axis=0)
+            self.suspect += np.broadcast_to(flags & Quality.SUSPECT, values.shape).astype(bool).sum(axis=0)
+            self.low = np.minimum(self.low, np.where(missing, np.inf, values).min(axis=0))
+            self.high = np.maximum(self.high, np.where(missing, -np.inf, values).max(axis=0))
+            for digest, column in zip(digests, np.ascontiguousarray(values.T), strict=True):
+                digest.update(column.data)
+            if block.quality is not None:
+                self.lost_before += int(((flags & Quality.GAP) != 0).any(axis=1).sum())
+            if host is not None and block.host_ns is not None and block.device_ns is not None:
+                self.other_times += int(np.count_nonzero(host(block.device_ns) != block.t_ns))
+            for name, column in block.annotations.items():
+                self.labels[name] |= set(np.unique(column).tolist())
+        self.contents = [digest.digest() for digest in digests]
 
     @property
-    def there(self) -> FloatArray:
-        return np.asarray(self.values[~self.missing])
+    def present(self) -> npt.NDArray[np.int64]:
+        """Samples of each channel."""
+        return self.rows - self.missing
+
+    def names(self, which: npt.NDArray[Any]) -> tuple[str, ...]:
+        """Return the names of some channels, by a mask."""
+        return tuple(one.name for one, taken in zip(self.spec.channels, which, strict=True) if taken)
+
+    def said(self, which: npt.NDArray[Any]) -> str:
+        """Name channels as people would: "taxels t4 and t7", "fz", "E1, E2, E3 … (19 channels)"."""
+        names = self.names(which)
+        if len(names) > MOST_LISTED:
+            return f"{', '.join(names[:3])} … ({len(names)} channels)"
+        listed = names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"
+        if all(one.kind == "taxel" for one in self.spec.channels if one.name in names):
+            return f"taxel{'s' if len(names) > 1 else ''} {listed}"
+        return listed
+
+
+def _ends(spec: ChannelSpec) -> tuple[float, float]:
+    """Return the readings from which on a channel is saturated.
+
+    A temperature of a room or a position at a stop may equal a stated limit; a converter's end is what counts.
+    """
+    low, high = spec.lower, spec.upper
+    if spec.unit != "count" and (spec.kind not in ("force", "torque") or low == 0):
+        low = None
+    if spec.unit != "count" and spec.kind not in ("force", "torque"):
+        high = None
+    return -np.inf if low is None else low, np.inf if high is None else high
 
 
 def examine(recording: Recording) -> list[Finding]:
@@ -65,22 +120,22 @@ def examine(recording: Recording) -> list[Finding]:
         Empty: nothing was found.
     """
     found = list(_whole(recording))
-    clocks: dict[bytes, tuple[list[str], StreamData]] = {}
+    clocks: dict[bytes, tuple[list[str], _Stream]] = {}
     for name in recording.stream_names:
-        data = recording.read(name)
-        if len(data.data) == 0:
+        clock = recording.meta.clocks.get(name)
+        fitted = clock if clock is not None and clock.segments else None
+        stream = _Stream(recording.stream(name), fitted)
+        if stream.rows == 0:
             found.append(Finding("empty", "error", name, (), 0, f"{name} has no rows"))
             continue
-        columns = list(_columns(data))
-        for check in _CHECKS:
-            found.extend(check(name, columns))
-        found.extend(_labels(name, data))
-        found.extend(_gaps(name, data))
-        found.extend(_clock_fit(name, data, recording.meta.clocks.get(name)))
-        if data.t_ns is not None:
-            clocks.setdefault(data.t_ns.tobytes(), ([], data))[0].append(name)
-    for names, data in clocks.values():
-        found.extend(_clock(" and ".join(names), data))
+        found.extend(_channels(stream))
+        found.extend(_rows(stream))
+        if fitted is not None:
+            found.extend(_clock_fit(stream, fitted))
+        if stream.t_ns is not None:
+            clocks.setdefault(stream.t_ns.tobytes(), ([], stream))[0].append(name)
+    for names, stream in clocks.values():
+        found.extend(_clock(" and ".join(names), stream))
     order = {"error": 0, "warning": 1, "info": 2}
     return sorted(found, key=lambda finding: order[finding.severity])
 
@@ -116,101 +171,68 @@ def _counts(stream: str, counts: StreamCounts) -> Iterator[Finding]:
         yield Finding("unaccounted", "warning", stream, (), abs(open_rows), text)
 
 
-def _gaps(stream: str, data: StreamData) -> Iterator[Finding]:
-    count = 0 if data.quality is None else int(((data.quality & Quality.GAP) != 0).any(axis=1).sum())
-    if count:
-        text = f"{stream}: rows were lost before {count} of {len(data.data)} rows"
-        yield Finding("rows-before-lost", "warning", stream, (), count, text)
+def _channels(stream: _Stream) -> Iterator[Finding]:
+    name, there = stream.name, stream.present
+
+    def finding(check: str, severity: Severity, which: npt.NDArray[Any], count: int, text: str) -> Finding:
+        return Finding(check, severity, name, stream.names(which), count, text)
+
+    dead = there == 0
+    if dead.any():
+        yield finding("dead", "error", dead, int(dead.sum()), f"{stream.said(dead)} without a single sample")
+    varies = (there > 1) & (stream.low < stream.high)
+    stuck = (there > 1) & ~varies
+    if stuck.any():
+        yield finding("stuck", "warning", stuck, int(stuck.sum()), f"{stream.said(stuck)} constant")
+    full = np.flatnonzero(stream.saturated)
+    for places in [full] if len(full) > MOST_LISTED else full[:, None]:
+        some, count = np.isin(np.arange(len(there)), places), int(stream.saturated[places].sum())
+        text = f"{stream.said(some)} saturated in {count} of {len(places) * stream.rows} samples"
+        yield finding("saturated", "warning", some, count, text)
+    for count in dict.fromkeys(stream.missing[(stream.missing > 0) & ~dead].tolist()):
+        some = stream.missing == count
+        yield finding(
+            "missing", "info", some, count, f"{stream.said(some)} without a sample in {count} of {stream.rows} rows"
+        )
+    suspect = stream.suspect > 0
+    if suspect.any():
+        count = int(stream.suspect.sum())
+        text = f"{stream.said(suspect)}: {count} samples failed parity, checksum or sequence"
+        yield finding("suspect", "warning", suspect, count, text)
+    # Two channels that always read the same are one, wired or parsed twice; constant ones may agree by accident.
+    alike: dict[bytes, list[int]] = {}
+    for place in np.flatnonzero(varies).tolist():
+        alike.setdefault(stream.contents[place], []).append(place)
+    for places in alike.values():
+        if len(places) > 1:
+            some = np.isin(np.arange(len(there)), places)
+            yield finding("duplicated", "warning", some, len(places), f"{stream.said(some)} identical")
 
 
-def _clock_fit(stream: str, data: StreamData, clock: StreamClock | None) -> Iterator[Finding]:
-    if clock is None or data.host_ns is None:
-        return
-    other = int(np.count_nonzero(recomputed_t_ns(data, clock) != data.t_ns))
-    if other:
-        text = f"{other} times of {stream} are not those of its device's clock and the stated lines"
-        yield Finding("clock-fit", "error", stream, (), other, text)
+def _rows(stream: _Stream) -> Iterator[Finding]:
+    for label, values in stream.labels.items():
+        if len(values) == 1 and stream.rows > 1:
+            text = f"label {label} is {next(iter(values))!r} in every row"
+            yield Finding("constant-label", "info", stream.name, (), stream.rows, text)
+    if stream.lost_before:
+        text = f"{stream.name}: rows were lost before {stream.lost_before} of {stream.rows} rows"
+        yield Finding("rows-before-lost", "warning", stream.name, (), stream.lost_before, text)
+
+
+def _clock_fit(stream: _Stream, clock: StreamClock) -> Iterator[Finding]:
+    name = stream.name
+    if stream.other_times:
+        text = f"{stream.other_times} times of {name} are not those of its device's clock and the stated lines"
+        yield Finding("clock-fit", "error", name, (), stream.other_times, text)
     if any(segment.bound_ns is None for segment in clock.segments):
-        text = f"{stream}: too few rows to say how well its clock was put on the host's"
-        yield Finding("clock-bound", "info", stream, (), 0, text)
+        text = f"{name}: too few rows to say how well its clock was put on the host's"
+        yield Finding("clock-bound", "info", name, (), 0, text)
     if clock.breaks:
-        text = f"the clock of {stream} began again (times: {clock.breaks})"
-        yield Finding("clock-lost", "warning", stream, (), clock.breaks, text)
+        text = f"the clock of {name} began again (times: {clock.breaks})"
+        yield Finding("clock-lost", "warning", name, (), clock.breaks, text)
 
 
-def _columns(data: StreamData) -> Iterator[_Column]:
-    numbers = data.data.astype(np.float64)
-    quality = np.zeros(numbers.shape, dtype=np.uint8) if data.quality is None else data.quality
-    for place, spec in enumerate(data.spec.channels):
-        values, flags = numbers[:, place], quality[:, place]
-        missing = ~np.isfinite(values) | ((flags & Quality.MISSING) != 0)
-        saturated = (flags & Quality.SATURATED) != 0
-        # A temperature of a room or a position at a stop may equal a stated limit; a converter's end is what counts.
-        if spec.unit == "count" or spec.kind in ("force", "torque"):
-            if spec.upper is not None:
-                saturated |= values >= spec.upper
-            if spec.lower is not None and (spec.lower != 0 or spec.unit == "count"):
-                saturated |= values <= spec.lower
-        yield _Column(spec, values, missing, saturated & ~missing, (flags & Quality.SUSPECT) != 0)
-
-
-def _dead(stream: str, columns: Sequence[_Column]) -> Iterator[Finding]:
-    dead = [one for one in columns if one.missing.all()]
-    if dead:
-        names = _names(dead)
-        yield Finding("dead", "error", stream, _of(dead), len(dead), f"{names} without a single sample")
-
-
-def _stuck(stream: str, columns: Sequence[_Column]) -> Iterator[Finding]:
-    stuck = [one for one in columns if len(one.there) > 1 and np.ptp(one.there) == 0]
-    if stuck:
-        yield Finding("stuck", "warning", stream, _of(stuck), len(stuck), f"{_names(stuck)} constant")
-
-
-def _saturated(stream: str, columns: Sequence[_Column]) -> Iterator[Finding]:
-    for one in columns:
-        count = int(one.saturated.sum())
-        if count:
-            text = f"{one.spec.name} saturated in {count} of {len(one.values)} samples"
-            yield Finding("saturated", "warning", stream, (one.spec.name,), count, text)
-
-
-def _missing(stream: str, columns: Sequence[_Column]) -> Iterator[Finding]:
-    alike: dict[int, list[_Column]] = {}
-    for one in columns:
-        if one.missing.any() and not one.missing.all():
-            alike.setdefault(int(one.missing.sum()), []).append(one)
-    for count, some in alike.items():
-        text = f"{_names(some)} without a sample in {count} of {len(some[0].values)} rows"
-        yield Finding("missing", "info", stream, _of(some), count, text)
-
-
-def _suspect(stream: str, columns: Sequence[_Column]) -> Iterator[Finding]:
-    some = [one for one in columns if one.suspect.any()]
-    if some:
-        count = sum(int(one.suspect.sum()) for one in some)
-        text = f"{_names(some)}: {count} samples failed parity, checksum or sequence"
-        yield Finding("suspect", "warning", stream, _of(some), count, text)
-
-
-def _duplicated(stream: str, columns: Sequence[_Column]) -> Iterator[Finding]:
-    """Two channels that always read the same are one channel wired or parsed twice."""
-    twins: dict[bytes, list[_Column]] = {}
-    for one in columns:
-        # Constant channels may agree by accident, and are reported already; adding 0 makes -0 and 0 one.
-        if len(one.there) > 1 and np.ptp(one.there) > 0:
-            twins.setdefault((one.values + 0.0).tobytes(), []).append(one)
-    for some in twins.values():
-        if len(some) > 1:
-            yield Finding("duplicated", "warning", stream, _of(some), len(some), f"{_names(some)} identical")
-
-
-_CHECKS: tuple[Callable[[str, Sequence[_Column]], Iterator[Finding]], ...] = (
-    _dead, _stuck, _saturated, _missing, _suspect, _duplicated,
-)  # fmt: skip
-
-
-def _clock(stream: str, data: StreamData) -> Iterator[Finding]:
+def _clock(stream: str, data: _Stream) -> Iterator[Finding]:
     if data.t_ns is None or len(data.t_ns) < 2:
         return
     steps = np.diff(data.t_ns)
@@ -241,30 +263,3 @@ def _clock(stream: str, data: StreamData) -> Iterator[Finding]:
     stated = data.spec.rate_hz
     if stated is not None and abs(rate - stated) > RATE_TOLERANCE * stated:
         yield Finding("rate", "warning", stream, (), 0, f"{stream} runs at {rate:.4g} Hz; {stated:g} Hz are stated")
-
-
-def _labels(stream: str, data: StreamData) -> Iterator[Finding]:
-    for name, column in data.annotations.items():
-        values = np.unique(column)
-        if len(values) == 1 and len(column) > 1:
-            text = f"label {name} is {_shown(values[0])!r} in every row"
-            yield Finding("constant-label", "info", stream, (), len(column), text)
-
-
-def _shown(value: Any) -> Any:
-    return value.item() if hasattr(value, "item") else value
-
-
-def _of(columns: Sequence[_Column]) -> tuple[str, ...]:
-    return tuple(one.spec.name for one in columns)
-
-
-def _names(columns: Sequence[_Column]) -> str:
-    """Name channels as people would: "taxels t4 and t7", "fz", "E1, E2, E3 … (19 channels)"."""
-    names = _of(columns)
-    if len(names) > 6:
-        return f"{', '.join(names[:3])} … ({len(names)} channels)"
-    listed = names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"
-    if all(one.spec.kind == "taxel" for one in columns):
-        return f"taxel{'s' if len(names) > 1 else ''} {listed}"
-    return listed

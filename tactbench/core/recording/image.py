@@ -1,53 +1,151 @@
-"""The HDF5 file of a recording, built in memory: compressed, and described so that ordinary viewers plot it."""
+"""The HDF5 file of a recording: compressed, and described so that ordinary viewers plot it."""
 
 from __future__ import annotations
 
 import os
 from collections.abc import Iterable, Iterator, Mapping
-from io import BytesIO
+from contextlib import suppress
+from io import FileIO
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
+from tactbench.core.errors import UnwritableError
 from tactbench.core.recording import format as layout
 from tactbench.core.recording.partial import Annotations, Columns
+from tactbench.core.recording.reader import Recording, open_recording
 from tactbench.core.recording.times import on_host_clock
 from tactbench.core.spec.recording import RecordingMeta
 from tactbench.core.spec.sensor import StreamSpec
 
-COPY_ROWS = 16384
-"""Rows gathered before they are compressed: one row at a time would take a tenth of a millisecond each."""
+Blocks = Iterable[tuple[str, Columns]]
 
 
-def build(
-    memory: BytesIO,
+def store(
+    target: Path,
     meta: RecordingMeta,
     text: str,
-    blocks: Iterable[tuple[str, Columns]],
+    blocks: Blocks,
     annotations: Annotations,
-) -> Any:
-    """Return an open HDF5 file in memory that holds all blocks; it is not marked as complete.
+    *,
+    aside: Path,
+    replace: bool,
+) -> str:
+    """Write a recording beside its place, read it back, and rename it to `target`; return its content digest.
+
+    Memory is bounded by some chunks of each stream, whatever the length of the recording.
 
     Parameters
     ----------
-    memory
-        Empty; what the file is built in.
     meta, text
         What the recording says about itself, its clock fits included, and the same as text.
     blocks
         As they came; their times are put on the host's clock here.
+    aside
+        Where the file is written until it has been read back.
+    replace
+        Whether `target` may be there already.
 
-    Notes
-    -----
-    In memory, because HDF5 cannot give up a file on a disk that turns out to be full without crashing the process.
-    It needs as much memory as the compressed recording.
+    Raises
+    ------
+    RecordingError
+        If `target` exists and is not to be replaced, what was written reads otherwise, or the disk refuses; `target`
+        is as it was.
+    """
+    try:
+        with _Disk(aside, "w+") as disk:
+            try:
+                with build(disk, meta, text, blocks, annotations) as file:
+                    file.attrs["content_sha256"] = Recording(aside, file, text, complete=True).content_digest()
+                    file.attrs["complete"] = True
+            finally:
+                disk.check()
+            os.fsync(disk.fileno())
+        with open_recording(aside) as written:
+            digest = written.verify()
+        if not replace:
+            require_free(target)
+        aside.replace(target)
+        _sync_folder(target.parent)
+    except OSError as error:
+        raise cannot_write(target, error) from error
+    finally:
+        with suppress(OSError):
+            aside.unlink(missing_ok=True)
+    return digest
+
+
+def require_free(path: Path) -> None:
+    """Raise UnwritableError if there is a recording already."""
+    if path.exists():
+        raise UnwritableError(
+            f"{path} exists already.", hint="Give another name with --out, or replace it with --replace."
+        )
+
+
+def cannot_write(path: Path, error: OSError) -> UnwritableError:
+    """Return the error to raise when the disk refuses."""
+    reason = error.strerror or error
+    return UnwritableError(
+        f"The recording {path} cannot be written: {reason}.",
+        hint="Check the folder's permissions and the free space, or give another with --out.",
+    )
+
+
+class _Disk(FileIO):
+    """A file that HDF5 writes through. It keeps the first error of the disk to itself until `check` raises it.
+
+    HDF5 cannot give up a file on a full disk: closing it crashes the process.
+    """
+
+    error: OSError | None = None
+
+    def write(self, content: Any) -> int:
+        """Write all of `content`, or nothing more once the disk has refused something."""
+        left = memoryview(content)
+        try:
+            while left and self.error is None:
+                left = left[super().write(left) :]
+        except OSError as error:
+            self.error = error
+        return len(content)
+
+    def truncate(self, size: int | None = None) -> int:
+        """Set the length."""
+        try:
+            return super().truncate(size)
+        except OSError as error:
+            self.error = self.error or error
+            return size or 0
+
+    def check(self) -> None:
+        """Raise the first error of the disk."""
+        if self.error is not None:
+            raise self.error
+
+
+def build(memory: Any, meta: RecordingMeta, text: str, blocks: Blocks, annotations: Annotations) -> Any:
+    """Return an open HDF5 file, written into the binary file `memory`, that holds all blocks; see `store`.
+
+    It is not marked as complete.
     """
     import h5py
 
     # The oldest format that HDF5 still writes: every HDF5 reader in the world opens it.
     file = h5py.File(memory, "w", libver="earliest")
+    try:
+        _fill(file, meta, text, blocks, annotations)
+    except BaseException:
+        file.close()
+        raise
+    return file
+
+
+def _fill(file: Any, meta: RecordingMeta, text: str, blocks: Blocks, annotations: Annotations) -> None:
+    import h5py
+
     file.attrs["format"] = layout.FORMAT
     file.attrs["format_version"] = layout.VERSION
     file.attrs["complete"] = False
@@ -62,33 +160,11 @@ def build(
     for name in streams:
         _annotate(streams[name], annotations.get(name, {}))
         _describe(streams[name], specs[name])
-    return file
-
-
-def store(memory: BytesIO, file: Any, digest: str, target: Path) -> None:
-    """Mark a file built in memory as complete, and put it at `target` at once: synced first, then renamed.
-
-    Raises
-    ------
-    OSError
-        If the disk refuses; `target` is as it was.
-    """
-    file.attrs["content_sha256"] = digest
-    file.attrs["complete"] = True
-    file.flush()
-    completing = layout.completing_path(target)
-    try:
-        with completing.open("wb") as written, memory.getbuffer() as content:
-            written.write(content)
-            written.flush()
-            os.fsync(written.fileno())
-        completing.replace(target)
-    finally:
-        completing.unlink(missing_ok=True)
-    _sync_folder(target.parent)
 
 
 def _sync_folder(folder: Path) -> None:
+    if os.name == "nt":  # folders cannot be opened there
+        return
     opened = os.open(folder, os.O_RDONLY)
     try:
         os.fsync(opened)
@@ -96,16 +172,20 @@ def _sync_folder(folder: Path) -> None:
         os.close(opened)
 
 
-def _gathered(blocks: Iterable[tuple[str, Columns]]) -> Iterator[tuple[str, Columns]]:
-    """Yield fewer and larger blocks."""
+def _gathered(blocks: Blocks) -> Iterator[tuple[str, Columns]]:
+    """Yield larger blocks, of whole chunks but for each stream's last: a chunk is then compressed once."""
     waiting: dict[str, list[Columns]] = {}
     rows: dict[str, int] = {}
     for stream, columns in blocks:
         waiting.setdefault(stream, []).append(columns)
         rows[stream] = rows.get(stream, 0) + len(columns["data"])
-        if rows[stream] >= COPY_ROWS:
-            yield stream, _joined(waiting.pop(stream))
-            rows[stream] = 0
+        if rows[stream] >= layout.piece_rows(columns["data"].shape[1]):
+            joined, whole = _joined(waiting[stream]), rows[stream] // layout.CHUNK_ROWS * layout.CHUNK_ROWS
+            yield stream, {name: values[:whole] for name, values in joined.items()}
+            waiting[stream], rows[stream] = (
+                [{name: values[whole:] for name, values in joined.items()}],
+                rows[stream] - whole,
+            )
     for stream, some in waiting.items():
         yield stream, _joined(some)
 
@@ -137,10 +217,6 @@ def _create(group: Any, name: str, values: npt.NDArray[Any], rows: int) -> None:
         name, shape=(rows, *rest), maxshape=(None, *rest), dtype=values.dtype, chunks=(layout.CHUNK_ROWS, *rest),
         compression="gzip", compression_opts=4, shuffle=True, fillvalue=0,
     )  # fmt: skip
-    # Written, although they are the fill value: a dataset that claims more than it can hold is taken for one cut short.
-    for start in range(0, rows, COPY_ROWS):
-        stop = min(start + COPY_ROWS, rows)
-        group[name][start:stop] = np.zeros((stop - start, *rest), dtype=values.dtype)
 
 
 def _annotate(group: Any, annotations: Mapping[str, npt.NDArray[Any]]) -> None:

@@ -1,20 +1,19 @@
 """A recording while it is being made: a journal that can be read at every moment, also after ``kill -9``.
 
 An HDF5 file cannot be that: between two flushes its chunks and their index disagree, and a process killed there leaves
-a file of which the last chunks, or all of it, cannot be read; on a full disk its library cannot even close the file.
+a file of which the last chunks, or all of it, cannot be read.
 A journal is frames, one after the other, each with its length and checksum. Whatever happens, the frames before hold.
 ``docs/format.md`` describes it.
 """
 
 from __future__ import annotations
 
-import errno
+import itertools
 import json
 import os
 import struct
 import zlib
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -24,13 +23,12 @@ import numpy.typing as npt
 
 from tactbench.core.errors import FormatError, MissingRecordingError
 from tactbench.core.files import try_lock
-from tactbench.core.recording.format import canonical
+from tactbench.core.recording.format import canonical, partial_path, readable
 
 MAGIC = b"tactbench-partial 2\n"
 _READ = (b"tactbench-partial 1\n", MAGIC)
 _FRAME = struct.Struct("<IQI")
 """Bytes of the head, bytes of the columns, CRC-32 of both."""
-_DTYPES = {"<u1", "|u1", "<u2", "<i2", "<i4", "<i8", "<f4", "<f8"}
 
 Annotations = dict[str, dict[str, npt.NDArray[Any]]]
 """Labels of rows by stream and name: (n,) texts or whole numbers."""
@@ -39,29 +37,35 @@ Columns = dict[str, npt.NDArray[Any]]
 
 
 class Partial:
-    """The journal, for writing.
+    """The journal of one attempt to make a recording, for writing; no other attempt has the same file.
 
     Parameters
     ----------
     path
-        Where it lies while the recording is being made; what a crash left there before is replaced.
+        Where the recording is to lie.
     text
         The meta as it is known now.
     """
 
     def __init__(self, path: Path, text: str) -> None:
-        self.path = path
         self.rows: dict[str, int] = {}
         """Rows of the streams that have had a block"""
         self._end = 0
-        self._file = os.open(path, os.O_WRONLY | os.O_CREAT, 0o666)
+        for attempt in itertools.count(1):
+            self.path = partial_path(path, attempt)
+            try:
+                self._file = os.open(
+                    self.path, os.O_WRONLY | os.O_CREAT | os.O_EXCL | getattr(os, "O_BINARY", 0), 0o666
+                )
+                break
+            except FileExistsError:
+                continue
+        try_lock(self._file)  # says that it is being written
         try:
-            if try_lock(self._file) is False:
-                raise OSError(errno.EWOULDBLOCK, "another process is recording into it")
-            os.ftruncate(self._file, 0)
             self._write(MAGIC + _frame(text.encode(), b""))
         except BaseException:
-            os.close(self._file)
+            self.close()
+            self.path.unlink()
             raise
 
     def append(self, stream: str, columns: Mapping[str, npt.NDArray[Any]]) -> None:
@@ -130,25 +134,20 @@ def read_journal(path: Path) -> Journal:
     if not path.is_file():
         raise MissingRecordingError(f"There is no recording {path}.", hint="Check the path.")
     frames = _frames(path, path.stat().st_size)
-    first = next(frames, None)
-    if first is None:
+    meta, _, end = next(frames, (b"", b"", 0))
+    if not end:
         raise FormatError(
             f"{path} is not an unfinished recording, or broke off at once.",
             hint="A finished one is read without `--salvage`.",
         )
-    meta, _, end = first
-    text = meta.decode(errors="replace")
     annotations: Annotations = {}
-    changes: dict[str, Any] = {}
-    for head, body, place in frames:
-        end = place
-        if head.startswith(b"{"):
-            with _understood(path):
-                _take(json.loads(head), body, changes, annotations)
-    if changes:
-        with _understood(path):
-            text = canonical({**json.loads(text), **changes})
-    return Journal(path, text, annotations, end)
+    with readable(path):
+        content = json.loads(meta)
+        for head, body, place in frames:
+            end = place
+            if head.startswith(b"{"):
+                _take(json.loads(head), body, content, annotations)
+        return Journal(path, canonical(content), annotations, end)
 
 
 def read_blocks(path: Path, end: int | None = None) -> Iterator[tuple[str, Columns]]:
@@ -157,7 +156,7 @@ def read_blocks(path: Path, end: int | None = None) -> Iterator[tuple[str, Colum
     next(frames, None)
     for head, body, _ in frames:
         if not head.startswith(b"{"):
-            with _understood(path):
+            with readable(path):
                 block = _block(json.loads(head), body)
             yield block
 
@@ -188,8 +187,6 @@ def _block(head: Any, body: bytes) -> tuple[str, Columns]:
     columns: Columns = {}
     start = 0
     for name, dtype, shape in shapes:
-        if dtype not in _DTYPES:
-            raise ValueError(f"a column of {dtype}")
         count = int(np.prod(shape, dtype=np.int64))
         flat = np.frombuffer(body, dtype=dtype, count=count, offset=start)
         columns[str(name)] = flat.reshape(shape)
@@ -197,21 +194,10 @@ def _block(head: Any, body: bytes) -> tuple[str, Columns]:
     return str(stream), columns
 
 
-def _take(head: Any, body: bytes, changes: dict[str, Any], annotations: Annotations) -> None:
+def _take(head: Any, body: bytes, content: dict[str, Any], annotations: Annotations) -> None:
     if "meta" in head:
-        changes.update(head["meta"])
+        content.update(head["meta"])
         return
     stream, name, kind = head["annotation"]
-    if kind not in ("text", "<i8"):
-        raise ValueError(f"labels of {kind}")
     column = np.array(json.loads(body), dtype=np.str_) if kind == "text" else np.frombuffer(body, dtype=kind)
     annotations.setdefault(str(stream), {})[str(name)] = column
-
-
-@contextmanager
-def _understood(path: Path) -> Iterator[None]:
-    """Turn what goes wrong in reading one frame into a FormatError."""
-    try:
-        yield
-    except (ValueError, TypeError, KeyError, RecursionError) as error:
-        raise FormatError(f"{path} holds a frame that makes no sense: {error}.", hint="Record it again.") from error

@@ -1,4 +1,4 @@
-"""Reading recordings; nothing in a file from a stranger is executed, and nothing outside it is opened."""
+"""Reading recordings: lazily, and from the file alone."""
 
 from __future__ import annotations
 
@@ -14,47 +14,51 @@ from pydantic import ValidationError
 
 from tactbench.core.errors import FormatError, MissingRecordingError, UsageError
 from tactbench.core.recording import format as layout
-from tactbench.core.recording import trust
 from tactbench.core.samples import StreamData
 from tactbench.core.spec.recording import RecordingMeta
 from tactbench.core.spec.sensor import StreamSpec
+
+_NOTE = "annotations/"
+_COLUMNS = {
+    "data": ("iuf", 2), "t_ns": ("i", 1), "quality": ("u", 2), "sequence": ("i", 1), "device_ns": ("i", 1),
+    "host_ns": ("i", 1),
+}  # fmt: skip
+"""Columns of a stream: kinds of NumPy types, and number of dimensions."""
 
 
 class LazyStream:
     """A stream in an open recording: nothing is read until it is sliced."""
 
-    def __init__(
-        self, path: Path, spec: StreamSpec, group: Any, meta: RecordingMeta, *, version: int, strict: bool
-    ) -> None:
+    def __init__(self, path: Path, spec: StreamSpec, columns: dict[str, Any]) -> None:
         self.spec = spec
         self._path = path
-        self._columns = _columns(path, spec, group, meta, version=version, strict=strict)
-        lengths = {int(dataset.shape[0]) for dataset in self._columns.values()}
-        if strict and len(lengths) > 1:
-            raise FormatError(f"In {path}, the columns of {spec.name!r} differ in length.", hint=trust.SEE)
-        self._rows = min(lengths)
+        self._columns = columns
+        self.annotations = tuple(name.removeprefix(_NOTE) for name in columns if name.startswith(_NOTE))
+        """Names of the labels of its rows"""
 
     def __len__(self) -> int:
-        return self._rows
+        return int(self._columns["data"].shape[0])
 
     def __getitem__(self, rows: slice) -> StreamData:
         """Read the rows of a slice, and no others; FormatError if they are damaged."""
-        rows = slice(*rows.indices(self._rows))
-        try:
-            read = {name: self._read(name, rows) for name in self._columns}
-        except trust.READ_FAILURES as error:
-            raise _damaged(self._path, error) from error
-        notes = {name[len(_NOTE) :]: column for name, column in read.items() if name.startswith(_NOTE)}
-        return StreamData(
-            spec=self.spec,
-            t_ns=read.get("t_ns"),
-            data=read["data"],
-            quality=read.get("quality"),
-            annotations=notes,
-            sequence=read.get("sequence"),
-            device_ns=read.get("device_ns"),
-            host_ns=read.get("host_ns"),
-        )
+        read: dict[str, Any] = {"t_ns": None, "quality": None}
+        notes = {}
+        for name in self._columns:
+            column = self._read(name, rows)
+            if name.startswith(_NOTE):
+                notes[name.removeprefix(_NOTE)] = column
+            else:
+                read[name] = column
+        return StreamData(spec=self.spec, annotations=notes, **read)
+
+    def blocks(self) -> Iterator[StreamData]:
+        """Yield the whole stream in order, some 16 MiB at a time."""
+        for rows in self._pieces():
+            yield self[rows]
+
+    def times(self) -> npt.NDArray[np.int64] | None:
+        """Read the time stamps alone, (n,) nanoseconds; None where there is no clock."""
+        return self._read("t_ns", slice(None)) if "t_ns" in self._columns else None
 
     def add_to(self, digest: layout.ContentDigest) -> None:
         """Add every column to the digest, by its name below the stream."""
@@ -62,18 +66,25 @@ class LazyStream:
             where = f"/{self.spec.name}/{name}"
             first = self._read(name, slice(0, 0))
             if first.dtype.kind == "U":
-                digest.texts(where, self._read(name, slice(0, self._rows)))
+                digest.texts(where, self._read(name, slice(None)))
             else:
-                pieces = (self._read(name, rows) for rows in _slices(self._rows))
-                digest.numbers(where, first.dtype, (self._rows, *first.shape[1:]), pieces)
+                pieces = (self._read(name, rows) for rows in self._pieces())
+                digest.numbers(where, first.dtype, (len(self), *first.shape[1:]), pieces)
+
+    def _pieces(self) -> Iterator[slice]:
+        step = layout.piece_rows(len(self.spec.channels))
+        return (slice(start, start + step) for start in range(0, len(self), step))
 
     def _read(self, name: str, rows: slice) -> npt.NDArray[Any]:
+        import h5py
+
         dataset = self._columns[name]
-        if name.startswith(_NOTE):
-            return trust.labels_of(dataset, rows)
-        values = dataset[rows]
-        native: npt.NDArray[Any] = values.astype(values.dtype.newbyteorder("="), copy=False)
-        return native
+        with layout.readable(self._path):
+            if h5py.check_string_dtype(dataset.dtype) is not None:
+                return np.array(dataset.asstr("utf-8")[rows], dtype=np.str_)
+            values = np.asarray(dataset[rows])
+            kept: Any = np.int64 if name.startswith(_NOTE) else values.dtype.newbyteorder("=")
+            return values.astype(kept, copy=False)
 
 
 class Recording:
@@ -93,18 +104,17 @@ class Recording:
         Names of the streams that hold data, the sensor's first, in the order of the specs.
     """
 
-    def __init__(self, path: Path, file: Any, text: str, *, complete: bool) -> None:
+    def __init__(self, path: Path, file: Any, text: str, *, complete: bool, behind: Any = None) -> None:
         self.path = path
+        self._behind = behind  # the file that an HDF5 file of a journal is built in
         self.meta = parse_meta(path, text)
         self.complete = complete
         self.version = int(file.attrs["format_version"])
         self._text = text
         self._file = file
         self._specs = layout.specs_by_name(self.meta)
-        self._looked_at: dict[str, LazyStream] = {}
-        self._streams = trust.subgroup(path, file, "streams")
-        if self._streams is None:
-            raise FormatError(f"{path} has no streams.", hint=trust.SEE)
+        self._streams = file["streams"]
+        self._opened: dict[str, LazyStream] = {}
         self.stream_names = tuple(name for name in self._specs if name in self._streams)
 
     def __enter__(self) -> Recording:
@@ -118,6 +128,8 @@ class Recording:
     def close(self) -> None:
         """Close the file."""
         self._file.close()
+        if self._behind is not None:
+            self._behind.close()
 
     def stream(self, name: str) -> LazyStream:
         """Return a stream to slice.
@@ -132,19 +144,11 @@ class Recording:
                 f"{self.path} has no stream {name!r}; it has {', '.join(self.stream_names) or 'none'}.",
                 hint="See what is in it with `tactbench inspect`.",
             )
-        if name in self._looked_at:
-            return self._looked_at[name]
-        try:
-            group = trust.subgroup(self.path, self._streams, name)
-            stream = LazyStream(
-                self.path, self._specs[name], group, self.meta, version=self.version, strict=self.complete
-            )
-        except FormatError:
-            raise
-        except trust.READ_FAILURES as error:
-            raise _damaged(self.path, error) from error
-        self._looked_at[name] = stream
-        return stream
+        if name not in self._opened:
+            with layout.readable(self.path):
+                columns = _columns(self.path, self._specs[name], _child(self.path, self._streams, name), self)
+            self._opened[name] = LazyStream(self.path, self._specs[name], columns)
+        return self._opened[name]
 
     def read(self, name: str) -> StreamData:
         """Read a whole stream; FormatError if there is none, or if it is damaged."""
@@ -154,11 +158,7 @@ class Recording:
         """Return the digest of what the recording says, computed from the data now."""
         digest = layout.ContentDigest(self._text, self.version)
         for name in sorted(self.stream_names):
-            stream = self.stream(name)
-            try:
-                stream.add_to(digest)
-            except trust.READ_FAILURES as error:
-                raise _damaged(self.path, error) from error
+            self.stream(name).add_to(digest)
         return digest.hexdigest()
 
     def verify(self) -> str:
@@ -182,7 +182,27 @@ def open_recording(path: Path) -> Recording:
     FormatError
         If it is not a recording, is damaged or unfinished, or was written by a newer tactbench.
     """
-    return _open(Path(path))
+    import h5py
+
+    path = Path(path)
+    if not path.is_file():
+        raise MissingRecordingError(f"There is no recording {path}.", hint="Check the path.")
+    try:
+        # Best effort: some network disks know no locks, and a finished recording never changes.
+        file = h5py.File(path, "r", locking="best-effort")
+    except PermissionError as error:
+        raise FormatError(f"{path} cannot be read: {error.strerror}.", hint="Check its permissions.") from error
+    except (OSError, RuntimeError, ValueError) as error:
+        raise FormatError(
+            f"{path} is not an HDF5 file, or it was cut short: {error}.",
+            hint="Get it again from its source; `….partial` files are what a crash left behind.",
+        ) from error
+    try:
+        with layout.readable(path):
+            return Recording(path, file, _envelope(path, file), complete=True)
+    except BaseException:
+        file.close()
+        raise
 
 
 def read_meta(path: Path) -> RecordingMeta:
@@ -197,82 +217,46 @@ def content_digest(path: Path) -> str:
         return recording.verify()
 
 
-_NOTE = "annotations/"
-_DIGEST_ROWS = 64 * layout.CHUNK_ROWS
-"""Rows that are in memory at a time for the digest; whole chunks, so that none is decompressed twice."""
-
-
-def _slices(rows: int) -> Iterator[slice]:
-    for start in range(0, rows, _DIGEST_ROWS):
-        yield slice(start, min(start + _DIGEST_ROWS, rows))
-
-
-def _columns(
-    path: Path, spec: StreamSpec, group: Any, meta: RecordingMeta, *, version: int, strict: bool
-) -> dict[str, Any]:
-    """Return the datasets of a stream by their name below it, each looked at but not read."""
-    data = trust.numbers(path, group, "data", "iuf", 2, strict=strict)
-    declared = np.dtype(spec.dtype)
-    if data is None or data.shape[1] != len(spec.channels) or data.dtype.newbyteorder("=") != declared:
-        what = "no data" if data is None else f"{data.dtype} in {data.shape[1]} columns"
-        raise FormatError(
-            f"In {path}, stream {spec.name!r} holds {what}; its spec says {declared} in {len(spec.channels)}.",
-            hint=trust.SEE,
-        )
-    columns: dict[str, Any] = {
-        "data": data,
-        "t_ns": trust.numbers(path, group, "t_ns", "i", 1, strict=strict),
-        "quality": trust.numbers(path, group, "quality", "u", 2, strict=strict),
-        "sequence": trust.numbers(path, group, "sequence", "i", 1, strict=strict),
-    }
-    if (columns["t_ns"] is None) != (meta.clock == "none"):
-        has = "no time stamps" if columns["t_ns"] is None else "time stamps"
-        raise FormatError(
-            f"In {path}, stream {spec.name!r} has {has}, but its clock is {meta.clock!r}.", hint=trust.SEE
-        )
-    if version >= 2:
-        for name in ("device_ns", "host_ns"):
-            columns[name] = trust.numbers(path, group, name, "i", 1, strict=strict)
-        fitted = spec.name in meta.clocks and bool(meta.clocks[spec.name].segments)
-        if (columns["host_ns"] is not None) != fitted or (fitted and columns["device_ns"] is None):
-            raise FormatError(
-                f"In {path}, the times of {spec.name!r} do not go with what the meta says of its clock.",
-                hint=trust.SEE,
-            )
-    if columns["quality"] is not None and columns["quality"].shape[1] != len(spec.channels):
-        raise FormatError(f"In {path}, the quality of {spec.name!r} has another shape than its data.", hint=trust.SEE)
-    notes = trust.subgroup(path, group, "annotations")
-    for name in notes if notes is not None else ():
-        columns[_NOTE + name] = trust.annotation(path, notes, name, strict=strict)
-    return {name: dataset for name, dataset in columns.items() if dataset is not None}
-
-
-def _open(path: Path) -> Recording:
+def _child(path: Path, group: Any, name: str) -> Any:
+    """Return the item `name` of a group, or None; FormatError if its values are in another file."""
     import h5py
 
-    if not path.is_file():
-        raise MissingRecordingError(f"There is no recording {path}.", hint="Check the path.")
-    try:
-        # Best effort: some network disks know no locks, and a finished recording never changes.
-        file = h5py.File(path, "r", locking="best-effort")
-    except PermissionError as error:
-        raise FormatError(f"{path} cannot be read: {error.strerror}.", hint="Check its permissions.") from error
-    except trust.READ_FAILURES as error:
-        raise FormatError(
-            f"{path} is not an HDF5 file, or it was cut short: {error}.",
-            hint="Get it again from its source; `….partial` files are what a crash left behind.",
-        ) from error
-    try:
-        return Recording(path, file, _envelope(path, file), complete=True)
-    except FormatError:
-        file.close()
-        raise
-    except trust.READ_FAILURES as error:
-        file.close()
-        raise _damaged(path, error) from error
-    except BaseException:
-        file.close()
-        raise
+    link = group.get(name, getlink=True)
+    if link is None:
+        return None
+    item = group[name] if isinstance(link, h5py.HardLink) else None
+    if item is None or (isinstance(item, h5py.Dataset) and (item.is_virtual or item.external)):
+        raise FormatError(f"In {path}, {group.name}/{name} is a link to another place.", hint=layout.SEE)
+    return item
+
+
+def _columns(path: Path, spec: StreamSpec, group: Any, recording: Recording) -> dict[str, Any]:
+    """Return the datasets of a stream by their name below it; FormatError if they are not as the meta says."""
+    import h5py
+
+    wide = len(spec.channels)
+    meta, known = recording.meta, _COLUMNS if recording.version > 1 else list(_COLUMNS)[:4]
+    columns = {name: item for name in known if (item := _child(path, group, name)) is not None}
+    notes = _child(path, group, "annotations")
+    columns |= {_NOTE + name: _child(path, notes, name) for name in notes or ()}
+
+    def refuse(what: str) -> FormatError:
+        return FormatError(f"In {path}, stream {spec.name!r} {what}.", hint=layout.SEE)
+
+    if "data" not in columns or columns["data"].dtype.newbyteorder("=") != np.dtype(spec.dtype):
+        raise refuse(f"holds no data of type {spec.dtype}")
+    for name, item in columns.items():
+        text = name.startswith(_NOTE) and h5py.check_string_dtype(item.dtype) is not None
+        kinds, dimensions = _COLUMNS.get(name, ("iu", 1))
+        shape = (columns["data"].shape[0], wide)[:dimensions]
+        if item.shape != shape or not (text or item.dtype.kind in kinds):
+            raise refuse(f"holds {name} of {item.dtype} in {item.shape}; {shape} is expected")
+    if ("t_ns" not in columns) != (meta.clock == "none"):
+        raise refuse(f"has {'no ' if 't_ns' not in columns else ''}time stamps, but its clock is {meta.clock!r}")
+    fitted = spec.name in meta.clocks and bool(meta.clocks[spec.name].segments)
+    if ("host_ns" in columns) != fitted or (fitted and "device_ns" not in columns):
+        raise refuse("has times that do not go with what the meta says of its clock")
+    return columns
 
 
 def _envelope(path: Path, file: Any) -> str:
@@ -283,42 +267,26 @@ def _envelope(path: Path, file: Any) -> str:
             hint="Turn foreign files into recordings with `tactbench import MAPPING.yaml`.",
         )
     version = int(file.attrs["format_version"])
-    if version > layout.VERSION:
+    if not 1 <= version <= layout.VERSION:
         raise FormatError(
-            f"{path} has format version {version}; this tactbench reads up to {layout.VERSION}.",
+            f"{path} has format version {version}; this tactbench reads 1 to {layout.VERSION}.",
             hint="Install a newer tactbench.",
         )
-    if version < 1:
-        raise FormatError(f"{path} has format version {version}, which never was.", hint=trust.SEE)
     if not bool(file.attrs.get("complete", False)):
         raise FormatError(f"{path} was not finished.", hint="Record it again.")
     text = file.attrs["meta"]
-    text = bytes(text).decode() if isinstance(text, bytes) else str(text)
-    text.encode()  # h5py keeps bytes that are no UTF-8 as surrogates
-    if len(text) > layout.MAX_META_CHARACTERS:
-        raise FormatError(f"{path} has a meta text of {len(text)} characters.", hint=trust.SEE)
-    return text
+    return text.decode() if isinstance(text, bytes) else str(text)
 
 
 def parse_meta(path: Path, text: str) -> RecordingMeta:
     """Return a meta text as a model; FormatError, naming `path`, if it makes no sense."""
     try:
-        content = json.loads(text)
-        if "\\ud" in text or "\\uD" in text:  # a surrogate, perhaps without its other half: nothing can print it
-            layout.canonical(content).encode()
-    except (ValueError, RecursionError) as error:
-        raise _damaged(path, error) from error
-    try:
-        return RecordingMeta.model_validate(content)
-    except UsageError as error:
-        raise FormatError(f"{path} says something that cannot be: {error.message}", hint=trust.SEE) from error
+        return RecordingMeta.model_validate(json.loads(text))
     except ValidationError as error:
         first = error.errors(include_url=False)[0]
-        where = ".".join(str(part) for part in first["loc"])
-        raise FormatError(
-            f"{path} says something about itself that cannot be: {where}: {first['msg']}.", hint=trust.SEE
-        ) from error
-
-
-def _damaged(path: Path, error: BaseException) -> FormatError:
-    return FormatError(f"{path} is damaged: {error}.", hint="Get it again from its source, or record it again.")
+        what = f"{'.'.join(str(part) for part in first['loc'])}: {first['msg']}"
+    except UsageError as error:
+        what = error.message
+    except (ValueError, RecursionError) as error:
+        what = str(error)
+    raise FormatError(f"{path} says something about itself that cannot be: {what}.", hint=layout.SEE)

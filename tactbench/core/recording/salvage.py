@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator
-from io import BytesIO
 from pathlib import Path
-from typing import Any
+from tempfile import TemporaryFile
 
 from tactbench.core.errors import FormatError
 from tactbench.core.recording import format as layout
@@ -14,7 +13,6 @@ from tactbench.core.recording import image
 from tactbench.core.recording.partial import Columns, Journal, read_journal
 from tactbench.core.recording.reader import Recording, parse_meta
 from tactbench.core.recording.times import with_clock_fits
-from tactbench.core.recording.writer import cannot_write
 from tactbench.core.spec.recording import RecordingMeta
 
 REMARK = "Rescued: the recording broke off and is not whole."
@@ -35,7 +33,13 @@ def salvage(path: Path) -> Recording:
     path = Path(path)
     journal = read_journal(path)
     meta, text = _fitted(journal, parse_meta(path, journal.text))
-    return Recording(path, _built(BytesIO(), journal, meta, text), text, complete=False)
+    behind = TemporaryFile()  # noqa: SIM115  (the recording closes it)
+    try:
+        file = image.build(behind, meta, text, _known(journal, meta), journal.annotations)
+        return Recording(path, file, text, complete=False, behind=behind)
+    except BaseException:
+        behind.close()
+        raise
 
 
 def rescue(path: Path, target: Path) -> None:
@@ -50,20 +54,19 @@ def rescue(path: Path, target: Path) -> None:
     FormatError
         If it is not an unfinished recording.
     RecordingError
-        If `target` cannot be written.
+        If `target` exists, or cannot be written.
     """
     path, target = Path(path), Path(target)
+    image.require_free(target)
     journal = read_journal(path)
     meta = parse_meta(path, journal.text)
     meta, text = _fitted(journal, meta.model_copy(update={"remarks": (*meta.remarks, REMARK)}))
-    memory = BytesIO()
-    with _built(memory, journal, meta, text) as file:
-        digest = Recording(path, file, text, complete=True).content_digest()
-        try:
-            target.parent.mkdir(parents=True, exist_ok=True)
-            image.store(memory, file, digest, target)
-        except OSError as error:
-            raise cannot_write(target, error) from error
+    try:
+        target.parent.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise image.cannot_write(target, error) from error
+    aside = layout.completing_path(target)
+    image.store(target, meta, text, _known(journal, meta), journal.annotations, aside=aside, replace=False)
 
 
 def _fitted(journal: Journal, meta: RecordingMeta) -> tuple[RecordingMeta, str]:
@@ -71,7 +74,7 @@ def _fitted(journal: Journal, meta: RecordingMeta) -> tuple[RecordingMeta, str]:
     rows: Counter[str] = Counter()
 
     def counted() -> Iterator[tuple[str, Columns]]:
-        for stream, columns in _fitting(journal, meta):
+        for stream, columns in _known(journal, meta):
             rows[stream] += len(columns["data"])
             yield stream, columns
 
@@ -81,23 +84,12 @@ def _fitted(journal: Journal, meta: RecordingMeta) -> tuple[RecordingMeta, str]:
     return fitted, layout.meta_text(fitted)
 
 
-def _built(memory: BytesIO, journal: Journal, meta: RecordingMeta, text: str) -> Any:
-    return image.build(memory, meta, text, _fitting(journal, meta), journal.annotations)
-
-
-def _fitting(journal: Journal, meta: RecordingMeta) -> Iterator[tuple[str, Columns]]:
+def _known(journal: Journal, meta: RecordingMeta) -> Iterator[tuple[str, Columns]]:
     """Yield the blocks; FormatError for one that the meta does not know."""
     specs = layout.specs_by_name(meta)
     for stream, columns in journal.blocks():
-        data = columns.get("data")
-        if stream not in specs or data is None or data.shape[1:] != (len(specs[stream].channels),):
+        if stream not in specs or columns["data"].shape[1:] != (len(specs[stream].channels),):
             raise FormatError(
-                f"{journal.path} holds a block of {stream!r} that its meta does not know.",
-                hint="Was it put together by hand?",
-            )
-        if "device_ns" in columns and "t_ns" not in columns:
-            raise FormatError(
-                f"{journal.path} holds a block of {stream!r} with device times alone.",
-                hint="Was it put together by hand?",
+                f"{journal.path} holds a block of {stream!r} that its meta does not know.", hint=layout.SEE
             )
         yield stream, columns

@@ -4,10 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 
-from tactbench.core.errors import FormatError
 from tactbench.core.recording.clock_fit import ClockFit, HostTimes
 from tactbench.core.recording.partial import Columns
-from tactbench.core.samples import IntArray, StreamData
 from tactbench.core.spec.recording import RecordingMeta, StreamClock
 
 Blocks = Iterable[tuple[str, Columns]]
@@ -41,19 +39,3 @@ def on_host_clock(meta: RecordingMeta, blocks: Blocks) -> Iterator[tuple[str, Co
             of_host = times.setdefault(stream, HostTimes(clock))
             columns = {**columns, "host_ns": columns["t_ns"], "t_ns": of_host(columns["device_ns"])}
         yield stream, columns
-
-
-def recomputed_t_ns(data: StreamData, clock: StreamClock) -> IntArray:
-    """Return the times of a whole stream from its raw columns: what is stored as ``t_ns`` is exactly this.
-
-    Raises
-    ------
-    FormatError
-        If it has no raw columns, or `clock` no line for some row.
-    """
-    if data.device_ns is None or data.host_ns is None:
-        raise FormatError(
-            f"The times of {data.spec.name!r} are as they came: there is nothing to compute them from.",
-            hint="Only streams with `device_ns` and `host_ns` were put on the host's clock.",
-        )
-    return HostTimes(clock)(data.device_ns)

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
-from io import BytesIO
 from pathlib import Path
 from types import TracebackType
 from typing import Any
@@ -13,13 +12,12 @@ import numpy as np
 import numpy.typing as npt
 from pydantic import ValidationError
 
-from tactbench.core.errors import RecordingError, RigError, UnwritableError
+from tactbench.core.errors import RecordingError, RigError, TactbenchError
 from tactbench.core.recording import format as layout
 from tactbench.core.recording import image
 from tactbench.core.recording.partial import Annotations, Columns, Partial, read_blocks
-from tactbench.core.recording.reader import Recording
 from tactbench.core.recording.times import with_clock_fits
-from tactbench.core.samples import Block
+from tactbench.core.samples import Block, Quality
 from tactbench.core.spec.recording import RecordingMeta
 from tactbench.core.spec.sensor import StreamSpec
 
@@ -27,44 +25,57 @@ from tactbench.core.spec.sensor import StreamSpec
 class RecordingWriter:
     """Writes one recording; use it as a context manager.
 
-    While it is open the file is called ``<path>.partial`` and holds, after every block, all blocks so far. Leaving
-    the context completes it: times of devices put on the host's clock, compressed anew, content digest, sync, rename
-    to `path`. Leaving it by an exception removes it, for the caller knows that it failed and can record again, or
-    keeps what there is with :meth:`complete_at`; only a crash of the process leaves the ``.partial`` behind, for
-    :func:`tactbench.core.recording.salvage.salvage`.
+    While it is open, a journal ``<path>.partial`` (or ``<path>.2.partial`` where that is taken, and so on) holds, after
+    every block, all blocks so far. Leaving the context completes the recording: times of devices are put on the host's
+    clock, the file is written beside its place, read back, and renamed to `path`; only then is the journal removed.
+    When the context is left by an exception, or the recording cannot be completed, the journal of a recording that is
+    not simulated stays, and the error names the command that makes a recording of it.
 
     Parameters
     ----------
     path
-        Where the finished recording shall lie; a file that is there is replaced at the end, not before.
+        Where the finished recording shall lie.
     meta
         What it says about itself; :meth:`revise` changes it until the end.
+    replace
+        Whether a file that is there is replaced, at the end and not before.
+    keep
+        Whether the journal stays of a recording that could not be completed; False where it can be made again, from a
+        table or a log.
 
     Raises
     ------
     RecordingError
-        If the file cannot be written, or `meta` cannot be stored.
+        If there is a file and it is not to be replaced, the disk refuses, or `meta` cannot be stored.
     """
 
-    def __init__(self, path: Path, meta: RecordingMeta) -> None:
+    def __init__(self, path: Path, meta: RecordingMeta, *, replace: bool = False, keep: bool = True) -> None:
         self.path = path
         self.meta = meta
-        self._aside = layout.partial_path(path)
+        self._replace = replace
+        self._keep = keep
         self._specs = layout.specs_by_name(meta)
+        self._forces = {
+            stream.name: [place for place, one in enumerate(stream.channels) if one.kind in ("force", "torque")]
+            for stream in meta.reference
+        }
         self.content_digest = ""
         """Digest of what was written, once the recording is complete."""
         self._annotations: Annotations = {}
         self._has: dict[str, tuple[bool, bool]] = {}
         self._partial: Partial | None = None
-        self._keep_journal = False
+        self.journal: Path | None = None
+        """What was kept of a recording that was not completed, once the context is left."""
 
     def __enter__(self) -> RecordingWriter:
         text = self._text()
+        if not self._replace:
+            image.require_free(self.path)
         try:
             self.path.parent.mkdir(parents=True, exist_ok=True)
-            self._partial = Partial(self._aside, text)
+            self._partial = Partial(self.path, text)
         except OSError as error:
-            raise cannot_write(self.path, error) from error
+            raise image.cannot_write(self.path, error) from error
         return self
 
     def __exit__(
@@ -72,32 +83,58 @@ class RecordingWriter:
     ) -> None:
         try:
             if kind is None:
-                self._complete(self._open, self.path)
-        except OSError as failure:
-            raise cannot_write(self.path, failure) from failure
-        finally:
-            self._clear()
+                self.complete()
+        except BaseException as failure:
+            self._leave(failure)
+            raise
+        self._leave(error)
 
     @property
     def rows(self) -> Mapping[str, int]:
         """Rows of the streams that have had a block."""
         return dict(self._open.rows)
 
-    def complete_at(self, target: Path) -> None:
-        """Complete the recording at `target` instead, before the context is left by an exception.
+    def complete(self) -> None:
+        """Complete the recording, as leaving the context does; after an exception, before it is left.
 
         Raises
         ------
         RecordingError
             If the disk refuses it; the journal then stays, as after a crash.
         """
-        self._keep_journal = True
-        try:
-            target.parent.mkdir(parents=True, exist_ok=True)
-            self._complete(self._open, target)
-        except OSError as failure:
-            raise cannot_write(target, failure) from failure
-        self._keep_journal = False
+        journal = self._open
+        if any(timed for _, timed in self._has.values()):
+            self.meta = with_clock_fits(self.meta, self._blocks(journal))
+        self.content_digest = image.store(
+            self.path, self.meta, self._text(), self._blocks(journal), self._annotations,
+            aside=layout.completing_path(journal.path), replace=self._replace,
+        )  # fmt: skip
+
+    def _blocks(self, journal: Partial) -> Iterator[tuple[str, Columns]]:
+        """Yield the blocks of the journal; RecordingError if a row that came is not there."""
+        left = dict(journal.rows)
+        for stream, columns in read_blocks(journal.path):
+            left[stream] -= len(columns["data"])
+            yield stream, columns
+        if any(count > 0 for count in left.values()):
+            raise RecordingError(
+                f"The recording {self.path} lost rows while it was made: {left}.", hint="Did the disk fail?"
+            )
+
+    def _leave(self, error: BaseException | None) -> None:
+        """Close the journal; remove it unless it holds rows that are nowhere else."""
+        journal, self._partial = self._open, None
+        journal.close()
+        if not self.content_digest and any(journal.rows.values()) and self._keep and not self.meta.simulated:
+            self.journal = journal.path
+            found = recovery(journal.path, self.path)
+            if isinstance(error, TactbenchError):
+                error.hint = f"{error.hint} {found}".strip()
+            elif error is not None:
+                error.add_note(found)
+            return
+        with suppress(OSError):  # a disk that refuses this has refused the recording before
+            journal.path.unlink(missing_ok=True)
 
     def revise(self, **changes: Any) -> None:
         """Change fields of the meta that are known only later (`drawn`, `counts`, `provenance` …).
@@ -126,7 +163,7 @@ class RecordingWriter:
         except ValueError as error:
             raise self._not_storable(error) from error
         except OSError as error:
-            raise cannot_write(self.path, error) from error
+            raise image.cannot_write(self.path, error) from error
 
     def append(self, block: Block) -> None:
         """Add `block` to its stream and flush it.
@@ -135,7 +172,8 @@ class RecordingWriter:
         ------
         RigError
             If the block does not fit its stream: unknown name, wrong number of channels or of times, a clock where
-            there is none, readings that do not fit the stored type.
+            there is none, readings that do not fit the stored type, a force of the reference that is NaN and not marked
+            as missing.
         RecordingError
             If the disk refuses it.
         """
@@ -155,7 +193,7 @@ class RecordingWriter:
         try:
             self._open.append(spec.name, columns)
         except OSError as error:
-            raise cannot_write(self.path, error) from error
+            raise image.cannot_write(self.path, error) from error
 
     def annotate(self, stream: str, name: str, values: Sequence[str] | npt.NDArray[Any]) -> None:
         """Attach a label to every row of `stream`: text or whole numbers, one a row, after its last block.
@@ -182,7 +220,7 @@ class RecordingWriter:
         try:
             self._open.annotate(stream, name, column)
         except OSError as error:
-            raise cannot_write(self.path, error) from error
+            raise image.cannot_write(self.path, error) from error
         self._annotations.setdefault(stream, {})[name] = column
 
     @property
@@ -210,19 +248,26 @@ class RecordingWriter:
                 f"A block of stream {block.stream!r} came; the recording has {', '.join(sorted(self._specs))}.",
                 hint="Declare the stream in the sensor's spec or the rig's reference.",
             )
-        if block.data.ndim != 2 or block.data.shape[1] != len(spec.channels):
-            raise RigError(
-                f"A block of stream {block.stream!r} has shape {block.data.shape}, not (n, {len(spec.channels)}).",
-                hint="A block is rows by channels, in the order of the stream's spec.",
-            )
-        for name, values in (
-            ("t_ns", block.t_ns), ("sequence", block.sequence), ("device_ns", block.device_ns),
-            ("quality", block.quality),
+        rows, wide = len(block.data), len(spec.channels)
+        for name, values, shape in (
+            ("data", block.data, (rows, wide)), ("quality", block.quality, (rows, wide)), ("t_ns", block.t_ns, (rows,)),
+            ("sequence", block.sequence, (rows,)), ("device_ns", block.device_ns, (rows,)),
         ):  # fmt: skip
-            if values is not None and len(values) != len(block.data):
+            if values is not None and np.shape(values) != shape:
                 raise RigError(
-                    f"A block of stream {block.stream!r} has {len(block.data)} rows but {len(values)} of {name}.",
-                    hint="Give one of each a row.",
+                    f"A block of stream {block.stream!r} has {name} of shape {np.shape(values)}, not (n, {wide})"
+                    f"{'' if name == 'data' else f' or (n,) with n = {rows}'}.",
+                    hint="A block is rows by channels, in the order of the stream's spec; give one time a row.",
+                )
+        for place in self._forces.get(block.stream, ()):
+            empty = ~np.isfinite(block.data[:, place])
+            if block.quality is not None:
+                empty &= (block.quality[:, place] & Quality.MISSING) == 0
+            if empty.any():
+                raise RigError(
+                    f"The reference {spec.channels[place].name!r} of {block.stream!r} is NaN in {int(empty.sum())} "
+                    "rows that are not marked as missing.",
+                    hint="Mark rows without a sample by the quality MISSING.",
                 )
         if (block.t_ns is None) != (self.meta.clock == "none"):
             has = "no times" if block.t_ns is None else "times"
@@ -232,33 +277,6 @@ class RecordingWriter:
             )
         return spec
 
-    def _complete(self, partial: Partial, target: Path) -> None:
-        if any(timed for _, timed in self._has.values()):
-            self.meta = with_clock_fits(self.meta, read_blocks(self._aside))
-        text, memory = self._text(), BytesIO()
-        with image.build(memory, self.meta, text, read_blocks(self._aside), self._annotations) as file:
-            self.content_digest = self._check(Recording(self._aside, file, text, complete=True), partial)
-            image.store(memory, file, self.content_digest, target)
-
-    def _check(self, recording: Recording, partial: Partial) -> str:
-        """Return the digest of the stored bytes, after making sure that every row that came is there."""
-        rows = {name: len(recording.stream(name)) for name in recording.stream_names}
-        if any(rows.get(name, 0) < count for name, count in partial.rows.items()):
-            raise RecordingError(
-                f"The recording {self.path} lost rows while it was made: {rows} of {partial.rows} are there.",
-                hint="Did another process write to it, or did the disk fail? Record it again.",
-            )
-        return recording.content_digest()
-
-    def _clear(self) -> None:
-        """Remove the journal, unless it is all that is left of the recording."""
-        if self._partial is not None:
-            self._partial.close()
-            self._partial = None
-        if not self._keep_journal:
-            with suppress(OSError):  # a disk that refuses this has refused the recording before
-                self._aside.unlink(missing_ok=True)
-
 
 def _columns(block: Block, spec: StreamSpec) -> Columns:
     """Return what is stored of `block`, by column; quality only if something is not good."""
@@ -266,14 +284,8 @@ def _columns(block: Block, spec: StreamSpec) -> Columns:
     for name, numbers in (("t_ns", block.t_ns), ("sequence", block.sequence), ("device_ns", block.device_ns)):
         if numbers is not None:
             columns[name] = _whole(np.asarray(numbers), name, spec)
-    if block.quality is not None:
-        if block.quality.shape != block.data.shape:
-            raise RigError(
-                f"A block of stream {spec.name!r} has data {block.data.shape} and quality {block.quality.shape}.",
-                hint="Give one quality a sample of each channel.",
-            )
-        if block.quality.any():
-            columns["quality"] = np.asarray(block.quality, dtype=np.uint8)
+    if block.quality is not None and block.quality.any():
+        columns["quality"] = np.asarray(block.quality, dtype=np.uint8)
     return columns
 
 
@@ -304,10 +316,10 @@ def _stored(data: npt.NDArray[Any], spec: StreamSpec) -> npt.NDArray[Any]:
     return data.astype(declared)
 
 
-def cannot_write(path: Path, error: OSError) -> UnwritableError:
-    """Return the error to raise when the disk refuses."""
-    reason = error.strerror or error
-    return UnwritableError(
-        f"The recording {path} cannot be written: {reason}.",
-        hint="Check the folder's permissions and the free space, or give another with --out.",
-    )
+def recovery(journal: Path, path: Path) -> str:
+    """Return in words where the rows of an unfinished recording are, and the command that makes a recording of them."""
+    import shlex
+
+    rescued = path.with_name(f"{path.stem}-rescued{path.suffix}") if path.exists() else path
+    command = shlex.join(["tactbench", "inspect", str(journal), "--rescue", str(rescued)])
+    return f"What was recorded is in {journal}; make a recording of it:  {command}"

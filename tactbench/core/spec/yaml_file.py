@@ -15,12 +15,10 @@ M = TypeVar("M", bound=BaseModel)
 Path_ = tuple[str | int, ...]
 
 MOST_BYTES = 2**17
-"""The parser reads some 300 kB a second; the largest file of this project has 12 kB."""
-MOST_DEPTH = 32
-MOST_ALIASES = 100
-MOST_VALUES = 20_000
-"""With every alias written out: nine lines of nine aliases each are a third of a billion values."""
-_NUMBERS = ("tag:yaml.org,2002:int", "tag:yaml.org,2002:float")
+"""The largest file of this project has 12 kB."""
+_INT, _FLOAT, _TEXT = (f"tag:yaml.org,2002:{name}" for name in ("int", "float", "str"))
+_KEYS = (_INT, _TEXT, "tag:yaml.org,2002:merge")
+_WHOLE = re.compile(r"-?[1-9][0-9]*|0")
 _ODD_NUMBER = re.compile(r"[-+]?(0[0-9_]|[0-9][0-9_.]*[_:])")
 """Notations of YAML 1.1 that hardly anybody means: 010 is 8, 2025_04 is 202504, 1:30 is 90."""
 
@@ -34,133 +32,78 @@ def load_yaml(path: Path, model: type[M]) -> M:
         If the file cannot be read, is not YAML, repeats a key, has an unknown or mistyped key (the nearest known one
         is offered), or a value that `model` refuses. The message starts with ``file:line``.
     """
+    file = str(path)
     try:
-        with path.open("rb") as opened:
-            held = opened.read(MOST_BYTES + 1)
+        held = path.read_bytes()
         if len(held) > MOST_BYTES:
-            raise ConfigError(
-                str(path), None, f"is larger than {MOST_BYTES // 1024} KiB.", hint="Is it the right file?"
-            )
-        text = held.decode()
+            raise ConfigError(file, None, f"is larger than {MOST_BYTES // 1024} KiB.", hint="Is it the right file?")
+        node, data = _loaded(held.decode(), file)
     except OSError as error:
         raise ConfigError(
-            str(path), None, f"cannot be read: {error.strerror}.", hint="Check the path and its permissions."
+            file, None, f"cannot be read: {error.strerror}.", hint="Check the path and its permissions."
         ) from error
     except UnicodeDecodeError as error:
-        raise ConfigError(str(path), None, "is not UTF-8 text.", hint="Save it as UTF-8.") from error
-    try:
-        node = _composed(text, str(path))
-    except yaml.YAMLError as error:
-        mark = getattr(error, "problem_mark", None)
-        problem = getattr(error, "problem", None) or "is not YAML"
-        raise ConfigError(
-            str(path), mark.line + 1 if mark else None, f"{problem}.", hint="Check the syntax."
-        ) from error
+        raise ConfigError(file, None, "is not UTF-8 text.", hint="Save it as UTF-8.") from error
     if node is None:
-        raise ConfigError(str(path), None, "is empty.", hint="See docs/ for an example.")
+        raise ConfigError(file, None, "is empty.", hint="See docs/ for an example.")
     lines: dict[Path_, int] = {}
-    data = _construct(node, (), lines, str(path))
+    _look(node, (), lines, file)
     try:
         return model.model_validate(data)
     except ValidationError as error:
-        raise _explain(error, str(path), lines, node, model) from error
+        raise _explain(error, file, lines, node, model) from error
 
 
 def plain_value(text: str) -> Any:
     """Return what YAML reads `text` as if that is a number, a truth value or a text, else `text` itself."""
     try:
-        node = _composed(text, "")
-        value = _scalar(node, "") if isinstance(node, yaml.ScalarNode) else text
-    except (yaml.YAMLError, ConfigError):
+        node, value = _loaded(text, "")
+        _look(node, (), {}, "")
+    except ConfigError:
         return text
     return value if isinstance(value, str | int | float | bool) else text
 
 
-class _LimitedLoader(yaml.SafeLoader):
-    """Refuses what nests too deep, or repeats itself too often, as soon as it is read; raises ConfigError."""
-
-    def __init__(self, text: str, file: str) -> None:
-        super().__init__(text)
-        self._file = file
-        self._depth = self._aliases = 0
-
-    def compose_node(self, parent: yaml.Node | None, index: Any) -> yaml.Node | None:
-        event: Any = self.peek_event()  # type: ignore[no-untyped-call]
-        inside = isinstance(event, yaml.CollectionStartEvent)
-        self._depth += inside
-        self._aliases += isinstance(event, yaml.AliasEvent)
-        if self._depth > MOST_DEPTH or self._aliases > MOST_ALIASES:
-            line = event.start_mark.line + 1 if event.start_mark else None
-            deep = self._depth > MOST_DEPTH
-            what = f"it nests {self._depth} deep" if deep else f"it has more than {MOST_ALIASES} aliases"
-            raise ConfigError(self._file, line, f"{what}.", hint="Write it out plainly.")
-        node = super().compose_node(parent, index)
-        self._depth -= inside
-        return node
-
-
-def _composed(text: str, file: str) -> yaml.Node | None:
-    """Return the nodes of a text, nothing built of them yet; raises ConfigError, yaml.YAMLError."""
-    loader = _LimitedLoader(text, file)
+def _loaded(text: str, file: str) -> tuple[Any, Any]:
+    """Return the node and the plain data of a text; raises ConfigError."""
     try:
-        return loader.get_single_node()
-    finally:
-        loader.dispose()
+        return yaml.compose(text, yaml.SafeLoader), yaml.safe_load(text)
+    except yaml.YAMLError as error:
+        mark = getattr(error, "problem_mark", None)
+        problem = getattr(error, "problem", None) or "is not YAML"
+        raise ConfigError(file, mark.line + 1 if mark else None, f"{problem}.", hint="Check the syntax.") from error
+    except (ValueError, RecursionError) as error:  # a number or date that is none, or brackets without end
+        raise ConfigError(file, None, f"cannot be read as plain values: {error}.", hint="Quote texts.") from error
 
 
-def _construct(node: yaml.Node, at: Path_, lines: dict[Path_, int], file: str) -> Any:
-    """Build plain data from `node`, remembering the line of every key and item."""
-    lines.setdefault(at, node.start_mark.line + 1)
-    if len(at) > MOST_DEPTH or len(lines) > MOST_VALUES:
-        what = "an alias contains itself" if len(at) > MOST_DEPTH else f"there are more than {MOST_VALUES} values here"
-        raise ConfigError(file, node.start_mark.line + 1, f"{what}.", hint="Write it out, without aliases (*).")
-    if not node.tag.startswith("tag:yaml.org,2002:") or "python" in node.tag:
-        raise ConfigError(
-            file, node.start_mark.line + 1, f"the tag {node.tag!r} is refused.", hint="Only plain YAML is read."
-        )
-    if isinstance(node, yaml.MappingNode):
-        built: dict[str | int, Any] = {}
-        for key_node, value_node in node.value:
-            line = key_node.start_mark.line + 1
-            key = _key(key_node, file)
-            if key in built:
-                raise ConfigError(file, line, f"the key {key!r} stands here twice.", hint="Remove one of them.")
-            lines[(*at, key)] = line
-            built[key] = _construct(value_node, (*at, key), lines, file)
-        return built
-    if isinstance(node, yaml.SequenceNode):
-        return [_construct(item, (*at, place), lines, file) for place, item in enumerate(node.value)]
-    return _scalar(node, file) if isinstance(node, yaml.ScalarNode) else None
-
-
-def _key(node: yaml.Node, file: str) -> str | int:
-    """Return a key that YAML reads as it is written: ``yes`` would become True, ``0x1f`` 31."""
+def _look(node: Any, at: Path_, lines: dict[Path_, int], file: str) -> None:
+    """Remember the line of every key and item; refuse what YAML reads as something else than is written."""
     line = node.start_mark.line + 1
-    if not isinstance(node, yaml.ScalarNode):
-        raise ConfigError(file, line, "a key must be a word or a whole number.", hint="Quote it.")
-    key, written = _scalar(node, file), node.value[:80]
-    if isinstance(key, str | int) and str(key) == node.value:
-        return key
-    raise ConfigError(
-        file, line, f"the key {written} is neither a word nor a whole number: it would be read as {key!r}.",
-        hint=f"Quote it: '{written}'.",
-    )  # fmt: skip
-
-
-def _scalar(node: yaml.ScalarNode, file: str) -> Any:
-    line, written = node.start_mark.line + 1, str(node.value)[:80]
-    if node.tag in _NUMBERS and _ODD_NUMBER.match(node.value):
+    lines.setdefault(at, line)
+    if isinstance(node, yaml.MappingNode):
+        seen = set()
+        for key_node, value_node in node.value:
+            line, key = key_node.start_mark.line + 1, str(key_node.value)[:80]
+            number = key_node.tag == _INT
+            if key_node.tag not in _KEYS or (number and not _WHOLE.fullmatch(key)):
+                raise ConfigError(
+                    file, line, f"the key {key} is neither a word nor a whole number.", hint=f"Quote it: '{key}'."
+                )  # fmt: skip
+            if key in seen:
+                raise ConfigError(file, line, f"the key {key!r} stands here twice.", hint="Remove one of them.")
+            seen.add(key)
+            place: Path_ = (*at, int(key) if number else key)
+            lines[place] = line
+            _look(value_node, place, lines, file)
+    elif isinstance(node, yaml.SequenceNode):
+        for index, item in enumerate(node.value):
+            _look(item, (*at, index), lines, file)
+    elif node.tag in (_INT, _FLOAT) and _ODD_NUMBER.match(node.value):
+        written = node.value[:80]
         raise ConfigError(
             file, line, f"{written} would be read as another number than is written.",
             hint=f"Quote it if it is a word: '{written}'; else leave out leading zeros, _ and :.",
         )  # fmt: skip
-    try:
-        return yaml.constructor.SafeConstructor().construct_object(node)
-    except (yaml.YAMLError, ValueError) as error:
-        raise ConfigError(
-            file, line, f"{written!r} cannot be read as a plain value.",
-            hint="Only plain YAML is read: no tags that build objects.",
-        ) from error  # fmt: skip
 
 
 def _explain(
@@ -174,11 +117,11 @@ def _explain(
     at, line = _deepest(loc, lines)
     name = ".".join(str(part) for part in at) or "the file"
     if first["type"] == "extra_forbidden":
-        known = _siblings(error, loc, model)
-        close = nearest(str(loc[-1]), known)
-        meant = f"Did you mean {' or '.join(repr(word) for word in close)}? " if close else ""
-        listing = f"Known here: {', '.join(sorted(known))}." if known else ""
-        return ConfigError(file, line, f"the key {str(loc[-1])!r} is not known.", hint=f"{meant}{listing}".strip())
+        schema = model.model_json_schema()
+        parts = (schema, *schema.get("$defs", {}).values())
+        close = nearest(str(loc[-1]), {key for part in parts for key in part.get("properties", {})})
+        meant = f"Did you mean {' or '.join(repr(word) for word in close)}?" if close else "Remove it."
+        return ConfigError(file, line, f"the key {str(loc[-1])!r} is not known.", hint=meant)
     if first["type"] == "missing":
         return ConfigError(file, line, f"the key {str(loc[-1])!r} is missing in {name}.", hint="Add it.")
     text = _written(root, at)
@@ -206,35 +149,4 @@ def _written(node: yaml.Node, at: Path_) -> str:
             node = children[part]
     if not isinstance(node, yaml.ScalarNode):
         return ""
-    is_text = node.tag == "tag:yaml.org,2002:str"
-    return repr(node.value) if is_text else str(node.value)
-
-
-def _siblings(error: ValidationError, loc: Path_, model: type[BaseModel]) -> set[str]:
-    """Return the keys that the model of the unknown key's parent knows."""
-    current: Any = model
-    for part in loc[:-1]:
-        current = _step(current, part)
-        if current is None:
-            return set()
-    inside = [argument for argument in getattr(current, "__args__", ()) if hasattr(argument, "model_fields")]
-    fields = getattr(inside[0] if len(inside) == 1 else current, "model_fields", {})
-    return {field.alias or name for name, field in fields.items()}
-
-
-def _step(current: Any, part: str | int) -> Any:
-    """Return the model found under `part`, looking through unions, lists and dicts."""
-    fields = getattr(current, "model_fields", None)
-    if fields is not None:
-        by_alias = {field.alias or name: field for name, field in fields.items()}
-        return by_alias[str(part)].annotation if str(part) in by_alias else current
-    arguments = [argument for argument in getattr(current, "__args__", ()) if argument is not type(None)]
-    models = [argument for argument in arguments if hasattr(argument, "model_fields")]
-    if isinstance(part, str) and len(models) > 1:
-        for candidate in models:
-            tags = [field.default for field in candidate.model_fields.values()]
-            if part in tags or part == candidate.__name__:
-                return candidate
-    if arguments:
-        return _step(arguments[-1], part) if not models else models[0]
-    return None
+    return repr(node.value) if node.tag == _TEXT else str(node.value)

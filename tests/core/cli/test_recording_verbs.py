@@ -64,7 +64,36 @@ def test_a_wrong_table_is_one_clear_screen(tables):
     assert done.stdout == ""
     assert "Traceback" not in done.stderr
     assert "two.csv:52: column 'a': 'x' is not a number" in done.stderr
-    assert not list((tables.folder / "recordings").rglob("*"))[1:]
+    assert not (tables.folder / "recordings").exists()
+
+
+def test_an_import_with_errors_says_so_by_its_exit_code(tables):
+    with (tables.folder / "two.csv").open("a") as file:
+        file.write("0.1,1,1,2\n")
+    done = tables("import", "mapping.yaml", "--out", "recordings", code=1)
+    assert "error: time runs backwards" in done.stdout
+    assert (tables.folder / "recordings" / "two.h5").exists()
+
+
+def test_without_what_only_posix_has(tables):
+    """Not the same as Windows; but what is not there cannot be needed."""
+    script = (
+        "import multiprocessing, os, sys\n"
+        "sys.modules.update(dict.fromkeys(('fcntl', 'resource', 'termios', 'pwd')))\n"
+        "for name in ('fork', 'killpg', 'sched_getaffinity'):\n    delattr(os, name)\n"
+        "multiprocessing.set_start_method('spawn')\n"
+        "from tactbench.core.cli import main\n"
+        "main(sys.argv[1:])\n"
+    )
+    for words in (
+        ("import", "mapping.yaml", "--out", "recordings"),
+        ("record", "--sensor", "ideal", "--seconds", "3", "--out", "press.h5"),
+        ("inspect", "recordings/one.h5", "press.h5"),
+    ):
+        done = subprocess.run(
+            [sys.executable, "-c", script, *words], cwd=tables.folder, check=False, capture_output=True, text=True
+        )
+        assert done.returncode == 0, done.stderr
 
 
 def test_a_damaged_recording(tables):
@@ -88,6 +117,10 @@ def test_record_then_inspect(verbs):
     assert about["meta"]["scene"]["profile"]["end"]["value"] == 2.0
     assert {stream["of"] for stream in about["streams"]} == {"sensor", "reference"}
     assert "exists already" in verbs("record", "--sensor", "icub", "--out", "press.h5", code=2).stderr
+    again = ("record", "--sensor", "icub", "--cap-mm", "10", "--force-n", "2", "--seconds", "3", "--out", "other.h5")
+    verbs(*again)  # the seed alone decides, and not the name of the file
+    (other,) = json.loads(verbs("inspect", "other.h5", "--format", "json").stdout)
+    assert (other["meta"]["name"], other["content_sha256"]) == ("other", about["content_sha256"])
 
 
 def test_record_a_slide(verbs):

@@ -10,8 +10,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tactbench.core.errors import FormatError, RecordingError
-from tactbench.core.recording.clock_fit import ClockFit, HostTimes, one_way, two_way
+from tactbench.core.errors import FormatError
+from tactbench.core.recording.clock_fit import ClockFit, HostTimes, one_way
 from tactbench.core.spec.recording import StreamClock
 
 MS = 1_000_000
@@ -38,7 +38,7 @@ def on_host(fit, device):
 def test_the_error_is_within_the_bound(simulated, name):
     """Bounds from measured tables over 30 s stretches; benchmarks/clock_fit.py runs a thousand of each."""
     worst = 0.0
-    for seed in range(10):
+    for seed in range(4):
         error, bound, squares = simulated.one_run(
             np.random.default_rng([seed, 60]), simulated.DELAYS[name], 60, 100, 0.0, 600.0, 30 * S
         )
@@ -71,7 +71,7 @@ def highest_below(device, host):
     return best
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=30, deadline=None)
 @given(
     st.lists(st.tuples(st.integers(1, 10**6), st.integers(0, 10**6)), min_size=2, max_size=14), st.integers(0, 2**60)
 )
@@ -87,7 +87,7 @@ def test_the_line_is_the_hulls_edge_over_the_middle(rows, start):
     assert segment.bound_ns is None
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=15, deadline=None)
 @given(st.integers(0, 2**32), st.lists(st.integers(0, 12000), max_size=6))
 def test_blocks_and_whole_columns_are_the_same(seed, cuts):
     rng = np.random.default_rng(seed)
@@ -155,24 +155,3 @@ def test_few_points(device):
 def test_rows_without_a_line_are_refused():
     with pytest.raises(FormatError, match="no line"):
         HostTimes(StreamClock(source="device"))(np.arange(3))
-
-
-@pytest.mark.parametrize("late_s", [0.0, 1e-3])
-def test_two_way_always_covers(simulated, late_s):
-    """With asymmetric ways the error is half the asymmetry, and inside the bound."""
-    for seed in range(5):
-        rng = np.random.default_rng(seed)
-        device, true = simulated.clocks(rng, 60, 10, 0.0, 600.0)
-        way = np.rint((0.2e-3 + rng.exponential(0.5e-3, (2, len(device)))) * 1e9).astype(np.int64)
-        fit = ClockFit(two_way)
-        fit.add(device, true - way[0] - round(late_s * 1e9), true + way[1])
-        error = np.abs(on_host(fit, device) - true).max()
-        assert error <= max(segment.bound_ns for segment in fit.segments())
-        assert error == pytest.approx(late_s * 1e9 / 2, abs=60_000)  # two hulls of delays of 0.5 ms over 300 polls
-
-
-def test_two_way_needs_requests_before_replies():
-    device = np.arange(10) * S
-    with pytest.raises(RecordingError, match="No linear clock"):
-        two_way(0, (device, device + MS, device - MS))
-    assert two_way(0, (device[:1], device[:1], device[:1] + 10)).bound_ns == 6

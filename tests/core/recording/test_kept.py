@@ -7,20 +7,27 @@ from pathlib import Path
 
 import h5py
 import numpy as np
+import pytest
 
+from tactbench.core.recording.clock_fit import HostTimes
 from tactbench.core.recording.reader import open_recording
-from tactbench.core.recording.times import recomputed_t_ns
 from tactbench.core.samples import Quality
 from tactbench.core.spec.recording import StreamClock
 
 KEPT = Path(__file__).resolve().parents[2] / "recordings"
 
 
-def test_version_2():
-    with open_recording(KEPT / "v2" / "press.h5") as recording:
-        recording.verify()
-        assert recording.version == 2
-        assert recording.content_digest() == "ec0bc4f35085db5b3da669083822bff1c8b37a39b1a4dfd6228c37f1ce7267c3"
+@pytest.mark.parametrize(
+    ("version", "digest"),
+    [
+        (2, "ec0bc4f35085db5b3da669083822bff1c8b37a39b1a4dfd6228c37f1ce7267c3"),
+        (3, "fdf030b9e327789f876a8b93aa36e494cb12d1e45910b14b49e08cc30b65cd7b"),
+    ],
+)
+def test_versions_2_and_3(version, digest):
+    with open_recording(KEPT / f"v{version}" / "press.h5") as recording:
+        assert recording.verify() == digest
+        assert recording.version == version
         meta, taxels, force = recording.meta, recording.read("taxels"), recording.read("force_torque")
     n = np.arange(180)
     assert (meta.clock, meta.emulation.time, meta.counts) == ("host", "real", {"pad parity errors": 1})
@@ -33,7 +40,7 @@ def test_version_2():
     ]  # fmt: skip
     assert np.array_equal(taxels.sequence, n)
     assert np.array_equal(taxels.device_ns, np.where(n < 100, n, n - 100) * 10_000_000)
-    assert np.array_equal(taxels.t_ns, recomputed_t_ns(taxels, clock))
+    assert np.array_equal(taxels.t_ns, HostTimes(clock)(taxels.device_ns))
     true = 1_000_000_000_000 + n * 10_000_000
     assert (taxels.host_ns - true >= 200_000).all()
     assert np.abs(taxels.t_ns - true - 200_000).max() < 40_000  # the least delay is not taken off

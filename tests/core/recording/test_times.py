@@ -7,9 +7,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tactbench.core.errors import FormatError, RigError
+from tactbench.core.recording.clock_fit import HostTimes
 from tactbench.core.recording.health import examine
 from tactbench.core.recording.reader import open_recording
-from tactbench.core.recording.times import recomputed_t_ns
 from tactbench.core.recording.writer import RecordingWriter
 from tactbench.core.samples import Block
 from tactbench.core.spec.quantity import Source
@@ -57,7 +57,7 @@ def test_stored_times_are_exactly_recomputed(tmp_path_factory, seed, blocks, los
         read, clock = recording.read("taxels"), recording.meta.clocks["taxels"]
     assert np.array_equal(read.device_ns, device)
     assert np.array_equal(read.host_ns, host)
-    assert np.array_equal(read.t_ns, recomputed_t_ns(read, clock))
+    assert np.array_equal(read.t_ns, HostTimes(clock)(read.device_ns))
     assert clock.breaks == (0 < lost < 4000)
 
 
@@ -83,16 +83,6 @@ def test_where_the_device_is_not_the_clock_times_are_as_they_came(tmp_path, make
     assert np.array_equal(read.t_ns, host)
     assert np.array_equal(read.device_ns, device)
     assert read.host_ns is None
-    with pytest.raises(FormatError, match="as they came"):
-        recomputed_t_ns(read, StreamClock(source="device"))
-
-
-def test_device_times_in_some_blocks_only_are_refused(tmp_path, make_meta):
-    n = np.arange(5)
-    with RecordingWriter(tmp_path / "x.h5", make_meta()) as writer:
-        writer.append(Block("taxels", n, np.ones((5, 3)), device_ns=n))
-        with pytest.raises(RigError, match="device times"):
-            writer.append(Block("taxels", n + 5, np.ones((5, 3))))
 
 
 def test_a_block_after_the_labels_is_refused(tmp_path, make_meta):

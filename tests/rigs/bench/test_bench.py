@@ -45,7 +45,7 @@ def press(path, file, sensor="icub", scene=SCENE, operator=None):
     try:
         acquire(
             bench(file, operator), REGISTRY.sensors[sensor], REGISTRY.rigs["bench"], scene, role=None, seed=7,
-            path=path, clock=lambda: 0.0, provenance={}, interrupted=path,
+            path=path, clock=lambda: 0.0, provenance={}, complete_interrupted=True,
         )  # fmt: skip
     except RigError as raised:
         error = raised

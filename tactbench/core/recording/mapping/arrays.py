@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import importlib
-import math
 import zipfile
 from collections.abc import Collection, Iterator
 from pathlib import Path
@@ -15,12 +14,6 @@ import numpy.typing as npt
 from tactbench.core.errors import MappingError, nearest
 from tactbench.core.recording.mapping.model import Arrays, Mat
 from tactbench.core.recording.mapping.table import ArrayTable, plain
-
-MAX_BYTES = 4 * 2**30
-"""An archive that unpacks to more is refused: a small file can claim any size."""
-
-_MAT_BYTES = 16
-"""Of a complex number, the largest that an array of MATLAB holds."""
 
 Words = dict[str, str]
 
@@ -67,17 +60,6 @@ def read_arrays(path: Path, shown: str, how: Arrays) -> Iterator[tuple[Words, Ar
         yield {"index": f"{index:0{wide}d}", **words}, ArrayTable(f"{shown}[{how.array}, {index}]", rows)
 
 
-def require_small(path: Path, shown: str, most: int = MAX_BYTES) -> None:
-    """Refuse an archive that unpacks to more than `most` bytes; MappingError, zipfile.BadZipFile."""
-    with zipfile.ZipFile(path) as archive:
-        _require_small(shown, sum(member.file_size for member in archive.infolist()), most)
-
-
-def _require_small(shown: str, size: int, most: int) -> None:
-    if size > most:
-        raise MappingError(f"{shown} unpacks to {size} bytes; at most {most} are read.", hint="Split it.")
-
-
 def _require_there(shown: str, names: set[str], there: Collection[str]) -> None:
     for name in sorted(names):
         if name not in there:
@@ -88,8 +70,7 @@ def _require_there(shown: str, names: set[str], there: Collection[str]) -> None:
 
 def _load_npz(path: Path, shown: str, names: set[str]) -> dict[str, npt.NDArray[Any]]:
     try:
-        require_small(path, shown)
-        with np.load(path, allow_pickle=False) as archive:
+        with path.open("rb") as opened, np.load(opened, allow_pickle=False) as archive:
             _require_there(shown, names, archive.files)
             return {name: archive[name] for name in names}
     except MappingError:
@@ -104,9 +85,7 @@ def _load_npz(path: Path, shown: str, names: set[str]) -> dict[str, npt.NDArray[
 def _load_mat(path: Path, shown: str, names: set[str]) -> dict[str, npt.NDArray[Any]]:
     io: Any = importlib.import_module("scipy.io")
     try:
-        sizes = {name: math.prod(shape) * _MAT_BYTES for name, shape, _ in io.whosmat(path)}
-        _require_there(shown, names, sizes)
-        _require_small(shown, sum(sizes[name] for name in names), MAX_BYTES)
+        _require_there(shown, names, [name for name, *_ in io.whosmat(path)])
         found = io.loadmat(path, variable_names=sorted(names))
     except MappingError:
         raise

@@ -4,18 +4,16 @@ from __future__ import annotations
 
 import fnmatch
 import re
-import shutil
-import tempfile
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from dataclasses import replace as replaced
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import cast, get_args
 
 from tactbench.core.errors import MappingError, RecordingError, UnwritableError
-from tactbench.core.files import try_lock
 from tactbench.core.recording.health import Finding, examine
 from tactbench.core.recording.mapping.channels import MappedStream, device, fill, sensor_of
 from tactbench.core.recording.mapping.files import FileSet, RawRecording, find, read
@@ -34,8 +32,6 @@ RIG = "import"
 """What an imported recording says about its rig: somebody else's, made known by a mapping."""
 
 ENDING = ".h5"
-_IMPORTING, _LOCK = ".importing-", "lock"
-"""Of a folder in which recordings wait, and the file in it that its process holds."""
 _FILE_NAME = re.compile(r"^[A-Za-z0-9][A-Za-z0-9._-]*$")
 
 Progress = Callable[[int, int, str], None]
@@ -145,34 +141,24 @@ def import_tables(
 def _aside(out: Path) -> Iterator[Path]:
     """Give the folder in which recordings wait until all of them are good; hidden, so that no rig replays it.
 
-    Those that killed processes have left are removed first: nobody holds the lock in them.
+    Folders that were made for an import that is refused are removed again.
     """
+    made = [folder for folder in (out, *out.parents) if not folder.exists()]
     try:
         out.mkdir(parents=True, exist_ok=True)
-        for left in out.glob(f"{_IMPORTING}*"):
-            if not left.is_symlink() and left.is_dir() and not _held(left):
-                shutil.rmtree(left, ignore_errors=True)
-        folder = Path(tempfile.mkdtemp(prefix=_IMPORTING, dir=out))
-        lock = (folder / _LOCK).open("wb")
+        waiting = TemporaryDirectory(prefix=".importing-", dir=out)
     except OSError as error:
         raise UnwritableError(
             f"The folder {out} cannot be written: {error.strerror}.", hint="Give another with --out DIR."
         ) from error
-    with lock:
-        try_lock(lock.fileno())
-        try:
-            yield folder
-        finally:
-            shutil.rmtree(folder, ignore_errors=True)
-
-
-def _held(folder: Path) -> bool:
-    """Return whether a process still writes into a folder of `_aside`."""
     try:
-        with (folder / _LOCK).open("rb") as lock:
-            return not try_lock(lock.fileno())
-    except OSError:  # no lock yet, perhaps
-        return True
+        with waiting as folder:
+            yield Path(folder)
+    except BaseException:
+        for empty in made:
+            with suppress(OSError):
+                empty.rmdir()
+        raise
 
 
 def _count_files(sets: Sequence[FileSet]) -> int:
@@ -190,7 +176,7 @@ def _write(
         for name, table in raw.tables.items()
         if (time := mapping.tables[name].time) is not None
     }
-    with RecordingWriter(path, meta) as writer:
+    with RecordingWriter(path, meta, keep=False) as writer:
         for name, stream in streams.items():
             table = raw.tables[stream.source.table]
             read_in = samples(stream, table)

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import importlib
 import re
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
 from pydantic import Field, ValidationInfo, field_validator, model_validator
 
@@ -18,10 +17,6 @@ from tactbench.core.spec.task import LabelTarget
 
 Column = int | str
 """A column by its place (from 0) or by its name in the header."""
-
-_regular: Any = importlib.import_module("re._parser")
-"""How the standard library reads regular expressions; it says so nowhere else."""
-_REPEATS = (_regular.MAX_REPEAT, _regular.MIN_REPEAT, _regular.POSSESSIVE_REPEAT)
 
 WORD = r"^[a-z][a-z0-9_]*$"
 MUST_NAME_SENTINELS = {"force": "N", "torque": "N*m"}
@@ -143,11 +138,6 @@ class TableSource(Frozen):
         for name in groups:
             if not re.match(WORD, name):
                 raise ValueError(f"the group {name!r} must be a word in lower case")
-        if _nests(_regular.parse(path), repeated=False):
-            raise ValueError(
-                "a repeated group has a repetition or alternatives inside, which may take for ever; write it flat: "
-                "[a-z_]+ for ([a-z]+_?)+, or a fixed number of times {8} inside"
-            )
         return path
 
 
@@ -379,27 +369,6 @@ def _require(task: DeclaredTask, what: str, asked: set[str], there: set[str]) ->
     for name in sorted(asked - there):
         listed = ", ".join(sorted(there)) or "none"
         raise ValueError(f"task {task.name} asks for {what} {name}, which the mapping does not have; it has {listed}")
-
-
-def _nests(parsed: Any, *, repeated: bool) -> bool:
-    """Return whether a part of a parsed regular expression that is repeated can itself be matched in several lengths.
-
-    Such an expression may try as many ways as there are subsets of the letters before it gives up.
-    """
-    for name, argument in parsed:
-        again = repeated
-        if name in _REPEATS:
-            least, most, _ = argument
-            if repeated and least != most:
-                return True
-            again = repeated or most > 1
-        elif name is _regular.BRANCH and repeated:
-            return True
-        for part in argument if isinstance(argument, tuple) else (argument,):
-            inside = part if isinstance(part, list) else [part]
-            if any(isinstance(one, _regular.SubPattern) and _nests(one, repeated=again) for one in inside):
-                return True
-    return False
 
 
 def _convertible(given: str, required: str) -> None:

@@ -9,15 +9,9 @@ from pathlib import Path
 from typing import Any
 
 from tactbench.core.errors import MappingError
-from tactbench.core.recording.mapping.arrays import require_small
 from tactbench.core.recording.mapping.model import Xlsx
 from tactbench.core.recording.mapping.table import TextTable, plain
 from tactbench.core.recording.mapping.text import Line, table_of
-
-MOST_BYTES = 2**29
-"""Unpacked: openpyxl holds all texts of a workbook in memory."""
-MOST_CELLS = 20_000_000
-"""Empty ones too: a small file can name a cell in the last row of the last column."""
 
 
 def read_sheet(path: Path, shown: str, how: Xlsx) -> TextTable:
@@ -26,7 +20,7 @@ def read_sheet(path: Path, shown: str, how: Xlsx) -> TextTable:
     Raises
     ------
     MappingError
-        If openpyxl is not installed, the file is no workbook, the sheet is not in it, or it is empty or too large.
+        If openpyxl is not installed, the file is no workbook, the sheet is not in it, or it is empty.
     """
     try:
         from openpyxl import load_workbook
@@ -36,12 +30,11 @@ def read_sheet(path: Path, shown: str, how: Xlsx) -> TextTable:
             hint="Install it with `pip install 'tactbench[xlsx]'`, or save the sheet as CSV.",
         ) from error
     try:
-        require_small(path, shown, MOST_BYTES)
         with warnings.catch_warnings(), path.open("rb") as opened:
             warnings.simplefilter("ignore")  # styles and extensions that openpyxl does not know
             book = load_workbook(opened, read_only=True, data_only=True)
             sheet = _sheet(book, shown, how)
-            lines = list(_lines(sheet.iter_rows(min_row=how.skip_lines + 1, values_only=True), shown, how.skip_lines))
+            lines = list(_lines(sheet.iter_rows(min_row=how.skip_lines + 1, values_only=True), how.skip_lines))
     except MappingError:
         raise
     except Exception as error:  # whatever a damaged file makes of the library
@@ -61,13 +54,9 @@ def _sheet(book: Any, shown: str, how: Xlsx) -> Any:
     return book[name]
 
 
-def _lines(rows: Any, shown: str, skipped: int) -> Iterator[Line]:
+def _lines(rows: Any, skipped: int) -> Iterator[Line]:
     """Yield the rows that are not blank, without the blank cells at their ends."""
-    read = 0
     for number, row in enumerate(rows, skipped + 1):
-        read += max(len(row), 1)
-        if read > MOST_CELLS:
-            raise MappingError(f"{shown} has more than {MOST_CELLS} cells.", hint="Save the sheet as CSV.")
         cells = [_text(value) for value in row]
         while cells and not cells[-1]:
             cells.pop()

@@ -1,8 +1,8 @@
-"""How ``press.h5`` beside this file was made: once, by format version 2. It is never written anew.
+"""How ``press.h5`` beside this file was made: once, by format version 3. It is never written anew.
 
 Taxels with a clock of their own, lost once and begun again, with a gap; the force on the host's clock.
 
-Usage: python tests/recordings/v2/make.py FILE
+Usage: python tests/recordings/v3/make.py FILE
 """
 
 import sys
@@ -13,7 +13,7 @@ import numpy as np
 from tactbench.core.recording.writer import RecordingWriter
 from tactbench.core.samples import Block, Quality
 from tactbench.core.spec.quantity import Source
-from tactbench.core.spec.recording import Emulation, RecordingMeta, StreamClock, StreamCounts
+from tactbench.core.spec.recording import Emulation, PlanEntry, RecordingMeta, StreamClock, StreamCounts
 from tactbench.core.spec.sensor import ChannelSpec, SensorSpec, StreamSpec
 
 ROWS = 180
@@ -47,6 +47,8 @@ def main(path: Path) -> None:
         },
         streams={"taxels": StreamCounts(received=183, written=180, dropped=2, duplicates=1, gaps=3)},
         counts={"pad parity errors": 1},
+        plan=(PlanEntry(effect="creep", included=False, reason="made for a test", change=0.25),),
+        drawn={"solver_residual": 1e-9},
     )  # fmt: skip
     data = rng.integers(0, 4096, (ROWS, 3)).astype(np.uint16)
     with RecordingWriter(path, meta) as writer:
