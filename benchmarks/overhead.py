@@ -40,7 +40,7 @@ def one(cells: int, on: str | None) -> dict[str, float]:
         folder = Path(made)
         shelf = trivial.install(folder / "plugin")
         trivial.use(folder / "plugin")
-        from tactbench.core.evaluation.cell import CellContext, evaluate
+        from tactbench.core.evaluation.cell import CellContext, evaluate_cell
         from tactbench.core.evaluation.dataset import load_dataset
         from tactbench.core.matrix.engine import EngineChoice
         from tactbench.core.matrix.run import run_matrix
@@ -62,7 +62,7 @@ def one(cells: int, on: str | None) -> dict[str, float]:
         data = load_dataset(task, sorted(shelf.glob("*.h5")))
         began = time.perf_counter()
         for seed in range(1, cells + 1):
-            evaluate(
+            evaluate_cell(
                 CellContext(
                     task,
                     installed().estimators["nothing"],

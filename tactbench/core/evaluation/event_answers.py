@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -13,7 +13,7 @@ from tactbench.core.evaluation.dataset import Dataset, Table
 from tactbench.core.evaluation.metrics import METRICS
 from tactbench.core.evaluation.slip_reference import SCALES, SlipReference
 from tactbench.core.events.alarms import alarms
-from tactbench.core.events.curve import ScoredRecording, ThresholdCurve, threshold_curve
+from tactbench.core.events.curve import ScoredRecording, threshold_curve
 from tactbench.core.events.labels import GROSS, UNDECIDED
 from tactbench.core.events.matching import match
 from tactbench.core.events.metrics import GroundTruth, displacement_at_detection, score_events
@@ -71,21 +71,18 @@ class Detected(NamedTuple):
     """Alarms at the thresholds of `BOUNDS_PER_MINUTE`; empty where the detector has a threshold of its own"""
 
 
-@dataclass
-class EventAnswers:
-    """The test recordings of one cell."""
+@dataclass(frozen=True)
+class EventRules:
+    """How a detector's scores become alarms, and what is counted of these."""
 
     policy: AlarmPolicy
     max_false_alarms_per_minute: float
     own_threshold: float | None
     hop_ns: int
-    tested: list[Detected] = field(default_factory=list)
-    thresholds: dict[str, float] = field(default_factory=dict)
-    """By fold"""
 
     @classmethod
-    def of(cls, task: TaskSpec, own_threshold: float | None) -> EventAnswers:
-        """Return the answers of a task of events, still none."""
+    def of(cls, task: TaskSpec, own_threshold: float | None) -> EventRules:
+        """Return the rules of a task of events."""
         if task.alarms is None or task.max_false_alarms_per_minute is None or not isinstance(task.target, SlipTarget):
             raise DataError(f"Task {task.name!r} asks for no events.", hint="Report this.")
         return cls(task.alarms, task.max_false_alarms_per_minute, own_threshold, nanoseconds(task.target.hop_s))
@@ -103,24 +100,27 @@ class EventAnswers:
             found.append(Scored(place, first + self.hop_ns * np.arange(n), whole, _reference(table)))
         return found
 
-    def choose(self, fold: str, validated: Sequence[Scored]) -> tuple[float, tuple[float, ...]]:
-        """Return the threshold of a fold, and those of all bounds."""
+    def choose(self, validated: Sequence[Scored]) -> tuple[float, tuple[float, ...]]:
+        """Return the threshold of a fold, and those of all bounds; none of a detector with a threshold of its own."""
         if self.own_threshold is not None:
-            self.thresholds[fold] = self.own_threshold
             return self.own_threshold, ()
         curve = threshold_curve([ScoredRecording(one.t_ns, one.score, one.truth()) for one in validated], self.policy)
-        chosen = _operating_point(curve, self.max_false_alarms_per_minute)
-        self.thresholds[fold] = chosen
-        return chosen, tuple(_operating_point(curve, bound) for bound in BOUNDS_PER_MINUTE)
+        try:
+            chosen, *bounds = (
+                curve.operating_point(bound) for bound in (self.max_false_alarms_per_minute, *BOUNDS_PER_MINUTE)
+            )
+        except DataError as error:
+            raise DataError(
+                "No threshold can be chosen: the validation recordings have no slip, or no disturbance to count false "
+                "alarms on.",
+                hint="Give validation recordings of both (label `event: disturbance`), or another --split.",
+            ) from error
+        return chosen, tuple(bounds)
 
-    def add(self, scored: Sequence[Scored], threshold: float, bounds: Sequence[float], data: Dataset) -> Items:
-        """Keep what became of test recordings; return their items as :func:`items` does."""
-        new = [
-            Detected(one, threshold, self.alarms(one, threshold), tuple(self.alarms(one, each) for each in bounds))
-            for one in scored
-        ]
-        self.tested += new
-        return self.items([(one.scored, one.alarm_ns) for one in new], data)
+    def detect(self, scored: Scored, threshold: float, bounds: Sequence[float]) -> Detected:
+        """Return what becomes of a test recording."""
+        at_bounds = tuple(self.alarms(scored, each) for each in bounds)
+        return Detected(scored, threshold, self.alarms(scored, threshold), at_bounds)
 
     def alarms(self, one: Scored, threshold: float) -> IntArray:
         """Return when a recording's alarms are known, without the time that computing takes."""
@@ -148,7 +148,7 @@ class EventAnswers:
                 row[mine] = frames.row[np.maximum(last, 0)]
         return Items(truth, answered, place, row, at_ns * 1e-9)
 
-    def figures(self, compute_s: float | None) -> dict[str, float]:
+    def figures(self, tested: Sequence[Detected], compute_s: float | None) -> dict[str, float]:
         """Return what is said of the events of all test recordings; what cannot be said is not there.
 
         Parameters
@@ -156,11 +156,11 @@ class EventAnswers:
         compute_s
             Seconds from the end of a frame's window to its answer; None: not measured, latencies are without it.
         """
-        truths = [one.scored.truth() for one in self.tested]
-        scores = score_events(truths, [one.alarm_ns for one in self.tested], self.policy)
+        truths = [one.scored.truth() for one in tested]
+        scores = score_events(truths, [one.alarm_ns for one in tested], self.policy)
         late_s = compute_s or 0.0
         moved, start = [], 0
-        for one, truth in zip(self.tested, truths, strict=True):
+        for one, truth in zip(tested, truths, strict=True):
             n = len(truth.event_ns)
             reference = one.scored.reference
             moved.append(
@@ -183,45 +183,31 @@ class EventAnswers:
             "false alarms per minute": float(scores.false_alarms_per_minute),
             "minutes of disturbances": scores.base_s / 60,
             "displacement at detection p50 mm": 1e3 * float(np.median(displacement)) if displacement.size else np.nan,
-            **self._frames(),
-            **self._other_labels(),
+            **_frame_scores(tested),
+            **self._other_labels(tested),
         }
         if compute_s is not None:
             found |= {"compute ms a frame": 1e3 * compute_s, "compute s per s of signal": 1e9 * compute_s / self.hop_ns}
         return {name: value for name, value in found.items() if np.isfinite(value)}
 
-    def _frames(self) -> dict[str, float]:
-        """Return frame scores of gross slip against the rest, over frames that have a label and an answer."""
-        truth, given = [], []
-        for one in self.tested:
-            state = one.scored.reference.state(one.scored.t_ns, 1.0)
-            known = (state != UNDECIDED) & ~np.isnan(one.scored.score)
-            truth.append(state[known] == GROSS)
-            given.append(one.scored.score[known] >= one.threshold)
-        y, predicted = (np.concatenate(each).astype(np.int64) for each in (truth, given))
-        if not y.size:
-            return {}
-        names = {"balanced_accuracy": "frame balanced accuracy", "macro_f1": "frame macro F1"}
-        return {text: METRICS[metric].of(y, predicted, 2) for metric, text in names.items()}
-
-    def _other_labels(self) -> dict[str, float]:
+    def _other_labels(self, tested: Sequence[Detected]) -> dict[str, float]:
         """Return F1 of the same alarms against labels of halved and doubled thresholds."""
         names = {0.5: "F1 with label thresholds halved", 2.0: "F1 with label thresholds doubled"}
         found = {}
         for scale in SCALES[1:]:
-            if all(scale in one.scored.reference.labels for one in self.tested):
-                truths = [one.scored.truth(scale) for one in self.tested]
-                found[names[scale]] = float(score_events(truths, [one.alarm_ns for one in self.tested], self.policy).f1)
+            if all(scale in one.scored.reference.labels for one in tested):
+                truths = [one.scored.truth(scale) for one in tested]
+                found[names[scale]] = float(score_events(truths, [one.alarm_ns for one in tested], self.policy).f1)
         return found
 
-    def operating_points(self, compute_s: float | None) -> tuple[Mapping[str, float], ...]:
+    def operating_points(self, tested: Sequence[Detected], compute_s: float | None) -> tuple[Mapping[str, float], ...]:
         """Return what test recordings say at thresholds that validation chose for several bounds of false alarms."""
         if self.own_threshold is not None:
             return ()
-        truths = [one.scored.truth() for one in self.tested]
+        truths = [one.scored.truth() for one in tested]
         found = []
         for number, bound in enumerate(BOUNDS_PER_MINUTE):
-            scores = score_events(truths, [one.at_bounds[number] for one in self.tested], self.policy)
+            scores = score_events(truths, [one.at_bounds[number] for one in tested], self.policy)
             point = {
                 "bound": bound,
                 "f1": float(scores.f1),
@@ -231,6 +217,21 @@ class EventAnswers:
             }
             found.append({name: value for name, value in point.items() if np.isfinite(value)})
         return tuple(found)
+
+
+def _frame_scores(tested: Sequence[Detected]) -> dict[str, float]:
+    """Return frame scores of gross slip against the rest, over frames that have a label and an answer."""
+    truth, given = [], []
+    for one in tested:
+        state = one.scored.reference.state(one.scored.t_ns, 1.0)
+        known = (state != UNDECIDED) & ~np.isnan(one.scored.score)
+        truth.append(state[known] == GROSS)
+        given.append(one.scored.score[known] >= one.threshold)
+    y, predicted = (np.concatenate(each).astype(np.int64) for each in (truth, given))
+    if not y.size:
+        return {}
+    names = {"balanced_accuracy": "frame balanced accuracy", "macro_f1": "frame macro F1"}
+    return {text: METRICS[metric].of(y, predicted, 2) for metric, text in names.items()}
 
 
 def state_figures(tested: Answers, data: Dataset) -> dict[str, float]:
@@ -257,14 +258,3 @@ def _reference(table: Table) -> SlipReference:
     if table.reference is None:
         raise DataError(f"Recording {table.meta.name!r} was read without its reference.", hint="Report this.")
     return table.reference
-
-
-def _operating_point(curve: ThresholdCurve, bound: float) -> float:
-    try:
-        return curve.operating_point(bound)
-    except DataError as error:
-        raise DataError(
-            "No threshold can be chosen: the validation recordings have no slip, or no disturbance to count false "
-            "alarms on.",
-            hint="Give validation recordings of both (label `event: disturbance`), or another --split.",
-        ) from error

@@ -14,7 +14,8 @@ import numpy.typing as npt
 
 from tactbench.core.errors import UnknownNameError
 from tactbench.core.samples import FloatArray
-from tactbench.core.spec.task import VECTOR_METRIC
+from tactbench.core.spec.row import HIGH_ERROR, MEDIAN_ERROR
+from tactbench.core.spec.task import VECTOR_METRIC, VectorTarget
 
 Rows = Callable[[npt.NDArray[Any], npt.NDArray[Any], int], FloatArray]
 Score = Callable[[FloatArray, int], FloatArray]
@@ -35,8 +36,9 @@ class Metric:
     """Truth and predictions are (n, components)."""
 
     def of(self, y: npt.NDArray[Any], predicted: npt.NDArray[Any], n_classes: int = 0) -> float:
-        """Return the score of `predicted` against `y`."""
-        return float(self.score(self.rows(y, predicted, n_classes).sum(axis=0), n_classes))
+        """Return the score of `predicted` against `y`; infinite where squares of the answers overflow."""
+        with np.errstate(over="ignore", invalid="ignore"):
+            return float(self.score(self.rows(y, predicted, n_classes).sum(axis=0), n_classes))
 
 
 def _squares(y: npt.NDArray[Any], predicted: npt.NDArray[Any], _: int) -> FloatArray:
@@ -148,3 +150,14 @@ def metric_called(name: str) -> Metric:
     if name not in METRICS:
         raise UnknownNameError("metric", name, METRICS)
     return METRICS[name]
+
+
+def vector_details(target: VectorTarget, y: npt.NDArray[Any], predicted: npt.NDArray[Any]) -> dict[str, float]:
+    """Return what stands beside the mean error: percentiles over all rows, and each component's own RMSE."""
+    error = distances(y, predicted)
+    squares = np.mean((predicted - y) ** 2, axis=0)
+    return {
+        MEDIAN_ERROR: float(np.median(error)),
+        HIGH_ERROR: float(np.percentile(error, 95)),
+        **{f"RMSE of {name}": float(np.sqrt(one)) for name, one in zip(target.names, squares, strict=True)},
+    }

@@ -7,31 +7,29 @@ recording's unloaded hold.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
 
 from tactbench.core.evaluation.dataset import Dataset, Table
-from tactbench.core.evaluation.interval import (
+from tactbench.core.evaluation.interval import enough, influences, student_quantile
+from tactbench.core.evaluation.metrics import Metric
+from tactbench.core.evaluation.sets import hold_s, unloaded
+from tactbench.core.evaluation.time_blocks import (
     RESAMPLES,
     block_length,
     circular_blocks,
-    enough,
     generator,
     integrated_correlation,
-    strata_of,
-    student_reach,
 )
-from tactbench.core.evaluation.jackknife import influences
-from tactbench.core.evaluation.metrics import Metric
-from tactbench.core.evaluation.replication import ReplicateUnits
-from tactbench.core.evaluation.unloaded import hold_s, unloaded
 from tactbench.core.samples import Answers, FloatArray, IntArray
 from tactbench.core.spec.recording import RecordingMeta
 from tactbench.core.spec.task import ChannelTarget, TaskSpec
+
+if TYPE_CHECKING:
+    from tactbench.core.evaluation.replicate_sums import ReplicateUnits
 
 FEWEST = 30
 """Independent unloaded samples below which no floor is told (assumed): a deviation from 30 is known to 13 %."""
@@ -72,11 +70,27 @@ class Floor:
     @property
     def value(self) -> float:
         """The deviation of the reference, pooled over the recordings."""
-        return float(np.sqrt(_per_freedom(self.sums(list(self.holds)).sum(axis=0))))
+        return float(np.sqrt(self.square))
 
-    def sums(self, recordings: Sequence[int]) -> FloatArray:
-        """Return (recordings, 2) sums of squares and degrees of freedom."""
-        return np.array([[self.holds[one].squares.sum(), self.holds[one].freedom] for one in recordings])
+    @property
+    def square(self) -> float:
+        """The variance of the reference, pooled over the recordings."""
+        sums = np.array([[one.squares.sum(), one.freedom] for one in self.holds.values()])
+        return float(_per_freedom(sums.sum(axis=0)))
+
+    def by_replicate(self, tested: Answers, code: IntArray) -> FloatArray:
+        """Return (replicates, 2) sums of squares and degrees of freedom, from (n,) the replicate of each test row.
+
+        Where a recording's test rows are in several replicates, its hold is dealt to them in order of time, in
+        proportion to their rows: noise of one hold is as good as of another.
+        """
+        out = np.zeros((int(code.max()) + 1, 2))
+        for place, hold in self.holds.items():
+            mine = np.flatnonzero(tested.recording == place)
+            codes = code[mine[np.argsort(tested.row[mine], kind="stable")]]
+            share = codes[np.arange(len(hold.squares)) * len(codes) // len(hold.squares)]
+            np.add.at(out, share, hold.shares)
+        return out
 
 
 def reference_floor(task: TaskSpec, metric: Metric, data: Dataset, tested: Answers) -> tuple[Floor | None, str]:
@@ -132,52 +146,21 @@ def beyond_floor(floor: Floor, tested: Answers, unit: ReplicateUnits, seed: int)
     blocks as for the RMSE, the holds in their own, and the degrees of freedom are those of Welch and Satterthwaite.
     """
     loss = (tested.y_pred - tested.y_true) ** 2
-    held = floor.sums(list(floor.holds))
-    excess = float(loss.mean() - _per_freedom(held.sum(axis=0)))
+    excess = float(loss.mean() - floor.square)
     if enough(tested.y_true, unit.codes, 0):
-        low, high = _over_units(floor, loss, tested, unit, excess)
+        n = len(unit.labels)
+        sums, held = np.zeros((n, 2)), floor.by_replicate(tested, unit.codes)
+        np.add.at(sums, unit.codes, np.column_stack([loss, np.ones(len(loss))]))
+        without = _per_freedom(sums.sum(axis=0) - sums) - _per_freedom(held.sum(axis=0) - held)
+        carried = influences(without, np.zeros(n, dtype=np.int64))
+        reach = float(student_quantile(n - 1)) * float(np.sqrt(carried @ carried))
     else:
-        low, high = _over_time(floor, loss, tested.recording, seed, excess)
-    ends = [float(np.sqrt(max(0.0, value))) for value in (excess, low, high)]
+        reach = _reach_over_time(floor, loss, tested.recording, seed)
+    ends = [float(np.sqrt(max(0.0, value))) for value in (excess, excess - reach, excess + reach)]
     return BeyondFloor(floor.value, *ends)
 
 
-def floor_sums(floor: Floor, recording: IntArray, code: IntArray, replicates: int, rows: IntArray) -> FloatArray:
-    """Return (replicates, 2) the floor's sums of squares and degrees of freedom by replicate.
-
-    Parameters
-    ----------
-    recording, code, rows
-        (n,) of each test row: its recording, its replicate, and its row in the recording. Where a recording's test rows
-        are in several replicates, its hold is dealt to them in order of time, in proportion to their rows: noise of one
-        hold is as good as of another.
-    """
-    out = np.zeros((replicates, 2))
-    for place, hold in floor.holds.items():
-        mine = np.flatnonzero(recording == place)
-        codes = code[mine[np.argsort(rows[mine], kind="stable")]]
-        share = codes[np.arange(len(hold.squares)) * len(codes) // len(hold.squares)]
-        np.add.at(out, share, hold.shares)
-    return out
-
-
-def _over_units(
-    floor: Floor, loss: FloatArray, tested: Answers, unit: ReplicateUnits, excess: float
-) -> tuple[float, float]:
-    n = len(unit.labels)
-    sums = np.zeros((n, 2))
-    np.add.at(sums, unit.codes, np.column_stack([loss, np.ones(len(loss))]))
-    held = floor_sums(floor, tested.recording, unit.codes, n, tested.row)
-    strata = strata_of(tested.y_true, unit.codes, 0)
-    without = _per_freedom(sums.sum(axis=0) - sums) - _per_freedom(held.sum(axis=0) - held)
-    carried = influences(without, np.zeros(n, dtype=np.int64))
-    reach = student_reach(float(n - len(strata))) * float(np.sqrt(carried @ carried))
-    return excess - reach, excess + reach
-
-
-def _over_time(
-    floor: Floor, loss: FloatArray, recording: IntArray, seed: int, excess: float
-) -> tuple[float, float]:  # fmt: skip
+def _reach_over_time(floor: Floor, loss: FloatArray, recording: IntArray, seed: int) -> float:
     rng = generator(seed)
     places = np.unique(recording).tolist()
     errors = [np.column_stack([loss[recording == one], np.ones((recording == one).sum())]) for one in places]
@@ -193,10 +176,9 @@ def _over_time(
         deviations.append(float(_per_freedom(total).std()) * np.sqrt(blocks / freedom))
     squares = np.array(deviations) ** 2
     if not squares.any():
-        return excess, excess
+        return 0.0
     together = float(squares.sum() ** 2 / (squares**2 / np.array(freedoms)).sum())
-    reach = student_reach(together) * float(np.sqrt(squares.sum()))
-    return excess - reach, excess + reach
+    return float(student_quantile(together)) * float(np.sqrt(squares.sum()))
 
 
 def _per_freedom(sums: FloatArray) -> FloatArray:

@@ -6,7 +6,7 @@ import os
 import platform
 import random
 import time
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from contextlib import suppress
 from dataclasses import fields
 from functools import lru_cache
@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from tactbench.core.errors import CellStopped, EngineError, NotApplicable, RecordingError
-from tactbench.core.evaluation.libraries import import_libraries
+from tactbench.core.evaluation.warm_up import import_libraries
 from tactbench.core.matrix.plan import Cell, task_of
 from tactbench.core.matrix.store import Row
 from tactbench.core.plugins.registry import installed, load_object
@@ -26,7 +26,6 @@ from tactbench.core.spec.row import RowModel
 from tactbench.core.spec.task import TaskSpec
 
 if TYPE_CHECKING:
-    from tactbench.core.evaluation.cell import CellResult
     from tactbench.core.evaluation.dataset import Dataset
 
 
@@ -57,7 +56,7 @@ def prepare(estimator: str, kind: str) -> None:
         build = load_object(descriptor.where)
         build(kind=kind, seed=0, threads=1, **descriptor.params)
         if descriptor.rehearsal is not None:
-            from tactbench.core.evaluation.rehearsal import rehearse
+            from tactbench.core.evaluation.warm_up import rehearse
 
             rehearse(build(kind=kind, seed=0, threads=1, **{**descriptor.params, **descriptor.rehearsal}), kind)
 
@@ -100,7 +99,8 @@ def solve(job: Job, concurrency: int = 1, working: Callable[[str], None] | None 
         os.chdir(folder)  # recordings lie relative to it, wherever a constructor has gone
     import numpy as np
 
-    from tactbench.core.evaluation.cell import CellContext, evaluate
+    from tactbench.core.evaluation.cell import CellContext, evaluate_cell
+    from tactbench.core.evaluation.result import row_of
 
     began = time.perf_counter()
     # The global generators get the cell's seed: who draws from them shall not depend on the cells before.
@@ -111,11 +111,11 @@ def solve(job: Job, concurrency: int = 1, working: Callable[[str], None] | None 
         task, estimator, dict(cell.params), cell.protocol, cell.split, seed=cell.seed, clock=time.perf_counter,
         progress=working, latency=cell.latency,
     )  # fmt: skip
-    result = evaluate(context, data)
+    result = evaluate_cell(context, data)
     row = {
         **opening(cell, task),
-        **_described(data.metas),
-        **_scored(result),
+        **row_of(result),
+        **_described(data.metas, result.remarks),
         **_published(cell, task, result.split),
         "looks_at": estimator.looks_at,
         "recordings": [str(path) for path in data.paths],
@@ -125,7 +125,6 @@ def solve(job: Job, concurrency: int = 1, working: Callable[[str], None] | None 
         "host": this_host(),
         "log": printed(),
     }
-    row["remarks"] += result.remarks
     return row, {
         role: {one.name: getattr(sets, one.name) for one in fields(sets)} for role, sets in result.sets.items()
     }
@@ -226,7 +225,7 @@ def unanswered(cell: Cell, why: BaseException) -> Row:
     return row
 
 
-def _described(metas: Sequence[RecordingMeta]) -> Row:
+def _described(metas: Sequence[RecordingMeta], remarks: Sequence[str]) -> Row:
     """Return what recordings say that a reader of the row must know."""
     seconds = [float(meta.provenance["sim_s"]) for meta in metas if "sim_s" in meta.provenance]
     return {
@@ -235,7 +234,7 @@ def _described(metas: Sequence[RecordingMeta]) -> Row:
         "sim_s": sum(seconds) if seconds else None,
         "assumptions": _assumed(metas),
         "plan": [entry.model_dump() for entry in metas[0].plan],
-        "remarks": sorted({remark for meta in metas for remark in meta.remarks}),
+        "remarks": [*sorted({remark for meta in metas for remark in meta.remarks}), *remarks],
     }
 
 
@@ -252,25 +251,6 @@ def _assumed(metas: Sequence[RecordingMeta]) -> dict[str, Scalar]:
         else:
             found[name] = ", ".join(str(value) for value in values)
     return found
-
-
-def _scored(result: CellResult) -> Row:
-    """Return what was measured, as plain data: the result's names are those of the row."""
-    row = {name: _plain(getattr(result, name)) for name in RowModel.model_fields if hasattr(result, name)}
-    del row["remarks"]
-    if result.beyond is not None:
-        row |= {"reference_floor": result.beyond.floor, "score_beyond_floor": result.beyond.score}
-        row |= {"beyond_floor_ci_low": result.beyond.low, "beyond_floor_ci_high": result.beyond.high}
-    row["true_score"], row["true_ci_low"], row["true_ci_high"] = result.true or (None,) * 3
-    return row
-
-
-def _plain(value: Any) -> Any:
-    if isinstance(value, Mapping):
-        return {name: _plain(one) for name, one in value.items()}
-    if isinstance(value, tuple | list):
-        return [_plain(one) for one in value]
-    return value.tolist() if hasattr(value, "tolist") else value
 
 
 def import_estimators(estimators: Iterable[tuple[str, str]]) -> None:

@@ -7,13 +7,12 @@ from typing import Any
 
 import numpy as np
 
+from tactbench.core.evaluation.interval import NORMAL, student_quantile
 from tactbench.core.evaluation.metrics import EXCESS, SUMMED
+from tactbench.core.evaluation.replicate_sums import tables_of
 from tactbench.core.samples import FloatArray, IntArray
-from tactbench.core.statistics.excess import beyond_floor, excess_of
-from tactbench.core.statistics.influence import PairableRows, scores_of, together
-from tactbench.core.statistics.leaving_out import best_without
-from tactbench.core.statistics.rank import Rank
-from tactbench.core.statistics.student import NORMAL, quantile
+from tactbench.core.statistics.influence import PairableRows, scores_of, scores_without, together
+from tactbench.core.statistics.rank import Rank, beyond_floor, excess_of
 
 Row = Mapping[str, Any]
 _STRIP = 64
@@ -102,7 +101,7 @@ def _clearly(
     mean = _means(rows, groups, error)
     deviation, freedom = _own_errors(rows, groups)
     distinct, which = np.unique(freedom, return_inverse=True)
-    wide = quantile(distinct) ** 2
+    wide = student_quantile(distinct) ** 2
     same = float(rows[0].get("equivalence") or 0.0)
     near_to = np.full(n, same)
     if rows[0]["metric"] == EXCESS.name:
@@ -176,3 +175,32 @@ def _own_errors(rows: Sequence[Row], groups: Sequence[PairableRows]) -> tuple[Fl
         if low is not None and high is not None:
             deviation[place] = (high - low) / (2 * NORMAL)
     return deviation, freedom
+
+
+def best_without(rows: Sequence[Row], groups: Sequence[PairableRows]) -> list[int] | None:
+    """Return the place in `rows` of the best one without each replicate; None if they do not share replicates.
+
+    Parameters
+    ----------
+    rows
+        Finished rows of one metric.
+    groups
+        What :func:`together` says of them.
+
+    Notes
+    -----
+    A first place that leaves with one replicate is no property of the sensor (Huang et al. 2025, Dropping just a
+    handful of preferences can change top large language model rankings).
+    """
+    metric = str(rows[0]["metric"])
+    if len(groups) != 1 or len(groups[0].places) != len(rows):
+        return None
+    kept = [row["replicates"] for row in rows]
+    if all("scores" in one for one in kept):
+        each = np.array([scores_of(one, metric) for one in kept])
+        without = np.array([np.median(np.delete(each, place, axis=1), axis=1) for place in range(each.shape[1])]).T
+    else:
+        n_classes = len(rows[0]["classes"])
+        without = scores_without(tables_of(kept, metric, n_classes), metric, n_classes)
+    best = np.argmax(without, axis=0) if SUMMED[metric].higher_is_better else np.argmin(without, axis=0)
+    return [int(place) for place in best]

@@ -8,8 +8,7 @@ import pytest
 from tactbench.core.errors import NotApplicable
 from tactbench.core.evaluation.dataset import load_dataset
 from tactbench.core.evaluation.protocols import DEPLOYABLE, KARL2016, PROTOCOLS
-from tactbench.core.evaluation.selection import scales
-from tactbench.core.evaluation.sets import SetRows
+from tactbench.core.evaluation.sets import SetRows, scales
 from tactbench.core.evaluation.splits import choose_split, inner_splits, make_splits, shots, training_sessions
 from tactbench.plugin import load_registry
 
@@ -132,8 +131,7 @@ def test_the_third_protocol_is_the_papers_in_everything_but_the_scale():
     changed = {name for name in type(third).model_fields if getattr(third, name) != getattr(KARL2016, name)}
     assert changed == {"name", "title", "scaled_by"}
     some = [
-        SetRows(X=np.array([[0.0], [width]]), **dict.fromkeys(("y", "labelled", "time_s", "recording", "row", "cluster",
-                                                            "segment"), np.zeros(2)))
+        SetRows(X=np.array([[0.0], [width]]), **dict.fromkeys(("y", "labelled", "time_s", "recording", "row", "segment"), np.zeros(2)))
         for width in (1.0, 2.0)
     ]  # fmt: skip
     assert scales(KARL2016, *some)[1].deviation == 2 * scales(third, *some)[1].deviation

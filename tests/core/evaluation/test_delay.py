@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 from tactbench.core.acquisition import acquire
-from tactbench.core.evaluation.cell import CellContext, evaluate
+from tactbench.core.evaluation.cell import CellContext, evaluate_cell
 from tactbench.core.evaluation.dataset import load_dataset
-from tactbench.core.evaluation.delay import NO_LINK, NO_RATE, answer_delay_ms, reading_delay_ms
+from tactbench.core.evaluation.delay import NO_LINK, NO_RATE, answer_delay_ms, stated_delay_ms
 from tactbench.core.evaluation.protocols import PROTOCOLS, protocol_called
-from tactbench.core.evaluation.windows import causal_mean
+from tactbench.core.evaluation.sets import causal_mean
 from tactbench.core.leaderboard.table import build_table
 from tactbench.core.plugins.registry import load_registry
 from tactbench.plugin import Block, ForceRamp, RigDescriptor, Scene, StreamSpec, assumed
@@ -51,6 +51,10 @@ def with_link(data, link):
 def estimator():
     """Least squares behind one window."""
     return load_registry().estimators["ols"].model_copy(update={"window_grid": (K,)})
+
+
+def reading_delay_ms(data, rules, k):
+    return stated_delay_ms(data, data, TASK, rules, estimator(), k)
 
 
 def slope_s(k, interval_s):
@@ -117,34 +121,34 @@ def test_what_is_not_known_is_absent_and_said(tmp_path):
 
 def test_the_delay_of_a_cell_is_the_sum_of_its_parts_on_a_clock_that_counts_readings(tmp_path):
     ticks = itertools.count()
-    result = evaluate(
+    result = evaluate_cell(
         CellContext(TASK, estimator(), {}, "deployable-untared", "roles", seed=1, clock=lambda: next(ticks) * 2.0**-10),
         pressed(tmp_path / "a"),
     )
     # One tick passes between the two looks at the clock around each call.
     tick_ms = 1e3 * 2.0**-10
-    assert result.delay_parts_ms == pytest.approx(
+    assert result.times.delay_parts_ms == pytest.approx(
         {"sampling": 12.0, "window": 240.0, "features": tick_ms, "prediction": tick_ms}
     )
-    assert result.answer_delay_ms == pytest.approx(252.0 + 2 * tick_ms)
-    assert result.latency_n == 200
-    assert result.latency_ms_p95 is not None
+    assert result.times.answer_delay_ms == pytest.approx(252.0 + 2 * tick_ms)
+    assert result.times.latency_n == 200
+    assert result.times.latency_ms_p95 is not None
     assert NO_LINK in result.remarks
 
 
 def test_an_answer_that_looks_at_no_reading_waits_for_none(tmp_path):
     mean = load_registry().estimators["mean"]
-    result = evaluate(
+    result = evaluate_cell(
         CellContext(TASK, mean, {}, "deployable-untared", "roles", seed=1, clock=itertools.count().__next__),
         pressed(tmp_path / "a"),
     )
-    assert set(result.delay_parts_ms) == {"prediction"}
-    assert result.answer_delay_ms == result.latency_ms_p50
+    assert set(result.times.delay_parts_ms) == {"prediction"}
+    assert result.times.answer_delay_ms == result.times.latency_ms_p50
     assert NO_LINK not in result.remarks
 
 
 def test_without_the_times_of_a_machine_there_is_no_sum(tmp_path):
-    result = evaluate(
+    result = evaluate_cell(
         CellContext(
             TASK,
             estimator(),
@@ -157,8 +161,8 @@ def test_without_the_times_of_a_machine_there_is_no_sum(tmp_path):
         ),
         pressed(tmp_path / "a"),
     )
-    assert set(result.delay_parts_ms) == {"sampling", "window"}
-    assert result.answer_delay_ms is None
+    assert set(result.times.delay_parts_ms) == {"sampling", "window"}
+    assert result.times.answer_delay_ms is None
     assert NO_LINK not in result.remarks
 
 

@@ -9,9 +9,9 @@ import pytest
 from pydantic import ValidationError
 
 from tactbench.core.errors import DataError, NotApplicable, PluginContractError
-from tactbench.core.evaluation.cell import CellContext, evaluate
+from tactbench.core.evaluation.cell import CellContext, evaluate_cell
 from tactbench.core.evaluation.dataset import load_dataset
-from tactbench.core.evaluation.event_answers import EventAnswers
+from tactbench.core.evaluation.event_answers import EventRules
 from tactbench.core.evaluation.frames import frame_features, frame_times, framed
 from tactbench.core.evaluation.protocols import protocol_called
 from tactbench.core.evaluation.summaries import summary_of
@@ -35,7 +35,7 @@ def run(paths, estimator="pac-band", asked=TASK, split=None, **more):
         asked, REGISTRY.estimators[estimator], {}, "deployable", split, seed=1, clock=time.perf_counter,
         **{"latency": False, **more},
     )  # fmt: skip
-    return evaluate(context, paths)
+    return evaluate_cell(context, paths)
 
 
 @pytest.fixture(scope="module")
@@ -167,7 +167,7 @@ def test_without_validation_recordings_a_share_of_the_training_groups_serves(tmp
 
 def test_so_many_training_groups_validate_as_it_takes_to_have_slips_and_disturbances(paths):
     result = run([path for path in paths if "validation" not in path.stem], split="shuffled")
-    assert result.folds == 5
+    assert len(result.sizes.fold_sizes) == 5
     assert result.events["recall"] > 0  # the highest threshold that hits the one or two slips it was chosen on
     assert {name for name in result.chosen if name.startswith("threshold of fold shuffled fold")}
 
@@ -196,13 +196,13 @@ def test_what_is_missing_of_the_reference_is_named(tmp_path):
 def test_compute_time_delays_alarms_and_changes_no_hit(paths):
     task, estimator = TASK, REGISTRY.estimators["pac-band"]
     data = framed(load_dataset(task, paths[:2]), task, RULES, estimator)
-    answers = EventAnswers.of(task, 0.5)
+    rules = EventRules.of(task, 0.5)
     found = []
     for place, table in enumerate(data.tables):
         one = type("Part", (), {"recording": np.full(len(table.row), place), "row": table.row})
-        found += answers.scored(one, (table.y == 1).astype(float), data)
-    answers.add(found, 0.5, (), data)
-    at_once, late = answers.figures(0.0), answers.figures(0.05)
+        found += rules.scored(one, (table.y == 1).astype(float), data)
+    tested = [rules.detect(one, 0.5, ()) for one in found]
+    at_once, late = rules.figures(tested, 0.0), rules.figures(tested, 0.05)
     assert late["onset latency p50 ms"] == pytest.approx(at_once["onset latency p50 ms"] + 50.0)
     assert late["displacement at detection p50 mm"] == pytest.approx(at_once["displacement at detection p50 mm"] + 0.5)
     assert late["compute s per s of signal"] == pytest.approx(5.0)
@@ -212,7 +212,7 @@ def test_compute_time_delays_alarms_and_changes_no_hit(paths):
 
 def test_latency_that_is_measured_is_in_the_events(paths):
     result = run(paths, latency=True)
-    parts = result.delay_parts_ms
+    parts = result.times.delay_parts_ms
     assert result.events["compute ms a frame"] == pytest.approx(parts["features"] + parts["prediction"])
     assert (parts["window"], parts["sampling"]) == (50.0, 10.0)
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from tactbench.core.errors import DataError, NotApplicable, PluginContractError, UsageError
-from tactbench.core.evaluation.cell import CellContext, evaluate
+from tactbench.core.evaluation.cell import CellContext, evaluate_cell
 from tactbench.core.evaluation.fitting import answers, fit
 from tactbench.core.plugins.registry import load_registry
 
@@ -72,7 +72,7 @@ def test_data_an_estimator_refuses_is_an_error_with_its_name():
 def test_an_estimator_of_the_other_kind_is_refused(tmp_path):
     path = record(tmp_path / "a.h5", *ramp(0, n=100))
     with pytest.raises(UsageError, match="'majority' does classification"):
-        evaluate(
+        evaluate_cell(
             CellContext(force_task(), ESTIMATORS["majority"], {}, "deployable", None, seed=0, clock=ticking()), [path]
         )
 
@@ -81,7 +81,9 @@ def test_recordings_without_roles_skip_the_papers_protocol(tmp_path):
     """Foreign recordings have no roles: the cell is skipped with the reason, it does not fail."""
     paths = [record(tmp_path / f"{name}.h5", *ramp(0), session=name) for name in "ab"]
     with pytest.raises(NotApplicable, match="roles"):
-        evaluate(CellContext(force_task(), ESTIMATORS["mean"], {}, "karl2016", None, seed=0, clock=ticking()), paths)
+        evaluate_cell(
+            CellContext(force_task(), ESTIMATORS["mean"], {}, "karl2016", None, seed=0, clock=ticking()), paths
+        )
 
 
 def test_a_score_that_is_undefined_is_left_out_or_refused_never_nan(tmp_path):
@@ -91,11 +93,13 @@ def test_a_score_that_is_undefined_is_left_out_or_refused_never_nan(tmp_path):
         record(tmp_path / "b.h5", X, np.full(200, 2.0), session="b", role="test"),
     ]
     task = force_task(protocols=("deployable",))
-    result = evaluate(CellContext(task, ESTIMATORS["mean"], {}, "deployable", "roles", seed=0, clock=ticking()), paths)
+    result = evaluate_cell(
+        CellContext(task, ESTIMATORS["mean"], {}, "deployable", "roles", seed=0, clock=ticking()), paths
+    )
     assert "r2" not in result.scores
     assert np.isfinite(list(result.scores.values())).all()
     with pytest.raises(DataError, match="r2 of 200 test rows is undefined"):
-        evaluate(
+        evaluate_cell(
             CellContext(
                 force_task(metric="r2"), ESTIMATORS["mean"], {}, "deployable", "roles", seed=0, clock=ticking()
             ),
@@ -110,7 +114,7 @@ def test_folds_that_choose_differently_are_reported_each(tmp_path):
     for place, noise in enumerate((0.1, 3.0, 0.1, 3.0)):
         X, force = ramp(place, n=300, noise=20.0 * noise)
         paths.append(record(tmp_path / f"{place}.h5", X, force + rng.normal(0, noise, 300), session=str(place)))
-    result = evaluate(
+    result = evaluate_cell(
         CellContext(force_task(), ESTIMATORS["ridge"], {}, "deployable", None, seed=0, clock=ticking()), paths
     )
     allowed = {"alpha": ESTIMATORS["ridge"].grid["alpha"], "k": ESTIMATORS["ridge"].window_grid}
@@ -123,7 +127,7 @@ def test_the_same_seed_gives_the_same_score_bit_by_bit_with_one_thread_or_two(tm
     paths = [record(tmp_path / f"{name}.h5", *ramp(place, label_noise=0.5), session=name)
              for place, name in enumerate("ab")]  # fmt: skip
     results = [
-        evaluate(
+        evaluate_cell(
             CellContext(
                 force_task(),
                 ESTIMATORS["forest"],
@@ -141,7 +145,11 @@ def test_the_same_seed_gives_the_same_score_bit_by_bit_with_one_thread_or_two(tm
     first, second, third, other = results
     assert np.array_equal(first.sets["test"].y_pred, second.sets["test"].y_pred)
     assert np.array_equal(second.sets["test"].y_pred, third.sets["test"].y_pred)
-    assert (first.score, first.ci_low, first.ci_high) == (second.score, second.ci_low, second.ci_high)
+    assert (first.score, first.interval.low, first.interval.high) == (
+        second.score,
+        second.interval.low,
+        second.interval.high,
+    )
     assert other.score != first.score
 
 
@@ -151,7 +159,7 @@ def test_curvature_rows_of_a_single_class_each_are_answered_by_a_class(tmp_path)
                labels={"kind": float(cap)})
         for seed, (role, cap) in enumerate((r, c) for r in ("train", "validation", "test") for c in (1, 2))
     ]  # fmt: skip
-    result = evaluate(
+    result = evaluate_cell(
         CellContext(label_task(), ESTIMATORS["chance"], {}, "karl2016", None, seed=3, clock=ticking()), paths
     )
     # Uniform over two classes: 0.5, standard deviation 0.5 / sqrt(2000) = 0.011; five of them.
@@ -167,7 +175,7 @@ def test_a_number_that_cannot_be_computed_with_is_named(tmp_path, what):
         force_task(), load_registry().estimators["ols"], {}, "deployable", "session", seed=1, clock=ticking()
     )
     with pytest.raises(DataError, match=rf"In recording 'a', {what} reaches 1e\+300"):
-        evaluate(context, paths)
+        evaluate_cell(context, paths)
 
 
 def test_a_class_that_no_training_row_has_is_named(tmp_path):
@@ -178,6 +186,6 @@ def test_a_class_that_no_training_row_has_is_named(tmp_path):
     context = CellContext(
         label_task(), load_registry().estimators["logistic"], {}, "deployable", "session", seed=1, clock=ticking()
     )
-    result = evaluate(context, paths)
+    result = evaluate_cell(context, paths)
     assert result.score == 0.0
     assert "tested but never trained on: 'a' in 0; 'b' in 1; 'c' in 2" in result.remarks

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 
 from tactbench.core.errors import DataError, NotApplicable, PluginContractError, UsageError
-from tactbench.core.evaluation.cell import CellContext, evaluate
+from tactbench.core.evaluation.cell import CellContext, evaluate_cell
 from tactbench.core.evaluation.dataset import load_dataset
+from tactbench.core.evaluation.fitting import voted
 from tactbench.core.evaluation.protocols import protocol_called
 from tactbench.core.evaluation.splits import make_splits
-from tactbench.core.evaluation.summaries import answer_span_s, summarised
-from tactbench.core.evaluation.vote import voted
+from tactbench.core.evaluation.summaries import summarised
 from tactbench.core.plugins.registry import load_registry
 from tactbench.core.recording.writer import RecordingWriter
 from tactbench.core.samples import Part
@@ -65,35 +65,35 @@ def run(asked, paths, split=None, estimator="forest", protocol="deployable", **m
         asked, REGISTRY.estimators[estimator], params, protocol, split, seed=1, clock=time.perf_counter,
         **{"latency": False, **more},
     )  # fmt: skip
-    return evaluate(context, paths)
+    return evaluate_cell(context, paths)
 
 
 def test_a_recording_is_one_answer_by_what_it_did_and_not_where_it_stood(tmp_path):
     paths = sequences(tmp_path)
     result = run(task(), paths)
     assert result.split == "recording"
-    assert result.n_test == 24
+    assert result.sizes.n_test == 24
     assert sorted(result.sets["test"].recording.tolist()) == list(range(24))
-    assert result.n_train == 4 * 24
+    assert result.sizes.n_train == 4 * 24
     # Deviations of 1 and 3 from 40 samples are known to 11 %: eight standard errors apart.
     assert result.score == 1.0
     assert run(task(), paths, estimator="majority").scores["accuracy"] == pytest.approx(16 / 24)
-    assert result.ci_method.startswith("jackknife over 24 recordings ")
+    assert result.interval.method.startswith("jackknife over 24 recordings ")
     assert "one answer a recording, from deviation, mean-step" in result.remarks
 
 
 def test_the_delay_of_an_answer_holds_the_recording_it_waits_for(tmp_path):
     paths = sequences(tmp_path)
     whole = run(task(), paths, latency=True)
-    assert whole.delay_parts_ms["window"] == pytest.approx(390.0)
-    assert whole.answer_delay_ms == pytest.approx(sum(whole.delay_parts_ms.values()))
-    assert whole.delay_parts_ms["features"] > 0
+    assert whole.times.delay_parts_ms["window"] == pytest.approx(390.0)
+    assert whole.times.answer_delay_ms == pytest.approx(sum(whole.times.delay_parts_ms.values()))
+    assert whole.times.delay_parts_ms["features"] > 0
     part = task(summaries=(Summary(measure="deviation", start=0.1, end=0.3, unit="s"),))
-    assert run(part, paths).delay_parts_ms["window"] == pytest.approx(200.0)
+    assert run(part, paths).times.delay_parts_ms["window"] == pytest.approx(200.0)
     half = task(summaries=(Summary(measure="deviation", end=0.5),))
-    assert run(half, paths).delay_parts_ms["window"] == pytest.approx(195.0)
-    assert run(vote(), paths).delay_parts_ms["window"] == pytest.approx(390.0)
-    assert "window" not in run(task(), paths, estimator="majority").delay_parts_ms
+    assert run(half, paths).times.delay_parts_ms["window"] == pytest.approx(195.0)
+    assert run(vote(), paths).times.delay_parts_ms["window"] == pytest.approx(390.0)
+    assert "window" not in run(task(), paths, estimator="majority").times.delay_parts_ms
 
 
 def test_without_a_clock_shares_are_asked_and_the_delay_is_not_known(tmp_path):
@@ -102,7 +102,7 @@ def test_without_a_clock_shares_are_asked_and_the_delay_is_not_known(tmp_path):
                     labels={"slip": place % 2}) for place in range(12)]  # fmt: skip
     result = run(task(), paths, latency=True)
     assert result.score == 1.0
-    assert result.answer_delay_ms is None
+    assert result.times.answer_delay_ms is None
     assert "answer delay unknown: the recordings do not tell their sampling rate" in result.remarks
     with pytest.raises(NotApplicable, match="states none for taxels"):
         run(task(summaries=(Summary(measure="band-energy", band_hz=(1.0, 2.0)),)), paths)
@@ -154,7 +154,7 @@ def test_a_copied_recording_leaks_as_whole_as_it_is(tmp_path):
 
 def test_the_first_frame_alone_is_asked_as_of_samples(tmp_path):
     result = run(task(), sequences(tmp_path), protocol="first-frame")
-    assert result.n_test == 24
+    assert result.sizes.n_test == 24
     assert set(result.sets["test"].row.tolist()) == {0}
     assert "one answer a recording, from its first row" in result.remarks
     assert result.score < 0.9, "an offset drawn at random does not tell slip"
@@ -227,9 +227,9 @@ def test_the_hold_is_tared_on_and_left_out_of_every_stream(tmp_path):
     # A mean of 25 and of 1000 samples less one of 75 and of 3000: 0.23 and 0.03 at most, four times that here.
     assert all(abs(table.X[0, 1]) < 1.0 and abs(table.X[0, 2]) < 0.1 for table in tared.tables)
     assert all(table.X[0, 1] == pytest.approx(20, abs=1) for table in untared.tables)
-    assert answer_span_s(data, FAST, protocol_called("deployable")) == pytest.approx(1.5, abs=1 / SLOW_HZ)
     result = run(FAST, two_rates(tmp_path, hold_s=0.5))
     assert result.tare_s == pytest.approx(0.5)
+    assert result.times.delay_parts_ms["window"] == pytest.approx(1500, abs=1e3 / SLOW_HZ)
     assert result.counts["rows before the press begins"] == 12 * 25
 
 
@@ -288,7 +288,7 @@ def test_a_task_may_name_code_for_features_of_its_own(tmp_path):
 def part_of(recording, y):
     n = len(y)
     row = np.arange(n)
-    return Part(np.zeros((n, 1)), np.asarray(y), row * 1.0, np.asarray(recording), row, np.zeros(n, dtype=np.int64))
+    return Part(np.zeros((n, 1)), np.asarray(y), row * 1.0, np.asarray(recording), row)
 
 
 def test_frames_vote_and_of_equals_the_first_class_wins():
@@ -310,11 +310,11 @@ def test_a_vote_scores_recordings_that_frames_alone_get_half_wrong(tmp_path):
     one, all_of_them = run(frames, paths, estimator="logistic"), run(vote(), paths, estimator="logistic")
     assert one.score < 0.7
     assert all_of_them.score > 0.9
-    assert (one.n_test, all_of_them.n_test) == (2400, 20)
-    assert one.n_train == all_of_them.n_train
-    assert all_of_them.batch_rows == 2400
+    assert (one.sizes.n_test, all_of_them.sizes.n_test) == (2400, 20)
+    assert one.sizes.n_train == all_of_them.sizes.n_train
+    assert all_of_them.times.batch_rows == 2400
     assert "one answer a recording, from the commonest answer of its frames" in all_of_them.remarks
-    assert all_of_them.ci_method.startswith("jackknife over 20 recordings ")
+    assert all_of_them.interval.method.startswith("jackknife over 20 recordings ")
 
 
 def test_parameters_are_chosen_by_the_vote_too(tmp_path):
@@ -324,7 +324,7 @@ def test_parameters_are_chosen_by_the_vote_too(tmp_path):
              for place in range(12)]  # fmt: skip
     number = vote(kind="regression", metric="rmse")
     result = run(number, paths, estimator="ridge")
-    assert result.n_test == 12
+    assert result.sizes.n_test == 12
     # A mean of sixty readings of deviation 3 is known to 0.4; folds of neighbours are answered across a gap of two.
     assert result.score < 1.0
     assert "one answer a recording, from the mean answer of its frames" in result.remarks
@@ -341,9 +341,9 @@ def test_a_vote_is_asked_under_the_papers_protocol_and_of_every_recording(tmp_pa
     paths = [record(tmp_path / f"s{place}.h5", rng.normal(place % 2, 1, (700, 1)), np.full(700, 1.0), role=role,
                     labels={"slip": place % 2}) for place, role in enumerate(roles * 2)]  # fmt: skip
     result = run(vote(), paths, estimator="logistic", protocol="karl2016")
-    assert result.n_test == 2
+    assert result.sizes.n_test == 2
     assert result.counts["rows before the press begins"] == 6 * 600
-    assert result.delay_parts_ms["window"] == pytest.approx(990.0), "100 of 700 rows are kept"
+    assert result.times.delay_parts_ms["window"] == pytest.approx(990.0), "100 of 700 rows are kept"
     short = record(tmp_path / "short.h5", rng.normal(size=(500, 1)), np.full(500, 1.0), role="test", labels={"slip": 0})
     with pytest.raises(DataError, match="leaves no row of recording 'short'"):
         run(vote(), [*paths, short], estimator="logistic", protocol="karl2016")

@@ -3,20 +3,18 @@
 import numpy as np
 import pytest
 
-from tactbench.core.evaluation.cell import CellContext, evaluate
+from tactbench.core.evaluation.cell import CellContext, evaluate_cell
 from tactbench.core.evaluation.dataset import load_dataset
 from tactbench.core.evaluation.metrics import METRICS
 from tactbench.core.evaluation.reference_floor import (
     FEWEST,
     Floor,
     beyond_floor,
-    floor_sums,
     hold_of,
     reference_floor,
     true_force,
 )
-from tactbench.core.evaluation.replicate_sums import summed
-from tactbench.core.evaluation.replication import ReplicateUnits
+from tactbench.core.evaluation.replicate_sums import ReplicateUnits, summed
 from tactbench.core.plugins.registry import installed
 from tactbench.core.samples import Answers
 from tactbench.core.spec.drive import ForceLoop
@@ -142,8 +140,9 @@ def test_replicates_keep_the_whole_of_the_floor(recordings):
     answers, unit, floor = asked(0.3, recordings=recordings, rows=500, hold=90)
     code = np.arange(len(answers)) * 7 // len(answers)
     for codes, n in ((code, 7), (unit.codes, recordings)):
-        sums = floor_sums(floor, answers.recording, codes, n, answers.row)
-        np.testing.assert_allclose(sums.sum(axis=0), floor.sums(list(floor.holds)).sum(axis=0), rtol=1e-12)
+        squares, freedom = (sums := floor.by_replicate(answers, codes)).sum(axis=0)
+        assert len(sums) == n
+        assert squares / freedom == pytest.approx(floor.value**2, rel=1e-12)
         assert (sums > 0).all()
 
 
@@ -177,7 +176,7 @@ TASK = force_task(protocols=("deployable",), splits=("roles",))
 
 def result_of(paths, task=TASK):
     estimator = installed().estimators["ols" if task.kind == "regression" else "logistic"]
-    return evaluate(
+    return evaluate_cell(
         CellContext(task, estimator, {}, "deployable", "roles", seed=1, clock=lambda: 0.0, latency=False), paths
     )
 
@@ -187,7 +186,7 @@ def test_a_cell_tells_its_floor_and_the_error_against_the_true_force(tmp_path):
     assert result.beyond.floor == pytest.approx(SIGMA, rel=0.1), "480 samples: 3.2 % standard error"
     assert result.score == pytest.approx(SIGMA, rel=0.1)
     assert result.true[0] < 0.1, "the taxels know the force"
-    assert result.true[1] <= result.true[0] <= result.true[2]
+    assert result.true[1].low <= result.true[0] <= result.true[1].high
     assert result.beyond.low <= result.true[0] <= result.beyond.high
     kept = result.replicates
     assert len(kept["floor"]) == len(kept["sums"])

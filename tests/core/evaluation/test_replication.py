@@ -3,7 +3,7 @@
 import numpy as np
 
 from tactbench.core.evaluation.dataset import load_dataset
-from tactbench.core.evaluation.replication import replicates
+from tactbench.core.evaluation.replicate_sums import replicates
 
 from .made import force_task, label_task, record
 from .test_karl2016 import ramp
@@ -13,7 +13,7 @@ from .test_splits import grasps, run, sessions
 def test_objects_of_the_official_test_stand_in_for_each_other(tmp_path):
     """One test file is one session; the task names objects, and there are twelve."""
     paths = [grasps(tmp_path, "train", seed=1), grasps(tmp_path, "test", seed=2)]
-    assert run(paths, "roles", label_task()).ci_method.startswith("jackknife over 12 objects ")
+    assert run(paths, "roles", label_task()).interval.method.startswith("jackknife over 12 objects ")
 
 
 def test_trials_of_one_session_stand_in_for_each_other(tmp_path):
@@ -22,7 +22,7 @@ def test_trials_of_one_session_stand_in_for_each_other(tmp_path):
         for place in range(9)
     ]
     task = force_task(protocols=("deployable",))
-    method = run(paths, "roles", task, "mean", params={}).ci_method
+    method = run(paths, "roles", task, "mean", params={}).interval.method
     assert method.startswith("jackknife over 7 recordings ")
     assert method.endswith("): spread between sessions is not in it")
 
@@ -37,14 +37,14 @@ def test_a_group_that_some_classes_do_not_have_is_said_not_to_be_in_the_interval
         )
         for number in range(16)
     ]  # fmt: skip
-    method = run(paths, "roles", label_task()).ci_method
+    method = run(paths, "roles", label_task()).interval.method
     assert method.startswith("jackknife over 12 recordings ")
     assert method.endswith(": spread between sessions and objects is not in it; some test rows have no object")
 
 
 def test_sessions_come_before_recordings(tmp_path):
     paths = sessions(tmp_path, tuple("abcdef"), n=40)
-    method = run(paths, "session", estimator="mean", params={}).ci_method
+    method = run(paths, "session", estimator="mean", params={}).interval.method
     assert method.startswith("jackknife over 6 sessions ")
     assert "not in it" not in method
 
@@ -57,7 +57,7 @@ def test_five_caps_of_one_session_each_recorded_once_are_not_replicates(tmp_path
         for role in ("train", "validation", "test") for cap in range(5)
     ]  # fmt: skip
     result = run(paths, "roles", label_task(), "chance", params={})
-    assert "within 5 recordings" in result.ci_method
+    assert "within 5 recordings" in result.interval.method
 
 
 def test_a_unit_is_found_for_each_row_by_its_number(tmp_path):

@@ -6,10 +6,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy import stats
 
-from tactbench.core.evaluation.interval import score_interval
-from tactbench.core.evaluation.jackknife import influences
+from tactbench.core.evaluation.interval import FURTHEST, influences, score_interval, transform_of
 from tactbench.core.evaluation.metrics import METRICS
-from tactbench.core.evaluation.score_transform import FURTHEST, transform_of
 
 
 @given(st.lists(st.floats(-100, 100), min_size=2, max_size=20))

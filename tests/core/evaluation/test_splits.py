@@ -6,12 +6,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tactbench.core.errors import DataError, NotApplicable, UsageError
-from tactbench.core.evaluation.cell import CellContext, evaluate
+from tactbench.core.evaluation.cell import CellContext, evaluate_cell
 from tactbench.core.evaluation.dataset import load_dataset
 from tactbench.core.evaluation.protocols import DEPLOYABLE
-from tactbench.core.evaluation.sets import FeatureScale, keep, part
+from tactbench.core.evaluation.sets import FeatureScale, causal_mean, keep, part
 from tactbench.core.evaluation.splits import choose_split, make_splits
-from tactbench.core.evaluation.windows import causal_mean
 
 from .made import force_task, label_task, record
 from .test_karl2016 import ESTIMATORS, ramp, ticking
@@ -34,7 +33,7 @@ def grasps(folder, role=None, objects=12, each=20, seed=0):
 
 
 def run(paths, split=None, task=None, estimator="forest", **more):
-    return evaluate(
+    return evaluate_cell(
         CellContext(
             task or force_task(),
             ESTIMATORS[estimator],
@@ -148,10 +147,10 @@ def test_recordings_that_take_no_part_are_no_sessions_of_the_row_and_are_mention
         record(tmp_path / f"{place}.h5", *ramp(place, n=60), session=str(place), role=role)
     paths = sorted(tmp_path.glob("*.h5"))
     by_role = run(paths, "roles", estimator="mean", params={})
-    assert (by_role.n_recordings, by_role.n_sessions) == (4, 4)
+    assert (by_role.sizes.n_recordings, by_role.sizes.n_sessions) == (4, 4)
     assert by_role.counts["recordings without a role that take no part in split roles"] == 2
     by_session = run(paths, "session", estimator="mean", params={})
-    assert (by_session.n_recordings, by_session.n_sessions) == (5, 5)
+    assert (by_session.sizes.n_recordings, by_session.sizes.n_sessions) == (5, 5)
     assert by_session.counts["recordings of role test that take no part in split session"] == 1
     assert "recordings" not in " ".join(run(paths[:2], "session", estimator="mean", params={}).counts)
 
@@ -172,7 +171,7 @@ def test_deployable_scales_by_training_data_only(tmp_path):
     assert run(data, estimator="ridge", params={}).score == result.score
     from collections import Counter
 
-    from tactbench.core.evaluation.selection import scales
+    from tactbench.core.evaluation.sets import scales
 
     fold = make_splits(data, "session", 0)[0]
     train = keep(data, DEPLOYABLE, fold.train, "t", Counter())
@@ -186,7 +185,7 @@ def test_rows_without_a_label_are_left_out_and_counted(tmp_path):
     force[::2] = np.nan
     paths = [record(tmp_path / f"{name}.h5", X, force, session=name) for name in "ab"]
     result = run(paths)
-    assert result.n_test == 300
+    assert result.sizes.n_test == 300
     assert result.counts["of 600 rows have no force sample and were left out"] == 300
 
 
@@ -197,14 +196,14 @@ def test_a_dropped_out_taxel_never_reaches_an_estimator(tmp_path):
     paths = [record(tmp_path / f"{name}.h5", X, force, session=name) for name in "ab"]
     result = run(paths)
     assert result.counts["rows left out because t1 has no sample"] == 20
-    assert result.n_test == 2 * 289
+    assert result.sizes.n_test == 2 * 289
 
 
 def test_a_recording_that_its_source_calls_unreliable_is_left_out_and_counted(tmp_path):
     paths = sessions(tmp_path)
     paths.append(record(tmp_path / "bad.h5", *ramp(7), session="d", excluded="declared unreliable"))
     result = run(paths)
-    assert result.n_recordings == 3
+    assert result.sizes.n_recordings == 3
     assert result.counts["recordings left out (declared unreliable)"] == 1
 
 

@@ -6,12 +6,11 @@ import numpy as np
 import pytest
 
 from tactbench.core.errors import NotApplicable
-from tactbench.core.evaluation.cell import NOT_TARED, CellContext, evaluate
+from tactbench.core.evaluation.cell import CellContext, evaluate_cell
 from tactbench.core.evaluation.dataset import load_dataset
-from tactbench.core.evaluation.preparation import prepared
 from tactbench.core.evaluation.protocols import DEPLOYABLE, DEPLOYABLE_UNTARED
+from tactbench.core.evaluation.sets import hold_s, prepared, tare_s, tared, unloaded
 from tactbench.core.evaluation.splits import make_splits
-from tactbench.core.evaluation.unloaded import hold_s, tare_s, tared, unloaded
 from tactbench.core.plugins.registry import installed
 from tactbench.core.spec.profile import ForceRamp
 from tactbench.core.spec.quantity import assumed
@@ -19,6 +18,7 @@ from tactbench.core.spec.scene import Scene
 
 from .made import force_task, record
 
+NOT_TARED = "not tared: no recording states an unloaded hold"
 TASK = force_task(protocols=("deployable", "deployable-untared"), splits=("roles",))
 HOLD, ROWS = 40, 200
 
@@ -44,7 +44,7 @@ def three(folder, offsets=(0.0, 0.0, 0.0), **how):
 
 
 def answered(paths, protocol, estimator="ols"):
-    return evaluate(
+    return evaluate_cell(
         CellContext(
             TASK, installed().estimators[estimator], {}, protocol, "roles", seed=1, clock=lambda: 0.0, latency=False
         ),

@@ -10,8 +10,7 @@ from scipy import stats
 
 from tactbench.core.evaluation.interval import score_interval
 from tactbench.core.evaluation.metrics import METRICS
-from tactbench.core.statistics.over_folds import corrected_t
-from tactbench.core.statistics.paired import difference
+from tactbench.core.statistics.paired import corrected_t, difference
 from tactbench.core.statistics.ranking import ranks
 
 TRIALS = 250

@@ -6,8 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy import stats
 
-from tactbench.core.statistics.holm import holm
-from tactbench.core.statistics.over_folds import corrected_t, over_folds
+from tactbench.core.statistics.paired import corrected_t, holm, over_folds
 
 from .made import mae_row
 

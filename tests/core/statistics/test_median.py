@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tactbench.core.statistics.median import FEWEST, median_interval
+from tactbench.core.statistics.replicates import FEWEST, median_interval
 
 VALUES = st.lists(st.floats(-1e6, 1e6), min_size=FEWEST, max_size=30)
 

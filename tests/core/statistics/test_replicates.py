@@ -3,9 +3,8 @@
 import pytest
 
 from tactbench.core.leaderboard.table import build_table
-from tactbench.core.statistics.median import median_interval
 from tactbench.core.statistics.paired import difference
-from tactbench.core.statistics.replicates import over_replicates, recordings_right
+from tactbench.core.statistics.replicates import median_interval, over_replicates, recordings_right
 from tests.core.leaderboard.rendering import to_json
 from tests.core.leaderboard.rows import row
 
