@@ -29,7 +29,7 @@ from tactbench.core.evaluation.delay import (
     stated_delay_ms,
     tail_ms,
 )
-from tactbench.core.evaluation.event_answers import Detected, EventRules, Items, state_figures
+from tactbench.core.evaluation.event_answers import Detected, EventRules, state_figures
 from tactbench.core.evaluation.fitting import (
     Build,
     Choice,
@@ -43,12 +43,12 @@ from tactbench.core.evaluation.fitting import (
     voted,
 )
 from tactbench.core.evaluation.frames import band_limit, clocked, framed
-from tactbench.core.evaluation.interval import Interval, score_interval
+from tactbench.core.evaluation.interval import Interval, ReplicateUnits, score_interval
 from tactbench.core.evaluation.leaks import leak_stamps
 from tactbench.core.evaluation.metrics import METRICS, Metric, class_f1, confusion, metric_called, vector_details
 from tactbench.core.evaluation.protocols import ProtocolSpec, protocol_called
 from tactbench.core.evaluation.reference_floor import beyond_floor, reference_floor, true_force
-from tactbench.core.evaluation.replicate_sums import ReplicateUnits, replicates, summed
+from tactbench.core.evaluation.replicate_sums import replicates, summed
 from tactbench.core.evaluation.result import Result, Sizes, Times
 from tactbench.core.evaluation.sets import asked_for, not_asked_for, prepared, tare_s, tared
 from tactbench.core.evaluation.splits import (
@@ -382,9 +382,9 @@ def _answer(
     else:
         scored = {role: rules.scored(*one, made) for role, one in given.items()}
         threshold, bounds = rules.choose(scored.get("validation", []))
-        detected = tuple(rules.detect(one, threshold, bounds) for one in scored["test"])
+        detected = tuple(Detected(one, threshold, bounds) for one in scored["test"])
         sets = {
-            role: _items(rules.items([(one, rules.alarms(one, threshold)) for one in several], made), number)
+            role: rules.items([(one, rules.alarms(one, threshold)) for one in several], made, number)
             for role, several in scored.items()
             if role == "test" or alone
         }
@@ -419,12 +419,6 @@ def _rows(part: Part, predicted: npt.NDArray[Any], made: Dataset, number: int) -
             force[mine] = table.force[np.searchsorted(table.row, part.row[mine])]
     fold = np.full(len(part), number, dtype=np.int64)
     return Answers(part.y, predicted, part.recording, part.row, fold, part.time_s, force)
-
-
-def _items(items: Items, number: int) -> Answers:
-    """Return events and alarms as answers."""
-    fold, none = np.full(len(items.row), number, dtype=np.int64), np.full(len(items.row), np.nan)
-    return Answers(*items[:4], fold, items.time_s, none)
 
 
 # --- Answers to a score -----------------------------------------------------------------------------------------------

@@ -57,6 +57,12 @@ class Table:
     reference: SlipReference | None = None
     """What the reference says about slip, on its own clock; read where a task asks for it"""
 
+    @property
+    def slip(self) -> SlipReference:
+        """The reference, of a task that asks for it."""
+        assert self.reference is not None
+        return self.reference
+
 
 @dataclass(frozen=True)
 class Dataset:

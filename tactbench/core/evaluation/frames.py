@@ -145,9 +145,6 @@ def clocked(table: Table, rules: ProtocolSpec) -> tuple[StreamReadings, ...]:
 def frame_times(table: Table, task: TaskSpec, rules: ProtocolSpec) -> FrameTimes:
     """Return when the frames of a recording end: all that all streams fill, after the hold where it is dropped."""
     target = slip_target(task)
-    reference = table.reference
-    if reference is None:
-        raise DataError(f"Recording {table.meta.name!r} was read without its reference.", hint="Report this.")
     streams = clocked(table, rules)
     begin_s = max(float(_time(stream)[0]) for stream in streams)
     if rules.discard_hold and table.meta.scene is not None:
@@ -159,7 +156,7 @@ def frame_times(table: Table, task: TaskSpec, rules: ProtocolSpec) -> FrameTimes
         raise DataError(
             f"Recording {table.meta.name!r} is shorter than a frame of {target.window_s:g} s.", hint="Leave it out."
         )
-    return FrameTimes(ends_ns, reference)
+    return FrameTimes(ends_ns, table.slip)
 
 
 def _framed(
@@ -199,14 +196,12 @@ def _framed(
 
 def slip_target(task: TaskSpec) -> SlipTarget:
     """Return the target of a task of frames."""
-    if not isinstance(task.target, SlipTarget):
-        raise DataError(f"Task {task.name!r} has no frames.", hint="Report this.")
+    assert isinstance(task.target, SlipTarget)
     return task.target
 
 
 def _time(stream: StreamReadings) -> FloatArray:
-    if stream.time_s is None:
-        raise DataError(f"{stream.stream} has no clock.", hint="State it in the mapping.")
+    assert stream.time_s is not None
     return stream.time_s
 
 

@@ -36,6 +36,20 @@ class Interval:
     method: str
 
 
+@dataclass(frozen=True)
+class ReplicateUnits:
+    """What was repeated: sessions, groups or recordings."""
+
+    name: str
+    """What one of them is called: session, object …"""
+    codes: IntArray
+    """(n,) which one each row belongs to"""
+    labels: tuple[str, ...]
+    """What each is called, by its code"""
+    caveat: str = ""
+    """What an interval over them does not know; added to how it was found"""
+
+
 def score_interval(
     metric: Metric,
     y: npt.NDArray[Any],

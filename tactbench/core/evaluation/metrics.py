@@ -41,16 +41,12 @@ class Metric:
             return float(self.score(self.rows(y, predicted, n_classes).sum(axis=0), n_classes))
 
 
-def _squares(y: npt.NDArray[Any], predicted: npt.NDArray[Any], _: int) -> FloatArray:
-    return np.column_stack([(predicted - y) ** 2, np.ones(len(y))])
+def _mean_of(error: Callable[[npt.NDArray[Any]], npt.NDArray[Any]]) -> Rows:
+    """Return the summands of a mean over rows of what `error` makes of their differences."""
+    return lambda y, predicted, _: np.column_stack([error(predicted - y), np.ones(len(y))])
 
 
-def _absolutes(y: npt.NDArray[Any], predicted: npt.NDArray[Any], _: int) -> FloatArray:
-    return np.column_stack([np.abs(predicted - y), np.ones(len(y))])
-
-
-def _distances(y: npt.NDArray[Any], predicted: npt.NDArray[Any], _: int) -> FloatArray:
-    return np.column_stack([distances(y, predicted), np.ones(len(y))])
+_squares = _mean_of(np.square)
 
 
 def distances(y: npt.NDArray[Any], predicted: npt.NDArray[Any]) -> FloatArray:
@@ -122,8 +118,8 @@ METRICS = {
     metric.name: metric
     for metric in (
         Metric("rmse", "regression", False, _squares, _rmse),
-        Metric("mae", "regression", False, _absolutes, _mae),
-        Metric(VECTOR_METRIC, "regression", False, _distances, _mae, vector=True),
+        Metric("mae", "regression", False, _mean_of(np.abs), _mae),
+        Metric(VECTOR_METRIC, "regression", False, _mean_of(lambda d: np.linalg.norm(d, axis=1)), _mae, vector=True),
         Metric("r2", "regression", True, _explained, _r2),
         Metric("accuracy", "classification", True, _pairs, _accuracy),
         Metric("balanced_accuracy", "classification", True, _pairs, _balanced),

@@ -8,13 +8,13 @@ recording's unloaded hold.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from tactbench.core.evaluation.dataset import Dataset, Table
-from tactbench.core.evaluation.interval import enough, influences, student_quantile
+from tactbench.core.evaluation.interval import ReplicateUnits, enough, influences, student_quantile
 from tactbench.core.evaluation.metrics import Metric
 from tactbench.core.evaluation.sets import hold_s, unloaded
 from tactbench.core.evaluation.time_blocks import (
@@ -28,26 +28,8 @@ from tactbench.core.samples import Answers, FloatArray, IntArray
 from tactbench.core.spec.recording import RecordingMeta
 from tactbench.core.spec.task import ChannelTarget, TaskSpec
 
-if TYPE_CHECKING:
-    from tactbench.core.evaluation.replicate_sums import ReplicateUnits
-
 FEWEST = 30
 """Independent unloaded samples below which no floor is told (assumed): a deviation from 30 is known to 13 %."""
-
-
-@dataclass(frozen=True)
-class UnloadedHold:
-    """What one recording's reference says while nothing presses."""
-
-    squares: FloatArray
-    """(n,) squared differences from the hold's mean, in time order"""
-    freedom: float
-    """how many independent differences they are worth: n less one, or less than that where noise is correlated"""
-
-    @property
-    def shares(self) -> FloatArray:
-        """(n, 2) each sample's square, and its part of the degrees of freedom: what a block of time adds up."""
-        return np.column_stack([self.squares, np.full(len(self.squares), self.freedom / max(len(self.squares), 1))])
 
 
 @dataclass(frozen=True)
@@ -64,8 +46,8 @@ class BeyondFloor:
 class Floor:
     """What is known of the reference of the recordings that were tested."""
 
-    holds: dict[int, UnloadedHold]
-    """By number of the recording."""
+    holds: dict[int, FloatArray]
+    """By number of the recording (:func:`hold_of`)."""
 
     @property
     def value(self) -> float:
@@ -75,8 +57,7 @@ class Floor:
     @property
     def square(self) -> float:
         """The variance of the reference, pooled over the recordings."""
-        sums = np.array([[one.squares.sum(), one.freedom] for one in self.holds.values()])
-        return float(_per_freedom(sums.sum(axis=0)))
+        return float(_per_freedom(sum(one.sum(axis=0) for one in self.holds.values())))
 
     def by_replicate(self, tested: Answers, code: IntArray) -> FloatArray:
         """Return (replicates, 2) sums of squares and degrees of freedom, from (n,) the replicate of each test row.
@@ -88,8 +69,7 @@ class Floor:
         for place, hold in self.holds.items():
             mine = np.flatnonzero(tested.recording == place)
             codes = code[mine[np.argsort(tested.row[mine], kind="stable")]]
-            share = codes[np.arange(len(hold.squares)) * len(codes) // len(hold.squares)]
-            np.add.at(out, share, hold.shares)
+            np.add.at(out, codes[np.arange(len(hold)) * len(codes) // len(hold)], hold)
         return out
 
 
@@ -107,14 +87,14 @@ def reference_floor(task: TaskSpec, metric: Metric, data: Dataset, tested: Answe
         return None, ""
     if task.target.reduce is not None:
         return None, ""  # a number of many samples has not the noise of one
-    holds: dict[int, UnloadedHold] = {}
+    holds: dict[int, FloatArray] = {}
     for place in np.unique(tested.recording).tolist():
         table = data.tables[place]
         why = _no_hold(table)
         if why:
             return None, f"no floor of the reference: recording {table.meta.name!r} {why}"
         holds[place] = hold_of(table.y[unloaded(table) & table.labelled])
-    if sum(one.freedom for one in holds.values()) < FEWEST:
+    if sum(one[:, 1].sum() for one in holds.values()) < FEWEST:
         return None, f"no floor of the reference: fewer than {FEWEST} independent samples of it are unloaded"
     return Floor(holds), ""
 
@@ -129,10 +109,16 @@ def _no_hold(table: Table) -> str:
     return ""
 
 
-def hold_of(y: npt.NDArray[Any]) -> UnloadedHold:
-    """Return what (n,) samples of an unloaded reference say, n at least 2, in time order."""
+def hold_of(y: npt.NDArray[Any]) -> FloatArray:
+    """Return what (n,) samples of an unloaded reference say, n at least 2, in time order.
+
+    (n, 2): the squared difference of each from the hold's mean, and its part of the degrees of freedom, which are n
+    less one, or less than that where noise is correlated.
+    """
     centred = np.asarray(y, dtype=np.float64) - np.mean(y)
-    return UnloadedHold(centred**2, len(centred) - min(integrated_correlation(centred), len(centred) / 2))
+    n = len(centred)
+    freedom = n - min(integrated_correlation(centred), n / 2)
+    return np.column_stack([centred**2, np.full(n, freedom / n)])
 
 
 def beyond_floor(floor: Floor, tested: Answers, unit: ReplicateUnits, seed: int) -> BeyondFloor:
@@ -165,7 +151,7 @@ def _reach_over_time(floor: Floor, loss: FloatArray, recording: IntArray, seed: 
     places = np.unique(recording).tolist()
     errors = [np.column_stack([loss[recording == one], np.ones((recording == one).sum())]) for one in places]
     deviations, freedoms = [], []
-    for parts in (errors, [floor.holds[one].shares for one in places]):
+    for parts in (errors, [floor.holds[one] for one in places]):
         total, blocks = np.zeros((RESAMPLES, 2)), 0.0
         for part in parts:
             length = block_length(part[:, 0])

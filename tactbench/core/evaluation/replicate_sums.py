@@ -18,14 +18,14 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from tactbench.core.evaluation.dataset import Dataset
-from tactbench.core.evaluation.interval import enough, loss_of, plural, strata_of
+from tactbench.core.evaluation.interval import ReplicateUnits, enough, loss_of, plural, strata_of
 from tactbench.core.evaluation.metrics import EXCESS, Metric
 from tactbench.core.evaluation.protocols import shots
 from tactbench.core.evaluation.reference_floor import Floor
@@ -40,20 +40,6 @@ block for every sensor."""
 BLOCKS_IN_ALL = 200
 """About so many, whatever the number of recordings; never fewer than `FEWEST` each."""
 FEWEST = 4
-
-
-@dataclass(frozen=True)
-class ReplicateUnits:
-    """What was repeated: sessions, groups or recordings."""
-
-    name: str
-    """What one of them is called: session, object …"""
-    codes: IntArray
-    """(n,) which one each row belongs to"""
-    labels: tuple[str, ...]
-    """What each is called, by its code"""
-    caveat: str = ""
-    """What an interval over them does not know; added to how it was found"""
 
 
 def replicates(

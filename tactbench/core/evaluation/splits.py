@@ -13,7 +13,6 @@ import numpy.typing as npt
 from tactbench.core.errors import DataError, NotApplicable, UsageError
 from tactbench.core.evaluation.dataset import Dataset, Table
 from tactbench.core.evaluation.protocols import FIRST_FRAME, ProtocolSpec, shots
-from tactbench.core.spec.recording import RecordingMeta
 from tactbench.core.spec.task import TaskSpec
 
 Mask = npt.NDArray[np.bool_]
@@ -191,40 +190,44 @@ def _open_to_folds(data: Dataset) -> list[int]:
     return free or list(range(len(data.tables)))
 
 
-def _none(data: Dataset) -> list[Mask]:
-    return [np.zeros(len(table.row), dtype=bool) for table in data.tables]
+def _masks(data: Dataset, chosen: Callable[[int, Table], Mask | bool]) -> tuple[Mask, ...]:
+    """Return one (n,) mask a recording, from its place and itself."""
+    return tuple(np.zeros(len(table.row), dtype=bool) | chosen(place, table) for place, table in enumerate(data.tables))
 
 
 def _by_roles(data: Dataset, number: int | None, name: str) -> Assignment:
     """Return the official sets; of few shots the first `number` training sessions alone, without validation."""
-    first = None if number is None else set(training_sessions(data)[:number])
-
-    def rows(wanted: Callable[[RecordingMeta], bool]) -> tuple[Mask, ...]:
-        return tuple(np.full(len(table.row), wanted(table.meta)) for table in data.tables)
-
-    train = rows(lambda meta: meta.role == "train" if first is None else meta.session in first)
-    validation = rows(lambda meta: first is None and meta.role == "validation")
-    there = any(mask.any() for mask in validation)
-    return Assignment(name, train, rows(lambda meta: meta.role == "test"), validation if there else None)
+    train, validation, test = (
+        tuple(np.full(len(table.row), table.meta.role == role) for table in data.tables)
+        for role in ("train", "validation", "test")
+    )
+    if number is not None:
+        first = training_sessions(data)[:number]
+        train, validation = _masks(data, lambda _, table: table.meta.session in first), ()
+    return Assignment(name, train, test, validation if any(mask.any() for mask in validation) else None)
 
 
 def _in_session(data: Dataset, gap: int) -> Iterator[Assignment]:
     """Within each session, the first part of every recording's labelled rows trains, the rest tests."""
     places = _open_to_folds(data)
     for session in sorted({data.metas[place].session for place in places}):
-        train, test = _none(data), _none(data)
-        for place in places:
-            table = data.tables[place]
-            if table.meta.session != session:
-                continue
-            labelled = np.flatnonzero(table.labelled)
-            if len(labelled) < 10:
-                continue
-            first = labelled[int(TRAIN_SHARE * len(labelled))]
-            train[place][: max(first - gap, 0)] = True
-            test[place][first:] = True
+        mine = _masks(data, lambda place, table: place in places and table.meta.session == session)  # noqa: B023
+        train, test = _cut_in_time(data, mine, gap, fewest=10)
         if any(mask.any() for mask in test):
-            yield Assignment(session, tuple(train), tuple(test), groups="session")
+            yield Assignment(session, train, test, groups="session")
+
+
+def _cut_in_time(
+    data: Dataset, masks: Sequence[Mask], gap: int, fewest: int
+) -> tuple[tuple[Mask, ...], tuple[Mask, ...]]:
+    """Return the first part in time of each recording and, after a gap, the last; none of fewer labelled rows."""
+    before, after = [], []
+    for table, mask in zip(data.tables, masks, strict=True):
+        rows, number = np.flatnonzero(mask & table.labelled), np.arange(len(table.row))
+        first = rows[int(TRAIN_SHARE * len(rows))] if len(rows) >= fewest else len(number) + gap
+        before.append(mask & (number < first - gap) & (len(rows) >= fewest))
+        after.append(mask & (number >= first))
+    return tuple(before), tuple(after)
 
 
 def _told(fold: Assignment, data: Dataset) -> Assignment:
@@ -256,14 +259,9 @@ def _dealt(sizes: Mapping[str, int]) -> list[set[str]]:
 
 
 def _held_out(data: Dataset, group: str, values: set[str], name: str) -> Assignment:
-    train, test = _none(data), _none(data)
-    for place in _open_to_folds(data):
-        table = data.tables[place]
-        if group in table.groups:
-            inside = np.isin(table.groups[group], sorted(values))
-            test[place] |= inside
-            train[place] |= ~inside
-    return Assignment(name, tuple(train), tuple(test), groups=group)
+    known = [place for place in _open_to_folds(data) if group in data.tables[place].groups]
+    test = _masks(data, lambda place, table: place in known and np.isin(table.groups[group], sorted(values)))
+    return Assignment(name, _masks(data, lambda place, _: place in known and ~test[place]), test, groups=group)
 
 
 def _shuffled(data: Dataset, seed: int) -> Iterator[Assignment]:
@@ -279,10 +277,9 @@ def _shuffled(data: Dataset, seed: int) -> Iterator[Assignment]:
     else:
         dealt = {place: rng.permutation(np.arange(len(data.tables[place].row)) % FOLDS) for place in places}
     for number in range(folds):
-        train, test = _none(data), _none(data)
-        for place, fold in dealt.items():
-            test[place], train[place] = fold == number, fold != number
-        yield Assignment(f"shuffled fold {number + 1}", tuple(train), tuple(test), groups="recording")
+        test = _masks(data, lambda place, _: place in dealt and dealt[place] == number)  # noqa: B023
+        train = _masks(data, lambda place, _: place in dealt and ~test[place])  # noqa: B023
+        yield Assignment(f"shuffled fold {number + 1}", train, test, groups="recording")
 
 
 def _values(data: Dataset, group: str) -> list[str]:
@@ -308,15 +305,7 @@ def inner_splits(data: Dataset, outer: Assignment, gap: int = 0) -> list[tuple[t
             check = tuple(mask & out for mask, out in zip(outer.train, apart, strict=True))
             inner.append((fit, check))
         return inner
-    learn, last = _none(data), _none(data)
-    for place, table in enumerate(data.tables):
-        rows = np.flatnonzero(outer.train[place] & table.labelled)
-        if len(rows) >= 5:
-            first = rows[int(TRAIN_SHARE * len(rows))]
-            number = np.arange(len(table.row))
-            learn[place] = outer.train[place] & (number < first - gap)
-            last[place] = outer.train[place] & (number >= first)
-    return [(tuple(learn), tuple(last))]
+    return [_cut_in_time(data, outer.train, gap, fewest=5)]
 
 
 def with_validation(outer: Assignment, data: Dataset) -> Assignment:
@@ -325,7 +314,7 @@ def with_validation(outer: Assignment, data: Dataset) -> Assignment:
     Of the inner splits so many as it takes to validate on events and on disturbances, if there are any.
     """
     classes, kinds = _classes_in(data, outer.train), _kinds_in(data, outer.train)
-    check = tuple(_none(data))
+    check = _masks(data, lambda *_: False)
     for _, more in inner_splits(data, outer):
         check = tuple(one | other for one, other in zip(check, more, strict=True))
         learn = tuple(mask & ~out for mask, out in zip(outer.train, check, strict=True))

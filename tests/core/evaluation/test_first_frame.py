@@ -58,35 +58,12 @@ def test_one_row_a_recording_is_tested_and_the_others_are_counted(tmp_path):
     assert result.split == run(sorted(tmp_path.glob("*.h5")), "deployable").split == "recording"
 
 
-def test_a_first_row_that_is_missing_is_replaced_by_the_first_there_is(tmp_path):
-    rng = np.random.default_rng(0)
-    for number in range(12):
-        quality = np.zeros((6, 2), dtype=np.uint8)
-        quality[0, 0] = 1
-        record(tmp_path / f"g{number}.h5", rng.normal(size=(6, 2)), quality=quality, labels={"object": number % 2})
-    result = run(sorted(tmp_path.glob("*.h5")))
-    assert set(result.sets["test"].row.tolist()) == {1}
-
-
 def test_an_answer_that_changes_within_a_recording_is_skipped_with_the_reason(tmp_path):
     rng = np.random.default_rng(0)
     paths = [record(tmp_path / f"s{place}.h5", rng.normal(size=(30, 3)), rng.normal(size=30), session=str(place))
              for place in range(3)]  # fmt: skip
     with pytest.raises(NotApplicable, match="changes within recording 's0'"):
         run(paths, task=force_task())
-
-
-def test_single_readings_are_skipped_with_the_reason(tmp_path):
-    rng = np.random.default_rng(0)
-    paths = [record(tmp_path / f"g{place}.h5", rng.normal(size=(1, 3)), labels={"object": place % 2})
-             for place in range(8)]  # fmt: skip
-    with pytest.raises(NotApplicable, match="one reading"):
-        run(paths)
-
-
-def test_a_split_that_cuts_recordings_in_time_is_skipped_with_the_reason(tmp_path):
-    with pytest.raises(NotApplicable, match="'in-session' tests the end"):
-        run(grasps(tmp_path, offset=3.0), split="in-session")
 
 
 def test_too_few_first_rows_have_no_interval_and_say_so(tmp_path):

@@ -22,7 +22,6 @@ from tactbench.plugin import (
     ChannelTarget,
     ForceRamp,
     Indenter,
-    LabelTarget,
     Scene,
     SensorSpec,
     Source,
@@ -96,18 +95,6 @@ def test_the_delay_of_an_answer_holds_the_recording_it_waits_for(tmp_path):
     assert "window" not in run(task(), paths, estimator="majority").times.delay_parts_ms
 
 
-def test_without_a_clock_shares_are_asked_and_the_delay_is_not_known(tmp_path):
-    rng = np.random.default_rng(0)
-    paths = [record(tmp_path / f"s{place}.h5", rng.normal(0, 1 + 2 * (place % 2), (30, 2)), t_ns=None,
-                    labels={"slip": place % 2}) for place in range(12)]  # fmt: skip
-    result = run(task(), paths, latency=True)
-    assert result.score == 1.0
-    assert result.times.answer_delay_ms is None
-    assert "answer delay unknown: the recordings do not tell their sampling rate" in result.remarks
-    with pytest.raises(NotApplicable, match="states none for taxels"):
-        run(task(summaries=(Summary(measure="band-energy", band_hz=(1.0, 2.0)),)), paths)
-
-
 def test_splits_keep_recordings_whole(tmp_path):
     paths = sequences(tmp_path, object=lambda place: f"o{place % 4}")
     data = load_dataset(task(), paths)
@@ -140,24 +127,6 @@ def test_an_answer_that_changes_within_a_recording_is_none_of_the_whole(tmp_path
     paths = [record(tmp_path / f"s{place}.h5", X, annotations={"slip": np.repeat([0, 1], 10)}) for place in range(3)]
     with pytest.raises(NotApplicable, match="asks one answer of each recording, and slip changes within 's0'"):
         run(asked, paths)
-
-
-def test_a_copied_recording_leaks_as_whole_as_it_is(tmp_path):
-    paths = sequences(tmp_path)
-    X = np.random.default_rng(5).normal(0, 1, (40, 2))
-    twins = [record(tmp_path / f"{name}.h5", X, labels={"slip": "stable"}) for name in ("a", "b")]
-    assert not run(task(), paths).stamps
-    stamps = run(task(), [*paths, *twins]).stamps
-    assert len(stamps) == 1
-    assert stamps[0].startswith("leaks: ")
-
-
-def test_the_first_frame_alone_is_asked_as_of_samples(tmp_path):
-    result = run(task(), sequences(tmp_path), protocol="first-frame")
-    assert result.sizes.n_test == 24
-    assert set(result.sets["test"].row.tolist()) == {0}
-    assert "one answer a recording, from its first row" in result.remarks
-    assert result.score < 0.9, "an offset drawn at random does not tell slip"
 
 
 # --- own clocks
@@ -231,13 +200,6 @@ def test_the_hold_is_tared_on_and_left_out_of_every_stream(tmp_path):
     assert result.tare_s == pytest.approx(0.5)
     assert result.times.delay_parts_ms["window"] == pytest.approx(1500, abs=1e3 / SLOW_HZ)
     assert result.counts["rows before the press begins"] == 12 * 25
-
-
-@pytest.mark.parametrize("protocol", ["karl2016", "karl2016-training-scale"])
-def test_protocols_that_drop_single_samples_do_not_go_with_summaries(tmp_path, protocol):
-    data = load_dataset(task(), sequences(tmp_path))
-    with pytest.raises(NotApplicable, match="summarises whole recordings"):
-        summarised(data, task(), protocol_called(protocol))
 
 
 # --- code of the task's own
@@ -317,38 +279,6 @@ def test_a_vote_scores_recordings_that_frames_alone_get_half_wrong(tmp_path):
     assert all_of_them.interval.method.startswith("jackknife over 20 recordings ")
 
 
-def test_parameters_are_chosen_by_the_vote_too(tmp_path):
-    """Numbers, and a window to choose: ridge is scored by recordings on the validation folds as well."""
-    rng = np.random.default_rng(4)
-    paths = [record(tmp_path / f"s{place:02d}.h5", rng.normal(place, 3, (60, 1)), labels={"slip": place})
-             for place in range(12)]  # fmt: skip
-    number = vote(kind="regression", metric="rmse")
-    result = run(number, paths, estimator="ridge")
-    assert result.sizes.n_test == 12
-    # A mean of sixty readings of deviation 3 is known to 0.4; folds of neighbours are answered across a gap of two.
-    assert result.score < 1.0
-    assert "one answer a recording, from the mean answer of its frames" in result.remarks
-    by_mean = task(kind="regression", metric="rmse", summaries=(Summary(measure="mean"),))
-    summed = run(by_mean, paths, estimator="ridge")
-    assert summed.score < 1.0
-    assert {one["k"] for one in summed.search} == {0}, "one row has nothing before it to average"
-
-
-def test_a_vote_is_asked_under_the_papers_protocol_and_of_every_recording(tmp_path):
-    """Its rows are dropped and scaled sample by sample, and those that are left vote."""
-    rng = np.random.default_rng(4)
-    roles = ("train", "validation", "test")
-    paths = [record(tmp_path / f"s{place}.h5", rng.normal(place % 2, 1, (700, 1)), np.full(700, 1.0), role=role,
-                    labels={"slip": place % 2}) for place, role in enumerate(roles * 2)]  # fmt: skip
-    result = run(vote(), paths, estimator="logistic", protocol="karl2016")
-    assert result.sizes.n_test == 2
-    assert result.counts["rows before the press begins"] == 6 * 600
-    assert result.times.delay_parts_ms["window"] == pytest.approx(990.0), "100 of 700 rows are kept"
-    short = record(tmp_path / "short.h5", rng.normal(size=(500, 1)), np.full(500, 1.0), role="test", labels={"slip": 0})
-    with pytest.raises(DataError, match="leaves no row of recording 'short'"):
-        run(vote(), [*paths, short], estimator="logistic", protocol="karl2016")
-
-
 # --- numbers
 
 
@@ -383,42 +313,4 @@ def test_a_number_of_a_recording_is_a_channel_reduced(tmp_path):
     assert sorted(run(mean, paths, estimator="ols").sets["test"].y_true) == pytest.approx(sorted(expected), rel=1e-3)
 
 
-def test_a_number_of_a_recording_has_no_floor_of_a_samples_noise(tmp_path):
-    result = run(number_task(), pushes(tmp_path)[0], estimator="ols")
-    assert result.beyond is None
-    assert result.true is None
-    assert not [remark for remark in result.remarks if "floor" in remark]
-
-
-def test_a_label_that_says_a_number_can_be_asked_for_as_one(tmp_path):
-    paths, highest = pushes(tmp_path)
-    asked = number_task(target=LabelTarget(name="most_n", unit="N"))
-    assert sorted(run(asked, paths, estimator="ols").sets["test"].y_true) == pytest.approx(sorted(highest), abs=1e-6)
-    worded = record(tmp_path / "worded.h5", np.ones((60, 2)), np.ones(60), labels={"most_n": "much"})
-    with pytest.raises(DataError, match="label 'most_n' is no number"):
-        run(asked, [*paths, worded], estimator="ols")
-
-
 # --- the declaration
-
-
-@pytest.mark.parametrize(
-    ("wrong", "words"),
-    [
-        ({"vote": "frames"}, "or else vote"),
-        ({"summaries": ()}, "needs either"),
-        ({"answer_per": "sample"}, "belong to answer_per: recording"),
-        (
-            {"answer_per": "sample", "summaries": (), "target": ChannelTarget(reduce="max")},
-            "for answer_per: recording alone",
-        ),
-        ({"target": ChannelTarget()}, "asks for a label"),
-        ({"splits": ("recording", "in-session")}, "cuts recordings in time"),
-        ({"summaries": (MOVES[0], MOVES[0])}, "the same"),
-        ({"features_by": "no colon"}, "pattern"),
-        ({"summaries": (Summary(measure="mean", kinds=("ac_pressure",)),)}, "features do not have"),
-    ],
-)
-def test_a_task_that_contradicts_itself_is_refused(wrong, words):
-    with pytest.raises(ValueError, match=words):
-        task(**wrong)

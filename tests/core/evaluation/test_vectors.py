@@ -4,13 +4,11 @@ import time
 
 import numpy as np
 import pytest
-from pydantic import ValidationError
 
 from tactbench.core.evaluation.cell import CellContext, evaluate_cell
 from tactbench.core.evaluation.dataset import load_dataset
 from tactbench.core.evaluation.metrics import METRICS
 from tactbench.core.evaluation.replicate_sums import tables_of
-from tactbench.core.matrix.store import shard
 from tactbench.core.plugins.registry import load_registry
 from tactbench.core.recording.writer import RecordingWriter
 from tactbench.core.samples import Quality
@@ -86,17 +84,6 @@ def test_a_vector_is_answered_in_the_tasks_unit(tmp_path):
     assert run(place_task(), paths, "time-index").score > 1.0
 
 
-def test_what_stands_beside_the_mean_is_of_the_same_answers(tmp_path):
-    result = run(place_task(), presses(tmp_path, noise=3.0))
-    error = np.linalg.norm(result.sets["test"].y_pred - result.sets["test"].y_true, axis=1)
-    assert result.score == pytest.approx(error.mean())
-    assert result.scores["median error"] == pytest.approx(np.median(error))
-    assert result.scores["95th percentile of the error"] == pytest.approx(np.percentile(error, 95))
-    assert result.scores["RMSE of x"] ** 2 + result.scores["RMSE of y"] ** 2 == pytest.approx(np.mean(error**2))
-    assert not {"rmse", "mae", "r2"} & set(result.scores), "these are of numbers"
-    assert "answers are vectors (x, y): one model per component" in result.remarks
-
-
 @pytest.mark.parametrize("estimator", ["lasso", "svm", "boosting", "forest-10", "knn"])
 def test_each_component_is_learnt_as_if_it_were_asked_for_alone(tmp_path, estimator):
     """Parameters that are searched are fixed: a vector has one choice for all of its components."""
@@ -146,55 +133,3 @@ def test_intervals_and_replicates_are_of_the_vectors(tmp_path):
     assert of_time.interval.method.startswith("jackknife over 6 recordings")
     few = run(place_task(), presses(tmp_path, number=4, noise=3.0))
     assert few.interval.method.startswith("block bootstrap in time within 2 recordings")
-
-
-def test_splits_and_leak_checks_work_as_for_numbers(tmp_path):
-    paths = presses(tmp_path, noise=3.0)
-    assert len(run(place_task(), paths, split="session").sizes.fold_sizes) == 6, "those of role test stay apart"
-    assert run(place_task(), paths, split="few-shot-2").sizes.n_train == 2 * 60
-    assert any("shuffled" in stamp for stamp in run(place_task(), paths, split="shuffled").stamps)
-    twice = presses(tmp_path, number=2, noise=3.0, seed=9, role=lambda _: None)
-    again = tmp_path / "again"
-    again.mkdir()
-    copied = presses(again, number=2, noise=3.0, seed=9, session=lambda place: f"t{place}", role=lambda _: None)
-    assert any("%" in stamp for stamp in run(place_task(), [*twice, *copied], split="session").stamps)
-
-
-def test_the_first_frame_is_asked_only_where_it_has_an_answer_that_stays(tmp_path):
-    with pytest.raises(NotApplicable, match="changes within recording"):
-        run(place_task(), presses(tmp_path), split="session", protocol="first-frame")
-    still = presses(tmp_path, missing=10, wander=0.0)
-    with pytest.raises(NotApplicable, match="the first row of no recording has an answer"):
-        run(place_task(), still, split="session", protocol="first-frame")
-
-
-def test_the_latency_of_a_vector_is_that_of_all_its_models(tmp_path):
-    assert run(place_task(), presses(tmp_path, noise=3.0), "forest-10", latency=True).times.latency_ms_p50 > 0
-
-
-def test_answers_are_read_back_from_their_shard(tmp_path):
-    answers = run(place_task(), presses(tmp_path, noise=3.0)).sets
-    image = shard.build("{}", "{}", answers)
-    found = shard.answers_in(tmp_path / "cell.h5", image)
-    np.testing.assert_array_equal(found["test"].y_pred, answers["test"].y_pred)
-    np.testing.assert_array_equal(found["test"].y_true, answers["test"].y_true)
-
-
-@pytest.mark.parametrize(
-    ("more", "says"),
-    [
-        ({"metric": "rmse"}, "belong together"),
-        ({"target": ChannelTarget()}, "belong together"),
-        ({"kind": "classification"}, "kind: regression"),
-        ({"answer_per": "recording", "vote": "frames"}, "asks for a label"),
-    ],
-)
-def test_a_vector_that_cannot_be_asked_for_is_refused(more, says):
-    with pytest.raises(ValidationError, match=says):
-        place_task(**more)
-
-
-@pytest.mark.parametrize("names", [("x",), ("x", "x")])
-def test_a_vector_has_components_that_differ(names):
-    with pytest.raises(ValidationError):
-        VectorTarget(names=names, unit="mm")
