@@ -70,7 +70,7 @@ def together(rows: Sequence[Row]) -> list[PairableRows]:
             influence = (scores - scores.mean(axis=1, keepdims=True)) / np.sqrt(n * (n - 1))
             runs = np.ones(len(several))
         else:
-            runs = np.clip([float(one["run"]) for one in several], 1.0, n)
+            runs = np.clip([float(one.get("run", 1)) for one in several], 1.0, n)
             influence = influences(scores_without(tables_of(several, metric, n_classes), metric, n_classes), codes)
             for one in np.unique(codes):
                 influence[:, codes == one] = _smoothed(influence[:, codes == one], runs)

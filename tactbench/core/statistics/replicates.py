@@ -80,15 +80,10 @@ def _of_all(name: str, members: Sequence[Row]) -> dict[str, Any]:
         return dict(first)
     done = [row for row in members if row["status"] == "done"]
     if not done:
-        return {**_stopped(first, len(members)), "cell": name}
+        unknown = {"recordings_right": None, "recordings_asked": None, "replicates": {}, "cell": name}
+        return {**first, **_counted([first], len(members), "replicate", []), **unknown}
     found = _of_campaigns(done) if done[0]["simulated"] else _of_sessions(done)
     return {**found, "cell": name, "repeat": first["repeat"], "remarks": _remarks(members, done), **_right(done)}
-
-
-def _stopped(first: Row, n: int) -> dict[str, Any]:
-    return {**first, "n_replicates": n, "replicate_unit": "replicate", "replicate_scores": [],
-            "seeds": [first["seed"]], "score_min": None, "score_max": None, "recordings_right": None,
-            "recordings_asked": None, "replicates": {}}  # fmt: skip
 
 
 def _of_campaigns(done: Sequence[Row]) -> dict[str, Any]:
@@ -106,31 +101,22 @@ def _of_campaigns(done: Sequence[Row]) -> dict[str, Any]:
             level = known.level if known else level
     scores = [row["score"] for row in done]
     parts = _middle([row.get("delay_parts_ms") or {} for row in done])
+    points_of = [row.get("operating_points") or [] for row in done]
+    alike = len({len(points) for points in points_of}) == 1
+    covers = "" if level == LEVEL else f", {100 * level:.3g} %"
     return found | {
         **_counted(done, len(done), "replicate", scores),
-        "ci_method": _method(len(done), level) if level else "",
+        "ci_method": f"order statistics of {len(done)} replicates{covers}" if level else "",
         "replicates": _kept(done) if len(done) >= FEWEST else {},
         "chosen": _chosen(done),
         "scores": _middle([row["scores"] for row in done]),
         "events": _middle([row.get("events") or {} for row in done]),
-        "operating_points": _middle_points([row.get("operating_points") or [] for row in done]),
+        "operating_points": [_middle(points) for points in zip(*points_of, strict=True)] if alike else [],
         "delay_parts_ms": parts,
         "answer_delay_ms": None if found.get("answer_delay_ms") is None else sum(parts.values()),
         "confusion": _added([row["confusion"] for row in done]),
         "counts": dict(sum((Counter(row["counts"]) for row in done), Counter[str]())),
     }
-
-
-def _middle_points(points: Sequence[Sequence[Mapping[str, float]]]) -> list[dict[str, float]]:
-    """Return the middle of each operating point; none where replicates have different numbers of them."""
-    if len({len(one) for one in points}) > 1:
-        return []
-    return [_middle(list(several)) for several in zip(*points, strict=True)]
-
-
-def _method(n: int, level: float) -> str:
-    less = "" if level == LEVEL else f", {100 * level:.3g} %"
-    return f"order statistics of {n} replicates{less}"
 
 
 def _kept(done: Sequence[Row]) -> dict[str, Any]:
@@ -178,9 +164,7 @@ def _unit(row: Row) -> str:
 
 def _sessions(row: Row) -> int:
     """Return how many sessions, or coarser groups, a row's own interval is over; 0 if it is over nothing so coarse."""
-    kept = row.get("replicates") or {}
-    names = kept.get("names")
-    return 0 if not isinstance(names, list) or _unit(row).startswith(_IN_ONE_SESSION) else len(names)
+    return 0 if _unit(row).startswith(_IN_ONE_SESSION) else len((row.get("replicates") or {}).get("names", ()))
 
 
 def _median(values: Sequence[Any]) -> float | None:
@@ -231,16 +215,13 @@ def recordings_right(row: Row) -> tuple[int, int] | None:
 
     None of a regression, and where the row does not keep its recordings apart.
     """
-    kept, n = row.get("replicates") or {}, len(row["classes"])
-    unit, names, lines = str(kept.get("unit", "")), kept.get("names"), kept.get("sums")
-    if not n or not unit.startswith(_IN_ONE_SESSION) or not isinstance(names, list) or not isinstance(lines, list):
+    kept, n, unit = row.get("replicates") or {}, len(row["classes"]), _unit(row)
+    if not n or not unit.startswith(_IN_ONE_SESSION):
         return None
     recordings: dict[str, Counter[int]] = {}
-    for name, line in zip(names, lines, strict=False):
-        recording = str(name).rpartition("/")[0] if unit.startswith("block") else str(name)
-        found = recordings.setdefault(recording, Counter())
-        for column, count in zip(line[::2], line[1::2], strict=False):
-            found[column] += count
+    for name, line in zip(kept["names"], kept["sums"], strict=True):
+        found = recordings.setdefault(name.rpartition("/")[0] if unit.startswith("block") else name, Counter())
+        found.update(dict(zip(line[::2], line[1::2], strict=True)))
     right = 0
     for found in recordings.values():
         if len({column // n for column in found}) != 1:
