@@ -1,7 +1,7 @@
 """One cell: from recordings to folds of X and y, fitted models, their answers, and a score.
 
 :func:`load_task` makes the folds, :func:`evaluate` does the rest for any object with ``fit`` and ``predict``;
-:func:`evaluate_cell` calls both for a cell of the matrix. Regression, classification and events part in two places
+:func:`evaluate_cell` calls both for a cell of the matrix. Regression, classification and events differ in two places
 alone: in what is scored of a fold (:func:`_answer`), and in what stands beside the score (:func:`_result`).
 """
 

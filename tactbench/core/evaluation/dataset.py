@@ -195,12 +195,7 @@ def _read(
         )
     y, labelled = _target(recording, task, clock)
     for name, column in (columns | ({"the target": y} if task.kind == "regression" else {})).items():
-        largest = float(np.max(np.abs(column), initial=0.0, where=~np.isnan(column)))
-        if largest > LARGEST:
-            raise DataError(
-                f"In recording {meta.name!r}, {name} reaches {largest:.3g}, which cannot be computed with.",
-                hint="Is it a fill value? State it under `sentinels` in the mapping, or mark it as missing.",
-            )
+        require_computable(column, name, meta)
     force = y if isinstance(task.target, ChannelTarget) and task.target.kind == "force" else None
     found = channels_for(recording, ChannelTarget(kind="force"))
     if force is None and len(found) == 1:
@@ -227,6 +222,16 @@ def _read(
         reference=reference,
     )
     return tuple(columns), table
+
+
+def require_computable(values: FloatArray, name: str, meta: RecordingMeta) -> None:
+    """Raise DataError for numbers of any shape whose squares cannot be summed; NaN is none."""
+    largest = float(np.max(np.abs(values), initial=0.0, where=~np.isnan(values)))
+    if largest > LARGEST:
+        raise DataError(
+            f"In recording {meta.name!r}, {name} reaches {largest:.3g}, which cannot be computed with.",
+            hint="Is it a fill value? State it under `sentinels` in the mapping, or mark it as missing.",
+        )
 
 
 def _count_flags(stream: StreamData, picked: Sequence[int], counts: Counter[str]) -> None:

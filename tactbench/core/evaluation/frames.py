@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from tactbench.core.errors import DataError, NotApplicable, PluginContractError
-from tactbench.core.evaluation.dataset import LARGEST, Dataset, Table
+from tactbench.core.evaluation.dataset import Dataset, Table, require_computable
 from tactbench.core.evaluation.protocols import ProtocolSpec
 from tactbench.core.evaluation.slip_reference import SlipReference
 from tactbench.core.evaluation.summaries import in_band, tared_readings
@@ -171,12 +171,7 @@ def _framed(
     answered = np.asarray(~np.isnan(X).any(axis=1))
     if not answered.all():
         counts["frames without a sample of some stream"] += int((~answered).sum())
-    largest = float(np.max(np.abs(X), initial=0.0, where=answered[:, None]))
-    if largest > LARGEST:
-        raise DataError(
-            f"In recording {table.meta.name!r}, a feature reaches {largest:.3g}, which cannot be computed with.",
-            hint="Is a reading a fill value? State it under `sentinels` in the mapping.",
-        )
+    require_computable(X[answered], "a feature", table.meta)
     ends_ns, row = frames.ends_ns[answered], np.flatnonzero(answered)
     state = frames.reference.state(ends_ns, 1.0)
     events = task.kind == "events"

@@ -10,7 +10,7 @@ from dataclasses import replace
 import numpy as np
 
 from tactbench.core.errors import DataError, NotApplicable, PluginContractError
-from tactbench.core.evaluation.dataset import LARGEST, Dataset, Table
+from tactbench.core.evaluation.dataset import Dataset, Table, require_computable
 from tactbench.core.evaluation.protocols import ProtocolSpec
 from tactbench.core.evaluation.sets import hold_s, moments
 from tactbench.core.plugins.registry import load_object
@@ -94,11 +94,7 @@ def recording_features(task: TaskSpec, rules: ProtocolSpec) -> Callable[[Table],
                 )
             found |= more
         for name, value in found.items():
-            if not abs(value) <= LARGEST:
-                raise DataError(
-                    f"In recording {table.meta.name!r}, {name} reaches {value:.3g}, which cannot be computed with.",
-                    hint="Is a reading a fill value? State it under `sentinels` in the mapping.",
-                )
+            require_computable(np.array(value), name, table.meta)
         return found
 
     return compute

@@ -23,8 +23,6 @@ class SlipLabels:
     """(n,) :data:`STICK`, :data:`INCIPIENT`, :data:`GROSS` or :data:`UNDECIDED` of each sample of the reference."""
     gross_ns: IntArray
     """(e, 2) onset and end of each gross slip that a hold in contact precedes [ns]."""
-    incipient_ns: IntArray
-    """(i, 2) beginning and end of each stretch of incipient slip [ns]."""
 
 
 def stick_ratio(tangential_n: FloatArray, normal_n: FloatArray, friction: float) -> FloatArray:
@@ -97,9 +95,9 @@ def slip_labels(
         [UNDECIDED, GROSS, UNDECIDED, INCIPIENT],
         STICK,
     ).astype(np.int64)
-    gross, incipient = (_stretches(state == which) for which in (GROSS, INCIPIENT))
+    gross = _stretches(state == GROSS)
     held = np.concatenate([[False], (rest & contact)[:-1]])[gross[:, 0]]
-    return SlipLabels(state, t_ns[gross[held]], t_ns[incipient])
+    return SlipLabels(state, t_ns[gross[held]])
 
 
 def at_rest(t_ns: IntArray, displacement_m: FloatArray, thresholds: SlipThresholds) -> npt.NDArray[np.bool_]:

@@ -59,7 +59,6 @@ def test_incipient_slip_lies_between_its_two_stick_ratios():
     clear = rising & (np.abs(share - begins) > 1e-9) & (np.abs(share - ends) > 1e-9)
     expected = np.where(share <= begins, STICK, np.where(share < ends, INCIPIENT, UNDECIDED))
     assert np.array_equal(labels.state[clear], expected[clear])
-    assert labels.incipient_ns[0] / 1e9 == pytest.approx([0.5 + begins / 2, 0.5 + ends / 2], abs=1.1e-3)
 
 
 def test_the_stick_ratio_by_hand():
@@ -154,5 +153,5 @@ def test_halved_and_doubled_thresholds_move_the_labels_the_way_they_say():
     onsets = [scales[factor].gross_ns[0, 0] / 1e9 for factor in (0.5, 1.0, 2.0)]
     late = THRESHOLDS.gross_displacement_m / SPEED
     assert onsets == pytest.approx([1.0 + late / 2, 1.0 + late, 1.0 + 2 * late], abs=2.1e-3)
-    begins = [scales[factor].incipient_ns[0, 0] for factor in (0.5, 1.0, 2.0)]
+    begins = [int(np.argmax(scales[factor].state == INCIPIENT)) for factor in (0.5, 1.0, 2.0)]
     assert begins == sorted(begins)
