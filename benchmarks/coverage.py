@@ -24,14 +24,12 @@ import numpy as np
 from scipy import stats
 from scipy.signal import lfilter
 
-from tactbench.core.evaluation.interval import score_interval
+from tactbench.core.evaluation.interval import ReplicateUnits, score_interval
 from tactbench.core.evaluation.metrics import METRICS
 from tactbench.core.evaluation.reference_floor import Floor, beyond_floor, hold_of
 from tactbench.core.evaluation.replicate_sums import summed_in_time
-from tactbench.core.evaluation.replication import ReplicateUnits
 from tactbench.core.samples import Answers
-from tactbench.core.statistics.over_folds import corrected_t
-from tactbench.core.statistics.paired import difference
+from tactbench.core.statistics.paired import corrected_t, difference
 from tactbench.core.statistics.ranking import ranks
 
 ROWS = 60

@@ -42,7 +42,7 @@ def arrays_of(out: Path, folder: Path) -> list[str]:
     """Write the arrays that the paper's protocol makes of each replicate's recordings; return seeds and files."""
     from tactbench.core.evaluation.dataset import load_dataset
     from tactbench.core.evaluation.protocols import KARL2016
-    from tactbench.core.evaluation.sets import FeatureScale, keep, part
+    from tactbench.core.evaluation.sets import FeatureScale, keep, moments, part
     from tactbench.core.evaluation.splits import make_splits
     from tactbench.core.matrix.store import Store
     from tactbench.core.plugins.registry import load_registry
@@ -57,7 +57,7 @@ def arrays_of(out: Path, folder: Path) -> list[str]:
         made = {}
         for role in ("train", "validation", "test"):
             kept = keep(data, KARL2016, getattr(assignment, role), role, Counter())
-            one = part(kept, FeatureScale.of(kept.X), 0)
+            one = part(kept, FeatureScale(*moments(kept.X)), 0)
             made[f"X_{role}"], made[f"y_{role}"] = one.X, one.y
         np.savez(folder / f"arrays{row['seed']}.npz", **made)
         said += [f"arrays{row['seed']}.npz", str(row["seed"])]

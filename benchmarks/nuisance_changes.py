@@ -29,7 +29,7 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from tactbench.core.acquisition import acquire
-from tactbench.core.evaluation.cell import CellContext, evaluate
+from tactbench.core.evaluation.cell import CellContext, evaluate_cell
 from tactbench.core.evaluation.dataset import Dataset, load_dataset
 from tactbench.core.spec.scene import Simulation
 from tactbench.core.spec.task import PlannedScene, in_drawn_order
@@ -154,7 +154,7 @@ def score(sensor: str, task: str, undone: frozenset[str], seed: int, *, full: bo
         name, params, every = ("forest", {}, 1) if full else ("forest", {"n_estimators": 200}, 4)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
-        return evaluate(
+        return evaluate_cell(
             CellContext(spec, REGISTRY.estimators[name], params, "karl2016", None, seed=seed, clock=time.perf_counter),
             thinned(data, every),
         ).score

@@ -20,7 +20,7 @@ import numpy as np
 from tactbench.core.matrix.run import run_matrix
 from tactbench.core.matrix.store import Store
 from tactbench.core.spec.matrix import EstimatorChoice, MatrixSpec, TaskChoice
-from tactbench.core.statistics.median import median_interval
+from tactbench.core.statistics.replicates import median_interval
 
 ASKED = {"force": ("lasso", "ols"), "curvature": ("forest-10", "logistic")}
 SIZE = 8

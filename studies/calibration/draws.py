@@ -18,9 +18,10 @@ import numpy as np
 import numpy.typing as npt
 
 from tactbench.core.acquisition import acquire
-from tactbench.core.evaluation.cell import CellContext, CellResult, evaluate
+from tactbench.core.evaluation.cell import CellContext, evaluate_cell
 from tactbench.core.evaluation.dataset import Dataset, Table, load_dataset
 from tactbench.core.evaluation.metrics import metric_called
+from tactbench.core.evaluation.result import Result
 from tactbench.core.plugins.registry import installed, load_object
 from tactbench.core.spec.recording import RecordingMeta
 from tactbench.core.spec.scene import NUISANCES, Simulation
@@ -130,7 +131,7 @@ def _simulated(
     for sensor, name in dict.fromkeys((one["sensor"], one["task"]) for one in outputs):
         task = registry.tasks[name].spec
         simulation = Simulation(nuisances={name: value for name, value, own in given if not own or sensor in own})
-        answers: dict[str, CellResult] = {}
+        answers: dict[str, Result] = {}
         with tempfile.TemporaryDirectory() as folder, warnings.catch_warnings():
             warnings.simplefilter("ignore")  # of estimators that do not converge
             paths = []
@@ -153,7 +154,7 @@ def _simulated(
                         task, registry.estimators[estimator["name"]], estimator.get("params") or {},
                         procedure["protocol"], None, seed=seed, clock=time.perf_counter, latency=False,
                     )  # fmt: skip
-                    answers[key] = evaluate(context, thinned(data, every))
+                    answers[key] = evaluate_cell(context, thinned(data, every))
                 found[output["name"]] = read_off(output.get("figure") or {"kind": "score"}, answers[key], data.metas)
     return {one["name"]: found[one["name"]] for one in outputs}
 
@@ -171,7 +172,7 @@ def thinned(data: Dataset, every: int) -> Dataset:
     return replace(data, tables=tuple(map(cut, data.tables)))
 
 
-def read_off(figure: Mapping[str, Any], result: CellResult, metas: Sequence[RecordingMeta]) -> float:
+def read_off(figure: Mapping[str, Any], result: Result, metas: Sequence[RecordingMeta]) -> float:
     """Return the score, the metric over a band of commanded force, or the white noise of the predictions."""
     answers = result.sets["test"]
     if figure["kind"] == "band":

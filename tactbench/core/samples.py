@@ -165,8 +165,6 @@ class Part:
     """(n,) which recording of the dataset the row is from"""
     row: IntArray
     """(n,) which row of that recording"""
-    cluster: IntArray
-    """(n,) unit of replication: session, or the group the split keeps apart"""
 
     def __len__(self) -> int:
         return len(self.y)

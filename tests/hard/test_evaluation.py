@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from tactbench.core.errors import DataError
-from tactbench.core.evaluation.cell import CellContext, evaluate
+from tactbench.core.evaluation.cell import CellContext, evaluate_cell
 from tactbench.core.evaluation.interval import block_length
 from tactbench.core.evaluation.protocols import PROTOCOLS
 from tactbench.plugin import load_registry
@@ -40,7 +40,7 @@ def test_no_case_of_the_family_fails(name):
 
 def _score(task, estimator, protocol, paths, params=None):
     ticks = itertools.count()
-    result = evaluate(
+    result = evaluate_cell(
         CellContext(
             task,
             ESTIMATORS[estimator],
@@ -53,7 +53,7 @@ def _score(task, estimator, protocol, paths, params=None):
         ),
         paths,
     )
-    assert np.isfinite([result.score, result.ci_low, result.ci_high]).all()
+    assert np.isfinite([result.score, result.interval.low, result.interval.high]).all()
     return result
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from threadpoolctl import threadpool_limits
 
-from tactbench.core.evaluation.splits import shots
+from tactbench.core.evaluation.protocols import shots
 from tactbench.core.matrix.keys import Keys
 from tactbench.core.matrix.plan import plan_cells
 from tactbench.core.matrix.plan_recordings import requests_for

@@ -8,7 +8,7 @@ import pytest
 from tactbench.core.acquisition import acquire
 from tactbench.core.cli.pages import _scenes
 from tactbench.core.errors import NotApplicable
-from tactbench.core.evaluation.cell import CellContext, evaluate
+from tactbench.core.evaluation.cell import CellContext, evaluate_cell
 from tactbench.core.evaluation.protocols import protocol_called
 from tactbench.core.evaluation.splits import SPLITS_WITHOUT_GROUPS
 from tactbench.core.plugins.registry import installed
@@ -43,7 +43,7 @@ def recorded(request, tmp_path_factory):
 
 
 def run(paths, estimator):
-    return evaluate(
+    return evaluate_cell(
         CellContext(
             contact_location.SPEC, installed().estimators[estimator], {}, "deployable", "roles", seed=1,
             clock=time.perf_counter, latency=False,

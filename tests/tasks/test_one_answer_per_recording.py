@@ -7,7 +7,7 @@ import pytest
 
 from tactbench.core.acquisition import acquire
 from tactbench.core.errors import NotApplicable
-from tactbench.core.evaluation.cell import CellContext, evaluate
+from tactbench.core.evaluation.cell import CellContext, evaluate_cell
 from tactbench.core.evaluation.dataset import load_dataset
 from tactbench.core.plugins.registry import installed
 from tactbench.core.recording.mapping import import_tables
@@ -46,7 +46,7 @@ def campaign(request, tmp_path_factory):
 
 
 def run(task, recordings, split=None, estimator="forest", protocol="deployable", **params):
-    return evaluate(
+    return evaluate_cell(
         CellContext(
             task, installed().estimators[estimator], params, protocol, split, seed=1, clock=time.perf_counter,
             latency=False,
@@ -58,13 +58,13 @@ def run(task, recordings, split=None, estimator="forest", protocol="deployable",
 @pytest.mark.parametrize("task", [SUMMARISED, VOTED], ids=["summaries", "vote"])
 def test_curvature_is_asked_of_whole_recordings_of_the_twin(campaign, task):
     result = run(task, campaign, "session", n_estimators=20)
-    assert result.n_test == len(campaign) == 10
+    assert result.sizes.n_test == len(campaign) == 10
     assert len({*result.sets["test"].recording.tolist()}) == 10
-    assert result.ci_method.startswith("jackknife over 5 sessions ")
+    assert result.interval.method.startswith("jackknife over 5 sessions ")
     # Guessing one of two caps leaves a macro F1 of a half at best.
     assert result.score > run(task, campaign, "session", "majority").score + 0.2
     assert result.tare_s == pytest.approx(7.2, abs=0.1), "the hold of the scenes is tared on as for samples"
-    assert result.delay_parts_ms["window"] == pytest.approx(60e3 - 7.2e3, rel=0.01)
+    assert result.times.delay_parts_ms["window"] == pytest.approx(60e3 - 7.2e3, rel=0.01)
 
 
 @pytest.fixture(scope="module")
@@ -83,11 +83,11 @@ def test_slip_of_real_sequences_by_blocks_of_neighbours(sequences, estimator, pa
     """The notes of the data have 0.978 of eight blocks, 0.993 of shuffled folds and 0.752 of always 'slipped'."""
     found = run(slip_sequence.SPEC, sequences, estimator=estimator, **params)
     assert found.split == "block", "nothing stricter is labelled: no object and one session"
-    assert found.n_test == 137
+    assert found.sizes.n_test == 137
     assert found.score >= 0.96
     trivial = run(slip_sequence.SPEC, sequences, estimator="majority")
     assert trivial.score == pytest.approx(103 / 137)
-    assert found.ci_low > trivial.score
+    assert found.interval.low > trivial.score
 
 
 def test_slip_of_real_sequences_has_no_official_test_and_no_time_to_cut(sequences):

@@ -5,7 +5,7 @@ import time
 import numpy as np
 import pytest
 
-from tactbench.core.evaluation.cell import CellContext, evaluate
+from tactbench.core.evaluation.cell import CellContext, evaluate_cell
 from tactbench.core.plugins.registry import installed
 from tactbench.core.recording.writer import RecordingWriter
 from tactbench.core.spec.recording import RecordingMeta
@@ -40,7 +40,7 @@ def test_all_three_components_are_answered_in_newtons(tmp_path):
         context = CellContext(
             SPEC, installed().estimators[estimator], {}, "deployable", None, 1, time.perf_counter, latency=False
         )
-        return evaluate(context, paths)
+        return evaluate_cell(context, paths)
 
     paths = pushes(tmp_path)
     found = run("ols")

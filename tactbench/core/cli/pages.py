@@ -7,8 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-from tactbench.core.evaluation.few_shot import shots
-from tactbench.core.evaluation.protocols import PROTOCOLS
+from tactbench.core.evaluation.protocols import PROTOCOLS, shots
 from tactbench.core.leaderboard.names import LOWER_IS_BETTER, METRIC_NAMES
 from tactbench.core.spec.events import SlipTarget
 from tactbench.core.spec.parameter import Parameter

@@ -73,8 +73,7 @@ def _facts(found: StoredCell, why: Explanation) -> dict[str, Any]:
 def _replicates(found: StoredCell) -> list[str]:
     """Return what the cell came to over its replicates, and what each of them scored."""
     from tactbench.core.leaderboard.names import metric_name
-    from tactbench.core.statistics.median import counted, percent
-    from tactbench.core.statistics.replicates import over_replicates
+    from tactbench.core.statistics.replicates import counted, over_replicates, percent
     from tactbench.core.tables.numbers import ABSENT, interval, score
 
     name = found.cell.name.removesuffix(f"/{found.cell.repeat}")

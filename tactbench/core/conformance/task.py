@@ -102,7 +102,7 @@ def splits_are_known(subject: Subject) -> None:
 
     Name roles, session, in-session, shuffled, few-shot-N, a campaign of the task, or a label of its scenes.
     """
-    from tactbench.core.evaluation.few_shot import shots
+    from tactbench.core.evaluation.protocols import shots
     from tactbench.core.evaluation.splits import SPLITS_WITHOUT_GROUPS
 
     spec = subject.descriptor.spec

@@ -14,8 +14,7 @@ from tactbench.core.cost.front import front
 from tactbench.core.cost.rounds import Timing
 from tactbench.core.cost.timed_estimators import TimedEstimator
 from tactbench.core.errors import NotApplicable, TactbenchError
-from tactbench.core.evaluation.delay import answer_delay_ms
-from tactbench.core.evaluation.timing import tail_ms
+from tactbench.core.evaluation.delay import answer_delay_ms, tail_ms
 from tactbench.core.matrix.store import Row
 from tactbench.core.spec.recording import RecordingMeta
 from tactbench.core.spec.rig import EstimatorDescriptor

@@ -15,8 +15,8 @@ import numpy as np
 import numpy.typing as npt
 
 from tactbench.core.cost.timed_estimators import TimedEstimator
+from tactbench.core.evaluation.delay import single_row_latency_s, single_row_preparation_s
 from tactbench.core.evaluation.fitting import answers, fit
-from tactbench.core.evaluation.timing import single_row_latency_s, single_row_preparation_s
 from tactbench.core.matrix.progress import Progress
 from tactbench.core.plugins.interfaces import Estimator
 

@@ -10,14 +10,12 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from tactbench.core.evaluation.cell import load_task
 from tactbench.core.evaluation.dataset import Dataset
-from tactbench.core.evaluation.delay import reading_delay_ms
-from tactbench.core.evaluation.frames import frame_delay_ms, frame_features_s, framed
+from tactbench.core.evaluation.delay import features_s, stated_delay_ms
+from tactbench.core.evaluation.fitting import builder, features_of, select
 from tactbench.core.evaluation.metrics import Metric, metric_called
-from tactbench.core.evaluation.preparation import assigned, builder, prepared
-from tactbench.core.evaluation.protocols import protocol_called
-from tactbench.core.evaluation.selection import features_of, select
-from tactbench.core.evaluation.splits import with_validation
+from tactbench.core.evaluation.sets import prepared
 from tactbench.core.evaluation.summaries import without_windows
 from tactbench.core.plugins.interfaces import Estimator
 from tactbench.core.samples import FloatArray
@@ -78,23 +76,20 @@ def timed_estimator(
     threads
         What the estimator is told it may use.
     """
-    rules, metric = protocol_called(protocol), metric_called(task.metric)
-    frames = task.answer_per == "frame"
-    recorded = data
-    if frames:
-        descriptor = without_windows(descriptor, task)
-        data = framed(data, task, rules, descriptor)
+    metric, frames = metric_called(task.metric), task.answer_per == "frame"
+    loaded = load_task(task, data, protocol, split, estimator=descriptor, seed=seed)
+    descriptor = without_windows(descriptor, task)
+    made, rules, assignment = loaded.data, loaded.rules, loaded.assignments[-1]
     build = builder(descriptor, params, task, seed, threads)
-    assignment = assigned(task, descriptor, data, split, seed)[-1]
-    if task.kind == "events" and descriptor.threshold is None and assignment.validation is None:
-        assignment = with_validation(assignment, data)
-    choice = select(descriptor, params, build, data, rules, assignment, metric)
+    choice = select(descriptor, params, build, made, rules, assignment, metric, Counter())
     k = choice.k if choice else descriptor.window_grid[0]
-    fold = prepared(assignment, data, rules, k, Counter())
+    fold = prepared(assignment, made, rules, k, Counter())
     chosen = choice.params if choice else {}
-    parts, remarks = reading_delay_ms(data, rules, k) if descriptor.looks_at == "features" and not frames else ({}, ())
-    if frames:
-        parts, remarks = frame_delay_ms(recorded, data.features, task, rules, descriptor)
+    parts, remarks = stated_delay_ms(data, made, task, rules, descriptor, k)
+
+    def of_a_frame_s(clock: Callable[[], float]) -> float:
+        return features_s(data, task, rules, descriptor, fold.test.X, k, clock) or 0.0
+
     return TimedEstimator(
         name=descriptor.name,
         build=lambda: build(chosen),
@@ -103,13 +98,13 @@ def timed_estimator(
         y_train=fold.train.y,
         X_test=features_of(fold.test, descriptor),
         y_test=fold.test.y,
-        n_classes=0 if task.kind == "events" else len(data.classes),
+        n_classes=0 if task.kind == "events" else len(made.classes),
         metric=metric if task.kind != "events" else None,
-        trained_on=tuple(data.metas[place] for place in np.unique(fold.train.recording)),
+        trained_on=tuple(made.metas[place] for place in np.unique(fold.train.recording)),
         looks_at=descriptor.looks_at,
         k=k,
         tared=rules.tare,
         delay_parts_ms=parts,
         remarks=remarks,
-        features_s=(lambda clock: frame_features_s(recorded, task, rules, descriptor, clock)) if frames else None,
+        features_s=of_a_frame_s if frames else None,
     )

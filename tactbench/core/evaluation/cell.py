@@ -1,133 +1,78 @@
-"""One cell: protocol, folds, estimator, score, cost."""
+"""One cell: from recordings to folds of X and y, fitted models, their answers, and a score.
+
+:func:`load_task` makes the folds, :func:`evaluate` does the rest for any object with ``fit`` and ``predict``;
+:func:`evaluate_cell` calls both for a cell of the matrix. Regression, classification and events differ in two places
+alone: in what is scored of a fold (:func:`_answer`), and in what stands beside the score (:func:`_result`).
+"""
 
 from __future__ import annotations
 
+import copy
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, field, fields
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from tactbench.core.errors import DataError
-from tactbench.core.evaluation.dataset import Dataset, load_dataset
-from tactbench.core.evaluation.delay import NO_LINK, NO_RATE, answer_delay_ms, reading_delay_ms
-from tactbench.core.evaluation.event_answers import EventAnswers, Items, state_figures
-from tactbench.core.evaluation.fitting import answers as answers_of
-from tactbench.core.evaluation.fitting import fit
-from tactbench.core.evaluation.frames import band_limit, clocked, frame_delay_ms, frame_features_s, framed
-from tactbench.core.evaluation.interval import LEVEL, score_interval
+from tactbench.core.errors import DataError, PluginContractError
+from tactbench.core.evaluation.dataset import LARGEST, Dataset, load_dataset
+from tactbench.core.evaluation.delay import (
+    NO_LINK,
+    NO_RATE,
+    answer_delay_ms,
+    features_s,
+    peak_rss_mb,
+    single_row_latency_s,
+    stated_delay_ms,
+    tail_ms,
+)
+from tactbench.core.evaluation.event_answers import Detected, EventRules, state_figures
+from tactbench.core.evaluation.fitting import (
+    Build,
+    Choice,
+    answers,
+    asked,
+    builder,
+    features_of,
+    fit,
+    one_model_a_component,
+    select,
+    voted,
+)
+from tactbench.core.evaluation.frames import band_limit, clocked, framed
+from tactbench.core.evaluation.interval import Interval, ReplicateUnits, score_interval
 from tactbench.core.evaluation.leaks import leak_stamps
-from tactbench.core.evaluation.metrics import METRICS, Metric, class_f1, confusion, metric_called
-from tactbench.core.evaluation.preparation import assigned, builder, prepared
+from tactbench.core.evaluation.metrics import METRICS, Metric, class_f1, confusion, metric_called, vector_details
 from tactbench.core.evaluation.protocols import ProtocolSpec, protocol_called
-from tactbench.core.evaluation.reference_floor import BeyondFloor, beyond_floor, reference_floor, true_force
-from tactbench.core.evaluation.replicate_sums import summed
-from tactbench.core.evaluation.replication import ReplicateUnits, replicates
-from tactbench.core.evaluation.selection import Build, Choice, features_of, select
-from tactbench.core.evaluation.sets import not_asked_for
+from tactbench.core.evaluation.reference_floor import beyond_floor, reference_floor, true_force
+from tactbench.core.evaluation.replicate_sums import replicates, summed
+from tactbench.core.evaluation.result import Result, Sizes, Times
+from tactbench.core.evaluation.sets import asked_for, not_asked_for, prepared, tare_s, tared
 from tactbench.core.evaluation.splits import (
     SHUFFLED_STAMP,
     SHUFFLED_WHOLE_STAMP,
     Assignment,
-    assert_disjoint,
     choose_split,
+    make_splits,
     over_rows,
     used_rows,
     with_validation,
     without_part,
 )
-from tactbench.core.evaluation.summaries import (
-    is_summarised,
-    recording_features,
-    summarised,
-    waiting_for_the_whole,
-    without_windows,
-)
-from tactbench.core.evaluation.timing import (
-    AT_LEAST,
-    calls_s,
-    peak_rss_mb,
-    single_row_latency_s,
-    single_row_preparation_s,
-    tail_ms,
-)
-from tactbench.core.evaluation.unloaded import tare_s
-from tactbench.core.evaluation.vectors import vector_details
-from tactbench.core.evaluation.vote import require_answers, voted
+from tactbench.core.evaluation.summaries import summarised, without_windows
 from tactbench.core.plugins.interfaces import Estimator
-from tactbench.core.samples import Answers, FloatArray, Fold, Part
+from tactbench.core.samples import Answers, FloatArray, Fold, IntArray, Part
 from tactbench.core.spec.recording import RecordingMeta
 from tactbench.core.spec.rig import EstimatorDescriptor
 from tactbench.core.spec.scene import Role
 from tactbench.core.spec.task import TaskSpec, VectorTarget
 from tactbench.core.thread_limit import thread_limit
 
-
-@dataclass(frozen=True)
-class CellResult:
-    """Everything a row and a shard hold about one cell. Times are seconds unless the name says otherwise."""
-
-    metric: str
-    score: float
-    ci_low: float
-    ci_high: float
-    ci_level: float
-    ci_method: str
-    scores: Mapping[str, float]
-    """other metrics, the score on validation data, of each fold and each class"""
-    fold_sizes: Mapping[str, tuple[int, int]]
-    """training and test rows of each fold, by its name in `scores`"""
-    confusion: npt.NDArray[np.int64] | None
-    """(true class, predicted class)"""
-    classes: tuple[Any, ...]
-    split: str
-    folds: int
-    n_recordings: int
-    """that some fold uses; n_sessions alike"""
-    n_sessions: int
-    n_train: int
-    n_test: int
-    counts: Mapping[str, int]
-    chosen: Mapping[str, float]
-    dagger: bool
-    stamps: tuple[str, ...]
-    search_s: float
-    fit_s: float
-    predict_s: float
-    batch_rows: int
-    latency_ms_p50: float | None
-    """None where latency was not measured; `latency_ms_max`, `latency_n` and `answer_delay_ms` alike"""
-    latency_ms_p95: float | None
-    """None also where fewer than 200 calls were measured"""
-    latency_ms_max: float | None
-    latency_n: int | None
-    answer_delay_ms: float | None
-    """None where a part other than the link is not known; see delay"""
-    delay_parts_ms: Mapping[str, float]
-    """sampling, link, window, features, prediction: those that are known"""
-    threads: int
-    peak_rss_mb: float | None
-    search: tuple[Mapping[str, Any], ...]
-    """every candidate that was compared on validation data: its parameters, k, score and fold"""
-    sets: Mapping[Role, Answers]
-    """answers by role: test always; validation, and for regression train, where the split has one fold"""
-    replicates: Mapping[str, Any]
-    """the primary metric's sums over each replicate; see replicate_sums"""
-    beyond: BeyondFloor | None = None
-    """of an error of force: what is beyond the noise of the reference; None where that is not known"""
-    true: tuple[float, float, float] | None = None
-    """the metric against the force that was exerted, and its interval; None where that is not known"""
-    tare_s: float | None = None
-    """seconds of unloaded hold that each recording was tared on, the shortest of all; None: none was tared"""
-    remarks: tuple[str, ...] = ()
-    """what could not be done, and why"""
-    events: Mapping[str, float] = field(default_factory=dict)
-    """figures of events, times in the unit of the name"""
-    operating_points: tuple[Mapping[str, float], ...] = ()
-    """the same at thresholds chosen on validation for several bounds of false alarms"""
+Clock = Callable[[], float]
+"""Seconds, monotonic."""
 
 
 @dataclass(frozen=True)
@@ -144,8 +89,7 @@ class CellContext:
     """what is kept apart; None: the task's first that fits"""
     seed: int
     """decides everything random: the same seed gives the same score in any process"""
-    clock: Callable[[], float]
-    """seconds, monotonic"""
+    clock: Clock
     threads: int = 1
     """that estimator and BLAS may use"""
     latency: bool = True
@@ -154,152 +98,8 @@ class CellContext:
     """told what is being done"""
 
 
-class _Folds:
-    """The folds of one cell, and what they add up to."""
-
-    def __init__(self, context: CellContext, recorded: Dataset) -> None:
-        self.context, self.recorded = context, recorded
-        self.rules: ProtocolSpec = protocol_called(context.protocol)
-        self.metric: Metric = metric_called(context.task.metric)
-        self.split: str = choose_split(context.task, self.rules, recorded, context.split)
-        self.held_s = tare_s(recorded) if self.rules.tare else 0.0
-        if context.task.answer_per == "frame":
-            data = framed(recorded, context.task, self.rules, context.estimator)
-        else:
-            data = summarised(recorded, context.task, self.rules)
-        self.data = data
-        own_threshold = context.estimator.threshold
-        self.events = EventAnswers.of(context.task, own_threshold) if context.task.kind == "events" else None
-        self.held_back: list[str] = []
-        self.counts: Counter[str] = Counter(data.counts)
-        self.sets: dict[Role, list[Answers]] = {}
-        self.scores: dict[str, float] = {}
-        self.fold_sizes: dict[str, tuple[int, int]] = {}
-        self.chosen: list[Choice] = []
-        self.names: list[str] = []
-        self.took_part: list[RecordingMeta] = []
-        self.folds = self.n_train = self.k = 0
-        self.stamps: tuple[str, ...] = data.stamps
-        self.untrained: dict[str, list[str]] = {}
-        self.search_s = self.fit_s = self.predict_s = 0.0
-        self.batch_rows = 0
-        self.test: Any = None
-
-    def look_over(self, assignments: Sequence[Assignment]) -> None:
-        """Count which recorded rows the folds together use, and which they do not."""
-        used = used_rows(assignments)
-        self.counts.update(without_part(self.recorded, self.split, used))
-        self.counts.update(not_asked_for(self.recorded, self.rules, used))
-        self.took_part = [
-            table.meta for table, mask in zip(self.recorded.tables, used, strict=True) if (mask & table.labelled).any()
-        ]
-
-    def add(self, number: int, assignment: Assignment, build: Build, *, alone: bool) -> Estimator:
-        """Choose, fit and test on one fold, and return the fitted model; `alone`: it is the only one."""
-        context, data, rules, metric, counts = self.context, self.data, self.rules, self.metric, self.counts
-        estimator, clock = context.estimator, context.clock
-        if self.events and self.events.own_threshold is None and assignment.validation is None:
-            assignment = with_validation(assignment, data)
-            self.held_back.append(assignment.name)
-        began = clock()
-        choice = select(estimator, context.params, build, data, rules, assignment, metric, counts)
-        self.search_s += clock() - began
-        k = choice.k if choice else estimator.window_grid[0]
-        fold = prepared(assignment, data, rules, k, counts)
-        _worth_answering(fold, data)
-        if data.classes:
-            for one in np.setdiff1d(fold.test.y, fold.train.y):
-                self.untrained.setdefault(str(data.classes[int(one)]), []).append(fold.name)
-        X_train, X_test = features_of(fold.train, estimator), features_of(fold.test, estimator)
-        model = build(choice.params if choice else {})
-        began = clock()
-        fit(model, X_train, fold.train.y, estimator.name, counts)
-        self.fit_s += clock() - began
-        n_classes = len(data.classes)
-        began = clock()
-        shape = fold.test.y.shape[1:]
-        predicted = answers_of(model, X_test, estimator.name, 0 if self.events else n_classes, shape)
-        self.predict_s += clock() - began
-        self.batch_rows += len(fold.test)
-        self.n_train += len(fold.train)
-        self.folds += 1
-        self.test, self.k = fold.test, k
-        if self.events:
-            self._detect(self.events, fold, predicted, model, number, alone=alone)
-            return model
-        if data.vote:
-            require_answers(data, assignment.test, fold.test)
-        tested, combined = self._combined(fold.test, predicted)
-        self.scores[f"fold {fold.name}"] = metric.of(tested.y, combined, n_classes)
-        self.fold_sizes[f"fold {fold.name}"] = (len(fold.train), len(tested))
-        self._keep("test", tested, combined, number)
-        if alone and not n_classes:
-            on_training = answers_of(model, X_train, estimator.name, n_classes, fold.train.y.shape[1:])
-            self._keep("train", *self._combined(fold.train, on_training), number)
-        if fold.validation is not None and len(fold.validation):
-            X_validation, shape = features_of(fold.validation, estimator), fold.validation.y.shape[1:]
-            on_validation = answers_of(model, X_validation, estimator.name, n_classes, shape)
-            held_back, on_validation = self._combined(fold.validation, on_validation)
-            if not choice:
-                self.scores["validation"] = metric.of(held_back.y, on_validation, n_classes)
-            if alone:
-                self._keep("validation", held_back, on_validation, number)
-        if choice:
-            self.chosen.append(choice)
-            self.names.append(fold.name)
-            self.scores["validation"] = choice.score
-        return model
-
-    def _detect(
-        self, events: EventAnswers, fold: Fold, score: FloatArray, model: Estimator, number: int, *, alone: bool
-    ) -> None:
-        """Choose a threshold on validation recordings and keep what it comes to on those and on test recordings."""
-        estimator, data = self.context.estimator, self.data
-        validated = []
-        if fold.validation is not None and len(fold.validation):
-            given = answers_of(model, features_of(fold.validation, estimator), estimator.name, 0)
-            validated = events.scored(fold.validation, given, data)
-        threshold, bounds = events.choose(fold.name, validated)
-        tested = events.add(events.scored(fold.test, score, data), threshold, bounds, data)
-        self.scores[f"fold {fold.name}"] = self._keep_items("test", tested, number)
-        self.fold_sizes[f"fold {fold.name}"] = (len(fold.train), len(tested.y_true))
-        if validated and alone:
-            items = events.items([(one, events.alarms(one, threshold)) for one in validated], data)
-            self.scores["validation"] = self._keep_items("validation", items, number)
-
-    def _keep_items(self, role: Role, items: Items, number: int) -> float:
-        """Keep events and alarms as answers, and return their score."""
-        n = len(items.y_true)
-        fold, none = np.full(n, number, dtype=np.int64), np.full(n, np.nan)
-        self.sets.setdefault(role, []).append(Answers(*items[:4], fold, items.time_s, none))
-        return self.metric.of(items.y_true, items.y_pred, len(self.data.classes))
-
-    def _combined(self, part: Part, predicted: npt.NDArray[Any]) -> tuple[Part, npt.NDArray[Any]]:
-        """Return what is scored: rows and their answers, or recordings and what their rows' answers come to."""
-        return voted(part, predicted, len(self.data.classes)) if self.data.vote else (part, predicted)
-
-    def _keep(self, role: Role, part: Part, predicted: npt.NDArray[Any], number: int) -> None:
-        """Keep what was answered, with time and reference force beside it."""
-        force = np.full(len(part), np.nan)
-        for place in np.unique(part.recording):
-            table = self.data.tables[place]
-            if table.force is not None:
-                mine = part.recording == place
-                force[mine] = table.force[np.searchsorted(table.row, part.row[mine])]
-        fold = np.full(len(part), number, dtype=np.int64)
-        answered = Answers(part.y, predicted, part.recording, part.row, fold, part.time_s, force)
-        self.sets.setdefault(role, []).append(answered)
-
-
-def evaluate(context: CellContext, recordings: Sequence[Path] | Dataset) -> CellResult:
-    """Answer a task from recordings with an estimator, and measure how well and at what cost.
-
-    Parameters
-    ----------
-    context
-        Task, estimator, protocol, split.
-    recordings
-        Files, or what was read of them already.
+def evaluate_cell(context: CellContext, recordings: Sequence[Path] | Dataset) -> Result:
+    """Load the recordings of a cell (files, or what was read of them) and evaluate its estimator on them.
 
     Raises
     ------
@@ -310,76 +110,449 @@ def evaluate(context: CellContext, recordings: Sequence[Path] | Dataset) -> Cell
     DataError
         If a set is empty, has one class only, or its labels never change.
     """
-    say = context.progress or (lambda _: None)
-    recorded = recordings if isinstance(recordings, Dataset) else load_dataset(context.task, recordings)
-    estimator = without_windows(context.estimator, context.task)
-    context = replace(context, estimator=estimator)
-    folds = _Folds(context, recorded)
-    data = folds.data
-    assignments = assigned(context.task, estimator, data, folds.split, context.seed)
-    assert_disjoint(assignments)
+    task, estimator, seed = context.task, context.estimator, context.seed
+    data = load_task(task, recordings, context.protocol, context.split, estimator=estimator, seed=seed)
+    build = builder(estimator, context.params, task, seed, context.threads)
+    return evaluate(
+        Configured(without_windows(estimator, task), build, context.params), data, clock=context.clock, seed=seed,
+        threads=context.threads, latency=context.latency, progress=context.progress,
+    )  # fmt: skip
+
+
+# --- Recordings to folds ----------------------------------------------------------------------------------------------
+
+PLAIN = EstimatorDescriptor.model_construct(name="estimator", title="", kinds=(), where="")
+"""What is taken of an estimator that is only an object: it looks at all features, and has nothing to be chosen."""
+
+
+@dataclass(frozen=True)
+class TaskData:
+    """What a task asks of recordings under a protocol: rows, and which of them train and test.
+
+    `X` is tared, and neither scaled nor filtered: these are fitted on each fold's training rows.
+    """
+
+    task: TaskSpec
+    rules: ProtocolSpec
+    split: str
+    recorded: Dataset
+    """the recordings as they were read"""
+    data: Dataset
+    """the same as rows to be answered: samples, frames, or one row a recording"""
+    assignments: tuple[Assignment, ...]
+    """which rows of each recording are for what, fold by fold"""
+    held_back: bool = False
+    """a share of the training groups is what thresholds are chosen on: no recording has the role validation"""
+
+    @property
+    def X(self) -> FloatArray:  # noqa: N802  (as in scikit-learn)
+        """Return (n, features) readings of the rows that the protocol looks at and that have a label."""
+        return self._joined([tared(table) if self.rules.tare else table.X for table in self.data.tables])
+
+    @property
+    def y(self) -> npt.NDArray[Any]:
+        """Return (n,) numbers or class indices, (n, components) of a vector."""
+        return self._joined([table.y for table in self.data.tables])
+
+    @property
+    def groups(self) -> npt.NDArray[Any]:
+        """Return (n,) labels that the split keeps apart; those of the session where it keeps no group apart."""
+        tables, name = self.data.tables, self.assignments[0].groups
+        return self._joined([table.groups[name] for table in tables])
+
+    @property
+    def feature_names(self) -> tuple[str, ...]:
+        """Return the names of the columns of `X`."""
+        return self.data.features
+
+    @property
+    def folds(self) -> list[tuple[IntArray, IntArray]]:
+        """Return the rows of each fold that train and those that test: a `cv` for scikit-learn."""
+        return [
+            (np.flatnonzero(self._joined(one.train)), np.flatnonzero(self._joined(one.test)))
+            for one in self.assignments
+        ]
+
+    def _joined(self, columns: Sequence[npt.NDArray[Any]]) -> npt.NDArray[Any]:
+        there = [asked_for(table, self.rules) & table.labelled for table in self.data.tables]
+        return np.concatenate([column[mask] for column, mask in zip(columns, there, strict=True)])
+
+
+def load_task(
+    task: TaskSpec,
+    recordings: Sequence[Path] | Dataset,
+    protocol: str,
+    split: str | None = None,
+    *,
+    estimator: EstimatorDescriptor = PLAIN,
+    seed: int = 0,
+) -> TaskData:
+    """Return recordings as rows and folds.
+
+    Parameters
+    ----------
+    recordings
+        Files, or what was read of them already.
+    split
+        What is kept apart; None: the task's first that the recordings can serve.
+    estimator
+        Decides the features of frames, the gap between training and test where recordings are cut in time (its longest
+        window), and whether a threshold has to be chosen.
+    seed
+        Of split ``shuffled``.
+    """
+    recorded = recordings if isinstance(recordings, Dataset) else load_dataset(task, recordings)
+    rules, estimator = protocol_called(protocol), without_windows(estimator, task)
+    split = choose_split(task, rules, recorded, split)
+    if rules.tare:
+        tare_s(recorded)  # refuses recordings of which some only can be tared
+    frames = task.answer_per == "frame"
+    data = framed(recorded, task, rules, estimator) if frames else summarised(recorded, task, rules)
+    assignments = make_splits(data, split, seed, max(estimator.window_grid), one_by_one=split in task.campaigns)
     if not assignments:
         raise DataError("No fold could be made of these recordings.", hint="Choose another --split.")
-    over_recorded = [over_rows(one, recorded) for one in assignments]
-    folds.look_over(over_recorded)
-    if folds.split == "shuffled":
-        folds.stamps += (SHUFFLED_WHOLE_STAMP if data.whole else SHUFFLED_STAMP,)
-    else:
-        folds.stamps += leak_stamps(recorded, over_recorded)
-    build = builder(estimator, context.params, context.task, context.seed, context.threads)
-    with thread_limit(context.threads):
-        for number, assignment in enumerate(assignments):
-            say(f"{estimator.name}: {assignment.name}")
-            model = folds.add(number, assignment, build, alone=len(assignments) == 1)
-        latency = _latency_ms(model, features_of(folds.test, estimator), context.clock) if context.latency else {}
-        delay = _delay(folds, latency)
-    return _result(folds, latency, delay)
+    chosen = task.kind == "events" and estimator.threshold is None
+    held_back = [chosen and one.validation is None for one in assignments]
+    assignments = [
+        with_validation(one, data) if back else one for one, back in zip(assignments, held_back, strict=True)
+    ]
+    return TaskData(task, rules, split, recorded, data, tuple(assignments), any(held_back))
 
 
-def _latency_ms(model: Estimator, X: FloatArray, clock: Callable[[], float]) -> dict[str, Any]:
-    waits = single_row_latency_s(model, X, clock)
-    p95, largest = tail_ms(waits)
-    return {
-        "latency_ms_p50": float(1e3 * np.median(waits)), "latency_ms_p95": p95, "latency_ms_max": largest,
-        "latency_n": len(waits),
-    }  # fmt: skip
+# --- Folds to fitted models -------------------------------------------------------------------------------------------
 
 
-class _Delay(NamedTuple):
-    parts_ms: dict[str, float]
-    total_ms: float | None
-    remarks: tuple[str, ...]
+@dataclass(frozen=True)
+class Configured:
+    """An estimator, what is known of it, and how it is made."""
+
+    descriptor: EstimatorDescriptor
+    build: Build
+    params: Mapping[str, Any] = field(default_factory=dict)
+    """fixed by the user: they are not searched"""
 
 
-def _delay(folds: _Folds, latency: Mapping[str, Any]) -> _Delay:
-    """Return how late answers of the last fold's model are: the one whose latency was measured, if it was."""
-    looks_at, tared = folds.context.estimator.looks_at, folds.rules.tare
-    parts: dict[str, float] = {}
-    remarks: tuple[str, ...] = ()
-    if folds.context.task.answer_per == "frame":
-        task, estimator = folds.context.task, folds.context.estimator
-        parts, remarks = frame_delay_ms(folds.recorded, folds.data.features, task, folds.rules, estimator)
-        if latency and "window" in parts:
-            spent_s = frame_features_s(folds.recorded, task, folds.rules, estimator, folds.context.clock)
-            parts["features"] = 1e3 * spent_s
-    elif looks_at == "features":
-        parts, remarks = reading_delay_ms(folds.recorded, folds.rules, folds.k)
-        parts = waiting_for_the_whole(parts, folds.recorded, folds.context.task, folds.rules)
-        if latency:
-            # A median needs no more calls, and a row keeps nothing else of them.
-            if is_summarised(folds.context.task, folds.rules):
-                tables, compute = folds.recorded.tables, recording_features(folds.context.task, folds.rules)
-                ready_s = calls_s(len(tables), tables.__getitem__, compute, folds.context.clock, AT_LEAST)
-            else:
-                ready_s = single_row_preparation_s(
-                    folds.test.X, folds.k, folds.context.clock, tared=tared, at_most=AT_LEAST
+@dataclass(frozen=True)
+class FittedFold:
+    """A model, and the fold that it was fitted to."""
+
+    fold: Fold
+    model: Estimator
+    choice: Choice | None
+    """what was chosen on validation data; None: there was nothing to choose"""
+    k: int
+    """rows that the mean filter looks back"""
+    search_s: float
+    fit_s: float
+
+
+@dataclass(frozen=True)
+class AnsweredFold:
+    """What was answered in one fold, and what it took."""
+
+    name: str
+    choice: Choice | None
+    score: float
+    validation: float | None
+    """the score on validation data"""
+    sizes: tuple[int, int]
+    """training and test rows, or recordings, or events and alarms"""
+    untrained: tuple[Any, ...]
+    """classes that are tested and that no training row had"""
+    search_s: float
+    fit_s: float
+    predict_s: float
+    batch_rows: int
+    sets: Mapping[Role, Answers]
+    detected: tuple[Detected, ...] = ()
+    threshold: float = np.inf
+
+
+def evaluate(
+    estimator: Estimator | Configured,
+    data: TaskData,
+    *,
+    clock: Clock,
+    seed: int = 0,
+    threads: int = 1,
+    latency: bool = True,
+    progress: Callable[[str], None] | None = None,
+) -> Result:
+    """Answer a task with an estimator, and measure how well and at what cost.
+
+    Parameters
+    ----------
+    estimator
+        Any object with ``fit`` and ``predict``, which stays as it is; or one that is to be made anew.
+    clock
+        Returns seconds, monotonic.
+    seed
+        Of what intervals resample.
+    threads
+        Threads that estimator and BLAS may use.
+    latency
+        Whether to measure how long the answer to one row takes.
+    progress
+        Told what is being done.
+    """
+    if not isinstance(estimator, Configured):
+        given = estimator
+        named = PLAIN.model_copy(update={"name": type(given).__name__})
+        estimator = Configured(named, one_model_a_component(data.task, lambda _: copy.deepcopy(given)))
+    descriptor, metric = estimator.descriptor, metric_called(data.task.metric)
+    rules = EventRules.of(data.task, descriptor.threshold) if data.task.kind == "events" else None
+    counts = Counter(data.data.counts)
+    answered: list[AnsweredFold] = []
+    with thread_limit(threads):
+        for number, assignment in enumerate(data.assignments):
+            if progress is not None:
+                progress(f"{descriptor.name}: {assignment.name}")
+            fitted = _fit(estimator, data, assignment, metric, counts, clock)
+            answered.append(_answer(fitted, data, descriptor, metric, rules, number, clock))
+        times, delay_remarks = _times(fitted, answered, data, descriptor, clock, threads, latency=latency)
+    return _result(answered, data, descriptor, metric, rules, times, delay_remarks, counts, seed)
+
+
+def _fit(
+    estimator: Configured, data: TaskData, assignment: Assignment, metric: Metric, counts: Counter[str], clock: Clock
+) -> FittedFold:
+    """Choose on validation data, and fit."""
+    descriptor, made = estimator.descriptor, data.data
+    began = clock()
+    choice = select(descriptor, estimator.params, estimator.build, made, data.rules, assignment, metric, counts)
+    search_s = clock() - began
+    k = choice.k if choice else descriptor.window_grid[0]
+    fold = prepared(assignment, made, data.rules, k, counts)
+    for what, part in (("training", fold.train), ("test", fold.test)):
+        if len(part) == 0:
+            raise DataError(
+                f"The {what} set of fold {fold.name!r} has no labelled row.", hint="Choose another --split."
+            )
+    values = np.unique(fold.train.y, axis=0)
+    if len(values) < 2:
+        only = made.classes[int(values[0])] if made.classes else values[0]
+        raise DataError(
+            f"All training labels of fold {fold.name!r} are {only}: there is nothing to learn.",
+            hint="Choose another --split, or check the label column with `tactbench inspect`.",
+        )
+    if made.vote:
+        answerable = set(fold.test.recording.tolist())
+        for place, (table, mask) in enumerate(zip(made.tables, assignment.test, strict=True)):
+            if place not in answerable and (mask & table.labelled).any():
+                raise DataError(
+                    f"The protocol leaves no row of recording {table.meta.name!r}, which is to be answered as a whole.",
+                    hint="Use --protocol deployable-untared, or leave the recording out.",
                 )
-            parts["features"] = float(1e3 * np.median(ready_s))
+    X = features_of(fold.train, descriptor)
+    model = estimator.build(choice.params if choice else {})
+    began = clock()
+    fit(model, X, fold.train.y, descriptor.name, counts)
+    return FittedFold(fold, model, choice, k, search_s, clock() - began)
+
+
+# --- Models to answers ------------------------------------------------------------------------------------------------
+
+
+def _answer(
+    fitted: FittedFold,
+    data: TaskData,
+    descriptor: EstimatorDescriptor,
+    metric: Metric,
+    rules: EventRules | None,
+    number: int,
+    clock: Clock,
+) -> AnsweredFold:
+    """Have a model answer its fold; validation and training answers are kept where the fold is the only one."""
+    fold, made = fitted.fold, data.data
+    n_classes = 0 if rules else len(made.classes)
+    X, shape = features_of(fold.test, descriptor), fold.test.y.shape[1:]
+    began = clock()
+    predicted = answers(fitted.model, X, descriptor.name, n_classes, shape)
+    predict_s = clock() - began
+    given: dict[Role, tuple[Part, npt.NDArray[Any]]] = {"test": (fold.test, predicted)}
+    if fold.validation is not None and len(fold.validation):
+        given["validation"] = fold.validation, asked(fitted.model, fold.validation, descriptor, n_classes)
+    alone = len(data.assignments) == 1
+    if alone and not made.classes:
+        given["train"] = fold.train, asked(fitted.model, fold.train, descriptor, 0)
+    detected: tuple[Detected, ...] = ()
+    threshold = np.inf
+    if rules is None:
+        sets = {role: _rows(*one, made, number) for role, one in given.items()}
+    else:
+        scored = {role: rules.scored(*one, made) for role, one in given.items()}
+        threshold, bounds = rules.choose(scored.get("validation", []))
+        detected = tuple(Detected(one, threshold, bounds) for one in scored["test"])
+        sets = {
+            role: rules.items([(one, rules.alarms(one, threshold)) for one in several], made, number)
+            for role, several in scored.items()
+            if role == "test" or alone
+        }
+    kept: dict[Role, Answers] = sets if alone else {"test": sets["test"]}
+    scores = {role: metric.of(one.y_true, one.y_pred, len(made.classes)) for role, one in sets.items()}
+    untrained = np.setdiff1d(fold.test.y, fold.train.y).tolist() if made.classes else []
+    return AnsweredFold(
+        name=fold.name,
+        choice=fitted.choice,
+        score=scores["test"],
+        validation=fitted.choice.score if fitted.choice else scores.get("validation"),
+        sizes=(len(fold.train), len(sets["test"])),
+        untrained=tuple(made.classes[int(one)] for one in untrained),
+        search_s=fitted.search_s,
+        fit_s=fitted.fit_s,
+        predict_s=predict_s,
+        batch_rows=len(fold.test),
+        sets=kept,
+        detected=detected,
+        threshold=threshold,
+    )
+
+
+def _rows(part: Part, predicted: npt.NDArray[Any], made: Dataset, number: int) -> Answers:
+    """Return the answers to rows, or to recordings what their rows' answers come to, with the reference force."""
+    if made.vote:
+        part, predicted = voted(part, predicted, len(made.classes))
+    force = np.full(len(part), np.nan)
+    for place in np.unique(part.recording):
+        table, mine = made.tables[place], part.recording == place
+        if table.force is not None:
+            force[mine] = table.force[np.searchsorted(table.row, part.row[mine])]
+    fold = np.full(len(part), number, dtype=np.int64)
+    return Answers(part.y, predicted, part.recording, part.row, fold, part.time_s, force)
+
+
+# --- Answers to a score -----------------------------------------------------------------------------------------------
+
+
+def _times(
+    fitted: FittedFold,
+    answered: Sequence[AnsweredFold],
+    data: TaskData,
+    descriptor: EstimatorDescriptor,
+    clock: Clock,
+    threads: int,
+    *,
+    latency: bool,
+) -> tuple[Times, tuple[str, ...]]:
+    """Return what all folds took, and how late answers of the last fold's model are, with remarks on that."""
+    recorded, task, rules = data.recorded, data.task, data.rules
+    parts, remarks = stated_delay_ms(recorded, data.data, task, rules, descriptor, fitted.k)
+    p50 = p95 = largest = calls = None
     if latency:
-        parts["prediction"] = latency["latency_ms_p50"]
+        waits_s = single_row_latency_s(fitted.model, features_of(fitted.fold.test, descriptor), clock)
+        p50, calls = float(1e3 * np.median(waits_s)), len(waits_s)
+        p95, largest = tail_ms(waits_s)
+        ready_s = features_s(recorded, task, rules, descriptor, fitted.fold.test.X, fitted.k, clock)
+        parts |= ({} if ready_s is None else {"features": 1e3 * ready_s}) | {"prediction": p50}
     else:
         remarks = tuple(one for one in remarks if one not in (NO_LINK, NO_RATE))  # there is no delay to speak of
-    return _Delay(parts, answer_delay_ms(parts, looks_at), remarks)
+    times = Times(
+        search_s=sum(one.search_s for one in answered),
+        fit_s=sum(one.fit_s for one in answered),
+        predict_s=sum(one.predict_s for one in answered),
+        batch_rows=sum(one.batch_rows for one in answered),
+        latency_ms_p50=p50,
+        latency_ms_p95=p95,
+        latency_ms_max=largest,
+        latency_n=calls,
+        answer_delay_ms=answer_delay_ms(parts, descriptor.looks_at),
+        delay_parts_ms=parts,
+        threads=threads,
+        peak_rss_mb=peak_rss_mb(),
+    )
+    return times, remarks
+
+
+def _result(
+    answered: Sequence[AnsweredFold],
+    data: TaskData,
+    descriptor: EstimatorDescriptor,
+    metric: Metric,
+    rules: EventRules | None,
+    times: Times,
+    delay_remarks: Sequence[str],
+    counts: Counter[str],
+    seed: int,
+) -> Result:
+    task, made = data.task, data.data
+    n_classes = len(made.classes)
+    sets = {role: _joined([one.sets[role] for one in answered]) for role in answered[0].sets}
+    tested = sets["test"]
+    score = metric.of(tested.y_true, tested.y_pred, n_classes)
+    if not np.isfinite(score):
+        _refuse(descriptor.name, metric, tested)
+    unit = replicates(made, task, data.split, tested.y_true, tested.recording, tested.row)
+    scores = {f"fold {one.name}": one.score for one in answered}
+    if answered[-1].validation is not None:
+        scores["validation"] = answered[-1].validation
+    for other in METRICS.values():
+        if other.kind == task.kind and other.vector == metric.vector and other is not metric:
+            scores[other.name] = other.of(tested.y_true, tested.y_pred, n_classes)
+    remarks = [_answered_from(data), *_of_frames(data, descriptor, answered)]
+    beside: dict[str, Any] = {}
+    floor = None
+    if metric.kind == "regression":
+        if isinstance(task.target, VectorTarget):
+            scores |= vector_details(task.target, tested.y_true, tested.y_pred)
+            remarks.append(f"answers are vectors ({', '.join(task.target.names)}): one model per component")
+        floor, no_floor = reference_floor(task, metric, made, tested)
+        remarks.append(no_floor)
+        truth = true_force(task, made, tested)
+        if floor is not None:
+            beside["beyond"] = beyond_floor(floor, tested, unit, seed)
+        if truth is not None:
+            beside["true"] = metric.of(truth, tested.y_pred), _interval(metric, truth, tested, unit, 0, seed)
+    else:
+        sums = metric.rows(tested.y_true, tested.y_pred, n_classes).sum(axis=0)
+        beside["confusion"] = confusion(sums, n_classes).astype(np.int64)
+        scores |= {
+            f"F1 of {label}": float(one) for label, one in zip(made.classes, class_f1(sums, n_classes), strict=True)
+        }
+    if rules is not None:
+        detected = [one for fold in answered for one in fold.detected]
+        latency = times.latency_ms_p50 is not None
+        compute_s = sum(times.delay_parts_ms.get(name, 0.0) for name in ("features", "prediction")) / 1e3
+        beside["events"] = rules.figures(detected, compute_s if latency else None)
+        beside["operating_points"] = rules.operating_points(detected, compute_s if latency else None)
+    elif task.answer_per == "frame":
+        scores |= state_figures(tested, made)
+    held_s = tare_s(data.recorded) if data.rules.tare else 0.0
+    if data.rules.tare and not held_s:
+        remarks.append("not tared: no recording states an unloaded hold")
+    remarks += [_untrained(answered), *delay_remarks]
+    took_part, left_out, stamps = _part_taken(data)
+    return Result(
+        metric=metric.name,
+        score=score,
+        interval=_interval(metric, tested.y_true, tested, unit, n_classes, seed),
+        # R² of labels that never change is undefined; a key that is not there says so, NaN would not even be JSON.
+        scores={name: value for name, value in scores.items() if np.isfinite(value)},
+        sizes=Sizes(
+            n_recordings=len(took_part),
+            n_sessions=len({meta.session for meta in took_part}),
+            n_train=sum(one.sizes[0] for one in answered),
+            n_test=len(tested),
+            fold_sizes={f"fold {one.name}": one.sizes for one in answered},
+        ),
+        times=times,
+        split=data.split,
+        sets=sets,
+        replicates=summed(metric, tested, unit, made, floor),
+        classes=made.classes,
+        chosen=_chosen(answered) | _thresholds(answered, rules),
+        search=tuple(
+            {**candidate.params, "k": candidate.k, "score": candidate.score, "fold": one.name}
+            for one in answered
+            if one.choice
+            for candidate in one.choice.compared
+        ),
+        counts=dict(counts + Counter(left_out)),
+        dagger=data.rules.uses_test_statistics,
+        stamps=made.stamps + stamps,
+        tare_s=held_s or None,
+        remarks=tuple(one for one in remarks if one),
+        **beside,
+    )
 
 
 def _joined(folds: Sequence[Answers]) -> Answers:
@@ -387,190 +560,88 @@ def _joined(folds: Sequence[Answers]) -> Answers:
     return Answers(**{name: np.concatenate([getattr(one, name) for one in folds]) for name in names})
 
 
-def _worth_answering(fold: Fold, data: Dataset) -> None:
-    for what, one in (("training", fold.train), ("test", fold.test)):
-        if len(one) == 0:
-            raise DataError(
-                f"The {what} set of fold {fold.name!r} has no labelled row.", hint="Choose another --split."
-            )
-    values = np.unique(fold.train.y, axis=0)
-    if len(values) < 2:
-        only = data.classes[int(values[0])] if data.classes else values[0]
-        raise DataError(
-            f"All training labels of fold {fold.name!r} are {only}: there is nothing to learn.",
-            hint="Choose another --split, or check the label column with `tactbench inspect`.",
+def _refuse(estimator: str, metric: Metric, tested: Answers) -> None:
+    """Raise for a score that is no number: because of the answers, or of the labels."""
+    largest = float(np.abs(tested.y_pred).max())
+    if largest > LARGEST:
+        raise PluginContractError(
+            f"The estimator {estimator!r} answered with numbers up to {largest:.3g}: their {metric.name} overflows.",
+            hint=f"Its predict(X) must return numbers below {LARGEST:g}, in the unit of the labels.",
         )
-
-
-def _result(folds: _Folds, latency: Mapping[str, Any], delay: _Delay) -> CellResult:
-    task, seed, split = folds.context.task, folds.context.seed, folds.split
-    data, rules, metric = folds.data, folds.rules, folds.metric
-    sets = {role: _joined(parts) for role, parts in folds.sets.items()}
-    tested = sets["test"]
-    y, predicted, recording, row = tested.y_true, tested.y_pred, tested.recording, tested.row
-    n_classes = len(data.classes)
-    held = folds.held_s
-    floor, no_floor = reference_floor(task, metric, data, tested)
-    truth = true_force(task, data, tested) if metric.kind == "regression" else None
-    unit = replicates(data, task, split, y, recording, row)
-    score = metric.of(y, predicted, n_classes)
-    compute_s = sum(delay.parts_ms.get(name, 0.0) for name in ("features", "prediction")) / 1e3 if latency else None
-    if not np.isfinite(score):
-        raise DataError(
-            f"The {metric.name} of {len(y)} test rows is undefined: their labels never change.",
-            hint="Choose another --split.",
-        )
-    interval = score_interval(metric, y, predicted, recording, unit.codes, unit.name, n_classes, seed)
-    scores = dict(folds.scores)
-    for other in METRICS.values():
-        if other.kind == task.kind and other.vector == metric.vector and other is not metric:
-            scores[other.name] = other.of(y, predicted, n_classes)
-    table = None
-    if n_classes:
-        sums = metric.rows(y, predicted, n_classes).sum(axis=0)
-        table = confusion(sums, n_classes).astype(np.int64)
-        for label, value in zip(data.classes, class_f1(sums, n_classes), strict=True):
-            scores[f"F1 of {label}"] = float(value)
-    if task.answer_per == "frame" and not folds.events:
-        scores |= state_figures(tested, data)
-    if isinstance(task.target, VectorTarget):
-        scores |= vector_details(task.target, y, predicted)
-    # R² of labels that never change is undefined; a key that is not there says so, NaN would not even be JSON.
-    scores = {name: value for name, value in scores.items() if np.isfinite(value)}
-    return CellResult(
-        metric=metric.name,
-        score=score,
-        ci_low=interval.low,
-        ci_high=interval.high,
-        ci_level=LEVEL,
-        ci_method=interval.method + unit.caveat,
-        scores=scores,
-        fold_sizes=folds.fold_sizes,
-        confusion=table,
-        classes=data.classes,
-        split=split,
-        folds=folds.folds,
-        n_recordings=len(folds.took_part),
-        n_sessions=len({meta.session for meta in folds.took_part}),
-        n_train=folds.n_train,
-        n_test=len(y),
-        counts=dict(folds.counts),
-        chosen=_chosen(folds.chosen, folds.names) | _thresholds(folds.events),
-        events=folds.events.figures(compute_s) if folds.events else {},
-        operating_points=folds.events.operating_points(compute_s) if folds.events else (),
-        dagger=rules.uses_test_statistics,
-        stamps=folds.stamps,
-        search_s=folds.search_s,
-        fit_s=folds.fit_s,
-        predict_s=folds.predict_s,
-        batch_rows=folds.batch_rows,
-        latency_ms_p50=latency.get("latency_ms_p50"),
-        latency_ms_p95=latency.get("latency_ms_p95"),
-        latency_ms_max=latency.get("latency_ms_max"),
-        latency_n=latency.get("latency_n"),
-        answer_delay_ms=delay.total_ms,
-        delay_parts_ms=delay.parts_ms,
-        threads=folds.context.threads,
-        peak_rss_mb=peak_rss_mb(),
-        search=_search(folds.chosen, folds.names),
-        sets=sets,
-        replicates=summed(metric, tested, unit, data, floor),
-        beyond=None if floor is None else beyond_floor(floor, tested, unit, seed),
-        true=None if truth is None else _against(truth, metric, tested, unit, seed),
-        tare_s=held or None,
-        remarks=tuple(
-            one
-            for one in (
-                _one_a_recording(folds),
-                *_of_frames(folds),
-                _of_vectors(task),
-                no_floor,
-                NOT_TARED if rules.tare and not held else "",
-                _untrained(folds),
-                *delay.remarks,
-            )
-            if one
-        ),
+    raise DataError(
+        f"The {metric.name} of {len(tested)} test rows is undefined: their labels never change.",
+        hint="Choose another --split.",
     )
 
 
-NOT_TARED = "not tared: no recording states an unloaded hold"
+def _interval(
+    metric: Metric, truth: npt.NDArray[Any], tested: Answers, unit: ReplicateUnits, n_classes: int, seed: int
+) -> Interval:
+    found = score_interval(metric, truth, tested.y_pred, tested.recording, unit.codes, unit.name, n_classes, seed)
+    return Interval(found.low, found.high, found.method + unit.caveat)
 
 
-def _one_a_recording(folds: _Folds) -> str:
-    task = folds.context.task
-    if task.answer_per != "recording":
+def _part_taken(data: TaskData) -> tuple[list[RecordingMeta], dict[str, int], tuple[str, ...]]:
+    """Return the recordings that some fold uses, what no fold uses, and stamps of folds that leak."""
+    recorded = data.recorded
+    folds = [over_rows(one, recorded) for one in data.assignments]
+    used = used_rows(folds)
+    took_part = [one.meta for one, mask in zip(recorded.tables, used, strict=True) if (mask & one.labelled).any()]
+    left_out = without_part(recorded, data.split, used) | not_asked_for(recorded, data.rules, used)
+    if data.split == "shuffled":
+        return took_part, left_out, (SHUFFLED_WHOLE_STAMP if recorded.whole else SHUFFLED_STAMP,)
+    return took_part, left_out, leak_stamps(recorded, folds)
+
+
+def _answered_from(data: TaskData) -> str:
+    if data.task.answer_per != "recording":
         return ""
-    made_of = "its first row" if folds.rules.first_row_only else task.answer_from
-    return f"one answer a recording, from {made_of}"
+    return f"one answer a recording, from {'its first row' if data.rules.first_row_only else data.task.answer_from}"
 
 
-def _of_frames(folds: _Folds) -> list[str]:
+def _of_frames(data: TaskData, descriptor: EstimatorDescriptor, answered: Sequence[AnsweredFold]) -> list[str]:
     """Return what a reader of scores of frames or events must know."""
-    if folds.context.task.answer_per != "frame":
+    if data.task.answer_per != "frame":
         return []
-    remarks = [band_limit(clocked(folds.recorded.tables[0], folds.rules))]
-    if folds.held_back:
+    remarks = [band_limit(clocked(data.recorded.tables[0], data.rules))]
+    if data.held_back:
         remarks.append("no recording has the role validation: thresholds are chosen on a share of the training groups")
-    if folds.events and any(np.isinf(one) for one in folds.events.thresholds.values()):
+    if data.task.kind == "events" and any(np.isinf(one.threshold) for one in answered):
         remarks.append(
-            f"{folds.context.estimator.name}: no threshold kept the bound of false alarms on validation and hit "
-            "anything: it never raises an alarm"
+            f"{descriptor.name}: no threshold kept the bound of false alarms on validation and hit anything: it never "
+            "raises an alarm"
         )
     return remarks
 
 
-def _thresholds(events: EventAnswers | None) -> dict[str, float]:
-    """Return the thresholds chosen, by fold where there are several; one that is never reached is not there."""
-    if events is None or events.own_threshold is not None:
-        return {}
-    several = len(events.thresholds) > 1
-    return {
-        f"threshold of fold {name}" if several else "threshold": value
-        for name, value in events.thresholds.items()
-        if np.isfinite(value)
-    }
-
-
-def _of_vectors(task: TaskSpec) -> str:
-    if not isinstance(task.target, VectorTarget):
-        return ""
-    return f"answers are vectors ({', '.join(task.target.names)}): one model per component"
-
-
-def _untrained(folds: _Folds) -> str:
+def _untrained(answered: Sequence[AnsweredFold]) -> str:
     """Return which classes were asked for that no training row had: no estimator can answer them."""
-    named = [f"{one!r} in {', '.join(names)}" for one, names in sorted(folds.untrained.items())]
+    folds: dict[str, list[str]] = {}
+    for one in answered:
+        for label in one.untrained:
+            folds.setdefault(str(label), []).append(one.name)
+    named = [f"{label!r} in {', '.join(names)}" for label, names in sorted(folds.items())]
     return f"tested but never trained on: {'; '.join(named)}" if named else ""
 
 
-def _against(
-    truth: FloatArray, metric: Metric, tested: Answers, unit: ReplicateUnits, seed: int
-) -> tuple[float, float, float]:
-    """Return the metric against (n,) another truth than the recorded one, and its interval."""
-    found = score_interval(metric, truth, tested.y_pred, tested.recording, unit.codes, unit.name, 0, seed)
-    return metric.of(truth, tested.y_pred), found.low, found.high
-
-
-def _chosen(choices: Sequence[Choice], folds: Sequence[str]) -> dict[str, float]:
+def _chosen(answered: Sequence[AnsweredFold]) -> dict[str, float]:
     """Return what was chosen; fold by fold where folds chose differently, since a median is what nobody chose."""
     chosen: dict[str, float] = {}
-    each = [{**choice.params, "k": choice.k} for choice in choices]
-    for name in each[0] if each else ():
-        values = [params[name] for params in each]
-        if not all(isinstance(value, int | float) for value in values):
+    each = {one.name: {**one.choice.params, "k": one.choice.k} for one in answered if one.choice}
+    for name in next(iter(each.values()), {}):
+        values = {fold: params[name] for fold, params in each.items()}
+        if not all(isinstance(value, int | float) for value in values.values()):
             continue
-        if len(set(values)) == 1:
-            chosen[name] = float(values[0])
+        if len(set(values.values())) == 1:
+            chosen[name] = float(next(iter(values.values())))
         else:
-            chosen |= {f"{name} of fold {fold}": float(value) for fold, value in zip(folds, values, strict=True)}
+            chosen |= {f"{name} of fold {fold}": float(value) for fold, value in values.items()}
     return chosen
 
 
-def _search(choices: Sequence[Choice], folds: Sequence[str]) -> tuple[Mapping[str, Any], ...]:
-    """Return every candidate of every fold as one flat mapping."""
-    return tuple(
-        {**candidate.params, "k": candidate.k, "score": candidate.score, "fold": fold}
-        for choice, fold in zip(choices, folds, strict=True)
-        for candidate in choice.compared
-    )
+def _thresholds(answered: Sequence[AnsweredFold], rules: EventRules | None) -> dict[str, float]:
+    """Return the thresholds chosen, by fold where there are several; one that is never reached is not there."""
+    if rules is None or rules.own_threshold is not None:
+        return {}
+    named = {"threshold" if len(answered) == 1 else f"threshold of fold {one.name}": one.threshold for one in answered}
+    return {name: value for name, value in named.items() if np.isfinite(value)}

@@ -1,17 +1,13 @@
-"""Finds a task's channels in a recording and reads them on the clock of its features."""
+"""Finds a task's channels in a recording and puts them on one clock: samples are looked up, never invented."""
 
 from __future__ import annotations
-
-from collections import Counter
 
 import numpy as np
 
 from tactbench.core.errors import DataError, NotApplicable, UsageError
-from tactbench.core.evaluation.alignment import nearest_rows
 from tactbench.core.recording.reader import Recording
-from tactbench.core.samples import FloatArray, Quality, StreamData, StreamReadings
+from tactbench.core.samples import FloatArray, IntArray, Quality, StreamData
 from tactbench.core.spec import units
-from tactbench.core.spec.recording import RecordingMeta
 from tactbench.core.spec.sensor import ChannelSpec
 from tactbench.core.spec.task import ChannelTarget, TaskSpec
 
@@ -41,50 +37,6 @@ def feature_streams(recording: Recording, task: TaskSpec) -> list[str]:
     return [name for name, there in kinds.items() if there & set(task.looks_at)]
 
 
-def features_on(
-    meta: RecordingMeta, clock: StreamData, stream: StreamData, task: TaskSpec, counts: Counter[str]
-) -> tuple[list[str], FloatArray]:
-    """Return names and (n, q) readings of one stream's features on the clock of another; NaN where there is none."""
-    picked = [place for place, channel in enumerate(stream.spec.channels) if channel.kind in task.looks_at]
-    names = [stream.spec.channels[place].name for place in picked]
-    readings = numbers(stream)[:, picked]
-    if stream.quality is not None:
-        for flag in (Quality.SATURATED, Quality.SUSPECT):
-            flagged = int(np.count_nonzero(stream.quality[:, picked] & flag))
-            if flagged:
-                counts[f"{str(flag.name).lower()} samples kept"] += flagged
-        after_gap = int(np.count_nonzero((stream.quality[:, picked] & Quality.GAP).any(axis=1)))
-        if after_gap:
-            counts[f"rows of {stream.spec.name} kept, before which others were lost"] += after_gap
-    if stream is clock:
-        return names, readings
-    rows = nearest_rows(clock, stream, meta.name)
-    if not len(readings):
-        return names, np.full((len(rows), len(picked)), np.nan)
-    return names, np.where((rows >= 0)[:, None], readings[np.maximum(rows, 0)], np.nan)
-
-
-def own_readings(clock: StreamData, stream: StreamData, task: TaskSpec, counts: Counter[str]) -> StreamReadings:
-    """Return one stream's features on its own clock, in seconds since the first row of `clock`."""
-    picked = [place for place, channel in enumerate(stream.spec.channels) if channel.kind in task.looks_at]
-    data = numbers(stream)[:, picked]
-    whole = np.asarray(~np.isnan(data).any(axis=1))
-    if stream is not clock and not whole.all():
-        counts[f"rows of {stream.spec.name} left out because a channel has no sample"] += int((~whole).sum())
-    time_s = (stream.t_ns - clock.t_ns[0]) * 1e-9 if stream.t_ns is not None and clock.t_ns is not None else None
-    steps = np.diff(time_s) if time_s is not None else np.zeros(0)
-    step_s = float(np.median(steps)) if len(steps) else 0.0
-    channels = [stream.spec.channels[place] for place in picked]
-    return StreamReadings(
-        stream=stream.spec.name,
-        channels=tuple(channel.name for channel in channels),
-        kinds=tuple(channel.kind for channel in channels),
-        data=data[whole],
-        time_s=None if time_s is None else time_s[whole],
-        rate_hz=1.0 / step_s if step_s > 0 else stream.spec.rate_hz,
-    )
-
-
 def numbers(data: StreamData) -> FloatArray:
     """Return the samples as float64, with NaN where there is none."""
     numbers = data.data.astype(np.float64)
@@ -94,8 +46,12 @@ def numbers(data: StreamData) -> FloatArray:
     return numbers
 
 
-def channel_on(recording: Recording, target: ChannelTarget, features: StreamData) -> FloatArray | None:
-    """Return a channel on the clock of the features, in the unit of `target`; None if there is none."""
+Found = tuple[str, int, ChannelSpec]
+"""Stream, place in it, and what is there."""
+
+
+def channel_on(recording: Recording, target: ChannelTarget, clock: StreamData) -> FloatArray | None:
+    """Return a channel on the clock of a stream, in the unit of `target`; None if there is none."""
     found = channels_for(recording, target)
     if not found:
         return None
@@ -105,11 +61,7 @@ def channel_on(recording: Recording, target: ChannelTarget, features: StreamData
             f"The recording {recording.meta.name!r} has several {target.kind} channels: {names}.",
             hint="Name one in the task's target.",
         )
-    return on_clock(recording, features, *found[0]) * unit_factor(found[0][2], target.unit)
-
-
-Found = tuple[str, int, ChannelSpec]
-"""Stream, place in it, and what is there."""
+    return read_channel(recording, clock, found[0]) * unit_factor(found[0][2], target.unit)
 
 
 def channels_for(recording: Recording, target: ChannelTarget) -> list[Found]:
@@ -131,14 +83,21 @@ def channels_for(recording: Recording, target: ChannelTarget) -> list[Found]:
     return found
 
 
-def on_clock(recording: Recording, features: StreamData, name: str, place: int, channel: ChannelSpec) -> FloatArray:
-    """Return (n,) samples of a channel on the clock of the features, as recorded; NaN where there is none."""
-    data = features if name == features.spec.name else recording.read(name)
-    column = numbers(data)[:, place]
-    picked = nearest_rows(features, data, recording.meta.name)
-    aligned = np.full(len(features.data), np.nan)
-    aligned[picked >= 0] = column[picked[picked >= 0]]
-    return aligned
+def read_channel(recording: Recording, clock: StreamData, found: Found) -> FloatArray:
+    """Return (n,) samples of a channel on the clock of a stream, as recorded; NaN where there is none."""
+    name, place, _ = found
+    data = clock if name == clock.spec.name else recording.read(name)
+    return on_clock(numbers(data)[:, [place]], data, clock, recording.meta.name)[:, 0]
+
+
+def on_clock(values: FloatArray, stream: StreamData, clock: StreamData, recording: str) -> FloatArray:
+    """Return (n, q) of (m, q) values of a stream on the clock of another; NaN where it has no sample."""
+    if stream is clock:
+        return values
+    rows = nearest_rows(clock, stream, recording)
+    out = np.full((len(rows), values.shape[1]), np.nan)
+    out[rows >= 0] = values[rows[rows >= 0]]
+    return out
 
 
 def unit_factor(channel: ChannelSpec, unit: str) -> float:
@@ -152,3 +111,67 @@ def unit_factor(channel: ChannelSpec, unit: str) -> float:
             f"The channel {channel.name!r} is recorded in {channel.unit!r}, which is no {unit!r}.",
             hint="State its unit or its scale in the mapping.",
         ) from None
+
+
+def require_forward(data: StreamData, recording: str) -> int:
+    """Return how many times of a stream equal the one before.
+
+    Raises
+    ------
+    DataError
+        If time runs backwards in it, or stands still: nothing can be aligned, filtered or split in time then.
+    """
+    if data.t_ns is None or len(data.t_ns) < 2:
+        return 0
+    steps = np.diff(data.t_ns)
+    backward = int((steps < 0).sum())
+    if backward or not steps.any():
+        what = f"runs backwards {backward} times" if backward else "stands still"
+        raise DataError(
+            f"In recording {recording!r}, the time of {data.spec.name} {what}.",
+            hint="See where with `tactbench inspect`; sort the rows before they are imported, or record again.",
+        )
+    return int((steps == 0).sum())
+
+
+def nearest_rows(features: StreamData, other: StreamData, recording: str) -> IntArray:
+    """Return, for every row of `features`, the row of `other` that belongs to it.
+
+    Parameters
+    ----------
+    features, other
+        Streams of the recording named `recording`, (n, …) and (m, …).
+
+    Returns
+    -------
+    IntArray
+        (n,) indices; -1 where the nearest sample is further away than half a median step of the slower clock.
+
+    Raises
+    ------
+    DataError
+        If there is no clock to align by and the numbers of rows differ, or time does not run forward.
+    """
+    n, m = len(features.data), len(other.data)
+    if features.t_ns is None or other.t_ns is None:
+        if n != m:
+            raise DataError(
+                f"In recording {recording!r}, {features.spec.name} has {n} rows and {other.spec.name} {m}, and there "
+                "is no clock to align them by.",
+                hint="Give the mapping a time column, or tables of equal length.",
+            )
+        return np.arange(n, dtype=np.int64)
+    if n == m and np.array_equal(features.t_ns, other.t_ns):
+        return np.arange(n, dtype=np.int64)
+    if m == 0:
+        return np.full(n, -1, dtype=np.int64)
+    require_forward(other, recording)
+    times = other.t_ns
+    after = np.clip(np.searchsorted(times, features.t_ns), 0, m - 1)
+    before = np.maximum(after - 1, 0)
+    earlier = np.abs(features.t_ns - times[before]) <= np.abs(times[after] - features.t_ns)
+    nearest = np.where(earlier, before, after)
+    steps = [float(np.median(np.diff(t))) for t in (features.t_ns, times) if len(t) > 1]
+    reach = max(steps, default=0.0) / 2
+    near = np.abs(times[nearest] - features.t_ns) <= reach
+    return np.where(near, nearest, -1).astype(np.int64)

@@ -12,18 +12,18 @@ import numpy as np
 import numpy.typing as npt
 
 from tactbench.core.errors import DataError, NotApplicable
-from tactbench.core.evaluation.alignment import require_forward
 from tactbench.core.evaluation.channels import (
     channel_on,
     channels_for,
     feature_streams,
-    features_on,
+    numbers,
     on_clock,
-    own_readings,
+    read_channel,
+    require_forward,
 )
 from tactbench.core.evaluation.slip_reference import SlipReference, slip_reference
 from tactbench.core.recording.reader import Recording, open_recording
-from tactbench.core.samples import FloatArray, IntArray, StreamData, StreamReadings
+from tactbench.core.samples import FloatArray, IntArray, Quality, StreamData, StreamReadings
 from tactbench.core.spec.events import SlipTarget
 from tactbench.core.spec.recording import RecordingMeta
 from tactbench.core.spec.task import ChannelTarget, LabelTarget, TaskSpec, VectorTarget
@@ -56,6 +56,12 @@ class Table:
     """Every stream on its own clock, times from the first row on; read where a task summarises recordings or frames"""
     reference: SlipReference | None = None
     """What the reference says about slip, on its own clock; read where a task asks for it"""
+
+    @property
+    def slip(self) -> SlipReference:
+        """The reference, of a task that asks for it."""
+        assert self.reference is not None
+        return self.reference
 
 
 @dataclass(frozen=True)
@@ -95,134 +101,171 @@ def load_dataset(task: TaskSpec, recordings: Sequence[Path]) -> Dataset:
     """
     counts: Counter[str] = Counter()
     repeated: dict[str, int] = {}
-    read: list[tuple[RecordingMeta, _Raw]] = []
-    used: list[Path] = []
+    tables: list[Table] = []
+    paths: list[Path] = []
+    features: tuple[str, ...] = ()
     for path in recordings:
         with open_recording(path) as recording:
             if recording.meta.excluded:
                 counts[f"recordings left out ({recording.meta.excluded})"] += 1
                 continue
-            read.append((recording.meta, _read(recording, task, counts, repeated)))
-            used.append(path)
-    if not read:
+            names, table = _read(recording, task, counts, repeated)
+        if tables and names != features:
+            raise DataError(
+                f"The recordings {tables[0].meta.name!r} and {table.meta.name!r} have different channels.",
+                hint="Evaluate them apart.",
+            )
+        features = names
+        tables.append(table)
+        paths.append(path)
+    if not tables:
         raise DataError("No recording is left to evaluate.", hint="See what was left out with `tactbench inspect`.")
-    _same_features([(meta, raw.features) for meta, raw in read])
-    framed = task.answer_per == "frame"
-    classes = _classes([raw for _, raw in read]) if task.kind == "classification" and not framed else ()
-    if not any(raw.labelled.any() for _, raw in read):
+    target = _target_name(task)
+    if not any(table.labelled.any() for table in tables):
         raise NotApplicable(
-            f"Task {task.name!r} asks for {_target_name(task)}, and no recording has it.",
+            f"Task {task.name!r} asks for {target}, and no recording has it.",
             hint="State it in the mapping, or choose another task.",
         )
-    tables = tuple(_table(meta, raw, classes) for meta, raw in read)
     unlabelled = sum(int((~table.labelled).sum()) for table in tables)
     if unlabelled:
-        counts[f"of {sum(len(table.row) for table in tables)} rows have no {_target_name(task)} and were left out"] = (
-            unlabelled
-        )
+        counts[f"of {sum(len(one.row) for one in tables)} rows have no {target} and were left out"] = unlabelled
+    classes: tuple[Any, ...] = ()
+    if task.kind == "classification" and task.answer_per != "frame":
+        found = {value for table in tables for value in np.unique(table.y[table.labelled]).tolist()}
+        classes = tuple(sorted(found, key=lambda value: (isinstance(value, str), value)))
+        index = {label: place for place, label in enumerate(classes)}
+        tables = [replace(one, y=np.array([index.get(value, -1) for value in one.y.tolist()])) for one in tables]
     whole = task.answer_per != "sample"
     if whole:
-        tables = tuple(_whole(_reduced(table, task), task) for table in tables)
-    return Dataset(
-        tables, read[0][1].features, classes, dict(counts), tuple(used), _clock_stamps(repeated), whole, bool(task.vote)
-    )
+        tables = [_whole(table, task, target) for table in tables]
+    stamps: tuple[str, ...] = ()
+    if repeated:
+        worst = max(repeated, key=lambda name: repeated[name])
+        number = f"{len(repeated)} recording{'s' if len(repeated) > 1 else ''}"
+        stamps = (f"clock: times equal the one before in {number}, {repeated[worst]} times in {worst!r}.",)
+    return Dataset(tuple(tables), features, classes, dict(counts), tuple(paths), stamps, whole, bool(task.vote))
 
 
-def _reduced(table: Table, task: TaskSpec) -> Table:
-    """Return a recording whose target, if it is a channel, is one number: reduced over the samples that are there."""
-    if task.answer_per != "recording" or not isinstance(task.target, ChannelTarget) or not table.labelled.any():
-        return table
+def _whole(table: Table, task: TaskSpec, target: str) -> Table:
+    """Return a recording that no group cuts, its target, if that is a channel, reduced to one number.
+
+    Where it is to have one answer, one whose answer changes is refused.
+    """
     there = table.y[table.labelled]
-    number = there.max() if task.target.reduce == "max" else there.mean()
-    return replace(table, y=np.full(len(table.y), number), labelled=np.ones(len(table.y), dtype=bool))
-
-
-def _whole(table: Table, task: TaskSpec) -> Table:
-    """Return a recording that no group cuts; where it is to have one answer, one whose answer changes is refused."""
-    if task.answer_per == "recording" and len(np.unique(table.y[table.labelled])) > 1:
+    if task.answer_per == "recording" and isinstance(task.target, ChannelTarget) and len(there):
+        number = there.max() if task.target.reduce == "max" else there.mean()
+        table = replace(table, y=np.full(len(table.y), number), labelled=np.ones(len(table.y), dtype=bool))
+    elif task.answer_per == "recording" and len(np.unique(there)) > 1:
         raise NotApplicable(
-            f"Task {task.name!r} asks one answer of each recording, and {_target_name(task)} changes within "
-            f"{table.meta.name!r}.",
+            f"Task {task.name!r} asks one answer of each recording, and {target} changes within {table.meta.name!r}.",
             hint="Cut the recordings where it changes (`recording` in the mapping), or ask a task of single samples.",
         )
     constant = {name: column for name, column in table.groups.items() if len(np.unique(column)) < 2}
     return replace(table, groups=constant)
 
 
-def _clock_stamps(repeated: Mapping[str, int]) -> tuple[str, ...]:
-    if not repeated:
-        return ()
-    worst = max(repeated, key=lambda name: repeated[name])
-    number = f"{len(repeated)} recording{'s' if len(repeated) > 1 else ''}"
-    return (f"clock: times equal the one before in {number}, {repeated[worst]} times in {worst!r}.",)
-
-
-@dataclass
-class _Raw:
-    features: tuple[str, ...]
-    X: FloatArray
-    y: npt.NDArray[Any]
-    labelled: npt.NDArray[np.bool_]
-    force: FloatArray | None
-    time_s: FloatArray
-    row: IntArray
-    groups: dict[str, npt.NDArray[np.str_]]
-    readings: tuple[StreamReadings, ...]
-    reference: SlipReference | None
-
-
-def _read(recording: Recording, task: TaskSpec, counts: Counter[str], repeated: dict[str, int]) -> _Raw:
+def _read(
+    recording: Recording, task: TaskSpec, counts: Counter[str], repeated: dict[str, int]
+) -> tuple[tuple[str, ...], Table]:
+    """Return the names of a recording's features, and its rows; of a classification `y` are the labels themselves."""
     meta = recording.meta
     streams = [recording.read(name) for name in feature_streams(recording, task)]
-    data = streams[0]
+    clock = streams[0]
     again = max(require_forward(stream, meta.name) for stream in streams)
     if again:
         repeated[meta.name] = again
-    columns = [features_on(meta, data, stream, task, counts) for stream in streams]
-    names = tuple(name for some, _ in columns for name in some)
-    X = np.hstack([block for _, block in columns])
-    if len(X) == 0:
+    if not len(clock.data):
         raise DataError(f"The recording {meta.name!r} has no samples.", hint="Record it again.")
-    empty = [name for name, column in zip(names, X.T, strict=True) if np.isnan(column).all()]
+    columns: dict[str, FloatArray] = {}
+    own: list[StreamReadings] = []
+    for stream in streams:
+        picked = [place for place, channel in enumerate(stream.spec.channels) if channel.kind in task.looks_at]
+        values = numbers(stream)[:, picked]
+        _count_flags(stream, picked, counts)
+        if task.summaries or task.features_by:
+            own.append(_own_readings(stream, clock, picked, values, counts))
+        names = [stream.spec.channels[place].name for place in picked]
+        columns |= dict(zip(names, on_clock(values, stream, clock, meta.name).T, strict=True))
+    X = np.column_stack(list(columns.values()))
+    empty = [name for name, column in columns.items() if np.isnan(column).all()]
     if empty:
         raise DataError(
             f"In recording {meta.name!r}, {', '.join(empty)} has no sample at all.",
             hint="Leave the channel out of the mapping, or record it again.",
         )
-    y, labelled = _target(recording, task, data)
-    force = _force(recording, task, data, y)
-    targets = [("the target", y)] if task.kind == "regression" else []
-    for name, column in (*zip(names, X.T, strict=True), *targets):
-        largest = float(np.max(np.abs(column), initial=0.0, where=~np.isnan(column)))
-        if largest > LARGEST:
-            raise DataError(
-                f"In recording {meta.name!r}, {name} reaches {largest:.3g}, which cannot be computed with.",
-                hint="Is it a fill value? State it under `sentinels` in the mapping, or mark it as missing.",
-            )
-    time_s = (data.t_ns - data.t_ns[0]) * 1e-9 if data.t_ns is not None else np.arange(len(X), dtype=np.float64)
-    own: tuple[StreamReadings, ...] = ()
-    if task.summaries or task.features_by:
-        own = tuple(own_readings(data, stream, task, counts) for stream in streams)
-    row = np.arange(len(X), dtype=np.int64)
-    slip = None
+    y, labelled = _target(recording, task, clock)
+    for name, column in (columns | ({"the target": y} if task.kind == "regression" else {})).items():
+        require_computable(column, name, meta)
+    force = y if isinstance(task.target, ChannelTarget) and task.target.kind == "force" else None
+    found = channels_for(recording, ChannelTarget(kind="force"))
+    if force is None and len(found) == 1:
+        force = read_channel(recording, clock, found[0])
+    reference = None
     if isinstance(task.target, SlipTarget):
-        slip = slip_reference(recording, task.target, 0 if data.t_ns is None else int(data.t_ns[0]), counts)
-    raw = _Raw(names, X, y, labelled, force, time_s, row, _groups(meta, data, task), own, slip)
+        reference = slip_reference(recording, task.target, 0 if clock.t_ns is None else int(clock.t_ns[0]), counts)
     whole = np.asarray(~np.isnan(X).any(axis=1))
-    if not whole.all():
-        for name, column in zip(names, X.T, strict=True):
-            if np.isnan(column).any():
-                counts[f"rows left out because {name} has no sample"] += int(np.isnan(column).sum())
-        raw = _rows(raw, whole)
-    return raw
+    for name, column in columns.items():
+        if np.isnan(column).any():
+            counts[f"rows left out because {name} has no sample"] += int(np.isnan(column).sum())
+    row = np.arange(len(X), dtype=np.int64)
+    time_s = (clock.t_ns - clock.t_ns[0]) * 1e-9 if clock.t_ns is not None else row.astype(np.float64)
+    table = Table(
+        meta=meta,
+        X=X[whole],
+        y=y[whole],
+        labelled=labelled[whole],
+        force=None if force is None else force[whole],
+        time_s=time_s[whole],
+        row=row[whole],
+        groups={name: column[whole] for name, column in _groups(meta, clock, task).items()},
+        readings=tuple(own),
+        reference=reference,
+    )
+    return tuple(columns), table
 
 
-def _rows(raw: _Raw, keep: npt.NDArray[np.bool_]) -> _Raw:
-    return _Raw(
-        raw.features, raw.X[keep], raw.y[keep], raw.labelled[keep], None if raw.force is None else raw.force[keep],
-        raw.time_s[keep], raw.row[keep], {name: column[keep] for name, column in raw.groups.items()}, raw.readings,
-        raw.reference,
-    )  # fmt: skip
+def require_computable(values: FloatArray, name: str, meta: RecordingMeta) -> None:
+    """Raise DataError for numbers of any shape whose squares cannot be summed; NaN is none."""
+    largest = float(np.max(np.abs(values), initial=0.0, where=~np.isnan(values)))
+    if largest > LARGEST:
+        raise DataError(
+            f"In recording {meta.name!r}, {name} reaches {largest:.3g}, which cannot be computed with.",
+            hint="Is it a fill value? State it under `sentinels` in the mapping, or mark it as missing.",
+        )
+
+
+def _count_flags(stream: StreamData, picked: Sequence[int], counts: Counter[str]) -> None:
+    """Count the samples and rows that are kept although something is said against them."""
+    if stream.quality is None:
+        return
+    quality = stream.quality[:, picked]
+    for flag in (Quality.SATURATED, Quality.SUSPECT):
+        flagged = int(np.count_nonzero(quality & flag))
+        if flagged:
+            counts[f"{str(flag.name).lower()} samples kept"] += flagged
+    after_gap = int(np.count_nonzero((quality & Quality.GAP).any(axis=1)))
+    if after_gap:
+        counts[f"rows of {stream.spec.name} kept, before which others were lost"] += after_gap
+
+
+def _own_readings(
+    stream: StreamData, clock: StreamData, picked: Sequence[int], values: FloatArray, counts: Counter[str]
+) -> StreamReadings:
+    """Return one stream's features on its own clock, in seconds since the first row of `clock`."""
+    whole = np.asarray(~np.isnan(values).any(axis=1))
+    if stream is not clock and not whole.all():
+        counts[f"rows of {stream.spec.name} left out because a channel has no sample"] += int((~whole).sum())
+    time_s = (stream.t_ns - clock.t_ns[0]) * 1e-9 if stream.t_ns is not None and clock.t_ns is not None else None
+    step_s = float(np.median(np.diff(time_s))) if time_s is not None and len(time_s) > 1 else 0.0
+    channels = [stream.spec.channels[place] for place in picked]
+    return StreamReadings(
+        stream=stream.spec.name,
+        channels=tuple(channel.name for channel in channels),
+        kinds=tuple(channel.kind for channel in channels),
+        data=values[whole],
+        time_s=None if time_s is None else time_s[whole],
+        rate_hz=1.0 / step_s if step_s > 0 else stream.spec.rate_hz,
+    )
 
 
 Labels = tuple[npt.NDArray[Any], npt.NDArray[np.bool_]]
@@ -235,13 +278,12 @@ def _target(recording: Recording, task: TaskSpec, features: StreamData) -> Label
         return found if task.kind == "classification" else _as_numbers(found, task.target.name, recording.meta.name)
     if isinstance(task.target, SlipTarget):  # of frames, which are made of the recording later
         return np.zeros(len(features.data)), np.ones(len(features.data), dtype=bool)
-    if isinstance(task.target, VectorTarget):
-        return _vector(recording, task.target, features)
-    column = channel_on(recording, task.target, features)
-    if column is None:
-        n = len(features.data)
-        return np.full(n, np.nan), np.zeros(n, dtype=bool)
-    return column, ~np.isnan(column)
+    missing = np.full(len(features.data), np.nan)
+    targets = task.target.components if isinstance(task.target, VectorTarget) else (task.target,)
+    columns = [channel_on(recording, one, features) for one in targets]
+    y = np.column_stack([missing if one is None else one for one in columns])
+    labelled = np.asarray(~np.isnan(y).any(axis=1))
+    return (y if isinstance(task.target, VectorTarget) else y[:, 0]), labelled
 
 
 def _as_numbers(found: Labels, name: str, recording: str) -> Labels:
@@ -258,13 +300,6 @@ def _as_numbers(found: Labels, name: str, recording: str) -> Labels:
     return numbers, there
 
 
-def _vector(recording: Recording, target: VectorTarget, features: StreamData) -> Labels:
-    missing = np.full(len(features.data), np.nan)
-    found = [channel_on(recording, one, features) for one in target.components]
-    vectors = np.column_stack([missing if one is None else one for one in found])
-    return vectors, np.asarray(~np.isnan(vectors).any(axis=1))
-
-
 def _label(meta: RecordingMeta, name: str, features: StreamData) -> Labels:
     n = len(features.data)
     if name in meta.labels:
@@ -273,14 +308,6 @@ def _label(meta: RecordingMeta, name: str, features: StreamData) -> Labels:
         column = features.annotations[name]
         return column, np.asarray(column != "") if column.dtype.kind == "U" else np.ones(n, dtype=bool)
     return np.full(n, ""), np.zeros(n, dtype=bool)
-
-
-def _force(recording: Recording, task: TaskSpec, features: StreamData, y: npt.NDArray[Any]) -> FloatArray | None:
-    """Return the reference force, in whatever unit: the target itself, or else the only force channel there is."""
-    if isinstance(task.target, ChannelTarget) and task.target.kind == "force":
-        return y
-    found = channels_for(recording, ChannelTarget(kind="force"))
-    return on_clock(recording, features, *found[0]) if len(found) == 1 else None
 
 
 def _groups(meta: RecordingMeta, data: StreamData, task: TaskSpec) -> dict[str, npt.NDArray[np.str_]]:
@@ -302,31 +329,6 @@ def _groups(meta: RecordingMeta, data: StreamData, task: TaskSpec) -> dict[str, 
     if not isinstance(task.target, SlipTarget | VectorTarget):
         groups.pop(task.target.name or "", None)
     return groups
-
-
-def _same_features(read: Sequence[tuple[RecordingMeta, tuple[str, ...]]]) -> None:
-    first, features = read[0]
-    for meta, others in read:
-        if others != features:
-            raise DataError(
-                f"The recordings {first.name!r} and {meta.name!r} have different channels.",
-                hint="Evaluate them apart.",
-            )
-
-
-def _classes(read: Sequence[_Raw]) -> tuple[Any, ...]:
-    found = {
-        value.item() if hasattr(value, "item") else value for raw in read for value in np.unique(raw.y[raw.labelled])
-    }
-    return tuple(sorted(found, key=lambda value: (isinstance(value, str), value)))
-
-
-def _table(meta: RecordingMeta, raw: _Raw, classes: tuple[Any, ...]) -> Table:
-    y = raw.y
-    if classes:
-        index = {label: place for place, label in enumerate(classes)}
-        y = np.array([index.get(value, -1) for value in raw.y.tolist()], dtype=np.int64)
-    return Table(meta, raw.X, y, raw.labelled, raw.force, raw.time_s, raw.row, raw.groups, raw.readings, raw.reference)
 
 
 def _target_name(task: TaskSpec) -> str:

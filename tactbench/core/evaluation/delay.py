@@ -1,18 +1,26 @@
-"""How late an answer is: from a change at the skin to the answer that knows of it, part by part."""
+"""How late an answer is, from a change at the skin to the answer that knows of it, part by part; what calls take."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import TYPE_CHECKING
+import sys
+from collections.abc import Callable, Mapping
+from typing import TypeVar
 
 import numpy as np
 
+from tactbench.core.evaluation.dataset import Dataset, Table
+from tactbench.core.evaluation.frames import frame_features, frame_times, slip_target
 from tactbench.core.evaluation.protocols import ProtocolSpec
+from tactbench.core.evaluation.sets import FeatureScale, asked_for, causal_mean
+from tactbench.core.evaluation.summaries import is_summarised, kept, recording_features
+from tactbench.core.plugins.interfaces import Estimator
+from tactbench.core.samples import FloatArray, StreamReadings
 from tactbench.core.spec.recording import RecordingMeta
+from tactbench.core.spec.rig import EstimatorDescriptor
 from tactbench.core.spec.sensor import StreamSpec
+from tactbench.core.spec.task import TaskSpec
 
-if TYPE_CHECKING:
-    from tactbench.core.evaluation.dataset import Dataset, Table
+T = TypeVar("T")
 
 RATE_TOLERANCE = 0.01
 """Relative difference of rates beyond which a remark says so: rates are stated to two or three digits."""
@@ -20,15 +28,24 @@ RATE_TOLERANCE = 0.01
 NO_LINK = "link delay unknown: the answer delay is without it"
 NO_RATE = "answer delay unknown: the recordings do not tell their sampling rate"
 _OF_READINGS = ("sampling", "window", "features")
+WARM_UP = 1
+AT_LEAST, AT_MOST = 20, 200
+BUDGET_S = 0.3
+CALLS_OF_P95 = 200
+"""Fewer calls have too few beyond their 95th percentile (ten of 200) to state it; the largest is stated instead."""
+RECORDINGS_TIMED = 3
+"""Of frames: each is hundreds of them."""
 
 
-def reading_delay_ms(data: Dataset, rules: ProtocolSpec, k: int) -> tuple[dict[str, float], tuple[str, ...]]:
+def stated_delay_ms(
+    recorded: Dataset, made: Dataset, task: TaskSpec, rules: ProtocolSpec, estimator: EstimatorDescriptor, k: int
+) -> tuple[dict[str, float], tuple[str, ...]]:
     """Return the parts of the answer delay that no machine decides, in ms, and remarks on them.
 
     Parameters
     ----------
-    data
-        The recordings that were asked, with the features that the answers used.
+    recorded, made
+        The recordings as they were read, and with the features that the answers used.
     k
         Rows that the mean filter looks back.
 
@@ -36,15 +53,42 @@ def reading_delay_ms(data: Dataset, rules: ProtocolSpec, k: int) -> tuple[dict[s
     -------
     dict, tuple
         ``sampling``: one interval of the slowest stream used, at the sensor's own rate: a change just after a sample
-        waits that long for the next one. Where the sensor states no rate, the interval of the recordings.
+        waits that long for the next one. Where the sensor states no rate, the interval of the recordings. Of frames the
+        wait for the next frame, where that is longer.
         ``link``: as the sensor's spec states it.
         ``window``: the group delay of the mean filter at the rate of the recordings, `k` / 2 intervals (a mean of n
         samples has linear phase of slope (n - 1) / 2; Oppenheim and Schafer, Discrete-Time Signal Processing, section
-        5.7). Samples that a protocol drops are not counted, nor the shorter windows at the start of a recording.
-        A part that is not known is absent.
+        5.7). Samples that a protocol drops are not counted, nor the shorter windows at the start of a recording. Of
+        frames half their length; of the reference none, since its last sample is looked at alone. Of recordings that
+        are answered whole, the time that one is listened to.
+        A part that is not known is absent; answers that look at no reading have none.
     """
+    frames = task.answer_per == "frame"
+    if estimator.looks_at != "features" and not (frames and estimator.looks_at == "reference"):
+        return {}, ()
+    parts, remarks = _reading_delay_ms(recorded, rules, 0 if frames else k)
+    if frames:
+        target = slip_target(task)
+        rates = [
+            stream.rate_hz
+            for table in recorded.tables
+            for stream in table.readings
+            if any(feature.startswith(f"{channel} ") for channel in stream.channels for feature in made.features)
+        ]
+        parts["sampling"] = 1e3 * max([target.hop_s, *(1.0 / rate for rate in rates if rate)])
+        parts["window"] = 1e3 * target.window_s / 2 if estimator.looks_at == "features" else 0.0
+    elif task.answer_per == "recording":
+        spans = [0.0 if rules.first_row_only else _span_s(recorded, table, task, rules) for table in recorded.tables]
+        known = [span for span in spans if span is not None]
+        parts.pop("window", None)
+        if len(known) == len(spans):
+            parts["window"] = 1e3 * max(known)
+    return parts, remarks
+
+
+def _reading_delay_ms(data: Dataset, rules: ProtocolSpec, k: int) -> tuple[dict[str, float], tuple[str, ...]]:
     parts: dict[str, float] = {}
-    interval_s = row_interval_s(data)
+    interval_s = _row_interval_s(data)
     remarks: dict[str, None] = {}
     own: list[float | None] = []
     for meta in data.metas:
@@ -87,20 +131,139 @@ def _used(meta: RecordingMeta, data: Dataset) -> list[StreamSpec]:
     return sorted(used, key=lambda one: all(channel.name != data.features[0] for channel in one.channels))
 
 
-def row_interval_s(data: Dataset) -> float | None:
+def _row_interval_s(data: Dataset) -> float | None:
     """Return the interval between rows, the longest of all recordings: the median of the clock's steps.
 
     Without a clock, by the rate that the stream states; None where a recording has neither.
     """
-    found = [_step_s(table) or _stated_s(_used(table.meta, data)[0]) for table in data.tables]
+    found: list[float | None] = []
+    for table in data.tables:
+        timed = table.meta.clock != "none" and len(table.time_s) > 1
+        step_s = float(np.median(np.diff(table.time_s))) if timed else 0.0
+        rate_hz = _used(table.meta, data)[0].rate_hz
+        found.append(step_s or (1.0 / rate_hz if rate_hz else None))
     known = [interval for interval in found if interval]
     return max(known) if len(known) == len(found) else None
 
 
-def _step_s(table: Table) -> float | None:
-    timed = table.meta.clock != "none" and len(table.time_s) > 1
-    return float(np.median(np.diff(table.time_s))) if timed else None
+def _span_s(data: Dataset, table: Table, task: TaskSpec, rules: ProtocolSpec) -> float | None:
+    if task.vote:
+        times_s = table.time_s[asked_for(table, rules)]
+        if table.meta.clock == "none":
+            interval_s = _row_interval_s(data)
+            return None if interval_s is None else len(times_s) * interval_s
+        return float(np.ptp(times_s)) if len(times_s) else 0.0
+    lengths = [_length_s(stream) for stream in kept(table, rules)]
+    if any(length is None for length in lengths):
+        return None
+    length = max(one for one in lengths if one is not None)
+    windows = [(one.start, one.end) if one.unit == "s" else (one.start * length, one.end * length)
+               for one in task.summaries]  # fmt: skip
+    if task.features_by:
+        windows.append((0.0, length))
+    return max(end for _, end in windows) - min(start for start, _ in windows)
 
 
-def _stated_s(stream: StreamSpec) -> float | None:
-    return 1.0 / stream.rate_hz if stream.rate_hz else None
+def _length_s(stream: StreamReadings) -> float | None:
+    if stream.time_s is not None:
+        return float(stream.time_s[-1])
+    return None if stream.rate_hz is None else len(stream.data) / stream.rate_hz
+
+
+def features_s(
+    recorded: Dataset,
+    task: TaskSpec,
+    rules: ProtocolSpec,
+    estimator: EstimatorDescriptor,
+    X: FloatArray,
+    k: int,
+    clock: Callable[[], float],
+) -> float | None:
+    """Return the median seconds that the features of one answer take, or None for an answer that looks at no reading.
+
+    Of a frame: those of a recording over its frames. A detector at work makes them frame by frame, in more calls.
+    """
+    if task.answer_per == "frame":
+        if estimator.looks_at not in ("features", "reference"):
+            return None
+        compute = frame_features(task, rules, estimator)
+        spent_s = []
+        for place in np.linspace(0, len(recorded.tables) - 1, RECORDINGS_TIMED).astype(int).tolist():
+            frames = frame_times(recorded.tables[place], task, rules)
+            began = clock()
+            compute(recorded.tables[place], frames)
+            spent_s.append((clock() - began) / len(frames.ends_ns))
+        return float(np.median(spent_s))
+    if estimator.looks_at != "features":
+        return None
+    if is_summarised(task, rules):  # a median needs no more calls, and a row keeps nothing else of them
+        tables = recorded.tables
+        ready_s = calls_s(len(tables), tables.__getitem__, recording_features(task, rules), clock, AT_LEAST)
+    else:
+        ready_s = single_row_preparation_s(X, k, clock, tared=rules.tare, at_most=AT_LEAST)
+    return float(np.median(ready_s))
+
+
+def single_row_latency_s(model: Estimator, X: FloatArray, clock: Callable[[], float]) -> FloatArray:
+    """Return (calls,) seconds of ``predict`` on one row whose features are ready.
+
+    At least 20 calls and at most 200, within 0.3 s where 20 take less; the first is not counted. Rows are spread
+    over `X`, so that a model that answers some rows faster is not flattered.
+    """
+    return calls_s(len(X), lambda place: X[place : place + 1], model.predict, clock)
+
+
+def single_row_preparation_s(
+    X: FloatArray, k: int, clock: Callable[[], float], *, tared: bool = False, at_most: int = AT_MOST
+) -> FloatArray:
+    """Return (calls,) seconds of making one row of features ready from the `k` + 1 readings that it is made of.
+
+    At most `at_most` calls, else as :func:`single_row_latency_s`, with the code that prepares whole
+    sets: taring if `tared`, scaling, the mean over the window. Rows of `X` stand for raw readings:
+    values change no time.
+    """
+    rest, scale = np.zeros(X.shape[1]), FeatureScale(np.zeros(X.shape[1]), np.ones(X.shape[1]))
+    segment = np.zeros(k + 1, dtype=np.int64)
+
+    def ready(readings: FloatArray) -> FloatArray:
+        return causal_mean(scale(readings - rest if tared else readings), k, segment[: len(readings)])[-1:]
+
+    return calls_s(len(X), lambda place: X[max(0, place - k) : place + 1], ready, clock, at_most)
+
+
+def tail_ms(spent_s: FloatArray) -> tuple[float | None, float]:
+    """Return the 95th percentile in ms, None for fewer than 200 calls, and the largest."""
+    enough = len(spent_s) >= CALLS_OF_P95
+    return float(1e3 * np.quantile(spent_s, 0.95)) if enough else None, float(1e3 * spent_s.max())
+
+
+def calls_s(
+    rows: int,
+    given: Callable[[int], T],
+    work: Callable[[T], object],
+    clock: Callable[[], float],
+    at_most: int = AT_MOST,
+) -> FloatArray:
+    """Return (calls,) seconds of `work` on what is `given` for places spread over `rows`."""
+    places = np.linspace(0, rows - 1, at_most).astype(int)
+    for place in places[:WARM_UP]:
+        work(given(place))
+    spent: list[float] = []
+    for place in np.random.default_rng(0).permutation(places):
+        row = given(place)
+        began = clock()
+        work(row)
+        spent.append(clock() - began)
+        if len(spent) >= AT_LEAST and sum(spent) > BUDGET_S:
+            break
+    return np.array(spent)
+
+
+def peak_rss_mb() -> float | None:
+    """Return the largest resident memory of this process so far, MB; None where the system does not tell."""
+    try:
+        import resource
+    except ImportError:
+        return None
+    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    return float(peak) / (2**20 if sys.platform == "darwin" else 2**10)

@@ -1,17 +1,92 @@
-"""Teaching and asking an estimator, its warnings counted and its answers checked."""
+"""An estimator: made, fitted, asked, and its hyper-parameters chosen on data it is neither trained nor tested on."""
 
 from __future__ import annotations
 
+import itertools
 import warnings
 from collections import Counter
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from tactbench.core.errors import DataError, PluginContractError, TactbenchError
+from tactbench.core.errors import DataError, PluginContractError, TactbenchError, UnknownNameError, UsageError
+from tactbench.core.evaluation.dataset import Dataset
+from tactbench.core.evaluation.metrics import Metric
+from tactbench.core.evaluation.protocols import ProtocolSpec
+from tactbench.core.evaluation.sets import keep, part, scales
+from tactbench.core.evaluation.splits import Assignment, inner_splits
 from tactbench.core.plugins.interfaces import Estimator
-from tactbench.core.samples import FloatArray
+from tactbench.core.plugins.registry import load_object
+from tactbench.core.samples import FloatArray, Part
+from tactbench.core.spec.rig import EstimatorDescriptor
+from tactbench.core.spec.task import TaskSpec, VectorTarget
+
+Build = Callable[[Mapping[str, Any]], Estimator]
+"""Parameters -> a fresh estimator."""
+
+
+def builder(
+    estimator: EstimatorDescriptor, params: Mapping[str, Any], task: TaskSpec, seed: int, threads: int
+) -> Build:
+    """Return what makes a fresh estimator from parameters; its imports are done, and one has been made to see.
+
+    Where the task asks for a vector, it is one estimator a component.
+
+    Raises
+    ------
+    UsageError
+        If the estimator cannot answer this kind of question, or a parameter is not one of its own.
+    """
+    if task.kind not in estimator.kinds:
+        raise UsageError(
+            f"The estimator {estimator.name!r} does {' and '.join(estimator.kinds)}; task {task.name!r} is "
+            f"{task.kind}.",
+            hint="See what others do with `tactbench list estimators`.",
+        )
+    for name in params:
+        if name not in estimator.params:
+            raise UnknownNameError(f"parameter of estimator {estimator.name!r}", name, estimator.params)
+    make = load_object(estimator.where)  # imports happen here, before any clock is read
+
+    def build(chosen: Mapping[str, Any]) -> Estimator:
+        made: Estimator = make(kind=task.kind, seed=seed, threads=threads, **{**estimator.params, **params, **chosen})
+        return made
+
+    build({})
+    return one_model_a_component(task, build)
+
+
+def one_model_a_component(task: TaskSpec, build: Build) -> Build:
+    """Return `build`; where the task asks for a vector, what makes an estimator a component."""
+    return (lambda chosen: PerComponent(lambda: build(chosen))) if isinstance(task.target, VectorTarget) else build
+
+
+class PerComponent:
+    """A model for each component of a vector, each taught as if it were asked for alone.
+
+    Parameters
+    ----------
+    build
+        Returns a fresh estimator of one number.
+    """
+
+    def __init__(self, build: Callable[[], Estimator]) -> None:
+        self._build = build
+        self._models: list[Estimator] = []
+
+    def fit(self, X: FloatArray, y: npt.NDArray[Any]) -> PerComponent:
+        """Fit a model to X (n, p) and each column of y (n, components)."""
+        self._models = [self._build() for _ in range(y.shape[1])]
+        for model, column in zip(self._models, y.T, strict=True):
+            model.fit(X, np.ascontiguousarray(column))
+        return self
+
+    def predict(self, X: FloatArray) -> npt.NDArray[Any]:
+        """Return (n, components) answers to X (n, p)."""
+        return np.column_stack([model.predict(X) for model in self._models])
 
 
 def fit(model: Estimator, X: FloatArray, y: npt.NDArray[Any], name: str, counts: Counter[str]) -> None:
@@ -75,3 +150,124 @@ def answers(
             hint=f"Its predict(X) must return {len(X)} {expected}, one for each row.",
         )
     return given.astype(np.int64 if n_classes else np.float64)
+
+
+def asked(model: Estimator, part: Part, descriptor: EstimatorDescriptor, n_classes: int) -> npt.NDArray[Any]:
+    """Return the answers of `model` to the rows of a set, as :func:`answers` does."""
+    return answers(model, features_of(part, descriptor), descriptor.name, n_classes, part.y.shape[1:])
+
+
+def voted(part: Part, predicted: npt.NDArray[Any], n_classes: int) -> tuple[Part, npt.NDArray[Any]]:
+    """Return the last row of each recording, and the answer to all of its rows.
+
+    Parameters
+    ----------
+    part, predicted
+        Rows in order of recording and time, and the (n,) answers to them.
+    n_classes
+        The answer is the commonest class, of equals the first; where 0, the mean.
+    """
+    places, code, counts = np.unique(part.recording, return_inverse=True, return_counts=True)
+    last = np.cumsum(counts) - 1
+    rows = Part(part.X[last], part.y[last], part.time_s[last], part.recording[last], part.row[last])
+    if not n_classes:
+        return rows, np.bincount(code, weights=predicted) / counts
+    votes = np.zeros((len(places), n_classes), dtype=np.int64)
+    np.add.at(votes, (code, predicted), 1)
+    return rows, votes.argmax(axis=1)
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """Parameters and window that were tried, and how well they did on the validation data."""
+
+    params: dict[str, Any]
+    k: int
+    score: float
+
+
+@dataclass(frozen=True)
+class Choice(Candidate):
+    """The candidate that was chosen, and those that it was compared with."""
+
+    compared: tuple[Candidate, ...] = ()
+    """all candidates in the order in which they were tried, the chosen one among them"""
+
+
+def features_of(one: Part, descriptor: EstimatorDescriptor) -> FloatArray:
+    """Return what the estimator may look at."""
+    if descriptor.looks_at == "time":
+        return one.row.astype(np.float64)[:, None]
+    if descriptor.looks_at == "nothing":
+        return np.zeros((len(one), 1))
+    return one.X
+
+
+def select(
+    descriptor: EstimatorDescriptor,
+    given: Mapping[str, Any],
+    build: Build,
+    data: Dataset,
+    protocol: ProtocolSpec,
+    assignment: Assignment,
+    metric: Metric,
+    counts: Counter[str],
+) -> Choice | None:
+    """Choose the estimator's grid parameters and window for one fold; None if there is nothing to choose.
+
+    The test rows of `assignment` are never looked at.
+
+    Parameters
+    ----------
+    given
+        Parameters the user has fixed: they are not searched.
+    counts
+        Told which fits came with a warning.
+
+    Raises
+    ------
+    DataError
+        If there is no data to choose on.
+    """
+    grid = {name: values for name, values in descriptor.grid.items() if name not in given}
+    if not grid and len(descriptor.window_grid) <= 1:
+        return None
+    gap = max(descriptor.window_grid)
+    held_back = assignment.validation
+    masks = inner_splits(data, assignment, gap) if held_back is None else [(assignment.train, held_back)]
+    pairs = []
+    for learn, held_out in masks:
+        try:
+            train, other = (
+                keep(data, protocol, rows, what, Counter())
+                for rows, what in ((learn, "training"), (held_out, "validation"))
+            )
+        except DataError:
+            continue  # one inner set without rows is no reason against the others
+        if train.labelled.any() and other.labelled.any():
+            pairs.append(((train, other), scales(protocol, train, other)))
+    if not pairs:
+        raise DataError(
+            f"Fold {assignment.name!r} has too few labelled rows to choose hyper-parameters on: some to learn from and "
+            f"some to check with are needed, {gap} rows apart where one recording must serve both.",
+            hint="Fix the parameters in the matrix (estimators: [{params: …}]), or use longer recordings.",
+        )
+    n_classes = len(data.classes)
+    tried: list[Candidate] = []
+    sign = 1.0 if metric.higher_is_better else -1.0
+    for k in descriptor.window_grid:
+        filtered = [[part(rows, scale, k) for rows, scale in zip(*pair, strict=True)] for pair in pairs]
+        for values in itertools.product(*grid.values()):
+            params = {**given, **dict(zip(grid, values, strict=True))}
+            truth, answered = [], []
+            for learned, check in filtered:
+                model = build(params)
+                fit(model, features_of(learned, descriptor), learned.y, descriptor.name, counts)
+                predicted = asked(model, check, descriptor, n_classes)
+                checked, combined = voted(check, predicted, n_classes) if data.vote else (check, predicted)
+                truth.append(checked.y)
+                answered.append(combined)
+            score = metric.of(np.concatenate(truth), np.concatenate(answered), n_classes)
+            tried.append(Candidate(params, k, score))
+    best = max(tried, key=lambda candidate: sign * candidate.score)  # of equals the first
+    return Choice(best.params, best.k, best.score, tuple(tried))

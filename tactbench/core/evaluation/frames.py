@@ -10,8 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from tactbench.core.errors import DataError, NotApplicable, PluginContractError
-from tactbench.core.evaluation.dataset import LARGEST, Dataset, Table
-from tactbench.core.evaluation.delay import reading_delay_ms
+from tactbench.core.evaluation.dataset import Dataset, Table, require_computable
 from tactbench.core.evaluation.protocols import ProtocolSpec
 from tactbench.core.evaluation.slip_reference import SlipReference
 from tactbench.core.evaluation.summaries import in_band, tared_readings
@@ -23,8 +22,6 @@ from tactbench.core.spec.rig import EstimatorDescriptor
 from tactbench.core.spec.summary import Summary
 from tactbench.core.spec.task import TaskSpec
 
-RECORDINGS_TIMED = 3
-"""Each is hundreds of frames."""
 STATES = ("stick", "incipient", "gross")
 EVENT_CLASSES = ("no event", "event")
 
@@ -73,7 +70,7 @@ def frame_features(
     task: TaskSpec, rules: ProtocolSpec, estimator: EstimatorDescriptor
 ) -> Callable[[Table, FrameTimes], Features]:
     """Return what makes the features of all frames of one recording; a detector's own code is imported here."""
-    target = _target(task)
+    target = slip_target(task)
     own = load_object(estimator.frames_by) if estimator.frames_by else None
     summaries = estimator.summaries or task.summaries
 
@@ -147,10 +144,7 @@ def clocked(table: Table, rules: ProtocolSpec) -> tuple[StreamReadings, ...]:
 
 def frame_times(table: Table, task: TaskSpec, rules: ProtocolSpec) -> FrameTimes:
     """Return when the frames of a recording end: all that all streams fill, after the hold where it is dropped."""
-    target = _target(task)
-    reference = table.reference
-    if reference is None:
-        raise DataError(f"Recording {table.meta.name!r} was read without its reference.", hint="Report this.")
+    target = slip_target(task)
     streams = clocked(table, rules)
     begin_s = max(float(_time(stream)[0]) for stream in streams)
     if rules.discard_hold and table.meta.scene is not None:
@@ -162,60 +156,7 @@ def frame_times(table: Table, task: TaskSpec, rules: ProtocolSpec) -> FrameTimes
         raise DataError(
             f"Recording {table.meta.name!r} is shorter than a frame of {target.window_s:g} s.", hint="Leave it out."
         )
-    return FrameTimes(ends_ns, reference)
-
-
-def frame_delay_ms(
-    recorded: Dataset, features: Sequence[str], task: TaskSpec, rules: ProtocolSpec, estimator: EstimatorDescriptor
-) -> tuple[dict[str, float], tuple[str, ...]]:
-    """Return the parts of a frame's answer delay that no machine decides, in ms, and remarks on them.
-
-    Parameters
-    ----------
-    recorded
-        The recordings as they were read.
-    features
-        Names of the features of frames.
-
-    Notes
-    -----
-    ``sampling``: the wait for the next sample of the slowest stream used, or for the next frame where that is longer.
-    ``window``: half a frame's length; of the reference none, since its last sample is looked at alone.
-    """
-    if estimator.looks_at not in ("features", "reference"):
-        return {}, ()
-    target = _target(task)
-    parts, remarks = reading_delay_ms(recorded, rules, 0)
-    rates = [
-        stream.rate_hz
-        for table in recorded.tables
-        for stream in table.readings
-        if any(feature.startswith(f"{channel} ") for channel in stream.channels for feature in features)
-    ]
-    parts["sampling"] = 1e3 * max([target.hop_s, *(1.0 / rate for rate in rates if rate)])
-    parts["window"] = 1e3 * target.window_s / 2 if estimator.looks_at == "features" else 0.0
-    return parts, remarks
-
-
-def frame_features_s(
-    recorded: Dataset,
-    task: TaskSpec,
-    rules: ProtocolSpec,
-    estimator: EstimatorDescriptor,
-    clock: Callable[[], float],
-) -> float:
-    """Return the seconds that one frame's features take: a recording's over its frames, the median of a few.
-
-    A detector at work makes the same features frame by frame, in more calls.
-    """
-    compute = frame_features(task, rules, estimator)
-    spent_s = []
-    for place in np.linspace(0, len(recorded.tables) - 1, RECORDINGS_TIMED).astype(int).tolist():
-        frames = frame_times(recorded.tables[place], task, rules)
-        began = clock()
-        compute(recorded.tables[place], frames)
-        spent_s.append((clock() - began) / len(frames.ends_ns))
-    return float(np.median(spent_s))
+    return FrameTimes(ends_ns, table.slip)
 
 
 def _framed(
@@ -230,12 +171,7 @@ def _framed(
     answered = np.asarray(~np.isnan(X).any(axis=1))
     if not answered.all():
         counts["frames without a sample of some stream"] += int((~answered).sum())
-    largest = float(np.max(np.abs(X), initial=0.0, where=answered[:, None]))
-    if largest > LARGEST:
-        raise DataError(
-            f"In recording {table.meta.name!r}, a feature reaches {largest:.3g}, which cannot be computed with.",
-            hint="Is a reading a fill value? State it under `sentinels` in the mapping.",
-        )
+    require_computable(X[answered], "a feature", table.meta)
     ends_ns, row = frames.ends_ns[answered], np.flatnonzero(answered)
     state = frames.reference.state(ends_ns, 1.0)
     events = task.kind == "events"
@@ -253,15 +189,14 @@ def _framed(
     return made, names
 
 
-def _target(task: TaskSpec) -> SlipTarget:
-    if not isinstance(task.target, SlipTarget):
-        raise DataError(f"Task {task.name!r} has no frames.", hint="Report this.")
+def slip_target(task: TaskSpec) -> SlipTarget:
+    """Return the target of a task of frames."""
+    assert isinstance(task.target, SlipTarget)
     return task.target
 
 
 def _time(stream: StreamReadings) -> FloatArray:
-    if stream.time_s is None:
-        raise DataError(f"{stream.stream} has no clock.", hint="State it in the mapping.")
+    assert stream.time_s is not None
     return stream.time_s
 
 

@@ -3,23 +3,28 @@
 from __future__ import annotations
 
 import importlib
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from tactbench.core.evaluation.jackknife import influences
 from tactbench.core.evaluation.metrics import Metric
-from tactbench.core.evaluation.score_transform import ScoreTransform, transform_of
+from tactbench.core.evaluation.time_blocks import RESAMPLES, block_length, circular_blocks, generator
 from tactbench.core.samples import FloatArray, IntArray
 
 LEVEL = 0.95
-RESAMPLES = 2000
+NORMAL = 1.959963984540054
+"""The normal quantile at 97.5 %: intervals of rows are 95 %."""
 ENOUGH_CLUSTERS = 5
 """Fewer than this cannot be resampled: the interval would be their range."""
 NOT_ONE = float(np.sqrt(2.0))
 """Standard error of the log-odds of half an error in n rows: where not one was wrong, more may not be known."""
+FURTHEST = 10.0
+"""An error's interval ends at so many times the error itself: few replicates may put no upper bound to it."""
+_MOST_FREEDOM = 1e9
+"""Degrees of freedom beyond which t is normal to all digits."""
 
 
 @dataclass(frozen=True)
@@ -29,6 +34,20 @@ class Interval:
     low: float
     high: float
     method: str
+
+
+@dataclass(frozen=True)
+class ReplicateUnits:
+    """What was repeated: sessions, groups or recordings."""
+
+    name: str
+    """What one of them is called: session, object …"""
+    codes: IntArray
+    """(n,) which one each row belongs to"""
+    labels: tuple[str, ...]
+    """What each is called, by its code"""
+    caveat: str = ""
+    """What an interval over them does not know; added to how it was found"""
 
 
 def score_interval(
@@ -53,18 +72,15 @@ def score_interval(
     Notes
     -----
     With at least five clusters, each is left out in turn, those of one class standing in for each other only, and the
-    interval is Student's over clusters [4]_, on a scale that suits the metric (:func:`transform_of`). Percentiles of
+    interval is Student's over clusters [1]_, on a scale that suits the metric (:func:`transform_of`). Percentiles of
     resampled clusters cover less than they say where there are few: ``benchmarks/coverage.py``. With fewer clusters, or
-    when a class is in fewer than five, time is resampled instead: circular blocks within each recording [1]_, whose
-    length follows from the autocorrelation of the loss [2]_ [3]_. Such an interval knows nothing of the spread between
+    when a class is in fewer than five, time is resampled instead: circular blocks within each recording, whose length
+    follows from the autocorrelation of the loss (`time_blocks`). Such an interval knows nothing of the spread between
     sessions and says so.
 
     References
     ----------
-    .. [1] Politis and Romano 1992, A circular block-resampling procedure for stationary data.
-    .. [2] Politis and White 2004, Automatic block-length selection for the dependent bootstrap.
-    .. [3] Patton, Politis and White 2009, correction to [2]_.
-    .. [4] Cameron, Gelbach and Miller 2008, Bootstrap-based improvements for inference with clustered errors.
+    .. [1] Cameron, Gelbach and Miller 2008, Bootstrap-based improvements for inference with clustered errors.
     """
     rng = generator(seed)
     rows = metric.rows(y, predicted, n_classes)
@@ -97,27 +113,19 @@ def score_interval(
     return _student(metric, score, float(resampled.std()) * widened, freedom, scale, method)
 
 
-def generator(seed: int) -> np.random.Generator:
-    """Return what blocks of time are drawn with: the same blocks for every figure of a cell."""
-    return np.random.default_rng(np.random.SeedSequence([seed, 0xC1]))
-
-
 def _of_clusters(
-    metric: Metric, sums: FloatArray, strata: list[IntArray], cluster_name: str, n_classes: int, n: int
+    metric: Metric, sums: FloatArray, strata: IntArray, cluster_name: str, n_classes: int, n: int
 ) -> Interval:
     """Return Student's interval over clusters, from what leaving each out changes."""
     score = float(metric.score(sums.sum(axis=0), n_classes))
     scale = transform_of(metric.name, score, n)
-    code = np.zeros(len(sums), dtype=np.int64)
-    for place, one in enumerate(strata):
-        code[one] = place
     without = scale.there(metric.score(sums.sum(axis=0) - sums, n_classes))
     without = np.where(np.isfinite(without), without, scale.there(score))  # R² of labels that are all alike
-    freedom = len(sums) - len(strata)
+    freedom = len(sums) - len(np.unique(strata))
     method = (
         f"jackknife over {len(sums)} {plural(cluster_name)} (Student's t, {freedom} degrees of freedom, {scale.name})"
     )
-    deviation = float(np.sqrt((influences(without, code) ** 2).sum()))
+    deviation = float(np.sqrt((influences(without, strata) ** 2).sum()))
     return _student(metric, score, deviation, freedom, scale, method)
 
 
@@ -127,14 +135,9 @@ def _student(
     """Return Student's interval of a score whose standard error on `scale` is `deviation`."""
     if metric.kind != "regression" and score in (0.0, 1.0):
         deviation = NOT_ONE
-    reach = student_reach(freedom) * deviation
+    reach = float(student_quantile(freedom)) * deviation
     ends = [float(scale.back(scale.there(score) + one * reach)) for one in (-1.0, 1.0)]
     return Interval(min(*ends, score), max(*ends, score), method)
-
-
-def student_reach(freedom: float) -> float:
-    """Return how many standard errors Student's interval reaches to either side."""
-    return float(importlib.import_module("scipy.special").stdtrit(freedom, 0.5 + LEVEL / 2))
 
 
 def _of_too_few(metric: Metric, rows: FloatArray, n_classes: int) -> Interval:
@@ -160,20 +163,17 @@ def plural(name: str) -> str:
     return name + ("es" if name.endswith("s") else "s")
 
 
-def strata_of(y: npt.NDArray[Any], cluster: IntArray, n_classes: int) -> list[IntArray]:
-    """Return the clusters that may stand in for each other: all, or class by class where each has one class only.
+def strata_of(y: npt.NDArray[Any], cluster: IntArray, n_classes: int) -> IntArray:
+    """Return (clusters,) numbers, equal for clusters that may stand in for each other.
 
-    Without it a resample could lose a class, and its score would be that of another question.
+    All of them, or class by class where each cluster has one class only: without it a resample could lose a class, and
+    its score would be that of another question.
     """
-    every = np.arange(int(cluster.max()) + 1)
-    if n_classes == 0:
-        return [every]
-    there = np.zeros((len(every), n_classes), dtype=bool)
-    there[cluster, y] = True
+    there = np.zeros((int(cluster.max()) + 1, max(n_classes, 1)), dtype=bool)
+    there[cluster, y if n_classes else 0] = True
     if (there.sum(axis=1) > 1).any():
-        return [every]
-    own = there.argmax(axis=1)
-    return [every[own == one] for one in np.unique(own)]
+        return np.zeros(len(there), dtype=np.int64)
+    return np.unique(there.argmax(axis=1), return_inverse=True)[1].astype(np.int64)
 
 
 def loss_of(metric: Metric, y: npt.NDArray[Any], predicted: npt.NDArray[Any]) -> FloatArray:
@@ -184,84 +184,82 @@ def loss_of(metric: Metric, y: npt.NDArray[Any], predicted: npt.NDArray[Any]) ->
     return np.asarray(squares.sum(axis=1)) if metric.vector else squares
 
 
-def circular_blocks(rows: FloatArray, length: int, rng: np.random.Generator) -> FloatArray:
-    """Return (RESAMPLES, m) sums of `rows` resampled in circular blocks, each resample as long as the original."""
-    n = len(rows)
-    blocks = -(-n // length)
-    last = n - (blocks - 1) * length
-    out = np.zeros((RESAMPLES, rows.shape[1]))
-    filled = np.flatnonzero(rows.any(axis=0))  # a recording of one class leaves most of the confusion matrix empty
-    mine = rows[:, filled]
-    total = np.concatenate([np.zeros((1, len(filled))), np.cumsum(np.concatenate([mine, mine[:length]]), axis=0)])
-    starts = rng.integers(0, n, size=(RESAMPLES, blocks))
-    whole = total[length : length + n] - total[:n]
-    end = starts[:, -1]
-    for place, column in enumerate(filled):
-        sums = whole[:, place][starts[:, :-1]].sum(axis=1)
-        out[:, column] = sums + total[end + last, place] - total[end, place]
-    return out
+def student_quantile(freedom: Any, level: float = LEVEL) -> FloatArray:
+    """Return how many standard errors a two-sided interval of `level` reaches, for each of some degrees of freedom."""
+    special = importlib.import_module("scipy.special")
+    return np.asarray(special.stdtrit(np.minimum(freedom, _MOST_FREEDOM), 0.5 + level / 2), dtype=np.float64)
 
 
-def block_length(loss: FloatArray) -> int:
-    """Return the block length for a circular bootstrap of the mean of `loss`, (n,) in time order.
+def two_sided_p(t: float, freedom: float) -> float:
+    """Return the probability of a value at least as far from 0 as `t`."""
+    special = importlib.import_module("scipy.special")
+    return float(2 * special.stdtr(min(freedom, _MOST_FREEDOM), -abs(t)))
+
+
+def influences(without: FloatArray, strata: IntArray) -> FloatArray:
+    """Return (…, replicates) whose sum of squares is the squared standard error of a score.
+
+    Parameters
+    ----------
+    without
+        (…, replicates) the score without each replicate.
+    strata
+        (replicates,) which replicates may stand in for each other; two or more of each.
 
     Notes
     -----
-    ``b = (2 G² / D)^(1/3) n^(1/3)`` with ``D = 4/3 g(0)²``, the flat-top lag window, and the bandwidth from the last
-    lag whose correlation is significant (Politis and White 2004, with the correction of 2009). Never shorter than
-    ``n^(1/3)``: longer blocks than needed stay valid, and a loss that looks independent may only be rare.
+    The jackknife of Quenouille and Tukey, within strata as in Shao and Tu 1995, The jackknife and bootstrap, section
+    6.2. For a mean over replicates this is the usual standard error exactly, and no derivative of a metric is needed.
     """
-    n = len(loss)
-    # The length knows no unit: scaled, so that the fourth power of an absurd error does not overflow.
-    loss = loss / max(float(np.abs(loss).max()), np.finfo(np.float64).tiny)
-    centred = loss - loss.mean()
-    shortest = int(np.ceil(n ** (1 / 3)))
-    if n < 8 or float(np.mean(centred**2)) <= 1e-30 * float(np.mean(loss**2)):
-        return shortest
-    _, g0, g = _lag_window(centred)
-    if g0 == 0.0:
-        return shortest
-    length = (2.0 * (g / g0) ** 2 / (4.0 / 3.0)) ** (1 / 3) * n ** (1 / 3)
-    return int(np.clip(np.ceil(length), shortest, max(shortest, min(np.ceil(3 * np.sqrt(n)), n // 3))))
+    out = np.zeros_like(without)
+    for one in np.unique(strata):
+        mine = without[..., strata == one]
+        n = mine.shape[-1]
+        out[..., strata == one] = np.sqrt((n - 1) / n) * (mine.mean(axis=-1, keepdims=True) - mine)
+    return out
 
 
-def integrated_correlation(centred: FloatArray) -> float:
-    """Return the sum of all correlations of (n,) numbers about their mean, at least that of white noise: 1.
+@dataclass(frozen=True)
+class ScoreTransform:
+    """A monotone function of a score, and its inverse."""
 
-    The mean of n of them varies by so many times ``variance / n``. By the window of :func:`block_length`.
+    name: str
+    there: Callable[[Any], Any]
+    back: Callable[[Any], Any]
+
+
+def transform_of(metric: str, score: float, n: int) -> ScoreTransform:
+    """Return the scale of a metric on which Student's interval is to be made.
+
+    Parameters
+    ----------
+    score
+        What was scored; no error's interval reaches beyond ten times as much.
+    n
+        Test rows: a share is never nearer to 0 or 1 than half of one.
+
+    Notes
+    -----
+    A mean of squares from few sessions that is too low also looks too certain, and the reverse, so that Student's
+    interval of it misses a large truth too often; that of its reciprocal does not. Shares near 0 or 1 have no room on
+    one side: their logarithmic odds have (Agresti 2013, Categorical data analysis, section 3.1). Both are measured in
+    ``benchmarks/coverage.py``.
     """
-    if len(centred) < 8 or not (np.abs(centred) > 0).any():
-        return 1.0
-    variance, g0, _ = _lag_window(centred / np.abs(centred).max())
-    return max(g0 / variance, 1.0)
+    if metric in ("rmse", "mae", "mean_euclidean_error"):
+        least = max(score, np.finfo(np.float64).tiny ** 0.5) / 1e3
+        return ScoreTransform(
+            "reciprocal scale",
+            lambda x: 1.0 / np.maximum(x, least),
+            lambda x: 1.0 / np.maximum(x, 1.0 / (FURTHEST * max(score, least))),
+        )
+    if metric == "r2":
+        return ScoreTransform(
+            "scale of log(1 − R²)", lambda x: np.log(np.maximum(1.0 - x, 0.5 / n)), lambda x: 1.0 - np.exp(x)
+        )
+    edge = 0.5 / n
 
+    def odds(x: Any) -> Any:
+        inside = np.clip(x, edge, 1.0 - edge)
+        return np.log(inside / (1.0 - inside))
 
-def _lag_window(centred: FloatArray) -> tuple[float, float, float]:
-    """Return variance, ``g(0) = sum c(k)`` and ``G = sum |k| c(k)`` of autocovariances c under the flat-top window."""
-    n = len(centred)
-    variance = float(np.mean(centred**2))
-    reach = max(5, int(np.ceil(np.sqrt(np.log10(n)))))
-    longest = int(np.ceil(np.sqrt(n))) + reach
-    longest = min(longest, n - 1)
-    covariance = _autocovariance(centred, 2 * longest)
-    correlation = covariance[1 : longest + 1] / variance
-    small = np.abs(correlation) < 2.0 * np.sqrt(np.log10(n) / n)
-    last = longest
-    for lag in range(len(small) - reach + 1):
-        if small[lag : lag + reach].all():
-            last = lag
-            break
-    bandwidth = min(2 * max(last, 1), len(covariance) - 1)
-    lags = np.arange(-bandwidth, bandwidth + 1)
-    ratio = np.abs(lags) / bandwidth
-    window = np.where(ratio <= 0.5, 1.0, 2.0 * (1.0 - ratio))
-    weighted = window * covariance[np.abs(lags)]
-    return variance, float(weighted.sum()), float((np.abs(lags) * weighted).sum())
-
-
-def _autocovariance(centred: FloatArray, lags: int) -> FloatArray:
-    """Return the autocovariance at lags 0 … `lags`, by the fast Fourier transform with padding against wrap-around."""
-    n = len(centred)
-    size = 1 << int(np.ceil(np.log2(2 * n)))
-    spectrum = np.fft.rfft(centred, size)
-    return np.asarray(np.fft.irfft(np.abs(spectrum) ** 2, size)[: min(lags, n - 1) + 1] / n)
+    return ScoreTransform("scale of log-odds", odds, lambda x: 1.0 / (1.0 + np.exp(-x)))

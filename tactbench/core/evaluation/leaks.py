@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
 
 import numpy as np
 import numpy.typing as npt
 
 from tactbench.core.evaluation.dataset import Dataset, Table
-from tactbench.core.evaluation.splits import Assignment, Mask
+from tactbench.core.evaluation.splits import Assignment
 
 BLOCK = 16
 """Consecutive rows that must be equal; a recording of fewer rows counts as a whole."""
@@ -25,50 +26,29 @@ def leak_stamps(data: Dataset, assignments: Sequence[Assignment]) -> tuple[str, 
     rows = [_row_hashes(table) for table in data.tables]
     worst, pair = 0.0, ("", "")
     for fold in assignments:
-        share, found = _shared(data, rows, fold)
+        owner: dict[int, int] = {}
+        for place, mask in enumerate(fold.train):
+            learned = mask if fold.validation is None else mask | fold.validation[place]
+            for block in _blocks(rows[place][learned])[0].tolist():
+                owner.setdefault(block, place)
+        covered, total = [], 0
+        for place, mask in enumerate(fold.test):
+            blocks, starts, length = _blocks(rows[place][mask])
+            same = [number for number, block in enumerate(blocks.tolist()) if block in owner]
+            inside = np.unique(starts[same][:, None] + np.arange(length)).size
+            total += int(mask.sum())
+            owners = Counter(owner[block] for block in blocks[same].tolist())
+            covered.append((inside, -place, owners.most_common(1)[0][0] if owners else -1))
+        share = sum(inside for inside, _, _ in covered) / max(total, 1)
         if share > worst:
-            worst, pair = share, found
+            _, test, train = max(covered)
+            worst, pair = share, (data.tables[-test].meta.name, data.tables[train].meta.name)
     if worst <= MOST_SHARED:
         return ()
     return (
         f"leaks: {worst:.0%} of the test rows of a fold are equal to training rows, in blocks of {BLOCK}; "
         f"{pair[0]!r} repeats {pair[1]!r}.",
     )
-
-
-def _shared(data: Dataset, rows: Sequence[_Hashes], fold: Assignment) -> tuple[float, tuple[str, str]]:
-    """Return which share of a fold's test rows stands in its training rows, and the pair of recordings most alike."""
-    trained = [_blocks(rows[place][mask])[0] for place, mask in enumerate(_fitted(fold))]
-    known = np.concatenate(trained)
-    owner = np.repeat(np.arange(len(trained)), [len(one) for one in trained])
-    order = np.argsort(known, kind="stable")
-    known, owner = known[order], owner[order]
-    total = covered = most = 0
-    pair = ("", "")
-    for place, mask in enumerate(fold.test):
-        hashes, starts, length = _blocks(rows[place][mask])
-        total += int(mask.sum())
-        at = np.searchsorted(known, hashes)
-        there = at < len(known)
-        there[there] = known[at[there]] == hashes[there]
-        same = np.flatnonzero(there)
-        if not len(same):
-            continue
-        inside = np.zeros(int(mask.sum()), dtype=bool)
-        for step in range(length):
-            inside[starts[same] + step] = True
-        covered += int(inside.sum())
-        if int(inside.sum()) > most:
-            most = int(inside.sum())
-            other = int(np.bincount(owner[at[same]]).argmax())
-            pair = (data.tables[place].meta.name, data.tables[other].meta.name)
-    return (covered / total if total else 0.0), pair
-
-
-def _fitted(fold: Assignment) -> list[Mask]:
-    if fold.validation is None:
-        return list(fold.train)
-    return [train | validation for train, validation in zip(fold.train, fold.validation, strict=True)]
 
 
 def _row_hashes(table: Table) -> _Hashes:

@@ -14,7 +14,8 @@ import numpy.typing as npt
 
 from tactbench.core.errors import UnknownNameError
 from tactbench.core.samples import FloatArray
-from tactbench.core.spec.task import VECTOR_METRIC
+from tactbench.core.spec.row import HIGH_ERROR, MEDIAN_ERROR
+from tactbench.core.spec.task import VECTOR_METRIC, VectorTarget
 
 Rows = Callable[[npt.NDArray[Any], npt.NDArray[Any], int], FloatArray]
 Score = Callable[[FloatArray, int], FloatArray]
@@ -35,20 +36,17 @@ class Metric:
     """Truth and predictions are (n, components)."""
 
     def of(self, y: npt.NDArray[Any], predicted: npt.NDArray[Any], n_classes: int = 0) -> float:
-        """Return the score of `predicted` against `y`."""
-        return float(self.score(self.rows(y, predicted, n_classes).sum(axis=0), n_classes))
+        """Return the score of `predicted` against `y`; infinite where squares of the answers overflow."""
+        with np.errstate(over="ignore", invalid="ignore"):
+            return float(self.score(self.rows(y, predicted, n_classes).sum(axis=0), n_classes))
 
 
-def _squares(y: npt.NDArray[Any], predicted: npt.NDArray[Any], _: int) -> FloatArray:
-    return np.column_stack([(predicted - y) ** 2, np.ones(len(y))])
+def _mean_of(error: Callable[[npt.NDArray[Any]], npt.NDArray[Any]]) -> Rows:
+    """Return the summands of a mean over rows of what `error` makes of their differences."""
+    return lambda y, predicted, _: np.column_stack([error(predicted - y), np.ones(len(y))])
 
 
-def _absolutes(y: npt.NDArray[Any], predicted: npt.NDArray[Any], _: int) -> FloatArray:
-    return np.column_stack([np.abs(predicted - y), np.ones(len(y))])
-
-
-def _distances(y: npt.NDArray[Any], predicted: npt.NDArray[Any], _: int) -> FloatArray:
-    return np.column_stack([distances(y, predicted), np.ones(len(y))])
+_squares = _mean_of(np.square)
 
 
 def distances(y: npt.NDArray[Any], predicted: npt.NDArray[Any]) -> FloatArray:
@@ -120,8 +118,8 @@ METRICS = {
     metric.name: metric
     for metric in (
         Metric("rmse", "regression", False, _squares, _rmse),
-        Metric("mae", "regression", False, _absolutes, _mae),
-        Metric(VECTOR_METRIC, "regression", False, _distances, _mae, vector=True),
+        Metric("mae", "regression", False, _mean_of(np.abs), _mae),
+        Metric(VECTOR_METRIC, "regression", False, _mean_of(lambda d: np.linalg.norm(d, axis=1)), _mae, vector=True),
         Metric("r2", "regression", True, _explained, _r2),
         Metric("accuracy", "classification", True, _pairs, _accuracy),
         Metric("balanced_accuracy", "classification", True, _pairs, _balanced),
@@ -148,3 +146,14 @@ def metric_called(name: str) -> Metric:
     if name not in METRICS:
         raise UnknownNameError("metric", name, METRICS)
     return METRICS[name]
+
+
+def vector_details(target: VectorTarget, y: npt.NDArray[Any], predicted: npt.NDArray[Any]) -> dict[str, float]:
+    """Return what stands beside the mean error: percentiles over all rows, and each component's own RMSE."""
+    error = distances(y, predicted)
+    squares = np.mean((predicted - y) ** 2, axis=0)
+    return {
+        MEDIAN_ERROR: float(np.median(error)),
+        HIGH_ERROR: float(np.percentile(error, 95)),
+        **{f"RMSE of {name}": float(np.sqrt(one)) for name, one in zip(target.names, squares, strict=True)},
+    }

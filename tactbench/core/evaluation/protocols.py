@@ -1,7 +1,8 @@
-"""Protocols as data: how recordings become X and y, and on which data each step is fitted."""
+"""Protocols as data: how recordings become X and y, and on which data each step is fitted; names of few-shot splits."""
 
 from __future__ import annotations
 
+import re
 from typing import Literal
 
 from pydantic import Field
@@ -20,7 +21,7 @@ class ProtocolSpec(Frozen):
     discard_hold: bool = False
     """Drop the scene's stated hold (the set-up's initialization, before any load) where a recording has a scene."""
     tare: bool = False
-    """Subtract from each recording its own mean over the unloaded hold that its scene states; see `unloaded`."""
+    """Subtract from each recording its own mean over the unloaded hold that its scene states; see `sets.hold_s`."""
     three_sigma: bool = False
     """Drop a sample if a feature or the reference force lies beyond three standard deviations of its set."""
     scaled_by: Literal["each set", "training set"]
@@ -32,7 +33,7 @@ class ProtocolSpec(Frozen):
     uses_test_statistics: bool = False
     """Rows carry a dagger."""
     first_row_only: bool = False
-    """Keep the first row of every recording and nothing else; see `first_frame`."""
+    """Keep the first row of every recording and nothing else; see `splits`."""
     probe: bool = False
     """Asks what recordings give away, not what a sensor can do: allowed for every task, whether it lists it or not."""
 
@@ -110,3 +111,9 @@ def protocol_called(name: str) -> ProtocolSpec:
     if name not in PROTOCOLS:
         raise UnknownNameError("protocol", name, PROTOCOLS)
     return PROTOCOLS[name]
+
+
+def shots(split: str) -> int | None:
+    """Return how many training sessions a split named `few-shot-N` has; None if it is another."""
+    found = re.fullmatch(r"few-shot-([1-9][0-9]*)", split)
+    return int(found[1]) if found else None

@@ -7,7 +7,6 @@ recording's unloaded hold.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -15,41 +14,22 @@ import numpy as np
 import numpy.typing as npt
 
 from tactbench.core.evaluation.dataset import Dataset, Table
-from tactbench.core.evaluation.interval import (
+from tactbench.core.evaluation.interval import ReplicateUnits, enough, influences, student_quantile
+from tactbench.core.evaluation.metrics import Metric
+from tactbench.core.evaluation.sets import hold_s, unloaded
+from tactbench.core.evaluation.time_blocks import (
     RESAMPLES,
     block_length,
     circular_blocks,
-    enough,
     generator,
     integrated_correlation,
-    strata_of,
-    student_reach,
 )
-from tactbench.core.evaluation.jackknife import influences
-from tactbench.core.evaluation.metrics import Metric
-from tactbench.core.evaluation.replication import ReplicateUnits
-from tactbench.core.evaluation.unloaded import hold_s, unloaded
 from tactbench.core.samples import Answers, FloatArray, IntArray
 from tactbench.core.spec.recording import RecordingMeta
 from tactbench.core.spec.task import ChannelTarget, TaskSpec
 
 FEWEST = 30
 """Independent unloaded samples below which no floor is told (assumed): a deviation from 30 is known to 13 %."""
-
-
-@dataclass(frozen=True)
-class UnloadedHold:
-    """What one recording's reference says while nothing presses."""
-
-    squares: FloatArray
-    """(n,) squared differences from the hold's mean, in time order"""
-    freedom: float
-    """how many independent differences they are worth: n less one, or less than that where noise is correlated"""
-
-    @property
-    def shares(self) -> FloatArray:
-        """(n, 2) each sample's square, and its part of the degrees of freedom: what a block of time adds up."""
-        return np.column_stack([self.squares, np.full(len(self.squares), self.freedom / max(len(self.squares), 1))])
 
 
 @dataclass(frozen=True)
@@ -66,17 +46,31 @@ class BeyondFloor:
 class Floor:
     """What is known of the reference of the recordings that were tested."""
 
-    holds: dict[int, UnloadedHold]
-    """By number of the recording."""
+    holds: dict[int, FloatArray]
+    """By number of the recording (:func:`hold_of`)."""
 
     @property
     def value(self) -> float:
         """The deviation of the reference, pooled over the recordings."""
-        return float(np.sqrt(_per_freedom(self.sums(list(self.holds)).sum(axis=0))))
+        return float(np.sqrt(self.square))
 
-    def sums(self, recordings: Sequence[int]) -> FloatArray:
-        """Return (recordings, 2) sums of squares and degrees of freedom."""
-        return np.array([[self.holds[one].squares.sum(), self.holds[one].freedom] for one in recordings])
+    @property
+    def square(self) -> float:
+        """The variance of the reference, pooled over the recordings."""
+        return float(_per_freedom(sum(one.sum(axis=0) for one in self.holds.values())))
+
+    def by_replicate(self, tested: Answers, code: IntArray) -> FloatArray:
+        """Return (replicates, 2) sums of squares and degrees of freedom, from (n,) the replicate of each test row.
+
+        Where a recording's test rows are in several replicates, its hold is dealt to them in order of time, in
+        proportion to their rows: noise of one hold is as good as of another.
+        """
+        out = np.zeros((int(code.max()) + 1, 2))
+        for place, hold in self.holds.items():
+            mine = np.flatnonzero(tested.recording == place)
+            codes = code[mine[np.argsort(tested.row[mine], kind="stable")]]
+            np.add.at(out, codes[np.arange(len(hold)) * len(codes) // len(hold)], hold)
+        return out
 
 
 def reference_floor(task: TaskSpec, metric: Metric, data: Dataset, tested: Answers) -> tuple[Floor | None, str]:
@@ -93,14 +87,14 @@ def reference_floor(task: TaskSpec, metric: Metric, data: Dataset, tested: Answe
         return None, ""
     if task.target.reduce is not None:
         return None, ""  # a number of many samples has not the noise of one
-    holds: dict[int, UnloadedHold] = {}
+    holds: dict[int, FloatArray] = {}
     for place in np.unique(tested.recording).tolist():
         table = data.tables[place]
         why = _no_hold(table)
         if why:
             return None, f"no floor of the reference: recording {table.meta.name!r} {why}"
         holds[place] = hold_of(table.y[unloaded(table) & table.labelled])
-    if sum(one.freedom for one in holds.values()) < FEWEST:
+    if sum(one[:, 1].sum() for one in holds.values()) < FEWEST:
         return None, f"no floor of the reference: fewer than {FEWEST} independent samples of it are unloaded"
     return Floor(holds), ""
 
@@ -115,10 +109,16 @@ def _no_hold(table: Table) -> str:
     return ""
 
 
-def hold_of(y: npt.NDArray[Any]) -> UnloadedHold:
-    """Return what (n,) samples of an unloaded reference say, n at least 2, in time order."""
+def hold_of(y: npt.NDArray[Any]) -> FloatArray:
+    """Return what (n,) samples of an unloaded reference say, n at least 2, in time order.
+
+    (n, 2): the squared difference of each from the hold's mean, and its part of the degrees of freedom, which are n
+    less one, or less than that where noise is correlated.
+    """
     centred = np.asarray(y, dtype=np.float64) - np.mean(y)
-    return UnloadedHold(centred**2, len(centred) - min(integrated_correlation(centred), len(centred) / 2))
+    n = len(centred)
+    freedom = n - min(integrated_correlation(centred), n / 2)
+    return np.column_stack([centred**2, np.full(n, freedom / n)])
 
 
 def beyond_floor(floor: Floor, tested: Answers, unit: ReplicateUnits, seed: int) -> BeyondFloor:
@@ -132,57 +132,26 @@ def beyond_floor(floor: Floor, tested: Answers, unit: ReplicateUnits, seed: int)
     blocks as for the RMSE, the holds in their own, and the degrees of freedom are those of Welch and Satterthwaite.
     """
     loss = (tested.y_pred - tested.y_true) ** 2
-    held = floor.sums(list(floor.holds))
-    excess = float(loss.mean() - _per_freedom(held.sum(axis=0)))
+    excess = float(loss.mean() - floor.square)
     if enough(tested.y_true, unit.codes, 0):
-        low, high = _over_units(floor, loss, tested, unit, excess)
+        n = len(unit.labels)
+        sums, held = np.zeros((n, 2)), floor.by_replicate(tested, unit.codes)
+        np.add.at(sums, unit.codes, np.column_stack([loss, np.ones(len(loss))]))
+        without = _per_freedom(sums.sum(axis=0) - sums) - _per_freedom(held.sum(axis=0) - held)
+        carried = influences(without, np.zeros(n, dtype=np.int64))
+        reach = float(student_quantile(n - 1)) * float(np.sqrt(carried @ carried))
     else:
-        low, high = _over_time(floor, loss, tested.recording, seed, excess)
-    ends = [float(np.sqrt(max(0.0, value))) for value in (excess, low, high)]
+        reach = _reach_over_time(floor, loss, tested.recording, seed)
+    ends = [float(np.sqrt(max(0.0, value))) for value in (excess, excess - reach, excess + reach)]
     return BeyondFloor(floor.value, *ends)
 
 
-def floor_sums(floor: Floor, recording: IntArray, code: IntArray, replicates: int, rows: IntArray) -> FloatArray:
-    """Return (replicates, 2) the floor's sums of squares and degrees of freedom by replicate.
-
-    Parameters
-    ----------
-    recording, code, rows
-        (n,) of each test row: its recording, its replicate, and its row in the recording. Where a recording's test rows
-        are in several replicates, its hold is dealt to them in order of time, in proportion to their rows: noise of one
-        hold is as good as of another.
-    """
-    out = np.zeros((replicates, 2))
-    for place, hold in floor.holds.items():
-        mine = np.flatnonzero(recording == place)
-        codes = code[mine[np.argsort(rows[mine], kind="stable")]]
-        share = codes[np.arange(len(hold.squares)) * len(codes) // len(hold.squares)]
-        np.add.at(out, share, hold.shares)
-    return out
-
-
-def _over_units(
-    floor: Floor, loss: FloatArray, tested: Answers, unit: ReplicateUnits, excess: float
-) -> tuple[float, float]:
-    n = len(unit.labels)
-    sums = np.zeros((n, 2))
-    np.add.at(sums, unit.codes, np.column_stack([loss, np.ones(len(loss))]))
-    held = floor_sums(floor, tested.recording, unit.codes, n, tested.row)
-    strata = strata_of(tested.y_true, unit.codes, 0)
-    without = _per_freedom(sums.sum(axis=0) - sums) - _per_freedom(held.sum(axis=0) - held)
-    carried = influences(without, np.zeros(n, dtype=np.int64))
-    reach = student_reach(float(n - len(strata))) * float(np.sqrt(carried @ carried))
-    return excess - reach, excess + reach
-
-
-def _over_time(
-    floor: Floor, loss: FloatArray, recording: IntArray, seed: int, excess: float
-) -> tuple[float, float]:  # fmt: skip
+def _reach_over_time(floor: Floor, loss: FloatArray, recording: IntArray, seed: int) -> float:
     rng = generator(seed)
     places = np.unique(recording).tolist()
     errors = [np.column_stack([loss[recording == one], np.ones((recording == one).sum())]) for one in places]
     deviations, freedoms = [], []
-    for parts in (errors, [floor.holds[one].shares for one in places]):
+    for parts in (errors, [floor.holds[one] for one in places]):
         total, blocks = np.zeros((RESAMPLES, 2)), 0.0
         for part in parts:
             length = block_length(part[:, 0])
@@ -193,10 +162,9 @@ def _over_time(
         deviations.append(float(_per_freedom(total).std()) * np.sqrt(blocks / freedom))
     squares = np.array(deviations) ** 2
     if not squares.any():
-        return excess, excess
+        return 0.0
     together = float(squares.sum() ** 2 / (squares**2 / np.array(freedoms)).sum())
-    reach = student_reach(together) * float(np.sqrt(squares.sum()))
-    return excess - reach, excess + reach
+    return float(student_quantile(together)) * float(np.sqrt(squares.sum()))
 
 
 def _per_freedom(sums: FloatArray) -> FloatArray:

@@ -1,4 +1,4 @@
-"""What a row keeps of its replicates, so that scores can be compared later without the answers.
+"""What was repeated, and what a row keeps of it, so that scores can be compared later without the answers.
 
 ::
 
@@ -18,17 +18,21 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
-from tactbench.core.errors import UnknownNameError
 from tactbench.core.evaluation.dataset import Dataset
-from tactbench.core.evaluation.interval import block_length, enough, loss_of, strata_of
-from tactbench.core.evaluation.metrics import EXCESS, SUMMED, Metric
-from tactbench.core.evaluation.reference_floor import Floor, floor_sums
-from tactbench.core.evaluation.replication import ReplicateUnits
+from tactbench.core.evaluation.interval import ReplicateUnits, enough, loss_of, plural, strata_of
+from tactbench.core.evaluation.metrics import EXCESS, Metric
+from tactbench.core.evaluation.protocols import shots
+from tactbench.core.evaluation.reference_floor import Floor
+from tactbench.core.evaluation.splits import SPLITS_WITHOUT_GROUPS
+from tactbench.core.evaluation.time_blocks import block_length
 from tactbench.core.samples import Answers, FloatArray, IntArray
+from tactbench.core.spec.task import TaskSpec
 
 BLOCKS = 40
 """Blocks of time a recording is cut into where there is nothing else to resample: the same share of time is the same
@@ -36,6 +40,53 @@ block for every sensor."""
 BLOCKS_IN_ALL = 200
 """About so many, whatever the number of recordings; never fewer than `FEWEST` each."""
 FEWEST = 4
+
+
+def replicates(
+    data: Dataset, task: TaskSpec, split: str, y: npt.NDArray[Any], recording: IntArray, row: IntArray
+) -> ReplicateUnits:
+    """Return the unit of replication of every test row.
+
+    The coarsest unit of which there are enough to resample: the group that the split keeps apart, or else the session;
+    then the groups that the task names; then the recording. If there are not enough of any, the first: the interval
+    then resamples time and says so. Groups that some test row is not in cannot be resampled: that is said.
+
+    Parameters
+    ----------
+    y, recording, row
+        (n,) truth, recording and row in it of every test row.
+    """
+    first = "session" if split in SPLITS_WITHOUT_GROUPS or shots(split) else split
+    named = [name for name in task.splits if name not in (*SPLITS_WITHOUT_GROUPS, first) and not shots(name)]
+    names = list(dict.fromkeys([first, *named, "recording"]))
+    units = [_unit(data, name, recording, row) for name in names]
+    there = [one for one in units if one is not None]
+    for place, one in enumerate(units):
+        if one is not None and enough(y, one.codes, len(data.classes)):
+            return replace(one, caveat=_caveat(names[:place], units[:place]))
+    return there[0]
+
+
+def _caveat(names: Sequence[str], units: Sequence[ReplicateUnits | None]) -> str:
+    """Return what an interval does not know that passes over coarser units."""
+    if not names:
+        return ""
+    unknown = [name for name, one in zip(names, units, strict=True) if one is None]
+    why = f"; some test rows have no {' and no '.join(unknown)}" if unknown else ""
+    return f": spread between {' and '.join(map(plural, names))} is not in it{why}"
+
+
+def _unit(data: Dataset, name: str, recording: IntArray, row: IntArray) -> ReplicateUnits | None:
+    """Return the groups of one name; None if some test row is in none."""
+    values = np.empty(len(recording), dtype=object)
+    for place in np.unique(recording):
+        table = data.tables[place]
+        if name not in table.groups:
+            return None
+        mine = recording == place
+        values[mine] = table.groups[name][np.searchsorted(table.row, row[mine])]
+    labels, codes = np.unique(values.astype(np.str_), return_inverse=True)
+    return ReplicateUnits(name, codes.reshape(-1).astype(np.int64), tuple(labels.tolist()))
 
 
 def summed(
@@ -54,25 +105,16 @@ def summed(
         What the holds of the tested recordings say of the reference.
     """
     n_classes = len(data.classes)
-    summands = metric.rows(tested.y_true, tested.y_pred, n_classes)
-    if enough(tested.y_true, unit.codes, n_classes):
-        strata = strata_of(tested.y_true, unit.codes, n_classes)
-        number = np.zeros(len(unit.labels), dtype=np.int64)
-        for place, one in enumerate(strata):
-            number[one] = place
-        return {
-            "unit": unit.name,
-            "names": list(unit.labels),
-            "strata": number.tolist() if len(strata) > 1 else None,
-            "run": 1,
-            "sums": _lines(summands, unit.codes, len(unit.labels), n_classes),
-            **_floor(floor, tested, unit.codes, len(unit.labels)),
-        }
-    return summed_in_time(metric, tested, _recording_names(data), n_classes, floor)
-
-
-def _floor(floor: Floor | None, tested: Answers, code: IntArray, n: int) -> dict[str, Any]:
-    return {} if floor is None else {"floor": floor_sums(floor, tested.recording, code, n, tested.row).tolist()}
+    if not enough(tested.y_true, unit.codes, n_classes):
+        return summed_in_time(metric, tested, _recording_names(data), n_classes, floor)
+    strata = strata_of(tested.y_true, unit.codes, n_classes)
+    return {
+        "unit": unit.name,
+        "names": list(unit.labels),
+        "strata": strata.tolist() if strata.any() else None,
+        "run": 1,
+        **_sums(metric, tested, unit.codes, n_classes, floor),
+    }
 
 
 def summed_in_time(
@@ -85,7 +127,6 @@ def summed_in_time(
     names
         What each recording is called, by its number.
     """
-    summands = metric.rows(tested.y_true, tested.y_pred, n_classes)
     order = sorted(np.unique(tested.recording).tolist(), key=lambda place: names[place])
     most = int(np.clip(BLOCKS_IN_ALL // len(order), FEWEST, BLOCKS))
     code = np.zeros(len(tested), dtype=np.int64)
@@ -109,8 +150,7 @@ def summed_in_time(
         "names": labels,
         "strata": strata,
         "run": max(runs),
-        "sums": _lines(summands, code, len(labels), n_classes),
-        **_floor(floor, tested, code, len(labels)),
+        **_sums(metric, tested, code, n_classes, floor),
     }
 
 
@@ -130,12 +170,14 @@ def _recording_names(data: Dataset) -> list[str]:
     return [f"{name} #{place + 1}" if still[name] > 1 else name for place, name in enumerate(longer)]
 
 
-def _lines(summands: FloatArray, code: IntArray, n: int, n_classes: int) -> list[list[float]]:
-    sums = np.zeros((n, summands.shape[1]))
+def _sums(metric: Metric, tested: Answers, code: IntArray, n_classes: int, floor: Floor | None) -> dict[str, Any]:
+    summands = metric.rows(tested.y_true, tested.y_pred, n_classes)
+    sums = np.zeros((int(code.max()) + 1, summands.shape[1]))
     np.add.at(sums, code, summands)
+    held = {} if floor is None else {"floor": floor.by_replicate(tested, code).tolist()}
     if not n_classes:
-        return [_without_needless_points(line) for line in sums.tolist()]
-    return [[int(value) for column in np.flatnonzero(line) for value in (column, line[column])] for line in sums]
+        return {"sums": [_without_needless_points(line) for line in sums.tolist()], **held}
+    return {"sums": [[int(one) for place in np.flatnonzero(line) for one in (place, line[place])] for line in sums]}
 
 
 def _without_needless_points(line: list[float]) -> list[float]:
@@ -143,35 +185,18 @@ def _without_needless_points(line: list[float]) -> list[float]:
     return [int(value) if value.is_integer() and abs(value) < 2**53 else value for value in line]
 
 
-def tables_of(several: list[dict[str, Any]], metric: str, n_classes: int) -> FloatArray:
+def tables_of(several: Sequence[dict[str, Any]], metric: str, n_classes: int) -> FloatArray:
     """Return (rows, replicates, m) the sums that :func:`summed` wrote, of rows with equal names.
 
-    Raises
-    ------
-    UnknownNameError
-        If there is no such metric.
-    ValueError
-        If the sums of some row have another shape than its metric's.
-    KeyError
-        If the mean square beyond the floor is asked for, and a row keeps no floor.
+    With `metric` :data:`EXCESS`, squares and degrees of freedom of the unloaded holds stand behind those of the errors.
     """
-    if metric not in SUMMED:
-        raise UnknownNameError("metric", metric, SUMMED)
-    found = SUMMED[metric]
-    if found.kind == "regression":
+    if not n_classes:
         dense = np.array([one["sums"] for one in several], dtype=np.float64)
-        if dense.ndim != 3:
-            raise ValueError(f"sums of shape {dense.shape} are not (rows, replicates, summands)")
-        if found is EXCESS:
-            held = np.array([one["floor"] for one in several], dtype=np.float64)
-            return np.concatenate([dense[..., :2], held], axis=2)
-        return dense
-    replicates, columns = len(several[0]["names"]), n_classes * n_classes
+        if metric != EXCESS.name:
+            return dense
+        return np.concatenate([dense[..., :2], np.array([one["floor"] for one in several], dtype=np.float64)], axis=2)
     lines = [line for one in several for line in one["sums"]]
-    pairs = np.array([value for line in lines for value in line], dtype=np.float64).reshape(-1, 2)
-    column = pairs[:, 0].astype(np.int64)
-    if len(lines) != len(several) * replicates or ((column < 0) | (column >= columns)).any():
-        raise ValueError(f"sums are not of {replicates} replicates and {n_classes} classes")
-    out = np.zeros((len(lines), columns))
-    out[np.repeat(np.arange(len(lines)), [len(line) // 2 for line in lines]), column] = pairs[:, 1]
-    return out.reshape(len(several), replicates, columns)
+    out = np.zeros((len(lines), n_classes * n_classes))
+    for row, line in zip(out, lines, strict=True):
+        row[line[::2]] = line[1::2]
+    return out.reshape(len(several), -1, n_classes * n_classes)

@@ -1,22 +1,67 @@
-"""From masks to X and y: what the protocol discards, scales and filters."""
+"""From masks to X and y: what the protocol tares, discards, scales and filters."""
 
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from tactbench.core.errors import DataError
+from tactbench.core.errors import DataError, NotApplicable
 from tactbench.core.evaluation.dataset import Dataset, Table
 from tactbench.core.evaluation.protocols import ProtocolSpec
-from tactbench.core.evaluation.unloaded import tared
-from tactbench.core.evaluation.windows import causal_mean
-from tactbench.core.samples import FloatArray, IntArray, Part
+from tactbench.core.evaluation.splits import Assignment
+from tactbench.core.samples import FloatArray, Fold, IntArray, Part
+from tactbench.core.spec.recording import RecordingMeta
 
 Mask = npt.NDArray[np.bool_]
+
+
+def hold_s(meta: RecordingMeta) -> float:
+    """Return how many seconds a recording is commanded to be unloaded before its press; 0 where it states none.
+
+    A scene states it (:class:`ForceRamp.hold`). Recordings without a scene, a clock or a hold at zero force state none,
+    and none is inferred from their readings.
+    """
+    if meta.scene is None or meta.clock == "none" or meta.scene.profile.start.to("N") != 0:
+        return 0.0
+    return meta.scene.profile.hold_s
+
+
+def unloaded(table: Table) -> npt.NDArray[np.bool_]:
+    """Return (n,) which rows of a recording lie in its unloaded hold."""
+    return np.asarray(table.time_s < hold_s(table.meta))
+
+
+def tared(table: Table) -> FloatArray:
+    """Return (n, features) readings less their mean over the recording's own unloaded hold.
+
+    Rows after the hold change nothing; a recording without a row there is returned as it is.
+    """
+    before = unloaded(table)
+    return np.asarray(table.X - table.X[before].mean(axis=0)) if before.any() else table.X
+
+
+def tare_s(data: Dataset) -> float:
+    """Return how many seconds every recording can be tared on, the shortest hold of all; 0 if none states one.
+
+    Raises
+    ------
+    NotApplicable
+        If some recordings can be tared and others cannot: their readings would not be of one kind.
+    """
+    held = [hold_s(table.meta) if unloaded(table).any() else 0.0 for table in data.tables]
+    if any(held) and not all(held):
+        name = data.metas[held.index(0.0)].name
+        raise NotApplicable(
+            f"{sum(one > 0 for one in held)} of {len(held)} recordings state an unloaded hold to tare on; {name!r} "
+            "states none.",
+            hint="Use --protocol deployable-untared, which tares none of them.",
+        )
+    return min(held, default=0.0)
 
 
 @dataclass(frozen=True)
@@ -25,11 +70,6 @@ class FeatureScale:
 
     mean: FloatArray
     deviation: FloatArray
-
-    @classmethod
-    def of(cls, X: FloatArray) -> FeatureScale:
-        """Measure `X`."""
-        return cls(*moments(X))
 
     def __call__(self, X: FloatArray) -> FloatArray:
         """Return z-scores; a feature that was constant where the scale was measured becomes exactly 0, never NaN."""
@@ -58,7 +98,6 @@ class SetRows:
     time_s: FloatArray
     recording: IntArray
     row: IntArray
-    cluster: IntArray
     segment: IntArray
     """Windows stay within one number."""
 
@@ -80,38 +119,41 @@ def keep(data: Dataset, protocol: ProtocolSpec, masks: Sequence[Mask], what: str
     DataError
         If no row is left.
     """
-    chosen = [mask & asked_for(table, protocol) for table, mask in zip(data.tables, masks, strict=True)]
+    tables = data.tables
+    chosen = [mask & asked_for(table, protocol) for table, mask in zip(tables, masks, strict=True)]
     sizes = [int(mask.sum()) for mask in chosen]
     if sum(sizes) == 0:
         raise DataError(f"The {what} set has no rows.", hint="Check roles, sessions and the length of the recordings.")
-    tables = data.tables
-    readings = [tared(table) if protocol.tare else table.X for table in tables]
-    X = np.concatenate([column[mask] for column, mask in zip(readings, chosen, strict=True)])
-    recording = np.repeat(np.arange(len(tables)), sizes)
-    row = np.concatenate([table.row[mask] for table, mask in zip(tables, chosen, strict=True)])
-    place = np.concatenate([np.flatnonzero(mask) for mask in chosen])
+
+    def joined(columns: Iterable[npt.NDArray[Any]]) -> npt.NDArray[Any]:
+        return np.concatenate([column[mask] for column, mask in zip(columns, chosen, strict=True)])
+
+    X = joined(tared(table) if protocol.tare else table.X for table in tables)
+    recording, place = np.repeat(np.arange(len(tables)), sizes), np.concatenate([np.flatnonzero(one) for one in chosen])
     good = np.ones(len(X), dtype=bool)
     if protocol.three_sigma:
-        forces = [np.full(len(table.row), np.nan) if table.force is None else table.force for table in tables]
-        force = np.concatenate([column[mask] for column, mask in zip(forces, chosen, strict=True)])
+        force = joined(np.full(len(one.row), np.nan) if one.force is None else one.force for one in tables)
         good = _within_three_sigma(X, force, data.features, what, counts)
         if not good.any():
             raise DataError(
                 f"The three-sigma rule of {protocol.name!r} leaves none of the {len(X)} rows of the {what} set.",
                 hint="Look at its channels with `tactbench inspect`, or use --protocol deployable.",
             )
-    sessions = {name: place for place, name in enumerate(sorted({meta.session for meta in data.metas}))}
-    cluster = np.repeat([sessions[meta.session] for meta in data.metas], sizes)
-    consecutive = protocol.window_over == "consecutive samples"
+    if protocol.window_over == "consecutive samples":
+        # `place` does not count rows with a dropped-out channel: a filter in use skips such a row and goes on. A jump
+        # in it is a row that belongs to another set.
+        breaks = (np.diff(recording[good], prepend=0) != 0) | (np.diff(place[good], prepend=place[good][0] - 1) != 1)
+        segment = np.cumsum(breaks)
+    else:
+        segment = recording[good]
     return SetRows(
         X=X[good],
-        y=np.concatenate([table.y[mask] for table, mask in zip(tables, chosen, strict=True)])[good],
-        labelled=np.concatenate([table.labelled[mask] for table, mask in zip(tables, chosen, strict=True)])[good],
-        time_s=np.concatenate([table.time_s[mask] for table, mask in zip(tables, chosen, strict=True)])[good],
+        y=joined(table.y for table in tables)[good],
+        labelled=joined(table.labelled for table in tables)[good],
+        time_s=joined(table.time_s for table in tables)[good],
         recording=recording[good],
-        row=row[good],
-        cluster=cluster[good],
-        segment=_segments(recording[good], place[good], consecutive=consecutive),
+        row=joined(table.row for table in tables)[good],
+        segment=segment,
     )
 
 
@@ -155,29 +197,61 @@ def _within_three_sigma(
     return good
 
 
-def _segments(recording: IntArray, place: IntArray, *, consecutive: bool) -> IntArray:
-    """Return (n,) numbers of the stretches that windows stay in.
-
-    `place` counts the rows of a table, in which rows with a dropped-out channel are not: a filter in use skips such a
-    row and goes on, it does not start anew. A jump in `place` is a row that belongs to another set.
-    """
-    if not consecutive:
-        return recording
-    breaks = (np.diff(recording, prepend=recording[:1]) != 0) | (np.diff(place, prepend=place[:1] - 1) != 1)
-    return np.cumsum(breaks).astype(np.int64)
-
-
 def part(kept: SetRows, scale: FeatureScale, k: int) -> Part:
     """Scale and filter a set, and leave the rows that have a label."""
     X = causal_mean(scale(kept.X), k, kept.segment)
     there = kept.labelled
     return Part(
-        X=X[there], y=kept.y[there], time_s=kept.time_s[there], recording=kept.recording[there], row=kept.row[there],
-        cluster=kept.cluster[there],
+        X=X[there], y=kept.y[there], time_s=kept.time_s[there], recording=kept.recording[there], row=kept.row[there]
     )  # fmt: skip
 
 
-def constant_features(kept: SetRows, features: Sequence[str]) -> list[str]:
-    """Return the features that never change in a set."""
-    spread = np.ptp(kept.X, axis=0)
-    return [name for name, width in zip(features, spread, strict=True) if width == 0]
+def scales(protocol: ProtocolSpec, train: SetRows, other: SetRows) -> tuple[FeatureScale, FeatureScale]:
+    """Return the scales of a training set and another, as the protocol has it."""
+    first = FeatureScale(*moments(train.X))
+    return first, FeatureScale(*moments(other.X)) if protocol.scaled_by == "each set" else first
+
+
+def prepared(assignment: Assignment, data: Dataset, rules: ProtocolSpec, k: int, counts: Counter[str]) -> Fold:
+    """Return X and y of one fold: kept, scaled and filtered over `k` + 1 samples as the protocol has it.
+
+    `counts` is told what was left out, and which features never change.
+    """
+    train = keep(data, rules, assignment.train, "training", counts)
+    for name, width in zip(data.features, np.ptp(train.X, axis=0), strict=True):
+        if width == 0:
+            counts[f"folds in which {name} never changes in training"] += 1
+
+    def scaled(masks: Sequence[Mask], what: str) -> Part:
+        kept = keep(data, rules, masks, what, counts)
+        return part(kept, scales(rules, train, kept)[1], k)
+
+    test = scaled(assignment.test, "test")
+    validation = None if assignment.validation is None else scaled(assignment.validation, "validation")
+    return Fold(assignment.name, part(train, FeatureScale(*moments(train.X)), k), test, validation)
+
+
+def causal_mean(X: FloatArray, k: int, segment: npt.NDArray[np.integer]) -> FloatArray:
+    """Return the mean of each row and the up to `k` rows before it in its segment.
+
+    Parameters
+    ----------
+    X
+        (n, features)
+    k
+        Rows looked back; 0 returns `X`. The first rows of a segment average what there is.
+    segment
+        (n,) non-decreasing numbers; a window never crosses from one to another.
+
+    Notes
+    -----
+    By cumulative sums of the centred columns: without centring, an offset of 1e8 would leave 1e-8 of its own size as
+    error in every difference of sums.
+    """
+    if k == 0 or len(X) == 0:
+        return X
+    centre = X.mean(axis=0)
+    total = np.concatenate([np.zeros((1, X.shape[1])), np.cumsum(X - centre, axis=0)])
+    here = np.arange(len(X))
+    start = np.maximum(here - k, np.searchsorted(segment, segment))  # the first row of each one's segment
+    return np.asarray((total[here + 1] - total[start]) / (here + 1 - start)[:, None] + centre)

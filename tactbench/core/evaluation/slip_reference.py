@@ -9,8 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tactbench.core.errors import DataError, NotApplicable
-from tactbench.core.evaluation.alignment import require_forward
-from tactbench.core.evaluation.channels import numbers, on_clock, unit_factor
+from tactbench.core.evaluation.channels import read_channel, require_forward, unit_factor
 from tactbench.core.events.labels import UNDECIDED, SlipLabels, slip_labels
 from tactbench.core.recording.reader import Recording
 from tactbench.core.samples import FloatArray, IntArray
@@ -86,9 +85,7 @@ def slip_reference(recording: Recording, target: SlipTarget, first_ns: int, coun
     for called, unit in _CHANNELS:
         stream, place = places[called]  # type: ignore[misc]
         channel = recording.stream(stream).spec.channels[place]
-        same = stream == clock.spec.name
-        column = numbers(clock)[:, place] if same else on_clock(recording, clock, stream, place, channel)
-        columns.append(column * unit_factor(channel, unit))
+        columns.append(read_channel(recording, clock, (stream, place, channel)) * unit_factor(channel, unit))
     whole = ~np.isnan(columns).any(axis=0)
     if not whole.all():
         counts["samples of the reference left out because a channel has none"] += int((~whole).sum())

@@ -4,17 +4,15 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
 
 from tactbench.core.errors import DataError, NotApplicable, UsageError
-from tactbench.core.evaluation.dataset import Dataset
-from tactbench.core.evaluation.few_shot import shots as shots
-from tactbench.core.evaluation.first_frame import require_first_rows
-from tactbench.core.evaluation.protocols import ProtocolSpec
+from tactbench.core.evaluation.dataset import Dataset, Table
+from tactbench.core.evaluation.protocols import FIRST_FRAME, ProtocolSpec, shots
 from tactbench.core.spec.task import TaskSpec
 
 Mask = npt.NDArray[np.bool_]
@@ -53,13 +51,13 @@ def choose_split(task: TaskSpec, protocol: ProtocolSpec, data: Dataset, requeste
     NotApplicable
         If the protocol does not go with the requested split, or it or every split of the task lacks what it needs.
     """
-    split = _chosen(task, protocol, data, requested)
+    split = _split_for(task, protocol, data, requested)
     if protocol.first_row_only:
-        require_first_rows(task, data, split)
+        _require_first_rows(task, data, split)
     return split
 
 
-def _chosen(task: TaskSpec, protocol: ProtocolSpec, data: Dataset, requested: str | None) -> str:
+def _split_for(task: TaskSpec, protocol: ProtocolSpec, data: Dataset, requested: str | None) -> str:
     if protocol.roles_only:
         if requested not in (None, "roles"):
             raise NotApplicable(
@@ -94,6 +92,23 @@ def _chosen(task: TaskSpec, protocol: ProtocolSpec, data: Dataset, requested: st
         f"None of the splits of task {task.name!r} ({', '.join(task.splits)}) fits these recordings.",
         hint="Name sessions, roles or groups in the mapping.",
     )
+
+
+def _require_first_rows(task: TaskSpec, data: Dataset, split: str) -> None:
+    """Raise NotApplicable for recordings whose first row stands for nothing that comes later."""
+    asks = f"Protocol {FIRST_FRAME.name!r} asks whether the first row of a recording gives its answer away; "
+    why, hint = "", "Compare with --split shuffled instead."
+    changing = next((one for one in data.tables if len(np.unique(one.y[one.labelled], axis=0)) > 1), None)
+    if changing is not None:
+        why = f"the answer of task {task.name!r} changes within recording {changing.meta.name!r}"
+    elif not any(table.labelled[:1].any() for table in data.tables):
+        why = f"the first row of no recording has an answer to task {task.name!r}"
+    elif all(len(table.row) == 1 for table in data.tables):
+        why = "each of these recordings is one reading"
+    elif split == "in-session":
+        why, hint = "split 'in-session' tests the end of every recording", "Use a split that keeps recordings whole."
+    if why:
+        raise NotApplicable(f"{asks}{why}.", hint=hint)
 
 
 def _can(name: str, data: Dataset) -> bool:
@@ -152,20 +167,21 @@ def make_splits(data: Dataset, split: str, seed: int, gap: int = 0, *, one_by_on
     -----
     Recordings whose role is ``test`` are an official test set: only split ``roles`` touches them.
     """
-    if split == "roles":
-        return [_by_roles(data)]
+    number = shots(split)
+    if split == "roles" or number is not None:
+        return [_by_roles(data, number, split)]
     if split == "in-session":
         return list(_in_session(data, gap))
     if split == "shuffled":
         return list(_shuffled(data, seed))
+    names = _values(data, split)
     if split == "session":
-        return list(_leave_one_out(data, "session"))
-    number = shots(split)
-    if number is not None:
-        return [_few(data, split, number)]
-    if one_by_one and len(_values(data, split)) <= MOST_ONE_BY_ONE:
-        return [_told(fold, data) for fold in _leave_one_out(data, split)]
-    return list(_grouped(data, split))
+        return [_held_out(data, split, {name}, name) for name in names]
+    if one_by_one and len(names) <= MOST_ONE_BY_ONE:
+        return [_told(_held_out(data, split, {name}, f"{split} {name}"), data) for name in names]
+    everything = [np.ones(len(data.tables[place].row), dtype=bool) for place in _open_to_folds(data)]
+    dealt = _dealt(_sizes([data.tables[place] for place in _open_to_folds(data)], everything, split))
+    return [_held_out(data, split, values, f"{split} fold {number}") for number, values in enumerate(dealt, 1)]
 
 
 def _open_to_folds(data: Dataset) -> list[int]:
@@ -174,48 +190,44 @@ def _open_to_folds(data: Dataset) -> list[int]:
     return free or list(range(len(data.tables)))
 
 
-def _none(data: Dataset) -> list[Mask]:
-    return [np.zeros(len(table.row), dtype=bool) for table in data.tables]
+def _masks(data: Dataset, chosen: Callable[[int, Table], Mask | bool]) -> tuple[Mask, ...]:
+    """Return one (n,) mask a recording, from its place and itself."""
+    return tuple(np.zeros(len(table.row), dtype=bool) | chosen(place, table) for place, table in enumerate(data.tables))
 
 
-def _by_roles(data: Dataset) -> Assignment:
-    masks = {role: tuple(np.full(len(table.row), table.meta.role == role) for table in data.tables)
-             for role in ("train", "validation", "test")}  # fmt: skip
-    validation = masks["validation"] if any(mask.any() for mask in masks["validation"]) else None
-    return Assignment("roles", masks["train"], masks["test"], validation)
+def _by_roles(data: Dataset, number: int | None, name: str) -> Assignment:
+    """Return the official sets; of few shots the first `number` training sessions alone, without validation."""
+    train, validation, test = (
+        tuple(np.full(len(table.row), table.meta.role == role) for table in data.tables)
+        for role in ("train", "validation", "test")
+    )
+    if number is not None:
+        first = training_sessions(data)[:number]
+        train, validation = _masks(data, lambda _, table: table.meta.session in first), ()
+    return Assignment(name, train, test, validation if any(mask.any() for mask in validation) else None)
 
 
 def _in_session(data: Dataset, gap: int) -> Iterator[Assignment]:
     """Within each session, the first part of every recording's labelled rows trains, the rest tests."""
     places = _open_to_folds(data)
     for session in sorted({data.metas[place].session for place in places}):
-        train, test = _none(data), _none(data)
-        for place in places:
-            table = data.tables[place]
-            if table.meta.session != session:
-                continue
-            labelled = np.flatnonzero(table.labelled)
-            if len(labelled) < 10:
-                continue
-            first = labelled[int(TRAIN_SHARE * len(labelled))]
-            train[place][: max(first - gap, 0)] = True
-            test[place][first:] = True
+        mine = _masks(data, lambda place, table: place in places and table.meta.session == session)  # noqa: B023
+        train, test = _cut_in_time(data, mine, gap, fewest=10)
         if any(mask.any() for mask in test):
-            yield Assignment(session, tuple(train), tuple(test), groups="session")
+            yield Assignment(session, train, test, groups="session")
 
 
-def _few(data: Dataset, split: str, number: int) -> Assignment:
-    """Train on the first `number` training sessions, test on all of role test; nothing else is looked at."""
-    first = set(training_sessions(data)[:number])
-    train = tuple(np.full(len(table.row), table.meta.session in first) for table in data.tables)
-    test = tuple(np.full(len(table.row), table.meta.role == "test") for table in data.tables)
-    return Assignment(split, train, test)
-
-
-def _leave_one_out(data: Dataset, group: str) -> Iterator[Assignment]:
-    names = _values(data, group)
-    for name in names:
-        yield _held_out(data, group, {name}, name if group == "session" else f"{group} {name}")
+def _cut_in_time(
+    data: Dataset, masks: Sequence[Mask], gap: int, fewest: int
+) -> tuple[tuple[Mask, ...], tuple[Mask, ...]]:
+    """Return the first part in time of each recording and, after a gap, the last; none of fewer labelled rows."""
+    before, after = [], []
+    for table, mask in zip(data.tables, masks, strict=True):
+        rows, number = np.flatnonzero(mask & table.labelled), np.arange(len(table.row))
+        first = rows[int(TRAIN_SHARE * len(rows))] if len(rows) >= fewest else len(number) + gap
+        before.append(mask & (number < first - gap) & (len(rows) >= fewest))
+        after.append(mask & (number >= first))
+    return tuple(before), tuple(after)
 
 
 def _told(fold: Assignment, data: Dataset) -> Assignment:
@@ -232,20 +244,11 @@ def _told(fold: Assignment, data: Dataset) -> Assignment:
     return replace(fold, name=f"{fold.name}, {'interpolated' if between else 'extrapolated'}")
 
 
-def _grouped(data: Dataset, group: str) -> Iterator[Assignment]:
-    """Deal groups into folds of about equal size, the largest first: no randomness, no order of files."""
-    sizes: dict[str, int] = {}
-    for place in _open_to_folds(data):
-        table = data.tables[place]
-        if group in table.groups:
-            for value, count in zip(*np.unique(table.groups[group][table.labelled], return_counts=True), strict=True):
-                sizes[str(value)] = sizes.get(str(value), 0) + int(count)
-    for number, held_out in enumerate(_dealt(sizes), 1):
-        yield _held_out(data, group, held_out, f"{group} fold {number}")
-
-
 def _dealt(sizes: Mapping[str, int]) -> list[set[str]]:
-    """Deal groups into folds, the largest first into the emptiest."""
+    """Deal groups into folds of about equal size, the largest first into the emptiest, of equal ones the first by name.
+
+    Neither chance nor the order of files decides; scikit-learn's ``GroupKFold`` takes equal groups in another order.
+    """
     folds: list[set[str]] = [set() for _ in range(min(FOLDS, len(sizes)))]
     filled = [0] * len(folds)
     for value in sorted(sizes, key=lambda name: (-sizes[name], name)):
@@ -256,42 +259,27 @@ def _dealt(sizes: Mapping[str, int]) -> list[set[str]]:
 
 
 def _held_out(data: Dataset, group: str, values: set[str], name: str) -> Assignment:
-    train, test = _none(data), _none(data)
-    for place in _open_to_folds(data):
-        table = data.tables[place]
-        if group in table.groups:
-            inside = np.isin(table.groups[group], sorted(values))
-            test[place] |= inside
-            train[place] |= ~inside
-    return Assignment(name, tuple(train), tuple(test), groups=group)
+    known = [place for place in _open_to_folds(data) if group in data.tables[place].groups]
+    test = _masks(data, lambda place, table: place in known and np.isin(table.groups[group], sorted(values)))
+    return Assignment(name, _masks(data, lambda place, _: place in known and ~test[place]), test, groups=group)
 
 
 def _shuffled(data: Dataset, seed: int) -> Iterator[Assignment]:
+    """Deal rows at random; where recordings are answered whole, deal those, class by class, in about equal shares."""
     rng = np.random.default_rng(seed)
-    places = _open_to_folds(data)
+    places, folds = _open_to_folds(data), FOLDS
     if data.whole:
-        yield from _shuffled_whole(data, rng.permutation(places))
-        return
-    fold = [rng.permutation(np.arange(len(data.tables[place].row)) % FOLDS) for place in places]
-    for number in range(FOLDS):
-        train, test = _none(data), _none(data)
-        for place, dealt in zip(places, fold, strict=True):
-            test[place] = dealt == number
-            train[place] = dealt != number
-        yield Assignment(f"shuffled fold {number + 1}", tuple(train), tuple(test), groups="recording")
-
-
-def _shuffled_whole(data: Dataset, places: npt.NDArray[np.integer]) -> Iterator[Assignment]:
-    """Deal whole recordings into folds in the order given, class by class, so that folds have about equal shares."""
-    labelled = [place for place in places if data.tables[place].labelled.any()]
-    if data.classes:
-        labelled.sort(key=lambda place: int(data.tables[place].y[data.tables[place].labelled][0]))
-    number = min(FOLDS, len(labelled))
-    for fold in range(number):
-        test, train = _none(data), _none(data)
-        for order, place in enumerate(labelled):
-            (test if order % number == fold else train)[place][:] = True
-        yield Assignment(f"shuffled fold {fold + 1}", tuple(train), tuple(test), groups="recording")
+        order = [int(place) for place in rng.permutation(places) if data.tables[place].labelled.any()]
+        if data.classes:
+            order.sort(key=lambda place: int(data.tables[place].y[data.tables[place].labelled][0]))
+        folds = min(FOLDS, len(order))
+        dealt = {place: np.full(len(data.tables[place].row), at % folds) for at, place in enumerate(order)}
+    else:
+        dealt = {place: rng.permutation(np.arange(len(data.tables[place].row)) % FOLDS) for place in places}
+    for number in range(folds):
+        test = _masks(data, lambda place, _: place in dealt and dealt[place] == number)  # noqa: B023
+        train = _masks(data, lambda place, _: place in dealt and ~test[place])  # noqa: B023
+        yield Assignment(f"shuffled fold {number + 1}", train, test, groups="recording")
 
 
 def _values(data: Dataset, group: str) -> list[str]:
@@ -306,9 +294,9 @@ def inner_splits(data: Dataset, outer: Assignment, gap: int = 0) -> list[tuple[t
     where there are more than five. With a single one, the last fifth in time of each recording is held back; where
     recordings are answered whole, a fifth of them.
     """
-    groups, sizes = outer.groups, _sizes(data, outer, outer.groups)
+    groups, sizes = outer.groups, _sizes(data.tables, outer.train, outer.groups)
     if data.whole and len(sizes) < 2:
-        groups, sizes = "recording", _sizes(data, outer, "recording")
+        groups, sizes = "recording", _sizes(data.tables, outer.train, "recording")
     if len(sizes) >= 2:
         inner = []
         for held_out in _dealt(sizes):
@@ -317,15 +305,7 @@ def inner_splits(data: Dataset, outer: Assignment, gap: int = 0) -> list[tuple[t
             check = tuple(mask & out for mask, out in zip(outer.train, apart, strict=True))
             inner.append((fit, check))
         return inner
-    learn, last = _none(data), _none(data)
-    for place, table in enumerate(data.tables):
-        rows = np.flatnonzero(outer.train[place] & table.labelled)
-        if len(rows) >= 5:
-            first = rows[int(TRAIN_SHARE * len(rows))]
-            number = np.arange(len(table.row))
-            learn[place] = outer.train[place] & (number < first - gap)
-            last[place] = outer.train[place] & (number >= first)
-    return [(tuple(learn), tuple(last))]
+    return [_cut_in_time(data, outer.train, gap, fewest=5)]
 
 
 def with_validation(outer: Assignment, data: Dataset) -> Assignment:
@@ -334,7 +314,7 @@ def with_validation(outer: Assignment, data: Dataset) -> Assignment:
     Of the inner splits so many as it takes to validate on events and on disturbances, if there are any.
     """
     classes, kinds = _classes_in(data, outer.train), _kinds_in(data, outer.train)
-    check = tuple(_none(data))
+    check = _masks(data, lambda *_: False)
     for _, more in inner_splits(data, outer):
         check = tuple(one | other for one, other in zip(check, more, strict=True))
         learn = tuple(mask & ~out for mask, out in zip(outer.train, check, strict=True))
@@ -360,18 +340,18 @@ def _kinds_in(data: Dataset, masks: Sequence[Mask]) -> set[bool]:
     return {reference.disturbance for reference in held if reference is not None}
 
 
-def _sizes(data: Dataset, outer: Assignment, groups: str) -> Counter[str]:
-    """Return how many training rows each group has."""
+def _sizes(tables: Sequence[Table], masks: Sequence[Mask], group: str) -> Counter[str]:
+    """Return how many labelled rows of the masks each group has."""
     sizes: Counter[str] = Counter()
-    for table, mask in zip(data.tables, outer.train, strict=True):
-        if mask.any():
-            values, counts = np.unique(table.groups[groups][mask & table.labelled], return_counts=True)
+    for table, mask in zip(tables, masks, strict=True):
+        if group in table.groups:
+            values, counts = np.unique(table.groups[group][mask & table.labelled], return_counts=True)
             sizes.update(dict(zip(values.tolist(), counts.tolist(), strict=True)))
     return sizes
 
 
 def over_rows(assignment: Assignment, recorded: Dataset) -> Assignment:
-    """Return an assignment of recordings that are one row each as one of all rows that were recorded."""
+    """Return an assignment of recordings that were made to frames, or one row each, as one of all rows recorded."""
 
     def spread(masks: tuple[Mask, ...]) -> tuple[Mask, ...]:
         return tuple(
@@ -381,11 +361,3 @@ def over_rows(assignment: Assignment, recorded: Dataset) -> Assignment:
 
     validation = None if assignment.validation is None else spread(assignment.validation)
     return replace(assignment, train=spread(assignment.train), test=spread(assignment.test), validation=validation)
-
-
-def assert_disjoint(assignments: Sequence[Assignment]) -> None:
-    """Refuse an assignment in which a row is on both sides; raises DataError."""
-    for assignment in assignments:
-        for train, test in zip(assignment.train, assignment.test, strict=True):
-            if (train & test).any():
-                raise DataError(f"Split {assignment.name!r} leaks: rows are on both sides.", hint="Report this.")

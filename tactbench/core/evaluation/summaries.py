@@ -10,11 +10,9 @@ from dataclasses import replace
 import numpy as np
 
 from tactbench.core.errors import DataError, NotApplicable, PluginContractError
-from tactbench.core.evaluation.dataset import LARGEST, Dataset, Table
-from tactbench.core.evaluation.delay import row_interval_s
+from tactbench.core.evaluation.dataset import Dataset, Table, require_computable
 from tactbench.core.evaluation.protocols import ProtocolSpec
-from tactbench.core.evaluation.sets import asked_for, moments
-from tactbench.core.evaluation.unloaded import hold_s
+from tactbench.core.evaluation.sets import hold_s, moments
 from tactbench.core.plugins.registry import load_object
 from tactbench.core.samples import FloatArray, StreamReadings
 from tactbench.core.spec.recording import RecordingMeta
@@ -96,11 +94,7 @@ def recording_features(task: TaskSpec, rules: ProtocolSpec) -> Callable[[Table],
                 )
             found |= more
         for name, value in found.items():
-            if not abs(value) <= LARGEST:
-                raise DataError(
-                    f"In recording {table.meta.name!r}, {name} reaches {value:.3g}, which cannot be computed with.",
-                    hint="Is a reading a fill value? State it under `sentinels` in the mapping.",
-                )
+            require_computable(np.array(value), name, table.meta)
         return found
 
     return compute
@@ -149,51 +143,6 @@ def summary_of(stream: StreamReadings, summary: Summary, recording: str) -> Floa
         return np.asarray(X[-1] - X[0])
     steps = np.abs(np.diff(X, axis=0))
     return np.asarray(steps.mean(axis=0)) if len(steps) else np.zeros(X.shape[1])
-
-
-def waiting_for_the_whole(
-    parts_ms: Mapping[str, float], data: Dataset, task: TaskSpec, rules: ProtocolSpec
-) -> dict[str, float]:
-    """Return the parts of an answer delay with the time that a recording is listened to as ``window``."""
-    parts = dict(parts_ms)
-    if task.answer_per == "recording":
-        span_s = answer_span_s(data, task, rules)
-        parts.pop("window", None)
-        parts |= {} if span_s is None else {"window": 1e3 * span_s}
-    return parts
-
-
-def answer_span_s(data: Dataset, task: TaskSpec, rules: ProtocolSpec) -> float | None:
-    """Return how long a recording is listened to before its answer is there, the longest of all; None: not known."""
-    if rules.first_row_only:
-        return 0.0
-    spans = [_span_s(data, table, task, rules) for table in data.tables]
-    known = [span for span in spans if span is not None]
-    return max(known) if len(known) == len(spans) else None
-
-
-def _span_s(data: Dataset, table: Table, task: TaskSpec, rules: ProtocolSpec) -> float | None:
-    if task.vote:
-        times_s = table.time_s[asked_for(table, rules)]
-        if table.meta.clock == "none":
-            interval_s = row_interval_s(data)
-            return None if interval_s is None else len(times_s) * interval_s
-        return float(np.ptp(times_s)) if len(times_s) else 0.0
-    lengths = [_length_s(stream) for stream in kept(table, rules)]
-    if any(length is None for length in lengths):
-        return None
-    length = max(one for one in lengths if one is not None)
-    windows = [(one.start, one.end) if one.unit == "s" else (one.start * length, one.end * length)
-               for one in task.summaries]  # fmt: skip
-    if task.features_by:
-        windows.append((0.0, length))
-    return max(end for _, end in windows) - min(start for start, _ in windows)
-
-
-def _length_s(stream: StreamReadings) -> float | None:
-    if stream.time_s is not None:
-        return float(stream.time_s[-1])
-    return None if stream.rate_hz is None else len(stream.data) / stream.rate_hz
 
 
 def _window(stream: StreamReadings, summary: Summary, recording: str) -> slice:

@@ -1,11 +1,10 @@
-"""From frames that say yes or no to alarms, causally."""
+"""From frames that say yes or no to alarms, causally; and which alarm hits which event."""
 
 from __future__ import annotations
 
 import numpy as np
 import numpy.typing as npt
 
-from tactbench.core.errors import DataError
 from tactbench.core.samples import IntArray
 from tactbench.core.spec.events import AlarmPolicy, nanoseconds
 
@@ -30,7 +29,6 @@ def alarms(t_ns: IntArray, active: npt.NDArray[np.bool_], policy: AlarmPolicy) -
     its first frame; within a gap nobody knows yet whether it will be bridged. An alarm less than `refractory_s` after
     the last one that was kept is dropped.
     """
-    check_times(t_ns, active.shape)
     on = np.flatnonzero(active)
     if on.size == 0:
         return np.zeros(0, dtype=np.int64)
@@ -41,10 +39,10 @@ def alarms(t_ns: IntArray, active: npt.NDArray[np.bool_], policy: AlarmPolicy) -
     long_enough = t - first >= nanoseconds(policy.minimum_length_s)
     _, places = np.unique(segment[long_enough], return_index=True)
     raised = t[long_enough][places]
-    return np.asarray(raised[kept(raised, nanoseconds(policy.refractory_s))])
+    return np.asarray(raised[_kept(raised, nanoseconds(policy.refractory_s))])
 
 
-def kept(raised_ns: IntArray, refractory_ns: int) -> IntArray:
+def _kept(raised_ns: IntArray, refractory_ns: int) -> IntArray:
     """Return the places of the alarms that the refractory time leaves, of alarms in order of time."""
     if refractory_ns == 0 or raised_ns.size < 2:
         return np.arange(raised_ns.size)
@@ -56,11 +54,42 @@ def kept(raised_ns: IntArray, refractory_ns: int) -> IntArray:
     return np.asarray(places, dtype=np.int64)
 
 
-def check_times(t_ns: IntArray, shape: tuple[int, ...]) -> None:
-    """Raise DataError unless the times are integers, strictly rising, one a frame."""
-    if t_ns.dtype != np.int64:
-        raise DataError(f"Times of frames are {t_ns.dtype}, not int64.", hint="Give nanoseconds.")
-    if t_ns.ndim != 1 or t_ns.shape != shape:
-        raise DataError(f"There are times of shape {t_ns.shape} for frames of shape {shape}.", hint="Give one a frame.")
-    if np.any(np.diff(t_ns) <= 0):
-        raise DataError("Times of frames do not rise strictly.", hint="Sort them, or cut where the clock runs back.")
+def match(onset_ns: IntArray, alarm_ns: IntArray, policy: AlarmPolicy) -> tuple[IntArray, IntArray]:
+    """Return the places of matched onsets and those of their alarms, as many pairs as there can be.
+
+    Parameters
+    ----------
+    onset_ns, alarm_ns
+        (n,) and (m,) times [ns], in any order.
+    policy
+        Its window: an alarm may hit an onset from `window_before_s` before to `window_after_s` after it, both ends
+        included.
+
+    Notes
+    -----
+    In order of time each event takes the earliest alarm that is left in its window. All windows are equally long, so
+    that their beginnings and ends come in the same order: an alarm passed over is too early for all later events, and
+    to take the earliest leaves every later event at least as much choice. The number of pairs is therefore the largest
+    possible [1]_ (a convex bipartite graph whose intervals do not nest). It takes O(n log n + m log m).
+
+    Of all largest matchings this is the one of first alarms: an event that is announced twice within its window has the
+    latency of the first announcement, and the second is a false positive.
+
+    References
+    ----------
+    .. [1] Glover 1967, Maximum matching in a convex bipartite graph, Naval Research Logistics Quarterly 14, 313-316.
+    """
+    before, after = nanoseconds(policy.window_before_s), nanoseconds(policy.window_after_s)
+    event_order, alarm_order = np.argsort(onset_ns, kind="stable"), np.argsort(alarm_ns, kind="stable")
+    alarms = alarm_ns[alarm_order].tolist()
+    events, hits, place = [], [], 0
+    for event, onset in enumerate(onset_ns[event_order].tolist()):
+        while place < len(alarms) and alarms[place] < onset - before:
+            place += 1
+        if place == len(alarms):
+            break
+        if alarms[place] <= onset + after:
+            events.append(event)
+            hits.append(place)
+            place += 1
+    return event_order[events].astype(np.int64), alarm_order[hits].astype(np.int64)

@@ -8,7 +8,6 @@ import numpy as np
 import numpy.typing as npt
 
 from tactbench.core.errors import DataError
-from tactbench.core.events.alarms import check_times
 from tactbench.core.samples import FloatArray, IntArray
 from tactbench.core.spec.events import SlipThresholds, nanoseconds
 
@@ -24,8 +23,6 @@ class SlipLabels:
     """(n,) :data:`STICK`, :data:`INCIPIENT`, :data:`GROSS` or :data:`UNDECIDED` of each sample of the reference."""
     gross_ns: IntArray
     """(e, 2) onset and end of each gross slip that a hold in contact precedes [ns]."""
-    incipient_ns: IntArray
-    """(i, 2) beginning and end of each stretch of incipient slip [ns]."""
 
 
 def stick_ratio(tangential_n: FloatArray, normal_n: FloatArray, friction: float) -> FloatArray:
@@ -77,7 +74,8 @@ def slip_labels(
     whatever the forces say. A contact at rest whose forces say gross is undecided: it has just let go, or mu is too
     low. A slip that the recording begins with has no onset and is no event, though its frames are gross.
     """
-    check_times(t_ns, displacement_m.shape)
+    if np.any(np.diff(t_ns) <= 0):
+        raise DataError("Times of the reference do not rise strictly.", hint="Sort them, or cut where the clock stops.")
     given = {"displacement": displacement_m, "tangential force": tangential_n, "normal force": normal_n}
     for name, values in given.items():
         if values.shape != t_ns.shape or not np.all(np.isfinite(values)):
@@ -97,24 +95,9 @@ def slip_labels(
         [UNDECIDED, GROSS, UNDECIDED, INCIPIENT],
         STICK,
     ).astype(np.int64)
-    gross, incipient = (_stretches(state == which) for which in (GROSS, INCIPIENT))
+    gross = _stretches(state == GROSS)
     held = np.concatenate([[False], (rest & contact)[:-1]])[gross[:, 0]]
-    return SlipLabels(state, *(_times(t_ns, stretch) for stretch in (gross[held], incipient)))
-
-
-def labels_at_scales(
-    t_ns: IntArray,
-    displacement_m: FloatArray,
-    tangential_n: FloatArray,
-    normal_n: FloatArray,
-    friction: float,
-    thresholds: SlipThresholds,
-) -> dict[float, SlipLabels]:
-    """Return :func:`slip_labels` under halved, stated and doubled thresholds: what a statement of sensitivity needs."""
-    return {
-        factor: slip_labels(t_ns, displacement_m, tangential_n, normal_n, friction, thresholds.scaled(factor))
-        for factor in (0.5, 1.0, 2.0)
-    }
+    return SlipLabels(state, t_ns[gross[held]])
 
 
 def at_rest(t_ns: IntArray, displacement_m: FloatArray, thresholds: SlipThresholds) -> npt.NDArray[np.bool_]:
@@ -156,7 +139,3 @@ def _stretches(mask: npt.NDArray[np.bool_]) -> IntArray:
     """Return (k, 2) first and last place of each run of True."""
     edges = np.diff(np.concatenate([[False], mask, [False]]).astype(np.int64))
     return np.column_stack([np.flatnonzero(edges == 1), np.flatnonzero(edges == -1) - 1])
-
-
-def _times(t_ns: IntArray, places: IntArray) -> IntArray:
-    return np.asarray(t_ns[places].reshape(-1, 2))

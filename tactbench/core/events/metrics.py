@@ -7,11 +7,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
-from tactbench.core.errors import DataError
-from tactbench.core.events.matching import match
+from tactbench.core.events.alarms import match
 from tactbench.core.samples import FloatArray, IntArray
 from tactbench.core.spec.events import AlarmPolicy, nanoseconds
 
@@ -26,13 +26,6 @@ class GroundTruth:
     """(d, 2) beginning and end of each disturbance: a press, a tap, a motor that starts [ns]. They may overlap."""
     span_ns: tuple[int, int]
     """From when until when (excluded) the detector could raise alarms [ns]."""
-
-    def __post_init__(self) -> None:
-        for name, stretches in (("events", self.event_ns), ("disturbances", self.disturbance_ns)):
-            if stretches.ndim != 2 or stretches.shape[1] != 2 or np.any(stretches[:, 1] < stretches[:, 0]):
-                raise DataError(f"The {name} are not pairs of a beginning and an end.", hint="Give (n, 2) nanoseconds.")
-        if self.span_ns[1] < self.span_ns[0]:
-            raise DataError(f"The span {self.span_ns} ends before it begins.", hint="Give beginning and end.")
 
 
 @dataclass(frozen=True)
@@ -97,10 +90,9 @@ class EventScores:
         )
         return np.asarray(below + (above - below) * (place - low))
 
-    def row(self, place: int) -> EventScores:
-        """Return one threshold's scores, of shape ()."""
-        alarms, false = np.asarray(self.n_alarms[place]), np.asarray(self.n_false_alarms[place])
-        return EventScores(alarms, false, self.base_s, self.latency_s[place])
+    def row(self, place: Any) -> EventScores:
+        """Return the scores at one threshold, or at several."""
+        return EventScores(self.n_alarms[place], self.n_false_alarms[place], self.base_s, self.latency_s[place])
 
 
 def score_events(truths: Sequence[GroundTruth], alarms_ns: Sequence[IntArray], policy: AlarmPolicy) -> EventScores:

@@ -16,9 +16,8 @@ from tactbench.core.evaluation.protocols import is_probe
 from tactbench.core.leaderboard.columns import Line, line_of
 from tactbench.core.leaderboard.names import Row, distinct, grouped, hardware_name, metric_name, sign_of
 from tactbench.core.leaderboard.verdict import verdict_of
-from tactbench.core.statistics.excess import beyond_floor, excess_of
-from tactbench.core.statistics.median import FEWEST
-from tactbench.core.statistics.rank import Rank
+from tactbench.core.statistics.rank import Rank, beyond_floor, excess_of
+from tactbench.core.statistics.replicates import FEWEST
 from tactbench.core.tables.text import visible
 
 _Key = tuple[str, str, str, str]

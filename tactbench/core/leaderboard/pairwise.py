@@ -13,9 +13,7 @@ from tactbench.core.errors import UnknownNameError
 from tactbench.core.leaderboard.names import EMULATED, SIMULATED, Row, answer_name, grouped, hardware_name, metric_name
 from tactbench.core.spec.matrix import ComparisonChoice
 from tactbench.core.statistics.aggregate import Aggregate, aggregate
-from tactbench.core.statistics.holm import holm
-from tactbench.core.statistics.over_folds import FoldDifference, over_folds
-from tactbench.core.statistics.paired import Difference, difference
+from tactbench.core.statistics.paired import Difference, FoldDifference, difference, holm, over_folds
 from tactbench.core.tables.numbers import ABSENT, interval, score, signed, suffix
 from tactbench.core.tables.text_table import TextTable
 

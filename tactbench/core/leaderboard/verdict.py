@@ -9,9 +9,8 @@ from typing import Any
 
 from tactbench.core.leaderboard.names import METRIC_NAMES, Row, answer_name, grouped, sign_of
 from tactbench.core.spec.row import INTERVALS
-from tactbench.core.statistics.excess import beyond_floor
-from tactbench.core.statistics.median import FEWEST, counted, percent
-from tactbench.core.statistics.rank import Rank
+from tactbench.core.statistics.rank import Rank, beyond_floor
+from tactbench.core.statistics.replicates import FEWEST, counted, percent
 from tactbench.core.tables.numbers import interval, score, score_with_unit
 from tactbench.core.tables.text import visible
 

@@ -11,7 +11,7 @@ from tactbench.core.leaderboard.blocks import Block
 from tactbench.core.leaderboard.columns import COLUMNS, INTERVALS, NUMERIC, SHOWN
 from tactbench.core.leaderboard.names import Row, metric_name
 from tactbench.core.leaderboard.table import Table
-from tactbench.core.statistics.median import counted, percent
+from tactbench.core.statistics.replicates import counted, percent
 from tactbench.core.tables.numbers import ABSENT
 from tactbench.core.tables.text import command_line, visible
 from tactbench.core.tables.text_table import Entry, TextTable, finite, text_table

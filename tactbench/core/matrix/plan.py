@@ -9,8 +9,7 @@ from itertools import product
 from typing import Any
 
 from tactbench.core.errors import UnknownNameError, UsageError
-from tactbench.core.evaluation.few_shot import shots
-from tactbench.core.evaluation.protocols import DEPLOYABLE, FIRST_FRAME, is_probe, protocol_called
+from tactbench.core.evaluation.protocols import DEPLOYABLE, FIRST_FRAME, is_probe, protocol_called, shots
 from tactbench.core.plugins.registry import Registry
 from tactbench.core.spec.declared_task import DeclaredTask
 from tactbench.core.spec.matrix import REPLICATES, EstimatorChoice, MatrixSpec, TaskChoice

@@ -15,7 +15,7 @@ from tactbench.core.errors import (
     UnknownNameError,
     UsageError,
 )
-from tactbench.core.evaluation.few_shot import shots
+from tactbench.core.evaluation.protocols import shots
 from tactbench.core.matrix.installed import failing_as, rig_of
 from tactbench.core.matrix.keys import Keys
 from tactbench.core.matrix.plan import FEW_SHOT, Cell, plan_cells, serves, task_of

@@ -22,7 +22,6 @@ from tactbench.core.spec.row import RowModel
 from tactbench.core.spec.task import TaskSpec
 
 if TYPE_CHECKING:
-    from tactbench.core.evaluation.cell import CellResult
     from tactbench.core.evaluation.dataset import Dataset
     from tactbench.core.samples import Answers
 
@@ -55,7 +54,7 @@ def prepare(estimator: EstimatorDescriptor, kind: str) -> None:
         build = load_object(estimator.where)
         build(kind=kind, seed=0, threads=1, **estimator.params)
         if estimator.rehearsal is not None:
-            from tactbench.core.evaluation.rehearsal import rehearse
+            from tactbench.core.evaluation.warm_up import rehearse
 
             rehearse(build(kind=kind, seed=0, threads=1, **{**estimator.params, **estimator.rehearsal}), kind)
 
@@ -100,7 +99,8 @@ def solve(job: Job, concurrency: int = 1, progress: Callable[[str], None] | None
         os.chdir(folder)  # recordings lie relative to it, wherever a constructor has gone
     import numpy as np
 
-    from tactbench.core.evaluation.cell import CellContext, evaluate
+    from tactbench.core.evaluation.cell import CellContext, evaluate_cell
+    from tactbench.core.evaluation.result import row_of
 
     began = time.perf_counter()
     # The global generators get the cell's seed: what is drawn from them does not depend on the cells before.
@@ -111,11 +111,11 @@ def solve(job: Job, concurrency: int = 1, progress: Callable[[str], None] | None
         task, estimator, dict(cell.params), cell.protocol, cell.split, seed=cell.seed, clock=time.perf_counter,
         progress=progress, latency=cell.timed,
     )  # fmt: skip
-    result = evaluate(context, data)
+    result = evaluate_cell(context, data)
     row = {
         **opening(cell, task),
-        **_described(data.metas),
-        **_scored(result),
+        **row_of(result),
+        **_described(data.metas, (*result.remarks, *([TIMED] if cell.timed else []))),
         **published(cell, task, result.split),
         **({} if cell.timed else dict.fromkeys(_TIMES)),
         "looks_at": estimator.looks_at,
@@ -126,8 +126,7 @@ def solve(job: Job, concurrency: int = 1, progress: Callable[[str], None] | None
         "concurrency": concurrency,
         "host": host_id(),
     }
-    row["remarks"] += [*result.remarks, *([TIMED] if cell.timed else [])]
-    plain: Row = json.loads(json.dumps(row, allow_nan=False, default=_plain))
+    plain: Row = json.loads(json.dumps(row, allow_nan=False))
     return plain, {str(role): answers for role, answers in result.sets.items()}
 
 
@@ -184,7 +183,7 @@ def unanswered(cell: Cell, task: TaskSpec, why: BaseException, *, simulated: boo
     return row
 
 
-def _described(metas: Sequence[RecordingMeta]) -> Row:
+def _described(metas: Sequence[RecordingMeta], remarks: Sequence[str]) -> Row:
     """Return what recordings say that a reader of the row must know."""
     seconds = [float(meta.provenance["sim_s"]) for meta in metas if "sim_s" in meta.provenance]
     return {
@@ -193,7 +192,7 @@ def _described(metas: Sequence[RecordingMeta]) -> Row:
         "sim_s": sum(seconds) if seconds else None,
         "assumptions": _assumed(metas),
         "plan": [entry.model_dump(mode="json") for entry in metas[0].plan],
-        "remarks": sorted({remark for meta in metas for remark in meta.remarks}),
+        "remarks": [*sorted({remark for meta in metas for remark in meta.remarks}), *remarks],
     }
 
 
@@ -210,18 +209,3 @@ def _assumed(metas: Sequence[RecordingMeta]) -> dict[str, Scalar]:
         else:
             found[name] = ", ".join(str(value) for value in values)
     return found
-
-
-def _scored(result: CellResult) -> Row:
-    """Return what was measured, as plain data: the result's names are those of the row."""
-    row = {name: getattr(result, name) for name in RowModel.model_fields if hasattr(result, name)}
-    del row["remarks"]
-    if result.beyond is not None:
-        row |= {"reference_floor": result.beyond.floor, "score_beyond_floor": result.beyond.score}
-        row |= {"beyond_floor_ci_low": result.beyond.low, "beyond_floor_ci_high": result.beyond.high}
-    row["true_score"], row["true_ci_low"], row["true_ci_high"] = result.true or (None,) * 3
-    return row
-
-
-def _plain(value: Any) -> Any:
-    return value.tolist() if hasattr(value, "tolist") else dict(value)

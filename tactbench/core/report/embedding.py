@@ -14,11 +14,9 @@ from typing import Any
 import numpy as np
 
 from tactbench.core.errors import DataError, NotApplicable
-from tactbench.core.evaluation.dataset import load_dataset
-from tactbench.core.evaluation.preparation import assigned, prepared
-from tactbench.core.evaluation.protocols import protocol_called
-from tactbench.core.evaluation.selection import features_of
-from tactbench.core.evaluation.summaries import summarised
+from tactbench.core.evaluation.cell import load_task
+from tactbench.core.evaluation.fitting import features_of
+from tactbench.core.evaluation.sets import prepared
 from tactbench.core.files import read_regular, replace_file, sha256
 from tactbench.core.provenance.source import versions
 from tactbench.core.report.results import Results
@@ -146,13 +144,12 @@ def _features(results: Results, row: Mapping[str, Any], test: Answers) -> FloatA
     """Return (n, features) of the test set as the estimator saw them: kept, scaled and filtered by the protocol."""
     task = results.registry.tasks[row["task"]].spec
     estimator = results.registry.estimators[row["estimator"]]
-    rules = protocol_called(row["protocol"])
-    data = summarised(load_dataset(task, results.recordings(row)), task, rules)
-    if data.vote:
+    paths = results.recordings(row)
+    data = load_task(task, paths, row["protocol"], row["split"], estimator=estimator, seed=row["seed"])
+    if data.data.vote:
         raise NotApplicable("a recording is answered by its frames, and has no features of its own")
-    (assignment,) = assigned(task, estimator, data, row["split"], row["seed"])
     k = int(row["chosen"].get("k", estimator.window_grid[0]))
-    test_part = prepared(assignment, data, rules, k, Counter()).test
+    test_part = prepared(data.assignments[0], data.data, data.rules, k, Counter()).test
     if not (np.array_equal(test_part.recording, test.recording) and np.array_equal(test_part.row, test.row)):
         raise DataError(
             f"The recordings of {row['cell']} give other test rows than were answered.", hint="Run it again."

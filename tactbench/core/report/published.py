@@ -12,7 +12,7 @@ from tactbench.core.leaderboard.names import LOWER_IS_BETTER
 from tactbench.core.plugins.registry import Registry
 from tactbench.core.report.section import ReportData, Section
 from tactbench.core.spec.task import Published, TaskSpec
-from tactbench.core.statistics.median import counted, percent
+from tactbench.core.statistics.replicates import counted, percent
 from tactbench.core.tables.numbers import score, score_with_unit
 from tactbench.core.tables.text import command_line
 from tactbench.core.tables.text_table import ABSENT, Entry, TextTable, finite, text_table

@@ -81,7 +81,7 @@ THRESHOLDS = SlipThresholds(
 )
 """The published ones. All five are assumed: no source was found that states them for a whole contact. They see slip
 faster than 1 mm/s, or by steps of more than 0.1 mm. What a score owes to them is shown by halving and doubling them
-(`tactbench.core.events.labels.labels_at_scales`)."""
+(`tactbench.core.evaluation.slip_reference`)."""
 
 
 class SlipTarget(Frozen):

@@ -7,17 +7,14 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
-from tactbench.core.evaluation.jackknife import influences
-from tactbench.core.evaluation.metrics import EXCESS, SUMMED, Metric
+from tactbench.core.evaluation.interval import influences
+from tactbench.core.evaluation.metrics import EXCESS, SUMMED
 from tactbench.core.evaluation.replicate_sums import tables_of
 from tactbench.core.samples import FloatArray, IntArray
-from tactbench.core.statistics.median import FEWEST
+from tactbench.core.statistics.replicates import FEWEST
 
 Row = Mapping[str, Any]
-_Carried = tuple[npt.NDArray[np.bool_], FloatArray, FloatArray, FloatArray]
-"""Which rows are sound, and their influences, degrees of freedom and runs."""
 
 
 @dataclass(frozen=True)
@@ -56,73 +53,32 @@ def together(rows: Sequence[Row]) -> list[PairableRows]:
     """
     groups: dict[tuple[Any, ...], list[int]] = {}
     for place, row in enumerate(rows):
-        mark = _mark(row)
-        if mark is not None:
+        kept = row.get("replicates")
+        if kept:
+            strata = tuple(kept["strata"] or [0] * len(kept["names"]))
+            in_time = kept["unit"].startswith("block")
+            mark = tuple(kept["names"]), strata, in_time, "scores" in kept, len(row["classes"]), row["metric"]
             groups.setdefault(mark, []).append(place)
     found = []
-    for (names, strata, in_time, n_classes, metric), places in groups.items():
-        one = _group([rows[place]["replicates"] for place in places], SUMMED[metric], n_classes, strata, len(names))
-        if one is not None:
-            good, influence, freedom, runs = one
-            codes = np.array(strata or [0] * len(names), dtype=np.int64)
-            where = np.array(places, dtype=np.int64)[good]
-            found.append(PairableRows(where, names, codes, in_time, influence[good], freedom[good], runs[good]))
+    for (names, strata, in_time, own_scores, n_classes, metric), places in groups.items():
+        several, n, codes = [rows[place]["replicates"] for place in places], len(names), np.array(strata)
+        sizes = np.unique(codes, return_counts=True)[1]
+        if sizes.min() < (FEWEST if own_scores else 2):
+            continue
+        if own_scores:  # what is asked for is their mean
+            scores = np.array([scores_of(one, metric) for one in several])
+            influence = (scores - scores.mean(axis=1, keepdims=True)) / np.sqrt(n * (n - 1))
+            runs = np.ones(len(several))
+        else:
+            runs = np.clip([float(one.get("run", 1)) for one in several], 1.0, n)
+            influence = influences(scores_without(tables_of(several, metric, n_classes), metric, n_classes), codes)
+            for one in np.unique(codes):
+                influence[:, codes == one] = _smoothed(influence[:, codes == one], runs)
+        freedom = np.maximum(n / runs - len(sizes), 1.0)
+        good = np.isfinite(influence).all(axis=1)
+        where = np.array(places, dtype=np.int64)[good]
+        found.append(PairableRows(where, names, codes, in_time, influence[good], freedom[good], runs[good]))
     return found
-
-
-def _mark(row: Row) -> tuple[Any, ...] | None:
-    """Return what two rows must have in common to be paired; None if a row has nothing to resample."""
-    kept = row.get("replicates")
-    if not kept or row["metric"] not in SUMMED:
-        return None
-    try:
-        if "scores" in kept and len(kept["names"]) < FEWEST:
-            return None
-        strata = None if kept["strata"] is None else tuple(int(one) for one in kept["strata"])
-        names = tuple(str(one) for one in kept["names"])
-        return names, strata, str(kept["unit"]).startswith("block"), len(row["classes"]), row["metric"]
-    except (KeyError, TypeError, ValueError, OverflowError):
-        return None
-
-
-def _group(
-    kept: list[dict[str, Any]], metric: Metric, n_classes: int, strata: tuple[int, ...] | None, replicates: int
-) -> _Carried | None:
-    if any("scores" in one for one in kept):
-        return _of_scores(kept, metric, replicates)
-    codes = np.zeros(replicates, dtype=np.int64) if strata is None else np.array(strata, dtype=np.int64)
-    sizes = np.unique(codes, return_counts=True)[1] if len(codes) == replicates else np.zeros(1)
-    if not replicates or sizes.min() < 2:
-        return None
-    try:
-        sums = tables_of(kept, metric.name, n_classes)
-        runs = np.clip([float(one.get("run", 1)) for one in kept], 1.0, float(replicates))
-        with np.errstate(divide="ignore", invalid="ignore"):
-            without = metric.score(sums.sum(axis=1, keepdims=True) - sums, n_classes)
-    except (ValueError, IndexError, TypeError, KeyError):
-        if len(kept) == 1:
-            return None
-        return _one_by_one(kept, metric, n_classes, strata, replicates)
-    if sums.shape[1] != replicates:
-        return None
-    influence = influences(without, codes)
-    for one in np.unique(codes):
-        influence[:, codes == one] = _smoothed(influence[:, codes == one], runs)
-    freedom = np.maximum(replicates / runs - len(sizes), 1.0)
-    return np.isfinite(influence).all(axis=1) & np.isfinite(runs), influence, freedom, runs
-
-
-def _of_scores(kept: list[dict[str, Any]], metric: Metric, replicates: int) -> _Carried | None:
-    """Return what replicates with a score of their own carry of the mean over replicates."""
-    try:
-        scores = np.array([scores_of(one, metric.name) for one in kept], dtype=np.float64)
-    except (KeyError, TypeError, ValueError):
-        return None
-    if scores.shape != (len(kept), replicates):
-        return None
-    influence = (scores - scores.mean(axis=1, keepdims=True)) / np.sqrt(replicates * (replicates - 1))
-    alike = np.ones(len(kept))
-    return np.isfinite(influence).all(axis=1), influence, alike * (replicates - 1), alike
 
 
 def scores_of(kept: Mapping[str, Any], metric: str) -> FloatArray:
@@ -130,16 +86,10 @@ def scores_of(kept: Mapping[str, Any], metric: str) -> FloatArray:
     return np.asarray(kept["excess" if metric == EXCESS.name else "scores"], dtype=np.float64)
 
 
-def _one_by_one(
-    kept: list[dict[str, Any]], metric: Metric, n_classes: int, strata: tuple[int, ...] | None, replicates: int
-) -> _Carried:
-    """Keep one row of another shape from spoiling the rest."""
-    each = [_group([one], metric, n_classes, strata, replicates) for one in kept]
-    good = np.array([one is not None and bool(one[0][0]) for one in each])
-    influence = np.vstack([np.zeros(replicates) if one is None else one[1][0] for one in each])
-    freedom = np.array([1.0 if one is None else one[2][0] for one in each])
-    runs = np.array([1.0 if one is None else one[3][0] for one in each])
-    return good, influence, freedom, runs
+def scores_without(sums: FloatArray, metric: str, n_classes: int) -> FloatArray:
+    """Return (rows, replicates) scores without each replicate, from (rows, replicates, m) sums."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return SUMMED[metric].score(sums.sum(axis=1, keepdims=True) - sums, n_classes)
 
 
 def _smoothed(influence: FloatArray, runs: FloatArray) -> FloatArray:

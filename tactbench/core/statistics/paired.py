@@ -1,19 +1,23 @@
-"""Two cells compared: the difference of their scores, how sure it is, and whether it matters."""
+"""Two cells compared: the difference of their scores, how sure it is, and whether it matters.
+
+Over replicates (:func:`difference`), or over folds whose training data overlap (:func:`over_folds`); several
+comparisons at once are corrected for being several (:func:`holm`).
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
 
 import numpy as np
 
+from tactbench.core.evaluation.interval import NORMAL, student_quantile, two_sided_p
 from tactbench.core.evaluation.metrics import METRICS, Metric
 from tactbench.core.evaluation.replicate_sums import tables_of
 from tactbench.core.samples import FloatArray, IntArray
 from tactbench.core.statistics.influence import PairableRows, scores_of, together
-from tactbench.core.statistics.median import counted
-from tactbench.core.statistics.student import NORMAL, quantile, two_sided
+from tactbench.core.statistics.replicates import counted
 
 Row = Mapping[str, Any]
 Verdict = Literal["better", "worse", "equivalent", "undecided"]
@@ -146,7 +150,7 @@ def _unpaired(first: Row, second: Row, value: float, sign: float, groups: list[P
     pairs = sign * np.subtract.outer(own[0], own[1]) if len(of) == 2 else np.empty(0)
     return _difference(
         value, deviation, freedom, sign, _region(first),
-        p=two_sided(value / deviation, freedom) if 0 < deviation < np.inf else None,
+        p=two_sided_p(value / deviation, freedom) if 0 < deviation < np.inf else None,
         smallest_p=0.0 if 0 < deviation < np.inf else None,
         effect=value / spread if spread > 0 else None,
         improved=float(np.mean((pairs > 0) + 0.5 * (pairs == 0))) if len(pairs) else None,
@@ -161,7 +165,7 @@ def _unpaired(first: Row, second: Row, value: float, sign: float, groups: list[P
 def _difference(value: float, deviation: float, freedom: float, sign: float, region: float, **more: Any) -> Difference:
     if not np.isfinite(deviation):
         return Difference(value, None, None, verdict="undecided", beyond=False, **more)
-    reach = float(quantile(freedom)) * deviation
+    reach = float(student_quantile(freedom)) * deviation
     low, high = value - reach, value + reach
     verdict: Verdict = "undecided"
     if region > 0 and -region <= low and high <= region:
@@ -241,3 +245,91 @@ def _starts(strata: list[int], run: int) -> list[int]:
             since = 0
         since += 1
     return starts
+
+
+@dataclass(frozen=True)
+class FoldDifference:
+    """The mean difference over folds, and what can be said of it."""
+
+    mean: float
+    low: float
+    high: float
+    p: float
+    folds: int
+    method: str
+
+
+def corrected_t(differences: Sequence[float], test_over_train: float, repeats: int = 1) -> FoldDifference | None:
+    """Return the corrected resampled t-test of differences over folds; None of fewer than two.
+
+    Parameters
+    ----------
+    differences
+        One a fold, of every repeat.
+    test_over_train
+        Test rows over training rows of a fold; of unequal folds, the mean.
+    repeats
+        How often the folds were dealt anew.
+
+    Notes
+    -----
+    ``t = d̄ / sqrt((1/n + n_test/n_train) s²)`` with n - 1 degrees of freedom. The second term stands for the
+    correlation of folds that train on mostly the same rows; without it the test finds differences that are not there
+    (Nadeau and Bengio 2003, Inference for the generalization error). Over r repeats of k folds n is r k, as in
+    Bouckaert and Frank 2004, Evaluating the replicability of significance tests for comparing learning algorithms.
+    """
+    d = np.asarray(differences, dtype=np.float64)
+    n = len(d)
+    if n < 2:
+        return None
+    deviation = float(np.sqrt((1 / n + test_over_train) * d.var(ddof=1)))
+    mean = float(d.mean())
+    reach = float(student_quantile(n - 1)) * deviation
+    p = two_sided_p(mean / deviation, n - 1) if deviation > 0 else float(mean == 0)
+    who = "Bouckaert and Frank" if repeats > 1 else "Nadeau and Bengio"
+    over = f"{n // repeats} folds" + (f" of {repeats} repeats" if repeats > 1 else "")
+    return FoldDifference(mean, mean - reach, mean + reach, p, n, f"corrected resampled t ({who}) over {over}")
+
+
+def over_folds(pairs: Sequence[tuple[Row, Row]]) -> FoldDifference | None:
+    """Return the corrected test of two cells over the folds that both have, their repeats together.
+
+    Parameters
+    ----------
+    pairs
+        The two rows of each repeat.
+    """
+    differences: list[float] = []
+    ratios: list[float] = []
+    for first, second in pairs:
+        sizes = first.get("fold_sizes") or {}
+        for name, (n_train, n_test) in sizes.items():
+            if name in first["scores"] and name in second["scores"] and name in (second.get("fold_sizes") or {}):
+                differences.append(first["scores"][name] - second["scores"][name])
+                ratios.append(n_test / n_train)
+    if len(differences) < 2 * len(pairs):
+        return None
+    return corrected_t(differences, float(np.mean(ratios)), len(pairs))
+
+
+def holm(p: Sequence[float | None]) -> list[float | None]:
+    """Return p-values corrected for being several, in the order given.
+
+    Parameters
+    ----------
+    p
+        One a declared comparison; None for one that could not be made, which neither counts nor gets a value.
+
+    Notes
+    -----
+    Holm 1979, A simple sequentially rejective multiple test procedure: the k-th smallest of m is multiplied by
+    m - k + 1, never below that of a smaller one, never above 1. It controls the probability of any false finding
+    whatever the dependence between the comparisons.
+    """
+    made = sorted((value, place) for place, value in enumerate(p) if value is not None)
+    corrected: list[float | None] = [None] * len(p)
+    least = 0.0
+    for rank, (value, place) in enumerate(made):
+        least = max(least, min(1.0, (len(made) - rank) * value))
+        corrected[place] = least
+    return corrected

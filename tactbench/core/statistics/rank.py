@@ -1,8 +1,13 @@
-"""A rank, apart from what computes it, so that a table of stored results loads no numerics."""
+"""A rank, and what errors of force are ranked by: apart from what computes ranks, so that a table loads no numerics."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from statistics import median
+from typing import Any
+
+Row = Mapping[str, Any]
 
 
 @dataclass(frozen=True)
@@ -23,3 +28,16 @@ class Rank:
     first_without: int = field(default=0, compare=False)
     """without how many replicates, each left out alone, it is the best, of equal cells the one first in order; 0 for
     all cells where replicates differ"""
+
+
+def beyond_floor(rows: Sequence[Row]) -> bool:
+    """Return whether rows are ranked by their errors beyond the floor: all have one."""
+    return all(row["metric"] == "rmse" and row.get("reference_floor") is not None for row in rows)
+
+
+def excess_of(row: Row) -> float:
+    """Return a RMSE's mean square beyond the floor of its reference; of several replicates the median."""
+    kept = row.get("replicates") or {}
+    if "excess" in kept:
+        return float(median(kept["excess"]))
+    return float(row["score"] * row["score"] - row["reference_floor"] * row["reference_floor"])

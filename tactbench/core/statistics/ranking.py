@@ -6,18 +6,16 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
+from tactbench.core.evaluation.interval import NORMAL, student_quantile
 from tactbench.core.evaluation.metrics import EXCESS, SUMMED
+from tactbench.core.evaluation.replicate_sums import tables_of
 from tactbench.core.samples import FloatArray, IntArray
-from tactbench.core.statistics.excess import beyond_floor, excess_of
-from tactbench.core.statistics.influence import PairableRows, scores_of, together
-from tactbench.core.statistics.leaving_out import best_without
-from tactbench.core.statistics.rank import Rank
-from tactbench.core.statistics.student import NORMAL, quantile
+from tactbench.core.statistics.influence import PairableRows, scores_of, scores_without, together
+from tactbench.core.statistics.rank import Rank, beyond_floor, excess_of
 
 Row = Mapping[str, Any]
-_STRIP = 64
-"""Cells compared with all others at once: what a processor keeps at hand."""
 
 
 def ranks(rows: Iterable[Row]) -> dict[str, Rank]:
@@ -37,30 +35,18 @@ def ranks(rows: Iterable[Row]) -> dict[str, Rank]:
     place, and what comes in behind changes no place before it.
 
     `low` and `high` are the ranks that no comparison of two excludes, the shared place among them: 1 + the number of
-    cells that are clearly better, and the number of cells that are not clearly worse, itself among them [1]_.
-    Resampling the ranks themselves says too
-    little where cells are close: among near ties it covers as little as 77 % where 95 % are promised [2]_; see
-    ``benchmarks/coverage.py``.
+    cells that are clearly better, and the number of cells that are not clearly worse, itself among them (Mogstad,
+    Romano, Shaikh and Wilhelm 2024, Inference for ranks, at the level of a single pair). Resampling the ranks
+    themselves covers too little where cells are close: ``benchmarks/coverage.py``.
 
     Errors of force are ranked by what is beyond the floor of their reference, if all of them have one: by
     ``score² - floor²``, whose sums over replicates are exact and whose differences are free of what two cells' floors
     share. The region of practical equivalence is that of the roots: ``b² … (b + region)²`` for the better one's b.
 
     Differences are paired over replicates where two cells have the same (:func:`together`), else their errors are taken
-    as independent. Their interval is Student's, with the jackknife's standard error over replicates; of two degrees of
-    freedom the smaller. Where each replicate has a score of its own, the interval is that of the mean difference, and
-    the better median must agree with it. A row without replicates enters with the interval that stands beside its
-    score.
-
-    Nothing is drawn at random, and the answer depends on `cell`, `score`, `ci_low`, `ci_high`, `metric`, `classes`,
-    `equivalence`, `replicates` and the three keys of the error beyond the floor of these rows and on nothing else: it
-    may be kept under a digest of them.
-
-    References
-    ----------
-    .. [1] Mogstad, Romano, Shaikh and Wilhelm 2024, Inference for ranks, Review of Economic Studies 91; here at the
-       level of a single pair, not of all pairs at once.
-    .. [2] Hall and Miller 2009, Using the bootstrap to quantify the authority of an empirical ranking.
+    as independent; their interval is Student's, of two degrees of freedom the smaller. Where each replicate has a score
+    of its own, the better median must agree with it. A row without replicates enters with the interval beside its
+    score. Nothing is drawn at random.
     """
     entered = [row for row in rows if row["status"] == "done" and not row["is_baseline"]]
     if not entered:
@@ -92,7 +78,7 @@ def _excess(row: Row) -> Row:
 
 def _clearly(
     rows: Sequence[Row], groups: Sequence[PairableRows], error: FloatArray
-) -> tuple[IntArray, IntArray, IntArray, IntArray, IntArray]:
+) -> tuple[IntArray, IntArray, IntArray, npt.NDArray[np.bool_], npt.NDArray[np.bool_]]:
     """Return (n,) of cells in order of their errors what their ranks are made of.
 
     How many are clearly better and how many clearly worse, the place, and whether it is clearly worse than the cell
@@ -102,38 +88,27 @@ def _clearly(
     mean = _means(rows, groups, error)
     deviation, freedom = _own_errors(rows, groups)
     distinct, which = np.unique(freedom, return_inverse=True)
-    wide = quantile(distinct) ** 2
+    wide = student_quantile(distinct) ** 2
     same = float(rows[0].get("equivalence") or 0.0)
     near_to = np.full(n, same)
     if rows[0]["metric"] == EXCESS.name:
         near_to = (np.sqrt(np.maximum(error, 0.0)) + same) ** 2 - np.maximum(error, 0.0)
-    better, worse, places, apart, behind = (np.zeros(n, dtype=np.int64) for _ in range(5))
+    variance = np.add.outer(deviation**2, deviation**2)
+    for group in groups:
+        variance[np.ix_(group.places, group.places)] -= 2 * (group.influence @ group.influence.T)
+    bound = wide[np.minimum.outer(which, which)] * np.maximum(variance, 0.0)
+    ahead = np.subtract.outer(mean, mean)  # only what stands before a cell can be better
+    clear = np.tril(np.subtract.outer(error, error) > 0) & (ahead > 0) & (ahead**2 > bound)
+    if same > 0:
+        clear &= ~(ahead <= near_to) | (ahead + np.sqrt(bound) > near_to)
+    places = np.ones(n, dtype=np.int64)
     first = 0  # of those that share the place of the cell before
-    for start in range(0, n, _STRIP):
-        stop = min(start + _STRIP, n)
-        lines, columns = slice(start, stop), slice(0, stop)  # only what stands before a cell can be better
-        bound = np.add.outer(deviation[lines] ** 2, deviation[columns] ** 2)
-        for group in groups:
-            _less_covariance(bound, group, start, stop)
-        np.maximum(bound, 0.0, out=bound)
-        bound *= wide[0] if len(wide) == 1 else wide[np.minimum.outer(which[lines], which[columns])]
-        clear = np.subtract.outer(error[lines], error[columns]) > 0
-        ahead = np.subtract.outer(mean[lines], mean[columns])
-        clear &= ahead > 0
-        clear &= np.square(ahead) > bound
-        if same > 0:
-            region = np.broadcast_to(near_to[columns], ahead.shape)
-            near = np.nonzero(clear & (ahead <= region))
-            clear[near] = ahead[near] + np.sqrt(bound[near]) > region[near]
-        better[lines] = clear.sum(axis=1)
-        worse[columns] += clear.sum(axis=0)
-        for place in range(start, stop):
-            apart[place] = place > 0 and clear[place - start, place - 1]
-            behind[place] = clear[place - start, 0]
-            if clear[place - start, first:place].all():
-                first = place
-            places[place] = first + 1
-    return better, worse, places, apart, behind
+    for place in range(1, n):
+        if clear[place, first:place].all():
+            first = place
+        places[place] = first + 1
+    apart = np.concatenate([[False], np.diagonal(clear, -1)])
+    return clear.sum(axis=1), clear.sum(axis=0), places, apart, clear[:, 0]
 
 
 def _means(rows: Sequence[Row], groups: Sequence[PairableRows], error: FloatArray) -> FloatArray:
@@ -147,19 +122,6 @@ def _means(rows: Sequence[Row], groups: Sequence[PairableRows], error: FloatArra
             if "scores" in kept:
                 found[place] = sign * scores_of(kept, metric).mean()
     return found
-
-
-def _less_covariance(bound: FloatArray, group: PairableRows, start: int, stop: int) -> None:
-    """Take twice the covariance of cells `start` … `stop` and those before from a sum of variances, in place."""
-    first, last = np.searchsorted(group.places, [start, stop])
-    if first == last:
-        return
-    product = group.influence[first:last] @ group.influence[:last].T
-    product *= 2
-    if product.shape == bound.shape:
-        bound -= product
-    else:
-        bound[np.ix_(group.places[first:last] - start, group.places[:last])] -= product
 
 
 def _own_errors(rows: Sequence[Row], groups: Sequence[PairableRows]) -> tuple[FloatArray, FloatArray]:
@@ -176,3 +138,32 @@ def _own_errors(rows: Sequence[Row], groups: Sequence[PairableRows]) -> tuple[Fl
         if low is not None and high is not None:
             deviation[place] = (high - low) / (2 * NORMAL)
     return deviation, freedom
+
+
+def best_without(rows: Sequence[Row], groups: Sequence[PairableRows]) -> list[int] | None:
+    """Return the place in `rows` of the best one without each replicate; None if they do not share replicates.
+
+    Parameters
+    ----------
+    rows
+        Finished rows of one metric.
+    groups
+        What :func:`together` says of them.
+
+    Notes
+    -----
+    A first place that leaves with one replicate is no property of the sensor (Huang et al. 2025, Dropping just a
+    handful of preferences can change top large language model rankings).
+    """
+    metric = str(rows[0]["metric"])
+    if len(groups) != 1 or len(groups[0].places) != len(rows):
+        return None
+    kept = [row["replicates"] for row in rows]
+    if all("scores" in one for one in kept):
+        each = np.array([scores_of(one, metric) for one in kept])
+        without = np.array([np.median(np.delete(each, place, axis=1), axis=1) for place in range(each.shape[1])]).T
+    else:
+        n_classes = len(rows[0]["classes"])
+        without = scores_without(tables_of(kept, metric, n_classes), metric, n_classes)
+    best = np.argmax(without, axis=0) if SUMMED[metric].higher_is_better else np.argmin(without, axis=0)
+    return [int(place) for place in best]

@@ -5,14 +5,18 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from math import comb
 from statistics import median, median_low
 from typing import Any
 
 from tactbench.core.matrix.summary import fill_baselines
-from tactbench.core.statistics.median import FEWEST, LEVEL, median_interval
 
 Row = Mapping[str, Any]
 
+FEWEST = 5
+"""Replicates that an interval or a rank needs: the range of four holds the median in 87.5 % of cases only."""
+LEVEL = 0.95
 _MEDIANS = (
     "score", "reference_floor", "score_beyond_floor", "true_score", "sim_s", "search_s", "fit_s", "predict_s",
     "latency_ms_p50", "latency_ms_p95", "latency_ms_max", "answer_delay_ms", "peak_rss_mb", "wall_s",
@@ -76,15 +80,10 @@ def _of_all(name: str, members: Sequence[Row]) -> dict[str, Any]:
         return dict(first)
     done = [row for row in members if row["status"] == "done"]
     if not done:
-        return {**_stopped(first, len(members)), "cell": name}
+        unknown: dict[str, Any] = {"recordings_right": None, "recordings_asked": None, "replicates": {}, "cell": name}
+        return {**first, **_counted([first], len(members), "replicate", []), **unknown}
     found = _of_campaigns(done) if done[0]["simulated"] else _of_sessions(done)
     return {**found, "cell": name, "repeat": first["repeat"], "remarks": _remarks(members, done), **_right(done)}
-
-
-def _stopped(first: Row, n: int) -> dict[str, Any]:
-    return {**first, "n_replicates": n, "replicate_unit": "replicate", "replicate_scores": [],
-            "seeds": [first["seed"]], "score_min": None, "score_max": None, "recordings_right": None,
-            "recordings_asked": None, "replicates": {}}  # fmt: skip
 
 
 def _of_campaigns(done: Sequence[Row]) -> dict[str, Any]:
@@ -102,31 +101,22 @@ def _of_campaigns(done: Sequence[Row]) -> dict[str, Any]:
             level = known.level if known else level
     scores = [row["score"] for row in done]
     parts = _middle([row.get("delay_parts_ms") or {} for row in done])
+    points_of = [row.get("operating_points") or [] for row in done]
+    alike = len({len(points) for points in points_of}) == 1
+    covers = "" if level == LEVEL else f", {100 * level:.3g} %"
     return found | {
         **_counted(done, len(done), "replicate", scores),
-        "ci_method": _method(len(done), level) if level else "",
+        "ci_method": f"order statistics of {len(done)} replicates{covers}" if level else "",
         "replicates": _kept(done) if len(done) >= FEWEST else {},
         "chosen": _chosen(done),
         "scores": _middle([row["scores"] for row in done]),
         "events": _middle([row.get("events") or {} for row in done]),
-        "operating_points": _middle_points([row.get("operating_points") or [] for row in done]),
+        "operating_points": [_middle(points) for points in zip(*points_of, strict=True)] if alike else [],
         "delay_parts_ms": parts,
         "answer_delay_ms": None if found.get("answer_delay_ms") is None else sum(parts.values()),
         "confusion": _added([row["confusion"] for row in done]),
         "counts": dict(sum((Counter(row["counts"]) for row in done), Counter[str]())),
     }
-
-
-def _middle_points(points: Sequence[Sequence[Mapping[str, float]]]) -> list[dict[str, float]]:
-    """Return the middle of each operating point; none where replicates have different numbers of them."""
-    if len({len(one) for one in points}) > 1:
-        return []
-    return [_middle(list(several)) for several in zip(*points, strict=True)]
-
-
-def _method(n: int, level: float) -> str:
-    less = "" if level == LEVEL else f", {100 * level:.3g} %"
-    return f"order statistics of {n} replicates{less}"
 
 
 def _kept(done: Sequence[Row]) -> dict[str, Any]:
@@ -174,9 +164,7 @@ def _unit(row: Row) -> str:
 
 def _sessions(row: Row) -> int:
     """Return how many sessions, or coarser groups, a row's own interval is over; 0 if it is over nothing so coarse."""
-    kept = row.get("replicates") or {}
-    names = kept.get("names")
-    return 0 if not isinstance(names, list) or _unit(row).startswith(_IN_ONE_SESSION) else len(names)
+    return 0 if _unit(row).startswith(_IN_ONE_SESSION) else len((row.get("replicates") or {}).get("names", ()))
 
 
 def _median(values: Sequence[Any]) -> float | None:
@@ -227,16 +215,13 @@ def recordings_right(row: Row) -> tuple[int, int] | None:
 
     None of a regression, and where the row does not keep its recordings apart.
     """
-    kept, n = row.get("replicates") or {}, len(row["classes"])
-    unit, names, lines = str(kept.get("unit", "")), kept.get("names"), kept.get("sums")
-    if not n or not unit.startswith(_IN_ONE_SESSION) or not isinstance(names, list) or not isinstance(lines, list):
+    kept, n, unit = row.get("replicates") or {}, len(row["classes"]), _unit(row)
+    if not n or not unit.startswith(_IN_ONE_SESSION):
         return None
     recordings: dict[str, Counter[int]] = {}
-    for name, line in zip(names, lines, strict=False):
-        recording = str(name).rpartition("/")[0] if unit.startswith("block") else str(name)
-        found = recordings.setdefault(recording, Counter())
-        for column, count in zip(line[::2], line[1::2], strict=False):
-            found[column] += count
+    for name, line in zip(kept["names"], kept["sums"], strict=True):
+        found = recordings.setdefault(name.rpartition("/")[0] if unit.startswith("block") else name, Counter())
+        found.update(dict(zip(line[::2], line[1::2], strict=True)))
     right = 0
     for found in recordings.values():
         if len({column // n for column in found}) != 1:
@@ -244,3 +229,59 @@ def recordings_right(row: Row) -> tuple[int, int] | None:
         column, _ = found.most_common(1)[0]
         right += column // n == column % n
     return right, len(recordings)
+
+
+@dataclass(frozen=True)
+class MedianInterval:
+    """Where a median may lie."""
+
+    low: float
+    high: float
+    level: float
+    """Coverage: 0.95, or that of the whole range where five replicates reach no more."""
+
+
+def median_interval(values: Sequence[float]) -> MedianInterval | None:
+    """Return the 95 % interval of the median of what `values` were drawn from; None of fewer than five.
+
+    Notes
+    -----
+    The interval between the k-th smallest and the k-th largest of n values holds the median with probability
+    ``1 - 2 P(B < k)``, B binomial with n and 1/2, whatever the distribution is. Between the two k whose probabilities
+    enclose 95 % the ends are interpolated [1]_. The range of five values holds it in 93.75 % only: the level says so.
+
+    References
+    ----------
+    .. [1] Hettmansperger and Sheather 1986, Confidence intervals based on interpolated order statistics, Statistics and
+       Probability Letters 4, equation 2.
+    """
+    n = len(values)
+    if n < FEWEST:
+        return None
+    ordered = sorted(map(float, values))
+    k = next(k for k in range(1, n) if _coverage(n, k + 1) < LEVEL)
+    held, next_held = _coverage(n, k), _coverage(n, k + 1)
+    if held <= LEVEL:
+        return MedianInterval(ordered[0], ordered[-1], held)
+    share = (held - LEVEL) / (held - next_held)
+    weight = (n - k) * share / (k + (n - 2 * k) * share)
+    low = (1 - weight) * ordered[k - 1] + weight * ordered[k]
+    high = (1 - weight) * ordered[n - k] + weight * ordered[n - k - 1]
+    return MedianInterval(low, high, LEVEL)
+
+
+def counted(n: int, unit: str) -> str:
+    """Return so many of a unit of replication as text: ``8 replicates``, ``20 presses``, ``1 session``."""
+    if unit.startswith("block"):
+        return f"{n} {unit.replace('block', 'blocks', 1)}"
+    return f"{n} {unit}" if n == 1 else f"{n} {unit}{'es' if unit.endswith('s') else 's'}"
+
+
+def percent(n: int | None, unit: str | None) -> str:
+    """Return what intervals over `n` replicates, or sessions, cover, as text: ``95 %``."""
+    return "93.8 %" if n == FEWEST and unit == "replicate" else "95 %"
+
+
+def _coverage(n: int, k: int) -> float:
+    """Return the probability that the median lies between the k-th smallest and the k-th largest of n values."""
+    return 1.0 - 2.0 * sum(comb(n, i) for i in range(k)) / float(2**n)

@@ -5,11 +5,8 @@ import functools
 import numpy as np
 import pytest
 
-from tactbench.core.errors import NotApplicable
 from tactbench.core.evaluation.dataset import load_dataset
-from tactbench.core.evaluation.protocols import DEPLOYABLE, KARL2016, PROTOCOLS
-from tactbench.core.evaluation.selection import scales
-from tactbench.core.evaluation.sets import SetRows
+from tactbench.core.evaluation.protocols import DEPLOYABLE
 from tactbench.core.evaluation.splits import choose_split, inner_splits, make_splits, shots, training_sessions
 from tactbench.plugin import load_registry
 
@@ -83,13 +80,6 @@ def test_few_shots_train_on_nested_sets_and_test_on_the_same(loaded, name):
     assert len(sets[10][0]) == 10 * len(sets[1][0])
 
 
-def test_of_more_sessions_than_asked_for_the_first_train(loaded):
-    data = loaded("force", "few-shot-10")
-    for number in (1, 2, 5, 10):
-        (fold,) = make_splits(data, f"few-shot-{number}", 0)
-        assert values(data, "session", fold.train) == {f"session-{place}" for place in range(1, number + 1)}
-
-
 def test_sessions_are_taken_in_order_of_their_numbers(tmp_path):
     X = np.zeros((ROWS, 2)) + np.arange(ROWS)[:, None]
     names = ("day-10", "day-9", "day-2", "both", "last")
@@ -101,18 +91,6 @@ def test_sessions_are_taken_in_order_of_their_numbers(tmp_path):
     assert training_sessions(data) == ["day-2", "day-9", "day-10"], "a session with a test recording never trains"
 
 
-def test_more_shots_than_sessions_are_refused(tmp_path):
-    from tactbench.core.errors import UsageError
-
-    X = np.zeros((ROWS, 2)) + np.arange(ROWS)[:, None]
-    paths = [record(tmp_path / f"{role}.h5", X, np.arange(ROWS), session=role, role=role) for role in ("train", "test")]
-    data = load_dataset(force_task(), paths)
-    task = force_task(splits=("few-shot-1", "few-shot-2"))
-    assert choose_split(task, DEPLOYABLE, data, "few-shot-1") == "few-shot-1"
-    with pytest.raises(UsageError, match="few-shot-1"):
-        choose_split(task, DEPLOYABLE, data, "few-shot-2")
-
-
 def test_a_fold_says_whether_its_radius_lies_between_those_of_training(loaded):
     folds = make_splits(loaded("inverse-radius", "cap_radius_mm"), "cap_radius_mm", 0, one_by_one=True)
     told = {fold.name.removeprefix("cap_radius_mm ").split(", ")[0]: fold.name.split(", ")[1] for fold in folds}
@@ -120,25 +98,3 @@ def test_a_fold_says_whether_its_radius_lies_between_those_of_training(loaded):
         "5.0": "extrapolated", "flat": "extrapolated",
         **dict.fromkeys(("7.5", "10.0", "20.0", "40.0"), "interpolated"),
     }  # fmt: skip
-
-
-def test_folds_that_test_many_numbers_say_nothing(loaded):
-    folds = make_splits(loaded("force", "placement"), "placement", 0, one_by_one=True)
-    assert not any("polated" in fold.name for fold in folds)
-
-
-def test_the_third_protocol_is_the_papers_in_everything_but_the_scale():
-    third = PROTOCOLS["karl2016-training-scale"]
-    changed = {name for name in type(third).model_fields if getattr(third, name) != getattr(KARL2016, name)}
-    assert changed == {"name", "title", "scaled_by"}
-    some = [
-        SetRows(X=np.array([[0.0], [width]]), **dict.fromkeys(("y", "labelled", "time_s", "recording", "row", "cluster",
-                                                            "segment"), np.zeros(2)))
-        for width in (1.0, 2.0)
-    ]  # fmt: skip
-    assert scales(KARL2016, *some)[1].deviation == 2 * scales(third, *some)[1].deviation
-
-
-def test_a_protocol_of_roles_skips_another_split_and_says_so(loaded):
-    with pytest.raises(NotApplicable, match="by roles only"):
-        choose_split(TASKS["force"], KARL2016, loaded("force", "unit"), "unit")

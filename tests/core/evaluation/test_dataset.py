@@ -43,14 +43,6 @@ def test_features_of_several_streams_stand_on_the_clock_of_the_first(tmp_path):
     np.testing.assert_array_equal(data.tables[0].X, np.column_stack([slow, slow]))
 
 
-def test_a_row_without_a_sample_of_the_other_stream_is_left_out_and_counted(tmp_path):
-    slow = np.arange(0.0, 100.0, 10.0)
-    path = two_streams(tmp_path / "a.h5", (slow, slow), (slow[:6], slow[:6]), (slow, slow))
-    data = load_dataset(force_task(features=("taxel", "ac_pressure")), [path])
-    assert data.counts["rows left out because v0 has no sample"] == 4
-    assert data.tables[0].row.tolist() == list(range(6))
-
-
 def test_a_stream_the_sensor_lacks_is_a_reason_and_never_ignored(tmp_path):
     path = record(tmp_path / "a.h5", *ramp(0, n=50))
     with pytest.raises(NotApplicable, match="needs a vibration stream; made has none"):
@@ -91,16 +83,6 @@ def test_flagged_samples_are_kept_and_counted(tmp_path):
     assert len(data.tables[0].row) == 50
 
 
-def test_a_row_after_a_gap_is_a_good_row(tmp_path):
-    X, force = ramp(0, n=50)
-    quality = np.zeros(X.shape, dtype=np.uint8)
-    quality[10] = Quality.GAP
-    data = load_dataset(force_task(), [record(tmp_path / "a.h5", X, force, quality=quality)])
-    plain = load_dataset(force_task(), [record(tmp_path / "b.h5", X, force)])
-    assert data.counts == {"rows of taxels kept, before which others were lost": 1}
-    assert np.array_equal(data.tables[0].X, plain.tables[0].X)
-
-
 def test_samples_marked_missing_are_no_labels_whatever_number_stands_there(tmp_path):
     """-1 for "no sample" must not become a force of -1 N."""
     X, _ = ramp(0, n=50)
@@ -119,14 +101,6 @@ def test_samples_marked_missing_are_no_labels_whatever_number_stands_there(tmp_p
     data = load_dataset(force_task(), [tmp_path / "a.h5"])
     assert data.counts["of 50 rows have no force sample and were left out"] == 25
     assert set(data.tables[0].y[data.tables[0].labelled]) == {2.0}
-
-
-def test_the_answer_is_not_a_group(tmp_path):
-    X, _ = ramp(0, n=20)
-    notes = {"kind": np.tile(["a", "b"], 10), "object": np.repeat(["x", "y"], 10)}
-    data = load_dataset(label_task(), [record(tmp_path / "a.h5", X, annotations=notes)])
-    assert "kind" not in data.tables[0].groups
-    assert "object" in data.tables[0].groups
 
 
 def test_several_force_channels_need_a_name(tmp_path):

@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 from tactbench.core.acquisition import acquire
-from tactbench.core.evaluation.cell import CellContext, evaluate
+from tactbench.core.evaluation.cell import CellContext, evaluate_cell
 from tactbench.core.evaluation.dataset import load_dataset
-from tactbench.core.evaluation.delay import NO_LINK, NO_RATE, answer_delay_ms, reading_delay_ms
+from tactbench.core.evaluation.delay import NO_LINK, NO_RATE, answer_delay_ms, stated_delay_ms
 from tactbench.core.evaluation.protocols import PROTOCOLS, protocol_called
-from tactbench.core.evaluation.windows import causal_mean
+from tactbench.core.evaluation.sets import causal_mean
 from tactbench.core.leaderboard.table import build_table
 from tactbench.core.plugins.registry import load_registry
 from tactbench.plugin import Block, ForceRamp, RigDescriptor, Scene, StreamSpec, assumed
@@ -53,6 +53,10 @@ def estimator():
     return load_registry().estimators["ols"].model_copy(update={"window_grid": (K,)})
 
 
+def reading_delay_ms(data, rules, k):
+    return stated_delay_ms(data, data, TASK, rules, estimator(), k)
+
+
 def slope_s(k, interval_s):
     """Group delay of the filter that the protocols run, near zero frequency: minus the slope of its phase."""
     impulse = np.zeros((4096, 1))
@@ -72,18 +76,6 @@ def test_the_window_of_every_protocol_is_the_group_delay_of_the_filter_it_runs(t
     # A mean of n = k + 1 samples is late by (n - 1) / 2 of them. Clocks are whole nanoseconds: 1e-9 of a second.
     assert parts["window"] == pytest.approx(k / 2 * 12.0, abs=1e-6)
     assert parts["window"] == pytest.approx(1e3 * slope_s(k, 0.012), rel=1e-6, abs=1e-6)
-
-
-def test_one_row_alone_is_filtered_over_nothing(tmp_path):
-    data = load_dataset(TASK, pressed(tmp_path / "a"))
-    assert reading_delay_ms(data, protocol_called("first-frame"), K)[0]["window"] == 0.0
-
-
-def test_a_ramp_is_answered_by_as_much_too_late_as_the_window_says():
-    # The definition that a person can check: a filtered ramp is the ramp of that long ago.
-    t_s = np.arange(500) * 0.012
-    late = t_s - causal_mean(t_s[:, None], K, np.zeros(500, dtype=np.int64))[:, 0]
-    np.testing.assert_allclose(late[K:], K / 2 * 0.012, rtol=1e-9)
 
 
 def test_a_quicker_sensor_waits_less_for_its_next_sample_and_the_scene_says_what_it_did(tmp_path):
@@ -117,34 +109,23 @@ def test_what_is_not_known_is_absent_and_said(tmp_path):
 
 def test_the_delay_of_a_cell_is_the_sum_of_its_parts_on_a_clock_that_counts_readings(tmp_path):
     ticks = itertools.count()
-    result = evaluate(
+    result = evaluate_cell(
         CellContext(TASK, estimator(), {}, "deployable-untared", "roles", seed=1, clock=lambda: next(ticks) * 2.0**-10),
         pressed(tmp_path / "a"),
     )
     # One tick passes between the two looks at the clock around each call.
     tick_ms = 1e3 * 2.0**-10
-    assert result.delay_parts_ms == pytest.approx(
+    assert result.times.delay_parts_ms == pytest.approx(
         {"sampling": 12.0, "window": 240.0, "features": tick_ms, "prediction": tick_ms}
     )
-    assert result.answer_delay_ms == pytest.approx(252.0 + 2 * tick_ms)
-    assert result.latency_n == 200
-    assert result.latency_ms_p95 is not None
+    assert result.times.answer_delay_ms == pytest.approx(252.0 + 2 * tick_ms)
+    assert result.times.latency_n == 200
+    assert result.times.latency_ms_p95 is not None
     assert NO_LINK in result.remarks
 
 
-def test_an_answer_that_looks_at_no_reading_waits_for_none(tmp_path):
-    mean = load_registry().estimators["mean"]
-    result = evaluate(
-        CellContext(TASK, mean, {}, "deployable-untared", "roles", seed=1, clock=itertools.count().__next__),
-        pressed(tmp_path / "a"),
-    )
-    assert set(result.delay_parts_ms) == {"prediction"}
-    assert result.answer_delay_ms == result.latency_ms_p50
-    assert NO_LINK not in result.remarks
-
-
 def test_without_the_times_of_a_machine_there_is_no_sum(tmp_path):
-    result = evaluate(
+    result = evaluate_cell(
         CellContext(
             TASK,
             estimator(),
@@ -157,8 +138,8 @@ def test_without_the_times_of_a_machine_there_is_no_sum(tmp_path):
         ),
         pressed(tmp_path / "a"),
     )
-    assert set(result.delay_parts_ms) == {"sampling", "window"}
-    assert result.answer_delay_ms is None
+    assert set(result.times.delay_parts_ms) == {"sampling", "window"}
+    assert result.times.answer_delay_ms is None
     assert NO_LINK not in result.remarks
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tactbench.core.errors import NotApplicable
-from tactbench.core.evaluation.cell import CellContext, evaluate
+from tactbench.core.evaluation.cell import CellContext, evaluate_cell
 from tactbench.core.plugins.registry import load_registry
 from tests.core.evaluation.made import force_task, label_task, record
 
@@ -27,7 +27,7 @@ def grasps(folder, *, offset, each=12, n=20, seed=3):
 
 
 def run(paths, protocol="first-frame", split=None, task=TASK):
-    return evaluate(
+    return evaluate_cell(
         CellContext(
             task, REGISTRY.estimators["forest"], {"n_estimators": 10}, protocol, split, seed=1, clock=time.perf_counter,
             latency=False,
@@ -47,25 +47,15 @@ def test_offsets_before_contact_name_the_object_and_contact_alone_does_not(tmp_p
 
 def test_one_row_a_recording_is_tested_and_the_others_are_counted(tmp_path):
     result = run(grasps(tmp_path, offset=3.0))
-    assert result.n_test == 36
+    assert result.sizes.n_test == 36
     assert sorted(result.sets["test"].recording.tolist()) == list(range(36))
     assert set(result.sets["test"].row.tolist()) == {0}
     # Once, whatever the number of folds and sets that use the recording.
-    assert result.folds == 5
+    assert len(result.sizes.fold_sizes) == 5
     assert {what: n for what, n in result.counts.items() if "first of" in what} == {
         "rows after the first of a recording": 36 * 19
     }
     assert result.split == run(sorted(tmp_path.glob("*.h5")), "deployable").split == "recording"
-
-
-def test_a_first_row_that_is_missing_is_replaced_by_the_first_there_is(tmp_path):
-    rng = np.random.default_rng(0)
-    for number in range(12):
-        quality = np.zeros((6, 2), dtype=np.uint8)
-        quality[0, 0] = 1
-        record(tmp_path / f"g{number}.h5", rng.normal(size=(6, 2)), quality=quality, labels={"object": number % 2})
-    result = run(sorted(tmp_path.glob("*.h5")))
-    assert set(result.sets["test"].row.tolist()) == {1}
 
 
 def test_an_answer_that_changes_within_a_recording_is_skipped_with_the_reason(tmp_path):
@@ -76,20 +66,7 @@ def test_an_answer_that_changes_within_a_recording_is_skipped_with_the_reason(tm
         run(paths, task=force_task())
 
 
-def test_single_readings_are_skipped_with_the_reason(tmp_path):
-    rng = np.random.default_rng(0)
-    paths = [record(tmp_path / f"g{place}.h5", rng.normal(size=(1, 3)), labels={"object": place % 2})
-             for place in range(8)]  # fmt: skip
-    with pytest.raises(NotApplicable, match="one reading"):
-        run(paths)
-
-
-def test_a_split_that_cuts_recordings_in_time_is_skipped_with_the_reason(tmp_path):
-    with pytest.raises(NotApplicable, match="'in-session' tests the end"):
-        run(grasps(tmp_path, offset=3.0), split="in-session")
-
-
 def test_too_few_first_rows_have_no_interval_and_say_so(tmp_path):
     few = run(grasps(tmp_path, offset=3.0, each=2), split="recording")
-    assert (few.ci_low, few.ci_high) == (0.0, 1.0)
-    assert few.ci_method.startswith("none: 6 recordings of one row each are too few")
+    assert (few.interval.low, few.interval.high) == (0.0, 1.0)
+    assert few.interval.method.startswith("none: 6 recordings of one row each are too few")

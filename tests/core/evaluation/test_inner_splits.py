@@ -53,13 +53,6 @@ def test_a_cut_in_time_leaves_a_gap_of_the_longest_window(tmp_path_factory, gap)
                     assert np.flatnonzero(b)[0] - np.flatnonzero(a)[-1] == gap + 1
 
 
-def test_the_gap_costs_training_rows_and_never_test_rows(tmp_path):
-    data = load_dataset(force_task(), sessions(tmp_path, ("a",)))
-    (near,), (far,) = (make_splits(data, "in-session", 0, gap=gap) for gap in (0, 40))
-    np.testing.assert_array_equal(near.test[0], far.test[0])
-    assert near.train[0].sum() - far.train[0].sum() == 40
-
-
 def test_a_group_that_some_recordings_lack_is_refused(tmp_path):
     paths = [grasps(tmp_path, seed=1), *sessions(tmp_path, ("a",), labels={"kind": "stable"})]
     with pytest.raises(UsageError, match="object"):

@@ -5,7 +5,7 @@ import time
 import numpy as np
 import pytest
 
-from tactbench.core.evaluation.cell import CellContext, evaluate
+from tactbench.core.evaluation.cell import CellContext, evaluate_cell
 from tactbench.core.plugins.registry import load_registry
 
 from .made import force_task, record
@@ -16,7 +16,7 @@ ESTIMATOR = load_registry().estimators["ols"]
 
 def stamps(paths, split="session"):
     context = CellContext(force_task(), ESTIMATOR, {}, "deployable", split, seed=1, clock=time.perf_counter)
-    return evaluate(context, paths).stamps
+    return evaluate_cell(context, paths).stamps
 
 
 def test_sessions_of_their_own_have_no_stamp(tmp_path):

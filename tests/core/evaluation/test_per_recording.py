@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 
 from tactbench.core.errors import DataError, NotApplicable, PluginContractError, UsageError
-from tactbench.core.evaluation.cell import CellContext, evaluate
+from tactbench.core.evaluation.cell import CellContext, evaluate_cell
 from tactbench.core.evaluation.dataset import load_dataset
+from tactbench.core.evaluation.fitting import voted
 from tactbench.core.evaluation.protocols import protocol_called
 from tactbench.core.evaluation.splits import make_splits
-from tactbench.core.evaluation.summaries import answer_span_s, summarised
-from tactbench.core.evaluation.vote import voted
+from tactbench.core.evaluation.summaries import summarised
 from tactbench.core.plugins.registry import load_registry
 from tactbench.core.recording.writer import RecordingWriter
 from tactbench.core.samples import Part
@@ -22,7 +22,6 @@ from tactbench.plugin import (
     ChannelTarget,
     ForceRamp,
     Indenter,
-    LabelTarget,
     Scene,
     SensorSpec,
     Source,
@@ -65,47 +64,35 @@ def run(asked, paths, split=None, estimator="forest", protocol="deployable", **m
         asked, REGISTRY.estimators[estimator], params, protocol, split, seed=1, clock=time.perf_counter,
         **{"latency": False, **more},
     )  # fmt: skip
-    return evaluate(context, paths)
+    return evaluate_cell(context, paths)
 
 
 def test_a_recording_is_one_answer_by_what_it_did_and_not_where_it_stood(tmp_path):
     paths = sequences(tmp_path)
     result = run(task(), paths)
     assert result.split == "recording"
-    assert result.n_test == 24
+    assert result.sizes.n_test == 24
     assert sorted(result.sets["test"].recording.tolist()) == list(range(24))
-    assert result.n_train == 4 * 24
+    assert result.sizes.n_train == 4 * 24
     # Deviations of 1 and 3 from 40 samples are known to 11 %: eight standard errors apart.
     assert result.score == 1.0
     assert run(task(), paths, estimator="majority").scores["accuracy"] == pytest.approx(16 / 24)
-    assert result.ci_method.startswith("jackknife over 24 recordings ")
+    assert result.interval.method.startswith("jackknife over 24 recordings ")
     assert "one answer a recording, from deviation, mean-step" in result.remarks
 
 
 def test_the_delay_of_an_answer_holds_the_recording_it_waits_for(tmp_path):
     paths = sequences(tmp_path)
     whole = run(task(), paths, latency=True)
-    assert whole.delay_parts_ms["window"] == pytest.approx(390.0)
-    assert whole.answer_delay_ms == pytest.approx(sum(whole.delay_parts_ms.values()))
-    assert whole.delay_parts_ms["features"] > 0
+    assert whole.times.delay_parts_ms["window"] == pytest.approx(390.0)
+    assert whole.times.answer_delay_ms == pytest.approx(sum(whole.times.delay_parts_ms.values()))
+    assert whole.times.delay_parts_ms["features"] > 0
     part = task(summaries=(Summary(measure="deviation", start=0.1, end=0.3, unit="s"),))
-    assert run(part, paths).delay_parts_ms["window"] == pytest.approx(200.0)
+    assert run(part, paths).times.delay_parts_ms["window"] == pytest.approx(200.0)
     half = task(summaries=(Summary(measure="deviation", end=0.5),))
-    assert run(half, paths).delay_parts_ms["window"] == pytest.approx(195.0)
-    assert run(vote(), paths).delay_parts_ms["window"] == pytest.approx(390.0)
-    assert "window" not in run(task(), paths, estimator="majority").delay_parts_ms
-
-
-def test_without_a_clock_shares_are_asked_and_the_delay_is_not_known(tmp_path):
-    rng = np.random.default_rng(0)
-    paths = [record(tmp_path / f"s{place}.h5", rng.normal(0, 1 + 2 * (place % 2), (30, 2)), t_ns=None,
-                    labels={"slip": place % 2}) for place in range(12)]  # fmt: skip
-    result = run(task(), paths, latency=True)
-    assert result.score == 1.0
-    assert result.answer_delay_ms is None
-    assert "answer delay unknown: the recordings do not tell their sampling rate" in result.remarks
-    with pytest.raises(NotApplicable, match="states none for taxels"):
-        run(task(summaries=(Summary(measure="band-energy", band_hz=(1.0, 2.0)),)), paths)
+    assert run(half, paths).times.delay_parts_ms["window"] == pytest.approx(195.0)
+    assert run(vote(), paths).times.delay_parts_ms["window"] == pytest.approx(390.0)
+    assert "window" not in run(task(), paths, estimator="majority").times.delay_parts_ms
 
 
 def test_splits_keep_recordings_whole(tmp_path):
@@ -140,24 +127,6 @@ def test_an_answer_that_changes_within_a_recording_is_none_of_the_whole(tmp_path
     paths = [record(tmp_path / f"s{place}.h5", X, annotations={"slip": np.repeat([0, 1], 10)}) for place in range(3)]
     with pytest.raises(NotApplicable, match="asks one answer of each recording, and slip changes within 's0'"):
         run(asked, paths)
-
-
-def test_a_copied_recording_leaks_as_whole_as_it_is(tmp_path):
-    paths = sequences(tmp_path)
-    X = np.random.default_rng(5).normal(0, 1, (40, 2))
-    twins = [record(tmp_path / f"{name}.h5", X, labels={"slip": "stable"}) for name in ("a", "b")]
-    assert not run(task(), paths).stamps
-    stamps = run(task(), [*paths, *twins]).stamps
-    assert len(stamps) == 1
-    assert stamps[0].startswith("leaks: ")
-
-
-def test_the_first_frame_alone_is_asked_as_of_samples(tmp_path):
-    result = run(task(), sequences(tmp_path), protocol="first-frame")
-    assert result.n_test == 24
-    assert set(result.sets["test"].row.tolist()) == {0}
-    assert "one answer a recording, from its first row" in result.remarks
-    assert result.score < 0.9, "an offset drawn at random does not tell slip"
 
 
 # --- own clocks
@@ -227,17 +196,10 @@ def test_the_hold_is_tared_on_and_left_out_of_every_stream(tmp_path):
     # A mean of 25 and of 1000 samples less one of 75 and of 3000: 0.23 and 0.03 at most, four times that here.
     assert all(abs(table.X[0, 1]) < 1.0 and abs(table.X[0, 2]) < 0.1 for table in tared.tables)
     assert all(table.X[0, 1] == pytest.approx(20, abs=1) for table in untared.tables)
-    assert answer_span_s(data, FAST, protocol_called("deployable")) == pytest.approx(1.5, abs=1 / SLOW_HZ)
     result = run(FAST, two_rates(tmp_path, hold_s=0.5))
     assert result.tare_s == pytest.approx(0.5)
+    assert result.times.delay_parts_ms["window"] == pytest.approx(1500, abs=1e3 / SLOW_HZ)
     assert result.counts["rows before the press begins"] == 12 * 25
-
-
-@pytest.mark.parametrize("protocol", ["karl2016", "karl2016-training-scale"])
-def test_protocols_that_drop_single_samples_do_not_go_with_summaries(tmp_path, protocol):
-    data = load_dataset(task(), sequences(tmp_path))
-    with pytest.raises(NotApplicable, match="summarises whole recordings"):
-        summarised(data, task(), protocol_called(protocol))
 
 
 # --- code of the task's own
@@ -288,7 +250,7 @@ def test_a_task_may_name_code_for_features_of_its_own(tmp_path):
 def part_of(recording, y):
     n = len(y)
     row = np.arange(n)
-    return Part(np.zeros((n, 1)), np.asarray(y), row * 1.0, np.asarray(recording), row, np.zeros(n, dtype=np.int64))
+    return Part(np.zeros((n, 1)), np.asarray(y), row * 1.0, np.asarray(recording), row)
 
 
 def test_frames_vote_and_of_equals_the_first_class_wins():
@@ -310,43 +272,11 @@ def test_a_vote_scores_recordings_that_frames_alone_get_half_wrong(tmp_path):
     one, all_of_them = run(frames, paths, estimator="logistic"), run(vote(), paths, estimator="logistic")
     assert one.score < 0.7
     assert all_of_them.score > 0.9
-    assert (one.n_test, all_of_them.n_test) == (2400, 20)
-    assert one.n_train == all_of_them.n_train
-    assert all_of_them.batch_rows == 2400
+    assert (one.sizes.n_test, all_of_them.sizes.n_test) == (2400, 20)
+    assert one.sizes.n_train == all_of_them.sizes.n_train
+    assert all_of_them.times.batch_rows == 2400
     assert "one answer a recording, from the commonest answer of its frames" in all_of_them.remarks
-    assert all_of_them.ci_method.startswith("jackknife over 20 recordings ")
-
-
-def test_parameters_are_chosen_by_the_vote_too(tmp_path):
-    """Numbers, and a window to choose: ridge is scored by recordings on the validation folds as well."""
-    rng = np.random.default_rng(4)
-    paths = [record(tmp_path / f"s{place:02d}.h5", rng.normal(place, 3, (60, 1)), labels={"slip": place})
-             for place in range(12)]  # fmt: skip
-    number = vote(kind="regression", metric="rmse")
-    result = run(number, paths, estimator="ridge")
-    assert result.n_test == 12
-    # A mean of sixty readings of deviation 3 is known to 0.4; folds of neighbours are answered across a gap of two.
-    assert result.score < 1.0
-    assert "one answer a recording, from the mean answer of its frames" in result.remarks
-    by_mean = task(kind="regression", metric="rmse", summaries=(Summary(measure="mean"),))
-    summed = run(by_mean, paths, estimator="ridge")
-    assert summed.score < 1.0
-    assert {one["k"] for one in summed.search} == {0}, "one row has nothing before it to average"
-
-
-def test_a_vote_is_asked_under_the_papers_protocol_and_of_every_recording(tmp_path):
-    """Its rows are dropped and scaled sample by sample, and those that are left vote."""
-    rng = np.random.default_rng(4)
-    roles = ("train", "validation", "test")
-    paths = [record(tmp_path / f"s{place}.h5", rng.normal(place % 2, 1, (700, 1)), np.full(700, 1.0), role=role,
-                    labels={"slip": place % 2}) for place, role in enumerate(roles * 2)]  # fmt: skip
-    result = run(vote(), paths, estimator="logistic", protocol="karl2016")
-    assert result.n_test == 2
-    assert result.counts["rows before the press begins"] == 6 * 600
-    assert result.delay_parts_ms["window"] == pytest.approx(990.0), "100 of 700 rows are kept"
-    short = record(tmp_path / "short.h5", rng.normal(size=(500, 1)), np.full(500, 1.0), role="test", labels={"slip": 0})
-    with pytest.raises(DataError, match="leaves no row of recording 'short'"):
-        run(vote(), [*paths, short], estimator="logistic", protocol="karl2016")
+    assert all_of_them.interval.method.startswith("jackknife over 20 recordings ")
 
 
 # --- numbers
@@ -383,42 +313,4 @@ def test_a_number_of_a_recording_is_a_channel_reduced(tmp_path):
     assert sorted(run(mean, paths, estimator="ols").sets["test"].y_true) == pytest.approx(sorted(expected), rel=1e-3)
 
 
-def test_a_number_of_a_recording_has_no_floor_of_a_samples_noise(tmp_path):
-    result = run(number_task(), pushes(tmp_path)[0], estimator="ols")
-    assert result.beyond is None
-    assert result.true is None
-    assert not [remark for remark in result.remarks if "floor" in remark]
-
-
-def test_a_label_that_says_a_number_can_be_asked_for_as_one(tmp_path):
-    paths, highest = pushes(tmp_path)
-    asked = number_task(target=LabelTarget(name="most_n", unit="N"))
-    assert sorted(run(asked, paths, estimator="ols").sets["test"].y_true) == pytest.approx(sorted(highest), abs=1e-6)
-    worded = record(tmp_path / "worded.h5", np.ones((60, 2)), np.ones(60), labels={"most_n": "much"})
-    with pytest.raises(DataError, match="label 'most_n' is no number"):
-        run(asked, [*paths, worded], estimator="ols")
-
-
 # --- the declaration
-
-
-@pytest.mark.parametrize(
-    ("wrong", "words"),
-    [
-        ({"vote": "frames"}, "or else vote"),
-        ({"summaries": ()}, "needs either"),
-        ({"answer_per": "sample"}, "belong to answer_per: recording"),
-        (
-            {"answer_per": "sample", "summaries": (), "target": ChannelTarget(reduce="max")},
-            "for answer_per: recording alone",
-        ),
-        ({"target": ChannelTarget()}, "asks for a label"),
-        ({"splits": ("recording", "in-session")}, "cuts recordings in time"),
-        ({"summaries": (MOVES[0], MOVES[0])}, "the same"),
-        ({"features_by": "no colon"}, "pattern"),
-        ({"summaries": (Summary(measure="mean", kinds=("ac_pressure",)),)}, "features do not have"),
-    ],
-)
-def test_a_task_that_contradicts_itself_is_refused(wrong, words):
-    with pytest.raises(ValueError, match=words):
-        task(**wrong)

@@ -10,8 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from tactbench.core.errors import NotApplicable
-from tactbench.core.evaluation.cell import CellContext, evaluate
+from tactbench.core.evaluation.cell import CellContext, evaluate_cell
 from tactbench.core.evaluation.dataset import load_dataset
 from tactbench.core.plugins.registry import load_registry
 from tactbench.core.recording.mapping import import_tables
@@ -40,7 +39,7 @@ def grasps(shared_data, tmp_path_factory):
 
 def run(task, data, split, estimator="forest", protocol="deployable"):
     params = {"n_estimators": 30} if estimator == "forest" else {}
-    return evaluate(
+    return evaluate_cell(
         CellContext(
             REGISTRY.tasks[task].spec,
             REGISTRY.estimators[estimator],
@@ -71,59 +70,23 @@ def test_force_within_and_across_sessions(presses):
     assert len(folds(within)) == len(folds(across)) == 2
     assert all(0.2 < score < 0.35 for score in folds(within).values()), folds(within)
     assert all(0.4 < score < 0.9 for score in folds(across).values()), folds(across)
-    assert within.ci_low < within.score < within.ci_high < across.score
+    assert within.interval.low < within.score < within.interval.high < across.score
     assert not within.stamps
     assert 12.0 < run("force", presses, None, "mean").score < 13.0
-
-
-def test_foreign_recordings_skip_the_papers_protocol_with_a_reason(presses):
-    with pytest.raises(NotApplicable, match="roles"):
-        run("force", presses, None, "lasso", "karl2016")
 
 
 def test_grasp_stability_by_object_official_and_shuffled(grasps):
     by_object, shuffled = run("grasp-stability", grasps, None), run("grasp-stability", grasps, "shuffled")
     official = run("grasp-stability", grasps, "roles")
     assert by_object.split == "object"
-    assert by_object.ci_method.startswith("jackknife over 41 objects ")
+    assert by_object.interval.method.startswith("jackknife over 41 objects ")
     assert by_object.n_test == 1276 + 1273 + 2133, "the official test is not touched"
     assert 0.83 < by_object.score < 0.92
     assert shuffled.score > 0.9
-    assert shuffled.score > by_object.ci_high, "the leak is larger than the interval"
+    assert shuffled.score > by_object.interval.high, "the leak is larger than the interval"
     assert "leaks" in shuffled.stamps[0]
     assert not by_object.stamps
-    assert official.n_test == 511
-    assert official.ci_method.startswith("jackknife over 10 objects ")
+    assert official.sizes.n_test == 511
+    assert official.interval.method.startswith("jackknife over 10 objects ")
     assert 0.70 < official.score < 0.82
     assert run("grasp-stability", grasps, "roles", "majority").score == pytest.approx(261 / 511)
-
-
-def test_a_new_occasion_is_worth_a_coin_and_a_single_reading_has_no_first_frame(grasps):
-    """Trained on two orientations and tested on the third: 0.498, 0.658 and 0.504 in the notes, 0.55 of all rows."""
-    occasion = run("grasp-stability", grasps, "session")
-    assert len(folds(occasion)) == 3
-    assert 0.45 < occasion.score < 0.65
-    with pytest.raises(NotApplicable, match="changes within recording"):
-        run("grasp-stability", grasps, None, protocol="first-frame")
-
-
-@pytest.fixture(scope="module")
-def sheared(shared_data, tmp_path_factory):
-    return recordings(shared_data, tmp_path_factory.mktemp("shear"), "eflesh-shear", "eflesh")
-
-
-def test_shear_force_in_session_and_by_press(sheared):
-    data = load_dataset(REGISTRY.tasks["shear-force"].spec, sheared)
-    assert data.counts["of 7200 rows have no force sample called 'shear' and were left out"] == 3475
-    within = run("shear-force", data, "in-session")
-    # 0.24 N in the notes with a hundred trees; thirty are within 0.03 N of that. Published, by a network: 0.12 N.
-    assert 0.20 < within.score < 0.30
-    assert run("shear-force", data, "in-session", "mean").score == pytest.approx(6.33, abs=0.005)
-    by_press = run("shear-force", data, None, "ridge")
-    assert by_press.split == "press"
-    assert by_press.ci_method.startswith("jackknife over 10 presses ")
-
-
-def test_a_shear_force_is_never_taken_for_a_normal_one(sheared, presses):
-    with pytest.raises(NotApplicable, match="asks for force sample, and no recording has it"):
-        load_dataset(REGISTRY.tasks["force"].spec, sheared)

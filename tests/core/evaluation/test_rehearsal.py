@@ -5,7 +5,7 @@ import subprocess
 import sys
 
 SCRIPT = """
-from tactbench.core.evaluation.rehearsal import rehearse
+from tactbench.core.evaluation.warm_up import rehearse
 from tactbench.core.pool.processes import can_fork
 from tactbench.core.plugins.registry import installed, load_object
 

@@ -1,12 +1,13 @@
-"""A row's replicates say its score again, and little else."""
+"""What an interval resamples, and what a row keeps of it."""
 
 import json
 
 import numpy as np
 import pytest
 
+from tactbench.core.evaluation.dataset import load_dataset
 from tactbench.core.evaluation.metrics import METRICS
-from tactbench.core.evaluation.replicate_sums import BLOCKS, tables_of
+from tactbench.core.evaluation.replicate_sums import BLOCKS, replicates, tables_of
 
 from .made import force_task, label_task, record
 from .test_karl2016 import ramp
@@ -37,12 +38,6 @@ def test_the_score_of_a_class_follows_from_the_sums_exactly(tmp_path, metric):
     assert all(isinstance(value, int) for line in result.replicates["sums"] for value in line)
 
 
-def test_replicates_are_named_in_order_of_their_names(tmp_path):
-    kept = run(sessions(tmp_path, tuple("fbdace"), n=60), "session", estimator="mean", params={}).replicates
-    assert (kept["unit"], kept["names"], kept["strata"], kept["run"]) == ("session", list("abcdef"), None, 1)
-    assert [line[1] for line in kept["sums"]] == [60] * 6
-
-
 def test_few_sessions_are_cut_into_blocks_of_time(tmp_path):
     kept = run(sessions(tmp_path, n=200), "session", estimator="mean", params={}).replicates
     assert kept["unit"] == "block of 5 rows in time"
@@ -61,12 +56,6 @@ def test_a_sensor_of_twice_the_rate_has_the_same_blocks(tmp_path):
         for n in (100, 200) if (tmp_path / f"{n}").mkdir() is None
     )  # fmt: skip
     assert slow["names"] == quick["names"]
-
-
-def test_an_error_that_stays_hangs_blocks_together(tmp_path):
-    """The mean is wrong for a long while, then right for a long while."""
-    kept = run(sessions(tmp_path, n=400), "session", estimator="mean", params={}).replicates
-    assert kept["run"] > 1
 
 
 def test_classes_that_live_in_recordings_of_their_own_are_strata(tmp_path):
@@ -91,8 +80,51 @@ def test_recordings_of_one_name_are_told_apart(tmp_path):
     assert len(set(names)) == len(names)
 
 
-def test_sums_are_compact(tmp_path):
-    """Thousands of rows are read at once: numbers that are counts carry no point, empty columns are not there."""
-    kept = run([grasps(tmp_path, seed=1), grasps(tmp_path, seed=2)], "object", label_task()).replicates
-    assert len(json.dumps(kept)) < 1000
-    assert np.all([len(line) <= 8 for line in kept["sums"]])
+def test_trials_of_one_session_stand_in_for_each_other(tmp_path):
+    paths = [
+        record(tmp_path / f"{place}.h5", *ramp(place, n=40), session="one", role="train" if place < 2 else "test")
+        for place in range(9)
+    ]
+    task = force_task(protocols=("deployable",))
+    method = run(paths, "roles", task, "mean", params={}).interval.method
+    assert method.startswith("jackknife over 7 recordings ")
+    assert method.endswith("): spread between sessions is not in it")
+
+
+def test_a_group_that_some_classes_do_not_have_is_said_not_to_be_in_the_interval(tmp_path):
+    """Recordings stand in for objects where the recordings of one class have none."""
+    rng = np.random.default_rng(4)
+    paths = [
+        record(
+            tmp_path / f"{number}.h5", rng.normal(size=(20, 2)), role="train" if number < 4 else "test", session="one",
+            labels={"kind": number % 2, **({"object": number // 4} if number % 2 else {})},
+        )
+        for number in range(16)
+    ]  # fmt: skip
+    method = run(paths, "roles", label_task()).interval.method
+    assert method.startswith("jackknife over 12 recordings ")
+    assert method.endswith(": spread between sessions and objects is not in it; some test rows have no object")
+
+
+def test_five_caps_of_one_session_each_recorded_once_are_not_replicates(tmp_path):
+    """Resampling the caps would lose classes: time is resampled instead, and the row says so."""
+    X, _ = ramp(0, n=60)
+    paths = [
+        record(tmp_path / f"{role}{cap}.h5", X + cap, role=role, session=role, labels={"kind": cap})
+        for role in ("train", "validation", "test") for cap in range(5)
+    ]  # fmt: skip
+    result = run(paths, "roles", label_task(), "chance", params={})
+    assert "within 5 recordings" in result.interval.method
+
+
+def test_a_unit_is_found_for_each_row_by_its_number(tmp_path):
+    """Rows that were left out must not shift the groups of those that follow."""
+    X, force = ramp(0, n=60)
+    X[5:15, 0] = np.nan
+    notes = {"press": np.repeat(np.arange(6), 10)}
+    data = load_dataset(force_task(), [record(tmp_path / "a.h5", X, force, annotations=notes)])
+    table = data.tables[0]
+    unit = replicates(data, force_task(splits=("press",)), "press", table.y, np.zeros(50, dtype=np.int64), table.row)
+    assert unit.name == "press"
+    assert unit.codes.tolist() == (table.row // 10).tolist()
+    assert unit.labels == tuple(f"1/{number}" for number in range(6))

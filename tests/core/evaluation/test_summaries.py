@@ -62,21 +62,6 @@ def test_what_comes_after_the_window_changes_nothing(measure, X, later, data):
     assert np.array_equal(value(changed, measure, **window), value(X, measure, **window))
 
 
-@pytest.mark.parametrize("measure", ["mean", "deviation", "range"])
-@given(X=readings, data=st.data())
-def test_order_within_the_window_matters_to_changes_alone(measure, X, data):
-    order = data.draw(st.permutations(range(len(X))))
-    assert value(X[order], measure) == pytest.approx(value(X, measure), abs=ROUNDING)
-
-
-@given(X=readings)
-def test_halves_of_a_recording_are_its_halves(X):
-    n = len(X) // 2
-    X = X[: 2 * n]
-    assert np.array_equal(value(X, "mean", end=0.5), value(X[:n], "mean"))
-    assert np.array_equal(value(X, "range", start=0.5), value(X[n:], "range"))
-
-
 def test_what_the_words_mean():
     X = [1.0, 3.0, 2.0, 6.0]
     assert value(X, "mean") == 3.0
@@ -111,26 +96,3 @@ def test_a_window_in_seconds_needs_a_clock_and_a_recording_that_is_long_enough()
         summary_of(replace(stream(np.arange(100.0)), time_s=None), window, "r")
     with pytest.raises(DataError, match=r"'r' has 0.98 s of taxels"):
         summary_of(stream(np.arange(99.0)), window, "r")
-
-
-@pytest.mark.parametrize(
-    ("wrong", "words"),
-    [
-        ({"measure": "mean", "start": 0.5, "end": 0.5}, "ends after it starts"),
-        ({"measure": "mean", "end": 2.0}, "ends at 1"),
-        ({"measure": "band-energy"}, "needs it"),
-        ({"measure": "mean", "band_hz": (1.0, 2.0)}, "belongs to band-energy"),
-        ({"measure": "band-energy", "band_hz": (2.0, 1.0)}, "lower end"),
-        ({"measure": "mean", "end": float("inf"), "unit": "s"}, "finite"),
-    ],
-)
-def test_a_summary_that_means_nothing_is_refused(wrong, words):
-    with pytest.raises(ValueError, match=words):
-        Summary(**wrong)
-
-
-def test_names_say_which_window_and_which_band():
-    assert Summary(measure="deviation").name == "deviation"
-    assert summary("band-energy").name == "band-energy 5-20 Hz"
-    assert Summary(measure="mean", end=0.25).name == "mean 0-0.25 of the recording"
-    assert Summary(measure="mean", start=1, end=2, unit="s", kinds=("taxel",)).name == "mean 1-2 s of taxel"

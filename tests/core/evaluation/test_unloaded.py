@@ -6,12 +6,11 @@ import numpy as np
 import pytest
 
 from tactbench.core.errors import NotApplicable
-from tactbench.core.evaluation.cell import NOT_TARED, CellContext, evaluate
+from tactbench.core.evaluation.cell import CellContext, evaluate_cell
 from tactbench.core.evaluation.dataset import load_dataset
-from tactbench.core.evaluation.preparation import prepared
-from tactbench.core.evaluation.protocols import DEPLOYABLE, DEPLOYABLE_UNTARED
+from tactbench.core.evaluation.protocols import DEPLOYABLE
+from tactbench.core.evaluation.sets import hold_s, prepared, tare_s, tared
 from tactbench.core.evaluation.splits import make_splits
-from tactbench.core.evaluation.unloaded import hold_s, tare_s, tared, unloaded
 from tactbench.core.plugins.registry import installed
 from tactbench.core.spec.profile import ForceRamp
 from tactbench.core.spec.quantity import assumed
@@ -19,6 +18,7 @@ from tactbench.core.spec.scene import Scene
 
 from .made import force_task, record
 
+NOT_TARED = "not tared: no recording states an unloaded hold"
 TASK = force_task(protocols=("deployable", "deployable-untared"), splits=("roles",))
 HOLD, ROWS = 40, 200
 
@@ -44,7 +44,7 @@ def three(folder, offsets=(0.0, 0.0, 0.0), **how):
 
 
 def answered(paths, protocol, estimator="ols"):
-    return evaluate(
+    return evaluate_cell(
         CellContext(
             TASK, installed().estimators[estimator], {}, protocol, "roles", seed=1, clock=lambda: 0.0, latency=False
         ),
@@ -60,15 +60,6 @@ def test_constant_offsets_of_recordings_change_nothing_where_they_are_tared(tmp_
     assert untared[1] > 10 * untared[0], "what is not tared feels them"
     assert [one.tare_s for one in same] == [0.4, 0.4]
     assert answered(plain, "deployable-untared").tare_s is None
-
-
-def test_a_tared_recording_is_zero_on_average_while_unloaded(tmp_path):
-    data = load_dataset(TASK, three(tmp_path / "a", (1.0, 20.0, -3.0)))
-    for table in data.tables:
-        before = unloaded(table)
-        assert before.sum() == HOLD
-        np.testing.assert_allclose(tared(table)[before].mean(axis=0), 0.0, atol=1e-9)
-        np.testing.assert_allclose(np.diff(tared(table), axis=0), np.diff(table.X, axis=0), atol=1e-9)
 
 
 @pytest.mark.parametrize("first_changed", [HOLD, 120, ROWS - 1])
@@ -108,22 +99,9 @@ def test_recordings_without_a_hold_are_as_they_are_and_the_row_says_so(tmp_path)
     assert NOT_TARED not in answered(paths, "deployable-untared").remarks, "who does not tare need not say why not"
 
 
-def test_a_hold_of_rows_without_a_clock_is_not_known(tmp_path):
-    path = record(tmp_path / "a.h5", np.ones((ROWS, 3)), np.ones(ROWS), t_ns=None, scene=scene("a"), role="train")
-    (table,) = load_dataset(TASK, [path]).tables
-    assert not unloaded(table).any()
-
-
 def test_recordings_of_which_some_cannot_be_tared_are_refused(tmp_path):
     paths = three(tmp_path / "a")
     bare = record(tmp_path / "bare.h5", np.ones((ROWS, 3)), np.ones(ROWS), role="train", session="bare")
     with pytest.raises(NotApplicable, match=r"3 of 4 recordings .* 'bare'"):
         answered([*paths, bare], "deployable")
     assert answered([*paths, bare], "deployable-untared").score > 0
-
-
-def test_the_two_differ_in_the_tare_alone():
-    told = DEPLOYABLE.model_dump(exclude={"name", "title", "tare"})
-    assert told == DEPLOYABLE_UNTARED.model_dump(exclude={"name", "title", "tare"})
-    assert DEPLOYABLE.tare
-    assert not DEPLOYABLE_UNTARED.tare

@@ -4,13 +4,11 @@ import time
 
 import numpy as np
 import pytest
-from pydantic import ValidationError
 
-from tactbench.core.evaluation.cell import CellContext, evaluate
+from tactbench.core.evaluation.cell import CellContext, evaluate_cell
 from tactbench.core.evaluation.dataset import load_dataset
 from tactbench.core.evaluation.metrics import METRICS
 from tactbench.core.evaluation.replicate_sums import tables_of
-from tactbench.core.matrix.store import shard
 from tactbench.core.plugins.registry import load_registry
 from tactbench.core.recording.writer import RecordingWriter
 from tactbench.core.samples import Quality
@@ -57,7 +55,7 @@ def presses(folder, number=12, n=60, noise=0.0, seed=3, missing=0, wander=2e-4, 
 
 
 def run(task, paths, estimator="ols", split=None, protocol="deployable-untared", **more):
-    return evaluate(
+    return evaluate_cell(
         CellContext(
             task, REGISTRY.estimators[estimator], more.pop("params", {}), protocol, split, seed=1,
             clock=time.perf_counter, **{"latency": False, **more},
@@ -86,17 +84,6 @@ def test_a_vector_is_answered_in_the_tasks_unit(tmp_path):
     assert run(place_task(), paths, "time-index").score > 1.0
 
 
-def test_what_stands_beside_the_mean_is_of_the_same_answers(tmp_path):
-    result = run(place_task(), presses(tmp_path, noise=3.0))
-    error = np.linalg.norm(result.sets["test"].y_pred - result.sets["test"].y_true, axis=1)
-    assert result.score == pytest.approx(error.mean())
-    assert result.scores["median error"] == pytest.approx(np.median(error))
-    assert result.scores["95th percentile of the error"] == pytest.approx(np.percentile(error, 95))
-    assert result.scores["RMSE of x"] ** 2 + result.scores["RMSE of y"] ** 2 == pytest.approx(np.mean(error**2))
-    assert not {"rmse", "mae", "r2"} & set(result.scores), "these are of numbers"
-    assert "answers are vectors (x, y): one model per component" in result.remarks
-
-
 @pytest.mark.parametrize("estimator", ["lasso", "svm", "boosting", "forest-10", "knn"])
 def test_each_component_is_learnt_as_if_it_were_asked_for_alone(tmp_path, estimator):
     """Parameters that are searched are fixed: a vector has one choice for all of its components."""
@@ -108,7 +95,7 @@ def test_each_component_is_learnt_as_if_it_were_asked_for_alone(tmp_path, estima
         context = CellContext(
             task, descriptor, fixed, "deployable-untared", None, seed=1, clock=time.perf_counter, latency=False
         )
-        return evaluate(context, paths).sets["test"].y_pred
+        return evaluate_cell(context, paths).sets["test"].y_pred
 
     both = answered(place_task())
     for column, name in enumerate(("x", "y")):
@@ -125,7 +112,7 @@ def test_parameters_are_chosen_by_the_error_of_the_whole_vector(tmp_path):
 
 def test_a_row_without_one_component_has_no_label(tmp_path):
     result = run(place_task(), presses(tmp_path, missing=15))
-    assert result.n_test == 6 * 45
+    assert result.sizes.n_test == 6 * 45
     left_out = {what: number for what, number in result.counts.items() if "left out" in what}
     assert left_out == {"of 720 rows have no position samples called 'x' and 'y' and were left out": 12 * 15}
 
@@ -138,63 +125,11 @@ def test_recordings_without_the_reference_cannot_be_asked(tmp_path):
 
 def test_intervals_and_replicates_are_of_the_vectors(tmp_path):
     result = run(place_task(), presses(tmp_path, noise=3.0))
-    assert result.ci_method.startswith("jackknife over 6 sessions")
-    assert result.ci_low < result.score < result.ci_high
+    assert result.interval.method.startswith("jackknife over 6 sessions")
+    assert result.interval.low < result.score < result.interval.high
     sums = tables_of([dict(result.replicates)], "mean_euclidean_error", 0)[0].sum(axis=0)
     assert sums[0] / sums[1] == pytest.approx(result.score)
     of_time = run(place_task(), presses(tmp_path, noise=3.0, session=lambda _: "s"), split="roles")
-    assert of_time.ci_method.startswith("jackknife over 6 recordings")
+    assert of_time.interval.method.startswith("jackknife over 6 recordings")
     few = run(place_task(), presses(tmp_path, number=4, noise=3.0))
-    assert few.ci_method.startswith("block bootstrap in time within 2 recordings")
-
-
-def test_splits_and_leak_checks_work_as_for_numbers(tmp_path):
-    paths = presses(tmp_path, noise=3.0)
-    assert run(place_task(), paths, split="session").folds == 6, "those of role test stay apart"
-    assert run(place_task(), paths, split="few-shot-2").n_train == 2 * 60
-    assert any("shuffled" in stamp for stamp in run(place_task(), paths, split="shuffled").stamps)
-    twice = presses(tmp_path, number=2, noise=3.0, seed=9, role=lambda _: None)
-    again = tmp_path / "again"
-    again.mkdir()
-    copied = presses(again, number=2, noise=3.0, seed=9, session=lambda place: f"t{place}", role=lambda _: None)
-    assert any("%" in stamp for stamp in run(place_task(), [*twice, *copied], split="session").stamps)
-
-
-def test_the_first_frame_is_asked_only_where_it_has_an_answer_that_stays(tmp_path):
-    with pytest.raises(NotApplicable, match="changes within recording"):
-        run(place_task(), presses(tmp_path), split="session", protocol="first-frame")
-    still = presses(tmp_path, missing=10, wander=0.0)
-    with pytest.raises(NotApplicable, match="the first row of no recording has an answer"):
-        run(place_task(), still, split="session", protocol="first-frame")
-
-
-def test_the_latency_of_a_vector_is_that_of_all_its_models(tmp_path):
-    assert run(place_task(), presses(tmp_path, noise=3.0), "forest-10", latency=True).latency_ms_p50 > 0
-
-
-def test_answers_are_read_back_from_their_shard(tmp_path):
-    answers = run(place_task(), presses(tmp_path, noise=3.0)).sets
-    image = shard.build("{}", "{}", answers)
-    found = shard.answers_in(tmp_path / "cell.h5", image)
-    np.testing.assert_array_equal(found["test"].y_pred, answers["test"].y_pred)
-    np.testing.assert_array_equal(found["test"].y_true, answers["test"].y_true)
-
-
-@pytest.mark.parametrize(
-    ("more", "says"),
-    [
-        ({"metric": "rmse"}, "belong together"),
-        ({"target": ChannelTarget()}, "belong together"),
-        ({"kind": "classification"}, "kind: regression"),
-        ({"answer_per": "recording", "vote": "frames"}, "asks for a label"),
-    ],
-)
-def test_a_vector_that_cannot_be_asked_for_is_refused(more, says):
-    with pytest.raises(ValidationError, match=says):
-        place_task(**more)
-
-
-@pytest.mark.parametrize("names", [("x",), ("x", "x")])
-def test_a_vector_has_components_that_differ(names):
-    with pytest.raises(ValidationError):
-        VectorTarget(names=names, unit="mm")
+    assert few.interval.method.startswith("block bootstrap in time within 2 recordings")

@@ -44,25 +44,6 @@ def walk(seed, n=2000, step_s=0.01, jitter=0.0):
     return ScoredRecording(clock, score, truth(events, disturbances=[(1.0, 2.0), (12.0, 13.0)], span=(0.0, 20.0)))
 
 
-@pytest.mark.parametrize(
-    "rules",
-    [
-        policy(),
-        policy(merge=0.1, minimum=0.03, refractory=0.5),
-        policy(minimum=0.05, time="disturbances"),
-        policy(merge=30.0),
-    ],
-    ids=["plain", "all", "disturbances", "merged-into-one"],
-)
-def test_the_curve_of_real_valued_scores_is_each_threshold_on_its_own(rules):
-    recordings = [walk(1), walk(2, jitter=0.9)]
-    curve = threshold_curve(recordings, rules)
-    seen = np.unique(np.concatenate([one.score for one in recordings]))
-    rng = np.random.default_rng(3)
-    for threshold in [*rng.choice(seen, 100), *rng.uniform(seen[0] - 1, seen[-1] + 1, 100), seen[0], seen[-1]]:
-        assert_same(curve.at(threshold), at_one(recordings, threshold, rules))
-
-
 def test_every_row_but_the_last_has_alarms_of_its_own():
     rules = policy(merge=0.1)
     curve = threshold_curve([walk(1)], rules)
@@ -116,11 +97,3 @@ def test_a_detector_that_hits_nothing_within_the_bound_never_raises_an_alarm():
     score = np.where((worthless.t_ns // 10**9) % 2 == 1, 1.0, 0.0)
     curve = threshold_curve([ScoredRecording(worthless.t_ns, score, worthless.truth)], policy(before=0.0, after=0.01))
     assert curve.operating_point(0.0) == np.inf
-
-
-def test_scores_and_thresholds_that_are_none_are_refused():
-    flat = walk(1)
-    with pytest.raises(DataError, match="infinite"):
-        threshold_curve([ScoredRecording(flat.t_ns, np.full(flat.score.size, np.inf), flat.truth)], policy())
-    with pytest.raises(DataError, match="no threshold"):
-        threshold_curve([flat], policy()).at(np.nan)

@@ -40,8 +40,3 @@ def test_what_does_not_stand_for_a_task_is_not_in_it(rows):
         assert over_tasks([rows[0] | change, rows[1]]) is None
     assert over_tasks([rows[0], rows[0] | {"split": "unit", "cell": "other"}, rows[1]]) is None
     assert over_tasks([rows[0] | {"baseline": None}, rows[1]]) is None
-
-
-def test_replicates_of_strangers_are_no_traceback(rows):
-    for nonsense in ({"sums": "x"}, {"unit": 3, "names": None, "strata": "a", "sums": [[1], "b"]}, {"sums": [[]]}):
-        assert over_tasks([row | {"replicates": nonsense} for row in rows]) is None

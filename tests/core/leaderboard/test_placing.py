@@ -42,9 +42,3 @@ def test_with_replicates_ties_share_a_place_and_every_place_has_an_interval(rows
         assert line.cells[5] == (f"{low}–{high}" if low != high else str(low))
     assert [line.cells[0] for line in lines] == ["1=", "1=", "3"]
     assert any("A place with =" in note for note in table.notes)
-
-
-def test_replicates_that_are_no_replicates_are_no_traceback(rows):
-    for nonsense in ({"sums": "x"}, {"unit": 3, "names": None, "strata": "a", "sums": [[1], "b"]}, {"sums": [[]]}):
-        lines = build_table([*rows[1:], rows[0] | {"replicates": nonsense}]).blocks[0].lines
-        assert len(lines) == 3

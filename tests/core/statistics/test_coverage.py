@@ -10,7 +10,6 @@ from scipy import stats
 
 from tactbench.core.evaluation.interval import score_interval
 from tactbench.core.evaluation.metrics import METRICS
-from tactbench.core.statistics.over_folds import corrected_t
 from tactbench.core.statistics.paired import difference
 from tactbench.core.statistics.ranking import ranks
 
@@ -70,23 +69,3 @@ def test_the_best_of_ten_and_all_others_have_their_rank_in_its_interval(syntheti
         found = ranks([synthetic.row_of(str(place), "rmse", one) for place, one in enumerate(sums)])
         share.append(np.mean([found[str(n)].low <= n + 1 <= found[str(n)].high for n in range(10)]))
     assert np.mean(share) >= 0.92
-
-
-def test_overlapping_folds_find_nothing_where_there_is_nothing(synthetic):
-    """Ten repeats of ten folds: the naive test finds a difference every other time."""
-    rng = np.random.default_rng(4)
-    corrected = naive = 0
-    for _ in range(100):
-        X = rng.normal(size=(100, 2))
-        y = X.sum(axis=1) + rng.normal(size=100)
-        d = []
-        for _ in range(10):
-            place = rng.permutation(100) % 10
-            for fold in range(10):
-                train, test = place != fold, place == fold
-                slope = [(X[train, j] @ y[train]) / (X[train, j] @ X[train, j]) for j in (0, 1)]
-                d.append(np.subtract(*(np.mean((y[test] - slope[j] * X[test, j]) ** 2) for j in (0, 1))))
-        corrected += corrected_t(d, 1 / 9, 10).p <= 0.05
-        naive += stats.ttest_1samp(d, 0).pvalue <= 0.05
-    assert corrected <= stats.binom.ppf(0.999, 100, 0.05)
-    assert naive > 30

@@ -1,6 +1,5 @@
-"""Two cells compared: cross-checked with scipy where it knows the answer, and laws where nobody does."""
+"""Two cells compared, over replicates and over folds, and several comparisons at once."""
 
-import itertools
 from dataclasses import replace
 
 import numpy as np
@@ -9,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import stats
 
-from tactbench.core.statistics.paired import difference
+from tactbench.core.statistics.paired import corrected_t, difference, holm, over_folds
 
 from .made import mae_row, row
 
@@ -37,34 +36,6 @@ def test_the_p_value_is_that_of_all_exchanges():
     assert found.smallest_p == 2 / 2**7
 
 
-def test_the_p_value_of_a_square_root_is_that_of_exchanging_sessions_by_hand():
-    sums = [np.column_stack([one**2 * 50, np.full(5, 50)]) for one in (A[:5], B[:5])]
-    found = difference(row("a", sums[0]), row("b", sums[1]))
-
-    def apart(ways):
-        one = np.where(np.array(ways)[:, None], sums[1], sums[0]).sum(axis=0)
-        other = np.where(np.array(ways)[:, None], sums[0], sums[1]).sum(axis=0)
-        return abs(np.sqrt(one[0] / one[1]) - np.sqrt(other[0] / other[1]))
-
-    every = [apart(ways) for ways in itertools.product((False, True), repeat=5)]
-    assert found.p == pytest.approx(np.mean(np.array(every) >= every[0] - 1e-12))
-    assert found.smallest_p == 0.0625
-
-
-def test_many_sessions_draw_their_exchanges_the_same_way_each_time():
-    rng = np.random.default_rng(0)
-    a, b = rng.normal(5, 1, 30), rng.normal(5.3, 1, 30)
-    found = difference(mae_row("a", a), mae_row("b", b))
-    assert found == difference(mae_row("a", a), mae_row("b", b))
-    known = stats.permutation_test(
-        (a, b), lambda x, y, axis: np.mean(x - y, axis=axis), permutation_type="samples", vectorized=True,
-        n_resamples=20_000, rng=np.random.default_rng(1),
-    )  # fmt: skip
-    # Both are estimates: of p = 0.3, 9,999 draws scatter by 0.5 %, 20,000 by 0.3 %; four of their joint deviation.
-    assert found.p == pytest.approx(known.pvalue, abs=0.024)
-    assert found.smallest_p == 1e-4
-
-
 def test_other_replicates_are_not_paired():
     """Then the errors add up, and what sessions share does not cancel."""
     apart = difference(mae_row("a", A), mae_row("b", B, names=[f"t{place}" for place in range(7)]))
@@ -74,22 +45,6 @@ def test_other_replicates_are_not_paired():
     assert apart.high - apart.low > together.high - together.low
     deviation = np.sqrt(A.var(ddof=1) / 7 + B.var(ddof=1) / 7)
     assert apart.high - apart.value == pytest.approx(stats.t.ppf(0.975, 6) * deviation, rel=1e-9)
-
-
-def test_blocks_of_time_say_what_is_not_in_them():
-    kept = {"unit": "block of 10 rows in time", "strata": [0] * 40}
-    rng = np.random.default_rng(0)
-    found = difference(*(mae_row(name, 1 + 0.1 * rng.random(40), **kept) for name in "ab"))
-    assert found.method.startswith("paired over 40 blocks of 10 rows in time")
-    assert "spread between sessions is not in it" in found.method
-
-
-def test_neighbouring_blocks_that_hang_together_are_exchanged_together():
-    slow = np.repeat([1.0, -1.0, 1.0, 1.0, -1.0], 8)
-    kept = {"unit": "block of 10 rows in time", "strata": [0] * 40}
-    found = difference(mae_row("a", 5 + slow, run=8, **kept), mae_row("b", np.full(40, 5.0), run=1, **kept))
-    assert found.smallest_p == 2 / 2**5
-    assert found.p == pytest.approx(1.0)  # three runs up, two down: no split of five is less apart
 
 
 @pytest.mark.parametrize(
@@ -152,3 +107,52 @@ def test_classes_in_sessions_of_their_own_are_compared_within_classes():
     assert found.value == pytest.approx(-0.02)
     assert found.verdict == "worse"
     assert "8 degrees of freedom" in found.method
+
+
+P = st.lists(st.floats(0, 1) | st.none(), max_size=12)
+
+
+def test_holms_own_steps():
+    """Four at once: 0.01 x 4, 0.02 x 3, 0.03 x 2 raised to the one before, 0.2 x 1."""
+    assert holm([0.03, 0.01, None, 0.2, 0.02]) == pytest.approx([0.06, 0.04, None, 0.2, 0.06])
+    assert holm([]) == []
+
+
+@given(P)
+def test_corrected_values_keep_their_order_and_are_never_smaller(p):
+    corrected = holm(p)
+    made = sorted((value, after) for value, after in zip(p, corrected, strict=True) if value is not None)
+    assert [after is None for after in corrected] == [value is None for value in p]
+    assert all(value <= after <= 1 for value, after in made)
+    assert [after for _, after in made] == sorted(after for _, after in made)
+    if made:
+        assert made[0][1] == min(1.0, len(made) * made[0][0])  # the smallest as Bonferroni would
+
+
+D = [0.02, 0.05, -0.01, 0.04, 0.03, 0.06, 0.01, 0.02, 0.05, 0.03]
+
+
+def test_the_corrected_test_by_hand():
+    """Mean 0.03, variance 0.00045 + …: ten folds, one tenth tested, nine trained on."""
+    found = corrected_t(D, 1 / 9)
+    deviation = np.sqrt((1 / 10 + 1 / 9) * np.var(D, ddof=1))
+    assert found.mean == pytest.approx(0.03)
+    assert found.p == pytest.approx(2 * stats.t.sf(0.03 / deviation, 9), rel=1e-9)
+    assert found.high - found.mean == pytest.approx(stats.t.ppf(0.975, 9) * deviation, rel=1e-9)
+    assert "Nadeau and Bengio" in found.method
+    repeated = corrected_t(D, 1, repeats=5)
+    assert "Bouckaert and Frank" in repeated.method
+    assert "2 folds of 5 repeats" in repeated.method
+
+
+def test_folds_are_taken_by_name_and_one_fold_says_nothing():
+    def folded(cell, scores, sizes=(80, 20)):
+        named = {f"fold {name}": value for name, value in scores.items()}
+        return mae_row(cell, [1.0] * 5, scores=named | {"mae": 9.0}, fold_sizes=dict.fromkeys(named, sizes))
+
+    one, other = folded("a", {"x": 1.0, "y": 2.0, "z": 3.0}), folded("b", {"z": 2.5, "x": 0.4, "y": 1.9})
+    found, by_hand = over_folds([(one, other)]), corrected_t([0.6, 0.1, 0.5], 0.25)
+    assert (found.mean, found.p) == pytest.approx((by_hand.mean, by_hand.p))
+    assert over_folds([(folded("a", {"x": 1.0}), folded("b", {"x": 2.0}))]) is None
+    assert over_folds([(one, mae_row("old", [1.0] * 5))]) is None
+    assert corrected_t([0.1], 0.25) is None

@@ -1,12 +1,13 @@
-"""One row a cell: what its replicates came to."""
+"""One row a cell: what its replicates came to, and the interval of a median."""
 
+import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from tactbench.core.leaderboard.table import build_table
-from tactbench.core.statistics.median import median_interval
 from tactbench.core.statistics.paired import difference
-from tactbench.core.statistics.replicates import over_replicates, recordings_right
-from tests.core.leaderboard.rendering import to_json
+from tactbench.core.statistics.replicates import FEWEST, median_interval, over_replicates, recordings_right
 from tests.core.leaderboard.rows import row
 
 
@@ -57,12 +58,6 @@ def test_a_stopped_replicate_is_told_and_takes_no_other_down():
     (found,) = over_replicates(rows)
     assert (found["status"], found["n_replicates"]) == ("done", 7)
     assert "replicate with seed 3: timeout: 10 s were not enough" in found["remarks"]
-
-
-def test_a_cell_of_which_no_replicate_ended_is_one_row_that_says_so():
-    rows = [one | {"status": "failed", "score": None, "reason": "no"} for one in replicates(SCORES)]
-    (found,) = over_replicates(rows)
-    assert (found["status"], found["reason"], found["score"]) == ("failed", "no", None)
 
 
 def test_what_all_replicates_remark_is_told_once_and_what_some_do_with_their_number():
@@ -124,5 +119,38 @@ def test_recordings_classified_rightly_are_counted_by_most_of_their_samples():
     assert recordings_right(row(replicates=kept)) is None
 
 
-def test_json_holds_what_each_replicate_scored():
-    assert "[0.5,0.3,0.9" in to_json(over_replicates(replicates(SCORES))).replace(" ", "")
+VALUES = st.lists(st.floats(-1e6, 1e6), min_size=FEWEST, max_size=30)
+
+
+def test_five_have_their_range_and_say_how_little_it_covers():
+    found = median_interval([3.0, 1.0, 5.0, 2.0, 4.0])
+    assert (found.low, found.high) == (1.0, 5.0)
+    assert found.level == 1 - 2 / 2**5
+
+
+def test_ends_of_eight_are_those_of_the_published_formula():
+    # Hettmansperger and Sheather 1986, n = 8, k = 1: 0.9922 and 0.9297 enclose 0.95.
+    share = (127 / 128 - 0.95) / (127 / 128 - 119 / 128)
+    weight = 7 * share / (1 + 6 * share)
+    found = median_interval([float(place) for place in range(8)])
+    assert found.low == pytest.approx(weight, rel=1e-12)
+    assert found.high == pytest.approx(7 - weight, rel=1e-12)
+
+
+@given(VALUES)
+def test_the_sample_median_lies_in_it_and_order_does_not_matter(values):
+    found = median_interval(values)
+    assert found.low <= np.median(values) <= found.high
+    assert median_interval(values[::-1]) == found
+
+
+@pytest.mark.parametrize("draw", ["standard_normal", "standard_exponential", "standard_cauchy"])
+@pytest.mark.parametrize("n", [5, 8, 20])
+def test_it_covers_what_it_says_whatever_the_distribution(draw, n):
+    rng = np.random.default_rng([n, len(draw)])
+    centre = np.log(2) if draw == "standard_exponential" else 0.0
+    trials = 4000
+    found = [median_interval(values) for values in getattr(rng, draw)((trials, n))]
+    covered = np.mean([one.low <= centre <= one.high for one in found])
+    # Four standard errors of a share, and 0.015 by which interpolation of skewed values may be off.
+    assert abs(covered - found[0].level) < 4 * np.sqrt(0.05 * 0.95 / trials) + 0.015

@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy as np
 
-from tactbench.core.evaluation.cell import CellContext, evaluate
+from tactbench.core.evaluation.cell import CellContext, evaluate_cell
 from tactbench.core.evaluation.protocols import PROTOCOLS
 from tactbench.core.plugins.registry import installed
 from tactbench.core.recording.writer import RecordingWriter
@@ -107,15 +107,18 @@ def any_data(case: Case, *, protocol: str, name: str, kind: str) -> None:
         splits = [None] if PROTOCOLS[protocol].roles_only else [None, "in-session", "shuffled"]
         split = splits[case.rng.integers(len(splits))]
         case.says(split=str(split))
-        result = evaluate(
+        result = evaluate_cell(
             CellContext(
                 _task(kind), estimator, QUICK.get(name, {}), protocol, split, seed=1, clock=lambda: next(ticks) * 1e-3
             ),
             paths,
         )
-    for what, value in (("score", result.score), ("low end", result.ci_low), ("high end", result.ci_high)):
+    for what, value in (("score", result.score), ("low end", result.interval.low), ("high end", result.interval.high)):
         case.holds(np.isfinite(value), f"the {what} is {value}")
-    case.holds(result.ci_low <= result.ci_high, f"the interval runs from {result.ci_low} to {result.ci_high}")
+    case.holds(
+        result.interval.low <= result.interval.high,
+        f"the interval runs from {result.interval.low} to {result.interval.high}",
+    )
     case.holds(np.isfinite(list(result.scores.values())).all(), f"a score is none: {result.scores}")
     warned = [text for text in result.counts if "RuntimeWarning" in text]
     case.holds(not warned, f"{warned}")

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from tactbench.core.errors import TactbenchError, UsageError
-from tactbench.core.evaluation.splits import shots
+from tactbench.core.evaluation.protocols import shots
 from tactbench.core.matrix.progress import Progress, Silence
 from tactbench.core.report.figures import (
     confusion,

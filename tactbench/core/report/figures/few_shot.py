@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from tactbench.core.evaluation.few_shot import shots
+from tactbench.core.evaluation.protocols import shots
 from tactbench.core.leaderboard.names import METRIC_NAMES, answer_name, hardware_name
 from tactbench.core.report.figures.saving import write
 from tactbench.core.report.figures.sketch import with_unit

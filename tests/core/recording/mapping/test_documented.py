@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tactbench.core.evaluation.cell import CellContext, evaluate
+from tactbench.core.evaluation.cell import CellContext, evaluate_cell
 from tactbench.core.plugins.registry import installed
 from tactbench.core.recording.mapping import import_tables
 from tactbench.core.recording.mapping.channels import sensor_of
@@ -87,7 +87,7 @@ def test_a_folder_of_slip_directions_is_asked_which_way_it_slipped(tmp_path):
     paths = [one.path for one in report.recordings]
 
     def asked(task, estimator):
-        return evaluate(
+        return evaluate_cell(
             CellContext(
                 task, installed().estimators[estimator], {}, "deployable", None, 1, time.perf_counter, latency=False
             ),

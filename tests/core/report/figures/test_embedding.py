@@ -12,8 +12,7 @@ from hypothesis import strategies as st
 from tactbench.core.errors import DataError, NotApplicable
 from tactbench.core.evaluation.dataset import load_dataset
 from tactbench.core.evaluation.protocols import KARL2016
-from tactbench.core.evaluation.selection import scales
-from tactbench.core.evaluation.sets import keep, part
+from tactbench.core.evaluation.sets import keep, part, scales
 from tactbench.core.evaluation.splits import make_splits
 from tactbench.core.matrix.store import Store
 from tactbench.core.plugins.registry import load_object

@@ -1,15 +1,21 @@
-"""The first use of a library, before any clock is read."""
+"""What is done once in a process, before any clock is read: imports, and the first use of a library."""
 
 from __future__ import annotations
 
+import importlib
 import warnings
+from typing import TYPE_CHECKING
 
-import numpy as np
-
-from tactbench.core.plugins.interfaces import Estimator
 from tactbench.core.thread_limit import thread_limit
 
-_ROWS, _FEATURES = 40, 3
+if TYPE_CHECKING:
+    from tactbench.core.plugins.interfaces import Estimator
+
+
+def import_libraries() -> None:
+    """Import what every cell needs, so that processes forked later share it."""
+    for name in ("threadpoolctl", "scipy.special", "tactbench.core.evaluation.cell"):
+        importlib.import_module(name)
 
 
 def rehearse(estimator: Estimator, kind: str) -> None:
@@ -18,9 +24,11 @@ def rehearse(estimator: Estimator, kind: str) -> None:
     What a library puts off until its first fit (looking for other libraries, generating code) takes it up to some
     tenths of a second. Processes forked from here need not do it again.
     """
+    import numpy as np
+
     rng = np.random.default_rng(0)
-    X = rng.normal(size=(_ROWS, _FEATURES))
-    y = np.arange(_ROWS) % 2 if kind != "regression" else X[:, 0] + rng.normal(size=_ROWS)
+    X = rng.normal(size=(40, 3))
+    y = np.arange(len(X)) % 2 if kind != "regression" else X[:, 0] + rng.normal(size=len(X))
     with warnings.catch_warnings(), np.errstate(all="ignore"), thread_limit(1):
         warnings.simplefilter("ignore")
         estimator.fit(X, y)
