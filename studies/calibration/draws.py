@@ -21,7 +21,7 @@ from tactbench.core.acquisition import acquire
 from tactbench.core.evaluation.cell import CellContext, evaluate_cell
 from tactbench.core.evaluation.dataset import Dataset, Table, load_dataset
 from tactbench.core.evaluation.metrics import metric_called
-from tactbench.core.evaluation.result import Result
+from tactbench.core.evaluation.result import Result as CellResult
 from tactbench.core.plugins.registry import installed, load_object
 from tactbench.core.spec.recording import RecordingMeta
 from tactbench.core.spec.scene import NUISANCES, Simulation
@@ -131,7 +131,7 @@ def _simulated(
     for sensor, name in dict.fromkeys((one["sensor"], one["task"]) for one in outputs):
         task = registry.tasks[name].spec
         simulation = Simulation(nuisances={name: value for name, value, own in given if not own or sensor in own})
-        answers: dict[str, Result] = {}
+        answers: dict[str, CellResult] = {}
         with tempfile.TemporaryDirectory() as folder, warnings.catch_warnings():
             warnings.simplefilter("ignore")  # of estimators that do not converge
             paths = []
@@ -172,7 +172,7 @@ def thinned(data: Dataset, every: int) -> Dataset:
     return replace(data, tables=tuple(map(cut, data.tables)))
 
 
-def read_off(figure: Mapping[str, Any], result: Result, metas: Sequence[RecordingMeta]) -> float:
+def read_off(figure: Mapping[str, Any], result: CellResult, metas: Sequence[RecordingMeta]) -> float:
     """Return the score, the metric over a band of commanded force, or the white noise of the predictions."""
     answers = result.sets["test"]
     if figure["kind"] == "band":

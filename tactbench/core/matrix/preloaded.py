@@ -10,12 +10,14 @@ if hasattr(os, "setsid"):
     with suppress(OSError):
         os.setsid()  # Ctrl-C in a terminal reaches the run alone, which ends its workers
 
-for library in ("h5py", "scipy.linalg", "scipy.signal", "tactbench.core.acquisition", "tactbench.core.matrix.solve"):
+for library in ("h5py", "scipy.linalg", "scipy.signal", "tactbench.core.acquisition"):
     import_module(library)
 
+from tactbench.core.evaluation.warm_up import import_libraries  # noqa: E402
 from tactbench.core.matrix.solve import prepare  # noqa: E402
 from tactbench.core.plugins.registry import load_object, load_registry  # noqa: E402
 
+import_libraries()
 _ours = load_registry([point for point in entry_points(group="tactbench") if point.module.startswith("tactbench.")])
 for estimator in _ours.estimators:
     for kind in estimator.kinds:

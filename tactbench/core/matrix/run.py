@@ -237,6 +237,8 @@ class Run:
         """Queue recordings: all of a real rig as one piece of work, simulated ones by seed and sensor."""
         pieces: dict[tuple[int, str], list[RecordingRequest]] = {}
         for request in missing:
+            for left in request.path.parent.glob(f"{request.path.name}.*") if computed else ():
+                left.unlink(missing_ok=True)  # of a simulation that was killed; what devices gave is never removed
             pieces.setdefault((request.seed, request.sensor) if computed else (0, ""), []).append(request)
         parts = self.choice.processes if computed and len(pieces) < self.choice.processes else 1
         for piece in pieces.values():
@@ -249,6 +251,11 @@ class Run:
             raise outcome  # the disk is no cell's fault, and refuses the next recording too
         stopped = isinstance(outcome, BaseException)
         if stopped:
+            if "--rescue" not in str(outcome) and not is_computed(request, self.registry):
+                from tactbench.core.recording.writer import recovery
+
+                journals = sorted(request.path.parent.glob(f"{request.path.name}*.partial"))
+                outcome.hint = " ".join([outcome.hint, *(recovery(one, request.path) for one in journals)]).strip()
             for need, paths in self.plan.paths.items():
                 if request.path in paths:
                     self.plan.troubles.setdefault(need, outcome)
