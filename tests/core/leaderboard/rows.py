@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from tactbench.core.matrix.evaluate_cell import opening
+from tactbench.core.matrix.solve import opening
 from tactbench.core.matrix.plan import Cell
 from tactbench.core.spec.task import LabelTarget, TaskSpec
 
