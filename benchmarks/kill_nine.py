@@ -3,9 +3,9 @@
 A small matrix is run once undisturbed. Then it is run in other folders and killed at moments drawn evenly from its
 duration, the whole process group or the parent alone in turn, and started again at once, until it ends; the next folder
 follows, until there were as many kills as asked for. After every kill: each cell file and each recording opens and
-holds what its digest says, and every cell that was finished before is still finished, with the same row. At the end of every
-folder: what a seed decides, and the table without times, are those of the undisturbed run, and no half-written file is
-left.
+holds what its digest says, and every cell that was finished before is still finished, with the same row. At the end of
+every folder: what a seed decides, and the table without times, are those of the undisturbed run, and no half-written
+file is left.
 
 Usage: python benchmarks/kill_nine.py [--kills 100] [--matrix twin|trivial] [--repeats 100] [--jobs 2] [--seed 1]
 """

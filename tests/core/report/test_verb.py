@@ -1,15 +1,9 @@
 """`tactbench report`, as a person runs it."""
 
 import json
-import shutil
 
 import pytest
 
-from tactbench.core.matrix.progress import Silence
-from tactbench.core.matrix.store import Store
-from tactbench.core.plugins.registry import load_registry
-from tactbench.core.report.making import make_report
-from tactbench.core.report.results import open_results
 from tests.conftest import Verbs
 
 from .unrendered import unrendered
@@ -66,12 +60,3 @@ def test_a_place_that_refuses_the_page_is_named(reported):
     verbs, _ = reported
     (verbs.folder / "taken").write_text("a file, not a folder")
     one_clear_screen(verbs("report", "--out", "taken", code=2), "taken", "--out")
-
-
-def test_a_cell_that_cannot_be_read_is_left_out_and_named(results, tmp_path):
-    old = shutil.copytree(results, tmp_path / "old", ignore=shutil.ignore_patterns("report", "recordings"))
-    damaged = old / "cells" / f"{next(row['key'] for row in Store(old).rows() if row['status'] == 'done')}.h5"
-    damaged.write_bytes(damaged.read_bytes()[:-1])
-    with unrendered():
-        found = make_report(open_results(Store(old), load_registry()), tmp_path / "report", Silence())
-    assert any(damaged.name in text for text in found.missing)

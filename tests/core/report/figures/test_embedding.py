@@ -113,7 +113,7 @@ def test_other_recordings_than_were_answered_are_refused(tmp_path):
     material, row, test = the_first(folder)
     shutil.rmtree(tmp_path / "recordings" / "alpha")
     record(tmp_path / "recordings", "alpha", 2.0, 0, 50)
-    with pytest.raises(DataError, match="not the one that"):
+    with pytest.raises(DataError, match="other test rows than were answered"):
         embed(material, row, test)
 
 
