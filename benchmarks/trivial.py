@@ -1,6 +1,6 @@
 """Cells that do nothing, for measuring what is around them: a plugin with one task and one estimator, tiny recordings.
 
-Used by overhead.py, relisting.py and kill_nine.py.
+Used by kill_nine.py.
 """
 
 from __future__ import annotations

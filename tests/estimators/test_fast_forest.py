@@ -9,13 +9,14 @@ import numpy as np
 import pytest
 
 from tactbench.core.evaluation.fitting import fit
-from tactbench.core.matrix.evaluate_cell import Job, solve, unanswered
 from tactbench.core.matrix.plan import Cell
+from tactbench.core.matrix.solve import Job, solve, unanswered
 from tactbench.core.provenance.source import versions
 from tactbench.plugin import NotApplicable, load_object, load_registry
 from tests.core.evaluation.made import record
 
-FAST = load_registry().estimators["forest-fast"]
+REGISTRY = load_registry()
+FAST = REGISTRY.estimators["forest-fast"]
 
 
 def build(kind="classification", **params):
@@ -55,8 +56,8 @@ def test_a_cell_without_the_extra_is_skipped_with_the_reason_and_is_no_failure(t
         params=(), baseline=False, repeat=1, repeats=1, seed=1,
     )  # fmt: skip
     with pytest.raises(NotApplicable) as reason:
-        solve(Job(cell, paths))
-    row = unanswered(cell, reason.value)
+        solve(Job(cell, REGISTRY.tasks["curvature"].spec, FAST, paths, ()))
+    row = unanswered(cell, REGISTRY.tasks["curvature"].spec, reason.value, simulated=False)
     assert row["status"] == "skipped", row["reason"]
     assert "pip install 'tactbench[fast]'" in row["reason"]
 
@@ -89,7 +90,7 @@ class TestInstalled:
         X_new, y_new = cloud(4000, seed=1)
         right = []
         for name in ("forest-100", "forest-fast-100"):
-            descriptor = load_registry().estimators[name]
+            descriptor = REGISTRY.estimators[name]
             model = load_object(descriptor.where)(kind="classification", seed=1, threads=1, **descriptor.params)
             model.fit(X, y)
             right.append(np.mean(model.predict(X_new) == y_new))

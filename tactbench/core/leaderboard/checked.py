@@ -66,4 +66,4 @@ def _fault(row: Row) -> str:
 
 
 _ADDED = ("declared_task", "events", "operating_points")
-"""Keys that rows of the oldest folders lack (``tests/kept_results``); a key that is added to a row is added here."""
+"""Keys that rows of older folders lack; a key that is added to a row is added here."""

@@ -112,7 +112,7 @@ class Dask:
             for work, job in self._waiting
         }
         self._waiting.clear()
-        for future in as_completed(list(of), raise_errors=False):
+        for future in as_completed(list(of), loop=self._client.loop, raise_errors=False):
             try:
                 yield of[future], future.result()
             except KilledWorker as error:

@@ -39,10 +39,10 @@ def test_what_is_timed_adds_no_row_to_a_leaderboard_and_what_a_run_has_finished_
     asked = ("--sensor", "made", "--task", "force", "--recordings", "shelf", "--split", "session", "--out", "out")
     verbs("run", *asked, "--estimator", "ols")
     before = verbs("leaderboard", "out", "--format", "json").stdout
-    ledger = (verbs.folder / "out" / "index.jsonl").read_bytes()
+    cells = {path: path.read_bytes() for path in (verbs.folder / "out" / "cells").iterdir()}
     verbs("cost", *asked, "--rounds", "1", "--estimator", "ols", "--estimator", "knn")
     assert verbs("leaderboard", "out", "--format", "json").stdout == before
-    assert (verbs.folder / "out" / "index.jsonl").read_bytes() == ledger
+    assert {path: path.read_bytes() for path in (verbs.folder / "out" / "cells").iterdir()} == cells
     rows = json.loads(verbs("leaderboard", "out/cost", "--format", "json").stdout)
     assert {row["estimator"] for row in rows} == {"ols", "knn", "mean", "time-index"}
     made_by = {row["estimator"]: row["made_by"] for row in json.loads(before)}

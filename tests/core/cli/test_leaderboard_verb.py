@@ -163,7 +163,7 @@ def test_what_is_no_result_folder_is_told_in_a_sentence(verbs, content):
         place.write_text("x")
     elif content is not None:
         place.mkdir()
-        (place / "index.jsonl").write_text(content)
+        (place / "results.sqlite").write_text(content)
     refused = verbs("leaderboard", "there", code=2)
     assert "Traceback" not in refused.stderr
     assert "tactbench run" in refused.stderr

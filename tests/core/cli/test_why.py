@@ -58,12 +58,12 @@ def why(here, cell="acme/1", *options):
 def test_a_finished_cell_is_a_hit_and_says_where_it_lies(here):
     found = why(here)
     assert (found["cell"], found["answer"], found["reasons"], found["status"]) == (ACME, "hit", [], "done")
-    assert (here.folder / found["shard"]).is_file()
+    assert (here.folder / found["file"]).is_file()
     assert all((here.folder / "results" / path).is_file() for path in found["recordings"])
     assert found["try"] == f"tactbench rerun {ACME} --out results"
     text = here("why", ACME).stdout
     assert text.startswith(f"{ACME}\nhit: ")
-    assert found["shard"] in text
+    assert found["file"] in text
 
 
 def test_the_words_and_the_run_agree(here):
@@ -72,7 +72,9 @@ def test_the_words_and_the_run_agree(here):
     assert "3 of 4 answers were found finished" in here(*RUN, code=1).stderr
     filters.write_text("LAW = 0.5\n")
     found = why(here)
-    assert (found["answer"], found["reasons"]) == ("miss", ["acme/filters.py changed"])
+    assert found["answer"] == "miss"
+    (reason,) = found["reasons"]
+    assert reason.startswith("source: acme ")
     assert "2 of 4 answers were found finished" in here(*RUN, code=1).stderr
     assert why(here)["answer"] == "hit"
     filters.write_text(original + "# a comment\n")
@@ -85,28 +87,26 @@ def test_the_words_and_the_run_agree(here):
 @pytest.mark.parametrize(
     ("change", "reason"),
     [
-        (lambda acme: (acme / "table.csv").write_text("1"), "acme/table.csv is new"),
-        (lambda acme: (acme / "answers.py").write_text((acme / "answers.py").read_text() + "\nimport json5x\n"),
-         "import json5x nothing -> absent"),
+        (lambda acme: (acme / "table.csv").write_text("1"), "source: acme "),
         (lambda acme: (acme / "__init__.py").write_text(
             (acme / "__init__.py").read_text().replace('"gain": 1.0', '"gain": 2.0')),
-         "estimator: params.gain 1.0 -> 2.0"),
+         "estimator: params: gain 1.0 -> 2.0"),
     ],
-    ids=["a table", "an import", "a default"],
+    ids=["a table", "a default"],
 )  # fmt: skip
 def test_what_changed_is_said_in_words(here, change, reason):
     change(here.acme)
     found = why(here)
     assert found["answer"] == "miss"
-    assert reason in found["reasons"]
-    assert f"  {reason}\n" in here("why", "acme/1").stdout
+    assert any(said.startswith(reason) for said in found["reasons"])
+    assert f"  {reason}" in here("why", "acme/1").stdout
 
 
 def test_options_ask_for_it_otherwise(here):
-    assert "seed 1 -> 2" in why(here, "acme/1", "--seed", "2", "--estimator", "acme")["reasons"]
+    assert "configuration: seed 1 -> 2" in why(here, "acme/1", "--seed", "2", "--estimator", "acme")["reasons"]
     found = why(here, "acme/1", "--rung", "reference", "--estimator", "acme")
     assert found["answer"] == "miss"
-    assert any("rung" in reason and "reference" in reason for reason in found["reasons"])
+    assert any("recordings have to be made" in reason for reason in found["reasons"])
     found = why(here, "ideal/force/twin/deployable/acme", "--sensor", "ideal", "--task", "force", "--protocol",
                 "deployable", "--estimator", "acme", "--repeats", "1")  # fmt: skip
     assert (found["answer"], found["status"]) == ("miss", "never run")
@@ -116,9 +116,11 @@ def test_a_recording_that_was_removed_or_replaced_is_named(here):
     (flat,) = (here.folder / "results" / "recordings" / "ideal").glob("flat-test-*.h5")
     (other,) = (here.folder / "results" / "recordings" / "ideal").glob("flat-train-*.h5")
     flat.unlink()
-    assert why(here)["reasons"] == ["recording flat-test was removed"]
+    (reason,) = why(here)["reasons"]
+    assert reason.startswith(f"1 of 3 recordings have to be made, {flat.stem} first")
     shutil.copy(other, flat)
-    assert why(here)["reasons"] == ["recording flat-test has other bytes"]
+    (reason,) = why(here)["reasons"]
+    assert reason.startswith(f"data: {flat.stem} ")
 
 
 def test_a_stopped_cell_shows_its_reason_its_traceback_and_what_to_try(here):
@@ -139,15 +141,6 @@ def test_a_key_or_a_part_of_the_name_will_do_and_what_is_unclear_is_refused(here
     assert "part of the names of 4 cells" in several
     assert ACME in several
     assert "Did you mean" in here("why", ACME.replace("karl", "carl"), code=2).stderr
-
-
-def test_without_the_book_nothing_is_made_up(here):
-    shutil.rmtree(here.folder / "results" / "cache")
-    assert why(here)["answer"] == "hit"
-    (here.acme / "filters.py").write_text("LAW = 0.5\n")
-    found = why(here)
-    assert (found["answer"], found["reasons"]) == ("miss", [])
-    assert "not recorded" in found["unknown"]
 
 
 def test_a_folder_that_is_not_there_is_refused(here):

@@ -88,7 +88,7 @@ def test_scores_come_from_the_store_and_times_do_not(tmp_path):
     assert [row["score"] for row in first.rows] == [row["score"] for row in again.rows]
     assert [row["search_s"] for row in first.rows] == [row["search_s"] for row in again.rows]
     assert [row["latency_ms_p50"] for row in first.rows] != [row["latency_ms_p50"] for row in again.rows]
-    assert not (store.folder / "scores.json").exists(), "the files of the last run are not this verb's"
+    assert not (store.folder / "leaderboard.md").exists(), "the files of the last run are not this verb's"
 
 
 def test_the_files_say_what_the_table_says(ladder, tmp_path):

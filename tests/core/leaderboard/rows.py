@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from tactbench.core.matrix.evaluate_cell import opening
 from tactbench.core.matrix.plan import Cell
+from tactbench.core.matrix.solve import opening
 from tactbench.core.spec.task import LabelTarget, TaskSpec
 
 TASK = TaskSpec(

@@ -2,7 +2,6 @@
 
 import json
 import re
-import shutil
 
 import pytest
 
@@ -21,7 +20,7 @@ from tactbench.core.plugins.registry import installed
 from tactbench.core.report.results import open_results
 from tactbench.core.report.section import ReportData
 from tactbench.core.report.sensors import sensors_section
-from tests.conftest import ROOT
+from tests.core.matrix import made
 
 PAD = {"distribution": "acme", "version": "1.2", "package": "acme_pad", "source": "abc", "commit": ""}
 MADE_WITH = {"tactbench": "0.1.0", "commit": "1234", "plugins": [PAD]}
@@ -29,8 +28,11 @@ MADE_WITH = {"tactbench": "0.1.0", "commit": "1234", "plugins": [PAD]}
 
 @pytest.fixture
 def kept(tmp_path):
-    """A copy of a result folder."""
-    return shutil.copytree(ROOT / "tests" / "kept_results" / "v1", tmp_path / "kept")
+    """A result folder of an older commit."""
+    with Store(tmp_path / "kept").hold() as store:
+        store.begin(MADE_WITH)
+        made.kept(store, "pad/force/twin/karl2016/mean/1", sensor="pad", simulated=False)
+    return tmp_path / "kept"
 
 
 def levels(rows, folder, provenance=MADE_WITH):

@@ -7,10 +7,8 @@ import numpy as np
 from tactbench.core.matrix.plan import Cell
 from tactbench.core.matrix.solve import opening
 from tactbench.core.plugins.registry import load_registry
-from tactbench.core.recording.writer import RecordingWriter
 from tactbench.core.samples import Answers
-from tactbench.core.spec.recording import RecordingMeta
-from tactbench.plugin import Block, ChannelSpec, SensorSpec, Source, StreamSpec
+from tests.core.evaluation.made import record as write
 
 SECTIONS = {
     "configuration": {"seed": 1},
@@ -51,12 +49,5 @@ def kept(store, cell: str, *given, sections=SECTIONS, n=3, **more):
 
 def record(path, reading: float = 1.0, seconds: float = 0.5):
     """Write a small recording; how long it took is no part of its content."""
-    stream = StreamSpec(name="taxels", channels=(ChannelSpec(name="t", kind="taxel"),))
-    sensor = SensorSpec(name="made", title="Made", principle="none", streams=(stream,),
-                        principle_source=Source(tag="assumed", reference="a test"))  # fmt: skip
-    about = RecordingMeta(name="scene", sensor=sensor, rig="made", simulated=True, role="train", session="s",
-                          provenance={"sim_s": seconds})  # fmt: skip
     path.parent.mkdir(parents=True, exist_ok=True)
-    with RecordingWriter(path, about) as writer:
-        writer.append(Block("taxels", np.arange(5, dtype=np.int64), np.full((5, 1), reading)))
-    return path
+    return write(path, np.full((5, 3), reading), simulated=True, session="s", provenance={"sim_s": seconds})

@@ -14,8 +14,8 @@ from tests.conftest import Shell, Verbs
 from tests.core.cost.test_ladder import presses
 from tests.core.pool.patience import until
 
-LIMITS = ("--timeout", "3", "--memory", "120")
-"""The memory is for what a cell imports, too; the one that eats has no end."""
+LIMITS = ("--timeout", "8", "--memory", "400")
+"""One that forks holds what it shares twice; the one that eats has no end."""
 ASKED = ("run", "--rig", "replay", "--recordings", "shelf", "--sensor", "made", "--task", "force", "--split", "session")
 HONEST = ("ols", "mean", "time-index")
 ENDS = {
@@ -24,8 +24,8 @@ ENDS = {
     "evil-interrupt": ("failed", None, "KeyboardInterrupt"),
     "evil-abort": ("crashed", 6, "SIGABRT"),
     "evil-vanish": ("crashed", None, "exit code 0"),
-    "evil-hang": ("timeout", None, "longer than 3 s"),
-    "evil-eat": ("out-of-memory", None, "more than 120 MB"),
+    "evil-hang": ("timeout", None, "longer than 8 s"),
+    "evil-eat": ("out-of-memory", None, "more than 400 MB"),
     "evil-shape": ("failed", None, "answered 120 rows with shape (119,)"),
     "evil-nan": ("failed", None, "120 values that are NaN or infinite"),
     "evil-text": ("failed", None, "values of type <U"),

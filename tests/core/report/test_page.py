@@ -128,8 +128,8 @@ def test_every_column_of_numbers_has_something_to_be_sorted_by():
 
 def test_what_is_missing_is_said_with_the_command_that_makes_it(material):
     missing = "\n".join(make_page(ReportData(material)).missing)
-    for command in ("tactbench cost --sensor icub --task force", "tactbench run"):
-        assert f"`{command}`" in missing
+    for command in ("tactbench cost --sensor icub --task ", "tactbench run"):
+        assert f"`{command}" in missing
 
 
 def test_a_section_that_cannot_be_made_takes_no_other_with_it(material, tmp_path):
@@ -148,7 +148,7 @@ def test_linear_against_non_linear(material):
 
 def test_cost_files_are_shown_whatever_their_keys(material, tmp_path):
     subject, path = ReportData(material), tmp_path / "icub-force.json"
-    lasso, forest = (row for row in material.rows if row["task"] == "force" and not row["is_baseline"])
+    forest, lasso = (row for row in material.rows if row["task"] == "force" and not row["is_baseline"])
     asked = {name: lasso[name] for name in ("sensor", "task", "rig", "protocol", "split", "seed")}
     rows = [
         {"estimator": "lasso", "fit_s": 0.25, "fit_s_q1": 0.2, "front": True, "loop": None, "status": "done", "of": {}},

@@ -1,15 +1,9 @@
 """`tactbench report`, as a person runs it."""
 
 import json
-import shutil
 
 import pytest
 
-from tactbench.core.matrix.progress import Silence
-from tactbench.core.matrix.store import Store
-from tactbench.core.plugins.registry import load_registry
-from tactbench.core.report.making import make_report
-from tactbench.core.report.results import open_results
 from tests.conftest import Verbs
 
 from .unrendered import unrendered
@@ -59,7 +53,6 @@ def test_a_folder_that_is_not_there_is_not_made(verbs):
 
 def test_results_without_a_finished_cell_say_what_to_run(verbs):
     verbs("run", "--repeats", "1", "--sensor", "icub", "--task", "grasp-stability")
-    (verbs.folder / "tactbench-results" / "index.jsonl").touch()
     one_clear_screen(verbs("report", code=2), "No cell in tactbench-results has finished", "tactbench run")
 
 
@@ -67,18 +60,3 @@ def test_a_place_that_refuses_the_page_is_named(reported):
     verbs, _ = reported
     (verbs.folder / "taken").write_text("a file, not a folder")
     one_clear_screen(verbs("report", "--out", "taken", code=2), "taken", "--out")
-
-
-def test_a_row_of_another_version_is_left_out_and_named(results, tmp_path):
-    old = shutil.copytree(results, tmp_path / "old", ignore=shutil.ignore_patterns("report", "recordings"))
-    index = old / "index.jsonl"
-    lines = index.read_text().splitlines()
-    place = next(number for number, line in enumerate(lines) if '"status": "skipped"' in line)
-    first = json.loads(lines[place])
-    first.get("refs", {}).pop("search", None)
-    first["row"].pop("search", None)
-    del first["sha256"]  # as earlier versions wrote it
-    index.write_text("\n".join([*lines[:place], json.dumps(first), *lines[place + 1 :]]) + "\n")
-    with unrendered():
-        found = make_report(open_results(Store(old), load_registry()), tmp_path / "report", Silence())
-    assert f"{first['row']['cell']}: its row is of another version; run it again" in found.missing

@@ -1,0 +1,135 @@
+"""A run: what is computed when, what rows say of their times, and that scores depend on neither jobs nor engine."""
+
+import importlib.util
+
+import pytest
+
+from tactbench.core.errors import UsageError
+from tactbench.core.matrix.run import EngineChoice, run_matrix
+from tactbench.core.matrix.solve import TIMED
+from tactbench.core.matrix.store import Store
+from tactbench.core.matrix.summary import SEED_DECIDES
+from tactbench.core.pool import Limits
+from tactbench.core.spec.matrix import EstimatorChoice, MatrixSpec, TaskChoice
+from tests.core.cost.test_ladder import presses
+from tests.here import IN_THIS_PROCESS
+
+ASKED = ("forest-10", "ridge")
+
+
+def matrix(*estimators, repeats=2, **more):
+    choice = TaskChoice(name="force", protocol="deployable", split="session",
+                        estimators=tuple(EstimatorChoice(name=name) for name in estimators or ASKED))  # fmt: skip
+    return MatrixSpec(rig="replay", sensors=("made",), tasks=(choice,), repeats=repeats, **more)
+
+
+class Heard:
+    """Receives what a run tells."""
+
+    def __init__(self):
+        self.stages, self.steps, self.shown = [], [], []
+
+    def begin(self, stage, total):
+        self.stages.append((stage, total))
+
+    def advance(self, what, *, stopped=False):
+        self.steps.append(what)
+
+    def working(self, what):
+        raise AssertionError("a run tells steps")
+
+    def show(self, rows):
+        self.shown.append([row["cell"] for row in rows])
+
+
+def decided(rows):
+    return {row["cell"]: {name: row[name] for name in SEED_DECIDES} for row in rows}
+
+
+@pytest.fixture(scope="module")
+def shelf(tmp_path_factory):
+    return presses(tmp_path_factory.mktemp("made") / "shelf")
+
+
+@pytest.fixture(scope="module")
+def ran(shelf, tmp_path_factory):
+    """A run with two jobs, and what it told."""
+    heard = Heard()
+    folder = tmp_path_factory.mktemp("ran")
+    outcome = run_matrix(matrix(), Store(folder), choice=EngineChoice(jobs=2, limits=Limits(timeout_s=100.0)),
+                         recordings=shelf, progress=heard, shown=heard.show)  # fmt: skip
+    return outcome, heard, folder
+
+
+def test_every_planned_cell_has_a_row_in_the_order_of_the_plan(ran):
+    outcome, heard, folder = ran
+    names = [f"made/force/replay/deployable:session/{one}/{repeat}"
+             for repeat in (1, 2) for one in ("forest-10", "ridge", "mean", "time-index")]  # fmt: skip
+    assert [row["cell"] for row in outcome.rows] == names
+    assert {row["status"] for row in outcome.rows} == {"done"}
+    assert (outcome.computed, outcome.recorded, outcome.failures) == (8, 0, [])
+    assert sorted(heard.steps) == sorted(names)
+    assert heard.stages == [("replicate 1 of 2: evaluating", 4), ("replicate 2 of 2: evaluating", 4)]
+    assert heard.shown == [names[:4]], "whenever a replicate is complete, but for the last"
+    known = {row["cell"]: row for row in Store(folder).rows()}
+    assert {name: known[name]["score"] for name in names} == {row["cell"]: row["score"] for row in outcome.rows}
+    assert all(row["baseline"] is not None for row in outcome.rows)
+    assert all(len(paths) == 3 for paths in outcome.recordings.values())
+
+
+def test_times_are_taken_in_the_first_replicate_alone_and_the_row_says_so(ran):
+    for row in ran[0].rows:
+        times = [row[name] for name in ("fit_s", "predict_s", "latency_ms_p50", "latency_n")]
+        if row["repeat"] == 1:
+            assert all(time is not None for time in times)
+            assert TIMED in row["remarks"]
+            assert (row["concurrency"], row["latency_n"] >= 20) == (1, True)
+        else:
+            assert times == [None] * 4
+            assert TIMED not in row["remarks"]
+            assert row["concurrency"] == 2
+        assert row["wall_s"] > 0
+
+
+@pytest.mark.parametrize("choice", [IN_THIS_PROCESS, EngineChoice(jobs=1)], ids=["in-process", "one job"])
+def test_jobs_engine_and_order_change_no_score(ran, shelf, tmp_path, choice):
+    outcome = run_matrix(matrix(*ASKED[::-1]), Store(tmp_path), choice=choice, recordings=shelf)
+    assert decided(outcome.rows) == decided(ran[0].rows)
+
+
+def test_a_second_run_computes_nothing_and_a_changed_number_of_repeats_is_no_change(ran, shelf):
+    _, _, folder = ran
+    heard = Heard()
+    again = run_matrix(matrix(repeats=1), Store(folder), choice=EngineChoice(jobs=2), recordings=shelf,
+                       progress=heard)  # fmt: skip
+    assert (again.computed, heard.stages) == (0, [])
+    assert {(row["repeat"], row["repeats"]) for row in again.rows} == {(1, 1)}
+    assert {row["cell"]: row["repeats"] for row in Store(folder).rows()} == {
+        row["cell"]: 1 if row["repeat"] == 1 else 2 for row in ran[0].rows
+    }
+
+
+def test_without_latency_the_cell_is_another_one_with_the_same_score(ran, shelf):
+    _, _, folder = ran
+    outcome = run_matrix(matrix("ridge", repeats=1, latency=False), Store(folder), choice=IN_THIS_PROCESS,
+                         recordings=shelf)  # fmt: skip
+    (row,) = [row for row in outcome.rows if row["estimator"] == "ridge"]
+    (timed,) = [row for row in ran[0].rows if row["estimator"] == "ridge" and row["repeat"] == 1]
+    assert (row["latency_n"], row["fit_s"]) == (None, None)
+    assert (row["key"] != timed["key"], row["score"]) == (True, timed["score"])
+
+
+@pytest.mark.parametrize(
+    ("choice", "says"),
+    [
+        (EngineChoice("in-process", jobs=2), "--jobs 2"),
+        (EngineChoice("isolated", scheduler="tcp://127.0.0.1:1"), "--engine dask"),
+        (EngineChoice("dask"), r"pip install 'tactbench\[dask\]'"),
+    ],
+    ids=["jobs in one process", "scheduler without dask", "dask without its library"],
+)
+def test_choices_that_do_not_go_together_are_refused(tmp_path, monkeypatch, choice, says):
+    monkeypatch.setattr(importlib.util, "find_spec", lambda name: None)
+    with pytest.raises(UsageError, match=says):
+        run_matrix(matrix(), Store(tmp_path / "out"), choice=choice)
+    assert not (tmp_path / "out").exists()
