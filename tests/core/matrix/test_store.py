@@ -216,7 +216,7 @@ def test_reading_a_folder_that_is_not_there_makes_nothing(tmp_path):
     assert not (tmp_path / "none").exists()
 
 
-@pytest.mark.parametrize("value", [math.nan, math.inf, {1}, object(), lambda: None], ids=repr)
+@pytest.mark.parametrize("value", [math.nan, math.inf, {1}, object(), lambda: None], ids=["nan", "inf", "set", "object", "lambda"])
 def test_what_is_no_plain_data_writes_nothing(tmp_path, value):
     with Store(tmp_path).hold() as store:
         with pytest.raises((TypeError, ValueError)):
