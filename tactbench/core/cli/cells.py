@@ -47,7 +47,7 @@ def find_cell(out: Path, given: str, options: Mapping[str, Any] | None = None) -
     out
         The result folder.
     given
-        The cell's name, a part of it, or how its key begins.
+        The cell's name, or a part of it.
     options
         The selecting options, given or not: if one was given, the cell is looked for in the matrix that they ask for;
         otherwise among the folder's rows, and then in the default matrix. None: among the folder's rows only.
@@ -72,10 +72,9 @@ def find_cell(out: Path, given: str, options: Mapping[str, Any] | None = None) -
     rows = {row["cell"]: row for row in store.rows()}
     registry = with_declared_of(installed(), rows.values())
     keys = Keys(registry)
-    known = {name: str(row.get("key", "")) for name, row in rows.items()}
     if options is None or not any(_given(name, value) for name, value in options.items()):
         try:
-            row = rows[meant(given, list(rows), known)]
+            row = rows[meant(given, list(rows))]
         except UsageError as error:
             lost = [text for text in store.troubles if given in text]
             if lost:
@@ -88,7 +87,7 @@ def find_cell(out: Path, given: str, options: Mapping[str, Any] | None = None) -
             return StoredCell(store, registry, keys, cell, row, paths, requests)
     selection = dict(options or {})
     if not selection["config"] and any(given in name for name in rows):
-        given = meant(given, list(rows), known)
+        given = meant(given, list(rows))
         # The options change how the cell was asked; what they do not mention stays.
         was = {"sensors": (rows[given]["sensor"],), "tasks": (rows[given]["task"],), "rig": rows[given]["rig"]}
         selection |= {name: value for name, value in was.items() if not selection[name]}
@@ -97,7 +96,7 @@ def find_cell(out: Path, given: str, options: Mapping[str, Any] | None = None) -
         registry = with_declared(installed(), declared_in(folder))
         keys = Keys(registry)
     cells, needed = plan_run(matrix, registry, keys, store, folder)
-    cell = {one.name: one for one in cells}[meant(given, [one.name for one in cells], known)]
+    cell = {one.name: one for one in cells}[meant(given, [one.name for one in cells])]
     need = request_key(cell)
     paths, made = tuple(needed.paths.get(need, ())), tuple(needed.requests.get(need, ()))
     return StoredCell(store, registry, keys, cell, rows.get(cell.name), paths, made)

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 def command(ctx: click.Context, cell: str, out: Path, shape: str) -> None:
     """Compute one cell again and say whether it comes out the same, bit for bit.
 
-    CELL is its name as tables show it, a part that only one cell has, or how its key begins. What a simulation recorded
+    CELL is its name as tables show it, or a part that only one cell has. What a simulation recorded
     is recorded again, into a place of its own; other cells are answered from the same recordings.
 
     Exit code 0: identical; 1: something differs, or it fails; 2: usage.

@@ -31,7 +31,7 @@ _REASONS = 20
 def command(cell: str, out: Path, shape: str, **options: Any) -> None:
     """Say why a cell would be reused or computed, what its score rests on, and how it ended.
 
-    CELL is its name as tables show it, a part that only one cell has, or how its key begins; of the replicates of a
+    CELL is its name as tables show it, or a part that only one cell has; of the replicates of a
     cell the first is meant. Without options the cell is asked for as it was; with `run`'s options, as they ask for it.
     """
     keep_threads()

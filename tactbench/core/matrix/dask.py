@@ -11,7 +11,7 @@ import multiprocessing
 import os
 import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import suppress
+from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +19,7 @@ from distributed import Client, KilledWorker, LocalCluster, as_completed  # noqa
 from distributed.versions import VersionMismatchWarning  # noqa: TID253
 
 from tactbench.core.errors import Crashed, EngineError, UsageError
+from tactbench.core.matrix.keys import differences
 from tactbench.core.matrix.solve import Job, check_content
 from tactbench.core.plugins.registry import installed
 from tactbench.core.pool import Limits, Pool
@@ -58,47 +59,37 @@ class Dask:
             If no scheduler answers, or a worker's versions or sources differ from this run's.
         """
         logging.getLogger("distributed").setLevel(logging.CRITICAL)
-        self._cluster: LocalCluster | None = None
-        to: Any = self._scheduler
-        if to is None:
-            to = self._cluster = LocalCluster(
-                n_workers=self._jobs, threads_per_worker=1, host="127.0.0.1", memory_limit=0,
-                dashboard_address=None, silence_logs=logging.CRITICAL,
-            )  # fmt: skip
-        try:
-            with warnings.catch_warnings():  # versions that may change a number are compared below
-                warnings.simplefilter("ignore", VersionMismatchWarning)
-                self._client = Client(to, timeout=CONNECT_S, set_as_default=False)
-            self._client.wait_for_workers(1, timeout=GATHER_S)
-        except (OSError, ValueError) as error:
-            self._close_cluster()
-            raise UsageError(
-                f"No Dask scheduler with a worker answers at {self._scheduler}: {error}.",
-                hint="Start `dask scheduler` and `dask worker ADDRESS`, or leave --scheduler out for workers here.",
-            ) from error
         threads = {name: os.environ[name] for name in _THREADS if name in os.environ}
-        here = environment()
-        for address, there in self._client.run(_prepared, threads).items():
-            differ = [f"{name} is {there.get(name)} there and {here[name]} here" for name in here
-                      if there.get(name) != here[name]]  # fmt: skip
-            if differ:
-                self.__exit__()
+        with ExitStack() as stack:
+            to: Any = self._scheduler
+            if to is None:
+                to = stack.enter_context(LocalCluster(
+                    n_workers=self._jobs, threads_per_worker=1, host="127.0.0.1", memory_limit=0,
+                    dashboard_address=None, silence_logs=logging.CRITICAL,
+                ))  # fmt: skip
+            try:
+                with warnings.catch_warnings():  # versions that may change a number are compared below
+                    warnings.simplefilter("ignore", VersionMismatchWarning)
+                    self._client = stack.enter_context(Client(to, timeout=CONNECT_S, set_as_default=False))
+                self._client.wait_for_workers(1, timeout=GATHER_S)
+            except (OSError, ValueError) as error:
                 raise UsageError(
-                    f"The Dask worker at {address} cannot be used: {'; '.join(differ[:3])}.",
-                    hint="Start workers in the environment of this run, and stop the others.",
-                )
+                    f"No Dask scheduler with a worker answers at {self._scheduler}: {error}.",
+                    hint="Start `dask scheduler` and `dask worker ADDRESS`, or leave --scheduler out for workers here.",
+                ) from error
+            for address, there in self._client.run(_prepared, threads).items():
+                if differ := differences(environment(), there):
+                    raise UsageError(
+                        f"The Dask worker at {address} cannot be used: here and there {'; '.join(differ[:3])}.",
+                        hint="Start workers in the environment of this run, and stop the others.",
+                    )
+            self._stack = stack.pop_all()
         return self
 
     def __exit__(self, *_: object) -> None:
         """Disconnect; what is under way is cancelled."""
         self._waiting.clear()
-        with suppress(OSError, TimeoutError):
-            self._client.close(timeout=CONNECT_S)
-        self._close_cluster()
-
-    def _close_cluster(self) -> None:
-        if self._cluster is not None:
-            self._cluster.close(timeout=CONNECT_S)
+        self._stack.close()
 
     def submit(self, work: Callable[[Any], Any], items: Sequence[Any]) -> None:
         """Queue cells."""

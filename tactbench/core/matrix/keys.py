@@ -1,7 +1,7 @@
 """Keys: what decides a recording or a result, and nothing else, in one digest.
 
-What decides is listed in sections: the configuration, the descriptors, the versions, the source of each package, the
-data. A key is the digest of its sections; ``tactbench why`` compares the sections of two keys.
+What decides is listed in sections: the configuration, the versions, the source of each package (which holds its
+descriptors), the data. A key is the digest of its sections; ``tactbench why`` compares the sections of two keys.
 """
 
 from __future__ import annotations
@@ -18,9 +18,6 @@ from tactbench.core.plugins.taking_part import taking_part
 from tactbench.core.provenance.source import ANSWERING, RECORDING, digest_of, sources_of, versions
 from tactbench.core.spec.rig_file import RigFile
 from tactbench.core.spec.scene import Role, Scene
-
-_NOT_IN_THE_KEY = {"published", "equivalence", "reference_score", "title", "question", "scenes", "campaigns"}
-"""Of a task: what changes no number, and what its recordings say themselves, by their content."""
 
 Sections = dict[str, Any]
 
@@ -48,8 +45,8 @@ class Keys:
             modules = [self.registry.tasks.owned(cell.task).module, estimator.module, estimator.descriptor.where]
             modules += [spec.features_by] if spec.features_by else []
             self._answers[pair] = {
-                "task": digest_of(_canonical(spec.model_dump(exclude=_NOT_IN_THE_KEY))),
-                "estimator": estimator.descriptor.model_dump(exclude={"title", "linear", "rehearsal"}),
+                "task": cell.task_key,
+                "estimator": cell.estimator,
                 "versions": versions(estimator.descriptor.distributions),
                 "source": sources_of(modules, ANSWERING),
             }
@@ -87,14 +84,7 @@ class Keys:
                 if shape is not None and shape in self.registry.indenters:  # of an unknown one the rig complains
                     indenter = self.registry.indenters.owned(shape)
                     modules += [indenter.module, indenter.descriptor.where]
-                    sections["indenter"] = indenter.descriptor.model_dump(exclude={"title"})
-                sections |= {
-                    "sensor": digest_of(_canonical(owner.descriptor.model_dump())),
-                    "rig": carrier.descriptor.model_dump(),
-                    "effects": {one.descriptor.name: one.descriptor.model_dump() for one in effects},
-                    "versions": versions(),
-                    "source": sources_of(modules, RECORDING),
-                }
+                sections |= {"versions": versions(), "source": sources_of(modules, RECORDING)}
             self._makers[made] = sections
         return self._makers[made]
 

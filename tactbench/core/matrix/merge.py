@@ -25,7 +25,6 @@ from typing import Any
 from tactbench.core.errors import FolderError
 from tactbench.core.matrix.keys import differences
 from tactbench.core.matrix.store import Row, Store, writing
-from tactbench.core.matrix.store.store import sync_folder
 from tactbench.core.matrix.summary import SEED_DECIDES
 from tactbench.core.spec.status import STATUSES
 
@@ -147,7 +146,6 @@ def _made(out: Path) -> Iterator[Path]:
                 (aside / part).mkdir(parents=True, exist_ok=True)
             yield aside
             aside.rename(out)
-            sync_folder(out.absolute().parent)
         except BaseException:
             shutil.rmtree(aside, ignore_errors=True)
             raise

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
@@ -17,8 +16,8 @@ _SHOWN = 8
 """Cells named in a message."""
 
 
-def meant(given: str, names: Sequence[str], keys: Mapping[str, str]) -> str:
-    """Return the name of the cell that `given` stands for: its name, a part of only one name, or how its key begins.
+def meant(given: str, names: Sequence[str]) -> str:
+    """Return the name of the cell that `given` stands for: its name, or a part of only one name.
 
     The replicates of a cell differ in the last part of their names alone: what names them all, with or without that
     part, stands for the first of them.
@@ -27,8 +26,6 @@ def meant(given: str, names: Sequence[str], keys: Mapping[str, str]) -> str:
     ----------
     names
         Of the cells there are.
-    keys
-        Name -> key, for those that have one.
 
     Raises
     ------
@@ -38,17 +35,13 @@ def meant(given: str, names: Sequence[str], keys: Mapping[str, str]) -> str:
     if given in names:
         return given
     found = [name for name in names if _parts(name)[0] == given] or [name for name in names if given in name]
-    if not found and re.fullmatch(r"[0-9a-f]{4,}", given):
-        found = [name for name in names if keys.get(name, "").startswith(given)]
     if len({_parts(name)[0] for name in found}) == 1:
         return min(found, key=lambda name: _parts(name)[1])
     if not found:
         close = " or ".join(repr(name) for name in nearest(given, names))
         raise UsageError(
             f"There is no cell called {given!r} among {len(names)}.",
-            hint=f"Did you mean {close}?"
-            if close
-            else "See their names with `tactbench leaderboard DIR --format json`.",
+            hint=f"Did you mean {close}?" if close else "`tactbench leaderboard --format json` has their names.",
         )
     more = f" and {len(found) - _SHOWN} more" if len(found) > _SHOWN else ""
     raise UsageError(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
@@ -75,43 +75,6 @@ def requests_for(
     return requests
 
 
-UNKNOWN = "unknown"
-"""Sensor of recordings that cannot be read and lie where nothing tells whose they are."""
-
-
-def _owner(path: Path, sensors: Sequence[str], registry: Registry) -> str:
-    """Return whose recording this seems to be: a folder above has the name of a sensor, or there is one only."""
-    for folder in path.parent.parts[::-1]:
-        if folder in sensors or folder in registry.sensors:
-            return folder
-    return sensors[0] if len(sensors) == 1 else UNKNOWN
-
-
-def _serving(
-    task: TaskSpec,
-    split: str | None,
-    recordings: Mapping[Path, str | None],
-    unreadable: Mapping[Path, BaseException],
-    registry: Registry,
-) -> tuple[list[Path], BaseException | None]:
-    """Return the recordings of a sensor that belong to `task` under `split`, and why one of them cannot be read.
-
-    A recording of a scene that some task planned serves the campaigns that plan a scene of this name; a recording whose
-    scene nobody planned (an imported table) may serve any task. One that cannot be read is taken for a recording of the
-    scene that its file is named after, and otherwise for one that would have served.
-
-    Parameters
-    ----------
-    recordings
-        The scene of each that can be read; None: nobody planned it.
-    """
-    names = {planned.scene.name for planned in task.scenes_for(split)}
-    readable = [path for path, scene in recordings.items() if scene is None or not names or scene in names]
-    others = {planned.scene.name for known in registry.tasks for planned in known.spec.scenes_for(split)} - names
-    broken = (error for path, error in unreadable.items() if not names or path.stem.rpartition("-")[0] not in others)
-    return readable, next(broken, None)
-
-
 ACQUIRED_SPLITS = ("roles", "session", "recording", "unit", "in-session", "shuffled")
 """Splits that every recording acquired by a rig can be asked for; its scene's labels are further ones."""
 
@@ -176,36 +139,41 @@ def plan_run(
 def _from_replay(
     matrix: MatrixSpec, registry: Registry, paths: Sequence[Path], store: Store
 ) -> tuple[list[Cell], RecordingPlan]:
-    """Return the cells of recordings that exist; one that cannot be read costs the cells that need it."""
+    """Return the cells of recordings that exist.
+
+    A recording of a scene that some task planned serves the campaigns that plan a scene of this name; one whose scene
+    nobody planned (an imported table) serves any task. One that cannot be read stops the cells of its sensor, after
+    which a folder above it is named, or else of every sensor.
+    """
     if not paths:
         raise MissingRecordingError("There are no recordings.", hint="Import recordings with `tactbench import`.")
     scenes: dict[str, dict[Path, str | None]] = {}
-    broken: dict[Path, BaseException] = {}
+    broken: dict[str, BaseException] = {}
     for path in paths:
         try:
             about = store.about(path)
             scenes.setdefault(about["sensor"], {})[path] = about["scene"]
         except RecordingError as error:
-            broken[path] = error
-    unreadable: dict[str, dict[Path, BaseException]] = {}
-    for path, why in broken.items():
-        unreadable.setdefault(_owner(path, matrix.sensors or list(scenes), registry), {})[path] = why
-    known = sorted({*scenes, *unreadable})
+            named = {*registry.sensors.names(), *matrix.sensors, *scenes}
+            owner = next((folder for folder in reversed(path.parent.parts) if folder in named), "")
+            broken.setdefault(owner, error)
+    known = sorted({*scenes, *broken} - {""}) or list(matrix.sensors)
+    if not known:
+        raise broken[""]
     for name in matrix.sensors:
-        if name not in known:
+        if name not in known and "" not in broken:
             raise UnknownNameError("sensor in these recordings", name, known)
     cells = plan_cells(matrix, matrix.sensors or known, registry)
-    recording_plan = RecordingPlan()
+    plan = RecordingPlan()
     for key in dict.fromkeys(request_key(cell) for cell in cells):
         sensor, task, split, _ = key
-        recording_plan.paths[key], trouble = _serving(
-            registry.tasks[task].spec, split, scenes.get(sensor, {}), unreadable.get(sensor, {}), registry
-        )
+        names = {planned.scene.name for planned in registry.tasks[task].spec.scenes_for(split)}
+        found = scenes.get(sensor, {})
+        plan.paths[key] = [path for path, scene in found.items() if scene is None or not names or scene in names]
+        trouble = broken.get(sensor) or broken.get("") or (None if plan.paths[key] else _no_scenes(key, matrix))
         if trouble is not None:
-            recording_plan.troubles[key] = trouble
-        elif not recording_plan.paths[key]:
-            recording_plan.troubles[key] = _no_scenes(key, matrix)
-    return cells, recording_plan
+            plan.troubles[key] = trouble
+    return cells, plan
 
 
 def _no_scenes(key: RequestKey, matrix: MatrixSpec) -> NotApplicable:

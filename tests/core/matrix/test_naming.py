@@ -21,16 +21,10 @@ NAMES = [f"{FOREST}/10", f"{FOREST}/2", f"{FOREST}/1", f"{FAST}/1", "b/t/twin/p/
     ],
 )
 def test_the_name_of_a_cell_without_its_replicate_is_the_first_of_them(given, found):
-    assert meant(given, NAMES, {}) == found
+    assert meant(given, NAMES) == found
 
 
 def test_a_part_of_several_cells_is_refused_with_their_names():
     with pytest.raises(UsageError, match="part of the names of 4 cells") as refused:
-        meant("a/t", NAMES, {})
+        meant("a/t", NAMES)
     assert FAST in refused.value.hint
-
-
-def test_a_key_may_begin_several_replicates_of_no_cell():
-    assert meant("abcd", NAMES, {NAMES[3]: "abcdef"}) == NAMES[3]
-    with pytest.raises(UsageError, match="no cell"):
-        meant("abcd", NAMES, {})

@@ -153,26 +153,22 @@ def signature(path: Path) -> tuple[int, int]:
 
 
 def _opened(path: Path) -> sqlite3.Connection:
-    """Open the index; made anew if it is damaged or of another version, in memory if it cannot be written."""
+    """Open the index; one that is damaged or of another version is removed, for the next command to make it anew."""
     if path.parent.is_dir():
-        for _ in range(2):
-            database = None
-            try:
-                database = sqlite3.connect(path, timeout=_LOCKED_S)
-                (version,) = database.execute("PRAGMA user_version").fetchone()
-                if version not in (0, VERSION):
-                    raise sqlite3.DatabaseError(f"version {version}")
+        try:
+            database = sqlite3.connect(path, timeout=_LOCKED_S)
+            (version,) = database.execute("PRAGMA user_version").fetchone()
+            if version in (0, VERSION):
                 # What a crash or a power cut takes is read from the files again.
-                database.executescript("PRAGMA synchronous = OFF; PRAGMA journal_mode = MEMORY;")
-                database.executescript(_SCHEMA)
+                database.executescript("PRAGMA synchronous = OFF; PRAGMA journal_mode = MEMORY;" + _SCHEMA)
                 return database
-            except sqlite3.Error:
-                if database is not None:
-                    database.close()
-                try:
-                    path.unlink(missing_ok=True)
-                except OSError:
-                    break
+            database.close()
+            path.unlink()
+        except sqlite3.OperationalError:  # it cannot be written
+            pass
+        except (sqlite3.Error, OSError):
+            with suppress(OSError):
+                path.unlink()
     return _in_memory()
 
 

@@ -7,7 +7,7 @@ import json
 import os
 import time
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -26,8 +26,6 @@ Row = dict[str, Any]
 
 NAMING = ("cell", "repeat", "repeats")
 """What a matrix calls a cell; its key covers everything else."""
-_TEXT_CHARACTERS = 2**16
-"""Of a log or a traceback that are kept: the last."""
 _FULL = {
     errno.ENOSPC: "the disk is full",
     errno.EDQUOT: "the quota is used up",
@@ -109,8 +107,7 @@ class Store:
         ValueError, TypeError
             If the row is not plain data; nothing is written.
         """
-        row = {name: _clipped(value) if name in ("log", "traceback") else value for name, value in row.items()}
-        row["made_by"] = self._provenance[0]
+        row = {**row, "made_by": self._provenance[0]}
         self._write(CellFile(row, sections, self._provenance[1], answers=answers or {}))
         found: Row = json.loads(json.dumps(row))
         return found
@@ -138,13 +135,6 @@ class Store:
     def file_of(self, row: Mapping[str, Any]) -> Path:
         """Return the file of a cell: named by its key, or by its name if it stopped before it had one."""
         return self.folder / "cells" / f"{row.get('key') or digest_of(row['cell'])}.h5"
-
-    def write(self, name: str, text: str) -> Path:
-        """Write another file of results whole."""
-        path = self.folder / name
-        with writing(self.folder):
-            replace_file(path, text.encode())
-        return path
 
     @property
     def troubles(self) -> tuple[str, ...]:
@@ -200,10 +190,6 @@ def _read_recording(path: Path) -> dict[str, Any]:
         return {"digest": recording.verify(), "sensor": meta.sensor.name, "scene": scene}
 
 
-def _clipped(text: str) -> str:
-    return text if len(text) <= _TEXT_CHARACTERS else f"… {text[-_TEXT_CHARACTERS:]}"
-
-
 @contextmanager
 def writing(folder: Path) -> Iterator[None]:
     """Turn what the system refuses while `folder` is written into a FolderError that says what to do."""
@@ -215,17 +201,4 @@ def writing(folder: Path) -> Iterator[None]:
         hint = f"{kept}: check its permissions, or give another one with --out DIR."
         if error.errno in _FULL:
             hint = f"{kept}: make room, and the same command goes on from there."
-        elif error.errno in (errno.ENOENT, getattr(errno, "ESTALE", 0)):
-            what = "was removed or moved while it was being written"
-            hint = f"{kept} where it was moved to; give its new place as --out DIR."
         raise FolderError(f"The folder {folder} {what}.", hint=hint) from error
-
-
-def sync_folder(folder: Path) -> None:
-    """Have the names in a folder survive a power cut, where the system can sync that."""
-    with suppress(OSError):
-        opened = os.open(folder, os.O_RDONLY)
-        try:
-            os.fsync(opened)
-        finally:
-            os.close(opened)
