@@ -76,7 +76,7 @@ def interrupted(folder, command, at):
 
 @pytest.mark.parametrize(
     ("command", "at"),
-    [(COMMAND, " 0/15"), (COMMAND, " 4/15"), ([*FORCE, "--estimator", "forest"], "evaluating")],
+    [(COMMAND, " 0/18"), (COMMAND, " 4/18"), ([*FORCE, "--estimator", "forest"], "evaluating")],
     ids=["the first recording", "a later one", "evaluating"],
 )
 def test_ctrl_c_ends_it_with_one_sentence(tmp_path, command, at):
