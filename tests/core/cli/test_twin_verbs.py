@@ -47,7 +47,7 @@ def test_it_ends_with_the_score_with_all_effects_beside_that_with_those_chosen(v
     # Nothing that the plan leaves out touches these scenes: not a digit of the score.
     assert "the very same score" in said
     assert "Leaving out the others saved" in said
-    assert "recording: " in done.stderr
+    assert "recording and evaluating: " in done.stderr
 
 
 def test_what_an_effect_that_is_left_out_does_to_the_score_shows(verbs):
