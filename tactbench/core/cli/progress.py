@@ -117,13 +117,15 @@ class _Bar:
         from rich.progress import Progress as RichProgress
         from rich.text import Text
 
-        above = [Text.from_ansi(self._text, no_wrap=True)] if self._text else []
+        bar = self
 
         class Shown(RichProgress):
             """Bars below what is known so far."""
 
             def get_renderables(self) -> Iterator[Any]:
-                yield from (*above, *super().get_renderables())
+                if bar._text:
+                    yield Text.from_ansi(bar._text, no_wrap=True)
+                yield from super().get_renderables()
 
         self.end()
         columns = (
@@ -153,8 +155,10 @@ class _Bar:
         self._shown.update(self._task, now=what, refresh=True)
 
     def show(self, text: Callable[[], str]) -> None:
-        """Show what `text` returns above the bars that follow."""
+        """Show what `text` returns above the bars."""
         self._text = text()
+        if self._shown is not None:
+            self._shown.refresh()
 
     @contextmanager
     def paused(self) -> Iterator[None]:

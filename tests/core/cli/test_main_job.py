@@ -151,7 +151,7 @@ def interrupted(folder, step):
     pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
     with ending(RUN, cwd=folder, env=env, **pipes) as running:
         for line in running.stderr:
-            if line.startswith(f"recording and evaluating: {step}/"):
+            if line.startswith(f"recording and evaluating, timed: {step}/"):
                 break
         running.send_signal(signal.SIGINT)
         out, err = running.communicate(timeout=60)

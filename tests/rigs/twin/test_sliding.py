@@ -61,8 +61,9 @@ def record(rig, sensors, tmp_path):
         scene = Scene(name=name, indenter=CAP, placement=NOMINAL, **{"observe": ("ac_pressure",), **scene})
         path = tmp_path / f"{name}.h5"
         meta = acquire(
-            rig, sensors[sensor], TWIN, scene, role=None, seed=1, path=path, clock=time.monotonic, provenance={}
-        ).meta
+            rig, sensors[sensor], TWIN, scene, role=None, seed=1, path=path, clock=time.monotonic, provenance={},
+            replace=True,
+        ).meta  # fmt: skip
         with open_recording(path) as recording:
             recording.verify()
             return meta, {stream: recording.read(stream) for stream in recording.stream_names}, recording
