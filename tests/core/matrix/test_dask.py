@@ -49,7 +49,7 @@ def test_a_worker_that_differs_is_named(monkeypatch):
     monkeypatch.setattr(dask, "environment", lambda: {"python": "3.11", "scipy": "0.1"})
     monkeypatch.setattr(dask.Client, "run", lambda self, *_: {"tcp://there": {"python": "3.11", "scipy": "9.9"}})
     with (
-        pytest.raises(UsageError, match=r"tcp://there cannot be used: scipy is 9.9 there and 0.1 here"),
+        pytest.raises(UsageError, match=r"tcp://there cannot be used: here and there scipy 0.1 -> 9.9"),
         dask.Dask(1, UNLIMITED),
     ):
         pass

@@ -69,7 +69,7 @@ def test_every_planned_cell_has_a_row_in_the_order_of_the_plan(ran):
     assert {row["status"] for row in outcome.rows} == {"done"}
     assert (outcome.computed, outcome.recorded, outcome.failures) == (8, 0, [])
     assert sorted(heard.steps) == sorted(names)
-    assert heard.stages == [("replicate 1 of 2: evaluating", 4), ("replicate 2 of 2: evaluating", 4)]
+    assert heard.stages == [("evaluating, timed", 4), ("evaluating", 4)]
     assert heard.shown == [names[:4]], "whenever a replicate is complete, but for the last"
     known = {row["cell"]: row for row in Store(folder).rows()}
     assert {name: known[name]["score"] for name in names} == {row["cell"]: row["score"] for row in outcome.rows}

@@ -54,7 +54,7 @@ def together(*whats, limits=PATIENT):
         ("kills", Crashed, "signal 9 (SIGKILL)", "crashed"),
         ("vanishes", Crashed, "exit code 0", "crashed"),
         ("closes", Crashed, "gave no result", "crashed"),
-        ("unspeakable", Crashed, "gave no result", "crashed"),
+        ("unspeakable", Raised, "pickle", "failed"),
         ("eats", OutOfMemory, "more than 64 MB", "out-of-memory"),
         ("feeds_a_child", OutOfMemory, "more than 64 MB", "out-of-memory"),
     ],
