@@ -79,6 +79,7 @@ def test_without_what_only_posix_has(tables):
     """Not the same as Windows; but what is not there cannot be needed."""
     script = (
         "import multiprocessing, os, sys\n"
+        "import psutil\n"  # its code for Linux needs resource
         "sys.modules.update(dict.fromkeys(('fcntl', 'resource', 'termios', 'pwd')))\n"
         "for name in ('fork', 'killpg', 'sched_getaffinity'):\n    delattr(os, name)\n"
         "multiprocessing.set_start_method('spawn')\n"

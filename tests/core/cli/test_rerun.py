@@ -81,10 +81,10 @@ def test_a_recording_changed_by_hand_is_found(here):
     folder = here.folder / "results" / "recordings" / "ideal"
     (test,), (train,) = folder.glob("flat-test-*.h5"), folder.glob("flat-train-*.h5")
     shutil.copy(train, test)
-    found = here("mean/1", code=1)
-    (difference,) = found["differences"]
-    assert found["answer"] == "different"
-    assert difference.startswith(f"recording {test.name} ")
+    found = here("mean/1")
+    (changed,) = found["circumstances"]
+    assert found["answer"] == "identical", "it is made anew, as the cell had it"
+    assert changed.startswith(f"data: {test.stem} ")
 
 
 def test_changed_code_is_named_beside_what_came_out(here):

@@ -3,6 +3,7 @@
 import numpy as np
 
 from tactbench.core.recording.writer import RecordingWriter
+from tactbench.core.samples import Quality
 from tactbench.core.spec.recording import RecordingMeta
 from tactbench.plugin import Block, ChannelSpec, ChannelTarget, LabelTarget, SensorSpec, Source, StreamSpec, TaskSpec
 
@@ -31,7 +32,9 @@ def record(path, X, force=None, *, t_ns="regular", annotations=None, quality=Non
     with RecordingWriter(path, about) as writer:
         writer.append(Block("taxels", t_ns, X, quality))
         if force is not None:
-            writer.append(Block("force_torque", t_ns, np.asarray(force, dtype=np.float64)[:, None]))
+            force = np.asarray(force, dtype=np.float64)[:, None]
+            missing = np.where(np.isfinite(force), 0, Quality.MISSING).astype(np.uint8)
+            writer.append(Block("force_torque", t_ns, force, missing))
         for name, values in (annotations or {}).items():
             writer.annotate("taxels", name, values)
     return path

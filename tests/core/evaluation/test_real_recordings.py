@@ -80,7 +80,7 @@ def test_grasp_stability_by_object_official_and_shuffled(grasps):
     official = run("grasp-stability", grasps, "roles")
     assert by_object.split == "object"
     assert by_object.interval.method.startswith("jackknife over 41 objects ")
-    assert by_object.n_test == 1276 + 1273 + 2133, "the official test is not touched"
+    assert by_object.sizes.n_test == 1276 + 1273 + 2133, "the official test is not touched"
     assert 0.83 < by_object.score < 0.92
     assert shuffled.score > 0.9
     assert shuffled.score > by_object.interval.high, "the leak is larger than the interval"

@@ -129,7 +129,9 @@ def test_intervals_and_replicates_are_of_the_vectors(tmp_path):
     assert result.interval.low < result.score < result.interval.high
     sums = tables_of([dict(result.replicates)], "mean_euclidean_error", 0)[0].sum(axis=0)
     assert sums[0] / sums[1] == pytest.approx(result.score)
-    of_time = run(place_task(), presses(tmp_path, noise=3.0, session=lambda _: "s"), split="roles")
+    for name in ("one-session", "few"):
+        (tmp_path / name).mkdir()
+    of_time = run(place_task(), presses(tmp_path / "one-session", noise=3.0, session=lambda _: "s"), split="roles")
     assert of_time.interval.method.startswith("jackknife over 6 recordings")
-    few = run(place_task(), presses(tmp_path, number=4, noise=3.0))
+    few = run(place_task(), presses(tmp_path / "few", number=4, noise=3.0))
     assert few.interval.method.startswith("block bootstrap in time within 2 recordings")

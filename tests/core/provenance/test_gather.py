@@ -52,14 +52,12 @@ def test_equal_circumstances_give_equal_provenance_without_clock_person_host_or_
 
 def test_it_says_what_the_numbers_were_made_with():
     import numpy
-    import threadpoolctl
 
     found = gathered(seed=7)
     assert found["distributions"]["numpy"] == numpy.__version__
     assert (found["seed"], found["host"]) == (7, host_id())
     assert found["memory_mb"] > 0
-    libraries = [library for library in threadpoolctl.threadpool_info() if library["user_api"] == "blas"]
-    assert any(found["blas"]["version"].startswith(library["version"].partition(".dev")[0]) for library in libraries)
+    assert found["threads"]
 
 
 def test_a_strangers_plugin_is_told_with_its_source_and_nothing_is_imported_for_it(tmp_path):

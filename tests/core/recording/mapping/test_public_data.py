@@ -186,7 +186,7 @@ def test_the_first_frame_names_the_object(imported):
     first = run("object-identity", data, None, protocol="first-frame")
     trivial = run("object-identity", data, None, "majority", protocol="first-frame")
     assert (whole.split, first.split) == ("trial", "trial")
-    assert first.n_test == 203
+    assert first.sizes.n_test == 203
     assert whole.score > 0.98
     assert first.score > 0.98
     assert trivial.score < 0.13
