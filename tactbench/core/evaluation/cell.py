@@ -499,7 +499,7 @@ def _result(
         remarks.append(no_floor)
         truth = true_force(task, made, tested)
         if floor is not None:
-            beside["beyond"] = beyond_floor(floor, tested, unit, seed)
+            beside["beyond"] = beyond_floor(floor, tested, unit)
         if truth is not None:
             beside["true"] = metric.of(truth, tested.y_pred), _interval(metric, truth, tested, unit, 0, seed)
     else:
