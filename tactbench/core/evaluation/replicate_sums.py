@@ -39,7 +39,7 @@ def replicates(
 
     The coarsest unit of which there are enough to resample: the group that the split keeps apart, or else the session;
     then the groups that the task names; then the recording. If there are not enough of any, the first: the interval
-    then resamples time and says so. Groups that some test row is not in cannot be resampled: that is said.
+    then resamples time and says so. Groups that some test row is not in cannot be resampled.
 
     Parameters
     ----------
@@ -53,17 +53,13 @@ def replicates(
     there = [one for one in units if one is not None]
     for place, one in enumerate(units):
         if one is not None and enough(y, one.codes, len(data.classes)):
-            return replace(one, caveat=_caveat(names[:place], units[:place]))
+            return replace(one, caveat=_caveat(names[:place]))
     return there[0]
 
 
-def _caveat(names: Sequence[str], units: Sequence[ReplicateUnits | None]) -> str:
+def _caveat(names: Sequence[str]) -> str:
     """Return what an interval does not know that passes over coarser units."""
-    if not names:
-        return ""
-    unknown = [name for name, one in zip(names, units, strict=True) if one is None]
-    why = f"; some test rows have no {' and no '.join(unknown)}" if unknown else ""
-    return f": spread between {' and '.join(map(plural, names))} is not in it{why}"
+    return f": spread between {' and '.join(map(plural, names))} is not in it" if names else ""
 
 
 def _unit(data: Dataset, name: str, recording: IntArray, row: IntArray) -> ReplicateUnits | None:
