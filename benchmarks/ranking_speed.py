@@ -30,7 +30,7 @@ def block(rng: np.random.Generator, cells: int, sessions: int, classes: int) -> 
             squares = 100 * (1 + place / cells) * rng.gamma(20, 0.05, sessions)
             lines = [[float(value), 100] for value in squares]
             score = float(np.sqrt(squares.sum() / (100 * sessions)))
-        kept = {"unit": "session", "names": names, "strata": None, "run": 1, "sums": lines}
+        kept = {"unit": "session", "names": names, "strata": None, "sums": lines}
         rows.append({
             "cell": f"{place}", "status": "done", "is_baseline": False, "score": score, "ci_low": None, "ci_high": None,
             "metric": "accuracy" if classes else "rmse", "classes": list(range(classes)), "equivalence": 0.01,

@@ -50,7 +50,7 @@ from tactbench.core.evaluation.protocols import ProtocolSpec, protocol_called
 from tactbench.core.evaluation.reference_floor import beyond_floor, reference_floor, true_force
 from tactbench.core.evaluation.replicate_sums import replicates, summed
 from tactbench.core.evaluation.result import Result, Sizes, Times
-from tactbench.core.evaluation.sets import asked_for, not_asked_for, prepared, tare_s, tared
+from tactbench.core.evaluation.sets import asked_for, prepared, tare_s, tared
 from tactbench.core.evaluation.splits import (
     SHUFFLED_STAMP,
     SHUFFLED_WHOLE_STAMP,
@@ -499,7 +499,7 @@ def _result(
         remarks.append(no_floor)
         truth = true_force(task, made, tested)
         if floor is not None:
-            beside["beyond"] = beyond_floor(floor, tested, unit, seed)
+            beside["beyond"] = beyond_floor(floor, tested, unit)
         if truth is not None:
             beside["true"] = metric.of(truth, tested.y_pred), _interval(metric, truth, tested, unit, 0, seed)
     else:
@@ -548,7 +548,7 @@ def _result(
         ),
         counts=dict(counts + Counter(left_out)),
         dagger=data.rules.uses_test_statistics,
-        stamps=made.stamps + stamps,
+        stamps=stamps,
         tare_s=held_s or None,
         remarks=tuple(one for one in remarks if one),
         **beside,
@@ -587,7 +587,7 @@ def _part_taken(data: TaskData) -> tuple[list[RecordingMeta], dict[str, int], tu
     folds = [over_rows(one, recorded) for one in data.assignments]
     used = used_rows(folds)
     took_part = [one.meta for one, mask in zip(recorded.tables, used, strict=True) if (mask & one.labelled).any()]
-    left_out = without_part(recorded, data.split, used) | not_asked_for(recorded, data.rules, used)
+    left_out = without_part(recorded, data.split, used)
     if data.split == "shuffled":
         return took_part, left_out, (SHUFFLED_WHOLE_STAMP if recorded.whole else SHUFFLED_STAMP,)
     return took_part, left_out, leak_stamps(recorded, folds)

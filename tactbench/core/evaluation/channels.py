@@ -113,16 +113,10 @@ def unit_factor(channel: ChannelSpec, unit: str) -> float:
         ) from None
 
 
-def require_forward(data: StreamData, recording: str) -> int:
-    """Return how many times of a stream equal the one before.
-
-    Raises
-    ------
-    DataError
-        If time runs backwards in it, or stands still: nothing can be aligned, filtered or split in time then.
-    """
+def require_forward(data: StreamData, recording: str) -> None:
+    """Raise DataError if time runs backwards in a stream, or stands still: nothing can be aligned or filtered then."""
     if data.t_ns is None or len(data.t_ns) < 2:
-        return 0
+        return
     steps = np.diff(data.t_ns)
     backward = int((steps < 0).sum())
     if backward or not steps.any():
@@ -131,7 +125,6 @@ def require_forward(data: StreamData, recording: str) -> int:
             f"In recording {recording!r}, the time of {data.spec.name} {what}.",
             hint="See where with `tactbench inspect`; sort the rows before they are imported, or record again.",
         )
-    return int((steps == 0).sum())
 
 
 def nearest_rows(features: StreamData, other: StreamData, recording: str) -> IntArray:

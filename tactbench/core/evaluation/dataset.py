@@ -76,8 +76,6 @@ class Dataset:
     """What was left out, and why"""
     paths: tuple[Path, ...] = ()
     """The files of the tables"""
-    stamps: tuple[str, ...] = ()
-    """What a reader of a score must know of the recordings"""
     whole: bool = False
     """Each recording has one answer: no split may cut it"""
     vote: bool = False
@@ -100,7 +98,6 @@ def load_dataset(task: TaskSpec, recordings: Sequence[Path]) -> Dataset:
         If a channel has no sample at all, the recordings disagree about their channels, or nothing is left.
     """
     counts: Counter[str] = Counter()
-    repeated: dict[str, int] = {}
     tables: list[Table] = []
     paths: list[Path] = []
     features: tuple[str, ...] = ()
@@ -109,7 +106,7 @@ def load_dataset(task: TaskSpec, recordings: Sequence[Path]) -> Dataset:
             if recording.meta.excluded:
                 counts[f"recordings left out ({recording.meta.excluded})"] += 1
                 continue
-            names, table = _read(recording, task, counts, repeated)
+            names, table = _read(recording, task, counts)
         if tables and names != features:
             raise DataError(
                 f"The recordings {tables[0].meta.name!r} and {table.meta.name!r} have different channels.",
@@ -138,12 +135,7 @@ def load_dataset(task: TaskSpec, recordings: Sequence[Path]) -> Dataset:
     whole = task.answer_per != "sample"
     if whole:
         tables = [_whole(table, task, target) for table in tables]
-    stamps: tuple[str, ...] = ()
-    if repeated:
-        worst = max(repeated, key=lambda name: repeated[name])
-        number = f"{len(repeated)} recording{'s' if len(repeated) > 1 else ''}"
-        stamps = (f"clock: times equal the one before in {number}, {repeated[worst]} times in {worst!r}.",)
-    return Dataset(tuple(tables), features, classes, dict(counts), tuple(paths), stamps, whole, bool(task.vote))
+    return Dataset(tuple(tables), features, classes, dict(counts), tuple(paths), whole, bool(task.vote))
 
 
 def _whole(table: Table, task: TaskSpec, target: str) -> Table:
@@ -164,16 +156,13 @@ def _whole(table: Table, task: TaskSpec, target: str) -> Table:
     return replace(table, groups=constant)
 
 
-def _read(
-    recording: Recording, task: TaskSpec, counts: Counter[str], repeated: dict[str, int]
-) -> tuple[tuple[str, ...], Table]:
+def _read(recording: Recording, task: TaskSpec, counts: Counter[str]) -> tuple[tuple[str, ...], Table]:
     """Return the names of a recording's features, and its rows; of a classification `y` are the labels themselves."""
     meta = recording.meta
     streams = [recording.read(name) for name in feature_streams(recording, task)]
     clock = streams[0]
-    again = max(require_forward(stream, meta.name) for stream in streams)
-    if again:
-        repeated[meta.name] = again
+    for stream in streams:
+        require_forward(stream, meta.name)
     if not len(clock.data):
         raise DataError(f"The recording {meta.name!r} has no samples.", hint="Record it again.")
     columns: dict[str, FloatArray] = {}

@@ -43,8 +43,7 @@ class Scored(NamedTuple):
         span = int(self.t_ns[0]), int(self.t_ns[-1]) + 1
         events = self.reference.labels[scale].gross_ns
         events = events[(events[:, 0] >= span[0]) & (events[:, 0] < span[1])]
-        disturbance = np.array([span] if self.reference.disturbance else [], dtype=np.int64).reshape(-1, 2)
-        return GroundTruth(events, disturbance, span)
+        return GroundTruth(events, self.reference.disturbance, span)
 
 
 class Detected(NamedTuple):
@@ -148,11 +147,9 @@ class EventRules:
         scores = self._scores(tested)
         found = {
             "events": float(scores.latency_s.shape[-1]),
-            "alarms": float(scores.n_alarms),
             "precision": float(scores.precision),
             "misses": float(scores.n_misses),
-            "onset latency p95 ms": 1e3 * (float(scores.latency_percentile_s(95)) + late_s),
-            "minutes of disturbances": scores.base_s / 60,
+            "onset latency p95 ms": 1e3 * (scores.latency_percentile_s(95) + late_s),
             "displacement at detection p50 mm": 1e3 * float(np.median(displacement)) if displacement.size else np.nan,
             **_hits(scores, late_s),
             **_frame_scores(tested),
@@ -161,7 +158,7 @@ class EventRules:
             if all(scale in one.scored.reference.labels for one in tested):
                 found[f"F1 with label thresholds {text}"] = float(self._scores(tested, scale).f1)
         if compute_s is not None:
-            found |= {"compute ms a frame": 1e3 * compute_s, "compute s per s of signal": 1e9 * compute_s / self.hop_ns}
+            found["compute s per s of signal"] = 1e9 * compute_s / self.hop_ns
         return {name: value for name, value in found.items() if np.isfinite(value)}
 
     def operating_points(self, tested: Sequence[Detected], compute_s: float | None) -> tuple[Mapping[str, float], ...]:
@@ -182,40 +179,38 @@ def _hits(scores: EventScores, late_s: float) -> dict[str, float]:
     return {
         "recall": float(scores.recall),
         "false alarms per minute": float(scores.false_alarms_per_minute),
-        "onset latency p50 ms": 1e3 * (float(scores.latency_percentile_s(50)) + late_s),
+        "onset latency p50 ms": 1e3 * (scores.latency_percentile_s(50) + late_s),
     }
 
 
 def _frame_scores(tested: Sequence[Detected]) -> dict[str, float]:
     """Return frame scores of gross slip against the rest, over frames that have a label and an answer."""
-    truth, given = [], []
+    pairs = []
     for one in tested:
         state = one.scored.reference.state(one.scored.t_ns, 1.0)
         known = (state != UNDECIDED) & ~np.isnan(one.scored.score)
-        truth.append(state[known] == GROSS)
-        given.append(one.scored.score[known] >= one.threshold)
-    y, predicted = (np.concatenate(each).astype(np.int64) for each in (truth, given))
-    if not y.size:
-        return {}
-    names = {"balanced_accuracy": "frame balanced accuracy", "macro_f1": "frame macro F1"}
-    return {text: METRICS[metric].of(y, predicted, 2) for metric, text in names.items()}
+        pairs.append((state[known] == GROSS, one.scored.score[known] >= one.threshold))
+    return _scores_of(pairs, 2, "frame {}")
 
 
 def state_figures(tested: Answers, data: Dataset) -> dict[str, float]:
     """Return the scores of the same answers against states of halved and doubled thresholds of labels."""
     found: dict[str, float] = {}
     for scale, text in OTHER_SCALES.items():
-        truth, given = [], []
+        pairs = []
         for place in np.unique(tested.recording).tolist():
             reference = data.tables[place].slip
             if scale not in reference.labels:
                 return found
             mine = tested.recording == place
             state = reference.state(np.rint(tested.time_s[mine] * 1e9).astype(np.int64), scale)
-            truth.append(state[state != UNDECIDED])
-            given.append(tested.y_pred[mine][state != UNDECIDED])
-        y, predicted = np.concatenate(truth), np.concatenate(given)
-        for name, words in (("macro_f1", "macro F1"), ("balanced_accuracy", "balanced accuracy")):
-            if y.size:
-                found[f"{words} with label thresholds {text}"] = METRICS[name].of(y, predicted, len(data.classes))
+            pairs.append((state[state != UNDECIDED], tested.y_pred[mine][state != UNDECIDED]))
+        found |= _scores_of(pairs, len(data.classes), f"{{}} with label thresholds {text}")
     return found
+
+
+def _scores_of(pairs: Sequence[tuple[IntArray, IntArray]], n_classes: int, text: str) -> dict[str, float]:
+    """Return scores of frames from states and answers, recording by recording; none without a frame."""
+    y, predicted = (np.concatenate(each) for each in zip(*pairs, strict=True))
+    names = {"macro_f1": "macro F1", "balanced_accuracy": "balanced accuracy"} if y.size else {}
+    return {text.format(words): METRICS[name].of(y, predicted, n_classes) for name, words in names.items()}

@@ -13,7 +13,7 @@ from tactbench.core.errors import DataError, NotApplicable, PluginContractError
 from tactbench.core.evaluation.dataset import Dataset, Table, require_computable
 from tactbench.core.evaluation.protocols import ProtocolSpec
 from tactbench.core.evaluation.slip_reference import SlipReference
-from tactbench.core.evaluation.summaries import in_band, tared_readings
+from tactbench.core.evaluation.summaries import columns_of, in_band, measured, tared_readings
 from tactbench.core.events.labels import GROSS, UNDECIDED
 from tactbench.core.plugins.registry import load_object
 from tactbench.core.samples import FloatArray, IntArray, StreamReadings
@@ -90,8 +90,7 @@ def frame_features(
         for stream in streams:
             filtered: dict[tuple[float, float], FloatArray] = {}
             for summary in summaries:
-                picked = [place for place, kind in enumerate(stream.kinds)
-                          if not summary.kinds or kind in summary.kinds]  # fmt: skip
+                picked = columns_of(stream, summary)
                 if not picked:
                     continue
                 values = stream.data
@@ -104,7 +103,7 @@ def frame_features(
                     np.searchsorted(_time(stream), ends_s - target.window_s + edge, side="right")
                     for edge in (begin, end)
                 )
-                columns.append(_measured(values[:, picked], summary.measure, first, last))
+                columns.append(measured(values[:, picked], summary.measure, first, last))
                 names += [f"{stream.channels[place]} {summary.name}" for place in picked]
         if not columns:
             raise NotApplicable(
@@ -204,43 +203,6 @@ def _bounds(summary: Summary, window_s: float) -> tuple[float, float]:
     """Return where a summary begins and ends within a frame [s]."""
     scale = 1.0 if summary.unit == "s" else window_s
     return summary.start * scale, min(summary.end * scale, window_s)
-
-
-def _measured(values: FloatArray, measure: str, first: IntArray, last: IntArray) -> FloatArray:
-    """Return (frames, channels) of rows ``first .. last`` (excluded): what `summary_of` says of each window alone.
-
-    Sums are differences of running sums, counted from the first sample, so that no digit depends on later ones.
-    """
-    count = (last - first)[:, None].astype(np.float64)
-    some = count > 0
-    if measure == "range":
-        found = _extreme(np.maximum, values, first, last) - _extreme(np.minimum, values, first, last)
-    elif measure == "change":
-        found = values[np.maximum(last - 1, 0)] - values[np.minimum(first, len(values) - 1)]
-    elif measure == "mean-step":
-        steps = np.abs(np.diff(values, axis=0, prepend=values[:1]))
-        begin = np.minimum(first + 1, last)
-        found = _sums(steps, begin, last) / np.maximum(count - 1, 1)
-    elif measure == "band-energy":
-        found = _sums(values**2, first, last) / np.maximum(count, 1)
-    else:
-        centre = values[0]
-        mean = _sums(values - centre, first, last) / np.maximum(count, 1)
-        found = mean + centre
-        if measure == "deviation":
-            square = _sums((values - centre) ** 2, first, last) / np.maximum(count, 1)
-            found = np.sqrt(np.maximum(square - mean**2, 0.0))
-    return np.asarray(np.where(some, found, np.nan))
-
-
-def _sums(values: FloatArray, first: IntArray, last: IntArray) -> FloatArray:
-    total = np.concatenate([np.zeros((1, values.shape[1])), np.cumsum(values, axis=0)])
-    return np.asarray(total[last] - total[first])
-
-
-def _extreme(of: np.ufunc, values: FloatArray, first: IntArray, last: IntArray) -> FloatArray:
-    padded = np.concatenate([values, values[-1:]])  # reduceat wants every place to exist
-    return np.asarray(of.reduceat(padded, np.column_stack([first, np.maximum(last, first)]).ravel(), axis=0)[::2])
 
 
 def _own_features(

@@ -15,8 +15,6 @@ from tactbench.core.evaluation.time_blocks import RESAMPLES, block_length, circu
 from tactbench.core.samples import FloatArray, IntArray
 
 LEVEL = 0.95
-NORMAL = 1.959963984540054
-"""The normal quantile at 97.5 %: intervals of rows are 95 %."""
 ENOUGH_CLUSTERS = 5
 """Fewer than this cannot be resampled: the interval would be their range."""
 NOT_ONE = float(np.sqrt(2.0))

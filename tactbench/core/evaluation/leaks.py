@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Sequence
 
 import numpy as np
@@ -26,23 +25,21 @@ def leak_stamps(data: Dataset, assignments: Sequence[Assignment]) -> tuple[str, 
     rows = [_row_hashes(table) for table in data.tables]
     worst, pair = 0.0, ("", "")
     for fold in assignments:
-        owner: dict[int, int] = {}
-        for place, mask in enumerate(fold.train):
-            learned = mask if fold.validation is None else mask | fold.validation[place]
-            for block in _blocks(rows[place][learned])[0].tolist():
-                owner.setdefault(block, place)
-        covered, total = [], 0
-        for place, mask in enumerate(fold.test):
-            blocks, starts, length = _blocks(rows[place][mask])
-            same = [number for number, block in enumerate(blocks.tolist()) if block in owner]
-            inside = np.unique(starts[same][:, None] + np.arange(length)).size
-            total += int(mask.sum())
-            owners = Counter(owner[block] for block in blocks[same].tolist())
-            covered.append((inside, -place, owners.most_common(1)[0][0] if owners else -1))
-        share = sum(inside for inside, _, _ in covered) / max(total, 1)
+        learned = fold.train
+        if fold.validation is not None:
+            learned = tuple(one | other for one, other in zip(fold.train, fold.validation, strict=True))
+        known = [_blocks(hashes[mask])[0] for hashes, mask in zip(rows, learned, strict=True)]
+        tested = [_blocks(hashes[mask]) for hashes, mask in zip(rows, fold.test, strict=True)]
+        everything = np.concatenate(known)
+        covered = [
+            np.unique(starts[np.isin(blocks, everything)][:, None] + np.arange(length)).size
+            for blocks, starts, length in tested
+        ]
+        share = sum(covered) / max(sum(int(mask.sum()) for mask in fold.test), 1)
         if share > worst:
-            _, test, train = max(covered)
-            worst, pair = share, (data.tables[-test].meta.name, data.tables[train].meta.name)
+            test = int(np.argmax(covered))
+            train = int(np.argmax([np.isin(tested[test][0], blocks).sum() for blocks in known]))
+            worst, pair = share, (data.tables[test].meta.name, data.tables[train].meta.name)
     if worst <= MOST_SHARED:
         return ()
     return (

@@ -17,13 +17,7 @@ from tactbench.core.evaluation.dataset import Dataset, Table
 from tactbench.core.evaluation.interval import ReplicateUnits, enough, influences, student_quantile
 from tactbench.core.evaluation.metrics import Metric
 from tactbench.core.evaluation.sets import hold_s, unloaded
-from tactbench.core.evaluation.time_blocks import (
-    RESAMPLES,
-    block_length,
-    circular_blocks,
-    generator,
-    integrated_correlation,
-)
+from tactbench.core.evaluation.time_blocks import integrated_correlation
 from tactbench.core.samples import Answers, FloatArray, IntArray
 from tactbench.core.spec.recording import RecordingMeta
 from tactbench.core.spec.task import ChannelTarget, TaskSpec
@@ -38,8 +32,8 @@ class BeyondFloor:
 
     floor: float
     score: float
-    low: float
-    high: float
+    low: float | None
+    high: float | None
 
 
 @dataclass(frozen=True)
@@ -121,50 +115,30 @@ def hold_of(y: npt.NDArray[Any]) -> FloatArray:
     return np.column_stack([centred**2, np.full(n, freedom / n)])
 
 
-def beyond_floor(floor: Floor, tested: Answers, unit: ReplicateUnits, seed: int) -> BeyondFloor:
-    """Return what a RMSE is beyond the floor, with its 95 % interval.
+def beyond_floor(floor: Floor, tested: Answers, unit: ReplicateUnits) -> BeyondFloor:
+    """Return what a RMSE is beyond the floor, with its 95 % interval; None for its ends where there are too few units.
 
     Notes
     -----
     The interval is of the mean square beyond the floor, ``mean (p - y)² - floor²``, which may be below zero and is a
-    sum of two independent means; only its ends are put through ``sqrt(max(0, .))``. Where there are units enough each
-    is left out in turn, its hold with it; else both are resampled in circular blocks of time, the errors in the same
-    blocks as for the RMSE, the holds in their own, and the degrees of freedom are those of Welch and Satterthwaite.
+    sum of two independent means; only its ends are put through ``sqrt(max(0, .))``. Each unit is left out in turn, its
+    hold with it.
     """
     loss = (tested.y_pred - tested.y_true) ** 2
     excess = float(loss.mean() - floor.square)
-    if enough(tested.y_true, unit.codes, 0):
-        n = len(unit.labels)
-        sums, held = np.zeros((n, 2)), floor.by_replicate(tested, unit.codes)
-        np.add.at(sums, unit.codes, np.column_stack([loss, np.ones(len(loss))]))
-        without = _per_freedom(sums.sum(axis=0) - sums) - _per_freedom(held.sum(axis=0) - held)
-        carried = influences(without, np.zeros(n, dtype=np.int64))
-        reach = float(student_quantile(n - 1)) * float(np.sqrt(carried @ carried))
-    else:
-        reach = _reach_over_time(floor, loss, tested.recording, seed)
-    ends = [float(np.sqrt(max(0.0, value))) for value in (excess, excess - reach, excess + reach)]
-    return BeyondFloor(floor.value, *ends)
+    if not enough(tested.y_true, unit.codes, 0):
+        return BeyondFloor(floor.value, _root(excess), None, None)
+    n = len(unit.labels)
+    sums, held = np.zeros((n, 2)), floor.by_replicate(tested, unit.codes)
+    np.add.at(sums, unit.codes, np.column_stack([loss, np.ones(len(loss))]))
+    without = _per_freedom(sums.sum(axis=0) - sums) - _per_freedom(held.sum(axis=0) - held)
+    carried = influences(without, np.zeros(n, dtype=np.int64))
+    reach = float(student_quantile(n - 1)) * float(np.sqrt(carried @ carried))
+    return BeyondFloor(floor.value, _root(excess), _root(excess - reach), _root(excess + reach))
 
 
-def _reach_over_time(floor: Floor, loss: FloatArray, recording: IntArray, seed: int) -> float:
-    rng = generator(seed)
-    places = np.unique(recording).tolist()
-    errors = [np.column_stack([loss[recording == one], np.ones((recording == one).sum())]) for one in places]
-    deviations, freedoms = [], []
-    for parts in (errors, [floor.holds[one] for one in places]):
-        total, blocks = np.zeros((RESAMPLES, 2)), 0.0
-        for part in parts:
-            length = block_length(part[:, 0])
-            blocks += len(part) / length
-            total += circular_blocks(part, length, rng)
-        freedom = max(blocks - len(parts), 1.0)
-        freedoms.append(freedom)
-        deviations.append(float(_per_freedom(total).std()) * np.sqrt(blocks / freedom))
-    squares = np.array(deviations) ** 2
-    if not squares.any():
-        return 0.0
-    together = float(squares.sum() ** 2 / (squares**2 / np.array(freedoms)).sum())
-    return float(student_quantile(together)) * float(np.sqrt(squares.sum()))
+def _root(excess: float) -> float:
+    return float(np.sqrt(max(0.0, excess)))
 
 
 def _per_freedom(sums: FloatArray) -> FloatArray:

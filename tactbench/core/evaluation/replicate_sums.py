@@ -5,7 +5,6 @@
     {"unit": "session",                  what a replicate is
      "names": ["s1", "s2", …],           in order of the names: two rows with the same names can be paired
      "strata": [0, 0, 1, …] or None,     which replicates may stand in for each other; None: all
-     "run": 1,                           how many neighbouring blocks of time depend on each other
      "sums": [[…], …]                    the metric's summands over each replicate
      "floor": [[…, …], …]}               of a RMSE whose reference has a floor: squares and degrees of freedom of its
                                          unloaded holds over each replicate
@@ -16,7 +15,6 @@ column, count …``. Scores follow exactly: :attr:`Metric.score` of the sum of a
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
@@ -25,21 +23,13 @@ import numpy as np
 import numpy.typing as npt
 
 from tactbench.core.evaluation.dataset import Dataset
-from tactbench.core.evaluation.interval import ReplicateUnits, enough, loss_of, plural, strata_of
+from tactbench.core.evaluation.interval import ReplicateUnits, enough, plural, strata_of
 from tactbench.core.evaluation.metrics import EXCESS, Metric
 from tactbench.core.evaluation.protocols import shots
 from tactbench.core.evaluation.reference_floor import Floor
 from tactbench.core.evaluation.splits import SPLITS_WITHOUT_GROUPS
-from tactbench.core.evaluation.time_blocks import block_length
 from tactbench.core.samples import Answers, FloatArray, IntArray
 from tactbench.core.spec.task import TaskSpec
-
-BLOCKS = 40
-"""Blocks of time a recording is cut into where there is nothing else to resample: the same share of time is the same
-block for every sensor."""
-BLOCKS_IN_ALL = 200
-"""About so many, whatever the number of recordings; never fewer than `FEWEST` each."""
-FEWEST = 4
 
 
 def replicates(
@@ -49,7 +39,7 @@ def replicates(
 
     The coarsest unit of which there are enough to resample: the group that the split keeps apart, or else the session;
     then the groups that the task names; then the recording. If there are not enough of any, the first: the interval
-    then resamples time and says so. Groups that some test row is not in cannot be resampled: that is said.
+    then resamples time and says so. Groups that some test row is not in cannot be resampled.
 
     Parameters
     ----------
@@ -63,17 +53,13 @@ def replicates(
     there = [one for one in units if one is not None]
     for place, one in enumerate(units):
         if one is not None and enough(y, one.codes, len(data.classes)):
-            return replace(one, caveat=_caveat(names[:place], units[:place]))
+            return replace(one, caveat=_caveat(names[:place]))
     return there[0]
 
 
-def _caveat(names: Sequence[str], units: Sequence[ReplicateUnits | None]) -> str:
+def _caveat(names: Sequence[str]) -> str:
     """Return what an interval does not know that passes over coarser units."""
-    if not names:
-        return ""
-    unknown = [name for name, one in zip(names, units, strict=True) if one is None]
-    why = f"; some test rows have no {' and no '.join(unknown)}" if unknown else ""
-    return f": spread between {' and '.join(map(plural, names))} is not in it{why}"
+    return f": spread between {' and '.join(map(plural, names))} is not in it" if names else ""
 
 
 def _unit(data: Dataset, name: str, recording: IntArray, row: IntArray) -> ReplicateUnits | None:
@@ -99,85 +85,27 @@ def summed(
     tested
         The test rows, in time order within each recording of a fold.
     unit
-        What was repeated. Where there are too few of them, the replicates are blocks of time within recordings, and
-        the spread between sessions is not in them.
+        What was repeated. Where there are too few of them, the sums are over recordings: no interval rests on them.
     floor
         What the holds of the tested recordings say of the reference.
     """
     n_classes = len(data.classes)
     if not enough(tested.y_true, unit.codes, n_classes):
-        return summed_in_time(metric, tested, _recording_names(data), n_classes, floor)
+        places, codes = np.unique(tested.recording, return_inverse=True)
+        unit = ReplicateUnits("recording", codes, tuple(data.metas[place].name for place in places))
     strata = strata_of(tested.y_true, unit.codes, n_classes)
-    return {
+    summands = metric.rows(tested.y_true, tested.y_pred, n_classes)
+    sums = np.zeros((len(unit.labels), summands.shape[1]))
+    np.add.at(sums, unit.codes, summands)
+    kept = {
         "unit": unit.name,
         "names": list(unit.labels),
         "strata": strata.tolist() if strata.any() else None,
-        "run": 1,
-        **_sums(metric, tested, unit.codes, n_classes, floor),
+        "sums": [_without_needless_points(line) for line in sums.tolist()],
     }
-
-
-def summed_in_time(
-    metric: Metric, tested: Answers, names: Sequence[str], n_classes: int, floor: Floor | None = None
-) -> dict[str, Any]:  # fmt: skip
-    """Return what a row keeps where time is all there is to resample: sums over blocks of each recording.
-
-    Parameters
-    ----------
-    names
-        What each recording is called, by its number.
-    """
-    order = sorted(np.unique(tested.recording).tolist(), key=lambda place: names[place])
-    most = int(np.clip(BLOCKS_IN_ALL // len(order), FEWEST, BLOCKS))
-    code = np.zeros(len(tested), dtype=np.int64)
-    labels: list[str] = []
-    strata: list[int] = []
-    lengths: list[int] = []
-    runs: list[int] = []
-    for stratum, place in enumerate(order):
-        mine = np.flatnonzero(tested.recording == place)
-        mine = mine[np.argsort(tested.row[mine], kind="stable")]
-        blocks = min(most, len(mine))
-        code[mine] = len(labels) + np.arange(len(mine)) * blocks // len(mine)
-        labels += [f"{names[place]}/{number + 1}" for number in range(blocks)]
-        strata += [stratum] * blocks
-        lengths.append(len(mine) // blocks)
-        correlated = block_length(loss_of(metric, tested.y_true[mine], tested.y_pred[mine]))
-        runs.append(_run(correlated * blocks / len(mine), blocks))
-    spread = f"{min(lengths)}" if min(lengths) == max(lengths) else f"{min(lengths)}–{max(lengths)}"
-    return {
-        "unit": f"block of {spread} rows in time",
-        "names": labels,
-        "strata": strata,
-        "run": max(runs),
-        **_sums(metric, tested, code, n_classes, floor),
-    }
-
-
-def _run(blocks_correlated: float, blocks: int) -> int:
-    """Return how many neighbouring blocks to take together, a power of two, of which a recording has four or more."""
-    length = 1 << max(0, int(np.ceil(np.log2(max(blocks_correlated, 1.0)))))
-    most = 1 << max(0, int(np.floor(np.log2(max(blocks // FEWEST, 1)))))
-    return min(length, most)
-
-
-def _recording_names(data: Dataset) -> list[str]:
-    """Return a name for each recording, that of its session before it where two are called alike."""
-    plain = [meta.name for meta in data.metas]
-    many = Counter(plain)
-    longer = [f"{meta.session}/{meta.name}" if many[meta.name] > 1 else meta.name for meta in data.metas]
-    still = Counter(longer)
-    return [f"{name} #{place + 1}" if still[name] > 1 else name for place, name in enumerate(longer)]
-
-
-def _sums(metric: Metric, tested: Answers, code: IntArray, n_classes: int, floor: Floor | None) -> dict[str, Any]:
-    summands = metric.rows(tested.y_true, tested.y_pred, n_classes)
-    sums = np.zeros((int(code.max()) + 1, summands.shape[1]))
-    np.add.at(sums, code, summands)
-    held = {} if floor is None else {"floor": floor.by_replicate(tested, code).tolist()}
-    if not n_classes:
-        return {"sums": [_without_needless_points(line) for line in sums.tolist()], **held}
-    return {"sums": [[int(one) for place in np.flatnonzero(line) for one in (place, line[place])] for line in sums]}
+    if n_classes:
+        kept["sums"] = [[int(one) for place in np.flatnonzero(line) for one in (place, line[place])] for line in sums]
+    return kept | ({} if floor is None else {"floor": floor.by_replicate(tested, unit.codes).tolist()})
 
 
 def _without_needless_points(line: list[float]) -> list[float]:

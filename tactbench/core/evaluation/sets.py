@@ -41,8 +41,12 @@ def tared(table: Table) -> FloatArray:
 
     Rows after the hold change nothing; a recording without a row there is returned as it is.
     """
-    before = unloaded(table)
-    return np.asarray(table.X - table.X[before].mean(axis=0)) if before.any() else table.X
+    return less_rest(table.X, unloaded(table))
+
+
+def less_rest(X: FloatArray, before: Mask) -> FloatArray:
+    """Return (n, channels) readings less the mean of those that are (n,) before the press, if there are any."""
+    return X - X[before].mean(axis=0) if before.any() else X
 
 
 def tare_s(data: Dataset) -> float:
@@ -155,19 +159,6 @@ def keep(data: Dataset, protocol: ProtocolSpec, masks: Sequence[Mask], what: str
         row=joined(table.row for table in tables)[good],
         segment=segment,
     )
-
-
-def not_asked_for(data: Dataset, protocol: ProtocolSpec, used: Sequence[Mask]) -> dict[str, int]:
-    """Return how many of the rows that some fold uses the protocol does not look at, by reason.
-
-    Parameters
-    ----------
-    used
-        One (n,) mask a recording.
-    """
-    others = sum(int((mask & ~asked_for(table, protocol)).sum()) for table, mask in zip(data.tables, used, strict=True))
-    which = "after the first of a recording" if protocol.first_row_only else "before the press begins"
-    return {f"rows {which}": others} if others else {}
 
 
 def asked_for(table: Table, protocol: ProtocolSpec) -> Mask:

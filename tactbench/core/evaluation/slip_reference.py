@@ -9,15 +9,20 @@ from dataclasses import dataclass
 import numpy as np
 
 from tactbench.core.errors import DataError, NotApplicable
-from tactbench.core.evaluation.channels import read_channel, require_forward, unit_factor
+from tactbench.core.evaluation.channels import channel_on, channels_for, require_forward
 from tactbench.core.events.labels import UNDECIDED, SlipLabels, slip_labels
 from tactbench.core.recording.reader import Recording
 from tactbench.core.samples import FloatArray, IntArray
 from tactbench.core.spec.events import SlipTarget
+from tactbench.core.spec.task import ChannelTarget
 
 SCALES = (1.0, 0.5, 2.0)
 """Of the label thresholds: as stated, halved and doubled."""
-_CHANNELS = (("normal", "N"), ("tangential", "N"), ("slip", "m"))
+_CHANNELS = (
+    ChannelTarget(kind="force", name="normal", unit="N"),
+    ChannelTarget(kind="force", name="tangential", unit="N"),
+    ChannelTarget(kind="position", name="slip", unit="m"),
+)
 
 
 @dataclass(frozen=True)
@@ -67,8 +72,8 @@ def slip_reference(recording: Recording, target: SlipTarget, first_ns: int, coun
         If the coefficient is no number, or the surface never rests.
     """
     name = recording.meta.name
-    places = {called: _place(recording, called) for called, _ in _CHANNELS}
-    missing = [called for called, place in places.items() if place is None]
+    found = {str(one.name): channels_for(recording, one) for one in _CHANNELS}
+    missing = [called for called, there in found.items() if not there]
     if target.friction not in recording.meta.labels:
         missing.append(f"the label {target.friction}")
     if missing:
@@ -77,27 +82,25 @@ def slip_reference(recording: Recording, target: SlipTarget, first_ns: int, coun
             f"recording {name!r} has no {', no '.join(missing)}.",
             hint="State them in the mapping, or choose another task.",
         )
-    clock = recording.read(places["slip"][0])  # type: ignore[index]
+    clock = recording.read(found["slip"][0][0])
     require_forward(clock, name)
     if clock.t_ns is None:
         raise NotApplicable(f"The reference of recording {name!r} has no clock.", hint="State it in the mapping.")
-    columns = []
-    for called, unit in _CHANNELS:
-        stream, place = places[called]  # type: ignore[misc]
-        channel = recording.stream(stream).spec.channels[place]
-        columns.append(read_channel(recording, clock, (stream, place, channel)) * unit_factor(channel, unit))
+    columns = np.array([channel_on(recording, one, clock) for one in _CHANNELS])
     whole = ~np.isnan(columns).any(axis=0)
     if not whole.all():
         counts["samples of the reference left out because a channel has none"] += int((~whole).sum())
-    normal, tangential, slip = (column[whole] for column in columns)
+    normal, tangential, slip = columns[:, whole]
     t_ns = clock.t_ns[whole] - first_ns
     try:
         friction = float(recording.meta.labels[target.friction])
-    except ValueError as error:
+    except ValueError:
+        friction = np.nan
+    if not 0 < friction < np.inf:
         raise DataError(
             f"The label {target.friction} of recording {name!r} is {recording.meta.labels[target.friction]!r}.",
-            hint="Give a number.",
-        ) from error
+            hint="Give a number above 0.",
+        )
     labels = {}
     for scale in SCALES:
         try:
@@ -109,13 +112,3 @@ def slip_reference(recording: Recording, target: SlipTarget, first_ns: int, coun
     share = np.divide(np.abs(tangential), friction * normal, out=np.zeros_like(normal), where=contact)
     label, value = target.disturbance
     return SlipReference(t_ns, slip, share, normal, labels, str(recording.meta.labels.get(label)) == value)
-
-
-def _place(recording: Recording, name: str) -> tuple[str, int] | None:
-    own = {stream.name for stream in recording.meta.sensor.streams}
-    for stream in recording.stream_names:
-        if stream not in own:
-            for place, channel in enumerate(recording.stream(stream).spec.channels):
-                if channel.name == name:
-                    return stream, place
-    return None

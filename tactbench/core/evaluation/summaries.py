@@ -12,9 +12,9 @@ import numpy as np
 from tactbench.core.errors import DataError, NotApplicable, PluginContractError
 from tactbench.core.evaluation.dataset import Dataset, Table, require_computable
 from tactbench.core.evaluation.protocols import ProtocolSpec
-from tactbench.core.evaluation.sets import hold_s, moments
+from tactbench.core.evaluation.sets import hold_s, less_rest
 from tactbench.core.plugins.registry import load_object
-from tactbench.core.samples import FloatArray, StreamReadings
+from tactbench.core.samples import FloatArray, IntArray, StreamReadings
 from tactbench.core.spec.recording import RecordingMeta
 from tactbench.core.spec.rig import EstimatorDescriptor
 from tactbench.core.spec.summary import Summary
@@ -79,25 +79,29 @@ def recording_features(task: TaskSpec, rules: ProtocolSpec) -> Callable[[Table],
         found: dict[str, float] = {}
         for summary in task.summaries:
             for stream in streams:
-                columns = [place for place, kind in enumerate(stream.kinds)
-                           if not summary.kinds or kind in summary.kinds]  # fmt: skip
+                columns = columns_of(stream, summary)
                 if columns:
                     values = summary_of(stream, summary, table.meta.name)[columns]
                     names = [f"{stream.channels[place]} {summary.name}" for place in columns]
                     found |= dict(zip(names, values.tolist(), strict=True))
         if own is not None:
-            more = _checked(own(streams), f"{task.features_by}", table)
-            if found.keys() & more.keys():
+            more = own(streams)
+            if not more or not all(np.isfinite(value) for value in more.values()):
                 raise PluginContractError(
-                    f"{task.features_by} gave {min(found.keys() & more.keys())!r}, which is a summary's name.",
-                    hint="Call it otherwise.",
+                    f"{task.features_by} gave no finite number by name for recording {table.meta.name!r}.",
+                    hint="It gets a tuple of StreamReadings and must return a mapping of names to finite numbers.",
                 )
-            found |= more
+            found |= {name: float(value) for name, value in more.items()}
         for name, value in found.items():
             require_computable(np.array(value), name, table.meta)
         return found
 
     return compute
+
+
+def columns_of(stream: StreamReadings, summary: Summary) -> list[int]:
+    """Return which channels of a stream a summary is of."""
+    return [place for place, kind in enumerate(stream.kinds) if not summary.kinds or kind in summary.kinds]
 
 
 def kept(table: Table, rules: ProtocolSpec) -> tuple[StreamReadings, ...]:
@@ -123,26 +127,54 @@ def kept(table: Table, rules: ProtocolSpec) -> tuple[StreamReadings, ...]:
 
 def tared_readings(stream: StreamReadings, meta: RecordingMeta) -> StreamReadings:
     """Return a stream less its mean over the recording's own unloaded hold, where it has a clock and a sample there."""
-    unloaded = stream.time_s < hold_s(meta) if stream.time_s is not None else np.zeros(0, dtype=bool)
-    return replace(stream, data=stream.data - stream.data[unloaded].mean(axis=0)) if unloaded.any() else stream
+    return (
+        stream if stream.time_s is None else replace(stream, data=less_rest(stream.data, stream.time_s < hold_s(meta)))
+    )
 
 
 def summary_of(stream: StreamReadings, summary: Summary, recording: str) -> FloatArray:
     """Return (channels,) numbers, from the samples in the summary's window; a filter has seen those before it too."""
     rows = _window(stream, summary, recording)
-    if summary.band_hz is not None:
-        return np.asarray((in_band(stream, summary.band_hz, recording)[rows] ** 2).mean(axis=0))
-    X = stream.data[rows]
-    if summary.measure == "mean":
-        return np.asarray(X.mean(axis=0))
-    if summary.measure == "deviation":
-        return moments(X)[1]
-    if summary.measure == "range":
-        return np.asarray(np.ptp(X, axis=0))
-    if summary.measure == "change":
-        return np.asarray(X[-1] - X[0])
-    steps = np.abs(np.diff(X, axis=0))
-    return np.asarray(steps.mean(axis=0)) if len(steps) else np.zeros(X.shape[1])
+    values = stream.data if summary.band_hz is None else in_band(stream, summary.band_hz, recording)
+    values = values[rows]
+    return np.asarray(measured(values, summary.measure, np.array([0]), np.array([len(values)]))[0])
+
+
+def measured(values: FloatArray, measure: str, first: IntArray, last: IntArray) -> FloatArray:
+    """Return (windows, channels) of rows ``first .. last`` (excluded) of `values`; NaN for a window without a row.
+
+    Sums are differences of running sums, counted from the first sample, so that no digit depends on later ones.
+    """
+    count = (last - first)[:, None].astype(np.float64)
+    some = count > 0
+    if measure == "range":
+        found = _extreme(np.maximum, values, first, last) - _extreme(np.minimum, values, first, last)
+    elif measure == "change":
+        found = values[np.maximum(last - 1, 0)] - values[np.minimum(first, len(values) - 1)]
+    elif measure == "mean-step":
+        steps = np.abs(np.diff(values, axis=0, prepend=values[:1]))
+        begin = np.minimum(first + 1, last)
+        found = _sums(steps, begin, last) / np.maximum(count - 1, 1)
+    elif measure == "band-energy":
+        found = _sums(values**2, first, last) / np.maximum(count, 1)
+    else:
+        centre = values[0]
+        mean = _sums(values - centre, first, last) / np.maximum(count, 1)
+        found = mean + centre
+        if measure == "deviation":
+            square = _sums((values - centre) ** 2, first, last) / np.maximum(count, 1)
+            found = np.sqrt(np.maximum(square - mean**2, 0.0))
+    return np.asarray(np.where(some, found, np.nan))
+
+
+def _sums(values: FloatArray, first: IntArray, last: IntArray) -> FloatArray:
+    total = np.concatenate([np.zeros((1, values.shape[1])), np.cumsum(values, axis=0)])
+    return np.asarray(total[last] - total[first])
+
+
+def _extreme(of: np.ufunc, values: FloatArray, first: IntArray, last: IntArray) -> FloatArray:
+    padded = np.concatenate([values, values[-1:]])  # reduceat wants every place to exist
+    return np.asarray(of.reduceat(padded, np.column_stack([first, np.maximum(last, first)]).ravel(), axis=0)[::2])
 
 
 def _window(stream: StreamReadings, summary: Summary, recording: str) -> slice:
@@ -183,20 +215,6 @@ def in_band(stream: StreamReadings, band_hz: tuple[float, float], recording: str
     signal = importlib.import_module("scipy.signal")
     sections = signal.butter(2, band_hz, "bandpass", fs=stream.rate_hz, output="sos")
     return np.asarray(signal.sosfilt(sections, stream.data - stream.data[0], axis=0))
-
-
-def _checked(given: object, code: str, table: Table) -> dict[str, float]:
-    found = dict(given) if isinstance(given, Mapping) else {}
-    try:
-        numbers = {name: float(value) for name, value in found.items() if isinstance(name, str)}
-    except (TypeError, ValueError):
-        numbers = {}
-    if not numbers or len(numbers) < len(found) or not all(math.isfinite(value) for value in numbers.values()):
-        raise PluginContractError(
-            f"{code} gave no finite number by name for recording {table.meta.name!r}.",
-            hint="It is called with a tuple of StreamReadings and must return a mapping of names to finite numbers.",
-        )
-    return numbers
 
 
 def _one_row(table: Table, features: Features) -> Table:

@@ -14,7 +14,7 @@ import numpy as np
 
 from tactbench.core.errors import DataError
 from tactbench.core.events.alarms import alarms
-from tactbench.core.events.metrics import EventScores, GroundTruth, TimeBase, score_events
+from tactbench.core.events.metrics import EventScores, GroundTruth, score_events
 from tactbench.core.samples import FloatArray, IntArray
 from tactbench.core.spec.events import AlarmPolicy
 
@@ -40,8 +40,8 @@ class ThresholdCurve:
     scores: EventScores
     """Of shape (k,)."""
 
-    def at(self, threshold: float) -> EventScores:
-        """Return the scores at any threshold above minus infinity."""
+    def at(self, threshold: float | FloatArray) -> EventScores:
+        """Return the scores at any threshold, or several, above minus infinity."""
         return self.scores.row(np.searchsorted(self.threshold, threshold, side="left"))
 
     def operating_point(self, max_false_alarms_per_minute: float) -> float:
@@ -70,12 +70,12 @@ def threshold_curve(recordings: Sequence[ScoredRecording], policy: AlarmPolicy) 
     """Return the scores of all recordings together at every threshold, exactly."""
     pieces = [_of_one(recording, policy) for recording in recordings]
     threshold = np.unique(np.concatenate([[np.inf], *(piece.threshold for piece in pieces)]))
-    rows = [piece.scores.row(np.searchsorted(piece.threshold, threshold, side="left")) for piece in pieces]
+    rows = [piece.at(threshold) for piece in pieces]
     none = np.zeros(threshold.size, dtype=np.int64)
     scores = EventScores(
         n_alarms=sum((row.n_alarms for row in rows), none),
         n_false_alarms=sum((row.n_false_alarms for row in rows), none),
-        base_s=sum(TimeBase.of(one.truth, policy).length_ns for one in recordings) / 1e9,
+        base_ns=sum(row.base_ns for row in rows),
         latency_s=np.concatenate([np.zeros((threshold.size, 0)), *(row.latency_s for row in rows)], axis=1),
     )
     return ThresholdCurve(threshold, scores)
@@ -92,7 +92,7 @@ def _of_one(recording: ScoredRecording, policy: AlarmPolicy) -> ThresholdCurve:
     scores = EventScores(
         np.array([one.n_alarms for one in each]),
         np.array([one.n_false_alarms for one in each]),
-        each[0].base_s,
+        each[0].base_ns,
         np.array([one.latency_s for one in each]),
     )
     return ThresholdCurve(np.array([threshold for threshold, _ in found[::-1]]), scores)

@@ -76,12 +76,6 @@ def slip_labels(
     """
     if np.any(np.diff(t_ns) <= 0):
         raise DataError("Times of the reference do not rise strictly.", hint="Sort them, or cut where the clock stops.")
-    given = {"displacement": displacement_m, "tangential force": tangential_n, "normal force": normal_n}
-    for name, values in given.items():
-        if values.shape != t_ns.shape or not np.all(np.isfinite(values)):
-            raise DataError(f"The {name} is not one finite number a sample.", hint="Leave out samples without one.")
-    if not 0 < friction < np.inf:
-        raise DataError(f"{friction} is no coefficient of friction.", hint="Give the surface's own, above 0.")
     rest = at_rest(t_ns, displacement_m, thresholds)
     if not rest.any():
         raise DataError(

@@ -22,8 +22,8 @@ class GroundTruth:
 
     event_ns: IntArray
     """(e, 2) onset and end of each event [ns]."""
-    disturbance_ns: IntArray
-    """(d, 2) beginning and end of each disturbance: a press, a tap, a motor that starts [ns]. They may overlap."""
+    disturbance: bool
+    """Whether the recording as a whole is a disturbance: a press, a tap, a motor that starts."""
     span_ns: tuple[int, int]
     """From when until when (excluded) the detector could raise alarms [ns]."""
 
@@ -40,8 +40,8 @@ class EventScores:
     """(...) alarms, those outside the time base of false alarms included."""
     n_false_alarms: IntArray
     """(...) alarms within that time base."""
-    base_s: float
-    """Length of that time base [s]."""
+    base_ns: int
+    """Length of that time base [ns]."""
     latency_s: FloatArray
     """(..., e) alarm minus onset of each event [s], negative is early; NaN is a miss."""
 
@@ -73,26 +73,19 @@ class EventScores:
     @property
     def false_alarms_per_minute(self) -> FloatArray:
         """Return (...) false alarms per minute of the time base [1/min]."""
-        return _ratio(self.n_false_alarms, np.full(self.n_false_alarms.shape, self.base_s / 60.0))
+        return _ratio(self.n_false_alarms, np.full(self.n_false_alarms.shape, self.base_ns / 1e9 / 60.0))
 
-    def latency_percentile_s(self, percent: float) -> FloatArray:
-        """Return (...) a percentile of the latency over hits, linear between order statistics [s].
+    def latency_percentile_s(self, percent: float) -> float:
+        """Return a percentile of the latency over hits of one set of alarms, linear between order statistics [s].
 
         Never to be shown without :attr:`n_misses`: a detector that hits only the easy events looks quick.
         """
-        missed = np.full((*self.latency_s.shape[:-1], 1), np.nan)
-        ordered = np.sort(np.concatenate([self.latency_s, missed], axis=-1), axis=-1)  # NaN come last
-        last = np.maximum(self.n_hits - 1, 0)
-        place = percent / 100.0 * last
-        low = np.floor(place).astype(np.int64)
-        below, above = (
-            np.take_along_axis(ordered, which[..., None], axis=-1)[..., 0] for which in (low, np.minimum(low + 1, last))
-        )
-        return np.asarray(below + (above - below) * (place - low))
+        hits = self.latency_s[np.isfinite(self.latency_s)]
+        return float(np.percentile(hits, percent)) if hits.size else np.nan
 
     def row(self, place: Any) -> EventScores:
         """Return the scores at one threshold, or at several."""
-        return EventScores(self.n_alarms[place], self.n_false_alarms[place], self.base_s, self.latency_s[place])
+        return EventScores(self.n_alarms[place], self.n_false_alarms[place], self.base_ns, self.latency_s[place])
 
 
 def score_events(truths: Sequence[GroundTruth], alarms_ns: Sequence[IntArray], policy: AlarmPolicy) -> EventScores:
@@ -118,7 +111,7 @@ def score_events(truths: Sequence[GroundTruth], alarms_ns: Sequence[IntArray], p
         n_false += int(base.holds(alarm_ns).sum())
         base_ns += base.length_ns
     latency = np.concatenate(latencies) if latencies else np.zeros(0)
-    return EventScores(np.asarray(n_alarms), np.asarray(n_false), base_ns / 1e9, latency)
+    return EventScores(np.asarray(n_alarms), np.asarray(n_false), base_ns, latency)
 
 
 def latency_s(onset_ns: IntArray, alarm_ns: IntArray, policy: AlarmPolicy) -> FloatArray:
@@ -164,15 +157,14 @@ class TimeBase:
     @classmethod
     def of(cls, truth: GroundTruth, policy: AlarmPolicy) -> TimeBase:
         """Return the base of one recording: what the policy names, without every event and its window."""
-        if policy.false_alarm_time == "disturbances":
-            named = np.clip(truth.disturbance_ns, *truth.span_ns)
-        else:
-            named = np.asarray([truth.span_ns], dtype=np.int64)
+        named = truth.disturbance or policy.false_alarm_time == "non-events"
+        begin, close = truth.span_ns
         onset, end = truth.event_ns[:, 0], truth.event_ns[:, 1]
         until = np.maximum(onset + nanoseconds(policy.window_after_s), end) + 1  # the window holds its own end
-        events = np.column_stack([onset - nanoseconds(policy.window_before_s), until])
-        edge = np.unique(np.concatenate([named.ravel(), events.ravel()]))
-        counted = (_depth(edge, named) > 0) & (_depth(edge, events) == 0)
+        since = onset - nanoseconds(policy.window_before_s)
+        edge = np.unique(np.concatenate([[begin, close], since, until]))
+        of_event = (edge[:, None] >= since) & (edge[:, None] < until)
+        counted = named & (edge >= begin) & (edge < close) & ~of_event.any(axis=1)
         return cls(edge, np.concatenate([[False], counted]).astype(np.int64))
 
     @property
@@ -183,12 +175,6 @@ class TimeBase:
     def holds(self, t_ns: IntArray) -> IntArray:
         """Return (n,) whether each time lies in it: 0 or 1."""
         return np.asarray(self.counted[np.searchsorted(self.edge_ns, t_ns, side="right")])
-
-
-def _depth(t_ns: IntArray, stretches: IntArray) -> IntArray:
-    """Return (n,) how many half-open stretches (k, 2) each time lies in."""
-    begun, ended = (np.searchsorted(np.sort(edge), t_ns, side="right") for edge in stretches.T)
-    return np.asarray(begun - ended)
 
 
 def _ratio(part: FloatArray | IntArray, whole: FloatArray | IntArray) -> FloatArray:

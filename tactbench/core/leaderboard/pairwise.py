@@ -140,7 +140,7 @@ def _compared(
         elif other is None:
             refused = _why_alone(key, second, keys[1])
         elif not (refused := _why_not(one, other, first, second)):
-            result, folds = difference(one, other), over_folds([(one, other)])
+            result, folds = difference(one, other), over_folds(one, other)
         found.append(PairwiseComparison(kind, first, second, key[-1], one, other, result, folds, refused))
     return found
 

@@ -65,8 +65,7 @@ def aggregate(rows: Sequence[Row]) -> Aggregate | None:
     After Agarwal et al. 2021, Deep reinforcement learning at the edge of the statistical precipice: the mean of the
     middle half of all (task, replicate) scores, with an interval from resampling replicates within each task. Tasks
     weigh the same, however many replicates they have. Where a replicate has no score of its own (classes live in
-    replicates of their own, or replicates are blocks of time), the task enters with its one score, which varies as the
-    resampled replicates make it.
+    replicates of their own), the task enters with its one score, which varies as the resampled replicates make it.
     """
     left_out: list[str] = []
     tasks: list[str] = []
@@ -113,30 +112,27 @@ def _entries(row: Row) -> tuple[FloatArray, FloatArray, int]:
     group = together([row])[0]
     if "scores" in kept:
         own = scores_of(kept, row["metric"])
-        return own, own[_drawn(group.names, len(own), 1)], len(own)
+        return own, own[_drawn(group.names, len(own))], len(own)
     sums = tables_of([kept], row["metric"], n_classes)[0]
-    run = int(group.runs[0])
     sizes = np.unique(group.strata, return_counts=True)[1]
     with np.errstate(divide="ignore", invalid="ignore"):
         own = metric.score(sums, n_classes)
-        if kept["strata"] is None and not group.in_time and np.isfinite(own).all():
-            places = _drawn(group.names, len(own), 1)
-            return own, own[places], len(own)
+        if kept["strata"] is None and np.isfinite(own).all():
+            return own, own[_drawn(group.names, len(own))], len(own)
         times = np.zeros((RESAMPLES, len(sums)))
         for stratum in np.unique(group.strata):
             mine = np.flatnonzero(group.strata == stratum)
-            places = mine[_drawn((*group.names, str(stratum)), len(mine), run)]
+            places = mine[_drawn((*group.names, str(stratum)), len(mine))]
             np.add.at(times, (np.arange(RESAMPLES)[:, None], places), 1.0)
         whole = metric.score(times @ sums, n_classes)
-    return np.array([row["score"]]), whole[:, None], int(sizes.min() // run)
+    return np.array([row["score"]]), whole[:, None], int(sizes.min())
 
 
-def _drawn(names: Sequence[str], n: int, run: int) -> Any:
-    """Return (RESAMPLES, n) places drawn with replacement, in circular runs; the same for the same names."""
+def _drawn(names: Sequence[str], n: int) -> Any:
+    """Return (RESAMPLES, n) places drawn with replacement; the same for the same names."""
     digest = hashlib.blake2b("\n".join(names).encode(), digest_size=8).digest()
     rng = np.random.default_rng([SEED, int.from_bytes(digest, "little")])
-    starts = rng.integers(0, n, size=(RESAMPLES, -(-n // run)))
-    return ((starts[:, :, None] + np.arange(run)).reshape(RESAMPLES, -1) % n)[:, :n]
+    return rng.integers(0, n, size=(RESAMPLES, n))
 
 
 def interquartile_mean(values: FloatArray, weights: FloatArray) -> FloatArray:

@@ -26,15 +26,11 @@ class PairableRows:
     names: tuple[str, ...]
     strata: IntArray
     """(replicates,) which replicates may stand in for each other"""
-    in_time: bool
-    """the replicates are blocks of time: the spread between sessions is not in them"""
     influence: FloatArray
     """(n, replicates): a score's squared standard error is the sum of their squares, the covariance of two scores that
     of their products"""
-    freedom: FloatArray
-    """(n,) degrees of freedom of the standard error"""
-    runs: FloatArray
-    """(n,) how many neighbouring replicates depend on each other"""
+    freedom: float
+    """degrees of freedom of the standard errors"""
 
 
 def together(rows: Sequence[Row]) -> list[PairableRows]:
@@ -47,20 +43,17 @@ def together(rows: Sequence[Row]) -> list[PairableRows]:
 
     Notes
     -----
-    The influence of a replicate is what leaving it out changes (:func:`influences`). Where the replicates are blocks of
-    time that depend on their neighbours, influences are smoothed so that the sums of squares become those of Bartlett's
-    window (Künsch 1989), to which a circular block bootstrap converges.
+    The influence of a replicate is what leaving it out changes (:func:`influences`).
     """
     groups: dict[tuple[Any, ...], list[int]] = {}
     for place, row in enumerate(rows):
         kept = row.get("replicates")
         if kept:
             strata = tuple(kept["strata"] or [0] * len(kept["names"]))
-            in_time = kept["unit"].startswith("block")
-            mark = tuple(kept["names"]), strata, in_time, "scores" in kept, len(row["classes"]), row["metric"]
+            mark = tuple(kept["names"]), strata, "scores" in kept, len(row["classes"]), row["metric"]
             groups.setdefault(mark, []).append(place)
     found = []
-    for (names, strata, in_time, own_scores, n_classes, metric), places in groups.items():
+    for (names, strata, own_scores, n_classes, metric), places in groups.items():
         several, n, codes = [rows[place]["replicates"] for place in places], len(names), np.array(strata)
         sizes = np.unique(codes, return_counts=True)[1]
         if sizes.min() < (FEWEST if own_scores else 2):
@@ -68,16 +61,11 @@ def together(rows: Sequence[Row]) -> list[PairableRows]:
         if own_scores:  # what is asked for is their mean
             scores = np.array([scores_of(one, metric) for one in several])
             influence = (scores - scores.mean(axis=1, keepdims=True)) / np.sqrt(n * (n - 1))
-            runs = np.ones(len(several))
         else:
-            runs = np.clip([float(one.get("run", 1)) for one in several], 1.0, n)
             influence = influences(scores_without(tables_of(several, metric, n_classes), metric, n_classes), codes)
-            for one in np.unique(codes):
-                influence[:, codes == one] = _smoothed(influence[:, codes == one], runs)
-        freedom = np.maximum(n / runs - len(sizes), 1.0)
         good = np.isfinite(influence).all(axis=1)
         where = np.array(places, dtype=np.int64)[good]
-        found.append(PairableRows(where, names, codes, in_time, influence[good], freedom[good], runs[good]))
+        found.append(PairableRows(where, names, codes, influence[good], float(n - len(sizes))))
     return found
 
 
@@ -90,20 +78,3 @@ def scores_without(sums: FloatArray, metric: str, n_classes: int) -> FloatArray:
     """Return (rows, replicates) scores without each replicate, from (rows, replicates, m) sums."""
     with np.errstate(divide="ignore", invalid="ignore"):
         return SUMMED[metric].score(sums.sum(axis=1, keepdims=True) - sums, n_classes)
-
-
-def _smoothed(influence: FloatArray, runs: FloatArray) -> FloatArray:
-    """Return (n, blocks) whose sums of products are those of all circular runs of `runs` blocks, (n,), together.
-
-    The factor is the root of Fejér's kernel, which has no phase: rows of different run can still be multiplied.
-    """
-    if (runs <= 1).all():
-        return influence
-    n = influence.shape[1]
-    out = influence.copy()
-    frequency = np.arange(n // 2 + 1) / n
-    for run in np.unique(runs[runs > 1]).tolist():
-        response = np.abs(np.exp(-2j * np.pi * np.outer(frequency, np.arange(int(run)))).sum(axis=1)) / np.sqrt(run)
-        mine = runs == run
-        out[mine] = np.fft.irfft(np.fft.rfft(influence[mine], axis=1) * response, n, axis=1)
-    return out

@@ -12,7 +12,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from tactbench.core.evaluation.interval import NORMAL, student_quantile, two_sided_p
+from tactbench.core.evaluation.interval import student_quantile, two_sided_p
 from tactbench.core.evaluation.metrics import METRICS, Metric
 from tactbench.core.evaluation.replicate_sums import tables_of
 from tactbench.core.samples import FloatArray, IntArray
@@ -105,60 +105,51 @@ def _means(first: Row, second: Row) -> tuple[Row, Row]:
 def _paired(first: Row, second: Row, value: float, sign: float, group: PairableRows, metric: Metric) -> Difference:
     carried = group.influence[0] - group.influence[1]
     deviation = float(np.sqrt(carried @ carried))
-    freedom = float(group.freedom.min())
-    run = int(group.runs.max())
-    n = len(group.names) / run
-    p, smallest = exchanged(first, second, run)
+    n = len(group.names)
+    p, smallest = exchanged(first, second)
     unit = str(first["replicates"]["unit"])
-    over = f"paired over {counted(len(group.names), unit)}"
+    over = f"paired over {counted(n, unit)}"
     if first["replicates"].get("of") == "beyond":
         over += ", of the errors beyond the floor"
     own = value + carried * _to_own(group)
     return _difference(
-        value, deviation, freedom, sign, _region(first),
+        value, deviation, group.freedom, sign, _region(first),
         p=p,
         smallest_p=smallest,
         effect=value / (deviation * np.sqrt(n)) if deviation > 0 else None,
         improved=float(np.mean((sign * own > 0) + 0.5 * (own == 0))),
-        replicates=len(group.names),
+        replicates=n,
         unit=unit,
         paired=True,
-        method=f"{over}, Student's t ({freedom:.0f} degrees of freedom){_in_time(group)}",
+        method=f"{over}, Student's t ({group.freedom:.0f} degrees of freedom)",
     )  # fmt: skip
 
 
 def _unpaired(first: Row, second: Row, value: float, sign: float, groups: list[PairableRows]) -> Difference:
-    of = {int(place): (group, line) for group in groups for line, place in enumerate(group.places)}
-    errors, freedoms, own = [], [], []
-    for place, row in enumerate((first, second)):
-        if place in of:
-            group, line = of[place]
-            carried = group.influence[line]
-            errors.append(float(np.sqrt(carried @ carried)))
-            freedoms.append(float(group.freedom[line]))
-            own.append(row["score"] + carried * _to_own(group))
-        elif row["ci_low"] is not None and row["ci_high"] is not None:
-            errors.append((row["ci_high"] - row["ci_low"]) / (2 * NORMAL))
-            freedoms.append(np.inf)
-        else:
-            errors.append(np.inf)
-            freedoms.append(np.inf)
-    deviation, freedom = float(np.hypot(errors[0], errors[1])), min(freedoms)
-    counts = [len(of[place][0].names) if place in of else 0 for place in (0, 1)]
-    why = "they have other replicates" if len(of) == 2 else "replicates are missing, their own intervals stand in"
-    spread = float(np.sqrt((np.var(own[0], ddof=1) + np.var(own[1], ddof=1)) / 2)) if len(of) == 2 else 0.0
-    pairs = sign * np.subtract.outer(own[0], own[1]) if len(of) == 2 else np.empty(0)
+    method = "Student's t (of two degrees of freedom the smaller)"
+    unit = " and ".join(dict.fromkeys(str(row["replicates"].get("unit", "none")) for row in (first, second)))
+    if len(groups) < 2:
+        known: dict[str, Any] = dict.fromkeys(("p", "smallest_p", "effect", "improved"))
+        return _difference(
+            value, np.inf, np.inf, sign, 0.0,
+            **known, replicates=0, unit=unit, paired=False, method="not paired (replicates are missing)",
+        )  # fmt: skip
+    one, other = sorted(groups, key=lambda group: int(group.places[0]))
+    deviation = float(np.sqrt((one.influence**2).sum() + (other.influence**2).sum()))
+    own = [row["score"] + group.influence[0] * _to_own(group) for row, group in ((first, one), (second, other))]
+    spread = float(np.sqrt((np.var(own[0], ddof=1) + np.var(own[1], ddof=1)) / 2))
+    pairs = sign * np.subtract.outer(own[0], own[1])
+    freedom = min(one.freedom, other.freedom)
     return _difference(
         value, deviation, freedom, sign, _region(first),
-        p=two_sided_p(value / deviation, freedom) if 0 < deviation < np.inf else None,
-        smallest_p=0.0 if 0 < deviation < np.inf else None,
+        p=two_sided_p(value / deviation, freedom) if deviation > 0 else None,
+        smallest_p=0.0 if deviation > 0 else None,
         effect=value / spread if spread > 0 else None,
-        improved=float(np.mean((pairs > 0) + 0.5 * (pairs == 0))) if len(pairs) else None,
-        replicates=min(counts),
-        unit=" and ".join(dict.fromkeys(str(row["replicates"].get("unit", "none")) for row in (first, second))),
+        improved=float(np.mean((pairs > 0) + 0.5 * (pairs == 0))),
+        replicates=min(len(one.names), len(other.names)),
+        unit=unit,
         paired=False,
-        method=f"not paired ({why}), Student's t (of two degrees of freedom the smaller)"
-        + next((_in_time(group) for group in groups if group.in_time), ""),
+        method=f"not paired (they have other replicates), {method}",
     )  # fmt: skip
 
 
@@ -189,19 +180,13 @@ def _to_own(group: PairableRows) -> FloatArray:
     return np.asarray(len(sizes) * np.sqrt(n * (n - 1)))
 
 
-def _in_time(group: PairableRows) -> str:
-    return ": spread between sessions is not in it" if group.in_time else ""
-
-
-def exchanged(first: Row, second: Row, run: int = 1) -> tuple[float, float]:
+def exchanged(first: Row, second: Row) -> tuple[float, float]:
     """Return the p-value of exchanging two rows' answers within replicates, and the least it can be.
 
     Parameters
     ----------
     first, second
         Rows whose replicates have the same names and strata.
-    run
-        Neighbouring blocks of time that are exchanged together.
     """
     metric = METRICS[first["metric"]]
     if "scores" in first["replicates"]:
@@ -210,8 +195,6 @@ def exchanged(first: Row, second: Row, run: int = 1) -> tuple[float, float]:
         return _share((1.0 - 2.0 * ways) @ apart_each), smallest
     n_classes = len(first["classes"])
     sums = tables_of([first["replicates"], second["replicates"]], metric.name, n_classes)
-    strata = first["replicates"]["strata"] or [0] * sums.shape[1]
-    sums = np.add.reduceat(sums, _starts(strata, run), axis=1)
     ways, smallest = _ways(sums.shape[1])
     moved = ways.astype(np.float64) @ (sums[1] - sums[0])
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -236,17 +219,6 @@ def _share(apart: FloatArray) -> float:
     return float(np.mean(apart >= apart[0] * (1 - 1e-9) - 1e-15))
 
 
-def _starts(strata: list[int], run: int) -> list[int]:
-    """Return where runs of blocks begin, `run` blocks of a stratum each; the blocks of a stratum are neighbours."""
-    starts, since = [], run
-    for place, stratum in enumerate(strata):
-        if since == run or stratum != strata[place - 1]:
-            starts.append(place)
-            since = 0
-        since += 1
-    return starts
-
-
 @dataclass(frozen=True)
 class FoldDifference:
     """The mean difference over folds, and what can be said of it."""
@@ -259,24 +231,21 @@ class FoldDifference:
     method: str
 
 
-def corrected_t(differences: Sequence[float], test_over_train: float, repeats: int = 1) -> FoldDifference | None:
+def corrected_t(differences: Sequence[float], test_over_train: float) -> FoldDifference | None:
     """Return the corrected resampled t-test of differences over folds; None of fewer than two.
 
     Parameters
     ----------
     differences
-        One a fold, of every repeat.
+        One a fold.
     test_over_train
         Test rows over training rows of a fold; of unequal folds, the mean.
-    repeats
-        How often the folds were dealt anew.
 
     Notes
     -----
     ``t = d̄ / sqrt((1/n + n_test/n_train) s²)`` with n - 1 degrees of freedom. The second term stands for the
     correlation of folds that train on mostly the same rows; without it the test finds differences that are not there
-    (Nadeau and Bengio 2003, Inference for the generalization error). Over r repeats of k folds n is r k, as in
-    Bouckaert and Frank 2004, Evaluating the replicability of significance tests for comparing learning algorithms.
+    (Nadeau and Bengio 2003, Inference for the generalization error).
     """
     d = np.asarray(differences, dtype=np.float64)
     n = len(d)
@@ -286,30 +255,19 @@ def corrected_t(differences: Sequence[float], test_over_train: float, repeats: i
     mean = float(d.mean())
     reach = float(student_quantile(n - 1)) * deviation
     p = two_sided_p(mean / deviation, n - 1) if deviation > 0 else float(mean == 0)
-    who = "Bouckaert and Frank" if repeats > 1 else "Nadeau and Bengio"
-    over = f"{n // repeats} folds" + (f" of {repeats} repeats" if repeats > 1 else "")
-    return FoldDifference(mean, mean - reach, mean + reach, p, n, f"corrected resampled t ({who}) over {over}")
+    return FoldDifference(
+        mean, mean - reach, mean + reach, p, n, f"corrected resampled t (Nadeau and Bengio) over {n} folds"
+    )
 
 
-def over_folds(pairs: Sequence[tuple[Row, Row]]) -> FoldDifference | None:
-    """Return the corrected test of two cells over the folds that both have, their repeats together.
-
-    Parameters
-    ----------
-    pairs
-        The two rows of each repeat.
-    """
-    differences: list[float] = []
-    ratios: list[float] = []
-    for first, second in pairs:
-        sizes = first.get("fold_sizes") or {}
-        for name, (n_train, n_test) in sizes.items():
-            if name in first["scores"] and name in second["scores"] and name in (second.get("fold_sizes") or {}):
-                differences.append(first["scores"][name] - second["scores"][name])
-                ratios.append(n_test / n_train)
-    if len(differences) < 2 * len(pairs):
+def over_folds(first: Row, second: Row) -> FoldDifference | None:
+    """Return the corrected test of two cells over the folds that both have."""
+    sizes, other = first.get("fold_sizes") or {}, second.get("fold_sizes") or {}
+    both = [name for name in sizes if name in other and name in first["scores"] and name in second["scores"]]
+    if len(both) < 2:
         return None
-    return corrected_t(differences, float(np.mean(ratios)), len(pairs))
+    ratios = [sizes[name][1] / sizes[name][0] for name in both]
+    return corrected_t([first["scores"][name] - second["scores"][name] for name in both], float(np.mean(ratios)))
 
 
 def holm(p: Sequence[float | None]) -> list[float | None]:

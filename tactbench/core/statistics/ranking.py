@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from tactbench.core.evaluation.interval import NORMAL, student_quantile
+from tactbench.core.evaluation.interval import student_quantile
 from tactbench.core.evaluation.metrics import EXCESS, SUMMED
 from tactbench.core.evaluation.replicate_sums import tables_of
 from tactbench.core.samples import FloatArray, IntArray
@@ -45,8 +45,8 @@ def ranks(rows: Iterable[Row]) -> dict[str, Rank]:
 
     Differences are paired over replicates where two cells have the same (:func:`together`), else their errors are taken
     as independent; their interval is Student's, of two degrees of freedom the smaller. Where each replicate has a score
-    of its own, the better median must agree with it. A row without replicates enters with the interval beside its
-    score. Nothing is drawn at random.
+    of its own, the better median must agree with it. A row without replicates is told from none. Nothing is drawn at
+    random.
     """
     entered = [row for row in rows if row["status"] == "done" and not row["is_baseline"]]
     if not entered:
@@ -71,9 +71,7 @@ def ranks(rows: Iterable[Row]) -> dict[str, Rank]:
 
 def _excess(row: Row) -> Row:
     """Return a row of a RMSE as that of its mean square beyond the floor, which may be below zero."""
-    ends = {"ci_low": row["beyond_floor_ci_low"], "ci_high": row["beyond_floor_ci_high"]}
-    squares = {key: None if value is None else value * value for key, value in ends.items()}
-    return {**row, **squares, "score": excess_of(row), "metric": EXCESS.name}
+    return {**row, "score": excess_of(row), "metric": EXCESS.name}
 
 
 def _clearly(
@@ -86,7 +84,7 @@ def _clearly(
     """
     n = len(rows)
     mean = _means(rows, groups, error)
-    deviation, freedom = _own_errors(rows, groups)
+    deviation, freedom = _own_errors(n, groups)
     distinct, which = np.unique(freedom, return_inverse=True)
     wide = student_quantile(distinct) ** 2
     same = float(rows[0].get("equivalence") or 0.0)
@@ -124,19 +122,13 @@ def _means(rows: Sequence[Row], groups: Sequence[PairableRows], error: FloatArra
     return found
 
 
-def _own_errors(rows: Sequence[Row], groups: Sequence[PairableRows]) -> tuple[FloatArray, FloatArray]:
-    """Return (n,) standard errors and degrees of freedom: of the replicates, or else of the interval in the row."""
-    deviation = np.full(len(rows), np.inf)
-    freedom = np.full(len(rows), np.inf)
-    covered = np.zeros(len(rows), dtype=bool)
+def _own_errors(n: int, groups: Sequence[PairableRows]) -> tuple[FloatArray, FloatArray]:
+    """Return (n,) standard errors and degrees of freedom, infinite of a row without replicates."""
+    deviation = np.full(n, np.inf)
+    freedom = np.full(n, np.inf)
     for group in groups:
-        deviation[group.places] = np.sqrt(np.einsum("ij,ij->i", group.influence, group.influence))
+        deviation[group.places] = np.linalg.norm(group.influence, axis=1)
         freedom[group.places] = group.freedom
-        covered[group.places] = True
-    for place in np.flatnonzero(~covered).tolist():
-        low, high = rows[place]["ci_low"], rows[place]["ci_high"]
-        if low is not None and high is not None:
-            deviation[place] = (high - low) / (2 * NORMAL)
     return deviation, freedom
 
 

@@ -28,8 +28,6 @@ _INTERVALS = {
     "true_score": ("true_ci_low", "true_ci_high"),
 }
 """Where the interval of a number stands."""
-_IN_ONE_SESSION = ("recording", "block")
-"""How units of replication begin that lie within one session: no interval of ours is over them."""
 
 
 def over_replicates(rows: Sequence[Row]) -> list[dict[str, Any]]:
@@ -163,8 +161,8 @@ def _unit(row: Row) -> str:
 
 
 def _sessions(row: Row) -> int:
-    """Return how many sessions, or coarser groups, a row's own interval is over; 0 if it is over nothing so coarse."""
-    return 0 if _unit(row).startswith(_IN_ONE_SESSION) else len((row.get("replicates") or {}).get("names", ()))
+    """Return how many sessions, or groups, a row's own interval is over; 0 if recordings are all that was repeated."""
+    return 0 if _unit(row) == "recording" else len((row.get("replicates") or {}).get("names", ()))
 
 
 def _median(values: Sequence[Any]) -> float | None:
@@ -215,20 +213,17 @@ def recordings_right(row: Row) -> tuple[int, int] | None:
 
     None of a regression, and where the row does not keep its recordings apart.
     """
-    kept, n, unit = row.get("replicates") or {}, len(row["classes"]), _unit(row)
-    if not n or not unit.startswith(_IN_ONE_SESSION):
+    n = len(row["classes"])
+    if not n or _unit(row) != "recording":
         return None
-    recordings: dict[str, Counter[int]] = {}
-    for name, line in zip(kept["names"], kept["sums"], strict=True):
-        found = recordings.setdefault(name.rpartition("/")[0] if unit.startswith("block") else name, Counter())
-        found.update(dict(zip(line[::2], line[1::2], strict=True)))
     right = 0
-    for found in recordings.values():
-        if len({column // n for column in found}) != 1:
+    for line in row["replicates"]["sums"]:
+        counts = dict(zip(line[::2], line[1::2], strict=True))
+        if len({column // n for column in counts}) != 1:
             return None  # samples of several classes: no recording is right or wrong as a whole
-        column, _ = found.most_common(1)[0]
-        right += column // n == column % n
-    return right, len(recordings)
+        commonest = max(counts, key=lambda column: counts[column])
+        right += commonest // n == commonest % n
+    return right, len(row["replicates"]["sums"])
 
 
 @dataclass(frozen=True)
@@ -272,8 +267,6 @@ def median_interval(values: Sequence[float]) -> MedianInterval | None:
 
 def counted(n: int, unit: str) -> str:
     """Return so many of a unit of replication as text: ``8 replicates``, ``20 presses``, ``1 session``."""
-    if unit.startswith("block"):
-        return f"{n} {unit.replace('block', 'blocks', 1)}"
     return f"{n} {unit}" if n == 1 else f"{n} {unit}{'es' if unit.endswith('s') else 's'}"
 
 

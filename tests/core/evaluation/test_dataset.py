@@ -132,12 +132,3 @@ def test_time_that_does_not_run_forward_is_refused(tmp_path, what):
     path = two_streams(tmp_path / "a.h5", (slow, t), (slow, t), (turned if "reference" in what else t, t))
     with pytest.raises(DataError, match="stands still" if what == "still" else "runs backwards 9 times"):
         load_dataset(force_task(), [path])
-
-
-def test_times_that_repeat_are_stamped(tmp_path):
-    X, force = ramp(0, n=50)
-    t_ns = np.arange(50) * 10 * MS
-    t_ns[20] = t_ns[19]
-    data = load_dataset(force_task(), [record(tmp_path / "a.h5", X, force, t_ns=t_ns)])
-    assert data.stamps == ("clock: times equal the one before in 1 recording, 1 times in 'a'.",)
-    assert load_dataset(force_task(), [record(tmp_path / "b.h5", X, force)]).stamps == ()

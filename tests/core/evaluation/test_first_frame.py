@@ -50,11 +50,7 @@ def test_one_row_a_recording_is_tested_and_the_others_are_counted(tmp_path):
     assert result.sizes.n_test == 36
     assert sorted(result.sets["test"].recording.tolist()) == list(range(36))
     assert set(result.sets["test"].row.tolist()) == {0}
-    # Once, whatever the number of folds and sets that use the recording.
     assert len(result.sizes.fold_sizes) == 5
-    assert {what: n for what, n in result.counts.items() if "first of" in what} == {
-        "rows after the first of a recording": 36 * 19
-    }
     assert result.split == run(sorted(tmp_path.glob("*.h5")), "deployable").split == "recording"
 
 

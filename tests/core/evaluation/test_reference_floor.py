@@ -69,12 +69,12 @@ def asked(error, *, rows=4400, hold=600, recordings=1, seed=0, sigma=SIGMA):
     return answers, unit, Floor(holds)
 
 
-@pytest.mark.parametrize(("error", "recordings", "most"), [(0.5, 1, 0.12), (0.5, 8, 0.06), (2.0, 1, 0.03)])
+@pytest.mark.parametrize(("error", "recordings", "most"), [(0.5, 5, 0.06), (0.5, 8, 0.06), (2.0, 5, 0.03)])
 def test_the_error_of_its_own_comes_out_from_below_the_noise(error, recordings, most):
     inside, scores = [], []
     for seed in range(60):
         answers, unit, floor = asked(error, recordings=recordings, seed=seed)
-        found = beyond_floor(floor, answers, unit, seed)
+        found = beyond_floor(floor, answers, unit)
         inside.append(found.low <= error <= found.high)
         scores.append(found.score)
     assert np.mean(scores) == pytest.approx(error, rel=0.05)
@@ -85,11 +85,11 @@ def test_the_error_of_its_own_comes_out_from_below_the_noise(error, recordings, 
 
 def test_a_reference_without_noise_leaves_the_rmse_as_it_is():
     answers, unit, floor = asked(0.5, sigma=0.0, seed=2)
-    found = beyond_floor(floor, answers, unit, 2)
+    found = beyond_floor(floor, answers, unit)
     assert found.floor == 0.0
     assert found.score == pytest.approx(RMSE.of(answers.y_true, answers.y_pred), rel=1e-12)
     answers, unit, floor = asked(0.0, sigma=0.0, seed=2)
-    assert beyond_floor(floor, answers, unit, 2).score == 0.0
+    assert beyond_floor(floor, answers, unit).score == 0.0
 
 
 @pytest.mark.parametrize("recordings", [1, 3, 8])
@@ -144,7 +144,7 @@ def test_a_cell_tells_its_floor_and_the_error_against_the_true_force(tmp_path):
     assert result.score == pytest.approx(SIGMA, rel=0.1)
     assert result.true[0] < 0.1, "the taxels know the force"
     assert result.true[1].low <= result.true[0] <= result.true[1].high
-    assert result.beyond.low <= result.true[0] <= result.beyond.high
+    assert (result.beyond.low, result.beyond.high) == (None, None), "three recordings are too few"
     kept = result.replicates
     assert len(kept["floor"]) == len(kept["sums"])
     squares, freedom = np.sum(kept["floor"], axis=0)

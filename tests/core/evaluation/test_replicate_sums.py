@@ -7,7 +7,7 @@ import pytest
 
 from tactbench.core.evaluation.dataset import load_dataset
 from tactbench.core.evaluation.metrics import METRICS
-from tactbench.core.evaluation.replicate_sums import BLOCKS, replicates, tables_of
+from tactbench.core.evaluation.replicate_sums import replicates, tables_of
 
 from .made import force_task, label_task, record
 from .test_karl2016 import ramp
@@ -38,24 +38,10 @@ def test_the_score_of_a_class_follows_from_the_sums_exactly(tmp_path, metric):
     assert all(isinstance(value, int) for line in result.replicates["sums"] for value in line)
 
 
-def test_few_sessions_are_cut_into_blocks_of_time(tmp_path):
+def test_of_few_sessions_the_sums_of_each_recording_are_kept(tmp_path):
     kept = run(sessions(tmp_path, n=200), "session", estimator="mean", params={}).replicates
-    assert kept["unit"] == "block of 5 rows in time"
-    assert kept["names"] == [f"{name}/{number}" for name in "abc" for number in range(1, BLOCKS + 1)]
-    assert kept["strata"] == [place for place in range(3) for _ in range(BLOCKS)]
-    assert all(line[1] == 5 for line in kept["sums"])
-
-
-def test_a_sensor_of_twice_the_rate_has_the_same_blocks(tmp_path):
-    """So that two sensors pressed with the same scenes can be paired."""
-    slow, quick = (
-        run(
-            [record(tmp_path / f"{n}" / f"{name}.h5", *ramp(0, n=n), session=name) for name in "ab"],
-            "session", estimator="mean", params={},
-        ).replicates
-        for n in (100, 200) if (tmp_path / f"{n}").mkdir() is None
-    )  # fmt: skip
-    assert slow["names"] == quick["names"]
+    assert (kept["unit"], kept["names"], kept["strata"]) == ("recording", list("abc"), None)
+    assert all(line[1] == 200 for line in kept["sums"])
 
 
 def test_classes_that_live_in_recordings_of_their_own_are_strata(tmp_path):
@@ -68,16 +54,6 @@ def test_classes_that_live_in_recordings_of_their_own_are_strata(tmp_path):
     kept = run(paths, "roles", label_task(), "chance", params={}).replicates
     assert kept["names"] == [f"test{cap}{number}" for cap in range(2) for number in range(5)]
     assert kept["strata"] == [0] * 5 + [1] * 5
-
-
-def test_recordings_of_one_name_are_told_apart(tmp_path):
-    paths = []
-    for session in "ab":
-        (tmp_path / session).mkdir()
-        paths.append(record(tmp_path / session / "press.h5", *ramp(0, n=100), session=session))
-    names = run(paths, "session", estimator="mean", params={}).replicates["names"]
-    assert names[0] == "a/press/1"
-    assert len(set(names)) == len(names)
 
 
 def test_trials_of_one_session_stand_in_for_each_other(tmp_path):
@@ -103,7 +79,7 @@ def test_a_group_that_some_classes_do_not_have_is_said_not_to_be_in_the_interval
     ]  # fmt: skip
     method = run(paths, "roles", label_task()).interval.method
     assert method.startswith("jackknife over 12 recordings ")
-    assert method.endswith(": spread between sessions and objects is not in it; some test rows have no object")
+    assert method.endswith(": spread between sessions and objects is not in it")
 
 
 def test_five_caps_of_one_session_each_recorded_once_are_not_replicates(tmp_path):

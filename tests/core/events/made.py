@@ -28,10 +28,10 @@ def seconds(*values):
     return np.round(np.asarray(values, dtype=np.float64) * 1e9).astype(np.int64)
 
 
-def truth(events=(), disturbances=(), span=(0.0, 60.0)):
+def truth(events=(), disturbance=False, span=(0.0, 60.0)):
     """Return a ground truth stated in seconds."""
     begin, end = seconds(*span).tolist()
-    return GroundTruth(seconds(events).reshape(-1, 2), seconds(disturbances).reshape(-1, 2), (begin, end))
+    return GroundTruth(seconds(events).reshape(-1, 2), disturbance, (begin, end))
 
 
 milliseconds = st.integers(0, 8).map(lambda ms: ms / 1000)
@@ -50,9 +50,9 @@ stretches = st.lists(st.tuples(st.integers(0, 60), st.integers(0, 15)), max_size
     lambda pairs: np.asarray([(begin, begin + length) for begin, length in pairs], dtype=np.int64).reshape(-1, 2) * MS
 )
 truths = st.builds(
-    lambda events, disturbances, length: GroundTruth(events, disturbances, (0, length * MS)),
+    lambda events, disturbance, length: GroundTruth(events, disturbance, (0, length * MS)),
     stretches,
-    stretches,
+    st.booleans(),
     st.integers(0, 90),
 )
 

@@ -21,7 +21,7 @@ def at_one(recordings, threshold, rules):
 
 
 def assert_same(one, other):
-    assert (one.n_alarms, one.n_false_alarms, one.base_s) == (other.n_alarms, other.n_false_alarms, other.base_s)
+    assert (one.n_alarms, one.n_false_alarms, one.base_ns) == (other.n_alarms, other.n_false_alarms, other.base_ns)
     assert np.array_equal(one.latency_s, other.latency_s, equal_nan=True)
 
 
@@ -41,7 +41,7 @@ def walk(seed, n=2000, step_s=0.01, jitter=0.0):
     events = [(onset, onset + 0.5) for onset in (4.0, 9.0, 15.0)]
     for onset, end in events:
         score[round(onset / step_s) + 3 : round(end / step_s)] += 1.5
-    return ScoredRecording(clock, score, truth(events, disturbances=[(1.0, 2.0), (12.0, 13.0)], span=(0.0, 20.0)))
+    return ScoredRecording(clock, score, truth(events, span=(0.0, 20.0)))
 
 
 def test_every_row_but_the_last_has_alarms_of_its_own():
@@ -84,12 +84,12 @@ def test_the_operating_point_is_the_best_that_is_allowed(recordings, rules, boun
 def test_of_thresholds_of_equal_recall_the_fewest_false_positives_decide_and_then_the_highest():
     # An event at 1 s and a false rise at 5 s, outside the disturbance: each threshold up to 4 keeps the bound.
     clock, score = seconds(*range(10)), np.array([0.0, 4.0, 0.0, 0.0, 0.0, 2.0, 0.0, 0.0, 0.0, 0.0])
-    one = ScoredRecording(clock, score, truth([(1.0, 1.5)], disturbances=[(7.0, 8.0)], span=(0.0, 10.0)))
-    assert threshold_curve([one], policy(time="disturbances")).operating_point(1.0) == 4.0
+    one = ScoredRecording(clock, score, truth([(1.0, 1.5)], span=(0.0, 10.0)))
+    assert threshold_curve([one], policy()).operating_point(10.0) == 4.0
     # A second rise in the window of the event at every threshold above 2: the lower threshold has the better F1.
     score = np.array([0.0, 4.0, 2.0, 4.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0])
     one = ScoredRecording(clock, score, one.truth)
-    assert threshold_curve([one], policy(after=3.0, time="disturbances")).operating_point(1.0) == 2.0
+    assert threshold_curve([one], policy(after=3.0)).operating_point(0.0) == 2.0
 
 
 def test_a_detector_that_hits_nothing_within_the_bound_never_raises_an_alarm():

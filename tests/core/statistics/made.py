@@ -5,7 +5,7 @@ import numpy as np
 from tactbench.core.evaluation.metrics import METRICS
 
 
-def row(cell, sums, *, metric="rmse", classes=0, names=None, unit="session", strata=None, run=1, **more):
+def row(cell, sums, *, metric="rmse", classes=0, names=None, unit="session", strata=None, **more):
     """Return a finished row whose replicates have these sums, (replicates, m)."""
     sums = np.asarray(sums, dtype=np.float64)
     score = float(METRICS[metric].score(sums.sum(axis=0), classes))
@@ -19,7 +19,7 @@ def row(cell, sums, *, metric="rmse", classes=0, names=None, unit="session", str
         "metric": metric, "unit": "N", "score": score, "ci_low": None, "ci_high": None, "equivalence": None,
         "reference_score": None, "baseline": None, "simulated": True, "dagger": False, "stamps": [], "scores": {},
         "classes": list(range(classes)), "n_sessions": len(sums), "n_test": int(sums[:, -1].sum()),
-        "replicates": {"unit": unit, "names": names, "strata": strata, "run": run, "sums": lines},
+        "replicates": {"unit": unit, "names": names, "strata": strata, "sums": lines},
     } | more  # fmt: skip
 
 

@@ -40,9 +40,8 @@ def test_tasks_weigh_the_same_however_many_sessions_they_have():
     assert aggregate([few, few, many]).value == pytest.approx(0.75)
 
 
-def test_blocks_of_time_have_no_score_of_their_own():
-    kept = {"unit": "block of 10 rows in time", "strata": [0] * 20 + [1] * 20}
-    found = aggregate([mae_row("a", np.linspace(0.5, 1.5, 40), baseline=2.0, run=2, **kept)])
+def test_replicates_in_strata_enter_with_the_one_score():
+    found = aggregate([mae_row("a", np.linspace(0.5, 1.5, 40), baseline=2.0, strata=[0] * 20 + [1] * 20)])
     assert (found.value, found.entries) == (pytest.approx(0.5), 1)
     assert found.low < 0.5 < found.high
 

@@ -61,15 +61,9 @@ def test_verdicts_follow_the_interval_and_the_region(shift, same, verdict, beyon
     assert (found.verdict, found.beyond) == (verdict, beyond)
 
 
-def test_without_replicates_their_own_intervals_stand_in():
-    near = mae_row("a", A, replicates={}, ci_low=0.9, ci_high=1.1)
-    far = mae_row("b", A + 5, replicates={}, ci_low=5.9, ci_high=6.1)
-    found = difference(near, far)
-    assert (found.verdict, found.replicates, found.effect) == ("better", 0, None)
-    # Infinite degrees of freedom are taken as 10^9, where t still differs from normal in the ninth digit.
-    assert found.high - found.value == pytest.approx(0.1 * np.sqrt(2), rel=1e-8)
-    nothing = difference(near, far | {"ci_low": None, "ci_high": None})
-    assert (nothing.low, nothing.p, nothing.verdict) == (None, None, "undecided")
+def test_without_replicates_nothing_is_decided():
+    found = difference(mae_row("a", A, replicates={}, ci_low=0.9, ci_high=1.1), mae_row("b", A + 5))
+    assert (found.low, found.p, found.effect, found.verdict, found.replicates) == (None, None, None, "undecided", 0)
 
 
 @settings(max_examples=40, deadline=None)
@@ -139,10 +133,6 @@ def test_the_corrected_test_by_hand():
     assert found.mean == pytest.approx(0.03)
     assert found.p == pytest.approx(2 * stats.t.sf(0.03 / deviation, 9), rel=1e-9)
     assert found.high - found.mean == pytest.approx(stats.t.ppf(0.975, 9) * deviation, rel=1e-9)
-    assert "Nadeau and Bengio" in found.method
-    repeated = corrected_t(D, 1, repeats=5)
-    assert "Bouckaert and Frank" in repeated.method
-    assert "2 folds of 5 repeats" in repeated.method
 
 
 def test_folds_are_taken_by_name_and_one_fold_says_nothing():
@@ -151,8 +141,8 @@ def test_folds_are_taken_by_name_and_one_fold_says_nothing():
         return mae_row(cell, [1.0] * 5, scores=named | {"mae": 9.0}, fold_sizes=dict.fromkeys(named, sizes))
 
     one, other = folded("a", {"x": 1.0, "y": 2.0, "z": 3.0}), folded("b", {"z": 2.5, "x": 0.4, "y": 1.9})
-    found, by_hand = over_folds([(one, other)]), corrected_t([0.6, 0.1, 0.5], 0.25)
+    found, by_hand = over_folds(one, other), corrected_t([0.6, 0.1, 0.5], 0.25)
     assert (found.mean, found.p) == pytest.approx((by_hand.mean, by_hand.p))
-    assert over_folds([(folded("a", {"x": 1.0}), folded("b", {"x": 2.0}))]) is None
-    assert over_folds([(one, mae_row("old", [1.0] * 5))]) is None
+    assert over_folds(folded("a", {"x": 1.0}), folded("b", {"x": 2.0})) is None
+    assert over_folds(one, mae_row("old", [1.0] * 5)) is None
     assert corrected_t([0.1], 0.25) is None

@@ -68,7 +68,7 @@ def test_what_all_replicates_remark_is_told_once_and_what_some_do_with_their_num
 
 def test_recordings_keep_the_interval_over_their_sessions_and_lose_one_that_is_not_over_sessions():
     names = [f"s{place}" for place in range(6)]
-    for unit, kept in (("session", True), ("recording", False), ("block of 9 rows in time", False)):
+    for unit, kept in (("session", True), ("recording", False)):
         one = row(simulated=False, replicates={"unit": unit, "names": names, "strata": None, "sums": []})
         (found,) = over_replicates([one])
         assert (found["ci_low"] is not None) is kept
@@ -113,9 +113,8 @@ def test_recordings_classified_rightly_are_counted_by_most_of_their_samples():
     lines = [[0, 9, 1, 1], [4, 2, 5, 8], [8, 10]]
     kept = {"unit": "recording", "names": ["x", "y", "z"], "strata": None, "sums": lines}
     assert recordings_right(row(classes=["p", "q", "r"], replicates=kept)) == (2, 3)
-    in_time = {"unit": "block of 5 rows in time", "names": ["x/1", "x/2", "z/1"], "strata": [0, 0, 1], "sums": [
-        [0, 4, 1, 1], [1, 5], [8, 10]]}  # fmt: skip
-    assert recordings_right(row(classes=["p", "q", "r"], replicates=in_time)) == (1, 2)
+    mixed = kept | {"sums": [[0, 4, 4, 1]], "names": ["x"]}
+    assert recordings_right(row(classes=["p", "q", "r"], replicates=mixed)) is None
     assert recordings_right(row(replicates=kept)) is None
 
 
