@@ -65,7 +65,8 @@ class TactbenchError(Exception):
 
     def __reduce__(self) -> tuple[object, ...]:
         # Errors cross process borders as plain text, whatever arguments a subclass takes.
-        return (_rebuild, (type(self), self.message, self.hint))
+        plain = {name: value for name, value in vars(self).items() if isinstance(value, str | int | float | None)}
+        return (_rebuild, (type(self), self.message, self.hint), plain)
 
 
 def _rebuild(kind: type[TactbenchError], message: str, hint: str) -> TactbenchError:
@@ -226,24 +227,6 @@ class CellStopped(TactbenchError):  # noqa: N818  (a way to end, not one error)
         self.log = log
         self.spent_s: float | None = None
         self.traceback_text = traceback_text
-
-    def __reduce__(self) -> tuple[object, ...]:
-        state = (self.message, self.hint, self.signal, self.log, self.traceback_text, self.spent_s)
-        return (_stopped, (type(self), *state))
-
-
-def _stopped(
-    kind: type[CellStopped],
-    message: str,
-    hint: str,
-    signal: int | None,
-    log: str,
-    traceback_text: str,
-    spent_s: float | None,
-) -> CellStopped:
-    error = kind(message, hint=hint, signal=signal, log=log, traceback_text=traceback_text)
-    error.spent_s = spent_s
-    return error
 
 
 class Raised(CellStopped):

@@ -27,13 +27,3 @@ def test_those_that_fail_are_reported_and_stop_nothing(verbs):
     assert "tactbench plugins" in listed.stderr
     run = ("run", "--sensor", "acme-pad", "--task", "force", "--repeats", "1")
     assert "copycat-tactile" in verbs(*run, plugins=plugins, code=2).stderr
-
-
-def test_a_plugin_whose_import_ends_its_process_ends_no_run(shell, tmp_path):
-    package, info = tmp_path / "site" / "vanishing.py", tmp_path / "site" / "vanishing-1.0.dist-info"
-    info.mkdir(parents=True)
-    package.write_text("import os\nos._exit(0)\n")
-    (info / "METADATA").write_text("Metadata-Version: 2.1\nName: vanishing\nVersion: 1.0\n")
-    (info / "entry_points.txt").write_text("[tactbench]\nvanishing = vanishing\n")
-    run = ("run", "--repeats", "1", "--sensor", "ideal", "--task", "force", "--estimator", "ols", "--no-latency")
-    assert "ideal" in shell(*run, plugins=(str(tmp_path / "site"),)).stdout

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tactbench.core.errors import FormatError, RigError
+from tactbench.core.errors import FormatError
 from tactbench.core.recording.clock_fit import HostTimes
 from tactbench.core.recording.health import examine
 from tactbench.core.recording.reader import open_recording
@@ -85,15 +85,6 @@ def test_where_the_device_is_not_the_clock_times_are_as_they_came(tmp_path, make
     assert read.host_ns is None
 
 
-def test_a_block_after_the_labels_is_refused(tmp_path, make_meta):
-    n = np.arange(5)
-    with RecordingWriter(tmp_path / "x.h5", make_meta()) as writer:
-        writer.append(Block("taxels", n, np.ones((5, 3))))
-        writer.annotate("taxels", "press", n)
-        with pytest.raises(RigError, match="labelled"):
-            writer.append(Block("taxels", n + 5, np.ones((5, 3))))
-
-
 @pytest.mark.parametrize("name", ["host_ns", "device_ns"])
 def test_a_file_without_its_raw_times_is_refused(tmp_path, make_meta, name):
     path = record(tmp_path / "x.h5", make_meta(), *clocked(3)[::2])
@@ -101,17 +92,6 @@ def test_a_file_without_its_raw_times_is_refused(tmp_path, make_meta, name):
         del file[f"streams/taxels/{name}"]
     with open_recording(path) as recording, pytest.raises(FormatError, match="do not go with"):
         recording.read("taxels")
-
-
-def test_times_changed_behind_the_raw_ones_are_told(tmp_path, make_meta):
-    path = record(tmp_path / "x.h5", make_meta(), *clocked(3)[::2])
-    with open_recording(path) as recording:
-        assert "clock-fit" not in {finding.check for finding in examine(recording)}
-    with h5py.File(path, "a") as file:
-        file["streams/taxels/t_ns"][100] += 1
-    with open_recording(path) as recording:
-        (finding,) = [finding for finding in examine(recording) if finding.check == "clock-fit"]
-    assert (finding.severity, finding.count) == ("error", 1)
 
 
 def test_lost_rows_are_told(tmp_path, make_meta):

@@ -3,18 +3,9 @@
 import pytest
 from pydantic import ValidationError
 
-from tactbench.core.cli.config import default_matrix, packaged_matrices
+from tactbench.core.cli.config import default_matrix
 from tactbench.core.plugins.registry import load_registry
 from tactbench.core.spec.matrix import ComparisonChoice
-from tactbench.core.spec.yaml_file import load_yaml
-
-
-def test_the_default_matrix_declares_what_it_is_run_for():
-    declared = default_matrix().comparisons
-    assert [(one.sensors, one.task) for one in declared if one.sensors] == [
-        (("biotac", "icub"), "force"), (("biotac", "icub"), "curvature"),
-    ]  # fmt: skip
-    assert len([one for one in declared if one.estimators]) == 2
 
 
 def test_what_is_declared_is_run():
@@ -40,12 +31,6 @@ def test_what_is_declared_is_run():
 def test_a_comparison_that_is_none_is_refused(given, says):
     with pytest.raises(ValidationError, match=says):
         ComparisonChoice(**given)
-
-
-def test_packaged_matrices_declare_nothing_that_cannot_be_read():
-    from tactbench.core.spec.matrix import MatrixSpec
-
-    assert all(isinstance(load_yaml(path, MatrixSpec), MatrixSpec) for path in packaged_matrices().values())
 
 
 def test_each_task_of_ours_says_what_is_practically_the_same():

@@ -17,12 +17,6 @@ def load(tmp_path, text):
     return load_yaml(path, MatrixSpec)
 
 
-def test_a_good_file_becomes_a_model(tmp_path):
-    matrix = load(tmp_path, GOOD)
-    assert [task.name for task in matrix.tasks] == ["force", "curvature"]
-    assert matrix.tasks[1].estimators[0].name == "forest"
-
-
 @pytest.mark.parametrize(
     ("text", "line", "says"),
     [
@@ -57,12 +51,6 @@ def test_a_number_in_an_odd_notation_is_refused(tmp_path, value):
     with pytest.raises(ConfigError, match=f"matrix.yaml:2: {value} would be read as another"):
         load(tmp_path, f"tasks: [force]\nrepeats: {value}\n")
     assert plain_value(value) == value
-
-
-@pytest.mark.parametrize("value", ["yes", "2025-04-01", "1.50"])
-def test_a_refused_value_is_shown_as_it_is_written(tmp_path, value):
-    with pytest.raises(ConfigError, match=rf"sensors.0: .* \(given: {value}\)"):
-        load(tmp_path, f"tasks: [force]\nsensors: [{value}]\n")
 
 
 def test_a_missing_file_and_an_empty_one_are_config_errors(tmp_path):
