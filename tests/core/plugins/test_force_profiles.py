@@ -5,14 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tactbench.core.errors import PluginContractError, UsageError
+from tactbench.core.errors import UsageError
 from tactbench.core.plugins.force_profiles import force_path
 from tactbench.core.plugins.registry import installed
-from tactbench.core.spec.parameter import Parameter
-from tactbench.core.spec.quantity import Source, assumed
-from tactbench.core.spec.rig import ProfileDescriptor
+from tactbench.core.spec.quantity import assumed
 from tactbench.core.spec.scene import Scene
-from tactbench.plugin import ForcePath, sine, staircase
+from tactbench.plugin import sine, staircase
 
 
 def path_of(name, **given):
@@ -59,19 +57,3 @@ def test_a_path_names_its_profile_and_is_read_without_it():
 def test_a_parameter_that_cannot_be_is_named(name, given, says):
     with pytest.raises(UsageError, match=says):
         path_of(name, **given)
-
-
-def backwards(*, start):
-    return ForcePath(times_s=(0.0, start), forces_n=(0.0, -1.0), samples=1, source=Source(tag="assumed", reference="t"))
-
-
-@pytest.mark.parametrize(
-    ("where", "says"),
-    [(f"{__name__}:backwards", r"makes no force path of \{'start': 1.0\}: forces_n.1: .*0"),
-     ("builtins:dict", "returned a dict")],
-)  # fmt: skip
-def test_what_is_no_force_path_is_the_plugins_fault(where, says):
-    start = Parameter(default=1.0, unit="s", text="a time")
-    odd = ProfileDescriptor(name="odd", title="odd", where=where, parameters={"start": start})
-    with pytest.raises(PluginContractError, match=says):
-        force_path(odd, {}, "a test")

@@ -110,12 +110,3 @@ def test_a_device_that_starts_again_and_one_that_pauses():
     assert [segment.run for segment in fit.segments()] == [0, 1, 2]
     # 1 ms of uniform delay over 500 points: the least are a few microseconds above the line.
     assert np.abs(on_host(fit, device) - true).max() < 50_000
-
-
-def test_of_rows_that_come_together_the_last_counts():
-    device = np.arange(0, 10 * S, MS)
-    host = device // (10 * MS) * 10 * MS + 9 * MS  # ten rows a receipt, the last one without delay
-    fit = ClockFit()
-    fit.add(device, host)
-    (segment,) = fit.segments()
-    assert (segment.points, segment.offset_ns, segment.drift, segment.bound_ns) == (1000, 0, 0.0, 0)

@@ -1,6 +1,5 @@
 """Whatever a file is, reading it ends in what was written or in one clear error: never a crash, never a guess."""
 
-import json
 import random
 
 import h5py
@@ -63,66 +62,38 @@ def test_another_programs_hdf5(tmp_path):
         open_recording(tmp_path / "x.h5")
 
 
-def _newer(file):
-    file.attrs["format_version"] = 4
+def _put(name, value):
+    def change(file):
+        del file[name]
+        file[name] = value
 
-
-def _unfinished(file):
-    file.attrs["complete"] = False
-
-
-def _meta_field(file):
-    file.attrs["meta"] = json.dumps(json.loads(file.attrs["meta"]) | {"colour": "red"})
-
-
-def _no_data(file):
-    del file["streams/taxels/data"]
-
-
-def _other_width(file):
-    del file["streams/taxels/data"]
-    file["streams/taxels/data"] = np.zeros((3000, 4), dtype=np.uint16)
-
-
-def _fewer_times(file):
-    file["streams/taxels/t_ns"].resize(2999, axis=0)
-
-
-def _external_link(file):
-    del file["streams/taxels"]
-    file["streams/taxels"] = h5py.ExternalLink("other.h5", "/streams/taxels")
+    return change
 
 
 def _one_reading(file):
     file["streams/taxels/data"][100, 1] ^= 1
 
 
-TAMPERED = [value for name, value in list(globals().items()) if name[0] == "_" != name[1] and callable(value)]
-
-
-SAYS = {
-    _newer: "newer tactbench",
-    _unfinished: "not finished",
-    _external_link: "link to another place",
-    _one_reading: "digest",
-}
-
-
-def _read_without_digest(path):
-    with open_recording(path) as recording:
-        for name in recording.stream_names:
-            recording.read(name)
-
-
-@pytest.mark.filterwarnings("ignore::DeprecationWarning")  # NumPy's, about what the tampered files hold
-@pytest.mark.parametrize("tamper", TAMPERED, ids=lambda tamper: tamper.__name__.strip("_"))
-def test_a_file_that_contradicts_itself(good, tamper):
+@pytest.mark.parametrize(
+    ("tamper", "says"),
+    [
+        (lambda file: file.attrs.update({"format_version": 4}), "newer tactbench"),
+        (lambda file: file.attrs.update({"complete": False}), "not finished"),
+        (lambda file: file.attrs.update({"meta": file.attrs["meta"][:-1] + ',"colour":"red"}'}), "colour"),
+        (lambda file: file.pop("streams/taxels/data"), "no data of type uint16"),
+        (lambda file: file["streams/taxels/t_ns"].resize(2999, axis=0), "t_ns"),
+        (_put("streams/taxels/data", np.zeros((3000, 4), dtype=np.uint16)), "(3000, 3) is expected"),
+        (_put("streams/taxels", h5py.ExternalLink("other.h5", "/streams/taxels")), "link to another place"),
+        (_one_reading, "digest"),
+    ],
+)
+def test_a_file_that_contradicts_itself(good, tamper, says):
     with h5py.File(good, "a") as file:
         tamper(file)
     with pytest.raises(FormatError) as caught:
-        read_all(good) if tamper is _one_reading else _read_without_digest(good)
+        read_all(good)
     assert "press.h5" in str(caught.value)
-    assert SAYS.get(tamper, "") in str(caught.value)
+    assert says in str(caught.value)
     assert caught.value.hint
 
 

@@ -12,21 +12,12 @@ from hypothesis import strategies as st
 from tactbench.core.recording.reader import content_digest, open_recording
 from tactbench.core.recording.writer import RecordingWriter
 from tactbench.core.samples import Block
-from tactbench.core.spec.quantity import Source
 from tactbench.core.spec.recording import RecordingMeta
-from tactbench.core.spec.sensor import ChannelSpec, SensorSpec, StreamSpec
+from tests.core.recording.conftest import sensor
 
 DTYPES = ("uint8", "uint16", "int16", "int32", "float32", "float64")
 text = st.text(st.characters(blacklist_characters="\0", blacklist_categories=("Cs",)), max_size=12)
 scalar = st.one_of(text, st.integers(-(2**53), 2**53), st.floats(allow_nan=False, allow_infinity=False))
-
-
-def sensor(channels, dtype):
-    return SensorSpec(
-        name="pad", title="a pad", principle="capacitive", principle_source=Source(tag="assumed", reference="test"),
-        streams=(StreamSpec(name="taxels", dtype=dtype, channels=tuple(
-            ChannelSpec(name=f"t{place}", kind="taxel") for place in range(channels))),),
-    )  # fmt: skip
 
 
 @st.composite

@@ -3,7 +3,7 @@
 import h5py
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from tactbench.core.errors import FormatError
@@ -12,20 +12,9 @@ from tactbench.core.recording.health import examine
 from tactbench.core.recording.reader import open_recording
 from tactbench.core.recording.writer import RecordingWriter
 from tactbench.core.samples import Block
-from tactbench.core.spec.quantity import Source
-from tactbench.core.spec.recording import RecordingMeta, StreamClock, StreamCounts
-from tactbench.core.spec.sensor import ChannelSpec, SensorSpec, StreamSpec
+from tactbench.core.spec.recording import StreamClock, StreamCounts
 
 START = 1_700_000_000_000_000_000
-
-
-def _meta(**fields):
-    channels = tuple(ChannelSpec(name=f"t{place}", kind="taxel") for place in range(3))
-    sensor = SensorSpec(
-        name="pad", title="a pad", principle="capacitive", principle_source=Source(tag="assumed", reference="test"),
-        streams=(StreamSpec(name="taxels", dtype="uint16", channels=channels),),
-    )  # fmt: skip
-    return RecordingMeta(name="x", rig="test", sensor=sensor, **fields)
 
 
 def record(path, meta, device, host, blocks=7):
@@ -44,14 +33,14 @@ def clocked(seed, rows=4000):
     return device, true, true + rng.exponential(500_000, rows).astype(np.int64)
 
 
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=15, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(st.integers(0, 2**32), st.integers(1, 50), st.integers(0, 4000))
-def test_stored_times_are_exactly_recomputed(tmp_path_factory, seed, blocks, lost):
+def test_stored_times_are_exactly_recomputed(tmp_path_factory, make_meta, seed, blocks, lost):
     """Over 40 s, with a counter that begins again at some row."""
     device, _, host = clocked(seed)
     device[lost:] -= device[lost] if lost < 4000 else 0
     folder = tmp_path_factory.mktemp("times")
-    path = record(folder / "x.h5", _meta(), device, host, blocks)
+    path = record(folder / "x.h5", make_meta(), device, host, blocks)
     with open_recording(path) as recording:
         recording.verify()
         read, clock = recording.read("taxels"), recording.meta.clocks["taxels"]

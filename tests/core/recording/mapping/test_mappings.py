@@ -2,7 +2,6 @@
 
 import copy
 import os
-import re
 
 import numpy as np
 import openpyxl
@@ -325,15 +324,6 @@ def test_a_header_of_numbers_is_a_row(run, put, tmp_path, name):
     refused(run, tmp_path, "press.csv: its header row has the number '0.00' in column 0",
             tables__table__read={"format": name, "header": True})  # fmt: skip
     assert run(tables__table__read={"format": name, "header": False}).rows == 40
-
-
-@pytest.mark.parametrize(("kind", "unit"), [("force", "kg"), ("force", "mm"), ("force", "count"), ("torque", "N")])
-def test_a_target_in_a_unit_of_something_else_is_refused(run, put, tmp_path, kind, unit):
-    put("press.csv", rows())
-    channel = {"columns": 4, "name": "fz", "kind": kind, "unit": unit, "sentinels": []}
-    error = refused(run, tmp_path, f"'{unit}'", f"a {kind} is in", streams__force__channels=[channel])
-    line = int(re.search(r"mapping.yaml:(\d+):", str(error))[1])
-    assert (tmp_path / "mapping.yaml").read_text().splitlines()[line - 1].strip() == f"unit: {unit}"
 
 
 def test_words_for_no_sample(run, put):
