@@ -3,18 +3,11 @@
 import json
 
 
-def test_a_strangers_sensor_is_discovered_in_a_fresh_interpreter(shell):
-    found = json.loads(shell("plugins", "--format", "json", plugins=("good",)).stdout)
-    (row,) = [row for row in found["plugins"] if row["distribution"] == "acme-tactile"]
-    assert (row["status"], row["version"], row["brings"]) == ("loaded", "1.2.0", ["sensor acme-pad"])
-    assert "acme-pad" in json.loads(shell("list", "sensors", "--format", "json", plugins=("good",)).stdout)["sensors"]
-    brought = {thing for row in found["plugins"] if row["distribution"] == "tactbench" for thing in row["brings"]}
-    assert {"sensor biotac", "rig twin", "rig replay", "task force", "estimator forest"} <= brought
-
-
 def test_those_that_fail_are_reported_and_stop_nothing(verbs):
     plugins = ("good", "broken", "misspelt", "twin_name")
     found = json.loads(verbs("plugins", "--format", "json", plugins=plugins, code=1).stdout)
+    (row,) = [row for row in found["plugins"] if row["distribution"] == "acme-tactile"]
+    assert (row["status"], row["version"], row["brings"]) == ("loaded", "1.2.0", ["sensor acme-pad"])
     reasons = {row["distribution"]: row["reason"] for row in found["plugins"] if row["status"] == "failed"}
     assert reasons.keys() == {"broken-tactile", "misspelt-tactile"}
     assert "the vendor library is not installed" in reasons["broken-tactile"]
