@@ -65,7 +65,8 @@ class TactbenchError(Exception):
 
     def __reduce__(self) -> tuple[object, ...]:
         # Errors cross process borders as plain text, whatever arguments a subclass takes.
-        return (_rebuild, (type(self), self.message, self.hint), vars(self))
+        plain = {name: value for name, value in vars(self).items() if isinstance(value, str | int | float | None)}
+        return (_rebuild, (type(self), self.message, self.hint), plain)
 
 
 def _rebuild(kind: type[TactbenchError], message: str, hint: str) -> TactbenchError:

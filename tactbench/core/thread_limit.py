@@ -22,11 +22,6 @@ def thread_limit(threads: int) -> AbstractContextManager[Any]:
     return limit
 
 
-def find_libraries() -> None:
-    """Look for libraries now, if modules were imported since: processes forked from here need not."""
-    _libraries(len(sys.modules))
-
-
 @lru_cache(maxsize=1)
 def _libraries(modules: int) -> Any:
     """Return the libraries of this process as they were when it had imported so many modules."""

@@ -17,7 +17,7 @@ from tactbench.core.recording.salvage import rescue
 from tactbench.core.samples import Block
 from tactbench.core.spec.profile import ForceRamp
 from tactbench.core.spec.quantity import Source, assumed
-from tactbench.core.spec.recording import Emulation, PlanEntry, StreamClock, StreamCounts
+from tactbench.core.spec.recording import PlanEntry, StreamClock, StreamCounts
 from tactbench.core.spec.rig import RigDescriptor, SensorDescriptor
 from tactbench.core.spec.scene import Indenter, Scene
 from tactbench.core.spec.sensor import ChannelSpec, SensorSpec, StreamSpec
@@ -95,37 +95,6 @@ def test_everything_the_rig_says_is_kept(tmp_path):
     assert rig.closed
 
 
-def test_what_a_rig_remarks_is_shown_with_every_score(tmp_path):
-    class Remarks(Weights):
-        def __iter__(self):
-            yield from super().__iter__()
-            self.drawn = {"remark load": "50 N is too much", "remarkable": 1.0, "offset_mm": 0.25}
-
-    meta, _ = run(tmp_path / "r.h5", Remarks())
-    assert meta.remarks == ("50 N is too much",)
-
-
-def test_the_cost_is_the_rigs_alone(tmp_path):
-    """Time passes only inside the rig here: opening takes 1 s, each of six blocks 10 s, writing none."""
-    now = [0.0]
-
-    class Slow(Weights):
-        @contextmanager
-        def open(self, sensor, scene, *, seed):
-            now[0] += 1
-            with super().open(sensor, scene, seed=seed) as acquisition:
-                yield acquisition
-
-        def __iter__(self):
-            for block in super().__iter__():
-                now[0] += 10
-                yield block
-
-    assert run(tmp_path / "a.h5", Slow(), clock=lambda: now[0]).meta.provenance == {"tactbench": "1", "sim_s": 61.0}
-    made = run(tmp_path / "b.h5", Slow(), clock=lambda: now[0], simulated=False)
-    assert made.meta.provenance["acquisition_s"] == 61.0
-
-
 @pytest.mark.parametrize("fails_at", [0, 2])
 def test_a_rig_that_fails_leaves_nothing(tmp_path, fails_at):
     rig = Weights(fails_at)
@@ -200,22 +169,6 @@ def test_what_devices_say_is_recorded_and_times_are_the_hosts(tmp_path):
     assert np.array_equal(taxels.device_ns, np.arange(200) * 1_000_000)
     assert (force.device_ns, force.host_ns) == (None, None)
     assert np.array_equal(force.t_ns, true)
-
-
-def test_in_virtual_time_the_devices_clocks_are_fitted_too(tmp_path):
-    emulation = Emulation(time="virtual", seed=3, physics="twin", devices=("pad",))
-    meta, _ = run(tmp_path / "r.h5", Devices(emulation=emulation), simulated=False)
-    assert (meta.clock, meta.simulated, meta.emulation) == ("simulated", True, emulation)
-    clock = meta.clocks["taxels"]
-    assert (clock.source, clock.method, clock.delay_ns, clock.wraps) == ("device", "hull-1way", (200_000, 300_000), 2)
-    with open_recording(tmp_path / "r.h5") as recording:
-        taxels = recording.read("taxels")
-    assert len(taxels.device_ns) == len(taxels.host_ns) == 200
-
-
-def test_emulated_devices_in_real_time_have_their_clocks_fitted(tmp_path):
-    meta, _ = run(tmp_path / "r.h5", Devices(emulation=Emulation(time="real")), simulated=False)
-    assert (meta.clock, meta.simulated, meta.clocks["taxels"].method) == ("host", True, "hull-1way")
 
 
 STOPS = [
@@ -305,12 +258,6 @@ def test_an_interrupt_after_which_it_still_moves_is_an_error_that_says_so(tmp_pa
     with pytest.raises(RigError, match=r"interrupted, .* stand clear\."):
         run(rig.kept, rig, simulated=False, complete_interrupted=True)
     assert rig.kept.exists()
-
-
-def test_nothing_is_kept_of_a_simulation(tmp_path):
-    with pytest.raises(RigError):
-        run(tmp_path / "r.h5", Devices(stops="gone"), complete_interrupted=True)
-    assert list(tmp_path.iterdir()) == []
 
 
 def test_interrupted_before_the_first_row_there_is_nothing_to_keep(tmp_path):

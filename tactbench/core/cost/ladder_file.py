@@ -49,7 +49,7 @@ from typing import Any
 
 from tactbench.core.cost.ladder import Ladder
 from tactbench.core.errors import UnwritableError
-from tactbench.core.files import read_regular, replace_file
+from tactbench.core.files import replace_file
 
 VERSION = 2
 
@@ -126,7 +126,7 @@ def read_ladders(folder: Path) -> Iterator[dict[str, Any]]:
     """Yield the tables of a result folder, by name of file; a file that is none of this version is left out."""
     for path in sorted((folder / "cost").glob("*.json")):
         try:
-            found = json.loads(read_regular(path, 2**26))
+            found = json.loads(path.read_bytes())
         except (OSError, ValueError):
             continue
         if isinstance(found, dict) and found.get("version") == VERSION and isinstance(found.get("rows"), list):

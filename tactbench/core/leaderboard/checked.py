@@ -7,7 +7,7 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from tactbench.core.spec.row import JSON_KEYS, ReplicatedRow, fault_in_scores
+from tactbench.core.spec.row import JSON_KEYS, ReplicatedRow
 
 Row = dict[str, Any]
 
@@ -49,8 +49,6 @@ def _fault(row: Row) -> str:
     except ValidationError as error:
         first = error.errors(include_url=False)[0]
         return f"its {'.'.join(map(str, first['loc']))}: {first['msg']}"
-    if fault := fault_in_scores(row):
-        return fault
     for key, value in row.items():
         if type(value) is int and abs(value) >= _LARGEST and key != "seed":
             return f"its {key} is larger than a table holds"

@@ -11,7 +11,7 @@ from itertools import chain
 from pathlib import Path
 from typing import Any
 
-from tactbench.core.files import read_regular, replace_file
+from tactbench.core.files import replace_file
 from tactbench.core.provenance.source import PACKAGE
 
 Row = dict[str, Any]
@@ -21,7 +21,6 @@ KEY = "conformance_level"
 """Of a row, in a folder with such a file: the level, or why there is none."""
 NOT_CHECKED, OTHER_VERSION = "not checked", "other version"
 _LEVELS = ("none", "bronze", "silver", "gold")
-_MOST_BYTES = 65_536
 
 
 def identity_of(package: str, provenance: Mapping[str, Any]) -> dict[str, str]:
@@ -48,7 +47,7 @@ def read_levels(folder: Path) -> dict[str, dict[str, Any]]:
     found = {}
     for path in sorted((folder / FOLDER).glob("*.json")):
         try:
-            facts = json.loads(read_regular(path, _MOST_BYTES))
+            facts = json.loads(path.read_bytes())
         except (OSError, ValueError, RecursionError):
             continue
         if isinstance(facts, dict) and facts.get("level") in _LEVELS and facts.get("sensor") == path.stem:

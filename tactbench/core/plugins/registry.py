@@ -283,7 +283,7 @@ def ask_plugin(point: EntryPoint) -> dict[str, list[Any]]:
     manager.register(module, name=point.name)
     manager.check_pending()
     known = {f"tactbench_{family}" for family in _KINDS}
-    callers = manager.get_hookcallers(module) or []
+    callers = manager.get_hookcallers(module)
     if not callers:
         raise PluginContractError(
             f"{point.value} implements none of {', '.join(sorted(known))}.",
@@ -292,12 +292,7 @@ def ask_plugin(point: EntryPoint) -> dict[str, list[Any]]:
     offered: dict[str, list[Any]] = {}
     for caller in callers:
         family = caller.name.removeprefix("tactbench_")
-        answers = caller()  # pluggy leaves None out
-        if not answers:
-            raise PluginContractError(
-                f"{caller.name} of {point.value} returned None.", hint="Return a list of descriptors, if an empty one."
-            )
-        descriptors = list(answers[0])
+        descriptors = [descriptor for answer in caller() for descriptor in answer]  # pluggy leaves None out
         for descriptor in descriptors:
             if not isinstance(descriptor, _KINDS[family]):
                 raise PluginContractError(
@@ -315,17 +310,16 @@ def check_api_version(module: str, written_for: object) -> None:
     Raises
     ------
     PluginContractError
-        If they differ: which of the two is the older one, and what to update.
+        If they differ.
     """
     spoken = hookspecs.API_VERSION
     if type(written_for) is int and written_for == spoken:
         return
     stated = "no TACTBENCH_API" if written_for is None else f"TACTBENCH_API = {written_for!r}"
-    if type(written_for) is not int:
-        hint = f"Write TACTBENCH_API = {spoken} in it."
-    else:
-        hint = f"Update {'tactbench' if written_for > spoken else 'the plugin'}: see docs/stability.md."
-    raise PluginContractError(f"{module} states {stated}; the plugin interface here is {spoken}.", hint=hint)
+    raise PluginContractError(
+        f"{module} states {stated}; the plugin interface here is {spoken}.",
+        hint=f"Write TACTBENCH_API = {spoken} in it, or update the older of the two: see docs/stability.md.",
+    )
 
 
 @lru_cache

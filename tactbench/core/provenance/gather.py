@@ -5,6 +5,7 @@ It holds no clock, no name of a person or host and no path: equal circumstances 
 
 from __future__ import annotations
 
+import hashlib
 import os
 import platform
 import re
@@ -18,7 +19,6 @@ from typing import Any
 import psutil
 
 import tactbench
-from tactbench.core.files import sha256
 from tactbench.core.plugins.registry import Registry
 from tactbench.core.provenance.source import PACKAGE, RELEVANT, source_digest, version_of
 
@@ -56,7 +56,7 @@ def usable_cores() -> int:
 def host_id() -> str:
     """Return a digest that tells hosts apart without naming them."""
     parts = (platform.node(), platform.machine(), cpu_model(), str(os.cpu_count()))
-    return sha256("\0".join(parts))[:12]
+    return hashlib.sha256("\0".join(parts).encode()).hexdigest()[:12]
 
 
 @lru_cache(maxsize=1)

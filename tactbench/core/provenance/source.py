@@ -12,8 +12,6 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
-from tactbench.core.files import sha256
-
 PACKAGE = "tactbench"
 RELEVANT = ("numpy", "scipy", "scikit-learn")
 """Distributions whose version may change a number in any cell."""
@@ -89,4 +87,4 @@ def provenance_id(provenance: Mapping[str, Any]) -> str:
 
 def digest_of(text: str) -> str:
     """Return the digest that a key or an identifier is: 32 hexadecimal digits."""
-    return sha256(text)[:32]
+    return hashlib.sha256(text.encode()).hexdigest()[:32]

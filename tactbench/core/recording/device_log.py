@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from tactbench.core.errors import DataError, LinkError, MissingRecordingError, PluginContractError, UsageError
+from tactbench.core.errors import DataError, LinkError, MissingRecordingError, UsageError
 from tactbench.core.plugins.registry import load_object
 from tactbench.core.recording.health import Finding, examine
 from tactbench.core.recording.mapping.importing import ENDING, RIG
@@ -71,18 +71,13 @@ def import_log(
             hint="Describe the log's tables in a mapping (docs/mappings.md), or add `log_reader` to its descriptor.",
         )
     if not log.is_file():
-        what = f"{log} is no regular file." if log.exists() else f"There is no log {log}."
-        raise MissingRecordingError(what, hint="Check its name.")
+        raise MissingRecordingError(f"There is no log {log}.", hint="Check its name.")
     if out.suffix != ENDING:
         raise UsageError(f"{out} is no name for a recording.", hint=f"Give --out a file that ends in {ENDING}.")
     try:
-        found = load_object(sensor.log_reader)(log, options)
+        found: DeviceLog = load_object(sensor.log_reader)(log, options)
     except (DataError, LinkError) as error:  # no fault of this machine: another file, or other options, are needed
         raise UsageError(error.message, hint=error.hint) from error
-    if not isinstance(found, DeviceLog):
-        raise PluginContractError(
-            f"{sensor.log_reader} returned {type(found).__name__}, not a DeviceLog.", hint="Correct the plugin."
-        )
     began = (f"The log says that it began {found.started}.",) if found.started else ()
     meta = RecordingMeta(
         name=out.stem,

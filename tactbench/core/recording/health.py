@@ -10,7 +10,6 @@ from typing import Any, Literal
 import numpy as np
 import numpy.typing as npt
 
-from tactbench.core.recording.clock_fit import HostTimes
 from tactbench.core.recording.reader import LazyStream, Recording
 from tactbench.core.samples import Quality
 from tactbench.core.spec.recording import StreamClock, StreamCounts
@@ -46,17 +45,16 @@ class Finding:
 class _Stream:
     """What the checks need to know of a stream, gathered in one pass; arrays are (channels,)."""
 
-    def __init__(self, stream: LazyStream, clock: StreamClock | None) -> None:
+    def __init__(self, stream: LazyStream) -> None:
         self.name, self.spec, self.rows = stream.spec.name, stream.spec, len(stream)
         channels = self.spec.channels
         self.t_ns = stream.times()
         self.missing, self.saturated, self.suspect = (np.zeros(len(channels), dtype=np.int64) for _ in range(3))
         self.low, self.high = np.full(len(channels), np.inf), np.full(len(channels), -np.inf)
-        self.lost_before = self.other_times = 0
+        self.lost_before = 0
         self.labels: dict[str, set[Any]] = {name: set() for name in stream.annotations}
         digests = [hashlib.sha256() for _ in channels]
         bottom, top = np.array([_ends(one) for one in channels]).T
-        host = None if clock is None else HostTimes(clock)
         for block in stream.blocks():
             values = block.data.astype(np.float64) + 0.0  # -0 and 0 are one
             flags = np.zeros((1, len(channels)), dtype=np.uint8) if block.quality is None else block.quality
@@ -71,8 +69,6 @@ class _Stream:
                 digest.update(column.data)
             if block.quality is not None:
                 self.lost_before += int(((flags & Quality.GAP) != 0).any(axis=1).sum())
-            if host is not None and block.host_ns is not None and block.device_ns is not None:
-                self.other_times += int(np.count_nonzero(host(block.device_ns) != block.t_ns))
             for name, column in block.annotations.items():
                 self.labels[name] |= set(np.unique(column).tolist())
         self.contents = [digest.digest() for digest in digests]
@@ -123,15 +119,14 @@ def examine(recording: Recording) -> list[Finding]:
     clocks: dict[bytes, tuple[list[str], _Stream]] = {}
     for name in recording.stream_names:
         clock = recording.meta.clocks.get(name)
-        fitted = clock if clock is not None and clock.segments else None
-        stream = _Stream(recording.stream(name), fitted)
+        stream = _Stream(recording.stream(name))
         if stream.rows == 0:
             found.append(Finding("empty", "error", name, (), 0, f"{name} has no rows"))
             continue
         found.extend(_channels(stream))
         found.extend(_rows(stream))
-        if fitted is not None:
-            found.extend(_clock_fit(stream, fitted))
+        if clock is not None:
+            found.extend(_clock_fit(name, clock))
         if stream.t_ns is not None:
             clocks.setdefault(stream.t_ns.tobytes(), ([], stream))[0].append(name)
     for names, stream in clocks.values():
@@ -219,11 +214,7 @@ def _rows(stream: _Stream) -> Iterator[Finding]:
         yield Finding("rows-before-lost", "warning", stream.name, (), stream.lost_before, text)
 
 
-def _clock_fit(stream: _Stream, clock: StreamClock) -> Iterator[Finding]:
-    name = stream.name
-    if stream.other_times:
-        text = f"{stream.other_times} times of {name} are not those of its device's clock and the stated lines"
-        yield Finding("clock-fit", "error", name, (), stream.other_times, text)
+def _clock_fit(name: str, clock: StreamClock) -> Iterator[Finding]:
     if any(segment.bound_ns is None for segment in clock.segments):
         text = f"{name}: too few rows to say how well its clock was put on the host's"
         yield Finding("clock-bound", "info", name, (), 0, text)

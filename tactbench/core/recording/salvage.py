@@ -7,7 +7,6 @@ from collections.abc import Iterator
 from pathlib import Path
 from tempfile import TemporaryFile
 
-from tactbench.core.errors import FormatError
 from tactbench.core.recording import format as layout
 from tactbench.core.recording import image
 from tactbench.core.recording.partial import Columns, Journal, read_journal
@@ -35,7 +34,7 @@ def salvage(path: Path) -> Recording:
     meta, text = _fitted(journal, parse_meta(path, journal.text))
     behind = TemporaryFile()  # noqa: SIM115  (the recording closes it)
     try:
-        file = image.build(behind, meta, text, _known(journal, meta), journal.annotations)
+        file = image.build(behind, meta, text, journal.blocks(), journal.annotations)
         return Recording(path, file, text, complete=False, behind=behind)
     except BaseException:
         behind.close()
@@ -66,7 +65,7 @@ def rescue(path: Path, target: Path) -> None:
     except OSError as error:
         raise image.cannot_write(target, error) from error
     aside = layout.completing_path(target)
-    image.store(target, meta, text, _known(journal, meta), journal.annotations, aside=aside, replace=False)
+    image.store(target, meta, text, journal.blocks(), journal.annotations, aside=aside, replace=False)
 
 
 def _fitted(journal: Journal, meta: RecordingMeta) -> tuple[RecordingMeta, str]:
@@ -74,7 +73,7 @@ def _fitted(journal: Journal, meta: RecordingMeta) -> tuple[RecordingMeta, str]:
     rows: Counter[str] = Counter()
 
     def counted() -> Iterator[tuple[str, Columns]]:
-        for stream, columns in _known(journal, meta):
+        for stream, columns in journal.blocks():
             rows[stream] += len(columns["data"])
             yield stream, columns
 
@@ -82,14 +81,3 @@ def _fitted(journal: Journal, meta: RecordingMeta) -> tuple[RecordingMeta, str]:
     streams = {name: counts.model_copy(update={"written": rows[name]}) for name, counts in meta.streams.items()}
     fitted = fitted.model_copy(update={"streams": streams})
     return fitted, layout.meta_text(fitted)
-
-
-def _known(journal: Journal, meta: RecordingMeta) -> Iterator[tuple[str, Columns]]:
-    """Yield the blocks; FormatError for one that the meta does not know."""
-    specs = layout.specs_by_name(meta)
-    for stream, columns in journal.blocks():
-        if stream not in specs or columns["data"].shape[1:] != (len(specs[stream].channels),):
-            raise FormatError(
-                f"{journal.path} holds a block of {stream!r} that its meta does not know.", hint=layout.SEE
-            )
-        yield stream, columns

@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import Any
 
 from tactbench.core.cost.ladder_file import VERSION
-from tactbench.core.files import read_regular
 from tactbench.core.leaderboard.names import METRIC_NAMES
 from tactbench.core.report.section import Picture, ReportData, Section
 from tactbench.core.tables.numbers import delay, duration, interval, score, tail
@@ -76,8 +75,6 @@ def _verdict(row: Mapping[str, Any], loop: str) -> str:
 
 
 FOLDER = "cost"
-_MOST_BYTES = 2**24
-"""Of a file of costs or its drawing: more is not read, and makes no sense then."""
 
 
 def costs_section(subject: ReportData) -> Section:
@@ -95,7 +92,7 @@ def costs_section(subject: ReportData) -> Section:
         drawing = path.with_suffix(".png")
         if drawing.is_file():
             caption = f"The numbers of the table {table.title!r}, as `tactbench cost` has drawn them."
-            pictures.append(Picture(table.title, caption, read_regular(drawing, _MOST_BYTES)))
+            pictures.append(Picture(table.title, caption, drawing.read_bytes()))
     missing = () if tables else (_command(subject),)
     return Section(
         "cost",
@@ -128,7 +125,7 @@ def read_table(path: Path, subject: ReportData) -> TextTable:
     OSError
         If it cannot be read.
     """
-    held = json.loads(read_regular(path, _MOST_BYTES))
+    held = json.loads(path.read_bytes())
     about = held if isinstance(held, dict) else {}
     if about.get("version") == VERSION:
         try:

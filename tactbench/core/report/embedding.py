@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import importlib
 import json
 import math
@@ -17,15 +18,13 @@ from tactbench.core.errors import DataError, NotApplicable
 from tactbench.core.evaluation.cell import load_task
 from tactbench.core.evaluation.fitting import features_of
 from tactbench.core.evaluation.sets import prepared
-from tactbench.core.files import read_regular, replace_file, sha256
+from tactbench.core.files import replace_file
 from tactbench.core.provenance.source import versions
 from tactbench.core.report.results import Results
 from tactbench.core.samples import Answers, FloatArray, IntArray
 
 FOLDER = "report"
 """Inside a result folder."""
-_MOST_BYTES = 2**26
-"""Of a file of numbers."""
 
 
 def stored(results: Path, kind: str, facts: Mapping[str, Any], compute: Callable[[], Mapping[str, Any]]) -> Any:
@@ -47,9 +46,9 @@ def stored(results: Path, kind: str, facts: Mapping[str, Any], compute: Callable
     A file that is damaged is made anew, and a folder that cannot be written costs the next reader the time, no more.
     """
     key_text = json.dumps(facts, sort_keys=True)
-    path = results / FOLDER / kind / f"{sha256(key_text)[:32]}.json"
+    path = results / FOLDER / kind / f"{hashlib.sha256(key_text.encode()).hexdigest()[:32]}.json"
     try:
-        found = json.loads(read_regular(path, _MOST_BYTES))
+        found = json.loads(path.read_bytes())
         if found["facts"] == json.loads(key_text):
             return found["numbers"]
     except (OSError, ValueError, KeyError, TypeError):

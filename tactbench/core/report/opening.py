@@ -6,7 +6,6 @@ import json
 from collections import Counter
 from typing import Any
 
-from tactbench.core.files import read_regular
 from tactbench.core.provenance.source import RELEVANT
 from tactbench.core.report.figures.published_and_ours import COLUMN
 from tactbench.core.report.figures.published_and_ours import NAME as PUBLISHED
@@ -100,7 +99,7 @@ def about_section(subject: ReportData) -> Section:
 
 def _facts(subject: ReportData) -> dict[str, Any]:
     try:
-        facts = json.loads(read_regular(subject.folder / "run.json", 2**20))
+        facts = json.loads((subject.folder / "run.json").read_bytes())
     except (OSError, ValueError):
         return {}
     return facts if isinstance(facts, dict) else {}

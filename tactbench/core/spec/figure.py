@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from pydantic import Field, field_validator, model_validator
+from pydantic import Field, model_validator
 
-from tactbench.core.spec import units
-from tactbench.core.spec.quantity import Frozen, Source
+from tactbench.core.spec.quantity import Frozen, Source, Unit
 
 
 class RealFigure(Frozen):
@@ -29,17 +28,11 @@ class RealFigure(Frozen):
     """Upper end, included."""
     typical: float
     """The median, or the one value measured."""
-    unit: str = "1"
+    unit: Unit = "1"
     source: Source
     """What was measured, and where."""
     cause: str = ""
     """Why the sensor's model misses it, where it does and as far as it is known."""
-
-    @field_validator("unit")
-    @classmethod
-    def _known_unit(cls, unit: str) -> str:
-        units.parse(unit)
-        return unit
 
     @model_validator(mode="after")
     def _in_order(self) -> RealFigure:

@@ -5,11 +5,10 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping
 
-from pydantic import Field, FiniteFloat, field_validator, model_validator
+from pydantic import Field, FiniteFloat, model_validator
 
 from tactbench.core.errors import UsageError
-from tactbench.core.spec import units
-from tactbench.core.spec.quantity import Frozen, Quantity
+from tactbench.core.spec.quantity import Frozen, Quantity, Unit
 
 
 class Parameter(Frozen):
@@ -17,7 +16,7 @@ class Parameter(Frozen):
 
     default: FiniteFloat
     """Its value where nobody gives one, in `unit`."""
-    unit: str
+    unit: Unit
     """In which the code that a plugin names is given it."""
     text: str = Field(pattern=r"^\S[^\n]*$")
     """One line: what it is."""
@@ -25,12 +24,6 @@ class Parameter(Frozen):
     """Smallest value that may be given, in `unit`."""
     most: FiniteFloat | None = None
     """Largest value that may be given, in `unit`; None: there is no such limit."""
-
-    @field_validator("unit")
-    @classmethod
-    def _known_unit(cls, unit: str) -> str:
-        units.parse(unit)
-        return unit
 
     @model_validator(mode="after")
     def _default_may_be_given(self) -> Parameter:

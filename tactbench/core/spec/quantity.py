@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated, Literal
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, field_validator
+from pydantic import AfterValidator, BaseModel, ConfigDict
 
 from tactbench.core.errors import UsageError
 from tactbench.core.spec import units
@@ -17,6 +17,15 @@ class Frozen(BaseModel):
     """A value object: immutable, no unknown fields."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", defer_build=True)
+
+
+def _known(unit: str) -> str:
+    units.parse(unit)
+    return unit
+
+
+Unit = Annotated[str, AfterValidator(_known)]
+"""A unit of :mod:`tactbench.core.spec.units`."""
 
 
 class Source(Frozen):
@@ -33,16 +42,9 @@ class Quantity(Frozen):
 
     value: float
     """The number as the source states it."""
-    unit: str
-    """A unit of :mod:`tactbench.core.spec.units`."""
+    unit: Unit
     source: Source
     """Why this number may be believed."""
-
-    @field_validator("unit")
-    @classmethod
-    def _known_unit(cls, unit: str) -> str:
-        units.parse(unit)
-        return unit
 
     def to(self, unit: str) -> float:
         """Return the number in `unit`; raises UsageError when the dimensions differ."""
@@ -66,6 +68,8 @@ def _measuring(unit: str) -> AfterValidator:
 
 
 Length = Annotated[Quantity, _measuring("mm")]
+Mass = Annotated[Quantity, _measuring("kg")]
+Power = Annotated[Quantity, _measuring("W")]
 Pressure = Annotated[Quantity, _measuring("MPa")]
 Stiffness = Annotated[Quantity, _measuring("MPa/mm")]
 """Pressure per length."""

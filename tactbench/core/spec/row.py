@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from typing import Any, Literal, get_args, get_origin, get_type_hints
 
@@ -13,13 +12,6 @@ from tactbench.core.spec.status import Status
 LOWER_IS_BETTER = frozenset({"rmse", "mae", "mean_euclidean_error"})
 """Metrics of a row's score that are errors."""
 
-SCORES = {
-    "rmse": (0.0, math.inf), "mae": (0.0, math.inf), "mean_euclidean_error": (0.0, math.inf), "r2": (-math.inf, 1.0),
-    "accuracy": (0.0, 1.0), "balanced_accuracy": (0.0, 1.0), "macro_f1": (0.0, 1.0),
-    "event_f1": (0.0, 1.0),
-}  # fmt: skip
-"""What scores of a metric lie between."""
-
 MEDIAN_ERROR, HIGH_ERROR = "median error", "95th percentile of the error"
 """Keys of `scores` that stand beside the mean error of a vector: percentiles over the test rows."""
 
@@ -29,8 +21,6 @@ INTERVALS = (
     ("true_score", "true_ci_low", "true_ci_high"),
 )
 """Numbers of a row and the intervals that hold them: each is built around its number."""
-_ROUNDING = 1e-9
-"""Relative; an end that is the number itself may be computed in another order."""
 
 Numbers = dict[str, float]
 
@@ -43,7 +33,7 @@ class RowModel(BaseModel):
     lists of its own: pydantic copies empty defaults.
     """
 
-    model_config = ConfigDict(extra="allow", strict=True, defer_build=True)
+    model_config = ConfigDict(extra="allow", strict=True, allow_inf_nan=False, defer_build=True)
 
     # What was asked
     cell: str
@@ -146,23 +136,6 @@ class ReplicatedRow(RowModel):
     score_max: float | None = None
     recordings_right: float | None = None
     recordings_asked: float | None = None
-
-
-def fault_in_scores(row: Mapping[str, Any]) -> str:
-    """Return which number of a row cannot be, as a clause: outside its metric's range, or outside its own interval."""
-    lowest, highest = SCORES.get(str(row.get("metric")), (-math.inf, math.inf))
-    for name, *ends in INTERVALS:
-        score, (low, high) = row.get(name), (row.get(end) for end in ends)
-        if score is None:
-            continue
-        near = _ROUNDING * (1.0 + abs(score))
-        if not (lowest - near <= score <= highest + near and abs(score) < math.inf):
-            return f"{name!r} is {score:.6g}, and no {row['metric']} is"
-        if not all(end is None or abs(end) < math.inf for end in (low, high)):
-            return f"the interval of {name!r} has no ends"
-        if (low is not None and score < low - near) or (high is not None and score > high + near):
-            return f"{name!r} is {score:.6g}, outside its own interval of {low:.6g} to {high:.6g}"
-    return ""
 
 
 def _members(annotation: Any) -> list[Any]:

@@ -6,12 +6,12 @@ import math
 from collections.abc import Mapping
 from typing import Annotated, Any, Literal
 
-from pydantic import Field, ValidationError, field_validator, model_validator
+from pydantic import Field, ValidationError, model_validator
 
 from tactbench.core.errors import NotApplicable, UsageError
 from tactbench.core.spec import units
 from tactbench.core.spec.figure import RealFigure
-from tactbench.core.spec.quantity import Frozen, Quantity, Share, Source, Time, assumed
+from tactbench.core.spec.quantity import Frozen, Length, Mass, Power, Quantity, Share, Source, Time, Unit, assumed
 from tactbench.core.spec.skin import Skin
 
 ChannelKind = Literal[
@@ -43,7 +43,7 @@ class ChannelSpec(Frozen):
     name: str = Field(pattern=r"^[A-Za-z][A-Za-z0-9_.-]*$")
     """Unique within the sensor."""
     kind: ChannelKind
-    unit: str = "count"
+    unit: Unit = "count"
     """Unit of the stored numbers; `count` for a raw converter reading."""
     lower: float | None = None
     """Smallest value the converter can give."""
@@ -69,12 +69,6 @@ class ChannelSpec(Frozen):
     """Physical range."""
     band: PhysicalRange | None = None
     """Frequency band."""
-
-    @field_validator("unit")
-    @classmethod
-    def _known_unit(cls, unit: str) -> str:
-        units.parse(unit)
-        return unit
 
 
 class StreamSpec(Frozen):
@@ -226,17 +220,17 @@ class DataSheet(Frozen):
 
     force_range: PhysicalRange | None = None
     """Normal forces it answers to [force]."""
-    length: Quantity | None = None
+    length: Length | None = None
     """Of the sensing part, along the finger [length]."""
-    width: Quantity | None = None
+    width: Length | None = None
     """Across the finger [length]."""
-    height: Quantity | None = None
+    height: Length | None = None
     """From the mount to the touched surface [length]."""
-    mass: Quantity | None = None
+    mass: Mass | None = None
     """Without cable and mount [mass]."""
     interface: Statement | None = None
     """How readings leave it."""
-    power: Quantity | None = None
+    power: Power | None = None
     """Drawn from its supply [power]."""
     availability: Statement | None = None
     """Whether and where it can be had."""
@@ -245,10 +239,6 @@ class DataSheet(Frozen):
 
     @model_validator(mode="after")
     def _has_its_units(self) -> DataSheet:
-        for name, unit in (("length", "mm"), ("width", "mm"), ("height", "mm"), ("mass", "kg"), ("power", "W")):
-            stated: Quantity | None = getattr(self, name)
-            if stated is not None and not stated.to(unit) > 0:
-                raise ValueError(f"{name} is above 0 {unit}; leave it out where nobody states it")
         if self.force_range is not None:
             units.conversion(self.force_range.unit, "N")
             if not 0 <= self.force_range.lower < self.force_range.upper:
@@ -287,31 +277,21 @@ class SensorSpec(Frozen):
 
     @model_validator(mode="after")
     def _names_are_unique(self) -> SensorSpec:
-        names = [channel.name for stream in self.streams for channel in stream.channels]
-        doubled = sorted({name for name in names if names.count(name) > 1})
-        if doubled:
-            raise ValueError(f"channel names must be unique in a sensor; repeated: {', '.join(doubled)}")
-        streams = [stream.name for stream in self.streams]
-        if len(set(streams)) != len(streams):
-            raise ValueError(f"stream names must be unique in a sensor: {', '.join(streams)}")
-        return self
-
-    @model_validator(mode="after")
-    def _what_reads_shear_is_there(self) -> SensorSpec:
-        strange = sorted(set(self.reads_shear) - {channel.kind for channel in self.channels()})
-        if strange:
-            raise ValueError(f"reads_shear: the sensor has no channel of kind {', '.join(strange)}")
+        for what, several in (("channel", self.channels()), ("stream", self.streams)):
+            names = [one.name for one in several]
+            doubled = sorted({name for name in names if names.count(name) > 1})
+            if doubled:
+                raise ValueError(f"{what} names must be unique in a sensor; repeated: {', '.join(doubled)}")
         return self
 
     @model_validator(mode="after")
     def _a_site_is_one_place(self) -> SensorSpec:
         for first, *others in self.sites():
             for one in others:
-                for name in ("position_m", "normal"):
-                    if getattr(one, name) != getattr(first, name):
-                        raise ValueError(
-                            f"site {one.site}: {name} of {one.name} is not that of {first.name}; a site is one place"
-                        )
+                if (one.position_m, one.normal) != (first.position_m, first.normal):
+                    raise ValueError(
+                        f"site {one.site}: the place of {one.name} is not that of {first.name}; a site is one place"
+                    )
         return self
 
     def channels(self, *kinds: ChannelKind) -> tuple[ChannelSpec, ...]:

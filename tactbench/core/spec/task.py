@@ -77,12 +77,6 @@ class VectorTarget(Frozen):
     unit: str
     """Of every component: the length of a difference is in it too."""
 
-    @model_validator(mode="after")
-    def _names_differ(self) -> VectorTarget:
-        if len(set(self.names)) < len(self.names):
-            raise ValueError("two components of the target are the same channel")
-        return self
-
     @property
     def components(self) -> tuple[ChannelTarget, ...]:
         """Each component as a target of its own."""
@@ -221,9 +215,6 @@ class TaskSpec(Frozen):
         unseen = {kind for one in self.summaries for kind in one.kinds} - set(self.looks_at)
         if unseen:
             raise ValueError(f"summaries of {', '.join(sorted(unseen))}, which the task's features do not have")
-        names = [one.name for one in self.summaries]
-        if len(set(names)) < len(names):
-            raise ValueError("two summaries are the same")
         return self
 
     @property

@@ -173,13 +173,17 @@ LINE = 1 + PAD.splitlines().index("tasks:")
     ("old", "new", "says"),
     [
         ("names: [x, y]", "names: [x]", "target.names"),
-        ("names: [x, y]", "names: [x, z]", "asks for the position channel 'z'; there are: x, y"),
+        (
+            "names: [x, y]",
+            "names: [x, z]",
+            "asks for the position channel z, which the mapping does not have. It has x, y",
+        ),
         (
             "kind: position, names",
             "kind: force, names",
-            f"pad.yaml:{LINE}: tasks: task where asks for a target of kind",
+            "task 'where' asks for a target of kind force",
         ),
-        ("[session, recording]", "[sesion]", f"pad.yaml:{LINE}: tasks: task where asks for the split sesion"),
+        ("[session, recording]", "[sesion]", "asks for the split sesion"),
         ("[session, recording]", "[]", f"pad.yaml:{LINE + 4}"),
         ("estimators: [knn]", "metric: rmse", f"pad.yaml:{LINE + 1}"),
         ("estimators: [knn]", "metric: rmsee", f"pad.yaml:{LINE + 5}"),

@@ -2,19 +2,15 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 import pytest
 
-from tactbench.core.errors import PluginContractError, UsageError
+from tactbench.core.errors import UsageError
 from tactbench.core.plugins.force_profiles import force_path
 from tactbench.core.plugins.registry import installed
-from tactbench.core.spec.parameter import Parameter
-from tactbench.core.spec.quantity import Source, assumed
-from tactbench.core.spec.rig import ProfileDescriptor
+from tactbench.core.spec.quantity import assumed
 from tactbench.core.spec.scene import Scene
-from tactbench.plugin import ForcePath, sine, staircase
+from tactbench.plugin import sine, staircase
 
 
 def path_of(name, **given):
@@ -36,15 +32,6 @@ def test_a_staircase_goes_up_and_down_in_equal_steps_and_a_press_is_held_and_rel
     assert staircase(steps=1, peak=2).forces_n == (0.0, 0.0, 2.0, 2.0, 0.0, 0.0)
     path = path_of("press-hold-release", peak=4, rise=1, dwell=5, release=2, rest=3, hold=1)
     assert path.corners == ((0.0, 1.0, 2.0, 7.0, 9.0, 12.0), (0.0, 0.0, 4.0, 4.0, 0.0, 0.0))
-
-
-def test_a_sine_is_as_fine_as_it_says():
-    path = path_of("sine", mean=2, amplitude=1.5, frequency=0.5, periods=4, rise=1, hold=1)
-    t_s = np.linspace(2.0, 10.0, 20_001)
-    error = np.abs(at(path, t_s) - (2 - 1.5 * np.cos(2 * math.pi * 0.5 * (t_s - 2.0)))).max()
-    # In the middle of the chord of 1/64 of a period at the top; 20 000 points find it to a thousandth.
-    half = math.pi / 64
-    assert error == pytest.approx(1.5 * math.cos(half) * (1 - math.cos(half)), rel=1e-3)
 
 
 def test_a_path_names_its_profile_and_is_read_without_it():
@@ -70,19 +57,3 @@ def test_a_path_names_its_profile_and_is_read_without_it():
 def test_a_parameter_that_cannot_be_is_named(name, given, says):
     with pytest.raises(UsageError, match=says):
         path_of(name, **given)
-
-
-def backwards(*, start):
-    return ForcePath(times_s=(0.0, start), forces_n=(0.0, -1.0), samples=1, source=Source(tag="assumed", reference="t"))
-
-
-@pytest.mark.parametrize(
-    ("where", "says"),
-    [(f"{__name__}:backwards", r"makes no force path of \{'start': 1.0\}: forces_n.1: .*0"),
-     ("builtins:dict", "returned a dict")],
-)  # fmt: skip
-def test_what_is_no_force_path_is_the_plugins_fault(where, says):
-    start = Parameter(default=1.0, unit="s", text="a time")
-    odd = ProfileDescriptor(name="odd", title="odd", where=where, parameters={"start": start})
-    with pytest.raises(PluginContractError, match=says):
-        force_path(odd, {}, "a test")

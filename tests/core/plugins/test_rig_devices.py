@@ -49,12 +49,6 @@ def drawn(file):
         return said
 
 
-def test_one_sensor_and_every_other_emulated_device_have_emulators():
-    assert list(emulators_of(rig_file(), REGISTRY, "pad", sense)) == ["pad", "force", "motor"]
-    file = rig_file(force={"device": "scale", "link": "udp://127.0.0.1:9"})
-    assert list(emulators_of(file, REGISTRY, "pad", sense)) == ["pad", "motor"]
-
-
 @pytest.mark.parametrize(("channel", "sign", "value"), [("fz", 1, 0.1), ("fx", -1, -0.1)])
 def test_the_force_sensor_feels_the_pressing_force_where_its_entry_says(channel, sign, value):
     file = rig_file(force={"device": "scale", "link": "emulated", "channel": channel, "sign": sign})
@@ -121,15 +115,6 @@ def test_errors_of_drivers_name_the_entry_and_the_next_step(changed, sensor, sai
         links = {"pad": devices.opener("pad")} if emulators else dict.fromkeys(("pad", "force"), lambda: None)
         with pytest.raises((UsageError, UnknownNameError), match=said):
             drivers_of(file, REGISTRY, sensor, links, devices.clock)
-
-
-def test_what_nothing_emulates_is_said():
-    with pytest.raises(UsageError, match=r"nothing emulates it here.*tactbench emulate"):
-        drivers_of(rig_file(), REGISTRY, "pad", {}, lambda: 0)
-    with pytest.raises(UsageError, match="mute has no emulator"):
-        emulators_of(rig_file(), REGISTRY, "mute", sense)
-    with pytest.raises(UsageError, match="entry 'force': bare-scale has no emulator"):
-        emulators_of(rig_file(force={"device": "bare-scale", "link": "emulated"}), REGISTRY, "pad", sense)
 
 
 def test_what_was_opened_is_closed_when_a_later_device_fails():

@@ -10,7 +10,7 @@ from tactbench.core.spec.recording import RecordingMeta
 from tactbench.core.spec.sensor import ChannelSpec, SensorSpec, StreamSpec
 
 
-def _sensor(channels=3, dtype="uint16"):
+def sensor(channels=3, dtype="uint16"):
     return SensorSpec(
         name="pad",
         title="a pad",
@@ -39,7 +39,7 @@ def make_meta():
 
     def make(channels=3, dtype="uint16", **fields):
         given = {"name": "press", "rig": "test", "reference": (_reference(),), **fields}
-        return RecordingMeta(sensor=_sensor(channels, dtype), **given)
+        return RecordingMeta(sensor=sensor(channels, dtype), **given)
 
     return make
 

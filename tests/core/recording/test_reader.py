@@ -1,6 +1,5 @@
 """Whatever a file is, reading it ends in what was written or in one clear error: never a crash, never a guess."""
 
-import json
 import random
 
 import h5py
@@ -10,7 +9,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from tactbench.core.errors import FormatError, MissingRecordingError, RecordingError
-from tactbench.core.recording.reader import content_digest, open_recording, read_meta
+from tactbench.core.recording.reader import content_digest, open_recording
 from tactbench.core.recording.salvage import salvage
 from tactbench.core.recording.writer import RecordingWriter
 from tactbench.core.samples import Block
@@ -56,31 +55,6 @@ def test_cut_short_anywhere(good):
             read_all(good)
 
 
-def test_damaged_anywhere(good):
-    """Bytes are changed at random places: what is read is right, or the damage is told."""
-    whole = good.read_bytes()
-    before = read_all(good)
-    rng = random.Random(2)
-    told = 0
-    for _ in range(60):
-        damaged = bytearray(whole)
-        for _ in range(rng.choice([1, 4])):
-            damaged[rng.randrange(len(whole))] ^= rng.randrange(1, 256)
-        good.write_bytes(damaged)
-        try:
-            after = read_all(good)
-        except FormatError:
-            told += 1
-            continue
-        for old, new in zip(before, after, strict=True):
-            assert np.array_equal(old.data, new.data)
-            assert np.array_equal(old.t_ns, new.t_ns)
-            assert {name: list(column) for name, column in old.annotations.items()} == {
-                name: list(column) for name, column in new.annotations.items()
-            }
-    assert told > 30  # most of the file is data and meta: the checks must have had something to do
-
-
 def test_another_programs_hdf5(tmp_path):
     with h5py.File(tmp_path / "x.h5", "w") as file:
         file["data"] = np.arange(3)
@@ -88,138 +62,39 @@ def test_another_programs_hdf5(tmp_path):
         open_recording(tmp_path / "x.h5")
 
 
-def _newer(file):
-    file.attrs["format_version"] = 4
+def _put(name, value):
+    def change(file):
+        del file[name]
+        file[name] = value
 
-
-def _no_version(file):
-    del file.attrs["format_version"]
-
-
-def _unfinished(file):
-    file.attrs["complete"] = False
-
-
-def _no_meta(file):
-    del file.attrs["meta"]
-
-
-def _meta_no_json(file):
-    file.attrs["meta"] = "{"
-
-
-def _meta_unit(file):
-    meta = json.loads(file.attrs["meta"])
-    meta["sensor"]["streams"][0]["channels"][0]["unit"] = "furlong"
-    file.attrs["meta"] = json.dumps(meta)
-
-
-def _meta_field(file):
-    file.attrs["meta"] = json.dumps(json.loads(file.attrs["meta"]) | {"colour": "red"})
-
-
-def _no_streams(file):
-    del file["streams"]
-
-
-def _stream_is_data(file):
-    del file["streams/taxels"]
-    file["streams/taxels"] = np.arange(3)
-
-
-def _no_data(file):
-    del file["streams/taxels/data"]
-
-
-def _other_width(file):
-    del file["streams/taxels/data"]
-    file["streams/taxels/data"] = np.zeros((3000, 4), dtype=np.uint16)
-
-
-def _other_type(file):
-    del file["streams/taxels/data"]
-    file["streams/taxels/data"] = np.zeros((3000, 3))
-
-
-def _fewer_times(file):
-    file["streams/taxels/t_ns"].resize(2999, axis=0)
-
-
-def _no_times(file):
-    del file["streams/taxels/t_ns"]
-
-
-def _soft_link(file):
-    del file["streams/taxels/data"]
-    file["streams/taxels/data"] = h5py.SoftLink("/streams/force_torque/data")
-
-
-def _external_link(file):
-    del file["streams/taxels"]
-    file["streams/taxels"] = h5py.ExternalLink("other.h5", "/streams/taxels")
-
-
-def _virtual(file):
-    del file["streams/taxels/data"]
-    layout = h5py.VirtualLayout((3000, 3), dtype=np.uint16)
-    layout[:] = h5py.VirtualSource("other.h5", "/streams/taxels/data", (3000, 3))
-    file["streams/taxels"].create_virtual_dataset("data", layout)
-
-
-def _labels_of_floats(file):
-    file["streams/taxels/annotations/weight"] = np.zeros(3000)
-
-
-def _labels_too_few(file):
-    file["streams/taxels/annotations/press"] = np.zeros(2999, dtype=int)
-
-
-def _labels_no_text(file):
-    del file["streams/taxels/annotations/object"]
-    file["streams/taxels/annotations"].create_dataset(
-        "object", data=[b"\xff\xfe"] * 3000, dtype=h5py.string_dtype("ascii")
-    )
+    return change
 
 
 def _one_reading(file):
     file["streams/taxels/data"][100, 1] ^= 1
 
 
-TAMPERED = [value for name, value in list(globals().items()) if name[0] == "_" != name[1] and callable(value)]
-
-
-SAYS = {
-    _newer: "newer tactbench",
-    _unfinished: "not finished",
-    _meta_unit: "furlong",
-    _soft_link: "link to another place",
-    _external_link: "link to another place",
-    _virtual: "link to another place",
-    _one_reading: "digest",
-}
-
-
-def _read_without_digest(path):
-    with open_recording(path) as recording:
-        for name in recording.stream_names:
-            recording.read(name)
-
-
-@pytest.mark.filterwarnings("ignore::DeprecationWarning")  # NumPy's, about what the tampered files hold
-@pytest.mark.parametrize("tamper", TAMPERED, ids=lambda tamper: tamper.__name__.strip("_"))
-def test_a_file_that_contradicts_itself(good, tamper):
+@pytest.mark.parametrize(
+    ("tamper", "says"),
+    [
+        (lambda file: file.attrs.update({"format_version": 4}), "newer tactbench"),
+        (lambda file: file.attrs.update({"complete": False}), "not finished"),
+        (lambda file: file.attrs.update({"meta": file.attrs["meta"][:-1] + ',"colour":"red"}'}), "colour"),
+        (lambda file: file.pop("streams/taxels/data"), "no data of type uint16"),
+        (lambda file: file["streams/taxels/t_ns"].resize(2999, axis=0), "t_ns"),
+        (_put("streams/taxels/data", np.zeros((3000, 4), dtype=np.uint16)), "(3000, 3) is expected"),
+        (_put("streams/taxels", h5py.ExternalLink("other.h5", "/streams/taxels")), "link to another place"),
+        (_one_reading, "digest"),
+    ],
+)
+def test_a_file_that_contradicts_itself(good, tamper, says):
     with h5py.File(good, "a") as file:
         tamper(file)
     with pytest.raises(FormatError) as caught:
-        read_all(good) if tamper is _one_reading else _read_without_digest(good)
+        read_all(good)
     assert "press.h5" in str(caught.value)
-    assert SAYS.get(tamper, "") in str(caught.value)
+    assert says in str(caught.value)
     assert caught.value.hint
-
-
-def test_a_stream_that_is_not_there(good):
-    with open_recording(good) as recording, pytest.raises(FormatError, match="taxels, force_torque"):
-        recording.read("electrodes")
 
 
 def test_what_a_file_may_have_besides(good):
@@ -231,10 +106,6 @@ def test_what_a_file_may_have_besides(good):
         file["streams/mine/data"] = np.arange(3)
     assert content_digest(good) == before
     read_all(good)
-
-
-def test_meta_alone(good):
-    assert read_meta(good).name == "press"
 
 
 @settings(max_examples=25, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])

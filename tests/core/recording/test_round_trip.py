@@ -9,25 +9,15 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tactbench.core.recording import format as layout
-from tactbench.core.recording.reader import content_digest, open_recording, read_meta
+from tactbench.core.recording.reader import content_digest, open_recording
 from tactbench.core.recording.writer import RecordingWriter
 from tactbench.core.samples import Block
-from tactbench.core.spec.quantity import Source
 from tactbench.core.spec.recording import RecordingMeta
-from tactbench.core.spec.sensor import ChannelSpec, SensorSpec, StreamSpec
+from tests.core.recording.conftest import sensor
 
 DTYPES = ("uint8", "uint16", "int16", "int32", "float32", "float64")
 text = st.text(st.characters(blacklist_characters="\0", blacklist_categories=("Cs",)), max_size=12)
 scalar = st.one_of(text, st.integers(-(2**53), 2**53), st.floats(allow_nan=False, allow_infinity=False))
-
-
-def sensor(channels, dtype):
-    return SensorSpec(
-        name="pad", title="a pad", principle="capacitive", principle_source=Source(tag="assumed", reference="test"),
-        streams=(StreamSpec(name="taxels", dtype=dtype, channels=tuple(
-            ChannelSpec(name=f"t{place}", kind="taxel") for place in range(channels))),),
-    )  # fmt: skip
 
 
 @st.composite
@@ -84,18 +74,6 @@ def test_round_trip(made):
         assert sorted(one.name for one in Path(folder).iterdir()) == ["x.h5"]
 
 
-def test_a_slice_reads_the_same_rows_as_the_whole(write):
-    data = np.random.default_rng(0).integers(0, 4096, (3000, 5))
-    with open_recording(write(data, notes={"row": np.arange(3000)})) as recording:
-        stream = recording.stream("taxels")
-        assert len(stream) == 3000
-        for rows in (slice(100, 200), slice(-5, None), slice(0, 3000, 7), slice(2900, 9999), slice(10, 10)):
-            part = stream[rows]
-            assert np.array_equal(part.data, data[rows])
-            assert np.array_equal(part.t_ns, np.arange(3000)[rows] * 10_000_000)
-            assert np.array_equal(part.annotations["row"], np.arange(3000)[rows])
-
-
 def test_the_digest_is_of_what_is_said_not_of_the_file(tmp_path, make_meta):
     """Blocks, compression, byte order and provenance do not matter; one bit of one reading does."""
     data = np.arange(300, dtype=np.uint16).reshape(100, 3)
@@ -120,20 +98,6 @@ def test_the_digest_is_of_what_is_said_not_of_the_file(tmp_path, make_meta):
     with RecordingWriter(changed, make_meta()) as writer:
         writer.append(Block("taxels", np.arange(100) * 1000, data))
     assert content_digest(changed) not in digests
-
-
-def test_a_sensor_of_many_channels_fits(write):
-    """The meta of 600 channels is far more than the 64 KiB that an attribute of fixed length can hold."""
-    path = write(np.zeros((2, 600), dtype=int))
-    assert len(read_meta(path).sensor.streams[0].channels) == 600
-    with h5py.File(path) as file:
-        assert len(file.attrs["meta"]) > 2**16
-
-
-def test_more_channels_than_attributes_can_list(write):
-    path = write(np.ones((2, layout.MAX_LISTED_CHANNELS + 1), dtype=int))
-    with open_recording(path) as recording:
-        assert recording.read("taxels").data.all()
 
 
 def test_an_ordinary_viewer_finds_signal_axes_units_and_names(write):

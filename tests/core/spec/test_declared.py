@@ -3,28 +3,7 @@
 import pytest
 from pydantic import ValidationError
 
-from tactbench.core.cli.config import default_matrix, packaged_matrices
-from tactbench.core.plugins.registry import load_registry
 from tactbench.core.spec.matrix import ComparisonChoice
-from tactbench.core.spec.yaml_file import load_yaml
-
-
-def test_the_default_matrix_declares_what_it_is_run_for():
-    declared = default_matrix().comparisons
-    assert [(one.sensors, one.task) for one in declared if one.sensors] == [
-        (("biotac", "icub"), "force"), (("biotac", "icub"), "curvature"),
-    ]  # fmt: skip
-    assert len([one for one in declared if one.estimators]) == 2
-
-
-def test_what_is_declared_is_run():
-    """A comparison of an estimator that the matrix does not have would never be made."""
-    matrix = default_matrix()
-    choices = {choice.name: {one.name for one in choice.estimators} for choice in matrix.tasks}
-    for one in matrix.comparisons:
-        assert set(one.sensors or ()) <= set(matrix.sensors)
-        assert one.task in choices
-        assert set(one.estimators or ()) <= choices[one.task]
 
 
 @pytest.mark.parametrize(
@@ -40,27 +19,3 @@ def test_what_is_declared_is_run():
 def test_a_comparison_that_is_none_is_refused(given, says):
     with pytest.raises(ValidationError, match=says):
         ComparisonChoice(**given)
-
-
-def test_packaged_matrices_declare_nothing_that_cannot_be_read():
-    from tactbench.core.spec.matrix import MatrixSpec
-
-    assert all(isinstance(load_yaml(path, MatrixSpec), MatrixSpec) for path in packaged_matrices().values())
-
-
-def test_each_task_of_ours_says_what_is_practically_the_same():
-    ours = (
-        "force",
-        "curvature",
-        "inverse-radius",
-        "grasp-stability",
-        "object-identity",
-        "shear-force",
-        "slip-sequence",
-        "contact-location",
-        "three-axis-force",
-    )
-    tasks = load_registry().tasks
-    assert all(tasks[name].spec.equivalence > 0 for name in ours)
-    published = [one.score for name in ours for one in tasks[name].spec.published if tasks[name].spec.metric == "rmse"]
-    assert min(published) > max(tasks[name].spec.equivalence for name in ("force", "shear-force"))

@@ -3,7 +3,6 @@
 import pytest
 from pydantic import ValidationError
 
-from tactbench.core.plugins.declared import with_declared_of
 from tactbench.core.plugins.registry import load_registry
 from tactbench.core.spec.declared_task import DeclaredTask
 
@@ -56,15 +55,3 @@ def test_what_is_left_out_follows_from_the_target(target, more, kind, metric, un
 def test_a_declaration_that_makes_no_task_is_refused(target, more, says):
     with pytest.raises(ValidationError, match=says):
         declared(target, **more)
-
-
-def test_rows_of_a_stranger_bring_data_and_nothing_else():
-    registry = load_registry()
-    good = declared(VECTOR).model_dump_json()
-    bad = good.replace('"splits"', '"features_by":"os:system","splits"')
-    rows = [{"declared_task": one} for one in (good, bad, "{", "", good.replace('"push"', '"force"'))]
-    found = with_declared_of(registry, [*rows, {}])
-    assert set(found.tasks.names()) - set(registry.tasks.names()) == {"push"}
-    assert found.tasks["push"].spec.features_by is None
-    assert found.tasks["force"] == registry.tasks["force"]
-    assert "push" not in registry.tasks

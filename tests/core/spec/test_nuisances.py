@@ -11,7 +11,6 @@ from tactbench.core.spec.drive import ForceLoop
 from tactbench.core.spec.quantity import assumed
 from tactbench.core.spec.scene import NUISANCES, Scene, Simulation, Slide
 from tactbench.plugin import load_registry
-from tactbench.plugin.simulation import Nuisances
 from tests.conftest import ROOT
 
 SCENE = Scene(name="a", drive=ForceLoop(), slide=Slide(speed=assumed(5.0, "mm/s", "test")))
@@ -25,14 +24,6 @@ def test_every_nuisance_of_a_scene_is_set_alone_and_read_under_its_name(name):
     changed = SCENE.with_nuisances({name: value})
     assert changed.nuisances() == {**before, name: pytest.approx(value, rel=1e-12)}
     assert Scene.model_validate_json(changed.model_dump_json()) == changed
-
-
-@pytest.mark.parametrize("name", NUISANCES)
-def test_a_name_is_part_field_and_unit(name):
-    way, unit = NUISANCES[name]
-    told = unit.lower().replace("/", "_per_", 1).replace("/", "_")
-    words = [*(way[-2:] if way[0] != "environment" else way[-1:]), *([] if unit == "1" else [told])]
-    assert name == "_".join(words)
 
 
 def test_the_document_names_every_nuisance_of_a_scene():
@@ -59,13 +50,6 @@ def test_what_is_of_somebody_else_is_passed_over():
     assert biotac.with_nuisances({"dc_pressure_white_count": 1.0}) != biotac
 
 
-def test_numbers_that_belong_together_are_set_together():
-    both = {"surface_static_friction": 0.3, "surface_kinetic_friction": 0.2}
-    assert both.items() <= SCENE.with_nuisances(both).nuisances().items()
-    both = {"surface_kinetic_friction": 0.9, "surface_static_friction": 1.0}
-    assert both.items() <= SCENE.with_nuisances(both).nuisances().items()
-
-
 @pytest.mark.parametrize(
     ("values", "says"),
     [
@@ -78,17 +62,6 @@ def test_a_value_that_a_scene_cannot_have_is_refused_by_name(values, says):
     with pytest.raises(UsageError, match=says) as caught:
         SCENE.with_nuisances(values)
     assert caught.value.hint
-
-
-@pytest.mark.parametrize("name", ["drive_delay_ms", "surface_roughness_um"])
-def test_what_a_scene_lacks_is_not_made(name):
-    with pytest.raises(UsageError, match=f"{name}: the scene has no (drive|slide)"):
-        Scene(name="a").with_nuisances({name: 1.0})
-
-
-def test_offsets_angles_and_temperatures_may_be_negative():
-    values = {"placement_x_mm": -1.0, "placement_tilt_s_rad": -0.1, "ambient_degc": -5.0}
-    assert values.items() <= SCENE.with_nuisances(values).nuisances().items()
 
 
 def test_a_value_that_a_sensor_cannot_have_is_refused_by_name():
@@ -120,18 +93,3 @@ def test_a_scene_is_asked_as_a_simulation_says():
     assert SCENE.simulated_as(Simulation()) is SCENE
     own = SCENE.model_copy(update={"simulation": Simulation(effects=("+creep",))})
     assert own.simulated_as(Simulation(effects=("-drift",))).simulation.effects == ("+creep", "-drift")
-
-
-def test_what_nuisances_leave_out_is_zero():
-    none = Nuisances()
-    assert {one.value for name, (_, one) in none.by_name("taxel").items() if not name.endswith("_tau_s")} == {0.0}
-    assert none.hidden() == 0.0
-    assert Nuisances.model_validate_json(none.model_dump_json()) == none
-
-
-@pytest.mark.parametrize("name", ["warm_up", "wander"])
-def test_a_drift_needs_its_time_constant(name):
-    amount = assumed(1.0, "count", "test")
-    with pytest.raises(ValidationError, match=f"{name} is not 0, so {name}_tau is needed"):
-        Nuisances(**{name: amount})
-    assert getattr(Nuisances(**{name: amount, f"{name}_tau": assumed(9.0, "s", "test")}), name) == amount

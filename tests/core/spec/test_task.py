@@ -34,19 +34,3 @@ def test_protocol_estimator_and_split_must_fit(force, protocol, estimator, split
     one = Published(score=0.5, reference="r", protocol="karl2016", estimator="lasso", split="roles")
     found = force.model_copy(update={"published": (one,)}).published_for("icub", protocol, estimator, split)
     assert (found.score if found else None) == score
-
-
-def test_a_figure_of_another_model_stands_beside_every_estimator(force):
-    one = Published(score=0.5, reference="r", protocol="deployable")
-    task = force.model_copy(update={"published": (one,)})
-    assert task.published_for("icub", "deployable", "forest", "session") == one
-
-
-def test_the_papers_five_numbers_are_declared():
-    registry = load_registry()
-    said = {(one.sensor, one.estimator): one.score for task in registry.tasks for one in task.spec.published
-            if one.protocol == "karl2016"}  # fmt: skip
-    assert said == {
-        ("biotac", "lasso"): 0.7307, ("icub", "lasso"): 0.7659, (None, "time-index"): 0.6875,
-        ("biotac", "forest"): 0.60488, ("icub", "forest"): 0.79512,
-    }  # fmt: skip

@@ -83,7 +83,6 @@ def sensor_of(mapping: MappingFile) -> tuple[SensorSpec, tuple[StreamSpec, ...],
                 channels=tuple(channel.spec for channel in channels),
             )  # fmt: skip
             streams[name] = MappedStream(spec, source, channels)
-        _unique([channel.spec.name for stream in streams.values() for channel in stream.channels])
         described = mapping.sensor.model_dump()
         sensor = SensorSpec(
             **described | {"name": _WORD.sub("x", described["name"])},  # until its words are known
@@ -156,12 +155,3 @@ def _names(stream: str, group: ChannelGroup, columns: list[Column]) -> Iterator[
 
 def _column(value: Scalar) -> Column:
     return value if isinstance(value, int) else str(value)
-
-
-def _unique(names: list[str]) -> None:
-    doubled = sorted({name for name in names if names.count(name) > 1})
-    if doubled:
-        raise MappingError(
-            f"Two channels are called {', '.join(doubled)}.",
-            hint="Make names differ, for example with {column} or `over` in the pattern.",
-        )

@@ -10,6 +10,7 @@ from pathlib import Path
 from tactbench.core.errors import MappingError
 from tactbench.core.recording.mapping.arrays import read_arrays
 from tactbench.core.recording.mapping.model import Arrays, Mapping, TableSource, Xlsx
+from tactbench.core.recording.mapping.samples import check_join
 from tactbench.core.recording.mapping.sheets import read_sheet
 from tactbench.core.recording.mapping.table import Table
 from tactbench.core.recording.mapping.text import read_text
@@ -93,6 +94,7 @@ def read(mapping: Mapping, files: FileSet) -> Iterator[RawRecording]:
             tables[name] = read_sheet(file.path, file.shown, how)
         else:
             tables[name] = read_text(file.path, file.shown, how)
+    check_join(mapping, tables)
     yield from _split(mapping, RawRecording(tables, files.words, shown))
 
 
@@ -141,12 +143,6 @@ def _split(mapping: Mapping, raw: RawRecording) -> Iterator[RawRecording]:
     rows_of: dict[tuple[str, ...], list[int]] = {}
     for row, values in enumerate(zip(*(lead.texts(column) for column in mapping.split_by.values()), strict=True)):
         rows_of.setdefault(values, []).append(row)
-    for name, table in raw.tables.items():
-        if len(table) != len(lead):
-            raise MappingError(
-                f"{table.shown} (table {name!r}) has {len(table)} rows, {lead.shown} has {len(lead)}.",
-                hint="Tables joined by rows must be equally long.",
-            )
     for values, rows in rows_of.items():
         words = dict(zip(mapping.split_by, values, strict=True))
         yield RawRecording(

@@ -18,8 +18,8 @@ from tactbench.core.recording.health import Finding, examine
 from tactbench.core.recording.mapping.channels import MappedStream, device, fill, sensor_of
 from tactbench.core.recording.mapping.files import FileSet, RawRecording, find, read
 from tactbench.core.recording.mapping.model import Mapping, Word
-from tactbench.core.recording.mapping.samples import check_join, labels, samples, times
-from tactbench.core.recording.mapping.tasks import check_tasks, place_tasks, require_channels, tasks_text
+from tactbench.core.recording.mapping.samples import labels, samples, times
+from tactbench.core.recording.mapping.tasks import check_tasks, place_tasks, require_answerable, tasks_text
 from tactbench.core.recording.reader import content_digest, open_recording
 from tactbench.core.recording.writer import RecordingWriter
 from tactbench.core.samples import Block
@@ -118,7 +118,7 @@ def import_tables(
     """
     loaded = load_yaml(mapping, Mapping)
     sensor, reference, streams = sensor_of(loaded)
-    require_channels(loaded, streams, mapping)
+    require_answerable(loaded, streams, mapping)
     tasks = tasks_text(loaded, mapping.name)
     sets = find(loaded, mapping.parent if root is None else root)
     made: list[Imported] = []
@@ -168,7 +168,6 @@ def _count_files(sets: Sequence[FileSet]) -> int:
 def _write(
     path: Path, meta: RecordingMeta, mapping: Mapping, raw: RawRecording, streams: dict[str, MappedStream]
 ) -> Imported:
-    check_join(mapping, raw.tables)
     counts: dict[str, int] = {}
     missing: dict[str, int] = {}
     clocks = {

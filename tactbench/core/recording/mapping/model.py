@@ -13,7 +13,6 @@ from tactbench.core.spec.declared_task import DeclaredTask
 from tactbench.core.spec.quantity import Frozen, Quantity, Source
 from tactbench.core.spec.recording import Scalar
 from tactbench.core.spec.sensor import ChannelKind, Vector
-from tactbench.core.spec.task import LabelTarget
 
 Column = int | str
 """A column by its place (from 0) or by its name in the header."""
@@ -234,8 +233,6 @@ class Annotation(Frozen):
     def _one_way(self) -> Annotation:
         if (self.column is None) == (self.rows_per is None):
             raise ValueError("give either column or rows_per")
-        if self.values is not None and self.column is None:
-            raise ValueError("values translate a column")
         return self
 
 
@@ -311,29 +308,6 @@ class Mapping(Frozen):
     tasks: tuple[DeclaredTask, ...] = ()
     """Questions that the recordings can be asked, beside the installed ones."""
 
-    @field_validator("tasks")
-    @classmethod
-    def _tasks_can_be_asked(cls, tasks: tuple[DeclaredTask, ...], info: ValidationInfo) -> tuple[DeclaredTask, ...]:
-        streams, recording = info.data.get("streams"), info.data.get("recording")
-        if not streams or recording is None:  # they are wrong themselves
-            return tasks
-        names = [task.name for task in tasks]
-        if len(set(names)) < len(names):
-            raise ValueError("two tasks have the same name")
-        labels = {label for stream in streams.values() for label in stream.annotations} | set(recording.labels)
-        kinds = {stream.of: set[str]() for stream in streams.values()}
-        for stream in streams.values():
-            kinds[stream.of] |= {group.kind for group in stream.channels}
-        for task in tasks:
-            _require(task, "features of kind", set(task.features), kinds["sensor"])
-            if isinstance(task.target, LabelTarget):
-                _require(task, "the label", {task.target.name}, labels)
-            else:
-                _require(task, "a target of kind", {task.target.kind}, set[str]().union(*kinds.values()))
-            groups = {split for split in task.splits if not _FEW_SHOT.fullmatch(split)}
-            _require(task, "the split", groups, {*SPLITS, *labels})
-        return tasks
-
     @model_validator(mode="after")
     def _hangs_together(self) -> Mapping:
         for name, stream in self.streams.items():
@@ -349,26 +323,15 @@ class Mapping(Frozen):
         if self.clock != "none" and len(timed) < len(self.tables):
             without = next(name for name in self.tables if name not in timed)
             raise ValueError(f"clock is {self.clock}, but table {without} has no time; write `clock: none`")
-        by_rows = self.join is not None and self.join.by == "rows"
-        if by_rows and len(timed) > 1 and self.join is not None and self.join.times_within_ms is None:
+        join = self.join
+        if join is not None and join.by == "rows" and len(timed) > 1 and join.times_within_ms is None:
             raise ValueError("tables with a clock each, joined by rows, need `times_within_ms`")
-        if self.join is not None and self.join.by == "clock" and (self.clock == "none" or self.split_by):
+        if join is not None and join.by == "clock" and (self.clock == "none" or self.split_by):
             raise ValueError("a join by clock needs a clock, and rows that need not be split")
         arrays = [name for name, table in self.tables.items() if isinstance(table.read, Arrays)]
         if arrays and len(self.tables) > 1:
             raise ValueError(f"table {arrays[0]} is an archive and cannot be joined with others")
         return self
-
-
-SPLITS = ("roles", "session", "recording", "trial", "in-session", "shuffled")
-"""That recordings can be asked for whatever their labels are."""
-_FEW_SHOT = re.compile(r"few-shot-[1-9][0-9]{0,3}")
-
-
-def _require(task: DeclaredTask, what: str, asked: set[str], there: set[str]) -> None:
-    for name in sorted(asked - there):
-        listed = ", ".join(sorted(there)) or "none"
-        raise ValueError(f"task {task.name} asks for {what} {name}, which the mapping does not have; it has {listed}")
 
 
 def _convertible(given: str, required: str) -> None:

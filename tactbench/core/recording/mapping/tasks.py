@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from pathlib import Path
 
@@ -14,20 +15,35 @@ from tactbench.core.spec.declared_task import FILE, TaskFile
 from tactbench.core.spec.task import LabelTarget, VectorTarget
 from tactbench.core.spec.yaml_file import load_yaml
 
+SPLITS = ("roles", "session", "recording", "trial", "in-session", "shuffled")
+"""That recordings can be asked for whatever their labels are."""
+_FEW_SHOT = re.compile(r"few-shot-[1-9][0-9]{0,3}")
 
-def require_channels(mapping: MappingFile, streams: Mapping[str, MappedStream], path: Path) -> None:
-    """Refuse a task whose target names a channel that is not there; raises MappingError."""
-    every = [channel for stream in streams.values() for channel in stream.spec.channels]
+
+def require_answerable(mapping: MappingFile, streams: Mapping[str, MappedStream], path: Path) -> None:
+    """Refuse a task that asks for what the recordings will not have; raises MappingError."""
+    channels = [channel for stream in streams.values() for channel in stream.spec.channels]
+    own = {str(one.spec.kind) for stream in streams.values() if stream.source.of == "sensor" for one in stream.channels}
+    labels = {label for stream in streams.values() for label in stream.source.annotations} | {*mapping.recording.labels}
     for task in mapping.tasks:
+        groups = [split for split in task.splits if not _FEW_SHOT.fullmatch(split)]
+        asked: list[tuple[str, set[str], set[str]]] = [
+            ("features of kind", set(task.features), own),
+            ("the split", {*groups}, {*SPLITS, *labels}),
+        ]
         if isinstance(task.target, LabelTarget):
-            continue
-        there = [channel.name for channel in every if channel.kind == task.target.kind]
-        for one in task.target.components if isinstance(task.target, VectorTarget) else (task.target,):
-            if one.name is not None and one.name not in there:
+            asked.append(("the label", {task.target.name}, labels))
+        else:
+            kind = task.target.kind
+            parts = task.target.components if isinstance(task.target, VectorTarget) else (task.target,)
+            names = {one.name for one in parts if one.name is not None}
+            asked.append(("a target of kind", {kind}, {one.kind for one in channels}))
+            asked.append((f"the {kind} channel", names, {one.name for one in channels if one.kind == kind}))
+        for what, some, there in asked:
+            for name in sorted(some - there):
                 raise MappingError(
-                    f"{path}: task {task.name!r} asks for the {one.kind} channel {one.name!r}; there are: "
-                    f"{', '.join(there)}.",
-                    hint="Name one of them in the task's target.",
+                    f"{path}: task {task.name!r} asks for {what} {name}, which the mapping does not have.",
+                    hint=f"It has {', '.join(sorted(there)) or 'none'}.",
                 )
 
 

@@ -28,7 +28,10 @@ def read_text(path: Path, shown: str, how: Csv | Text | Records) -> TextTable:
     except OSError as error:
         raise MappingError(f"{shown} cannot be read: {error.strerror}.", hint="Check its permissions.") from error
     except UnicodeDecodeError as error:
-        raise MappingError(f"{shown} is not UTF-8 text.", hint=_other_format(path)) from error
+        raise MappingError(
+            f"{shown} is not UTF-8 text.",
+            hint="Name what it is, `format: xlsx`, `npz` or `mat`, or save the table as CSV in UTF-8.",
+        ) from error
     if isinstance(how, Records):
         return _records(_lines(text), shown, how)
     return table_of(shown, list(_cells(text, shown, how)), how)
@@ -43,13 +46,6 @@ def table_of(shown: str, lines: list[Line], how: Csv | Text | Xlsx) -> TextTable
         raise MappingError(f"{shown} has no rows.", hint="Remove the file, or correct `header` and `skip_lines`.")
     _same_length(shown, lines, len(header) if header else len(lines[0][1]))
     return TextTable(shown, header, [cells for _, cells in lines], [number for number, _ in lines], how.no_sample)
-
-
-def _other_format(path: Path) -> str:
-    ending = path.suffix.lower().removeprefix(".")
-    if ending in ("xlsx", "npz", "mat"):
-        return f"Read it with `format: {ending}`."
-    return "Is it the file the mapping means? If it is a spreadsheet, save it as CSV in UTF-8."
 
 
 def _cells(text: str, shown: str, how: Csv | Text) -> Iterator[Line]:

@@ -9,12 +9,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tactbench.core.evaluation.dataset import load_dataset
 from tactbench.core.recording.mapping import import_tables
 from tactbench.core.recording.reader import open_recording
 from tactbench.core.samples import Quality
 from tactbench.rigs.twin.likeness.report import checks
-from tests.core.evaluation.test_real_recordings import REGISTRY, run
+from tests.core.evaluation.test_real_recordings import REGISTRY
 
 MAPPINGS = Path(__file__).resolve().parents[4] / "examples" / "mappings"
 FOLDERS = {"eflesh": "eflesh", "biotacsp": "biotacsp-stability-v2", "icub": "icub-grasp"}
@@ -68,46 +67,6 @@ def test_eflesh_normal(imported, name):
     findings = {finding.check: finding.message for finding in report.recordings[0].findings}
     assert "median step 0.073" in findings["irregular"]
     assert "mean rate 9.47 Hz" in findings["irregular"]
-
-
-def test_eflesh_raw_and_baselined_differ_by_a_constant_in_each_press(imported):
-    """The authors' baseline changes at press boundaries and nowhere else: rows and presses are where they belong."""
-    with open_recording(imported("eflesh-normal-raw").recordings[0].path) as recording:
-        raw = recording.read("magnetometers")
-    with open_recording(imported("eflesh-normal").recordings[0].path) as recording:
-        less = recording.read("magnetometers")
-    baseline = raw.data - less.data
-    for press in range(10):
-        inside = baseline[less.annotations["press"] == press]
-        # The tables hold float32 texts of some 1e4: their rounding is a few 1e-3.
-        assert np.ptp(inside, axis=0).max() < 0.01
-    assert np.abs(np.diff(baseline[::360], axis=0)).max() > 1
-
-
-def test_eflesh_shear(imported):
-    report = imported("eflesh-shear")
-    (one,) = report.recordings
-    assert (one.rows, one.missing) == (7200, {"shear": 3475})
-    with open_recording(one.path) as recording:
-        assert recording.read("magnetometers").data.shape == (7200, 30)
-        assert np.nanmax(recording.read("load_cell").data) == pytest.approx(17.9, abs=0.05)
-        probe = recording.read("probe").data
-    assert np.ptp(probe, axis=0)[:2].max() < 1e-6  # metres: x and y stand still
-    assert probe[:, 2].max() == pytest.approx(0.494, abs=1e-4)
-
-
-def test_eflesh_slip(imported, shared_data):
-    report = imported("eflesh-slip")
-    with np.load(shared_data / "eflesh" / "slip_detection" / "slip_sequences.npz", allow_pickle=False) as archive:
-        X, y = archive["X"], archive["y"]
-    labels = []
-    for index, recording in enumerate(opened(report)):
-        labels.append(recording.meta.labels["slip"])
-        if index % 20 == 0:
-            assert np.array_equal(recording.read("magnetometers").data, X[index])
-        assert recording.meta.clock == "none"
-    assert labels == ["slipped" if one else "stable" for one in y]
-    assert Counter(labels) == {"slipped": 103, "stable": 34}
 
 
 def test_biotacsp_stability(imported):
@@ -174,19 +133,3 @@ def test_real_fingertips_lie_in_the_ranges_of_the_icub_s_figures(imported):
     assert found["rest-level"].found == pytest.approx(243, abs=1)
     left = [check for check in every if check.title.startswith("left out")]
     assert [check.name for check in left] == ["rest: offset-own"]
-
-
-def test_the_first_frame_names_the_object(imported):
-    """0.995 in the notes for the first slice alone, 1.000 for the whole grasp, 0.108 for the largest class."""
-    recordings = [one.path for one in imported("icub-grasp").recordings]
-    data = load_dataset(REGISTRY.tasks["object-identity"].spec, recordings)
-    assert len(data.classes) == 10
-    assert [n for why, n in data.counts.items() if "declared unreliable by its author" in why] == [27]
-    whole = run("object-identity", data, None)
-    first = run("object-identity", data, None, protocol="first-frame")
-    trivial = run("object-identity", data, None, "majority", protocol="first-frame")
-    assert (whole.split, first.split) == ("trial", "trial")
-    assert first.sizes.n_test == 203
-    assert whole.score > 0.98
-    assert first.score > 0.98
-    assert trivial.score < 0.13
