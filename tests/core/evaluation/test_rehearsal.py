@@ -5,15 +5,15 @@ import subprocess
 import sys
 
 SCRIPT = """
+import psutil
 from tactbench.core.evaluation.warm_up import rehearse
-from tactbench.core.pool.processes import can_fork
 from tactbench.core.plugins.registry import installed, load_object
 
 rehearsed = [(one, kind) for one in installed().estimators if one.rehearsal is not None for kind in one.kinds]
 for one, kind in rehearsed:
     assert set(one.rehearsal) <= set(one.params), one.name
     rehearse(load_object(one.where)(kind=kind, seed=0, threads=1, **{**one.params, **one.rehearsal}), kind)
-    assert can_fork(), one.name
+    assert psutil.Process().num_threads() == 1, one.name
 print(len(rehearsed))
 """
 
