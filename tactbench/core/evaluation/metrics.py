@@ -49,8 +49,9 @@ def _mean_of(error: Callable[[npt.NDArray[Any]], npt.NDArray[Any]]) -> Rows:
 _squares = _mean_of(np.square)
 
 
-def _lengths(differences: npt.NDArray[Any]) -> FloatArray:
-    return np.asarray(np.linalg.norm(differences, axis=1))
+def distances(y: npt.NDArray[Any], predicted: npt.NDArray[Any]) -> FloatArray:
+    """Return the (n,) Euclidean lengths of the differences of (n, components)."""
+    return np.asarray(np.linalg.norm(predicted - y, axis=1))
 
 
 def _explained(y: npt.NDArray[Any], predicted: npt.NDArray[Any], _: int) -> FloatArray:
@@ -118,7 +119,7 @@ METRICS = {
     for metric in (
         Metric("rmse", "regression", False, _squares, _rmse),
         Metric("mae", "regression", False, _mean_of(np.abs), _mae),
-        Metric(VECTOR_METRIC, "regression", False, _mean_of(_lengths), _mae, vector=True),
+        Metric(VECTOR_METRIC, "regression", False, _mean_of(lambda d: np.linalg.norm(d, axis=1)), _mae, vector=True),
         Metric("r2", "regression", True, _explained, _r2),
         Metric("accuracy", "classification", True, _pairs, _accuracy),
         Metric("balanced_accuracy", "classification", True, _pairs, _balanced),
@@ -149,7 +150,7 @@ def metric_called(name: str) -> Metric:
 
 def vector_details(target: VectorTarget, y: npt.NDArray[Any], predicted: npt.NDArray[Any]) -> dict[str, float]:
     """Return what stands beside the mean error: percentiles over all rows, and each component's own RMSE."""
-    error = _lengths(predicted - y)
+    error = distances(y, predicted)
     squares = np.mean((predicted - y) ** 2, axis=0)
     return {
         MEDIAN_ERROR: float(np.median(error)),
