@@ -192,7 +192,7 @@ def features_s(
             frames = frame_times(recorded.tables[place], task, rules)
             began = clock()
             compute(recorded.tables[place], frames)
-            spent_s.append((clock() - began) / len(frames.ends_ns))
+            spent_s.append((clock() - began) / len(frames))
         return float(np.median(spent_s))
     if estimator.looks_at != "features":
         return None

@@ -5,14 +5,12 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from typing import NamedTuple
 
 import numpy as np
 
 from tactbench.core.errors import DataError, NotApplicable, PluginContractError
 from tactbench.core.evaluation.dataset import Dataset, Table, require_computable
 from tactbench.core.evaluation.protocols import ProtocolSpec
-from tactbench.core.evaluation.slip_reference import SlipReference
 from tactbench.core.evaluation.summaries import columns_of, in_band, measured, tared_readings
 from tactbench.core.events.labels import GROSS, UNDECIDED
 from tactbench.core.plugins.registry import load_object
@@ -27,14 +25,6 @@ EVENT_CLASSES = ("no event", "event")
 
 Features = tuple[tuple[str, ...], FloatArray]
 """Names, and (frames, features) numbers; NaN where a stream has no sample in the window."""
-
-
-class FrameTimes(NamedTuple):
-    """Frames of one recording."""
-
-    ends_ns: IntArray
-    """(n,) since the first row of the sensor's clock"""
-    reference: SlipReference
 
 
 def framed(data: Dataset, task: TaskSpec, rules: ProtocolSpec, estimator: EstimatorDescriptor) -> Dataset:
@@ -52,33 +42,24 @@ def framed(data: Dataset, task: TaskSpec, rules: ProtocolSpec, estimator: Estima
         )
     counts = Counter(data.counts)
     compute = frame_features(task, rules, estimator)
-    tables, names = [], None
-    for table in data.tables:
-        one, own = _framed(table, task, rules, compute, counts)
-        if names not in (None, own):
-            raise PluginContractError(
-                f"{estimator.name} looks at other features of {table.meta.name!r} than of the recordings before.",
-                hint="Evaluate recordings with other channels apart.",
-            )
-        names = own
-        tables.append(one)
+    tables, names = zip(*(_framed(table, task, rules, compute, counts) for table in data.tables), strict=True)
     classes = EVENT_CLASSES if task.kind == "events" else STATES
-    return replace(data, tables=tuple(tables), features=names or (), classes=classes, counts=dict(counts))
+    return replace(data, tables=tables, features=names[0], classes=classes, counts=dict(counts))
 
 
 def frame_features(
     task: TaskSpec, rules: ProtocolSpec, estimator: EstimatorDescriptor
-) -> Callable[[Table, FrameTimes], Features]:
+) -> Callable[[Table, IntArray], Features]:
     """Return what makes the features of all frames of one recording; a detector's own code is imported here."""
     target = slip_target(task)
     own = load_object(estimator.frames_by) if estimator.frames_by else None
     summaries = estimator.summaries or task.summaries
 
-    def compute(table: Table, frames: FrameTimes) -> Features:
-        ends_s = np.asarray(frames.ends_ns * 1e-9, dtype=np.float64)
+    def compute(table: Table, ends_ns: IntArray) -> Features:
+        ends_s = np.asarray(ends_ns * 1e-9, dtype=np.float64)
         if estimator.looks_at == "reference":
-            place = frames.reference.at(frames.ends_ns)
-            share = np.where(place >= 0, frames.reference.force_share[np.maximum(place, 0)], np.nan)
+            place = table.slip.at(ends_ns)
+            share = np.where(place >= 0, table.slip.force_share[np.maximum(place, 0)], np.nan)
             return ("tangential over friction times normal force",), share[:, None]
         if estimator.looks_at != "features":
             return (), np.zeros((len(ends_s), 0))
@@ -141,8 +122,11 @@ def clocked(table: Table, rules: ProtocolSpec) -> tuple[StreamReadings, ...]:
     return streams
 
 
-def frame_times(table: Table, task: TaskSpec, rules: ProtocolSpec) -> FrameTimes:
-    """Return when the frames of a recording end: all that all streams fill, after the hold where it is dropped."""
+def frame_times(table: Table, task: TaskSpec, rules: ProtocolSpec) -> IntArray:
+    """Return (n,) when the frames of a recording end, ns since the first row of the sensor's clock.
+
+    They are all that all streams fill, after the hold where it is dropped.
+    """
     target = slip_target(task)
     streams = clocked(table, rules)
     begin_s = max(float(_time(stream)[0]) for stream in streams)
@@ -155,32 +139,32 @@ def frame_times(table: Table, task: TaskSpec, rules: ProtocolSpec) -> FrameTimes
         raise DataError(
             f"Recording {table.meta.name!r} is shorter than a frame of {target.window_s:g} s.", hint="Leave it out."
         )
-    return FrameTimes(ends_ns, table.slip)
+    return ends_ns
 
 
 def _framed(
     table: Table,
     task: TaskSpec,
     rules: ProtocolSpec,
-    compute: Callable[[Table, FrameTimes], Features],
+    compute: Callable[[Table, IntArray], Features],
     counts: Counter[str],
 ) -> tuple[Table, tuple[str, ...]]:
-    frames = frame_times(table, task, rules)
-    names, X = compute(table, frames)
+    all_ends_ns = frame_times(table, task, rules)
+    names, X = compute(table, all_ends_ns)
     answered = np.asarray(~np.isnan(X).any(axis=1))
     if not answered.all():
         counts["frames without a sample of some stream"] += int((~answered).sum())
     require_computable(X[answered], "a feature", table.meta)
-    ends_ns, row = frames.ends_ns[answered], np.flatnonzero(answered)
-    state = frames.reference.state(ends_ns, 1.0)
+    ends_ns, row = all_ends_ns[answered], np.flatnonzero(answered)
+    state = table.slip.state(ends_ns, 1.0)
     events = task.kind == "events"
-    place = frames.reference.at(ends_ns)
+    place = table.slip.at(ends_ns)
     made = replace(
         table,
         X=X[answered],
         y=(state == GROSS).astype(np.int64) if events else state,
         labelled=np.full(len(row), True) if events else state != UNDECIDED,
-        force=np.where(place >= 0, frames.reference.normal_n[np.maximum(place, 0)], np.nan),
+        force=np.where(place >= 0, table.slip.normal_n[np.maximum(place, 0)], np.nan),
         time_s=np.asarray(ends_ns * 1e-9, dtype=np.float64),
         row=row,
         groups={name: np.full(len(row), column[0]) for name, column in table.groups.items()},

@@ -174,14 +174,14 @@ def make_splits(data: Dataset, split: str, seed: int, gap: int = 0, *, one_by_on
         return list(_in_session(data, gap))
     if split == "shuffled":
         return list(_shuffled(data, seed))
-    names = _values(data, split)
+    tables = [data.tables[place] for place in _open_to_folds(data)]
+    sizes = _sizes(tables, [table.labelled for table in tables], split)
+    names = sorted(sizes)
     if split == "session":
         return [_held_out(data, split, {name}, name) for name in names]
     if one_by_one and len(names) <= MOST_ONE_BY_ONE:
         return [_told(_held_out(data, split, {name}, f"{split} {name}"), data) for name in names]
-    everything = [np.ones(len(data.tables[place].row), dtype=bool) for place in _open_to_folds(data)]
-    dealt = _dealt(_sizes([data.tables[place] for place in _open_to_folds(data)], everything, split))
-    return [_held_out(data, split, values, f"{split} fold {number}") for number, values in enumerate(dealt, 1)]
+    return [_held_out(data, split, values, f"{split} fold {number}") for number, values in enumerate(_dealt(sizes), 1)]
 
 
 def _open_to_folds(data: Dataset) -> list[int]:
@@ -280,11 +280,6 @@ def _shuffled(data: Dataset, seed: int) -> Iterator[Assignment]:
         test = _masks(data, lambda place, _: place in dealt and dealt[place] == number)  # noqa: B023
         train = _masks(data, lambda place, _: place in dealt and ~test[place])  # noqa: B023
         yield Assignment(f"shuffled fold {number + 1}", train, test, groups="recording")
-
-
-def _values(data: Dataset, group: str) -> list[str]:
-    places = _open_to_folds(data)
-    return sorted({str(value) for place in places for value in np.unique(data.tables[place].groups.get(group, []))})
 
 
 def inner_splits(data: Dataset, outer: Assignment, gap: int = 0) -> list[tuple[tuple[Mask, ...], tuple[Mask, ...]]]:

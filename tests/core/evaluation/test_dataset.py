@@ -8,9 +8,9 @@ from tactbench.core.evaluation.dataset import load_dataset
 from tactbench.core.recording.writer import RecordingWriter
 from tactbench.core.samples import Quality
 from tactbench.core.spec.recording import RecordingMeta
-from tactbench.plugin import Block, ChannelSpec, ChannelTarget, SensorSpec, Source, StreamSpec
+from tactbench.plugin import Block, ChannelSpec, SensorSpec, Source, StreamSpec
 
-from .made import force_task, label_task, record
+from .made import force_task, record
 from .test_karl2016 import ramp
 
 MS = 1_000_000
@@ -101,27 +101,6 @@ def test_samples_marked_missing_are_no_labels_whatever_number_stands_there(tmp_p
     data = load_dataset(force_task(), [tmp_path / "a.h5"])
     assert data.counts["of 50 rows have no force sample and were left out"] == 25
     assert set(data.tables[0].y[data.tables[0].labelled]) == {2.0}
-
-
-def test_several_force_channels_need_a_name(tmp_path):
-    sensor = SensorSpec(
-        name="made", title="t", principle="none", principle_source=Source(tag="assumed", reference="a test"),
-        streams=(StreamSpec(name="taxels", channels=(ChannelSpec(name="t0", kind="taxel"),)),),
-    )  # fmt: skip
-    channels = tuple(ChannelSpec(name=name, kind="force", unit="N") for name in ("fa", "fb"))
-    meta = RecordingMeta(name="a", sensor=sensor, reference=(StreamSpec(name="ft", channels=channels),), rig="made")
-    with RecordingWriter(tmp_path / "a.h5", meta) as writer:
-        times = np.arange(20, dtype=np.int64) * 10 * MS
-        writer.append(Block("taxels", times, np.zeros((20, 1))))
-        writer.append(Block("ft", times, np.tile([1.0, 2.0], (20, 1))))
-    with pytest.raises(DataError, match="fa, fb"):
-        load_dataset(force_task(), [tmp_path / "a.h5"])
-    by_label = label_task("cap")
-    X = np.zeros((20, 1))
-    (table,) = load_dataset(by_label, [record(tmp_path / "b.h5", X, X[:, 0], labels={"cap": 5.0})]).tables
-    assert table.force is not None, "the paper's rule looks at the force in the curvature task too"
-    named = force_task(target=ChannelTarget(kind="force", name="fb"))
-    assert set(load_dataset(named, [tmp_path / "a.h5"]).tables[0].y) == {2.0}
 
 
 @pytest.mark.parametrize("what", ["backwards", "still", "reference backwards"])

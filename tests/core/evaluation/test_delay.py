@@ -8,16 +8,13 @@ import numpy as np
 import pytest
 
 from tactbench.core.acquisition import acquire
-from tactbench.core.evaluation.cell import CellContext, evaluate_cell
 from tactbench.core.evaluation.dataset import load_dataset
 from tactbench.core.evaluation.delay import NO_LINK, NO_RATE, answer_delay_ms, stated_delay_ms
 from tactbench.core.evaluation.protocols import PROTOCOLS, protocol_called
 from tactbench.core.evaluation.sets import causal_mean
-from tactbench.core.leaderboard.table import build_table
 from tactbench.core.plugins.registry import load_registry
 from tactbench.plugin import Block, ForceRamp, RigDescriptor, Scene, StreamSpec, assumed
-from tests.core.evaluation.made import force_task, record
-from tests.core.leaderboard.rows import row
+from tests.core.evaluation.made import evaluated, force_task, record
 
 TASK = force_task(protocols=tuple(PROTOCOLS))
 STEP_NS = 12_000_000  # 12 ms, as the paper's 5000 samples in 60 s
@@ -108,11 +105,7 @@ def test_what_is_not_known_is_absent_and_said(tmp_path):
 
 
 def test_the_delay_of_a_cell_is_the_sum_of_its_parts_on_a_clock_that_counts_readings(tmp_path):
-    ticks = itertools.count()
-    result = evaluate_cell(
-        CellContext(TASK, estimator(), {}, "deployable-untared", "roles", seed=1, clock=lambda: next(ticks) * 2.0**-10),
-        pressed(tmp_path / "a"),
-    )
+    result = evaluated(TASK, pressed(tmp_path / "a"), estimator(), "deployable-untared", "roles", latency=True)
     # One tick passes between the two looks at the clock around each call.
     tick_ms = 1e3 * 2.0**-10
     assert result.times.delay_parts_ms == pytest.approx(
@@ -125,19 +118,7 @@ def test_the_delay_of_a_cell_is_the_sum_of_its_parts_on_a_clock_that_counts_read
 
 
 def test_without_the_times_of_a_machine_there_is_no_sum(tmp_path):
-    result = evaluate_cell(
-        CellContext(
-            TASK,
-            estimator(),
-            {},
-            "deployable-untared",
-            "roles",
-            seed=1,
-            clock=itertools.count().__next__,
-            latency=False,
-        ),
-        pressed(tmp_path / "a"),
-    )
+    result = evaluated(TASK, pressed(tmp_path / "a"), estimator(), "deployable-untared", "roles")
     assert set(result.times.delay_parts_ms) == {"sampling", "window"}
     assert result.times.answer_delay_ms is None
     assert NO_LINK not in result.remarks
@@ -168,25 +149,3 @@ def test_a_recording_keeps_the_rate_of_the_sensor_that_it_was_not_sampled_at(tmp
                        path=tmp_path / f"{rate:.0f}.h5", clock=lambda: 0.0, provenance={})  # fmt: skip
         assert done.meta.own_rates_hz == kept
         assert done.meta.sensor.link_delay == sensor.spec.link_delay
-
-
-def test_the_table_shows_a_delay_without_its_link_as_the_least_it_can_be():
-    parts = {"sampling": 20.0, "window": 240.0, "features": 0.03, "prediction": 0.05}
-    rows = [
-        row("a", score=0.5, answer_delay_ms=260.08, delay_parts_ms=parts),
-        row("b", score=0.6, answer_delay_ms=260.35, delay_parts_ms={**parts, "link": 0.27}),
-        row("c", score=0.7, answer_delay_ms=None, delay_parts_ms={}),
-    ]
-    table = build_table(rows)
-    shown = {line.cells[1]: line.cells[table.columns.index("delay")] for block in table.blocks for line in block.lines}
-    assert [shown[f"{name} SIM"] for name in "abc"] == ["≥ 260 ms", "260 ms", "–"]
-
-
-def test_a_95th_percentile_needs_200_calls():
-    rows = [
-        row("a", score=0.5, latency_ms_p95=None, latency_ms_max=3.0, latency_n=20),
-        row("b", score=0.6, latency_ms_p95=2.0, latency_ms_max=3.0, latency_n=200),
-    ]
-    table = build_table(rows)
-    shown = [line.cells[table.columns.index("p95")] for block in table.blocks for line in block.lines]
-    assert shown == ["3.00 ms (largest of 20)", "2.00 ms"]

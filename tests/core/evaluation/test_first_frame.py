@@ -1,14 +1,11 @@
 """What the first row of a recording tells, asked of recordings that give their answer away and of some that do not."""
 
-import time
-
 import numpy as np
 import pytest
 
 from tactbench.core.errors import NotApplicable
-from tactbench.core.evaluation.cell import CellContext, evaluate_cell
 from tactbench.core.plugins.registry import load_registry
-from tests.core.evaluation.made import force_task, label_task, record
+from tests.core.evaluation.made import evaluated, force_task, label_task, record
 
 REGISTRY = load_registry()
 TASK = label_task("object", splits=("recording", "shuffled"))
@@ -27,13 +24,7 @@ def grasps(folder, *, offset, each=12, n=20, seed=3):
 
 
 def run(paths, protocol="first-frame", split=None, task=TASK):
-    return evaluate_cell(
-        CellContext(
-            task, REGISTRY.estimators["forest"], {"n_estimators": 10}, protocol, split, seed=1, clock=time.perf_counter,
-            latency=False,
-        ),
-        paths,
-    )  # fmt: skip
+    return evaluated(task, paths, "forest", protocol, split, params={"n_estimators": 10})
 
 
 def test_offsets_before_contact_name_the_object_and_contact_alone_does_not(tmp_path_factory):

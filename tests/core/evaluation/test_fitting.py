@@ -7,15 +7,15 @@ from collections import Counter
 import numpy as np
 import pytest
 
-from tactbench.core.errors import DataError, PluginContractError, UsageError
-from tactbench.core.evaluation.cell import CellContext, evaluate, evaluate_cell, load_task
+from tactbench.core.errors import DataError, PluginContractError
+from tactbench.core.evaluation.cell import evaluate, load_task
 from tactbench.core.evaluation.fitting import answers, fit
 from tactbench.core.evaluation.result import row_of
 from tactbench.core.plugins.registry import load_registry
 from tactbench.core.spec.row import RowModel
 
-from .made import force_task, label_task, record
-from .test_karl2016 import ramp, ticking
+from .made import evaluated, force_task, label_task, record, ticking
+from .test_karl2016 import ramp
 
 ESTIMATORS = load_registry().estimators
 
@@ -65,14 +65,6 @@ def test_data_an_estimator_refuses_is_an_error_with_its_name():
         fit(Answering(None, ValueError("too small")), np.zeros((3, 1)), np.arange(3), "theirs", Counter())
 
 
-def test_an_estimator_of_the_other_kind_is_refused(tmp_path):
-    path = record(tmp_path / "a.h5", *ramp(0, n=100))
-    with pytest.raises(UsageError, match="'majority' does classification"):
-        evaluate_cell(
-            CellContext(force_task(), ESTIMATORS["majority"], {}, "deployable", None, seed=0, clock=ticking()), [path]
-        )
-
-
 def test_a_score_that_is_undefined_is_left_out_or_refused_never_nan(tmp_path):
     X, force = ramp(0, n=200)
     paths = [
@@ -80,18 +72,11 @@ def test_a_score_that_is_undefined_is_left_out_or_refused_never_nan(tmp_path):
         record(tmp_path / "b.h5", X, np.full(200, 2.0), session="b", role="test"),
     ]
     task = force_task(protocols=("deployable",))
-    result = evaluate_cell(
-        CellContext(task, ESTIMATORS["mean"], {}, "deployable", "roles", seed=0, clock=ticking()), paths
-    )
+    result = evaluated(task, paths, "mean", split="roles")
     assert "r2" not in result.scores
     assert np.isfinite(list(result.scores.values())).all()
     with pytest.raises(DataError, match="r2 of 200 test rows is undefined"):
-        evaluate_cell(
-            CellContext(
-                force_task(metric="r2"), ESTIMATORS["mean"], {}, "deployable", "roles", seed=0, clock=ticking()
-            ),
-            paths,
-        )
+        evaluated(force_task(metric="r2"), paths, "mean", split="roles")
 
 
 def test_folds_that_choose_differently_are_reported_each(tmp_path):
@@ -101,9 +86,7 @@ def test_folds_that_choose_differently_are_reported_each(tmp_path):
     for place, noise in enumerate((0.1, 3.0, 0.1, 3.0)):
         X, force = ramp(place, n=300, noise=20.0 * noise)
         paths.append(record(tmp_path / f"{place}.h5", X, force + rng.normal(0, noise, 300), session=str(place)))
-    result = evaluate_cell(
-        CellContext(force_task(), ESTIMATORS["ridge"], {}, "deployable", None, seed=0, clock=ticking()), paths
-    )
+    result = evaluated(force_task(), paths, "ridge")
     allowed = {"alpha": ESTIMATORS["ridge"].grid["alpha"], "k": ESTIMATORS["ridge"].window_grid}
     assert any(" of fold " in name for name in result.chosen), result.chosen
     for name, value in result.chosen.items():
@@ -114,19 +97,7 @@ def test_the_same_seed_gives_the_same_score_bit_by_bit_with_one_thread_or_two(tm
     paths = [record(tmp_path / f"{name}.h5", *ramp(place, label_noise=0.5), session=name)
              for place, name in enumerate("ab")]  # fmt: skip
     results = [
-        evaluate_cell(
-            CellContext(
-                force_task(),
-                ESTIMATORS["forest"],
-                {"n_estimators": 20},
-                "deployable",
-                None,
-                seed=seed,
-                clock=ticking(),
-                threads=threads,
-            ),
-            paths,
-        )
+        evaluated(force_task(), paths, "forest", params={"n_estimators": 20}, seed=seed, threads=threads)
         for seed, threads in ((0, 1), (0, 2), (0, 2), (1, 1))
     ]
     first, second, third, other = results
@@ -145,11 +116,8 @@ def test_a_number_that_cannot_be_computed_with_is_named(tmp_path, what):
     X, force = ramp(0, n=200)
     (X[:, 1] if what == "t1" else force)[100:] = 1e300
     paths = [record(tmp_path / "a.h5", X, force, session="1"), record(tmp_path / "b.h5", *ramp(1, n=200), session="2")]
-    context = CellContext(
-        force_task(), load_registry().estimators["ols"], {}, "deployable", "session", seed=1, clock=ticking()
-    )
     with pytest.raises(DataError, match=rf"In recording 'a', {what} reaches 1e\+300"):
-        evaluate_cell(context, paths)
+        evaluated(force_task(), paths, split="session")
 
 
 def test_a_class_that_no_training_row_has_is_named(tmp_path):
@@ -157,10 +125,7 @@ def test_a_class_that_no_training_row_has_is_named(tmp_path):
         record(tmp_path / f"{name}.h5", ramp(n, n=200)[0], session=str(n), labels={"kind": name})
         for n, name in enumerate("abc")
     ]
-    context = CellContext(
-        label_task(), load_registry().estimators["logistic"], {}, "deployable", "session", seed=1, clock=ticking()
-    )
-    result = evaluate_cell(context, paths)
+    result = evaluated(label_task(), paths, "logistic", split="session")
     assert result.score == 0.0
     assert "tested but never trained on: 'a' in 0; 'b' in 1; 'c' in 2" in result.remarks
 
@@ -180,8 +145,7 @@ def test_any_object_with_fit_and_predict_is_evaluated_as_a_plugin_is(tmp_path):
     paths = [record(tmp_path / f"{name}.h5", *ramp(place), session=name) for place, name in enumerate("abc")]
     data, given = load_task(force_task(), paths, "deployable"), Constant()
     result = evaluate(given, data, clock=ticking())
-    context = CellContext(force_task(), ESTIMATORS["mean"], {}, "deployable", None, seed=0, clock=ticking())
-    assert result.score == pytest.approx(evaluate_cell(context, paths).score, rel=1e-12)
+    assert result.score == pytest.approx(evaluated(force_task(), paths, "mean").score, rel=1e-12)
     assert not hasattr(given, "mean"), "copies are fitted"
     row = json.loads(json.dumps(row_of(result)))
     assert row.keys() <= RowModel.model_fields.keys()

@@ -5,12 +5,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tactbench.core.errors import UsageError
 from tactbench.core.evaluation.dataset import load_dataset
 from tactbench.core.evaluation.splits import inner_splits, make_splits
 
 from .made import force_task, label_task
-from .test_splits import grasps, run, sessions
+from .test_splits import grasps, sessions
 
 
 def values(data, group, masks):
@@ -51,14 +50,3 @@ def test_a_cut_in_time_leaves_a_gap_of_the_longest_window(tmp_path_factory, gap)
             for a, b in zip(before, after, strict=True):
                 if b.any():
                     assert np.flatnonzero(b)[0] - np.flatnonzero(a)[-1] == gap + 1
-
-
-def test_a_group_that_some_recordings_lack_is_refused(tmp_path):
-    paths = [grasps(tmp_path, seed=1), *sessions(tmp_path, ("a",), labels={"kind": "stable"})]
-    with pytest.raises(UsageError, match="object"):
-        run(paths, "object", label_task())
-
-
-def test_the_answer_cannot_be_split_by(tmp_path):
-    with pytest.raises(UsageError, match="cannot be split by 'kind'"):
-        run([grasps(tmp_path, seed=1)], "kind", label_task())

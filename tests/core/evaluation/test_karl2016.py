@@ -1,13 +1,11 @@
 """The paper's protocol, step by step, on recordings whose right answer can be worked out by hand."""
 
-import itertools
 from collections import Counter
 
 import numpy as np
 import pytest
 
 from tactbench.core.errors import NotApplicable
-from tactbench.core.evaluation.cell import CellContext, evaluate_cell
 from tactbench.core.evaluation.dataset import load_dataset
 from tactbench.core.evaluation.fitting import select
 from tactbench.core.evaluation.metrics import METRICS
@@ -16,15 +14,10 @@ from tactbench.core.evaluation.sets import FeatureScale, keep, moments, part
 from tactbench.core.evaluation.splits import make_splits
 from tactbench.core.plugins.registry import load_object, load_registry
 
-from .made import force_task, record
+from .made import evaluated, force_task, record
 
 ESTIMATORS = load_registry().estimators
 ROLES = ("train", "validation", "test")
-
-
-def ticking():
-    counter = itertools.count()
-    return lambda: next(counter) * 1e-3
 
 
 def three(folder, make, **more):
@@ -91,9 +84,10 @@ def test_a_channel_that_never_changes_becomes_zero_and_is_reported(tmp_path):
         X[:, 2] = 243.7
         return X, force
 
-    _, _, one, _ = sets(three(tmp_path, stuck), "train")
+    paths = three(tmp_path, stuck)
+    _, _, one, _ = sets(paths, "train")
     assert not one.X[:, 2].any()
-    result = run(three(tmp_path, stuck))
+    result = run(paths)
     assert result.counts["folds in which t2 never changes in training"] == 1
     assert np.isfinite(result.score)
 
@@ -105,20 +99,8 @@ def test_the_window_is_the_mean_over_t_minus_k_to_t_within_one_recording(tmp_pat
         np.testing.assert_allclose(one.X[t], z[max(0, t - 20) : t + 1].mean(axis=0), atol=1e-12)
 
 
-def run(paths, estimator="lasso", task=None, **more):
-    return evaluate_cell(
-        CellContext(
-            task or force_task(),
-            ESTIMATORS[estimator],
-            more.pop("params", {}),
-            "karl2016",
-            more.pop("split", None),
-            seed=more.pop("seed", 0),
-            clock=ticking(),
-            **more,
-        ),
-        paths,
-    )
+def run(paths, estimator="lasso", **more):
+    return evaluated(force_task(), paths, estimator, "karl2016", **{"seed": 0, **more})
 
 
 def test_lasso_on_one_perfect_feature_is_wrong_by_exactly_lambda(tmp_path):

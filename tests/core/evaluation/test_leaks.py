@@ -1,22 +1,14 @@
 """A recording under two names, or a piece of one, on both sides of a split is stamped; alike presses are not."""
 
-import time
-
 import numpy as np
 import pytest
 
-from tactbench.core.evaluation.cell import CellContext, evaluate_cell
-from tactbench.core.plugins.registry import load_registry
-
-from .made import force_task, record
+from .made import evaluated, force_task, record
 from .test_karl2016 import ramp
-
-ESTIMATOR = load_registry().estimators["ols"]
 
 
 def stamps(paths, split="session"):
-    context = CellContext(force_task(), ESTIMATOR, {}, "deployable", split, seed=1, clock=time.perf_counter)
-    return evaluate_cell(context, paths).stamps
+    return evaluated(force_task(), paths, split=split).stamps
 
 
 def test_sessions_of_their_own_have_no_stamp(tmp_path):

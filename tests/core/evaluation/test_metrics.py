@@ -5,10 +5,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from scipy import stats
-from scipy.signal import lfilter
 from sklearn import metrics as reference
 
-from tactbench.core.evaluation.interval import block_length, influences, score_interval, transform_of
+from tactbench.core.evaluation.interval import influences, score_interval, transform_of
 from tactbench.core.evaluation.metrics import METRICS
 
 seeds = st.integers(0, 2**32 - 1)
@@ -84,28 +83,6 @@ def test_the_block_interval_covers_the_truth_where_errors_have_memory():
     # as independent cover far less, which is what this interval is for.
     assert hits >= 0.88 * trials
     assert naive < hits
-
-
-def test_sessions_of_one_class_stand_in_for_each_other_only():
-    """Five sessions of each of two classes, all of class 1 wrong: every resample has as many of each."""
-    cluster = np.repeat(np.arange(10), 30)
-    y = (cluster >= 5).astype(np.int64)
-    predicted = np.zeros_like(y)
-    found = score_interval(METRICS["accuracy"], y, predicted, cluster, cluster, "session", 2, 0)
-    assert "10 sessions" in found.method
-    assert (found.low, found.high) == (0.5, 0.5)
-
-
-@pytest.mark.parametrize("memory", [0.5, 0.8, 0.95])
-def test_the_block_length_is_that_of_the_theory_for_a_first_order_process(memory):
-    """g = sum |k| R(k) = 2 R0 a / (1-a)², g0 = R0 (1+a) / (1-a): b = (6 a² / (1-a²)²)^(1/3) n^(1/3)."""
-    rng = np.random.default_rng(5)
-    n = 20_000
-    lengths = [block_length(lfilter([1.0], [1.0, -memory], rng.normal(size=n + 500))[500:]) for _ in range(15)]
-    expected = (6 * memory**2 / (1 - memory**2) ** 2 * n) ** (1 / 3)
-    # The bandwidth is estimated: one length scatters by 5 to 11 %, the mean of fifteen by 3 %, and lies 2 to 5 % low.
-    # The constant of the stationary bootstrap in place of the circular one's would be 13 % lower still.
-    assert np.mean(lengths) == pytest.approx(expected, rel=0.10)
 
 
 @given(st.lists(st.floats(-100, 100), min_size=2, max_size=20))

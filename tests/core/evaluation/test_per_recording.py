@@ -1,12 +1,9 @@
 """One answer a recording: by summaries on each stream's own clock, by code of the task's own, or by a vote."""
 
-import time
-
 import numpy as np
 import pytest
 
 from tactbench.core.errors import DataError, NotApplicable, PluginContractError, UsageError
-from tactbench.core.evaluation.cell import CellContext, evaluate_cell
 from tactbench.core.evaluation.dataset import load_dataset
 from tactbench.core.evaluation.fitting import voted
 from tactbench.core.evaluation.protocols import protocol_called
@@ -29,7 +26,7 @@ from tactbench.plugin import (
     Summary,
     assumed,
 )
-from tests.core.evaluation.made import force_task, label_task, record
+from tests.core.evaluation.made import evaluated, force_task, label_task, record
 
 REGISTRY = load_registry()
 MOVES = (Summary(measure="deviation"), Summary(measure="mean-step"))
@@ -60,11 +57,7 @@ def sequences(folder, number=24, n=40, seed=5, **more):
 
 def run(asked, paths, split=None, estimator="forest", protocol="deployable", **more):
     params = {"n_estimators": 20} if estimator == "forest" else {}
-    context = CellContext(
-        asked, REGISTRY.estimators[estimator], params, protocol, split, seed=1, clock=time.perf_counter,
-        **{"latency": False, **more},
-    )  # fmt: skip
-    return evaluate_cell(context, paths)
+    return evaluated(asked, paths, estimator, protocol, split, params=params, **more)
 
 
 def test_a_recording_is_one_answer_by_what_it_did_and_not_where_it_stood(tmp_path):

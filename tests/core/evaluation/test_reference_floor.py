@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-from tactbench.core.evaluation.cell import CellContext, evaluate_cell
 from tactbench.core.evaluation.interval import ReplicateUnits
 from tactbench.core.evaluation.metrics import METRICS
 from tactbench.core.evaluation.reference_floor import (
@@ -12,14 +11,13 @@ from tactbench.core.evaluation.reference_floor import (
     beyond_floor,
     hold_of,
 )
-from tactbench.core.plugins.registry import installed
 from tactbench.core.samples import Answers
 from tactbench.core.spec.drive import ForceLoop
 from tactbench.core.spec.profile import ForceRamp
 from tactbench.core.spec.quantity import assumed
 from tactbench.core.spec.scene import Scene
 
-from .made import force_task, record
+from .made import evaluated, force_task, record
 
 SIGMA = 0.6875
 RMSE = METRICS["rmse"]
@@ -92,17 +90,6 @@ def test_a_reference_without_noise_leaves_the_rmse_as_it_is():
     assert beyond_floor(floor, answers, unit).score == 0.0
 
 
-@pytest.mark.parametrize("recordings", [1, 3, 8])
-def test_replicates_keep_the_whole_of_the_floor(recordings):
-    answers, unit, floor = asked(0.3, recordings=recordings, rows=500, hold=90)
-    code = np.arange(len(answers)) * 7 // len(answers)
-    for codes, n in ((code, 7), (unit.codes, recordings)):
-        squares, freedom = (sums := floor.by_replicate(answers, codes)).sum(axis=0)
-        assert len(sums) == n
-        assert squares / freedom == pytest.approx(floor.value**2, rel=1e-12)
-        assert (sums > 0).all()
-
-
 def scene(name, hold=7.2, **more):
     samples = more.pop("samples", 400)
     profile = ForceRamp(hold=assumed(hold, "s", "a test"), samples=samples, **more.pop("profile", {}))
@@ -131,11 +118,8 @@ def recorded(folder, task, *, sigma=SIGMA, simulated=True, **how):
 TASK = force_task(protocols=("deployable",), splits=("roles",))
 
 
-def result_of(paths, task=TASK):
-    estimator = installed().estimators["ols" if task.kind == "regression" else "logistic"]
-    return evaluate_cell(
-        CellContext(task, estimator, {}, "deployable", "roles", seed=1, clock=lambda: 0.0, latency=False), paths
-    )
+def result_of(paths):
+    return evaluated(TASK, paths, split="roles")
 
 
 def test_a_cell_tells_its_floor_and_the_error_against_the_true_force(tmp_path):

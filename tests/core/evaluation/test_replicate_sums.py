@@ -67,32 +67,6 @@ def test_trials_of_one_session_stand_in_for_each_other(tmp_path):
     assert method.endswith("): spread between sessions is not in it")
 
 
-def test_a_group_that_some_classes_do_not_have_is_said_not_to_be_in_the_interval(tmp_path):
-    """Recordings stand in for objects where the recordings of one class have none."""
-    rng = np.random.default_rng(4)
-    paths = [
-        record(
-            tmp_path / f"{number}.h5", rng.normal(size=(20, 2)), role="train" if number < 4 else "test", session="one",
-            labels={"kind": number % 2, **({"object": number // 4} if number % 2 else {})},
-        )
-        for number in range(16)
-    ]  # fmt: skip
-    method = run(paths, "roles", label_task()).interval.method
-    assert method.startswith("jackknife over 12 recordings ")
-    assert method.endswith(": spread between sessions and objects is not in it")
-
-
-def test_five_caps_of_one_session_each_recorded_once_are_not_replicates(tmp_path):
-    """Resampling the caps would lose classes: time is resampled instead, and the row says so."""
-    X, _ = ramp(0, n=60)
-    paths = [
-        record(tmp_path / f"{role}{cap}.h5", X + cap, role=role, session=role, labels={"kind": cap})
-        for role in ("train", "validation", "test") for cap in range(5)
-    ]  # fmt: skip
-    result = run(paths, "roles", label_task(), "chance", params={})
-    assert "within 5 recordings" in result.interval.method
-
-
 def test_a_unit_is_found_for_each_row_by_its_number(tmp_path):
     """Rows that were left out must not shift the groups of those that follow."""
     X, force = ramp(0, n=60)

@@ -6,17 +6,15 @@ import numpy as np
 import pytest
 
 from tactbench.core.errors import NotApplicable
-from tactbench.core.evaluation.cell import CellContext, evaluate_cell
 from tactbench.core.evaluation.dataset import load_dataset
 from tactbench.core.evaluation.protocols import DEPLOYABLE
 from tactbench.core.evaluation.sets import hold_s, prepared, tare_s, tared
 from tactbench.core.evaluation.splits import make_splits
-from tactbench.core.plugins.registry import installed
 from tactbench.core.spec.profile import ForceRamp
 from tactbench.core.spec.quantity import assumed
 from tactbench.core.spec.scene import Scene
 
-from .made import force_task, record
+from .made import evaluated, force_task, record
 
 NOT_TARED = "not tared: no recording states an unloaded hold"
 TASK = force_task(protocols=("deployable", "deployable-untared"), splits=("roles",))
@@ -43,13 +41,8 @@ def three(folder, offsets=(0.0, 0.0, 0.0), **how):
     return paths
 
 
-def answered(paths, protocol, estimator="ols"):
-    return evaluate_cell(
-        CellContext(
-            TASK, installed().estimators[estimator], {}, protocol, "roles", seed=1, clock=lambda: 0.0, latency=False
-        ),
-        paths,
-    )
+def answered(paths, protocol):
+    return evaluated(TASK, paths, protocol=protocol, split="roles")
 
 
 def test_constant_offsets_of_recordings_change_nothing_where_they_are_tared(tmp_path):

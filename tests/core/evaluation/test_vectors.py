@@ -1,20 +1,16 @@
 """A vector for every sample: scored by the length of the difference, one model per component."""
 
-import time
-
 import numpy as np
 import pytest
 
-from tactbench.core.evaluation.cell import CellContext, evaluate_cell
-from tactbench.core.evaluation.dataset import load_dataset
 from tactbench.core.evaluation.metrics import METRICS
 from tactbench.core.evaluation.replicate_sums import tables_of
 from tactbench.core.plugins.registry import load_registry
 from tactbench.core.recording.writer import RecordingWriter
 from tactbench.core.samples import Quality
 from tactbench.core.spec.recording import RecordingMeta
-from tactbench.plugin import Block, ChannelSpec, ChannelTarget, NotApplicable, StreamSpec, VectorTarget
-from tests.core.evaluation.made import force_task, sensor
+from tactbench.plugin import Block, ChannelSpec, ChannelTarget, StreamSpec, VectorTarget
+from tests.core.evaluation.made import evaluated, force_task, sensor
 
 REGISTRY = load_registry()
 PLACE = StreamSpec(
@@ -55,13 +51,7 @@ def presses(folder, number=12, n=60, noise=0.0, seed=3, missing=0, wander=2e-4, 
 
 
 def run(task, paths, estimator="ols", split=None, protocol="deployable-untared", **more):
-    return evaluate_cell(
-        CellContext(
-            task, REGISTRY.estimators[estimator], more.pop("params", {}), protocol, split, seed=1,
-            clock=time.perf_counter, **{"latency": False, **more},
-        ),
-        paths,
-    )  # fmt: skip
+    return evaluated(task, paths, estimator, protocol, split, **more)
 
 
 def test_the_metric_is_the_mean_length_of_the_difference():
@@ -92,10 +82,7 @@ def test_each_component_is_learnt_as_if_it_were_asked_for_alone(tmp_path, estima
     descriptor = REGISTRY.estimators[estimator].model_copy(update={"window_grid": (0,)})
 
     def answered(task):
-        context = CellContext(
-            task, descriptor, fixed, "deployable-untared", None, seed=1, clock=time.perf_counter, latency=False
-        )
-        return evaluate_cell(context, paths).sets["test"].y_pred
+        return run(task, paths, descriptor, params=fixed).sets["test"].y_pred
 
     both = answered(place_task())
     for column, name in enumerate(("x", "y")):
@@ -117,21 +104,9 @@ def test_a_row_without_one_component_has_no_label(tmp_path):
     assert left_out == {"of 720 rows have no position samples called 'x' and 'y' and were left out": 12 * 15}
 
 
-def test_recordings_without_the_reference_cannot_be_asked(tmp_path):
-    task = place_task(target=VectorTarget(names=("x", "z"), unit="mm"))
-    with pytest.raises(NotApplicable, match="asks for position samples called 'x' and 'z', and no recording has it"):
-        load_dataset(task, presses(tmp_path, number=2))
-
-
 def test_intervals_and_replicates_are_of_the_vectors(tmp_path):
     result = run(place_task(), presses(tmp_path, noise=3.0))
     assert result.interval.method.startswith("jackknife over 6 sessions")
     assert result.interval.low < result.score < result.interval.high
     sums = tables_of([dict(result.replicates)], "mean_euclidean_error", 0)[0].sum(axis=0)
     assert sums[0] / sums[1] == pytest.approx(result.score)
-    for name in ("one-session", "few"):
-        (tmp_path / name).mkdir()
-    of_time = run(place_task(), presses(tmp_path / "one-session", noise=3.0, session=lambda _: "s"), split="roles")
-    assert of_time.interval.method.startswith("jackknife over 6 recordings")
-    few = run(place_task(), presses(tmp_path / "few", number=4, noise=3.0))
-    assert few.interval.method.startswith("block bootstrap in time within 2 recordings")

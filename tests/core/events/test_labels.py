@@ -67,15 +67,6 @@ def test_the_stick_ratio_by_hand():
     assert stick_ratio(pull, normal, MU) == pytest.approx([1.0, 0.5, 0.5, 0.0, 0.0, np.nan], nan_ok=True, abs=1e-5)
 
 
-def test_displacement_decides_over_forces():
-    """A coefficient stated too high or too low moves no onset: it only costs incipient frames."""
-    t, displacement, pull, normal = drag()
-    found = [slip_labels(seconds(*t), displacement, pull, normal, mu, THRESHOLDS) for mu in (0.5 * MU, MU, 2 * MU)]
-    assert all(np.array_equal(found[0].gross_ns, other.gross_ns) for other in found[1:])
-    low = found[0].state[(t > 0.76) & (t < 1.0)]  # the pull is over half: by its forces everything slips
-    assert np.all(low == UNDECIDED)
-
-
 def test_motion_in_the_air_and_motion_from_the_first_sample_are_no_events():
     t, displacement, pull, normal = drag()
     aloft = slip_labels(seconds(*t), displacement, pull, np.zeros_like(normal), MU, THRESHOLDS)
@@ -85,15 +76,6 @@ def test_motion_in_the_air_and_motion_from_the_first_sample_are_no_events():
     moving = slip_labels(seconds(*t[late]), displacement[late], pull[late], normal[late], MU, THRESHOLDS)
     assert moving.gross_ns.shape == (0, 2)
     assert np.any(moving.state == GROSS)
-
-
-def test_a_contact_made_as_the_motion_begins_was_held_by_nothing():
-    t, displacement, pull, _ = drag()
-    first = int(np.flatnonzero(labelled()[1].state == GROSS)[0])
-    normal = np.where(np.arange(t.size) >= first, P, 0.0)
-    labels = slip_labels(seconds(*t), displacement, pull, normal, MU, THRESHOLDS)
-    assert labels.state[first - 1 : first + 1].tolist() == [UNDECIDED, GROSS]
-    assert labels.gross_ns.shape == (0, 2)
 
 
 def holds_one_by_one(t, moved, hold, allowed):

@@ -18,11 +18,6 @@ def test_the_middle_half_of_equal_weights_is_the_trimmed_mean(values):
     assert found == pytest.approx(stats.trim_mean(values, 0.25), abs=1e-9)
 
 
-def test_an_entry_counts_by_its_weight():
-    """Of weights 1, 2, 1 the middle half is the middle entry alone."""
-    assert interquartile_mean(np.array([[9.0, 1.0, -7.0]]), np.array([1.0, 2.0, 1.0]))[0] == pytest.approx(1.0)
-
-
 def test_scores_stand_between_the_trivial_answer_and_the_reference_and_nothing_is_clipped():
     error = mae_row("a", [1.0] * 5, baseline=4.0)
     assert [normalised(error, value) for value in (4.0, 1.0, 0.0, 5.0)] == [0.0, 0.75, 1.0, -0.25]

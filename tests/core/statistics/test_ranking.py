@@ -22,12 +22,6 @@ def board(seed, cells=6, replicates=8, spread=0.3, **more):
     ]
 
 
-def test_cells_that_chance_made_differ_share_the_first_rank():
-    found = ranks(board(2, cells=4, spread=5.0))
-    assert {one.place for one in found.values()} == {1}
-    assert all(one.tied and one.low == 1 for one in found.values())
-
-
 def test_pairing_tells_apart_what_two_intervals_would_not():
     """The sessions differ by far more than the sensors do, and alike for both."""
     session = np.linspace(1, 9, 8)
@@ -63,17 +57,6 @@ def test_places_follow_scores_and_intervals_hold_them(seed, spread):
     assert found[0].place == 1
     assert [one.place for one in found] == sorted(one.place for one in found)
     assert all(1 <= one.low <= one.place <= one.high <= len(rows) for one in found)
-
-
-def test_higher_is_better_where_it_is():
-    def accuracy(cell, share):
-        hits = np.round(100 * np.asarray(share))
-        sums = np.zeros((len(hits), 4))
-        sums[:, 0], sums[:, 1] = hits, 100 - hits
-        return row(cell, sums, metric="accuracy", classes=2)
-
-    found = ranks([accuracy("bad", np.linspace(0.4, 0.5, 8)), accuracy("good", np.linspace(0.8, 0.9, 8))])
-    assert (found["good"].place, found["bad"].place) == (1, 2)
 
 
 def test_a_row_without_replicates_is_told_from_none():

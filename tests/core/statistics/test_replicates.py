@@ -83,16 +83,6 @@ def test_seeds_asked_of_the_same_recordings_are_no_replicates():
     assert found["ci_low"] is None
 
 
-def test_cells_are_paired_by_replicate():
-    one, other = over_replicates([*replicates(SCORES), *replicates([score - 0.05 for score in SCORES], "b")])
-    found = difference(one, other)
-    assert found.paired
-    assert found.value == pytest.approx(0.05)
-    assert found.low == pytest.approx(0.05)
-    assert found.p == pytest.approx(2 / 2**8)
-    assert found.replicates == 8
-
-
 def test_errors_of_force_are_compared_beyond_their_floor():
     known = {"metric": "rmse", "unit": "N", "reference_floor": 0.3}
     rows = [
