@@ -151,7 +151,9 @@ def test_one_sensor_fills_its_row_and_missing_recordings_cost_the_embedding_only
         drawn, said = draw(folder, tmp_path / "figures")
     assert kinds(drawn) == PUBLISHED + CURVATURE[:-1] + FORCE
     assert all(len(one.keys) == 1 for one in drawn)
-    assert any(one.startswith("No embedding of alpha/curvature") and str(tmp_path / "recordings") in one for one in said)
+    assert any(
+        one.startswith("No embedding of alpha/curvature") and str(tmp_path / "recordings") in one for one in said
+    )
 
 
 def test_folds_have_figures_of_their_test_sets(tmp_path):
