@@ -84,22 +84,12 @@ def test_the_words_and_the_run_agree(here):
     assert why(here)["answer"] == "hit"
 
 
-@pytest.mark.parametrize(
-    ("change", "reason"),
-    [
-        (lambda acme: (acme / "table.csv").write_text("1"), "source: acme "),
-        (lambda acme: (acme / "__init__.py").write_text(
-            (acme / "__init__.py").read_text().replace('"gain": 1.0', '"gain": 2.0')),
-         "estimator: params: gain 1.0 -> 2.0"),
-    ],
-    ids=["a table", "a default"],
-)  # fmt: skip
-def test_what_changed_is_said_in_words(here, change, reason):
-    change(here.acme)
+def test_what_changed_is_said_in_words(here):
+    (here.acme / "table.csv").write_text("1")
     found = why(here)
     assert found["answer"] == "miss"
-    assert any(said.startswith(reason) for said in found["reasons"])
-    assert f"  {reason}" in here("why", "acme/1").stdout
+    assert any(said.startswith("source: acme ") for said in found["reasons"])
+    assert "  source: acme " in here("why", "acme/1").stdout
 
 
 def test_options_ask_for_it_otherwise(here):
@@ -134,9 +124,7 @@ def test_a_stopped_cell_shows_its_reason_its_traceback_and_what_to_try(here):
     assert "Try: tactbench rerun ideal/force/twin/karl2016/acme-raises/1 --out results" in text
 
 
-def test_a_key_or_a_part_of_the_name_will_do_and_what_is_unclear_is_refused(here):
-    key = why(here)["key"]
-    assert why(here, key[:8])["cell"] == ACME
+def test_a_part_of_the_name_will_do_and_what_is_unclear_is_refused(here):
     several = here("why", "ideal/force", code=2).stderr
     assert "part of the names of 4 cells" in several
     assert ACME in several
