@@ -24,13 +24,13 @@ from tactbench.core.matrix.solve import Job, check_content
 from tactbench.core.plugins.registry import installed
 from tactbench.core.pool import Limits, Pool
 from tactbench.core.pool.child import plain_error
+from tactbench.core.provenance.gather import THREADS
 from tactbench.core.provenance.source import ANSWERING, sources_of, versions
 
 CONNECT_S = 10.0
 """Seconds to wait for a scheduler."""
 GATHER_S = 60.0
 """Seconds to wait for the first worker."""
-_THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 
 
 class Dask:
@@ -59,7 +59,7 @@ class Dask:
             If no scheduler answers, or a worker's versions or sources differ from this run's.
         """
         logging.getLogger("distributed").setLevel(logging.CRITICAL)
-        threads = {name: os.environ[name] for name in _THREADS if name in os.environ}
+        threads = {name: os.environ[name] for name in THREADS if name in os.environ}
         with ExitStack() as stack:
             to: Any = self._scheduler
             if to is None:

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal, get_args
+from typing import TYPE_CHECKING, Any, Literal
 
 from tactbench.core.errors import PluginContractError, UnwritableError, UsageError
 from tactbench.core.matrix.keys import Keys, Sections
@@ -32,7 +32,6 @@ if TYPE_CHECKING:
     from tactbench.core.matrix.dask import Dask
 
 EngineName = Literal["in-process", "isolated", "dask"]
-ENGINES: tuple[EngineName, ...] = get_args(EngineName)
 MEASURED_MEMORY = "the limit of memory was held by measuring every 50 ms: this system cannot refuse memory"
 
 
