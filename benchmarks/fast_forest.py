@@ -23,7 +23,7 @@ from sklearn.ensemble import RandomForestClassifier
 from tactbench.core.cost.rounds import measure
 from tactbench.core.cost.timed_estimators import TimedEstimator, timed_estimator
 from tactbench.core.evaluation.dataset import load_dataset
-from tactbench.core.matrix.progress import Silence
+from tactbench.core.matrix.progress import Progress
 from tactbench.core.matrix.run import run_matrix
 from tactbench.core.matrix.store import Store
 from tactbench.core.plugins.registry import load_object, load_registry
@@ -38,9 +38,9 @@ def arrays(sensor: str, folder: Path) -> TimedEstimator:
     """Return the plain forest with the arrays of its cell."""
     registry = load_registry()
     choice = TaskChoice(name=TASK, protocol=PROTOCOL, estimators=(EstimatorChoice(name="majority"),))
-    outcome = run_matrix(MatrixSpec(repeats=1, sensors=(sensor,), tasks=(choice,)), Store(folder))
+    (row,) = run_matrix(MatrixSpec(repeats=1, sensors=(sensor,), tasks=(choice,)), Store(folder)).rows
     spec = registry.tasks[TASK].spec
-    data = load_dataset(spec, outcome.recordings[outcome.rows[0]["cell"]])
+    data = load_dataset(spec, [folder / path for path in row["recordings"]])
     return timed_estimator(spec, registry.estimators["forest"], {}, PROTOCOL, "roles", data, seed=1, threads=1)
 
 
@@ -73,7 +73,7 @@ def main() -> None:
         plain = arrays(sensor, Path(folder))
     field = {name: of_seed(plain, name, 1) for name in names}
     times = measure(field, rounds=rounds, budget_s=float("inf"), threads=1, seed=1, clock=time.perf_counter,
-                    progress=Silence())  # fmt: skip
+                    progress=Progress())  # fmt: skip
     for name, timing in times.items():
         if timing.trouble is not None:
             raise SystemExit(f"{name}: {timing.trouble}")

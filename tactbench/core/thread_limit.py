@@ -8,6 +8,9 @@ from contextlib import AbstractContextManager
 from functools import lru_cache
 from typing import Any
 
+VARIABLES = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
+"""What numerical libraries read when they are loaded."""
+
 
 def thread_limit(threads: int) -> AbstractContextManager[Any]:
     """Return a context in which OpenMP and BLAS use at most `threads` threads.

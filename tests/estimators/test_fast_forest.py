@@ -56,7 +56,7 @@ def test_a_cell_without_the_extra_is_skipped_with_the_reason_and_is_no_failure(t
         params=(), baseline=False, repeat=1, repeats=1, seed=1,
     )  # fmt: skip
     with pytest.raises(NotApplicable) as reason:
-        solve(Job(cell, REGISTRY.tasks["curvature"].spec, FAST, paths, ()))
+        solve(Job(cell, REGISTRY.tasks["curvature"].spec, FAST, paths, (), "", {}))
     row = unanswered(cell, REGISTRY.tasks["curvature"].spec, reason.value, simulated=False)
     assert row["status"] == "skipped", row["reason"]
     assert "pip install 'tactbench[fast]'" in row["reason"]

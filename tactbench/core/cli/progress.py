@@ -7,17 +7,18 @@ import sys
 import time
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager, nullcontext
-from typing import Any, Protocol, TextIO
+from typing import Any, TextIO
 
 from tactbench.core.cli.screen import remark
 from tactbench.core.matrix.progress import Progress
 
 
-class Display(Progress, Protocol):
+class Display(Progress):
     """Progress, and what is known so far."""
 
     def paused(self) -> AbstractContextManager[None]:
         """Draw nothing meanwhile: somebody is asked something."""
+        return nullcontext()
 
     def show(self, text: Callable[[], str]) -> None:
         """Show what `text` returns while the rest is under way, in place of what was shown before; not in a log."""
@@ -53,7 +54,7 @@ def duration(seconds: float) -> str:
     return f"{minutes} min" if minutes < 90 else f"{minutes // 60} h {minutes % 60} min"
 
 
-class Lines:
+class Lines(Display):
     """One line a stage and one a finished tenth of it: readable in a log.
 
     Parameters
@@ -90,18 +91,8 @@ class Lines:
             more = f" ({', '.join(texts)})" if texts else ""
             remark(f"{self._stage}: {self._done}/{self._total} {what}{more}")
 
-    def working(self, what: str) -> None:
-        """Say nothing: what is under way is no line."""
 
-    def show(self, text: Callable[[], str]) -> None:
-        """Show nothing, and make nothing: only the last table is for a log."""
-
-    def paused(self) -> AbstractContextManager[None]:
-        """Nothing is drawn by itself."""
-        return nullcontext()
-
-
-class _Bar:
+class _Bar(Display):
     """A bar a stage; its clock ticks by a thread where a thread is allowed, else with each step."""
 
     def __init__(self, terminal: TextIO) -> None:

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import os
 
+from tactbench.core.thread_limit import VARIABLES
+
 
 def keep_threads(number: int = 1) -> None:
     """Keep numerical libraries at `number` threads, at one as the table's times state; before any is imported.
 
     Several threads would also sum in another order on another machine. Whoever sets these variables means it.
     """
-    for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
+    for name in VARIABLES:
         os.environ.setdefault(name, str(number))
     # scikit-learn imports pandas where it is, pandas imports Arrow, and Arrow's allocator would start a thread of its
     # own: no numbers are computed in it, but a process with threads cannot fork its cells.

@@ -79,7 +79,7 @@ def climb(
         )
     outcome = run_matrix(matrix, store, choice=choice, recordings=recordings, progress=progress)
     done = [row for row in outcome.rows if row["status"] == "done" and row["seed"] == matrix.seed]
-    data = load_dataset(task, outcome.recordings[done[0]["cell"]]) if done else None
+    data = load_dataset(task, [store.folder / path for path in done[0]["recordings"]]) if done else None
     answers = over_replicates(outcome.rows)
     rows: dict[str, Record] = {}
     timed_estimators: dict[str, TimedEstimator] = {}

@@ -10,7 +10,7 @@ import logging
 import multiprocessing
 import os
 import warnings
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
@@ -22,10 +22,10 @@ from tactbench.core.errors import Crashed, EngineError, UsageError
 from tactbench.core.matrix.keys import differences
 from tactbench.core.matrix.solve import Job, check_content
 from tactbench.core.plugins.registry import installed
-from tactbench.core.pool import Limits, Pool
+from tactbench.core.pool import Engine, Limits, Pool
 from tactbench.core.pool.child import plain_error
-from tactbench.core.provenance.gather import THREADS
 from tactbench.core.provenance.source import ANSWERING, sources_of, versions
+from tactbench.core.thread_limit import VARIABLES
 
 CONNECT_S = 10.0
 """Seconds to wait for a scheduler."""
@@ -33,7 +33,7 @@ GATHER_S = 60.0
 """Seconds to wait for the first worker."""
 
 
-class Dask:
+class Dask(Engine):
     """The engine; it connects when it is entered.
 
     Parameters
@@ -47,8 +47,8 @@ class Dask:
     """
 
     def __init__(self, jobs: int, limits: Limits, scheduler: str | None = None) -> None:
+        super().__init__()
         self._jobs, self._limits, self._scheduler = jobs, limits, scheduler
-        self._waiting: list[tuple[Callable[[Any], Any], Job]] = []
 
     def __enter__(self) -> Dask:
         """Connect, or start a cluster.
@@ -59,7 +59,7 @@ class Dask:
             If no scheduler answers, or a worker's versions or sources differ from this run's.
         """
         logging.getLogger("distributed").setLevel(logging.CRITICAL)
-        threads = {name: os.environ[name] for name in THREADS if name in os.environ}
+        threads = {name: os.environ[name] for name in VARIABLES if name in os.environ}
         with ExitStack() as stack:
             to: Any = self._scheduler
             if to is None:
@@ -88,19 +88,16 @@ class Dask:
 
     def __exit__(self, *_: object) -> None:
         """Disconnect; what is under way is cancelled."""
-        self._waiting.clear()
+        super().__exit__()
         self._stack.close()
-
-    def submit(self, work: Callable[[Any], Any], items: Sequence[Any]) -> None:
-        """Queue cells."""
-        self._waiting += [(work, item) for item in items]
 
     def outcomes(self) -> Iterator[tuple[Any, Any]]:
         """Yield every cell with its result or the error that stopped it, in the order in which they end."""
         folder = str(Path.cwd())
         of = {
             self._client.submit(carry_out, work, job, folder, self._limits, pure=False, retries=0): job
-            for work, job in self._waiting
+            for work, jobs in self._waiting
+            for job in jobs
         }
         self._waiting.clear()
         for future in as_completed(list(of), loop=self._client.loop, raise_errors=False):

@@ -2,36 +2,15 @@
 
 from __future__ import annotations
 
-from typing import Protocol
 
-
-class Progress(Protocol):
-    """Receives what happens; never decides anything."""
+class Progress:
+    """Receives what happens, and says nothing of it; never decides anything."""
 
     def begin(self, stage: str, total: int) -> None:
         """Start a stage of `total` steps."""
 
     def advance(self, what: str, *, stopped: bool = False) -> None:
-        """Finish one step; `what` names it.
-
-        Parameters
-        ----------
-        stopped
-            True: it should have ended otherwise.
-        """
+        """Finish one step, named `what`; `stopped`: it should have ended otherwise."""
 
     def working(self, what: str) -> None:
         """Say what is being done now, without finishing anything."""
-
-
-class Silence:
-    """A progress that says nothing."""
-
-    def begin(self, stage: str, total: int) -> None:
-        """Say nothing."""
-
-    def advance(self, what: str, *, stopped: bool = False) -> None:
-        """Say nothing."""
-
-    def working(self, what: str) -> None:
-        """Say nothing."""

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, fields
+from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 from tactbench.core.matrix.keys import Keys, differences
@@ -15,7 +15,6 @@ from tactbench.core.matrix.run import EngineChoice, Run
 from tactbench.core.matrix.store import Row, Store
 from tactbench.core.matrix.summary import SEED_DECIDES
 from tactbench.core.plugins.registry import Registry
-from tactbench.core.samples import Answers
 
 
 @dataclass(frozen=True)
@@ -35,9 +34,9 @@ class Repeated:
 
 
 def compute_again(
-    cell: Cell, before: Row, store: Store, registry: Registry, paths: Sequence[Path], progress: Progress
+    asked: Cell, before: Row, store: Store, registry: Registry, paths: Sequence[Path], progress: Progress
 ) -> Repeated:
-    """Compute `cell` again in this process; nothing in the result folder changes.
+    """Compute `asked` again in this process; nothing in the result folder changes.
 
     Parameters
     ----------
@@ -47,34 +46,19 @@ def compute_again(
         The recordings it was answered from. What a simulation recorded is recorded again, into another place.
     """
     with tempfile.TemporaryDirectory(prefix="tactbench-rerun-") as place, Store(Path(place)).hold() as again:
-        keys, need = Keys(registry), request_key(cell)
+        keys, need = Keys(registry), request_key(asked)
         plan = RecordingPlan(paths={need: list(paths)})
-        if registry.rigs[cell.rig].simulated:
-            plan.requests = requests_for([cell], registry, keys, again, cell.simulation)
+        if registry.rigs[asked.rig].simulated:
+            plan.requests = requests_for([asked], registry, keys, again, asked.simulation)
             plan.paths = {need: [request.path for request in plan.requests[need]]}
-        run = Run(again, registry, keys, plan, EngineChoice("in-process"), None, progress, None, [cell])
-        run.carry_out([cell], alone=True)
-        row = run.rows[cell.name]
+        run = Run(again, registry, keys, plan, EngineChoice("in-process"), None, progress, None, [asked])
+        run.carry_out([asked], alone=True)
+        row = run.rows[asked.name]
         done = row["status"] == before["status"] == "done"
-        decided = [name for name in SEED_DECIDES if name != "cell"] if done else ["status", "reason"]
-        old, new = ({name: one.get(name) for name in decided} for one in (before, row))
-        found = differences(old, new)
+        old, new = (
+            {name: one[name] for name in (SEED_DECIDES if done else ("status", "reason"))} for one in (before, row)
+        )
         if done:
-            names = [path.stem for path in plan.paths[need]]
-            old, new = (dict(zip(names, one["digests"], strict=False)) for one in (before, row))
-            found += differences(old, new, "recording ")
-            found += _answers(store.answers(before["key"]), again.answers(row["key"]))
-    return Repeated(row, tuple(found), run.recorded)
-
-
-def _answers(before: Mapping[str, Answers], now: Mapping[str, Answers]) -> list[str]:
-    found = [
-        f"answers on {role} are there only {'before' if role in before else 'now'}"
-        for role in before.keys() ^ now.keys()
-    ]
-    for role in before.keys() & now.keys():
-        for column in fields(Answers):
-            old, new = getattr(before[role], column.name), getattr(now[role], column.name)
-            if old.tobytes() != new.tobytes():
-                found.append(f"answers on {role}: values of {column.name} differ")
-    return found
+            for facts, cell in ((old, store.cell(before)), (new, again.cell(row))):
+                facts |= {"recording": cell.sections["data"], "answers": cell.digests}
+    return Repeated(row, tuple(differences(old, new)), run.recorded)

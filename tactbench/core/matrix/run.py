@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 import importlib.util
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
+from itertools import chain
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import Any, Literal
 
-from tactbench.core.errors import PluginContractError, UnwritableError, UsageError
+from tactbench.core.errors import UnwritableError, UsageError
 from tactbench.core.matrix.keys import Keys, Sections
 from tactbench.core.matrix.plan import Cell, task_of
 from tactbench.core.matrix.plan_recordings import RecordingPlan, RecordingRequest, RequestKey, plan_run, request_key
-from tactbench.core.matrix.progress import Progress, Silence
+from tactbench.core.matrix.progress import Progress
 from tactbench.core.matrix.record import GRACE_S, is_computed, recorder_for
 from tactbench.core.matrix.solve import Job, published, solve, unanswered
 from tactbench.core.matrix.store import Row, Store
@@ -21,15 +22,12 @@ from tactbench.core.matrix.summary import fill_baselines
 from tactbench.core.plugins.declared import declared_in, with_declared
 from tactbench.core.plugins.interfaces import Operator
 from tactbench.core.plugins.registry import Registry, installed
-from tactbench.core.pool import UNLIMITED, InProcess, Limits, Pool, start_server
+from tactbench.core.pool import UNLIMITED, Engine, InProcess, Limits, Pool, start_server
 from tactbench.core.pool.limits import can_refuse_memory
 from tactbench.core.provenance.gather import gather, usable_cores
 from tactbench.core.spec.matrix import MatrixSpec
 from tactbench.core.spec.status import STOPPED
 from tactbench.core.spec.task import TaskSpec
-
-if TYPE_CHECKING:
-    from tactbench.core.matrix.dask import Dask
 
 EngineName = Literal["in-process", "isolated", "dask"]
 MEASURED_MEMORY = "the limit of memory was held by measuring every 50 ms: this system cannot refuse memory"
@@ -66,7 +64,7 @@ class EngineChoice:
                 hint="Install it with: pip install 'tactbench[dask]'.",
             )
 
-    def engine(self, jobs: int) -> Pool | InProcess | Dask:
+    def engine(self, jobs: int) -> Engine:
         """Return what carries out cells, `jobs` at once on this machine."""
         if self.name == "dask":
             from tactbench.core.matrix.dask import Dask
@@ -85,8 +83,6 @@ class Outcome:
     """Cells computed now; the others were found finished."""
     recorded: int
     """Recordings made now."""
-    recordings: Mapping[str, tuple[Path, ...]] = field(default_factory=dict)
-    """The files each cell was evaluated on, by its name."""
 
     @property
     def failures(self) -> list[Row]:
@@ -142,13 +138,12 @@ def run_matrix(
         cells, plan = plan_run(matrix, registry, keys, store, recordings, choice.limits)
         provenance = gather(registry, seed=matrix.seed, engine=choice.name)
         store.begin(provenance)
-        run = Run(store, registry, keys, plan, choice, operator, progress or Silence(), shown, cells)
+        run = Run(store, registry, keys, plan, choice, operator, progress or Progress(), shown, cells)
         run.carry_out([cell for cell in cells if cell.timed], alone=True)
         run.carry_out([cell for cell in cells if not cell.timed], alone=False)
     rows = tuple(run.rows[cell.name] for cell in cells)
     fill_baselines(rows)
-    used = {cell.name: tuple(plan.paths.get(request_key(cell), ())) for cell in cells}
-    return Outcome(rows, provenance, run.computed, run.recorded, used)
+    return Outcome(rows, provenance, run.computed, run.recorded)
 
 
 @dataclass
@@ -167,8 +162,6 @@ class Run:
     rows: dict[str, Row] = field(default_factory=dict)
     computed: int = 0
     recorded: int = 0
-    _keys: dict[str, tuple[str, Sections]] = field(default_factory=dict)
-    """Key and sections of the cells at work, by name."""
     _begun: bool = False
     """Whether a stage of the progress was begun."""
 
@@ -177,40 +170,31 @@ class Run:
 
         Else cells whose recordings are there are evaluated beside the recording of others.
         """
-        if not cells:
-            return
         by_need: dict[RequestKey, list[Cell]] = {}
         for cell in cells:
             by_need.setdefault(request_key(cell), []).append(cell)
-        requests = {one.path: one for need in by_need for one in self.plan.requests.get(need, ())}
-        missing = [request for path, request in requests.items() if not path.exists()]
-        lacking = {
-            need: {request.path for request in self.plan.requests.get(need, ()) if not request.path.exists()}
-            for need in by_need
-        }
-        ready = [self._jobs(members) for need, members in by_need.items() if not lacking[need]]
-        later = sum(len(by_need[need]) for need in by_need if lacking[need])
-        total = len(missing) + later + sum(map(len, ready))
+        requests = (request for need in by_need for request in self.plan.requests.get(need, ()))
+        missing = {request.path: request for request in requests if not request.path.exists()}
+        lacking = {need: missing.keys() & self.plan.paths.get(need, ()) for need in by_need}
+        ready = [self._jobs(by_need[need]) for need, paths in lacking.items() if not paths]
+        later = [cell for need, paths in lacking.items() if paths for cell in by_need[need]]
+        total = len(missing) + len(later) + sum(map(len, ready))
         if not total:
             return
         self._begun = True
         stage = "recording and evaluating" if missing else "evaluating"
         self.progress.begin(f"{stage}, timed" if alone else stage, total)
-        computed = all(is_computed(request, self.registry) for request in missing)
-        engine = self.choice.engine(1 if alone else self.choice.processes)
-        at_once = 1 if alone or isinstance(engine, InProcess) else self.choice.processes
-        recorder = self._recorder(engine, alone=alone, computed=computed)
+        at_once = 1 if alone or self.choice.name == "in-process" else self.choice.processes
+        computed = all(is_computed(request, self.registry) for request in missing.values())
+        engine = self.choice.engine(at_once)
+        recorder = self._recorder(engine, beside_cells=computed and not alone, computed=computed)
         with recorder, engine:
-            self._submit_recordings(recorder, missing, computed=computed)
-            if recorder is not engine:
-                for request, outcome in recorder.outcomes():
-                    self._recorded(request, outcome)
-                ready += [self._jobs(by_need[need]) for need in by_need if lacking[need]]
-                lacking.clear()
+            self._submit_recordings(recorder, missing.values(), computed=computed)
             self._submit_cells(engine, ready, at_once)
-            for item, outcome in engine.outcomes():
+            first = () if recorder is engine else recorder.outcomes()
+            for item, outcome in chain(first, engine.outcomes()):
                 if isinstance(item, Job):
-                    self._evaluated(item, outcome, getattr(engine, "log", ""))
+                    self._evaluated(item, outcome, engine.log)
                     continue
                 self._recorded(item, outcome)
                 for need, paths in lacking.items():
@@ -221,18 +205,16 @@ class Run:
 
     # Recordings
 
-    def _recorder(self, engine: Pool | InProcess | Dask, *, alone: bool, computed: bool) -> Pool | InProcess | Dask:
+    def _recorder(self, engine: Engine, *, beside_cells: bool, computed: bool) -> Engine:
         """Return what makes recordings: the engine itself where they may be made beside cells."""
         if self.operator is not None and not computed:
             return InProcess()  # the operator's terminal belongs to this process
-        if isinstance(engine, InProcess) or (isinstance(engine, Pool) and computed and not alone):
+        if isinstance(engine, InProcess) or (isinstance(engine, Pool) and beside_cells):
             return engine
         grace_s = 0.0 if computed else GRACE_S
         return Pool(self.choice.processes if computed else 1, replace(self.choice.limits, grace_s=grace_s))
 
-    def _submit_recordings(
-        self, recorder: Pool | InProcess | Dask, missing: Sequence[RecordingRequest], *, computed: bool
-    ) -> None:
+    def _submit_recordings(self, recorder: Engine, missing: Iterable[RecordingRequest], *, computed: bool) -> None:
         """Queue recordings: all of a real rig as one piece of work, simulated ones by seed and sensor."""
         pieces: dict[tuple[int, str], list[RecordingRequest]] = {}
         for request in missing:
@@ -241,9 +223,9 @@ class Run:
             pieces.setdefault((request.seed, request.sensor) if computed else (0, ""), []).append(request)
         parts = self.choice.processes if computed and len(pieces) < self.choice.processes else 1
         for piece in pieces.values():
-            for part in range(parts):
-                if requests := piece[part::parts]:
-                    recorder.submit(recorder_for(requests, self.registry, self.operator), requests)
+            for part in range(min(parts, len(piece))):
+                requests = piece[part::parts]
+                recorder.submit(recorder_for(requests, self.registry, self.operator), requests)
 
     def _recorded(self, request: RecordingRequest, outcome: Any) -> None:
         if isinstance(outcome, UnwritableError):
@@ -277,14 +259,12 @@ class Run:
                 digests = {path: self.store.about(path)["digest"] for path in paths}
                 key, sections = self.keys.of_cell(cell, digests)
             except Exception as error:
-                self._keys[cell.name] = "", {}
                 self._stopped(cell, task, error)
                 continue
             found = self.store.finished(key)
             if found is None:
-                self._keys[cell.name] = key, sections
                 estimator = self.registry.estimators[cell.estimator]
-                jobs.append(Job(cell, task, estimator, tuple(paths), tuple(digests.values())))
+                jobs.append(Job(cell, task, estimator, tuple(paths), tuple(digests.values()), key, sections))
                 continue
             # Its key covers neither its number among the repeats nor what is published: they change no number.
             naming = {"cell": cell.name, "repeat": cell.repeat, "repeats": cell.repeats}
@@ -293,7 +273,7 @@ class Run:
             self._done(cell, row, computed=False)
         return jobs
 
-    def _submit_cells(self, engine: Pool | InProcess | Dask, groups: Sequence[Sequence[Job]], at_once: int) -> None:
+    def _submit_cells(self, engine: Engine, groups: Sequence[Sequence[Job]], at_once: int) -> None:
         """Queue cells: those of our own estimators that share recordings as one piece, others one estimator a piece."""
         work = partial(solve, concurrency=at_once)
         for jobs in groups:
@@ -307,25 +287,19 @@ class Run:
 
     def _evaluated(self, job: Job, outcome: Any, log: str) -> None:
         if isinstance(outcome, BaseException):
-            self._stopped(job.cell, job.task, outcome)
+            self._stopped(job.cell, job.task, outcome, job.key, job.sections)
             return
         row, answers = outcome
-        key, sections = self._keys[job.cell.name]
-        row |= {"key": key, "log": log, "recordings": [self.store.beside(Path(path)) for path in row["recordings"]]}
+        row |= {"key": job.key, "log": log, "recordings": [self.store.beside(Path(path)) for path in row["recordings"]]}
         if self.choice.limits.memory_mb is not None and not can_refuse_memory():
             row["remarks"].append(MEASURED_MEMORY)
-        try:
-            kept = self.store.keep(row, sections, answers)
-        except (TypeError, ValueError) as error:
-            why = PluginContractError(f"The cell's row is no plain data: {error}.", hint="Its task is at fault.")
-            self._stopped(job.cell, job.task, why)
-            return
-        self._done(job.cell, kept)
+        self._done(job.cell, self.store.keep(row, job.sections, answers))
 
-    def _stopped(self, cell: Cell, task: TaskSpec, why: BaseException) -> None:
+    def _stopped(
+        self, cell: Cell, task: TaskSpec, why: BaseException, key: str = "", sections: Sections | None = None
+    ) -> None:
         row = unanswered(cell, task, why, simulated=self.registry.rigs[cell.rig].simulated)
-        key, sections = self._keys[cell.name]
-        self._done(cell, self.store.keep({**row, "key": key}, sections))
+        self._done(cell, self.store.keep({**row, "key": key}, sections or {}))
 
     def _done(self, cell: Cell, row: Row, *, computed: bool = True) -> None:
         """Take the row of a cell; show all complete replicates if it completes one."""

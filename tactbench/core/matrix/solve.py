@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from tactbench.core.errors import CellStopped, EngineError, NotApplicable
+from tactbench.core.matrix.keys import Sections
 from tactbench.core.matrix.plan import Cell
 from tactbench.core.plugins.registry import load_object
 from tactbench.core.pool.child import plain_error
@@ -40,6 +41,9 @@ class Job(NamedTuple):
     recordings: tuple[Path, ...]
     digests: tuple[str, ...]
     """Of the recordings' content."""
+    key: str
+    sections: Sections
+    """What the key is made of."""
 
 
 def prepare(estimator: EstimatorDescriptor, kind: str) -> None:
@@ -91,7 +95,7 @@ def solve(job: Job, concurrency: int = 1, progress: Callable[[str], None] | None
     progress
         Called with what is being done.
     """
-    cell, task, estimator, recordings, _ = job
+    cell, task, estimator, recordings, *_ = job
     folder = Path.cwd()
     try:
         prepare(estimator, task.kind)

@@ -14,7 +14,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import suppress
 from pathlib import Path
 from queue import Empty, SimpleQueue
-from typing import Any, TypeVar
+from typing import Any, Self, TypeVar
 
 import psutil
 
@@ -35,11 +35,62 @@ MOST_LOG_BYTES = 2**24
 """A log that grows beyond this is emptied."""
 
 
-class Pool:
-    """Up to `jobs` child processes, each for one piece of work.
+class Engine:
+    """Carries out pieces of work, each a sequence of items; as a context it drops what has not begun at the end."""
 
-    A piece is a sequence of items that one process carries out in order. An item that raises, crashes, hangs or takes
-    too much memory has that error as its outcome; the items after it get a process of their own.
+    log = ""
+    """What the item had printed whose outcome was yielded last, the end of it."""
+
+    def __init__(self) -> None:
+        self._waiting: deque[tuple[Callable[[Any], Any], Sequence[Any]]] = deque()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._waiting.clear()
+
+    def submit(self, work: Callable[[Any], Any], items: Sequence[Any]) -> None:
+        """Queue a piece of work; may be called while `outcomes` is iterated."""
+        self._waiting.append((work, items))
+
+    def outcomes(self) -> Iterator[tuple[Any, Any]]:
+        """Yield every submitted item with its result or the error that stopped it, in the order in which they end."""
+        raise NotImplementedError
+
+    def each(
+        self, work: Callable[[T], R], items: Iterable[T], *, together: bool = False
+    ) -> Iterator[tuple[T, R | BaseException]]:
+        """Carry out `work` for every item, each as a piece of its own or all `together`, and yield outcomes."""
+        with self:
+            every = list(items)
+            for piece in [every] if together else [[item] for item in every]:
+                self.submit(work, piece)
+            yield from self.outcomes()
+
+
+class InProcess(Engine):
+    """Carries out items in this process, without limits: for a debugger. Ctrl-C ends it."""
+
+    def outcomes(self) -> Iterator[tuple[Any, Any]]:
+        """Yield every item with its result or the error that stopped it."""
+        while self._waiting:
+            work, items = self._waiting.popleft()
+            for item in items:
+                try:
+                    outcome = work(item)
+                except KeyboardInterrupt:
+                    raise
+                except BaseException as error:
+                    outcome = plain_error(error)
+                yield item, outcome
+
+
+class Pool(Engine):
+    """Up to `jobs` child processes, each for one piece of work, whose items it carries out in order.
+
+    An item that raises, crashes, hangs or takes too much memory has that error as its outcome; the items after it get a
+    process of their own.
 
     Parameters
     ----------
@@ -56,28 +107,19 @@ class Pool:
     """
 
     def __init__(self, jobs: int = 1, limits: Limits = UNLIMITED) -> None:
+        super().__init__()
         self.jobs, self.limits = jobs, limits
-        self.log = ""
-        """What the item had printed whose outcome was yielded last, the end of it."""
-        self._waiting: deque[tuple[Callable[[Any], Any], Sequence[Any]]] = deque()
         self._ended: SimpleQueue[tuple[Any, Any, str] | None] = SimpleQueue()
         """Item, outcome and log; None: a piece is through."""
         self._threads: list[threading.Thread] = []
         self._abandoned = threading.Event()
 
-    def __enter__(self) -> Pool:
-        return self
-
     def __exit__(self, *_: object) -> None:
         """End every process that is at work."""
-        self._waiting.clear()
+        super().__exit__()
         self._abandoned.set()
         for thread in self._threads:
             thread.join()
-
-    def submit(self, work: Callable[[Any], Any], items: Sequence[Any]) -> None:
-        """Queue a piece of work; may be called while `outcomes` is iterated."""
-        self._waiting.append((work, items))
 
     def outcomes(self) -> Iterator[tuple[Any, Any]]:
         """Yield every submitted item with its result or the error that stopped it, in the order in which they end."""
@@ -98,16 +140,6 @@ class Pool:
                 item, outcome, self.log = ended
                 yield item, outcome
 
-    def each(
-        self, work: Callable[[T], R], items: Iterable[T], *, together: bool = False
-    ) -> Iterator[tuple[T, R | BaseException]]:
-        """Carry out `work` for every item, each in its own process or all `together` in one, and yield outcomes."""
-        with self:
-            every = list(items)
-            for piece in [every] if together else [[item] for item in every]:
-                self.submit(work, piece)
-            yield from self.outcomes()
-
     def _carry_out(self, work: Callable[[Any], Any], items: Sequence[Any]) -> None:
         """Carry out a piece in one child process after the other, until each of its items has an outcome."""
         left = deque(items)
@@ -126,42 +158,6 @@ class Pool:
                 self._ended.put((item, plain_error(error), ""))
         finally:
             self._ended.put(None)
-
-
-class InProcess:
-    """Carries out items in this process, without limits: for a debugger. Ctrl-C ends it."""
-
-    log = ""
-
-    def __init__(self) -> None:
-        self._waiting: deque[tuple[Callable[[Any], Any], Any]] = deque()
-
-    def __enter__(self) -> InProcess:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self._waiting.clear()
-
-    def submit(self, work: Callable[[Any], Any], items: Sequence[Any]) -> None:
-        """Queue items."""
-        self._waiting.extend((work, item) for item in items)
-
-    def outcomes(self) -> Iterator[tuple[Any, Any]]:
-        """Yield every item with its result or the error that stopped it."""
-        while self._waiting:
-            work, item = self._waiting.popleft()
-            try:
-                outcome = work(item)
-            except KeyboardInterrupt:
-                raise
-            except BaseException as error:
-                outcome = plain_error(error)
-            yield item, outcome
-
-    def each(self, work: Callable[[T], R], items: Iterable[T]) -> Iterator[tuple[T, R | BaseException]]:
-        """Carry out `work` for every item and yield outcomes."""
-        self.submit(work, list(items))
-        yield from self.outcomes()
 
 
 _ABANDONED = object()

@@ -21,9 +21,8 @@ import psutil
 import tactbench
 from tactbench.core.plugins.registry import Registry
 from tactbench.core.provenance.source import PACKAGE, RELEVANT, source_digest, version_of
+from tactbench.core.thread_limit import VARIABLES
 
-THREADS = ("OPENBLAS_NUMTHREADS", "MKL_NUMTHREADS", "OMP_NUMTHREADS")
-"""What numerical libraries read when they are loaded."""
 GIT_S = 10.0
 """Seconds that git may take to answer: a checkout may lie on a slow network disk."""
 
@@ -40,7 +39,7 @@ def gather(registry: Registry, **circumstances: Any) -> dict[str, Any]:
         "cores": os.cpu_count(),
         "memory_mb": psutil.virtual_memory().total // 2**20,
         "host": host_id(),
-        "threads": next((os.environ[name] for name in THREADS if name in os.environ), "as many as cores"),
+        "threads": next((os.environ[name] for name in VARIABLES if name in os.environ), "as many as cores"),
         "plugins": list(_plugins(registry)),
         "distributions": {name: version_of(name) for name in RELEVANT},
         **circumstances,

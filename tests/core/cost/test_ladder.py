@@ -13,7 +13,7 @@ from tactbench.core.cost.ladder import climb
 from tactbench.core.cost.ladder_figure import draw_ladder
 from tactbench.core.cost.ladder_file import read_ladders, write_ladder
 from tactbench.core.errors import UnwritableError
-from tactbench.core.matrix.progress import Silence
+from tactbench.core.matrix.progress import Progress
 from tactbench.core.matrix.store import Store
 from tactbench.core.plugins.registry import load_registry
 from tactbench.core.spec.matrix import EstimatorChoice, MatrixSpec, TaskChoice
@@ -41,7 +41,7 @@ def climbed(folder, store, *estimators, rounds=2, split=None):
                         estimators=tuple(EstimatorChoice(name=name) for name in estimators))  # fmt: skip
     matrix = MatrixSpec(rig="replay", sensors=("made",), tasks=(choice,))
     return climb(matrix, load_registry(), store, rounds=rounds, budget_s=20.0, threads=1, clock=time.perf_counter,
-                 progress=Silence(), recordings=folder, choice=IN_THIS_PROCESS)  # fmt: skip
+                 progress=Progress(), recordings=folder, choice=IN_THIS_PROCESS)  # fmt: skip
 
 
 @pytest.fixture(scope="module")

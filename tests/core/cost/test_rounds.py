@@ -10,7 +10,7 @@ from tactbench.core.cost.ladder_rows import timed
 from tactbench.core.cost.rounds import REPEATS, WARM_UP_ROWS, measure
 from tactbench.core.cost.timed_estimators import TimedEstimator
 from tactbench.core.evaluation.metrics import metric_called
-from tactbench.core.matrix.progress import Silence
+from tactbench.core.matrix.progress import Progress
 
 N = 1000
 BINARY = 2.0**-10  # durations that add up without rounding
@@ -63,7 +63,7 @@ def timed_estimator(clock, name, *, fit_s=512 * BINARY, batch_s=256 * BINARY, ro
 
 def run(clock, *timed_estimators, rounds=5, budget_s=20.0, threads=1):
     named = {one.name: one for one in timed_estimators}
-    return measure(named, rounds=rounds, budget_s=budget_s, threads=threads, seed=3, clock=clock, progress=Silence())
+    return measure(named, rounds=rounds, budget_s=budget_s, threads=threads, seed=3, clock=clock, progress=Progress())
 
 
 def test_what_took_so_long_is_said_to_have_taken_so_long():

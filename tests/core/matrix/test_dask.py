@@ -57,7 +57,7 @@ def test_a_worker_that_differs_is_named(monkeypatch):
 
 def test_a_worker_that_sees_other_recordings_computes_nothing(tmp_path):
     (path, *_) = sorted(presses(tmp_path / "shelf").glob("*.h5"))
-    job = Job(None, None, None, (path,), ("another digest",))
+    job = Job(None, None, None, (path,), ("another digest",), "", {})
     outcome = dask.carry_out(decided, job, str(tmp_path), UNLIMITED)
     assert type(outcome) is EngineError
     assert str(path) in str(outcome)

@@ -74,7 +74,7 @@ def test_every_planned_cell_has_a_row_in_the_order_of_the_plan(ran):
     known = {row["cell"]: row for row in Store(folder).rows()}
     assert {name: known[name]["score"] for name in names} == {row["cell"]: row["score"] for row in outcome.rows}
     assert all(row["baseline"] is not None for row in outcome.rows)
-    assert all(len(paths) == 3 for paths in outcome.recordings.values())
+    assert all(len(row["recordings"]) == 3 for row in outcome.rows)
 
 
 def test_times_are_taken_in_the_first_replicate_alone_and_the_row_says_so(ran):

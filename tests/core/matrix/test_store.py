@@ -277,7 +277,7 @@ def holder(folder):
 
 
 def test_a_second_run_is_refused_reading_is_not_and_kill_9_lets_go(tmp_path):
-    with Store(tmp_path).hold() as store, store.hold():
+    with Store(tmp_path).hold() as store:
         kept(store, "a")
         with pytest.raises(FolderError), Store(tmp_path).hold():
             pass

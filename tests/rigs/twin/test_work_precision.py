@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from tactbench.core.cost.precision import measured
-from tactbench.core.matrix.progress import Silence
+from tactbench.core.matrix.progress import Progress
 from tactbench.core.spec.scene import Simulation
 from tactbench.plugin import Indenter, Placement, RigContext, Scene, SensorDescriptor, assumed, load_registry
 from tactbench.plugin.simulation import FluidBackedShell
@@ -45,7 +45,7 @@ def test_it_runs_for_every_installed_sensor_and_says_what_each_cannot_have(bonde
     sensors = list(load_registry().sensors)
     assert {"biotac", "icub", "ideal", bonded.name} <= {sensor.name for sensor in sensors}
     for sensor in sensors:
-        points, skipped = measured(work_precision.study(sensor, rounds=1), sensor.name, Silence())
+        points, skipped = measured(work_precision.study(sensor, rounds=1), sensor.name, Progress())
         assert any(point.default and point.rung == "default" for point in points)
         none_of_it = isinstance(sensor.spec.skin, FluidBackedShell) or sensor.name == bonded.name
         assert bool(skipped) is none_of_it

@@ -13,7 +13,7 @@ from typing import Any
 from tactbench.core.errors import FormatError
 from tactbench.core.samples import Answers
 
-FORMAT = "tactbench-cell 4"
+FORMAT = "tactbench-cell 5"
 _COMPRESSED_BYTES = 2**15
 """Smaller tables are stored as they are: compressing them takes longer than it saves room."""
 _COLUMNS = tuple(column.name for column in fields(Answers))
@@ -32,6 +32,8 @@ class CellFile:
     """When it was written, nanoseconds since the epoch: of two files of one cell the later counts."""
     answers: Mapping[str, Answers] = field(default_factory=dict)
     """By role; none of a cell that did not finish."""
+    digests: Mapping[str, str] = field(default_factory=dict)
+    """Of the answers, by role; set when the file is read."""
 
     def content(self) -> bytes:
         """Return the bytes of the file; raises ValueError or TypeError if the row is not plain data.
@@ -44,12 +46,13 @@ class CellFile:
         import numpy as np
 
         head = {"row": self.row, "sections": self.sections, "provenance": self.provenance, "ended_ns": self.ended_ns}
-        text = json.dumps(head, sort_keys=True, allow_nan=False).encode()
-        tables = {role: _table(self.answers[role]) for role in sorted(self.answers)}
+        tables = {role: _table(answers) for role, answers in self.answers.items()}
+        digests = {role: _digest(table) for role, table in tables.items()}
+        text = json.dumps({**head, "digests": digests}, sort_keys=True, allow_nan=False).encode()
         image = io.BytesIO()
         with h5py.File(image, "w") as file:
             file.attrs["format"] = FORMAT
-            file.attrs["sha256"] = _digest(text, tables)
+            file.attrs["sha256"] = hashlib.sha256(text).hexdigest()
             file["head"] = np.bytes_(text)
             for role, table in tables.items():
                 packed = {"shuffle": True, "compression": 4} if table.nbytes >= _COMPRESSED_BYTES else {}
@@ -57,25 +60,36 @@ class CellFile:
         return image.getvalue()
 
 
-def read_cell(path: Path) -> CellFile:
-    """Read the file of a cell; raises FormatError if it is none, or does not hold what was written."""
+def read_cell(path: Path, *, answers: bool = True) -> CellFile:
+    """Read the file of a cell, with or without its answers.
+
+    Raises
+    ------
+    FormatError
+        If it is none, or does not hold what was written.
+    """
     import h5py
 
+    tables = {}
     try:
         with h5py.File(path, "r") as file:
             if file.attrs.get("format") != FORMAT:
                 raise FormatError(f"{path} is not a cell of this version.", hint="Run the cell again.")
             text = bytes(file["head"][()])
-            tables = {str(role): table[()] for role, table in sorted(file.get("answers", {}).items())}
-            digest = file.attrs["sha256"]
+            sound = hashlib.sha256(text).hexdigest() == file.attrs["sha256"]
+            head = json.loads(text)
+            digests = head.pop("digests")
+            for role, digest in digests.items() if answers else ():
+                table = file[f"answers/{role}"][()]
+                sound &= _digest(table) == digest
+                tables[role] = Answers(**{name: table[name].copy() for name in _COLUMNS})
     except (OSError, KeyError, ValueError, TypeError, RuntimeError) as error:
         if isinstance(error, FormatError):
             raise
         raise FormatError(f"{path} cannot be read: {error}.", hint="Run the cell again.") from error
-    if _digest(text, tables) != digest:
+    if not sound:
         raise FormatError(f"{path} does not hold what was written: its digest differs.", hint="Run the cell again.")
-    answers = {role: Answers(**{name: table[name].copy() for name in _COLUMNS}) for role, table in tables.items()}
-    return CellFile(**json.loads(text), answers=answers)
+    return CellFile(**head, answers=tables, digests=digests)
 
 
 def _table(answers: Answers) -> Any:
@@ -90,8 +104,5 @@ def _table(answers: Answers) -> Any:
     return table
 
 
-def _digest(text: bytes, tables: Mapping[str, Any]) -> str:
-    sha = hashlib.sha256(text)
-    for role, table in tables.items():
-        sha.update(f"\n{role} {table.dtype.descr} {table.shape}\n".encode() + table.tobytes())
-    return sha.hexdigest()
+def _digest(table: Any) -> str:
+    return hashlib.sha256(f"{table.dtype.descr} {table.shape}\n".encode() + table.tobytes()).hexdigest()

@@ -73,7 +73,7 @@ class Index:
             self.drop(name)
         for name, path in sorted(changed.items()):
             try:
-                self.put(path, read_cell(path))
+                self.put(path, read_cell(path, answers=False))
             except FormatError as error:
                 self.drop(name)
                 self.troubles.append(str(error))

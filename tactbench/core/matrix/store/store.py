@@ -45,22 +45,18 @@ class Store:
     def __init__(self, folder: Path) -> None:
         self.folder = folder
         self._index: Index | None = None
-        self._held = False
         self._last_ns = 0
         self._provenance: tuple[str, Mapping[str, Any]] = ("", {})
 
     @contextmanager
     def hold(self) -> Iterator[Store]:
-        """Keep the folder to this run: made if it is not there, locked until the end. Its holder may enter it again.
+        """Keep the folder to this run: made if it is not there, locked until the end.
 
         Raises
         ------
         FolderError
             If another run holds it, or it cannot be made or written.
         """
-        if self._held:
-            yield self
-            return
         with writing(self.folder):
             for part in ("recordings", "cells"):
                 (self.folder / part).mkdir(parents=True, exist_ok=True)
@@ -74,10 +70,8 @@ class Store:
             with writing(self.folder):
                 for left in (self.folder / "cells").glob(".*.partial"):  # of a run that was killed
                     left.unlink()
-            self._held = True
             yield self
         finally:
-            self._held = False
             os.close(lock)
 
     @property

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from tactbench.core.errors import TactbenchError, UsageError
 from tactbench.core.evaluation.protocols import shots
-from tactbench.core.matrix.progress import Progress, Silence
+from tactbench.core.matrix.progress import Progress
 from tactbench.core.report.figures import (
     confusion,
     embedding_map,
@@ -66,7 +66,7 @@ def draw_figures(
     UsageError
         If `folder` cannot be made.
     """
-    reporter = progress or Silence()
+    reporter = progress or Progress()
     say: Remark = remark or (lambda _: None)
     try:
         folder.mkdir(parents=True, exist_ok=True)
