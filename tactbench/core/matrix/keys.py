@@ -7,7 +7,7 @@ descriptors), the data. A key is the digest of its sections; ``tactbench why`` c
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -103,15 +103,29 @@ def configuration_of(cell: Cell) -> Sections:
     }  # fmt: skip
 
 
-def differences(before: Mapping[str, Any], now: Mapping[str, Any], within: str = "") -> list[str]:
-    """Return one sentence for everything in which two mappings differ; none if nothing does."""
+def differences(
+    before: Mapping[str, Any],
+    now: Mapping[str, Any],
+    within: str = "",
+    *,
+    same: Callable[[Any, Any], bool] | None = None,
+) -> list[str]:
+    """Return one sentence for everything in which two mappings differ.
+
+    Parameters
+    ----------
+    within
+        What each sentence begins with.
+    same
+        Compares what is no mapping; None: as JSON.
+    """
     found = []
     for name in sorted({*before, *now}):
         old, new = before.get(name), now.get(name)
         place = f"{within}{name}"
         if isinstance(old, Mapping) and isinstance(new, Mapping):
-            found += differences(old, new, f"{place}: ")
-        elif _canonical(old) != _canonical(new):
+            found += differences(old, new, f"{place}: ", same=same)
+        elif not (same(old, new) if same else _canonical(old) == _canonical(new)):
             found.append(f"{place} {_short(old)} -> {_short(new)}")
     return found
 

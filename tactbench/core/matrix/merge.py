@@ -16,7 +16,7 @@ from __future__ import annotations
 import math
 import os
 import shutil
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -106,24 +106,16 @@ def _order(row: Row) -> tuple[int, str, str]:
 def _contradiction(one: tuple[Row, Store], other: tuple[Row, Store]) -> str:
     """Return in what two finished cells of one name differ that should be the same; empty if in nothing."""
     first, second = ({name: store.cell(row).sections.get(name) for name in _DECIDES} for row, store in (one, other))
-    found = differences(first, second)
-    if found:
-        return found[0]
-    for name in SEED_DECIDES:
-        if not _same(one[0].get(name), other[0].get(name)):
-            return f"{name} {one[0].get(name)!r} and {other[0].get(name)!r}"[:200]
-    return ""
+    old, new = ({name: row[name] for name in SEED_DECIDES} for row, _ in (one, other))
+    return "; ".join((differences(first, second) or differences(old, new, same=_same))[:3])
 
 
 def _same(one: Any, other: Any) -> bool:
     """Return whether two values of a row agree, numbers to a relative `SAME_SCORE`."""
-    if isinstance(one, Mapping) and isinstance(other, Mapping):
-        return one.keys() == other.keys() and all(_same(one[name], other[name]) for name in one)
     if isinstance(one, list) and isinstance(other, list):
         return len(one) == len(other) and all(map(_same, one, other))
-    if isinstance(one, float) or isinstance(other, float):
-        numbers = isinstance(one, int | float) and isinstance(other, int | float)
-        return numbers and math.isclose(one, other, rel_tol=SAME_SCORE, abs_tol=1e-12)
+    if isinstance(one, int | float) and isinstance(other, int | float):
+        return math.isclose(one, other, rel_tol=SAME_SCORE, abs_tol=1e-12)
     return bool(one == other)
 
 

@@ -20,17 +20,31 @@ GRACE_S = 5.0
 class Recorder:
     """Makes one recording after the other; each rig is built once.
 
+    It knows what `requests` name, and no other plugins' effects and indenters.
+
     Parameters
     ----------
+    requests
+        What it will be asked for.
     registry
         Where sensors and rigs are looked up.
     operator
         Who stands at a rig of real devices.
     """
 
-    def __init__(self, registry: Registry, operator: Operator | None = None) -> None:
-        self._registry, self._operator = registry, operator
+    def __init__(self, requests: Sequence[RecordingRequest], registry: Registry, operator: Operator | None) -> None:
+        self._operator = operator
         self._rigs: dict[tuple[str, str], Any] = {}
+        effects = [taking_part(registry, registry.sensors[one.sensor], one.scene) for one in requests]
+        shapes = {one.scene.indenter.shape for one in requests}
+        self._registry = registry.only(
+            sensors=dict.fromkeys(one.sensor for one in requests),
+            rigs=dict.fromkeys(one.rig for one in requests),
+            effects=dict.fromkeys(owned.descriptor.name for some in effects for owned in some),
+            indenters=[name for name in registry.indenters.names() if name in shapes],
+            profiles=registry.profiles.names(),
+            devices=registry.devices.names(),
+        )
 
     def __call__(self, request: RecordingRequest) -> str:
         """Make a recording and return its content digest; raises whatever the rig raises."""
@@ -54,28 +68,6 @@ class Recorder:
             provenance={},
         )
         return acquired.content_digest
-
-
-def recorder_for(
-    requests: Sequence[RecordingRequest], registry: Registry, operator: Operator | None = None
-) -> Recorder:
-    """Return a recorder that knows what `requests` name, and no other plugins' effects and indenters."""
-    sensors = dict.fromkeys(request.sensor for request in requests)
-    effects = {
-        owned.descriptor.name: None
-        for request in requests
-        for owned in taking_part(registry, registry.sensors[request.sensor], request.scene)
-    }
-    shapes = dict.fromkeys(request.scene.indenter.shape for request in requests)
-    named = registry.only(
-        sensors=sensors,
-        rigs=dict.fromkeys(request.rig for request in requests),
-        effects=effects,
-        indenters=[shape for shape in shapes if shape is not None and shape in registry.indenters],
-        profiles=registry.profiles.names(),
-        devices=registry.devices.names(),
-    )
-    return Recorder(named, operator)
 
 
 def is_computed(request: RecordingRequest, registry: Registry) -> bool:

@@ -15,7 +15,7 @@ from tactbench.core.matrix.keys import Keys, Sections
 from tactbench.core.matrix.plan import Cell, task_of
 from tactbench.core.matrix.plan_recordings import RecordingPlan, RecordingRequest, RequestKey, plan_run, request_key
 from tactbench.core.matrix.progress import Progress
-from tactbench.core.matrix.record import GRACE_S, is_computed, recorder_for
+from tactbench.core.matrix.record import GRACE_S, Recorder, is_computed
 from tactbench.core.matrix.solve import Job, published, solve, unanswered
 from tactbench.core.matrix.store import Row, Store
 from tactbench.core.matrix.summary import fill_baselines
@@ -225,7 +225,7 @@ class Run:
         for piece in pieces.values():
             for part in range(min(parts, len(piece))):
                 requests = piece[part::parts]
-                recorder.submit(recorder_for(requests, self.registry, self.operator), requests)
+                recorder.submit(Recorder(requests, self.registry, self.operator), requests)
 
     def _recorded(self, request: RecordingRequest, outcome: Any) -> None:
         if isinstance(outcome, UnwritableError):

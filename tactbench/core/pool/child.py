@@ -12,7 +12,6 @@ import traceback
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from multiprocessing.connection import Connection
-from pathlib import Path
 from types import FrameType
 from typing import Any
 
@@ -48,8 +47,6 @@ def run_child(
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, _terminate)
     threading.Thread(target=_end_with_parent, daemon=True).start()
-    with suppress(OSError):  # if the system runs out of memory, it ends this process before others
-        Path("/proc/self/oom_score_adj").write_text("1000")
     faulthandler.enable()
     os.chdir(folder)
     me = os.getpid()

@@ -93,7 +93,7 @@ def refused(tmp_path, *folders) -> str:
         ({"scores": {"mae": 1.0}}, {"scores": {"mae": 1.0 + 1e-10}}, None),
         ({"scores": {"mae": 1.0}}, {"scores": {"mae": 1.1}}, "scores"),
         ({"counts": {"kept": 3}}, {"counts": {"kept": 4}}, "counts"),
-        ({"ci_low": None}, {}, "ci_low None"),
+        ({"ci_low": None}, {}, "ci_low nothing"),
         ({"fit_s": 1.0, "peak_rss_mb": 90.0}, {"fit_s": 7.0, "peak_rss_mb": 80.0}, None),
         ({"sections": {**SECTIONS, "versions": {"numpy": "1.26"}}}, {}, "versions: numpy"),
         ({"sections": {**SECTIONS, "configuration": {"seed": 2}}}, {}, "configuration: seed"),
