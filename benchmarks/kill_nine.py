@@ -1,13 +1,14 @@
-"""kill -9 at random moments of a run, and what is left: nothing corrupt, nothing finished lost, the same scores.
+"""kill -9 or Ctrl-C at random moments of a run: nothing is corrupt, nothing finished is lost, scores stay the same.
 
 A small matrix is run once undisturbed. Then it is run in other folders and killed at moments drawn evenly from its
 duration, the whole process group or the parent alone in turn, and started again at once, until it ends; the next folder
 follows, until there were as many kills as asked for. After every kill: each cell file and each recording opens and
 holds what its digest says, and every cell that was finished before is still finished, with the same row. At the end of
 every folder: what a seed decides, and the table without times, are those of the undisturbed run, and no half-written
-file is left.
+file is left. After Ctrl-C (`--interrupt`: SIGINT to the parent) no process of the run is left either.
 
-Usage: python benchmarks/kill_nine.py [--kills 100] [--matrix twin|trivial] [--repeats 100] [--jobs 2] [--seed 1]
+Usage: python benchmarks/kill_nine.py [--interrupt] [--kills 100] [--matrix twin|trivial] [--repeats 100] [--jobs 2]
+       [--seed 1]
 """
 
 from __future__ import annotations
@@ -20,8 +21,10 @@ import subprocess
 import sys
 import tempfile
 import time
+from contextlib import suppress
 from pathlib import Path
 
+import psutil
 import trivial
 
 from tactbench.core.matrix.store import Row, Store
@@ -73,6 +76,7 @@ def scores(folder: Path) -> dict[str, Row]:
 def main() -> None:
     """Kill, check, and print what was seen; exit code 1 at the first promise that is not kept."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--interrupt", action="store_true", help="Ctrl-C in place of kill -9.")
     parser.add_argument("--kills", type=int, default=100)
     parser.add_argument("--matrix", choices=("twin", "trivial"), default="twin")
     parser.add_argument("--repeats", type=int, default=100, help="Of the trivial matrix.")
@@ -110,12 +114,19 @@ def main() -> None:
                 try:
                     _, said = process.communicate(timeout=moment)
                 except subprocess.TimeoutExpired:
-                    how = "group" if sum(kills.values()) % 2 == 0 else "parent"
+                    how = "group" if sum(kills.values()) % 2 == 0 and not asked.interrupt else "parent"
                     kill, which = (os.killpg, process.pid) if how == "group" else (os.kill, process.pid)
-                    kill(which, signal.SIGKILL)
+                    kill(which, signal.SIGINT if asked.interrupt else signal.SIGKILL)
                     # Not reaped yet: while a killed parent is a zombie, its number names its group and no stranger's.
                     os.waitid(os.P_PID, process.pid, os.WEXITED | os.WNOWAIT)
                     kills[how] += 1
+                    if asked.interrupt:
+                        process.wait()
+                        assert process.returncode == 130, process.returncode
+                        deadline = time.monotonic() + 5.0  # the fork server ends by itself when its owner has
+                        while (left := _left(process.pid, folder)) and time.monotonic() < deadline:
+                            time.sleep(0.05)
+                        assert not left, f"processes are left: {[one.cmdline() for one in left]}"
                     finished = checked(folder / name, finished)
                     kept += bool(finished)
                     killed.append(process)
@@ -137,6 +148,16 @@ def main() -> None:
           f"{cells} cells and {lasts:.1f} s in {folders} folders; {kept} left finished cells, all of which were kept; "
           "no corrupt file")  # fmt: skip
     print("scores, and the table without times, equal to the undisturbed run's in every folder")
+
+
+def _left(parent: int, folder: Path) -> list[psutil.Process]:
+    """Return the processes at work in `folder`, other than `parent`."""
+    found = []
+    for process in psutil.process_iter():
+        with suppress(psutil.Error):
+            if process.pid != parent and Path(process.cwd()).is_relative_to(folder):
+                found.append(process)
+    return found
 
 
 def _end(group: int) -> None:
