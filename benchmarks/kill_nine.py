@@ -122,7 +122,8 @@ def main() -> None:
                     kills[how] += 1
                     if asked.interrupt:
                         process.wait()
-                                                assert process.returncode in (130, -signal.SIGINT), process.returncode  # or Python was starting
+                        # Python that is starting ends by the signal itself.
+                        assert process.returncode in (130, -signal.SIGINT), process.returncode
                         deadline = time.monotonic() + 5.0  # the fork server ends by itself when its owner has
                         while (left := _left(process.pid, folder)) and time.monotonic() < deadline:
                             time.sleep(0.05)
