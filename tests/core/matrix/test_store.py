@@ -3,7 +3,6 @@
 import json
 import math
 import re
-import resource
 import shutil
 import signal
 import sqlite3
@@ -21,7 +20,7 @@ from tactbench.core.matrix.store import Store
 from tactbench.core.matrix.store import cell_file as format_of_cells
 from tactbench.core.samples import Answers
 from tests.conftest import ROOT
-from tests.core.pool.patience import ending
+from tests.core.pool.patience import ending, files_up_to
 
 from .made import SECTIONS, answers, kept, key, record, row
 
@@ -342,14 +341,8 @@ def test_a_full_disk_keeps_what_was_finished_and_goes_on_when_there_is_room(tmp_
 def test_a_file_that_may_not_grow_is_told(tmp_path):
     with Store(tmp_path).hold() as store:
         kept(store, "a")
-        before, ignored = resource.getrlimit(resource.RLIMIT_FSIZE), signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
-        resource.setrlimit(resource.RLIMIT_FSIZE, (10_000, before[1]))
-        try:
-            with pytest.raises(FolderError, match="larger than this process may write"):
-                kept(store, "b", n=5000)
-        finally:
-            resource.setrlimit(resource.RLIMIT_FSIZE, before)
-            signal.signal(signal.SIGXFSZ, ignored)
+        with files_up_to(10_000), pytest.raises(FolderError, match="larger than this process may write"):
+            kept(store, "b", n=5000)
     assert [one["cell"] for one in Store(tmp_path).rows()] == ["a"]
 
 

@@ -20,7 +20,8 @@ DATA = np.random.default_rng(0).integers(0, 4096, (3000, 3))
 def read_all(path):
     with open_recording(path) as recording:
         recording.verify()
-        return [recording.read(name) for name in recording.stream_names]
+        for name in recording.stream_names:
+            recording.read(name)
 
 
 @pytest.fixture
@@ -28,22 +29,20 @@ def good(write):
     return write(DATA, force=np.arange(3000.0), notes={"object": ["ball"] * 3000})
 
 
-def test_a_file_that_is_not_there(tmp_path):
-    with pytest.raises(MissingRecordingError, match=r"nowhere\.h5"):
-        open_recording(tmp_path / "nowhere.h5")
-    with pytest.raises(FileNotFoundError):
-        open_recording(tmp_path)
-    with pytest.raises(MissingRecordingError):
-        salvage(tmp_path / "nowhere.h5.partial")
-
-
-@pytest.mark.parametrize("content", [b"", b"t,x\n1,2\n", b"\x89HDF\r\n\x1a\n", bytes(4096)])
-def test_a_file_that_is_no_hdf5(tmp_path, content):
-    (tmp_path / "x.h5").write_bytes(content)
+@pytest.mark.parametrize("read", [open_recording, salvage])
+def test_a_file_that_is_not_there_or_no_recording(tmp_path, read):
+    for path in (tmp_path / "nowhere.h5", tmp_path):
+        with pytest.raises(MissingRecordingError, match=path.name):
+            read(path)
+    path = tmp_path / "x.h5"
+    for content in (b"", b"t,x\n1,2\n", b"\x89HDF\r\n\x1a\n", bytes(4096)):
+        path.write_bytes(content)
+        with pytest.raises(FormatError, match=r"x\.h5"):
+            read(path)
+    with h5py.File(path, "w") as file:
+        file["data"] = np.arange(3)
     with pytest.raises(FormatError, match=r"x\.h5"):
-        open_recording(tmp_path / "x.h5")
-    with pytest.raises(FormatError, match=r"x\.h5"):
-        salvage(tmp_path / "x.h5")
+        read(path)
 
 
 def test_cut_short_anywhere(good):
@@ -53,13 +52,6 @@ def test_cut_short_anywhere(good):
         good.write_bytes(whole[:length])
         with pytest.raises(FormatError):
             read_all(good)
-
-
-def test_another_programs_hdf5(tmp_path):
-    with h5py.File(tmp_path / "x.h5", "w") as file:
-        file["data"] = np.arange(3)
-    with pytest.raises(FormatError, match="tactbench import"):
-        open_recording(tmp_path / "x.h5")
 
 
 def _put(name, value):
@@ -82,7 +74,7 @@ def _one_reading(file):
         (lambda file: file.attrs.update({"meta": file.attrs["meta"][:-1] + ',"colour":"red"}'}), "colour"),
         (lambda file: file.pop("streams/taxels/data"), "no data of type uint16"),
         (lambda file: file["streams/taxels/t_ns"].resize(2999, axis=0), "t_ns"),
-        (_put("streams/taxels/data", np.zeros((3000, 4), dtype=np.uint16)), "(3000, 3) is expected"),
+        (_put("streams/taxels/data", np.zeros((3000, 4), dtype=np.uint16)), r"\(3000, 3\)"),
         (_put("streams/taxels", h5py.ExternalLink("other.h5", "/streams/taxels")), "link to another place"),
         (_one_reading, "digest"),
     ],
@@ -90,10 +82,8 @@ def _one_reading(file):
 def test_a_file_that_contradicts_itself(good, tamper, says):
     with h5py.File(good, "a") as file:
         tamper(file)
-    with pytest.raises(FormatError) as caught:
+    with pytest.raises(FormatError, match=rf"press\.h5.*{says}") as caught:
         read_all(good)
-    assert "press.h5" in str(caught.value)
-    assert says in str(caught.value)
     assert caught.value.hint
 
 
