@@ -114,13 +114,12 @@ def interrupted(_):
 
 
 @pytest.mark.parametrize("fail", [failing, interrupted])
-@pytest.mark.parametrize(
-    ("simulated", "keep", "kept"), [(False, True, True), (True, True, False), (False, False, False)]
-)
+@pytest.mark.parametrize(("simulated", "keep"), [(False, True), (True, True), (False, False)])
 def test_an_exception_leaves_the_old_file_alone_and_the_journal_of_a_real_device(
-    tmp_path, make_meta, fail, simulated, keep, kept
+    tmp_path, make_meta, fail, simulated, keep
 ):
     path, journal = tmp_path / "press.h5", tmp_path / "press.h5.partial"
+    kept = keep and not simulated
     record(path, make_meta(), appending())
     before = path.read_bytes()
     steps = (appending(rows=3), labelling(["ball", "", "Bär"]), revising(session="late", remarks=("late",)), fail)
