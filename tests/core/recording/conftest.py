@@ -23,25 +23,20 @@ def sensor(channels=3, dtype="uint16"):
     )
 
 
-@pytest.fixture
-def make_meta():
-    """Builds a meta: ``make_meta(channels=3, dtype="uint16", **fields)``."""
-
-    def make(channels=3, dtype="uint16", **fields):
-        given = {"name": "press", "rig": "test", "reference": (FORCE,), **fields}
-        return RecordingMeta(sensor=sensor(channels, dtype), **given)
-
-    return make
+def about(channels=3, dtype="uint16", **fields):
+    """Return what a recording of the sensor says of itself."""
+    given = {"name": "press", "rig": "test", "reference": (FORCE,), **fields}
+    return RecordingMeta(sensor=sensor(channels, dtype), **given)
 
 
 @pytest.fixture
-def write(tmp_path, make_meta):
+def write(tmp_path):
     """Writes a recording: ``write(data, force=None, t_ns=…, quality=None, notes={}, **meta)``."""
 
     def make(data, *, force=None, t_ns=None, quality=None, notes=None, **fields):
         data = np.asarray(data)
         times = np.arange(len(data), dtype=np.int64) * 10_000_000 if t_ns is None else np.asarray(t_ns)
-        meta = make_meta(data.shape[1], **fields)
+        meta = about(data.shape[1], **fields)
         timed = None if meta.clock == "none" else times
         path = tmp_path / f"{meta.name}.h5"
         with RecordingWriter(path, meta) as writer:

@@ -13,6 +13,7 @@ from tactbench.core.recording.reader import content_digest, open_recording
 from tactbench.core.recording.salvage import salvage
 from tactbench.core.recording.writer import RecordingWriter
 from tactbench.core.samples import Block
+from tests.core.recording.conftest import about
 
 DATA = np.random.default_rng(0).integers(0, 4096, (3000, 3))
 
@@ -100,10 +101,10 @@ def test_what_a_file_may_have_besides(good):
 
 @settings(max_examples=25, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(st.data())
-def test_a_journal_cut_or_damaged_anywhere_keeps_what_was_before(tmp_path, make_meta, data):
+def test_a_journal_cut_or_damaged_anywhere_keeps_what_was_before(tmp_path, data):
     journal = tmp_path / "x.h5.partial"
     ends = []
-    with RecordingWriter(tmp_path / "x.h5", make_meta(), replace=True) as writer:
+    with RecordingWriter(tmp_path / "x.h5", about(), replace=True) as writer:
         for number in range(5):
             writer.append(Block("taxels", np.arange(10) + 10 * number, np.full((10, 3), number)))
             ends.append(journal.stat().st_size)

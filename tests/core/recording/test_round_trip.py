@@ -12,8 +12,7 @@ from hypothesis import strategies as st
 from tactbench.core.recording.reader import content_digest, open_recording
 from tactbench.core.recording.writer import RecordingWriter
 from tactbench.core.samples import Block
-from tactbench.core.spec.recording import RecordingMeta
-from tests.core.recording.conftest import sensor
+from tests.core.recording.conftest import about
 
 DTYPES = ("uint8", "uint16", "int16", "int32", "float32", "float64")
 text = st.text(st.characters(blacklist_characters="\0", blacklist_categories=("Cs",)), max_size=12)
@@ -34,10 +33,10 @@ def recordings(draw):
         data = rng.integers(limits.min, limits.max, (rows, channels), dtype=dtype, endpoint=True)
     timed = draw(st.booleans())
     flags = rng.integers(0, 16, data.shape).astype(np.uint8) if draw(st.booleans()) else None
-    meta = RecordingMeta(
-        name="x", sensor=sensor(channels, dtype.name), rig="test", clock="host" if timed else "none",
-        session=draw(text), labels=draw(st.dictionaries(text, scalar, max_size=3)),
-        remarks=tuple(draw(st.lists(text, max_size=2))), drawn=draw(st.dictionaries(text, scalar, max_size=3)),
+    meta = about(
+        channels, dtype.name, clock="host" if timed else "none", reference=(), session=draw(text),
+        labels=draw(st.dictionaries(text, scalar, max_size=3)), remarks=tuple(draw(st.lists(text, max_size=2))),
+        drawn=draw(st.dictionaries(text, scalar, max_size=3)),
     )  # fmt: skip
     times = np.cumsum(rng.integers(0, 2**40, rows)) if timed else None
     cuts = [0, *sorted(draw(st.lists(st.integers(0, rows), max_size=3))), rows]
@@ -71,11 +70,11 @@ def test_round_trip(made):
         assert sorted(one.name for one in Path(folder).iterdir()) == ["x.h5"]
 
 
-def test_the_digest_is_of_what_is_said_not_of_the_file(tmp_path, make_meta):
+def test_the_digest_is_of_what_is_said_not_of_the_file(tmp_path):
     """Blocks, compression, byte order and provenance do not matter; one bit of one reading does."""
 
     def digest(name, data, step):
-        with RecordingWriter(tmp_path / name, make_meta(provenance={"host": name})) as writer:
+        with RecordingWriter(tmp_path / name, about(provenance={"host": name})) as writer:
             for first in range(0, 100, step):
                 part = slice(first, first + step)
                 writer.append(Block("taxels", np.arange(100)[part] * 1000, data[part], np.zeros_like(data[part])))
@@ -95,14 +94,10 @@ def test_the_digest_is_of_what_is_said_not_of_the_file(tmp_path, make_meta):
 
 def test_an_ordinary_viewer_finds_signal_axes_units_and_names(write):
     """What h5py alone sees, without tactbench: gzip and shuffle, NeXus attributes, plain types."""
-    with h5py.File(write(np.ones((5, 3), dtype=int), force=np.arange(5), notes={"press": np.arange(5)})) as file:
-        group = file["streams/taxels"]
-        assert group.attrs["signal"] == "data"
-        assert group.attrs["axes"].tolist() == ["t_ns", "."]
-        assert group["data"].attrs["units"] == "count"
-        assert group["t_ns"].attrs["units"] == "ns"
-        assert group.attrs["channel_names"].tolist() == ["t0", "t1", "t2"]
-        assert (group["data"].compression, group["data"].shuffle) == ("gzip", True)
-        assert file["streams/force_torque/data"].attrs["units"] == "N"
-        assert file.attrs["format"] == "tactbench-recording"
-        assert file.attrs["complete"]
+    with h5py.File(write(np.ones((5, 3), dtype=int), force=np.arange(5))) as file:
+        taxels, force = file["streams/taxels"], file["streams/force_torque"]
+        assert (taxels.attrs["signal"], taxels.attrs["axes"].tolist()) == ("data", ["t_ns", "."])
+        assert [one.attrs["units"] for one in (taxels["data"], taxels["t_ns"], force["data"])] == ["count", "ns", "N"]
+        assert taxels.attrs["channel_names"].tolist() == ["t0", "t1", "t2"]
+        assert (taxels["data"].compression, taxels["data"].shuffle) == ("gzip", True)
+        assert (file.attrs["format"], file.attrs["complete"]) == ("tactbench-recording", True)

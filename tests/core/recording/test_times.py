@@ -12,12 +12,13 @@ from tactbench.core.recording.reader import open_recording
 from tactbench.core.recording.writer import RecordingWriter
 from tactbench.core.samples import Block
 from tactbench.core.spec.recording import StreamClock
+from tests.core.recording.conftest import about
 
 START = 1_700_000_000_000_000_000
 
 
 @pytest.fixture
-def clocked(tmp_path_factory, make_meta):
+def clocked(tmp_path_factory):
     """Writes taxels over 40 s whose device's counter may begin again; returns the path, device times and receipts."""
 
     def make(seed=1, blocks=7, lost=0, **fields):
@@ -26,7 +27,7 @@ def clocked(tmp_path_factory, make_meta):
         host = device + START + (device - device[0]) * 37 // 1_000_000 + rng.exponential(500_000, 4000).astype(int)
         device[lost:] -= device[lost] if 0 < lost < 4000 else 0
         path = tmp_path_factory.mktemp("times") / "x.h5"
-        with RecordingWriter(path, make_meta(**fields)) as writer:
+        with RecordingWriter(path, about(**fields)) as writer:
             for rows in np.array_split(np.arange(4000), blocks):
                 writer.append(Block("taxels", host[rows], np.full((len(rows), 3), 9), device_ns=device[rows]))
         return path, device, host
