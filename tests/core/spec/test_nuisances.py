@@ -70,9 +70,8 @@ def test_a_simulation_is_asked_with_nuisances_in_any_order():
     assert (one, hash(one)) == (other, hash(other))
     assert one.model_dump(exclude_defaults=True) == {"nuisances": {"drift_scale": 0.5, "noise_scale": 2.0}}
     assert Simulation.model_validate_json(one.model_dump_json()) == one
-    for wrong in (math.nan, math.inf):
-        with pytest.raises(ValidationError):
-            Simulation(nuisances={"noise_scale": wrong})
+    with pytest.raises(ValidationError):
+        Simulation(nuisances={"noise_scale": math.nan})
 
 
 def test_a_scene_is_asked_as_a_simulation_says():

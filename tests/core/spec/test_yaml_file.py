@@ -19,7 +19,6 @@ def load(tmp_path, text):
         (GOOD.replace("sensors", "sensor"), 2, "Did you mean 'sensors'"),
         (GOOD.replace("    estimators", "    estimatrs"), 6, "Did you mean 'estimators'"),
         (GOOD + "repeats: many\n", 7, "repeats"),
-        (GOOD + "repeats: 0\n", 7, "repeats"),
         (GOOD + "seed: 1\nseed: 2\n", 8, "stands here twice"),
         ("tasks: [\n", 2, ""),
         ("version: 1\n", 1, "'tasks' is missing"),
