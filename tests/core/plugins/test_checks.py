@@ -1,7 +1,5 @@
 """A verdict: one number held against the range it must lie in."""
 
-from __future__ import annotations
-
 import json
 import math
 

@@ -1,7 +1,5 @@
 """Force profiles by name: what scenes hold is a path that needs no plugin."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

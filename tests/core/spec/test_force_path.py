@@ -1,7 +1,5 @@
 """A force that runs from point to point, beside the ramp that scenes have by default."""
 
-from __future__ import annotations
-
 import pytest
 from pydantic import ValidationError
 

@@ -1,7 +1,5 @@
 """What is pressed: how a scene says it, and that caps and flat surfaces are stored as they were before shapes."""
 
-from __future__ import annotations
-
 import pytest
 from pydantic import ValidationError
 
