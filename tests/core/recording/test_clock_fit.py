@@ -63,9 +63,6 @@ def test_blocks_and_whole_columns_are_the_same(seed, cuts):
     whole, cut = ([(one.run, one.middle_ns, one.offset_ns, one.drift) for one in fit.segments()] for fit in fits)
     assert whole == cut
     assert {run for run, *_ in whole} == {0, 1}
-    clock = StreamClock(source="device", segments=fits[0].segments())
-    times = HostTimes(clock)
-    assert np.array_equal(np.concatenate([times(device[part]) for part in parts]), HostTimes(clock)(device))
 
 
 def test_a_device_that_starts_again_and_one_that_pauses():

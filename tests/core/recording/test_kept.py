@@ -40,13 +40,11 @@ def test_versions_2_and_3(version, digest):
     assert np.array_equal(taxels.sequence, n)
     assert np.array_equal(taxels.device_ns, np.where(n < 100, n, n - 100) * 10_000_000)
     assert np.array_equal(taxels.t_ns, HostTimes(clock)(taxels.device_ns))
-    true = 1_000_000_000_000 + n * 10_000_000
-    assert (taxels.host_ns - true >= 200_000).all()
     assert np.argwhere(taxels.quality == Quality.GAP).tolist() == [[40, 0], [40, 1], [40, 2]]
     assert taxels.quality[41].tolist() == [0, Quality.GAP | Quality.SUSPECT, 0]
     assert taxels.annotations["object"].tolist() == ["ball"] * 100 + ["Bär"] * 80
     assert (force.host_ns, force.device_ns) == (None, None)
-    assert np.array_equal(force.t_ns, true)
+    assert np.array_equal(force.t_ns, 1_000_000_000_000 + n * 10_000_000)
 
 
 def test_version_1():

@@ -99,31 +99,22 @@ def test_what_a_file_may_have_besides(good):
     read_all(good)
 
 
-@settings(max_examples=25, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
-@given(st.data())
-def test_a_journal_cut_or_damaged_anywhere_keeps_what_was_before(tmp_path, data):
-    journal = tmp_path / "x.h5.partial"
-    ends = []
+@settings(max_examples=25, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(st.floats(0, 1, exclude_max=True), st.integers(0, 255))
+def test_a_journal_cut_or_damaged_anywhere_keeps_what_was_before(tmp_path, share, flip):
+    journal, ends = tmp_path / "x.h5.partial", []
     with RecordingWriter(tmp_path / "x.h5", about(), replace=True) as writer:
         for number in range(5):
             writer.append(Block("taxels", np.arange(10) + 10 * number, np.full((10, 3), number)))
             ends.append(journal.stat().st_size)
         whole = journal.read_bytes()
-    place = data.draw(st.integers(0, len(whole) - 1))
-    damaged = bytearray(whole)
-    if data.draw(st.booleans()):
-        del damaged[place:]
-    else:
-        damaged[place] ^= data.draw(st.integers(1, 255))
-    copy = tmp_path / "copy.partial"
-    copy.write_bytes(damaged)
+    place = int(share * len(whole))
+    rest = bytes([whole[place] ^ flip]) + whole[place + 1 :] if flip else b""
+    (tmp_path / "copy.partial").write_bytes(whole[:place] + rest)
     sound = sum(end <= place for end in ends)
     try:
-        with salvage(copy) as recording:
-            rows = len(recording.stream("taxels")) if recording.stream_names else 0
-            values = recording.read("taxels").data if rows else np.zeros((0, 3))
+        with salvage(tmp_path / "copy.partial") as recording:
+            values = recording.read("taxels").data[:, 0] if recording.stream_names else []
     except RecordingError:
-        assert sound == 0
-        return
-    assert rows == 10 * sound
-    assert np.array_equal(values[:, 0], np.arange(rows) // 10)
+        values = []
+    assert np.array_equal(values, np.arange(10 * sound) // 10)

@@ -35,29 +35,24 @@ def clocked(tmp_path_factory):
     return make
 
 
-@settings(max_examples=15, suppress_health_check=[HealthCheck.function_scoped_fixture])
-@given(st.integers(0, 2**32), st.integers(1, 50), st.integers(0, 4000))
-def test_stored_times_are_exactly_recomputed(clocked, seed, blocks, lost):
-    path, device, host = clocked(seed, blocks, lost)
+@settings(max_examples=20, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(st.integers(0, 2**32), st.integers(1, 50), st.integers(0, 4000), st.sampled_from([None, "host", "simulated"]))
+def test_stored_times_are_exactly_recomputed_or_as_they_came_where_the_device_is_no_clock(
+    clocked, seed, blocks, lost, source
+):
+    clocks = {"taxels": StreamClock(source=source)} if source else {}
+    path, device, host = clocked(seed, blocks, lost, clocks=clocks)
     with open_recording(path) as recording:
         recording.verify()
-        read, clock = recording.read("taxels"), recording.meta.clocks["taxels"]
+        read, found = recording.read("taxels"), recording.meta.clocks
     assert np.array_equal(read.device_ns, device)
-    assert np.array_equal(read.host_ns, host)
-    assert np.array_equal(read.t_ns, HostTimes(clock)(read.device_ns))
-    assert clock.breaks == (0 < lost < 4000)
-
-
-@pytest.mark.parametrize("source", ["host", "simulated"])
-def test_where_the_device_is_not_the_clock_times_are_as_they_came(clocked, source):
-    clocks = {"taxels": StreamClock(source=source)}
-    path, device, host = clocked(clocks=clocks)
-    with open_recording(path) as recording:
-        read = recording.read("taxels")
-        assert recording.meta.clocks == clocks
-    assert np.array_equal(read.t_ns, host)
-    assert np.array_equal(read.device_ns, device)
-    assert read.host_ns is None
+    if source:
+        assert (found, read.host_ns) == (clocks, None)
+        assert np.array_equal(read.t_ns, host)
+    else:
+        assert np.array_equal(read.host_ns, host)
+        assert np.array_equal(read.t_ns, HostTimes(found["taxels"])(read.device_ns))
+        assert found["taxels"].breaks == (0 < lost < 4000)
 
 
 @pytest.mark.parametrize("name", ["host_ns", "device_ns"])

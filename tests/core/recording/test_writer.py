@@ -55,6 +55,12 @@ def labelling(values):
     return partial(RecordingWriter.annotate, stream="taxels", name="object", values=values)
 
 
+def losing_rows(writer):
+    """Cut the journal, as a disk that loses what was written."""
+    journal = Path(f"{writer.path}.partial")
+    os.truncate(journal, journal.stat().st_size - 10)
+
+
 def write_for_ever(path, rows):
     """Write blocks, and say after each how many they are."""
     with RecordingWriter(Path(path), about()) as writer:
@@ -187,9 +193,10 @@ def test_quality_that_comes_late_leaves_the_rows_before_and_after_it_good(tmp_pa
         *(([appending(), labelling(values)], 1) for values in (["a"], ["a"] * (ROWS + 1), [0.5] * ROWS,
                                                                ["a\0b"] * ROWS, [None] * ROWS)),
         ([appending(), labelling(["a"] * ROWS), appending(ROWS)], 1),
+        ([appending(), appending(ROWS), losing_rows], 1),
     ],
 )  # fmt: skip
-def test_what_cannot_be_said_is_refused(tmp_path, steps, left):
+def test_what_cannot_be_said_or_has_lost_rows_is_refused(tmp_path, steps, left):
     with pytest.raises((RecordingError, RigError)):
         record(tmp_path / "x.h5", about(), *steps)
     assert len(list(tmp_path.iterdir())) == left, "only rows are kept"
@@ -209,25 +216,12 @@ def test_a_disk_that_is_full(tmp_path, blocks, kept):
         assert np.array_equal(recording.read("force_torque").data, np.concatenate(data[:kept]))
 
 
-def test_rows_that_vanish_are_noticed(tmp_path):
-    """A disk that lost rows must not make a recording with fewer of them."""
-    journal = tmp_path / "x.h5.partial"
-    cut = lambda _: os.truncate(journal, journal.stat().st_size - 10)  # noqa: E731
-    with pytest.raises(RecordingError, match="lost rows"):
-        record(tmp_path / "x.h5", about(), appending(), appending(ROWS), cut)
-    assert [one.name for one in tmp_path.iterdir()] == ["x.h5.partial"]
-
-
-def test_a_mat_of_many_channels_is_recorded_and_read_in_bounded_memory(tmp_path):
+def test_a_mat_of_many_channels_is_read_in_bounded_memory(write):
     """3,000 rows of 64 x 64 eight-bit taxels, most of them at rest: 12 MB that compress to almost nothing."""
-    path, rows = tmp_path / "mat.h5", np.arange(3000)
-    with RecordingWriter(path, about(4096, "uint8", reference=())) as writer:
-        for part in np.array_split(rows, 100):
-            data = np.zeros((30, 4096), dtype=np.uint8)
-            data[:, 100:110] = part[0] % 250
-            writer.append(Block("taxels", part * 10_000_000, data))
-    with open_recording(path) as recording:
+    data = np.zeros((3000, 4096), dtype=np.uint8)
+    data[:, 105] = np.arange(3000) % 250
+    with open_recording(write(data, dtype="uint8")) as recording:
         recording.verify()
         blocks = list(recording.stream("taxels").blocks())
     assert max(block.data.nbytes for block in blocks) <= 2**22
-    assert np.array_equal(np.concatenate([block.data[:, 105] for block in blocks]), rows // 30 * 30 % 250)
+    assert np.array_equal(np.concatenate([block.data for block in blocks]), data)
