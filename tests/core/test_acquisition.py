@@ -1,6 +1,5 @@
 """One scene on a rig into one file: everything the rig says is kept, and a rig that fails leaves nothing."""
 
-import itertools
 import os
 import signal
 import subprocess
@@ -19,7 +18,7 @@ from tactbench.core.spec.recording import PlanEntry, StreamClock, StreamCounts
 from tactbench.core.spec.rig import RigDescriptor, SensorDescriptor
 from tactbench.core.spec.scene import Scene
 from tactbench.core.spec.sensor import ChannelSpec, StreamSpec
-from tests.core.evaluation.made import FORCE
+from tests.core.evaluation.made import FORCE, ticking
 from tests.core.recording.conftest import sensor
 
 TAXELS = StreamSpec(name="taxels", dtype="uint16", channels=(ChannelSpec(name="t1", kind="taxel"),))
@@ -61,8 +60,7 @@ class Weights:
 
 def run(path, rig, *, simulated=True, **more):
     descriptor = RigDescriptor(name="weights", title="weights", where="x:y", simulated=simulated)
-    ticks = itertools.count()
-    return acquire(rig, SENSOR, descriptor, SCENE, role="train", seed=7, path=path, clock=lambda: float(next(ticks)),
+    return acquire(rig, SENSOR, descriptor, SCENE, role="train", seed=7, path=path, clock=ticking(),
                    provenance={"tactbench": "1"}, **more)  # fmt: skip
 
 

@@ -188,9 +188,7 @@ def test_a_file_added_or_taken_away_by_hand_counts(tmp_path):
 
 def test_reading_a_folder_that_is_not_there_makes_nothing(tmp_path):
     store = Store(tmp_path / "none")
-    assert store.rows() == []
-    assert store.finished(key(1)) is None
-    assert store.answers(key(1)) == {}
+    assert (store.rows(), store.finished(key(1)), store.answers(key(1))) == ([], None, {})
     assert not (tmp_path / "none").exists()
 
 

@@ -134,7 +134,6 @@ def test_several_lines_a_row(tables):
     assert (meta.trial, meta.labels) == ("3", {"object": "ball"})
 
 
-ARRAYS = {"array": "X", "axes": ["recording", "row", "channel"], "per_recording": {"y": "y"}}
 FORMATS = {
     "npz": lambda path, X: np.savez_compressed(path, X=X, y=np.arange(11) % 2),
     "mat": lambda path, X: scipy.io.savemat(path, {"X": X, "y": np.arange(11) % 2}, do_compression=True),
@@ -146,7 +145,8 @@ def test_an_archive_of_arrays(tables, name):
     X = np.random.default_rng(0).normal(size=(11, 5, 3)).astype(np.float32)
     FORMATS[name](tables.data / f"x.{name}", X)
     report = tables.run(
-        clock="none", tables__table={"files": f"x.{name}", "read": {"format": name, **ARRAYS}},
+        clock="none", tables__table={"files": f"x.{name}", "read": {
+            "format": name, "array": "X", "axes": ["recording", "row", "channel"], "per_recording": {"y": "y"}}},
         words={"slip": {"of": "y", "values": {0: "no", 1: "yes"}}, "block": {"of": "index", "divided_by": 4}},
         recording={"name": "r{index}", "session": "s", "labels": {"slip": "{slip}", "block": "{block}"}},
         streams={"taxels": {"table": "table", "dtype": "float32", "channels": [{**TAXELS, "columns": "0..2"}]}},
