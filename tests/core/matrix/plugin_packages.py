@@ -1,7 +1,5 @@
 """Packages in real folders, put on the path of fresh interpreters."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 

@@ -60,37 +60,23 @@ digests = st.lists(st.text("ab", min_size=1, max_size=3), max_size=4)
 
 @given(digests, digests)
 def test_other_data_or_another_order_have_another_key_and_their_names_do_not_count(keys, one, other):
-    data = [
-        {Path(f"{name}{place}"): text for place, text in enumerate(given)} for name, given in (("a", one), ("b", other))
-    ]
+    data = [{Path(f"{name}{n}"): text for n, text in enumerate(given)} for name, given in (("a", one), ("b", other))]
     assert (key(keys, data=data[0]) == key(keys, data=data[1])) == (one == other)
-
-
-def described(monkeypatch, kind, change):
-    """Return a key with a part of the task's or the estimator's descriptor changed."""
-    registry = load_registry()
-    looked_up = getattr(registry, f"{kind}s")
-    owned = looked_up.owned(getattr(CELL, kind))
-    descriptor = owned.descriptor
-    if kind == "task":
-        descriptor = descriptor.model_copy(update={"spec": descriptor.spec.model_copy(update=change)})
-        monkeypatch.setattr(type(looked_up), "__getitem__", lambda _, __: descriptor)
-    else:
-        changed = replace(owned, descriptor=descriptor.model_copy(update=change))
-        monkeypatch.setattr(looked_up, "owned", lambda _: changed)
-    return key(Keys(registry))
 
 
 def test_the_code_of_a_tasks_own_features_counts(tmp_path, monkeypatch):
     """In a package of its own: a changed feature is computed again."""
     monkeypatch.syspath_prepend(tmp_path)
-    code = tmp_path / "features_of_a_stranger.py"
+    registry = load_registry()
+    task = registry.tasks["force"]
+    spec = task.spec.model_copy(update={"features_by": "features_of_a_stranger:crest"})
+    task = task.model_copy(update={"spec": spec})
+    monkeypatch.setattr(type(registry.tasks), "__getitem__", lambda *_: task)
     found = []
     for body in ("1.0", "2.0", "2.0"):
-        code.write_text(f"def crest(streams):\n    return {{'crest': {body}}}\n")
+        (tmp_path / "features_of_a_stranger.py").write_text(f"def crest(streams):\n    return {{'crest': {body}}}\n")
         source_digest.cache_clear()
-        with monkeypatch.context() as patch:
-            found.append(described(patch, "task", {"features_by": "features_of_a_stranger:crest"}))
+        found.append(key(Keys(registry)))
     assert found[0] != found[1] == found[2]
 
 
@@ -107,14 +93,10 @@ def test_a_recording_counts_who_makes_it_of_what_in_which_role(keys):
 
 
 def test_keys_are_the_same_in_another_process(keys):
-    text = """
-from pathlib import Path
-from tactbench.core.matrix.keys import Keys
-from tactbench.core.matrix.plan import Cell
-from tactbench.core.plugins.registry import installed
-cell = Cell("ideal", "force", "twin", "deployable", "session", "lasso", (("lambda_", 0.2),), False, 1, 3, 5)
-print(Keys(installed()).of_cell(cell, {Path("flat.h5"): "d1", Path("round.h5"): "d2"})[0])
-"""
+    text = (
+        "from tests.core.matrix.test_keys import CELL, DATA, Keys, installed; "
+        "print(Keys(installed()).of_cell(CELL, DATA)[0])"
+    )
     found = {
         subprocess.run([sys.executable, "-c", text], env={"PYTHONHASHSEED": seed}, capture_output=True, text=True,
                        check=True, cwd=ROOT).stdout.strip()
@@ -124,13 +106,9 @@ print(Keys(installed()).of_cell(cell, {Path("flat.h5"): "d1", Path("round.h5"): 
 
 
 def test_what_differs_is_said_in_words():
-    before = {"seed": 1, "params": {"alpha": 1.0}, "source": {"acme": "a" * 32, "gone": "b"}, "same": [1, 2]}
-    now = {"seed": 2, "params": {"alpha": 1.5, "beta": None}, "source": {"acme": "c" * 32}, "same": (1, 2)}
-    assert differences(before, now) == [
-        "params: alpha 1.0 -> 1.5",
-        "seed 1 -> 2",
-        f"source: acme {'a' * 32} -> {'c' * 32}",
-        "source: gone b -> nothing",
-    ]
+    before = {"seed": 1, "params": {"alpha": 1.0}, "source": {"acme": "a", "gone": "b"}, "same": [1, 2]}
+    now = {"seed": 2, "params": {"alpha": 1.5, "beta": None}, "source": {"acme": "c"}, "same": (1, 2)}
+    said = ["params: alpha 1.0 -> 1.5", "seed 1 -> 2", "source: acme a -> c", "source: gone b -> nothing"]
+    assert differences(before, now) == said
     assert differences(now, now) == []
     assert len(differences({"text": "x" * 900}, {})[0]) < 90

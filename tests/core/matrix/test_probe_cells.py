@@ -1,15 +1,14 @@
 """``--probe`` adds cells; what was asked for stays as it was."""
 
-from pathlib import Path
-
 import pytest
 
 from tactbench.core.matrix.plan import plan_cells
 from tactbench.core.plugins.registry import load_registry
 from tactbench.core.spec.matrix import MatrixSpec
 from tactbench.core.spec.yaml_file import load_yaml
+from tests.conftest import ROOT
 
-MATRICES = sorted((Path(__file__).parents[3] / "examples" / "matrices").glob("real-*.yaml"))
+MATRICES = sorted((ROOT / "examples" / "matrices").glob("real-*.yaml"))
 
 
 @pytest.fixture(scope="module")
@@ -37,31 +36,20 @@ def test_three_more_ways_after_those_asked_for(registry):
     assert len({cell.name for cell in probed}) == len(probed)
 
 
-def test_what_is_asked_under_both_protocols_is_probed_once(registry):
-    assert ways(plan(registry, protocol=["karl2016", "deployable"])) == [
-        ("karl2016", None), ("deployable", None), ("first-frame", None), ("deployable", "shuffled"),
-    ]  # fmt: skip
-
-
 @pytest.mark.parametrize(
-    ("split", "expected"),
+    ("asked", "probes"),
     [
-        ("session", [("deployable", "session"), ("first-frame", "session"), ("deployable", "shuffled")]),
-        ("shuffled", [("deployable", "shuffled"), ("deployable", None), ("first-frame", None)]),
+        (("deployable", "session"), [("first-frame", "session"), ("deployable", "shuffled")]),
+        (("deployable", "shuffled"), [("deployable", None), ("first-frame", None)]),
+        (("deployable", "in-session"), []),  # a split in time keeps nothing apart
+        (("first-frame", None), []),  # a probe is not probed
+        ((["karl2016", "deployable"], None), [("first-frame", None), ("deployable", "shuffled")]),
     ],
 )
-def test_probes_keep_apart_what_the_cell_keeps_apart(registry, split, expected):
-    assert ways(plan(registry, protocol="deployable", split=split)) == expected
-
-
-def test_a_split_in_time_keeps_nothing_apart_and_is_not_probed(registry):
-    assert ways(plan(registry, protocol="deployable", split="in-session")) == [("deployable", "in-session")]
-
-
-def test_a_probe_may_be_asked_of_any_task_by_name(registry):
-    assert "first-frame" not in registry.tasks["curvature"].spec.protocols
-    assert ways(plan(registry, probe=False, protocol="first-frame")) == [("first-frame", None)]
-    assert ways(plan(registry, protocol="first-frame")) == [("first-frame", None)], "a probe is not probed"
+def test_probes_keep_apart_what_the_cell_keeps_apart(registry, asked, probes):
+    protocol, split = asked
+    choice = {"protocol": protocol, "split": split}
+    assert ways(plan(registry, **choice)) == [*ways(plan(registry, probe=False, **choice)), *probes]
 
 
 @pytest.mark.parametrize("path", MATRICES, ids=lambda path: path.stem)
@@ -77,10 +65,5 @@ def test_a_ready_matrix_of_real_recordings(registry, path):
 
 
 def test_there_is_one_for_each_data_set():
-    assert {path.stem for path in MATRICES} == {
-        "real-biotacsp",
-        "real-eflesh",
-        "real-eflesh-shear",
-        "real-eflesh-slip",
-        "real-icub",
-    }
+    data_sets = {"biotacsp", "eflesh", "eflesh-shear", "eflesh-slip", "icub"}
+    assert {path.stem for path in MATRICES} == {f"real-{name}" for name in data_sets}

@@ -1,15 +1,12 @@
-"""A plugin of a pad and a scale that send what they sense as JSON datagrams, and of a motor that is silent."""
-
-from __future__ import annotations
+"""A plugin of devices that send what they sense as JSON datagrams."""
 
 import json
-import math
 from typing import ClassVar
 
 import numpy as np
 
 from tactbench.plugin import Block, ChannelSpec, SensorDescriptor, StreamSpec, UsageError, hookimpl
-from tactbench.plugin.devices import DatagramLink, DeviceDescriptor, Driver, LinkTimeout
+from tactbench.plugin.devices import DeviceDescriptor, Driver, LinkTimeout
 from tactbench.sensors.ideal import SPEC
 
 TACTBENCH_API = 1
@@ -53,7 +50,7 @@ class Talker:
         return out
 
     def next_s(self):
-        return math.inf if self._settings.options.get("silent") else (self._sent + 1) * 0.01
+        return (self._sent + 1) * 0.01
 
 
 def build_emulator(settings):
@@ -63,20 +60,17 @@ def build_emulator(settings):
 
 
 class TalkingDriver(Driver):
-    """Reads them."""
-
     streams = ()
     counts: ClassVar = {}
 
     def __init__(self, settings):
-        if set(settings.options) - {"silent", "baud", "unit"}:
+        if set(settings.options) - {"baud", "unit"}:
             raise UsageError(f"It has no option {next(iter(settings.options))!r}.")
         if not settings.streams and "unit" not in settings.options:
             raise UsageError("A scale needs the option 'unit'.")
         fz = StreamSpec(name="scale", channels=(ChannelSpec(name="fz", kind="force", unit="N"),))
         self.streams = settings.streams or (fz,)
         self._link = settings.open_link()
-        assert isinstance(self._link, DatagramLink)
 
     def identify(self):
         return {}
@@ -90,7 +84,7 @@ class TalkingDriver(Driver):
         except LinkTimeout:
             return []
         senses = json.loads(came.data)["senses"]
-        rows = {one.name: [[senses.get(channel.name, math.nan) for channel in one.channels]] for one in self.streams}
+        rows = {one.name: [[senses.get(channel.name, np.nan) for channel in one.channels]] for one in self.streams}
         return [Block(name, np.array([came.t_ns]), np.array(row)) for name, row in rows.items()]
 
     def stop(self):

@@ -1,38 +1,11 @@
 """The rig that docs/plugins.md shows: its file is read and checked as the page says."""
 
-import os
 import re
-import subprocess
-import sys
-from pathlib import Path
 
 import pytest
 
-ROOT = Path(__file__).parents[3]
-
-
-@pytest.fixture
-def rig_check(tmp_path):
-    """Install the page's rig, and run `tactbench rig check` on settings."""
-    page = (ROOT / "docs" / "plugins.md").read_text(encoding="utf-8")
-    (code,) = re.findall(r"```python\n# acme_rig\.py\n(.*?)```", page, flags=re.DOTALL)
-    (tmp_path / "acme_rig.py").write_text(code, encoding="utf-8")
-    info = tmp_path / "acme_rig-1.0.dist-info"
-    info.mkdir()
-    (info / "METADATA").write_text("Metadata-Version: 2.1\nName: acme-rig\nVersion: 1.0\n", encoding="utf-8")
-    (info / "entry_points.txt").write_text("[tactbench]\nacme-rig = acme_rig\n", encoding="utf-8")
-
-    def run(settings):
-        path = tmp_path / "rig.yaml"
-        lines = ("version: 1", "rig: acme-press", "sensors: {icub: {link: emulated}}", f"settings: {settings}")
-        path.write_text("\n".join(lines), encoding="utf-8")
-        env = {**os.environ, "PYTHONPATH": f"{ROOT}{os.pathsep}{tmp_path}", "COLUMNS": "200", "PYTHONWARNINGS": "error"}
-        return subprocess.run(
-            [sys.executable, "-m", "tactbench", "rig", "check", str(path)], env=env, capture_output=True, text=True,
-            timeout=60,
-        )  # fmt: skip
-
-    return run
+from tests.conftest import ROOT
+from tests.core.matrix.plugin_packages import write_metadata
 
 
 @pytest.mark.parametrize(
@@ -43,7 +16,12 @@ def rig_check(tmp_path):
         ("{force_ceiling_n: 12}", 1, "12 N.*The frame bears 10 N"),
     ],
 )
-def test_its_file_is_checked_and_its_check_is_printed(rig_check, settings, code, said):
-    done = rig_check(settings)
-    assert done.returncode == code, done.stderr
+def test_its_file_is_checked_and_its_check_is_printed(shell, settings, code, said):
+    page = (ROOT / "docs" / "plugins.md").read_text(encoding="utf-8")
+    (source,) = re.findall(r"```python\n# acme_rig\.py\n(.*?)```", page, flags=re.DOTALL)
+    (shell.folder / "acme_rig.py").write_text(source, encoding="utf-8")
+    write_metadata(shell.folder, "acme-rig", "1.0", points="acme-rig = acme_rig")
+    lines = ("version: 1", "rig: acme-press", "sensors: {icub: {link: emulated}}", f"settings: {settings}")
+    (shell.folder / "rig.yaml").write_text("\n".join(lines), encoding="utf-8")
+    done = shell("rig", "check", "rig.yaml", code=code)
     assert re.search(said, done.stdout + done.stderr, re.DOTALL), done.stdout

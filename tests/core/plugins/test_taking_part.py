@@ -1,7 +1,5 @@
 """A plugin that is merely installed changes no recording and no key."""
 
-from __future__ import annotations
-
 import h5py
 import numpy as np
 

@@ -1,5 +1,9 @@
-"""Other processes: waited for with patience for a slow machine and no longer than needed, and ended with the test."""
+"""Other processes: waited for with patience for a slow machine and no longer than needed, and ended with the test.
 
+Also a limit on the files of this process, which stands for a full disk.
+"""
+
+import resource
 import subprocess
 import threading
 import time
@@ -15,6 +19,21 @@ def ending(command, **options):
             yield process
         finally:
             process.kill()
+
+
+@contextmanager
+def files_up_to(size):
+    """Let no file of this process grow beyond `size` bytes; the block may set another limit."""
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+
+    def limit(size):
+        resource.setrlimit(resource.RLIMIT_FSIZE, (size, before[1]))
+
+    limit(size)
+    try:
+        yield limit
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
 
 
 def gone(pid):

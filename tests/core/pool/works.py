@@ -6,7 +6,6 @@ import signal
 import subprocess
 import sys
 import threading
-from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
@@ -88,7 +87,9 @@ def hangs(begun=None):
     """Wait for ever; tell in a file who does."""
     print("about to hang", flush=True)
     if begun is not None:
-        tell(begun, str(os.getpid()))
+        aside = Path(f"{begun}.aside")
+        aside.write_text(str(os.getpid()))
+        aside.rename(begun)
     threading.Event().wait()
 
 
@@ -126,24 +127,12 @@ def leaves():
     return subprocess.Popen([sys.executable, "-c", "import time; time.sleep(600)"]).pid
 
 
-@contextmanager
-def device(path):
+def holds(path):
     try:
-        yield
+        hangs()
     finally:
         Path(path).write_text("closed")
 
 
-def holds(path):
-    with device(path):
-        hangs()
-
-
 def imports_and_fails(module):
     importlib.import_module(module).fail()
-
-
-def tell(path, text):
-    aside = Path(f"{path}.aside")
-    aside.write_text(text)
-    aside.rename(path)

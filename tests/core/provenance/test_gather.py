@@ -7,9 +7,8 @@ import platform
 import subprocess
 import sys
 import time
+from importlib import metadata
 from pathlib import Path
-
-import pytest
 
 from tactbench.core.plugins.registry import installed
 from tactbench.core.provenance.gather import _commit, foot, gather, host_id
@@ -23,7 +22,7 @@ def gathered(**circumstances):
 
 def git(folder, *arguments):
     identity = ("-c", "user.name=a", "-c", "user.email=a@b", "-c", "commit.gpgsign=false")
-    subprocess.run(["git", "-C", str(folder), *identity, *arguments], check=True, capture_output=True)
+    return subprocess.check_output(["git", "-C", str(folder), *identity, *arguments], text=True)
 
 
 def test_the_commit_says_whether_files_differ_from_it(tmp_path):
@@ -34,28 +33,21 @@ def test_the_commit_says_whether_files_differ_from_it(tmp_path):
     git(tmp_path, "init", "-q", str(package.parent))
     git(package, "add", ".")
     git(package, "commit", "-qm", "first")
-    head = subprocess.run(["git", "-C", str(package), "rev-parse", "HEAD"], capture_output=True, text=True, check=True)
-    assert _commit(package) == head.stdout[:12]
+    head = git(package, "rev-parse", "HEAD")[:12]
+    assert _commit(package) == head
     (package / "law.py").write_text("LAW = 4\n")
-    assert _commit(package) == f"{head.stdout[:12]}+changes"
+    assert _commit(package) == f"{head}+changes"
 
 
 def test_equal_circumstances_give_equal_provenance_without_clock_person_host_or_path():
-    assert gathered(seed=1, engine="isolated") == gathered(seed=1, engine="isolated")
-    assert gathered(seed=1) != gathered(seed=2)
-    found = gathered()
+    found = gathered(seed=1, engine="isolated")
+    assert found == gathered(seed=1, engine="isolated") != gathered(seed=2, engine="isolated")
     text = json.dumps(found)
     for private in (platform.node(), str(Path.home()), str(ROOT), sys.prefix, time.strftime("%Y-%m-%d")):
         assert private not in text
     assert getpass.getuser() not in found.values()
-
-
-def test_it_says_what_the_numbers_were_made_with():
-    import numpy
-
-    found = gathered(seed=7)
-    assert found["distributions"]["numpy"] == numpy.__version__
-    assert (found["seed"], found["host"]) == (7, host_id())
+    assert found["distributions"]["numpy"] == metadata.version("numpy")
+    assert (found["seed"], found["host"]) == (1, host_id())
     assert found["memory_mb"] > 0
     assert found["threads"]
 
@@ -83,14 +75,10 @@ def test_the_foot_says_each_thing_once_and_warns_of_several_hosts():
     one = gathered()
     assert foot([one, one]) == foot([one])
     software, place = foot([one])[0], foot([one])[-1]
-    assert software.startswith(f"tactbench {one['tactbench']}")
     assert f"numpy {one['distributions']['numpy']}" in software
     assert one["host"] in place
     said = foot([one, {**one, "host": "another"}])
-    assert said[-1] == "2 hosts: times of one are not to be compared with times of another."
-    assert sum(text.startswith("tactbench ") for text in said) == 1
-
-
-@pytest.mark.parametrize("one", [{}, {"host": "h"}, {"tactbench": "1"}])
-def test_the_foot_of_something_incomplete_says_what_there_is(one):
-    assert len(foot([one])) == len(one)
+    assert said[-1].startswith("2 hosts")
+    assert said.count(software) == 1
+    for incomplete in ({}, {"host": "h"}, {"tactbench": "1"}):
+        assert len(foot([incomplete])) == len(incomplete)

@@ -1,6 +1,7 @@
 """Real packages, edited: every byte of those that take part counts, and nothing else does."""
 
 import importlib
+from importlib import metadata
 
 import pytest
 
@@ -9,12 +10,13 @@ from tactbench.core.provenance.source import ANSWERING, RECORDING, source_digest
 from tests.conftest import ROOT
 from tests.core.matrix.plugin_packages import write_package
 
+LAW = {"__init__.py": "from some_plugin.law import LAW\n", "law.py": "LAW = 3\n"}
+
 
 @pytest.fixture
 def package(tmp_path, monkeypatch):
     monkeypatch.syspath_prepend(str(tmp_path))
-    return write_package(tmp_path, "some_plugin", {"__init__.py": "from some_plugin.law import LAW\n",
-                                                   "law.py": "LAW = 3\n"})  # fmt: skip
+    return write_package(tmp_path, "some_plugin", LAW)
 
 
 def digest(module="some_plugin.anything:at_all", own=()):
@@ -29,15 +31,16 @@ def digest(module="some_plugin.anything:at_all", own=()):
 def test_every_byte_of_the_package_counts(package, name):
     before = digest()
     path = package / name
-    original = path.read_bytes() if path.exists() else None
     path.parent.mkdir(parents=True, exist_ok=True)
-    path.write_bytes(b"1")
-    changed = digest()
-    path.write_bytes(b"2")
-    assert len({str(one) for one in (before, changed, digest())}) == 3
-    path.unlink()
-    if original is not None:
-        path.write_bytes(original)
+    found = [before]
+    for content in (b"1", b"2"):
+        path.write_bytes(content)
+        found.append(digest())
+    assert len({str(one) for one in found}) == 3
+    if name in LAW:
+        path.write_text(LAW[name])
+    else:
+        path.unlink()
     assert digest() == before
 
 
@@ -105,8 +108,6 @@ def test_each_place_of_tactbench_that_takes_part_is_there():
 
 
 def test_versions_of_what_computes_are_there_and_missing_ones_say_so():
-    import numpy
-
     found = versions(("no-such-distribution",))
     assert set(found) == {"python", *source.RELEVANT, "no-such-distribution"}
-    assert (found["no-such-distribution"], found["numpy"]) == ("missing", numpy.__version__)
+    assert (found["no-such-distribution"], found["numpy"]) == ("missing", metadata.version("numpy"))

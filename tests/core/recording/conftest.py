@@ -8,52 +8,37 @@ from tactbench.core.samples import Block
 from tactbench.core.spec.quantity import Source, assumed
 from tactbench.core.spec.recording import RecordingMeta
 from tactbench.core.spec.sensor import ChannelSpec, SensorSpec, StreamSpec
+from tests.core.evaluation.made import FORCE
 
 
 def sensor(channels=3, dtype="uint16"):
+    rest = assumed(7, "count", "test")
+    taxels = (ChannelSpec(name=f"t{n}", kind="taxel", lower=0, upper=4095, rest=rest) for n in range(channels))
     return SensorSpec(
         name="pad",
         title="a pad",
         principle="capacitive",
         principle_source=Source(tag="assumed", reference="made up for a test"),
-        streams=(
-            StreamSpec(
-                name="taxels",
-                dtype=dtype,
-                channels=tuple(
-                    ChannelSpec(name=f"t{place}", kind="taxel", lower=0, upper=4095, rest=assumed(7, "count", "test"))
-                    for place in range(channels)
-                ),
-            ),
-        ),
+        streams=(StreamSpec(name="taxels", dtype=dtype, channels=tuple(taxels)),),
     )
 
 
-def _reference():
-    return StreamSpec(name="force_torque", channels=(ChannelSpec(name="fz", kind="force", unit="N"),))
+def about(channels=3, dtype="uint16", **fields):
+    """Return what a recording of the sensor says of itself."""
+    given = {"name": "press", "rig": "test", "reference": (FORCE,), **fields}
+    return RecordingMeta(sensor=sensor(channels, dtype), **given)
 
 
 @pytest.fixture
-def make_meta():
-    """Builds a meta: ``make_meta(channels=3, dtype="uint16", **fields)``."""
+def write(tmp_path):
+    """Writes a recording: ``write(data, force=None, t_ns=…, quality=None, notes={}, **meta)``."""
 
-    def make(channels=3, dtype="uint16", **fields):
-        given = {"name": "press", "rig": "test", "reference": (_reference(),), **fields}
-        return RecordingMeta(sensor=sensor(channels, dtype), **given)
-
-    return make
-
-
-@pytest.fixture
-def write(tmp_path, make_meta):
-    """Writes a recording: ``write(data, force=None, name="press", t_ns=…, quality=None, notes={}, **meta)``."""
-
-    def make(data, *, force=None, name="press", t_ns=None, quality=None, notes=None, dtype="uint16", **fields):
+    def make(data, *, force=None, t_ns=None, quality=None, notes=None, **fields):
         data = np.asarray(data)
         times = np.arange(len(data), dtype=np.int64) * 10_000_000 if t_ns is None else np.asarray(t_ns)
-        meta = make_meta(data.shape[1], dtype, name=name, **fields)
+        meta = about(data.shape[1], **fields)
         timed = None if meta.clock == "none" else times
-        path = tmp_path / f"{name}.h5"
+        path = tmp_path / f"{meta.name}.h5"
         with RecordingWriter(path, meta) as writer:
             writer.append(Block("taxels", timed, data, quality))
             if force is not None:

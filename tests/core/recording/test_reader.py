@@ -1,7 +1,5 @@
 """Whatever a file is, reading it ends in what was written or in one clear error: never a crash, never a guess."""
 
-import random
-
 import h5py
 import numpy as np
 import pytest
@@ -13,6 +11,7 @@ from tactbench.core.recording.reader import content_digest, open_recording
 from tactbench.core.recording.salvage import salvage
 from tactbench.core.recording.writer import RecordingWriter
 from tactbench.core.samples import Block
+from tests.core.recording.conftest import about
 
 DATA = np.random.default_rng(0).integers(0, 4096, (3000, 3))
 
@@ -20,7 +19,8 @@ DATA = np.random.default_rng(0).integers(0, 4096, (3000, 3))
 def read_all(path):
     with open_recording(path) as recording:
         recording.verify()
-        return [recording.read(name) for name in recording.stream_names]
+        for name in recording.stream_names:
+            recording.read(name)
 
 
 @pytest.fixture
@@ -28,38 +28,28 @@ def good(write):
     return write(DATA, force=np.arange(3000.0), notes={"object": ["ball"] * 3000})
 
 
-def test_a_file_that_is_not_there(tmp_path):
-    with pytest.raises(MissingRecordingError, match=r"nowhere\.h5"):
-        open_recording(tmp_path / "nowhere.h5")
-    with pytest.raises(FileNotFoundError):
-        open_recording(tmp_path)
-    with pytest.raises(MissingRecordingError):
-        salvage(tmp_path / "nowhere.h5.partial")
-
-
-@pytest.mark.parametrize("content", [b"", b"t,x\n1,2\n", b"\x89HDF\r\n\x1a\n", bytes(4096)])
-def test_a_file_that_is_no_hdf5(tmp_path, content):
-    (tmp_path / "x.h5").write_bytes(content)
+@pytest.mark.parametrize("read", [open_recording, salvage])
+def test_a_file_that_is_not_there_or_no_recording(tmp_path, read):
+    for path in (tmp_path / "nowhere.h5", tmp_path):
+        with pytest.raises(MissingRecordingError, match=path.name):
+            read(path)
+    path = tmp_path / "x.h5"
+    for content in (b"", b"t,x\n1,2\n", b"\x89HDF\r\n\x1a\n", bytes(4096)):
+        path.write_bytes(content)
+        with pytest.raises(FormatError, match=r"x\.h5"):
+            read(path)
+    with h5py.File(path, "w") as file:
+        file["data"] = np.arange(3)
     with pytest.raises(FormatError, match=r"x\.h5"):
-        open_recording(tmp_path / "x.h5")
-    with pytest.raises(FormatError, match=r"x\.h5"):
-        salvage(tmp_path / "x.h5")
+        read(path)
 
 
 def test_cut_short_anywhere(good):
     whole = good.read_bytes()
-    rng = random.Random(1)
-    for length in sorted({0, 8, len(whole) - 1, *(rng.randrange(len(whole)) for _ in range(15))}):
+    for length in {0, 8, len(whole) - 1, *np.random.default_rng(1).integers(len(whole), size=15)}:
         good.write_bytes(whole[:length])
         with pytest.raises(FormatError):
             read_all(good)
-
-
-def test_another_programs_hdf5(tmp_path):
-    with h5py.File(tmp_path / "x.h5", "w") as file:
-        file["data"] = np.arange(3)
-    with pytest.raises(FormatError, match="tactbench import"):
-        open_recording(tmp_path / "x.h5")
 
 
 def _put(name, value):
@@ -82,7 +72,7 @@ def _one_reading(file):
         (lambda file: file.attrs.update({"meta": file.attrs["meta"][:-1] + ',"colour":"red"}'}), "colour"),
         (lambda file: file.pop("streams/taxels/data"), "no data of type uint16"),
         (lambda file: file["streams/taxels/t_ns"].resize(2999, axis=0), "t_ns"),
-        (_put("streams/taxels/data", np.zeros((3000, 4), dtype=np.uint16)), "(3000, 3) is expected"),
+        (_put("streams/taxels/data", np.zeros((3000, 4), dtype=np.uint16)), r"\(3000, 3\)"),
         (_put("streams/taxels", h5py.ExternalLink("other.h5", "/streams/taxels")), "link to another place"),
         (_one_reading, "digest"),
     ],
@@ -90,10 +80,8 @@ def _one_reading(file):
 def test_a_file_that_contradicts_itself(good, tamper, says):
     with h5py.File(good, "a") as file:
         tamper(file)
-    with pytest.raises(FormatError) as caught:
+    with pytest.raises(FormatError, match=rf"press\.h5.*{says}") as caught:
         read_all(good)
-    assert "press.h5" in str(caught.value)
-    assert says in str(caught.value)
     assert caught.value.hint
 
 
@@ -108,31 +96,22 @@ def test_what_a_file_may_have_besides(good):
     read_all(good)
 
 
-@settings(max_examples=25, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
-@given(st.data())
-def test_a_journal_cut_or_damaged_anywhere_keeps_what_was_before(tmp_path, make_meta, data):
-    journal = tmp_path / "x.h5.partial"
-    ends = []
-    with RecordingWriter(tmp_path / "x.h5", make_meta(), replace=True) as writer:
+@settings(max_examples=25, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(st.floats(0, 1, exclude_max=True), st.integers(0, 255))
+def test_a_journal_cut_or_damaged_anywhere_keeps_what_was_before(tmp_path, share, flip):
+    journal, ends = tmp_path / "x.h5.partial", []
+    with RecordingWriter(tmp_path / "x.h5", about(), replace=True) as writer:
         for number in range(5):
             writer.append(Block("taxels", np.arange(10) + 10 * number, np.full((10, 3), number)))
             ends.append(journal.stat().st_size)
         whole = journal.read_bytes()
-    place = data.draw(st.integers(0, len(whole) - 1))
-    damaged = bytearray(whole)
-    if data.draw(st.booleans()):
-        del damaged[place:]
-    else:
-        damaged[place] ^= data.draw(st.integers(1, 255))
-    copy = tmp_path / "copy.partial"
-    copy.write_bytes(damaged)
+    place = int(share * len(whole))
+    rest = bytes([whole[place] ^ flip]) + whole[place + 1 :] if flip else b""
+    (tmp_path / "copy.partial").write_bytes(whole[:place] + rest)
     sound = sum(end <= place for end in ends)
     try:
-        with salvage(copy) as recording:
-            rows = len(recording.stream("taxels")) if recording.stream_names else 0
-            values = recording.read("taxels").data if rows else np.zeros((0, 3))
+        with salvage(tmp_path / "copy.partial") as recording:
+            values = recording.read("taxels").data[:, 0] if recording.stream_names else []
     except RecordingError:
-        assert sound == 0
-        return
-    assert rows == 10 * sound
-    assert np.array_equal(values[:, 0], np.arange(rows) // 10)
+        values = []
+    assert np.array_equal(values, np.arange(10 * sound) // 10)

@@ -12,8 +12,7 @@ from hypothesis import strategies as st
 from tactbench.core.recording.reader import content_digest, open_recording
 from tactbench.core.recording.writer import RecordingWriter
 from tactbench.core.samples import Block
-from tactbench.core.spec.recording import RecordingMeta
-from tests.core.recording.conftest import sensor
+from tests.core.recording.conftest import about
 
 DTYPES = ("uint8", "uint16", "int16", "int32", "float32", "float64")
 text = st.text(st.characters(blacklist_characters="\0", blacklist_categories=("Cs",)), max_size=12)
@@ -34,17 +33,18 @@ def recordings(draw):
         data = rng.integers(limits.min, limits.max, (rows, channels), dtype=dtype, endpoint=True)
     timed = draw(st.booleans())
     flags = rng.integers(0, 16, data.shape).astype(np.uint8) if draw(st.booleans()) else None
-    meta = RecordingMeta(
-        name="x", sensor=sensor(channels, dtype.name), rig="test", clock="host" if timed else "none",
-        session=draw(text), labels=draw(st.dictionaries(text, scalar, max_size=3)),
-        remarks=tuple(draw(st.lists(text, max_size=2))), drawn=draw(st.dictionaries(text, scalar, max_size=3)),
+    meta = about(
+        channels, dtype.name, clock="host" if timed else "none", reference=(), session=draw(text),
+        labels=draw(st.dictionaries(text, scalar, max_size=3)), remarks=tuple(draw(st.lists(text, max_size=2))),
+        drawn=draw(st.dictionaries(text, scalar, max_size=3)),
     )  # fmt: skip
     times = np.cumsum(rng.integers(0, 2**40, rows)) if timed else None
-    cuts = sorted(draw(st.lists(st.integers(0, rows), max_size=3)))
-    return meta, times, data, flags, [0, *cuts, rows], draw(st.lists(text, min_size=rows, max_size=rows))
+    cuts = [0, *sorted(draw(st.lists(st.integers(0, rows), max_size=3))), rows]
+    notes = np.array(draw(st.lists(text, min_size=rows, max_size=rows)), dtype=np.str_)
+    return meta, times, data, flags, cuts, notes
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 @given(recordings())
 def test_round_trip(made):
     meta, times, data, flags, cuts, notes = made
@@ -55,61 +55,50 @@ def test_round_trip(made):
                 part = slice(first, last)
                 writer.append(Block("taxels", None if times is None else times[part], data[part],
                                     None if flags is None else flags[part]))  # fmt: skip
-            writer.annotate("taxels", "object", np.array(notes, dtype=np.str_))
+            writer.annotate("taxels", "object", notes)
             writer.annotate("taxels", "press", np.arange(len(data)))
         with open_recording(path) as recording:
             recording.verify()
             assert recording.meta == meta
             read = recording.read("taxels")
         # Bytes, not values: NaN and the sign of zero must survive too.
-        assert read.data.dtype == data.dtype
-        assert read.data.tobytes() == data.tobytes()
-        assert (read.t_ns is None) if times is None else np.array_equal(read.t_ns, times)
-        if flags is None or not flags.any():
-            assert read.quality is None
-        else:
-            assert np.array_equal(read.quality, flags)
-        assert read.annotations["object"].tolist() == np.array(notes, dtype=np.str_).tolist()
+        assert (read.data.dtype, read.data.tobytes()) == (data.dtype, data.tobytes())
+        for came, given in ((read.t_ns, times), (read.quality, None if flags is None or not flags.any() else flags)):
+            assert (came is None) if given is None else np.array_equal(came, given)
+        assert np.array_equal(read.annotations["object"], notes)
         assert np.array_equal(read.annotations["press"], np.arange(len(data)))
         assert sorted(one.name for one in Path(folder).iterdir()) == ["x.h5"]
 
 
-def test_the_digest_is_of_what_is_said_not_of_the_file(tmp_path, make_meta):
-    """Blocks, compression, byte order and provenance do not matter; one bit of one reading does."""
-    data = np.arange(300, dtype=np.uint16).reshape(100, 3)
-    digests = []
-    for number, step in enumerate((100, 7)):
-        path = tmp_path / f"{number}.h5"
-        with RecordingWriter(path, make_meta(provenance={"host": number})) as writer:
+def test_the_digest_is_of_what_is_said_not_of_the_file(tmp_path):
+    """Blocks, byte order, the name and what was computed on the way do not matter; one bit of one reading does."""
+
+    def digest(name, data, step):
+        later = {"provenance": {"host": name}, "drawn": {"solver_residual": 1e-9 * step}}
+        with RecordingWriter(tmp_path / name, about(name=name, **later)) as writer:
             for first in range(0, 100, step):
                 part = slice(first, first + step)
                 writer.append(Block("taxels", np.arange(100)[part] * 1000, data[part], np.zeros_like(data[part])))
-        digests.append(content_digest(path))
-    other = tmp_path / "big-endian.h5"
-    with h5py.File(tmp_path / "0.h5") as source, h5py.File(other, "w") as copy:
+        return content_digest(tmp_path / name)
+
+    data = np.arange(300, dtype=np.uint16).reshape(100, 3)
+    digests = {digest("a.h5", data, 100), digest("b.h5", data, 7)}
+    with h5py.File(tmp_path / "a.h5") as source, h5py.File(tmp_path / "big-endian.h5", "w") as copy:
         copy.attrs.update(dict(source.attrs))
-        group = copy.create_group("streams/taxels")
-        group["data"] = source["streams/taxels/data"][:].astype(">u2")
-        group["t_ns"] = source["streams/taxels/t_ns"][:].astype(">i8")
-    digests.append(content_digest(other))
-    assert len(set(digests)) == 1
+        for name, dtype in (("data", ">u2"), ("t_ns", ">i8")):
+            copy[f"streams/taxels/{name}"] = source[f"streams/taxels/{name}"][:].astype(dtype)
+    digests.add(content_digest(tmp_path / "big-endian.h5"))
+    assert len(digests) == 1
     data[50, 1] ^= 1
-    changed = tmp_path / "changed.h5"
-    with RecordingWriter(changed, make_meta()) as writer:
-        writer.append(Block("taxels", np.arange(100) * 1000, data))
-    assert content_digest(changed) not in digests
+    assert digest("changed.h5", data, 100) not in digests
 
 
 def test_an_ordinary_viewer_finds_signal_axes_units_and_names(write):
     """What h5py alone sees, without tactbench: gzip and shuffle, NeXus attributes, plain types."""
-    with h5py.File(write(np.ones((5, 3), dtype=int), force=np.arange(5), notes={"press": np.arange(5)})) as file:
-        group = file["streams/taxels"]
-        assert group.attrs["signal"] == "data"
-        assert group.attrs["axes"].tolist() == ["t_ns", "."]
-        assert group["data"].attrs["units"] == "count"
-        assert group["t_ns"].attrs["units"] == "ns"
-        assert group.attrs["channel_names"].tolist() == ["t0", "t1", "t2"]
-        assert (group["data"].compression, group["data"].shuffle) == ("gzip", True)
-        assert file["streams/force_torque/data"].attrs["units"] == "N"
-        assert file.attrs["format"] == "tactbench-recording"
-        assert file.attrs["complete"]
+    with h5py.File(write(np.ones((5, 3), dtype=int), force=np.arange(5))) as file:
+        taxels, force = file["streams/taxels"], file["streams/force_torque"]
+        assert (taxels.attrs["signal"], taxels.attrs["axes"].tolist()) == ("data", ["t_ns", "."])
+        assert [one.attrs["units"] for one in (taxels["data"], taxels["t_ns"], force["data"])] == ["count", "ns", "N"]
+        assert taxels.attrs["channel_names"].tolist() == ["t0", "t1", "t2"]
+        assert (taxels["data"].compression, taxels["data"].shuffle) == ("gzip", True)
+        assert (file.attrs["format"], file.attrs["complete"]) == ("tactbench-recording", True)

@@ -1,73 +1,84 @@
 """A recording is whole or not there; what a crash leaves can be read."""
 
+import itertools
 import os
 import signal
 import subprocess
 import sys
 from functools import partial
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from tactbench.core.errors import RecordingError, RigError, UnwritableError
-from tactbench.core.recording.health import examine
 from tactbench.core.recording.reader import open_recording
 from tactbench.core.recording.salvage import REMARK, rescue, salvage
 from tactbench.core.recording.writer import RecordingWriter
 from tactbench.core.samples import Block, Quality
-from tests.core.pool.patience import ending
+from tests.conftest import ROOT
+from tests.core.pool.patience import ending, files_up_to
+from tests.core.recording.conftest import about
 
 ROWS = 50
 
 
+def readings(n):
+    return (n[:, None] * 7 + np.arange(3) * 13) % 4096
+
+
 def block(first=0, rows=ROWS, **change):
     n = np.arange(first, first + rows)
-    data = (n[:, None] * 7 + np.arange(3) * 13) % 4096
-    return Block(**{"stream": "taxels", "t_ns": n * 1000, "data": data.astype(np.uint16), **change})
+    return Block(**{"stream": "taxels", "t_ns": n * 1000, "data": readings(n), **change})
 
 
 def record(path, meta, *steps, **options):
-    """Write a recording step by step; return the writer."""
+    """Write a recording step by step."""
     with RecordingWriter(path, meta, **options) as writer:
         for step in steps:
             step(writer)
-    return writer
 
 
-def appending(first=0, rows=ROWS):
-    return lambda writer: writer.append(block(first, rows))
+def appending(*place, **change):
+    return partial(RecordingWriter.append, block=block(*place, **change))
 
 
-# A child process writes blocks for ever, and says after each how many it has written.
-CHILD = """
-import sys
-import numpy as np
-from pathlib import Path
-from tactbench.core.recording.writer import RecordingWriter
-from tactbench.core.samples import Block
-from tactbench.core.spec.recording import RecordingMeta
-meta = RecordingMeta.model_validate_json(sys.stdin.readline())
-rows = int(sys.argv[2])
-with RecordingWriter(Path(sys.argv[1]), meta) as writer:
-    writer.revise(labels={"object": "ball"}, counts={"boards": 2})
-    for number in range(10**9):
-        n = np.arange(number * rows, (number + 1) * rows)
-        data = (n[:, None] * 7 + np.arange(3) * 13) % 4096
-        writer.append(Block("taxels", n * 1000 + 5, data.astype(np.uint16), (data % 5 == 0).astype(np.uint8),
-                            sequence=n, device_ns=n * 1000))
-        writer.append(Block("force_torque", n * 1000, np.sin(n)[:, None]))
-        print(number + 1, flush=True)
-"""
+def failing(_):
+    raise RigError("the motor stalled")
+
+
+def revising(**change):
+    return partial(RecordingWriter.revise, **change)
+
+
+def labelling(values):
+    return partial(RecordingWriter.annotate, stream="taxels", name="object", values=values)
+
+
+def losing_rows(writer):
+    """Cut the journal, as a disk that loses what was written."""
+    journal = Path(f"{writer.path}.partial")
+    os.truncate(journal, journal.stat().st_size - 10)
+
+
+def write_for_ever(path, rows):
+    """Write blocks, and say after each how many they are."""
+    with RecordingWriter(Path(path), about()) as writer:
+        writer.revise(labels={"object": "ball"}, counts={"boards": 2})
+        for number in itertools.count():
+            n = np.arange(number * rows, (number + 1) * rows)
+            good = (readings(n) % 5 == 0).astype(np.uint8)
+            writer.append(Block("taxels", n * 1000 + 5, readings(n), good, device_ns=n * 1000, sequence=n))
+            writer.append(Block("force_torque", n * 1000, np.sin(n)[:, None]))
+            print(number + 1, flush=True)
 
 
 @pytest.mark.parametrize(("rows", "after"), [(50, 21), (1500, 5)])
-def test_kill_9_loses_at_most_the_block_in_flight(tmp_path, make_meta, rows, after):
+def test_kill_9_loses_at_most_the_block_in_flight(tmp_path, rows, after):
     """The child is killed while it writes without pause, so that nearly every kill falls into a flush."""
     path, journal = tmp_path / "press.h5", tmp_path / "press.h5.partial"
-    pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "text": True}
-    with ending([sys.executable, "-c", CHILD, str(path), str(rows)], **pipes) as child:
-        child.stdin.write(make_meta().model_dump_json() + "\n")
-        child.stdin.flush()
+    child = f"from {__name__} import write_for_ever; write_for_ever({str(path)!r}, {rows})"
+    with ending([sys.executable, "-c", child], stdout=subprocess.PIPE, text=True, cwd=ROOT) as child:
         for _ in range(after):
             child.stdout.readline()
         os.kill(child.pid, signal.SIGKILL)
@@ -82,76 +93,55 @@ def test_kill_9_loses_at_most_the_block_in_flight(tmp_path, make_meta, rows, aft
     for taxels in both:
         n = np.arange(len(taxels.data))
         assert len(n) >= (int(said[-1]) if said else after) * rows
-        assert np.array_equal(taxels.data, (n[:, None] * 7 + np.arange(3) * 13) % 4096)
+        assert np.array_equal(taxels.data, readings(n))
         assert np.array_equal(taxels.quality, taxels.data % 5 == 0)
         assert np.array_equal(taxels.device_ns, n * 1000)
         assert np.array_equal(taxels.host_ns, n * 1000 + 5)
 
 
-def test_a_journal_keeps_labels_and_revisions(tmp_path, make_meta):
-    label = partial(RecordingWriter.annotate, stream="taxels", name="object", values=["ball", "", "Bär"])
-    early, late = (partial(RecordingWriter.revise, remarks=(word,), session=word) for word in ("early", "late"))
-    with pytest.raises(RigError, match="labelled"):
-        record(tmp_path / "x.h5", make_meta(), appending(rows=3), label, early, late, appending())
-    rescue(tmp_path / "x.h5.partial", tmp_path / "x.h5")
-    with open_recording(tmp_path / "x.h5") as recording:
-        assert (recording.meta.remarks, recording.meta.session) == (("late", REMARK), "late")
-        assert recording.read("taxels").annotations["object"].tolist() == ["ball", "", "Bär"]
-
-
-def test_a_journal_of_version_1_is_read(tmp_path, make_meta):
+def test_a_journal_of_version_1_is_read(tmp_path):
     """Its frames are the same; it has no labels and no revisions."""
-    with RecordingWriter(tmp_path / "x.h5", make_meta()) as writer:
-        writer.append(block())
-        journal = (tmp_path / "x.h5.partial").read_bytes()
+    with pytest.raises(RigError):
+        record(tmp_path / "x.h5", about(), appending(), failing)
+    journal = (tmp_path / "x.h5.partial").read_bytes()
     (tmp_path / "old.partial").write_bytes(journal.replace(b"tactbench-partial 2\n", b"tactbench-partial 1\n", 1))
     with salvage(tmp_path / "old.partial") as recording:
         assert np.array_equal(recording.read("taxels").data, block().data)
 
 
-@pytest.mark.parametrize("failure", [RigError("the motor stalled"), KeyboardInterrupt()])
-def test_an_exception_leaves_the_old_file_alone_and_the_journal_of_a_real_device(tmp_path, make_meta, failure):
-    path = tmp_path / "press.h5"
-    for simulated, left in ((True, ["press.h5"]), (False, ["press.h5", "press.h5.partial"])):
-        with RecordingWriter(path, make_meta(), replace=True) as writer:
-            writer.append(block())
-        before = path.read_bytes()
-
-        def fail(_, error=failure):
-            raise error
-
-        with pytest.raises(type(failure)) as caught:
-            record(path, make_meta(simulated=simulated), appending(rows=3), fail, replace=True)
-        assert path.read_bytes() == before
-        assert sorted(one.name for one in tmp_path.iterdir()) == left
-    said = " ".join([str(caught.value), *getattr(caught.value, "__notes__", ())])
-    assert f"tactbench inspect {path}.partial --rescue" in said
-    with salvage(tmp_path / "press.h5.partial") as recording:
-        assert len(recording.stream("taxels")) == 3
+def interrupted(_):
+    raise KeyboardInterrupt
 
 
-def test_nothing_is_kept_of_what_can_be_made_again(tmp_path, make_meta):
-    wrong = lambda writer: writer.append(block(t_ns=None))  # noqa: E731
-    with pytest.raises(RigError):
-        record(tmp_path / "x.h5", make_meta(), appending(), wrong, keep=False)
-    assert list(tmp_path.iterdir()) == []
+@pytest.mark.parametrize("fail", [failing, interrupted])
+@pytest.mark.parametrize(("simulated", "keep"), [(False, True), (True, True), (False, False)])
+def test_an_exception_leaves_the_old_file_alone_and_the_journal_of_a_real_device(tmp_path, fail, simulated, keep):
+    path, journal = tmp_path / "press.h5", tmp_path / "press.h5.partial"
+    kept = keep and not simulated
+    record(path, about(), appending())
+    before = path.read_bytes()
+    steps = (appending(0, 3), labelling(["ball", "", "Bär"]), revising(session="late", remarks=("late",)), fail)
+    with pytest.raises((RigError, KeyboardInterrupt)) as caught:
+        record(path, about(simulated=simulated), *steps, replace=True, keep=keep)
+    assert path.read_bytes() == before
+    assert sorted(tmp_path.iterdir()) == ([path, journal] if kept else [path])
+    if kept:
+        assert "--rescue" in " ".join([str(caught.value), *getattr(caught.value, "__notes__", ())])
+        rescue(journal, tmp_path / "rescued.h5")
+        with open_recording(tmp_path / "rescued.h5") as recording:
+            assert (recording.meta.remarks, recording.meta.session) == (("late", REMARK), "late")
+            assert recording.read("taxels").annotations["object"].tolist() == ["ball", "", "Bär"]
 
 
-def test_each_attempt_has_its_own_journal_and_no_recording_is_overwritten_unasked(tmp_path, make_meta):
+def test_each_attempt_has_its_own_journal_and_no_recording_is_overwritten_unasked(tmp_path):
     """A crash left a journal; a second attempt succeeds; a third one ends while a recording is there."""
     path = tmp_path / "x.h5"
 
-    def fail(_):
-        raise RigError("gone")
-
-    def meanwhile(_):  # another process finishes first
-        record(path, make_meta(), appending())
-
     with pytest.raises(RigError):
-        record(path, make_meta(), appending(rows=3), fail)
+        record(path, about(), appending(0, 3), failing)
     kept = (tmp_path / "x.h5.partial").read_bytes()
     with pytest.raises(UnwritableError, match="exists already"):
-        record(path, make_meta(), appending(rows=5), meanwhile)
+        record(path, about(), appending(0, 5), lambda _: record(path, about(), appending()))
     assert [one.name for one in sorted(tmp_path.iterdir())] == ["x.h5", "x.h5.2.partial", "x.h5.partial"]
     assert (tmp_path / "x.h5.partial").read_bytes() == kept
     with open_recording(path) as recording, salvage(tmp_path / "x.h5.2.partial") as late:
@@ -159,7 +149,7 @@ def test_each_attempt_has_its_own_journal_and_no_recording_is_overwritten_unaske
     with pytest.raises(UnwritableError, match="exists already"):
         rescue(tmp_path / "x.h5.2.partial", path)
     with pytest.raises(UnwritableError, match="exists already"):
-        record(path, make_meta())
+        record(path, about())
 
 
 @pytest.mark.parametrize(
@@ -177,106 +167,61 @@ def test_each_attempt_has_its_own_journal_and_no_recording_is_overwritten_unaske
         ({"stream": "force_torque", "data": np.full((ROWS, 1), np.nan)}, "not marked as missing"),
     ],
 )
-def test_a_block_that_does_not_fit_is_refused(tmp_path, make_meta, wrong, says):
-    with pytest.raises(RigError, match=says), RecordingWriter(tmp_path / "x.h5", make_meta()) as writer:
-        writer.append(block(**wrong))
+def test_a_block_that_does_not_fit_is_refused(tmp_path, wrong, says):
+    with pytest.raises(RigError, match=says):
+        record(tmp_path / "x.h5", about(), appending(**wrong))
     assert list(tmp_path.iterdir()) == []  # no row had come
 
 
 @pytest.mark.parametrize("rows", [ROWS, 20_000])  # fewer, and more, than are compressed at once
-def test_quality_that_comes_late_leaves_the_rows_before_and_after_it_good(tmp_path, make_meta, rows):
+def test_quality_that_comes_late_leaves_the_rows_before_and_after_it_good(tmp_path, rows):
     bad = np.zeros((ROWS, 3), dtype=np.uint8)
     bad[3, 1] = Quality.MISSING
-    with RecordingWriter(tmp_path / "x.h5", make_meta()) as writer:
-        writer.append(block(0, rows))
-        writer.append(block(rows, quality=bad))
-        writer.append(block(rows + ROWS, rows))
+    late = appending(rows, quality=bad)
+    record(tmp_path / "x.h5", about(), appending(0, rows), late, appending(rows + ROWS, rows))
     with open_recording(tmp_path / "x.h5") as recording:
         quality = recording.read("taxels").quality
     assert quality.shape == (2 * rows + ROWS, 3)
     assert np.argwhere(quality).tolist() == [[rows + 3, 1]]
 
 
-@pytest.mark.parametrize("labels", [["a"], ["a"] * (ROWS + 1), [0.5] * ROWS, ["a\0b"] * ROWS, [None] * ROWS])
-def test_labels_that_do_not_fit_are_refused(tmp_path, make_meta, labels):
-    annotate = partial(RecordingWriter.annotate, stream="taxels", name="object", values=labels)
-    with pytest.raises(RigError, match="object"):
-        record(tmp_path / "x.h5", make_meta(), lambda writer: writer.append(block()), annotate)
-
-
 @pytest.mark.parametrize(
-    "change",
-    [{"plan": "none"}, {"colour": "red"}, {"sensor": None}, {"drawn": {"x": float("nan")}}, {"clock": "none"}],
-)
-def test_what_cannot_be_said_is_refused(tmp_path, make_meta, change):
-    with pytest.raises(RecordingError):
-        record(tmp_path / "x.h5", make_meta(), partial(RecordingWriter.revise, **change))
-    assert list(tmp_path.iterdir()) == []
+    ("steps", "left"),
+    [
+        *(([revising(**change)], 0) for change in ({"plan": "none"}, {"colour": "red"}, {"sensor": None},
+                                                   {"drawn": {"x": float("nan")}}, {"clock": "none"})),
+        *(([appending(), labelling(values)], 1) for values in (["a"], ["a"] * (ROWS + 1), [0.5] * ROWS,
+                                                               ["a\0b"] * ROWS, [None] * ROWS)),
+        ([appending(), labelling(["a"] * ROWS), appending(ROWS)], 1),
+        ([appending(), appending(ROWS), losing_rows], 1),
+    ],
+)  # fmt: skip
+def test_what_cannot_be_said_or_has_lost_rows_is_refused(tmp_path, steps, left):
+    with pytest.raises((RecordingError, RigError)):
+        record(tmp_path / "x.h5", about(), *steps)
+    assert len(list(tmp_path.iterdir())) == left, "only rows are kept"
 
 
-def test_a_disk_that_is_full(tmp_path, make_meta):
+@pytest.mark.parametrize(("blocks", "kept"), [(100, 16), (15, 15)], ids=["while it is made", "when it is completed"])
+def test_a_disk_that_is_full(tmp_path, blocks, kept):
     """The size limit of a process stands for the disk: what came before it was full can be read."""
-    script = """
-import resource, signal, sys
-import numpy as np
-from pathlib import Path
-from tactbench.core.errors import RecordingError
-from tactbench.core.recording.writer import RecordingWriter
-from tactbench.core.samples import Block
-from tactbench.core.spec.recording import RecordingMeta
-meta = RecordingMeta.model_validate_json(sys.stdin.readline())
-signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
-limit, rows = 2**18, int(sys.argv[1])
-rng = np.random.default_rng(0)
-try:
-    with RecordingWriter(Path("x.h5"), meta) as writer:
-        for number in range(rows // 1000):
-            if number == 10:
-                resource.setrlimit(resource.RLIMIT_FSIZE, (limit, resource.RLIM_INFINITY))
-            writer.append(Block("force_torque", np.arange(1000), rng.normal(size=(1000, 1))))
-        resource.setrlimit(resource.RLIMIT_FSIZE, (2**16, resource.RLIM_INFINITY))
-except RecordingError as error:
-    print(error)
-"""
-    for rows, kept in ((100_000, 16_000), (15_000, 15_000)):  # while it is made; when it is completed
-        done = subprocess.run([sys.executable, "-c", script, str(rows)], cwd=tmp_path, text=True, timeout=60,
-                              input=make_meta().model_dump_json() + "\n", capture_output=True)  # fmt: skip
-        assert done.returncode == 0, done.stderr
-        assert "x.h5 cannot be written" in done.stdout
-        assert "free space" in done.stdout
-        assert "tactbench inspect x.h5.partial --rescue x.h5" in done.stdout
-        assert [one.name for one in tmp_path.iterdir()] == ["x.h5.partial"]
-        with salvage(tmp_path / "x.h5.partial") as recording:
-            assert np.array_equal(recording.read("force_torque").data, np.random.default_rng(0).normal(size=(kept, 1)))
-        (tmp_path / "x.h5.partial").unlink()
-
-
-def test_rows_that_vanish_are_noticed(tmp_path, make_meta):
-    """A disk that lost rows must not make a recording with fewer of them."""
-    journal = tmp_path / "x.h5.partial"
-    cut = lambda _: os.truncate(journal, journal.stat().st_size - 10)  # noqa: E731
-    with pytest.raises(RecordingError, match="lost rows"):
-        record(tmp_path / "x.h5", make_meta(), appending(), appending(ROWS), cut)
+    data = np.random.default_rng(0).normal(size=(blocks, 1000, 1))
+    steps = [partial(RecordingWriter.append, block=Block("force_torque", np.arange(1000), one)) for one in data]
+    with files_up_to(2**18) as limit, pytest.raises(RecordingError, match=r"x\.h5 cannot be written") as caught:
+        record(tmp_path / "x.h5", about(), *steps, lambda _: limit(2**16))
+    assert "free space" in str(caught.value)
+    assert "x.h5.partial --rescue" in " ".join([str(caught.value), *getattr(caught.value, "__notes__", ())])
     assert [one.name for one in tmp_path.iterdir()] == ["x.h5.partial"]
+    with salvage(tmp_path / "x.h5.partial") as recording:
+        assert np.array_equal(recording.read("force_torque").data, np.concatenate(data[:kept]))
 
 
-def test_a_mat_of_many_channels_is_recorded_and_read_in_bounded_memory(tmp_path, make_meta):
+def test_a_mat_of_many_channels_is_read_in_bounded_memory(write):
     """3,000 rows of 64 x 64 eight-bit taxels, most of them at rest: 12 MB that compress to almost nothing."""
-    path, rows = tmp_path / "mat.h5", 3000
-    flags = np.zeros((rows, 4096), dtype=np.uint8)
-    flags[2000, 7] = Quality.GAP
-    with RecordingWriter(path, make_meta(4096, "uint8", reference=())) as writer:
-        for first in range(0, rows, 30):
-            part = slice(first, first + 30)
-            data = np.zeros((30, 4096), dtype=np.uint8)
-            data[:, 100:110] = first % 250
-            writer.append(Block("taxels", np.arange(rows)[part] * 10_000_000, data, flags[part]))
-    with open_recording(path) as recording:
-        blocks = list(recording.stream("taxels").blocks())
-        assert "lost" not in {finding.check for finding in examine(recording)}
+    data = np.zeros((3000, 4096), dtype=np.uint8)
+    data[:, 105] = np.arange(3000) % 250
+    with open_recording(write(data, dtype="uint8")) as recording:
         recording.verify()
+        blocks = list(recording.stream("taxels").blocks())
     assert max(block.data.nbytes for block in blocks) <= 2**22
-    assert np.concatenate([block.data[:, 105] for block in blocks]).tolist() == [
-        n // 30 * 30 % 250 for n in range(rows)
-    ]
-    assert np.argwhere(np.concatenate([block.quality for block in blocks])).tolist() == [[2000, 7]]
+    assert np.array_equal(np.concatenate([block.data for block in blocks]), data)

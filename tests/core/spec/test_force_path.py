@@ -1,7 +1,5 @@
 """A force that runs from point to point, beside the ramp that scenes have by default."""
 
-from __future__ import annotations
-
 import pytest
 from pydantic import ValidationError
 
@@ -23,20 +21,14 @@ def test_a_path_says_of_itself_what_a_ramp_says():
     assert path((0.0, 1.0), (0.0, 2.0)).hold_s == 0.0
 
 
-@pytest.mark.parametrize(
-    ("times_s", "forces_n", "why"),
-    [
-        ((0.0, 1.0), (0.0,), "one force for each time"),
-        ((0.1, 1.0), (0.0, 1.0), "ascend from 0 s"),
-        ((0.0, 1.0, 1.0), (0.0, 1.0, 2.0), "ascend from 0 s"),
-        ((0.0, 1.0), (0.0, -1.0), "greater than or equal to 0"),
-        ((0.0, float("nan")), (0.0, 1.0), "finite"),
-        ((0.0,), (0.0,), "at least 2"),
-    ],
-)
-def test_a_path_that_cannot_be_run_is_refused(times_s, forces_n, why):
-    with pytest.raises(ValidationError, match=why):
-        path(times_s, forces_n)
+def test_a_path_that_cannot_be_run_is_refused():
+    nan = float("nan")
+    for times_s in ((0.0,), (0.1, 1.0), (0.0, 0.0), (0.0, nan)):
+        with pytest.raises(ValidationError):
+            path(times_s, tuple(0.0 for _ in times_s))
+    for forces_n in ((0.0,), (0.0, -1.0), (0.0, nan)):
+        with pytest.raises(ValidationError):
+            path((0.0, 1.0), forces_n)
 
 
 def test_a_scene_keeps_its_kind_of_profile_through_a_file():
@@ -44,5 +36,3 @@ def test_a_scene_keeps_its_kind_of_profile_through_a_file():
         scene = Scene(name="a", profile=profile)
         assert Scene.model_validate_json(scene.model_dump_json()) == scene
     assert isinstance(Scene.model_validate({"name": "a", "profile": {"samples": 5}}).profile, ForceRamp)
-    with pytest.raises(ValidationError, match="stairs"):
-        Scene.model_validate({"name": "a", "profile": {"kind": "stairs"}})

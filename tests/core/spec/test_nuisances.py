@@ -1,6 +1,5 @@
 """Nuisances by name: what a scene and a sensor declare can be set, alone and checked."""
 
-import json
 import math
 
 import pytest
@@ -51,38 +50,28 @@ def test_what_is_of_somebody_else_is_passed_over():
 
 
 @pytest.mark.parametrize(
-    ("values", "says"),
+    ("changed", "values", "says"),
     [
-        ({"placement_scatter_mm": -0.1}, "placement_scatter_mm = -0.1 is below 0"),
-        ({"noise_scale": -1.0}, "noise_scale = -1 is below 0"),
-        ({"surface_kinetic_friction": 2.0}, "surface_kinetic_friction = 2: .*friction must be static >= kinetic"),
+        (SCENE, {"placement_scatter_mm": -0.1}, "placement_scatter_mm = -0.1 is below 0"),
+        (SCENE, {"noise_scale": -1.0}, "noise_scale = -1 is below 0"),
+        (SCENE, {"surface_kinetic_friction": 2.0}, "surface_kinetic_friction = 2: .*static >= kinetic"),
+        (SENSORS[0], {"taxel_white_count": -1.0}, "taxel_white_count = -1 is below 0"),
+        (SENSORS[2], {"taxel_warm_up_count": 5.0}, "warm_up_tau is needed"),
     ],
 )
-def test_a_value_that_a_scene_cannot_have_is_refused_by_name(values, says):
-    with pytest.raises(UsageError, match=says) as caught:
-        SCENE.with_nuisances(values)
-    assert caught.value.hint
-
-
-def test_a_value_that_a_sensor_cannot_have_is_refused_by_name():
-    biotac, _, ideal = SENSORS
-    with pytest.raises(UsageError, match="taxel_white_count = -1 is below 0"):
-        biotac.with_nuisances({"taxel_white_count": -1.0})
-    with pytest.raises(UsageError, match="warm_up is not 0, so warm_up_tau is needed"):
-        ideal.with_nuisances({"taxel_warm_up_count": 5.0})
-    assert biotac.with_nuisances({"taxel_warm_up_count": -5.0}).settable()["taxel_warm_up_count"].value == -5.0
+def test_a_value_that_cannot_be_is_refused_by_name(changed, values, says):
+    with pytest.raises(UsageError, match=says):
+        changed.with_nuisances(values)
 
 
 def test_a_simulation_is_asked_with_nuisances_in_any_order():
     one = Simulation(nuisances={"noise_scale": 2, "drift_scale": 0.5})
     other = Simulation(nuisances={"drift_scale": 0.5, "noise_scale": 2.0})
-    assert one == other
-    assert hash(one) == hash(other)
+    assert (one, hash(one)) == (other, hash(other))
     assert one.model_dump(exclude_defaults=True) == {"nuisances": {"drift_scale": 0.5, "noise_scale": 2.0}}
-    assert Simulation.model_validate(json.loads(one.model_dump_json())) == one
-    for wrong in (math.nan, math.inf, "much", None):
-        with pytest.raises(ValidationError):
-            Simulation(nuisances={"noise_scale": wrong})
+    assert Simulation.model_validate_json(one.model_dump_json()) == one
+    with pytest.raises(ValidationError):
+        Simulation(nuisances={"noise_scale": math.nan})
 
 
 def test_a_scene_is_asked_as_a_simulation_says():

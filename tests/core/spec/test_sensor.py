@@ -1,0 +1,43 @@
+"""Several channels at one place are one taxel, and figures of real units are no part of what is recorded."""
+
+import pytest
+from pydantic import ValidationError
+
+from tactbench.core.report.datasheet import table_one
+from tactbench.plugin import ChannelSpec, SensorSpec, StreamSpec, load_registry
+from tests.core.evaluation.made import sensor
+
+
+def magnets(*channels):
+    given = sensor().model_dump(exclude={"streams"})
+    return SensorSpec(**given, streams=(StreamSpec(name="magnets", channels=channels),))
+
+
+def axes(site):
+    return [ChannelSpec(name=f"{site}{axis}", kind="taxel", site=site) for axis in "xyz"]
+
+
+def test_axes_of_a_magnet_are_one_site():
+    lone = ChannelSpec(name="lone", kind="taxel")
+    warm = ChannelSpec(name="warm", kind="dc_temperature", site="a")
+    pad = magnets(*axes("a"), lone, *axes("b"), warm)
+    sites = [[one.name for one in site] for site in pad.sites("taxel")]
+    assert sites == [["ax", "ay", "az"], ["lone"], ["bx", "by", "bz"]]
+    assert sum(map(len, pad.sites())) == 8
+    (row,) = [row for row in table_one([pad]) if row.title == "# taxels"]
+    assert row.facts[0].text == "3, of 7 channels"
+
+
+@pytest.mark.parametrize("field", ["position_m", "normal"])
+def test_a_site_in_two_places_is_refused(field):
+    elsewhere = ChannelSpec(name="at", kind="taxel", site="a", **{field: (0.0, 0.0, 1.0)})
+    with pytest.raises(ValidationError, match="site a: the place of at is not that of ax"):
+        magnets(*axes("a"), elsewhere)
+
+
+def test_no_recording_carries_figures_of_real_units_and_no_key_depends_on_them():
+    spec = load_registry().sensors["icub"].spec
+    assert spec.likeness
+    without = spec.model_copy(update={"likeness": ()})
+    assert spec.model_dump_json() == without.model_dump_json()
+    assert SensorSpec.model_validate_json(spec.model_dump_json()).likeness == ()
