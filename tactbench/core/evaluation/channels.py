@@ -50,11 +50,11 @@ Found = tuple[str, int, ChannelSpec]
 """Stream, place in it, and what is there."""
 
 
-def channel_on(recording: Recording, target: ChannelTarget, clock: StreamData) -> FloatArray | None:
-    """Return a channel on the clock of a stream, in the unit of `target`; None if there is none."""
+def channel_on(recording: Recording, target: ChannelTarget, clock: StreamData) -> FloatArray:
+    """Return a channel on the clock of a stream, in the unit of `target`; all NaN if there is none."""
     found = channels_for(recording, target)
     if not found:
-        return None
+        return np.full(len(clock.data), np.nan)
     if len(found) > 1:
         names = ", ".join(channel.name for _, _, channel in found)
         raise DataError(

@@ -267,10 +267,8 @@ def _target(recording: Recording, task: TaskSpec, features: StreamData) -> Label
         return found if task.kind == "classification" else _as_numbers(found, task.target.name, recording.meta.name)
     if isinstance(task.target, SlipTarget):  # of frames, which are made of the recording later
         return np.zeros(len(features.data)), np.ones(len(features.data), dtype=bool)
-    missing = np.full(len(features.data), np.nan)
     targets = task.target.components if isinstance(task.target, VectorTarget) else (task.target,)
-    columns = [channel_on(recording, one, features) for one in targets]
-    y = np.column_stack([missing if one is None else one for one in columns])
+    y = np.column_stack([channel_on(recording, one, features) for one in targets])
     labelled = np.asarray(~np.isnan(y).any(axis=1))
     return (y if isinstance(task.target, VectorTarget) else y[:, 0]), labelled
 

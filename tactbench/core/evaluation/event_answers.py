@@ -187,7 +187,7 @@ def _frame_scores(tested: Sequence[Detected]) -> dict[str, float]:
     """Return frame scores of gross slip against the rest, over frames that have a label and an answer."""
     pairs = []
     for one in tested:
-        state = one.scored.reference.state(one.scored.t_ns, 1.0)
+        state = one.scored.reference.state(one.scored.t_ns)
         known = (state != UNDECIDED) & ~np.isnan(one.scored.score)
         pairs.append((state[known] == GROSS, one.scored.score[known] >= one.threshold))
     return _scores_of(pairs, 2, "frame {}")

@@ -6,7 +6,7 @@ import itertools
 import warnings
 from collections import Counter
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -16,7 +16,7 @@ from tactbench.core.errors import DataError, PluginContractError, TactbenchError
 from tactbench.core.evaluation.dataset import Dataset
 from tactbench.core.evaluation.metrics import Metric
 from tactbench.core.evaluation.protocols import ProtocolSpec
-from tactbench.core.evaluation.sets import keep, part, scales
+from tactbench.core.evaluation.sets import keep, part, scale_of, taken
 from tactbench.core.evaluation.splits import Assignment, inner_splits
 from tactbench.core.plugins.interfaces import Estimator
 from tactbench.core.plugins.registry import load_object
@@ -165,8 +165,7 @@ def voted(part: Part, predicted: npt.NDArray[Any], n_classes: int) -> tuple[Part
         The answer is the commonest class, of equals the first; where 0, the mean.
     """
     places, code, counts = np.unique(part.recording, return_inverse=True, return_counts=True)
-    last = np.cumsum(counts) - 1
-    rows = Part(part.X[last], part.y[last], part.time_s[last], part.recording[last], part.row[last])
+    rows = taken(part, np.cumsum(counts) - 1)
     if not n_classes:
         return rows, np.bincount(code, weights=predicted) / counts
     votes = np.zeros((len(places), n_classes), dtype=np.int64)
@@ -175,20 +174,14 @@ def voted(part: Part, predicted: npt.NDArray[Any], n_classes: int) -> tuple[Part
 
 
 @dataclass(frozen=True)
-class Candidate:
+class Choice:
     """Parameters and window that were tried, and how well they did on the validation data."""
 
     params: dict[str, Any]
     k: int
     score: float
-
-
-@dataclass(frozen=True)
-class Choice(Candidate):
-    """The candidate that was chosen, and those that it was compared with."""
-
-    compared: tuple[Candidate, ...] = ()
-    """all candidates in the order in which they were tried, the chosen one among them"""
+    compared: tuple[Choice, ...] = ()
+    """of the one that was chosen: all in the order in which they were tried, it among them"""
 
 
 def features_of(one: Part, descriptor: EstimatorDescriptor) -> FloatArray:
@@ -242,7 +235,7 @@ def select(
         except DataError:
             continue  # one inner set without rows is no reason against the others
         if train.labelled.any() and other.labelled.any():
-            pairs.append(((train, other), scales(protocol, train, other)))
+            pairs.append([(rows, scale_of(protocol, train, rows)) for rows in (train, other)])
     if not pairs:
         raise DataError(
             f"Fold {assignment.name!r} has too few labelled rows to choose hyper-parameters on: some to learn from and "
@@ -250,10 +243,9 @@ def select(
             hint="Fix the parameters in the matrix (estimators: [{params: …}]), or use longer recordings.",
         )
     n_classes = len(data.classes)
-    tried: list[Candidate] = []
-    sign = 1.0 if metric.higher_is_better else -1.0
+    tried: list[Choice] = []
     for k in descriptor.window_grid:
-        filtered = [[part(rows, scale, k) for rows, scale in zip(*pair, strict=True)] for pair in pairs]
+        filtered = [[part(rows, scale, k) for rows, scale in pair] for pair in pairs]
         for values in itertools.product(*grid.values()):
             params = {**given, **dict(zip(grid, values, strict=True))}
             truth, answered = [], []
@@ -265,6 +257,6 @@ def select(
                 truth.append(checked.y)
                 answered.append(combined)
             score = metric.of(np.concatenate(truth), np.concatenate(answered), n_classes)
-            tried.append(Candidate(params, k, score))
-    best = max(tried, key=lambda candidate: sign * candidate.score)  # of equals the first
-    return Choice(best.params, best.k, best.score, tuple(tried))
+            tried.append(Choice(params, k, score))
+    best = max(tried, key=lambda candidate: metric.sign * candidate.score)  # of equals the first
+    return replace(best, compared=tuple(tried))

@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from tactbench.core.evaluation.metrics import Metric
-from tactbench.core.evaluation.time_blocks import RESAMPLES, block_length, circular_blocks, generator
+from tactbench.core.evaluation.time_blocks import RESAMPLES, block_length, circular_blocks
 from tactbench.core.samples import FloatArray, IntArray
 
 LEVEL = 0.95
@@ -47,14 +47,37 @@ class ReplicateUnits:
     caveat: str = ""
     """What an interval over them does not know; added to how it was found"""
 
+    def sums(self, rows: FloatArray) -> FloatArray:
+        """Return (units, m) sums of (n, m) summands over the rows of each."""
+        out = np.zeros((int(self.codes.max()) + 1, rows.shape[1]))
+        np.add.at(out, self.codes, rows)
+        return out
+
+    def enough(self, y: npt.NDArray[Any], n_classes: int) -> bool:
+        """Tell whether there are enough of them to resample, of every class that occurs in (n,) labels."""
+        each = [y == one for one in range(n_classes)]
+        own = [self.codes, *(self.codes[mask] for mask in each if mask.any())]
+        return all(len(np.unique(codes)) >= ENOUGH_CLUSTERS for codes in own)
+
+    def strata(self, y: npt.NDArray[Any], n_classes: int) -> IntArray:
+        """Return (units,) numbers, equal for units that may stand in for each other.
+
+        All of them, or class by class where each has one class only: without it a resample could lose a class, and its
+        score would be that of another question.
+        """
+        there = np.zeros((int(self.codes.max()) + 1, max(n_classes, 1)), dtype=bool)
+        there[self.codes, y if n_classes else 0] = True
+        if (there.sum(axis=1) > 1).any():
+            return np.zeros(len(there), dtype=np.int64)
+        return np.unique(there.argmax(axis=1), return_inverse=True)[1].astype(np.int64)
+
 
 def score_interval(
     metric: Metric,
     y: npt.NDArray[Any],
     predicted: npt.NDArray[Any],
     recording: IntArray,
-    cluster: npt.NDArray[Any],
-    cluster_name: str,
+    unit: ReplicateUnits,
     n_classes: int,
     seed: int,
 ) -> Interval:
@@ -62,10 +85,10 @@ def score_interval(
 
     Parameters
     ----------
-    y, predicted, recording, cluster
-        (n,) truth, prediction, recording and unit of replication of each test row, rows of a recording in time order.
-    cluster_name
-        What a cluster is, for the text.
+    y, predicted, recording
+        (n,) truth, prediction and recording of each test row, rows of a recording in time order.
+    unit
+        Which of the clusters each of these rows is of.
 
     Notes
     -----
@@ -80,14 +103,10 @@ def score_interval(
     ----------
     .. [1] Cameron, Gelbach and Miller 2008, Bootstrap-based improvements for inference with clustered errors.
     """
-    rng = generator(seed)
+    rng = np.random.default_rng(np.random.SeedSequence([seed, 0xC1]))  # the same blocks for every figure of a cell
     rows = metric.rows(y, predicted, n_classes)
-    names, number = np.unique(cluster, return_inverse=True)
-    if enough(y, number, n_classes):
-        sums = np.zeros((len(names), rows.shape[1]))
-        np.add.at(sums, number, rows)
-        strata = strata_of(y, number, n_classes)
-        return _of_clusters(metric, sums, strata, cluster_name, n_classes, len(y))
+    if unit.enough(y, n_classes):
+        return _of_clusters(metric, rows, y, unit, n_classes)
     if len(np.unique(recording)) == len(recording):
         return _of_too_few(metric, rows, n_classes)
     total = np.zeros((RESAMPLES, rows.shape[1]))
@@ -112,17 +131,17 @@ def score_interval(
 
 
 def _of_clusters(
-    metric: Metric, sums: FloatArray, strata: IntArray, cluster_name: str, n_classes: int, n: int
+    metric: Metric, rows: FloatArray, y: npt.NDArray[Any], unit: ReplicateUnits, n_classes: int
 ) -> Interval:
     """Return Student's interval over clusters, from what leaving each out changes."""
+    sums, strata = unit.sums(rows), unit.strata(y, n_classes)
     score = float(metric.score(sums.sum(axis=0), n_classes))
-    scale = transform_of(metric.name, score, n)
+    scale = transform_of(metric.name, score, len(y))
     without = scale.there(metric.score(sums.sum(axis=0) - sums, n_classes))
     without = np.where(np.isfinite(without), without, scale.there(score))  # R² of labels that are all alike
     freedom = len(sums) - len(np.unique(strata))
-    method = (
-        f"jackknife over {len(sums)} {plural(cluster_name)} (Student's t, {freedom} degrees of freedom, {scale.name})"
-    )
+    over = f"{len(sums)} {plural(unit.name)}"
+    method = f"jackknife over {over} (Student's t, {freedom} degrees of freedom, {scale.name}){unit.caveat}"
     deviation = float(np.sqrt((influences(without, strata) ** 2).sum()))
     return _student(metric, score, deviation, freedom, scale, method)
 
@@ -149,29 +168,9 @@ def _of_too_few(metric: Metric, rows: FloatArray, n_classes: int) -> Interval:
     return Interval(float(each.min()), float(each.max()), method)
 
 
-def enough(y: npt.NDArray[Any], cluster: npt.NDArray[Any], n_classes: int) -> bool:
-    """Tell whether there are enough clusters to resample, of every class that occurs."""
-    if len(np.unique(cluster)) < ENOUGH_CLUSTERS:
-        return False
-    return all(len(np.unique(cluster[y == one])) >= ENOUGH_CLUSTERS for one in range(n_classes) if (y == one).any())
-
-
 def plural(name: str) -> str:
     """Return the name of several units."""
     return name + ("es" if name.endswith("s") else "s")
-
-
-def strata_of(y: npt.NDArray[Any], cluster: IntArray, n_classes: int) -> IntArray:
-    """Return (clusters,) numbers, equal for clusters that may stand in for each other.
-
-    All of them, or class by class where each cluster has one class only: without it a resample could lose a class, and
-    its score would be that of another question.
-    """
-    there = np.zeros((int(cluster.max()) + 1, max(n_classes, 1)), dtype=bool)
-    there[cluster, y if n_classes else 0] = True
-    if (there.sum(axis=1) > 1).any():
-        return np.zeros(len(there), dtype=np.int64)
-    return np.unique(there.argmax(axis=1), return_inverse=True)[1].astype(np.int64)
 
 
 def loss_of(metric: Metric, y: npt.NDArray[Any], predicted: npt.NDArray[Any]) -> FloatArray:
@@ -182,10 +181,10 @@ def loss_of(metric: Metric, y: npt.NDArray[Any], predicted: npt.NDArray[Any]) ->
     return np.asarray(squares.sum(axis=1)) if metric.vector else squares
 
 
-def student_quantile(freedom: Any, level: float = LEVEL) -> FloatArray:
-    """Return how many standard errors a two-sided interval of `level` reaches, for each of some degrees of freedom."""
+def student_quantile(freedom: Any) -> FloatArray:
+    """Return how many standard errors a two-sided interval of 95 % reaches, for each of some degrees of freedom."""
     special = importlib.import_module("scipy.special")
-    return np.asarray(special.stdtrit(np.minimum(freedom, _MOST_FREEDOM), 0.5 + level / 2), dtype=np.float64)
+    return np.asarray(special.stdtrit(np.minimum(freedom, _MOST_FREEDOM), 0.5 + LEVEL / 2), dtype=np.float64)
 
 
 def two_sided_p(t: float, freedom: float) -> float:

@@ -214,7 +214,7 @@ def _in_session(data: Dataset, gap: int) -> Iterator[Assignment]:
         mine = _masks(data, lambda place, table: place in places and table.meta.session == session)  # noqa: B023
         train, test = _cut_in_time(data, mine, gap, fewest=10)
         if any(mask.any() for mask in test):
-            yield Assignment(session, train, test, groups="session")
+            yield Assignment(session, train, test)
 
 
 def _cut_in_time(
@@ -331,8 +331,7 @@ def _classes_in(data: Dataset, masks: Sequence[Mask]) -> set[int]:
 
 def _kinds_in(data: Dataset, masks: Sequence[Mask]) -> set[bool]:
     """Return whether recordings are disturbances, of those that the masks hold."""
-    held = [table.reference for table, mask in zip(data.tables, masks, strict=True) if mask.any()]
-    return {reference.disturbance for reference in held if reference is not None}
+    return {table.slip.disturbance for table, mask in zip(data.tables, masks, strict=True) if mask.any()}
 
 
 def _sizes(tables: Sequence[Table], masks: Sequence[Mask], group: str) -> Counter[str]:

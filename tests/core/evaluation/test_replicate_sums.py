@@ -8,6 +8,7 @@ import pytest
 from tactbench.core.evaluation.dataset import load_dataset
 from tactbench.core.evaluation.metrics import METRICS
 from tactbench.core.evaluation.replicate_sums import replicates, tables_of
+from tactbench.core.samples import Answers
 
 from .made import force_task, label_task, record
 from .test_karl2016 import ramp
@@ -74,7 +75,9 @@ def test_a_unit_is_found_for_each_row_by_its_number(tmp_path):
     notes = {"press": np.repeat(np.arange(6), 10)}
     data = load_dataset(force_task(), [record(tmp_path / "a.h5", X, force, annotations=notes)])
     table = data.tables[0]
-    unit = replicates(data, force_task(splits=("press",)), "press", table.y, np.zeros(50, dtype=np.int64), table.row)
+    first = np.zeros(50, dtype=np.int64)
+    tested = Answers(table.y, table.y, first, table.row, first, table.time_s, table.y)
+    unit = replicates(data, force_task(splits=("press",)), "press", tested)
     assert unit.name == "press"
     assert unit.codes.tolist() == (table.row // 10).tolist()
     assert unit.labels == tuple(f"1/{number}" for number in range(6))
