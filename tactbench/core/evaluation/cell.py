@@ -204,12 +204,10 @@ def load_task(
     assignments = make_splits(data, split, seed, max(estimator.window_grid), one_by_one=split in task.campaigns)
     if not assignments:
         raise DataError("No fold could be made of these recordings.", hint="Choose another --split.")
-    chosen = task.kind == "events" and estimator.threshold is None
-    held_back = [chosen and one.validation is None for one in assignments]
-    assignments = [
-        with_validation(one, data) if back else one for one, back in zip(assignments, held_back, strict=True)
-    ]
-    return TaskData(task, rules, split, recorded, data, tuple(assignments), any(held_back))
+    held_back = task.kind == "events" and estimator.threshold is None and assignments[0].validation is None
+    if held_back:
+        assignments = [with_validation(one, data) for one in assignments]
+    return TaskData(task, rules, split, recorded, data, tuple(assignments), held_back)
 
 
 # --- Folds to fitted models -------------------------------------------------------------------------------------------
@@ -564,10 +562,11 @@ def _part_taken(data: TaskData) -> tuple[list[RecordingMeta], dict[str, int], tu
     folds = [over_rows(one, recorded) for one in data.assignments]
     used = used_rows(folds)
     took_part = [one.meta for one, mask in zip(recorded.tables, used, strict=True) if (mask & one.labelled).any()]
-    left_out = without_part(recorded, data.split, used)
-    if data.split == "shuffled":
-        return took_part, left_out, (SHUFFLED_WHOLE_STAMP if recorded.whole else SHUFFLED_STAMP,)
-    return took_part, left_out, leak_stamps(recorded, folds)
+    if data.split != "shuffled":
+        stamps = leak_stamps(recorded, folds)
+    else:
+        stamps = (SHUFFLED_WHOLE_STAMP if recorded.whole else SHUFFLED_STAMP,)
+    return took_part, without_part(recorded, data.split, used), stamps
 
 
 def _of_answers(data: TaskData, descriptor: EstimatorDescriptor, answered: Sequence[AnsweredFold]) -> list[str]:

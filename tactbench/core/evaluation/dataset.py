@@ -192,7 +192,7 @@ def _read(recording: Recording, task: TaskSpec, counts: Counter[str]) -> tuple[t
     reference = None
     if isinstance(task.target, SlipTarget):
         reference = slip_reference(recording, task.target, 0 if clock.t_ns is None else int(clock.t_ns[0]), counts)
-    whole = np.asarray(~np.isnan(X).any(axis=1))
+    whole = ~np.isnan(X).any(axis=1)
     for name, column in columns.items():
         if np.isnan(column).any():
             counts[f"rows left out because {name} has no sample"] += int(np.isnan(column).sum())
@@ -241,7 +241,7 @@ def _own_readings(
     stream: StreamData, clock: StreamData, picked: Sequence[int], values: FloatArray, counts: Counter[str]
 ) -> StreamReadings:
     """Return one stream's features on its own clock, in seconds since the first row of `clock`."""
-    whole = np.asarray(~np.isnan(values).any(axis=1))
+    whole = ~np.isnan(values).any(axis=1)
     if stream is not clock and not whole.all():
         counts[f"rows of {stream.spec.name} left out because a channel has no sample"] += int((~whole).sum())
     time_s = (stream.t_ns - clock.t_ns[0]) * 1e-9 if stream.t_ns is not None and clock.t_ns is not None else None

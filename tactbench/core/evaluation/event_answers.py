@@ -104,7 +104,7 @@ class EventRules:
 
     def alarms(self, one: Scored, threshold: float) -> IntArray:
         """Return when a recording's alarms are known, without the time that computing takes."""
-        return alarms(one.t_ns, np.asarray(one.score >= threshold), self.policy)
+        return alarms(one.t_ns, one.score >= threshold, self.policy)
 
     def items(self, found: Sequence[tuple[Scored, IntArray]], data: Dataset, fold: int) -> Answers:
         """Return what F1 is counted on: events, alarms that hit none, and a line a recording.

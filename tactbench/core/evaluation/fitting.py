@@ -31,14 +31,10 @@ Build = Callable[[Mapping[str, Any]], Estimator]
 def builder(
     estimator: EstimatorDescriptor, params: Mapping[str, Any], task: TaskSpec, seed: int, threads: int
 ) -> Build:
-    """Return what makes a fresh estimator from parameters; its imports are done, and one has been made to see.
+    """Return what makes a fresh estimator from parameters, one a component where the task asks for a vector.
 
-    Where the task asks for a vector, it is one estimator a component.
-
-    Raises
-    ------
-    UsageError
-        If the estimator cannot answer this kind of question, or a parameter is not one of its own.
+    Its imports are done, and one has been made to see. Raises UsageError if the estimator cannot answer this kind of
+    question, or a parameter is not one of its own.
     """
     if task.kind not in estimator.kinds:
         raise UsageError(
@@ -65,13 +61,7 @@ def one_model_a_component(task: TaskSpec, build: Build) -> Build:
 
 
 class PerComponent:
-    """A model for each component of a vector, each taught as if it were asked for alone.
-
-    Parameters
-    ----------
-    build
-        Returns a fresh estimator of one number.
-    """
+    """A model for each component of a vector, each made by `build` and taught as if it were asked for alone."""
 
     def __init__(self, build: Callable[[], Estimator]) -> None:
         self._build = build
@@ -93,12 +83,7 @@ def fit(model: Estimator, X: FloatArray, y: npt.NDArray[Any], name: str, counts:
     """Fit `model` to X (n, p) and y (n,) or (n, components).
 
     A warning (a solver that did not converge …) is counted under the estimator's `name` and stands in the row; on
-    standard error nobody would connect it with a score.
-
-    Raises
-    ------
-    DataError
-        If the estimator refuses the data.
+    standard error nobody would connect it with a score. Raises DataError if the estimator refuses the data.
     """
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
@@ -120,15 +105,7 @@ def answers(
 ) -> npt.NDArray[Any]:
     """Return the answers of `model` to X (n, p): (n,) numbers, or class indices below `n_classes` unless it is 0.
 
-    Parameters
-    ----------
-    components
-        Shape of one answer: empty, or (d,) where it is a vector.
-
-    Raises
-    ------
-    PluginContractError
-        If it answers anything else.
+    Each answer has the shape `components`, (d,) where it is a vector. Anything else raises PluginContractError.
     """
     given = np.asarray(model.predict(X))
     wrong = ""
@@ -155,14 +132,10 @@ def asked(model: Estimator, part: Part, descriptor: EstimatorDescriptor, n_class
 
 
 def voted(part: Part, predicted: npt.NDArray[Any], n_classes: int) -> tuple[Part, npt.NDArray[Any]]:
-    """Return the last row of each recording, and the answer to all of its rows.
+    """Return the last row of each recording, and what the (n,) answers to its rows come to.
 
-    Parameters
-    ----------
-    part, predicted
-        Rows in order of recording and time, and the (n,) answers to them.
-    n_classes
-        The answer is the commonest class, of equals the first; where 0, the mean.
+    That is the commonest class, of equals the first; where `n_classes` is 0, the mean. Rows are in order of recording
+    and time.
     """
     places, code, counts = np.unique(part.recording, return_inverse=True, return_counts=True)
     rows = taken(part, np.cumsum(counts) - 1)
@@ -205,19 +178,8 @@ def select(
 ) -> Choice | None:
     """Choose the estimator's grid parameters and window for one fold; None if there is nothing to choose.
 
-    The test rows of `assignment` are never looked at.
-
-    Parameters
-    ----------
-    given
-        Parameters the user has fixed: they are not searched.
-    counts
-        Told which fits came with a warning.
-
-    Raises
-    ------
-    DataError
-        If there is no data to choose on.
+    Parameters `given` by the user are not searched, and the test rows of `assignment` are never looked at. `counts` is
+    told which fits came with a warning.
     """
     grid = {name: values for name, values in descriptor.grid.items() if name not in given}
     if not grid and len(descriptor.window_grid) <= 1:

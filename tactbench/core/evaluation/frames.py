@@ -28,13 +28,7 @@ Features = tuple[tuple[str, ...], FloatArray]
 
 
 def framed(data: Dataset, task: TaskSpec, rules: ProtocolSpec, estimator: EstimatorDescriptor) -> Dataset:
-    """Return each recording as frames, with the features that `estimator` looks at.
-
-    Raises
-    ------
-    NotApplicable
-        If the protocol drops single samples, or the sensor has nothing that the estimator looks at.
-    """
+    """Return each recording as frames, with the features that `estimator` looks at."""
     if rules.three_sigma or rules.discard_samples or rules.first_row_only:
         raise NotApplicable(
             f"Protocol {rules.name!r} drops single samples; task {task.name!r} looks at windows of consecutive ones.",
@@ -143,7 +137,7 @@ def _framed(
 ) -> tuple[Table, tuple[str, ...]]:
     all_ends_ns = frame_times(table, task, rules)
     names, X = compute(table, all_ends_ns)
-    answered = np.asarray(~np.isnan(X).any(axis=1))
+    answered = ~np.isnan(X).any(axis=1)
     if not answered.all():
         counts["frames without a sample of some stream"] += int((~answered).sum())
     require_computable(X[answered], "a feature", table.meta)

@@ -15,7 +15,7 @@ from tactbench.core.evaluation.time_blocks import RESAMPLES, block_length, circu
 from tactbench.core.samples import FloatArray, IntArray
 
 LEVEL = 0.95
-ENOUGH_CLUSTERS = 5
+ENOUGH_UNITS = 5
 """Fewer than this cannot be resampled: the interval would be their range."""
 NOT_ONE = float(np.sqrt(2.0))
 """Standard error of the log-odds of half an error in n rows: where not one was wrong, more may not be known."""
@@ -57,7 +57,7 @@ class ReplicateUnits:
         """Tell whether there are enough of them to resample, of every class that occurs in (n,) labels."""
         each = [y == one for one in range(n_classes)]
         own = [self.codes, *(self.codes[mask] for mask in each if mask.any())]
-        return all(len(np.unique(codes)) >= ENOUGH_CLUSTERS for codes in own)
+        return all(len(np.unique(codes)) >= ENOUGH_UNITS for codes in own)
 
     def strata(self, y: npt.NDArray[Any], n_classes: int) -> IntArray:
         """Return (units,) numbers, equal for units that may stand in for each other.
@@ -81,20 +81,13 @@ def score_interval(
     n_classes: int,
     seed: int,
 ) -> Interval:
-    """Return the interval of ``metric.of(y, predicted)``.
-
-    Parameters
-    ----------
-    y, predicted, recording
-        (n,) truth, prediction and recording of each test row, rows of a recording in time order.
-    unit
-        Which of the clusters each of these rows is of.
+    """Return the interval of ``metric.of(y, predicted)``; rows of a recording are in time order.
 
     Notes
     -----
-    With at least five clusters, each is left out in turn, those of one class standing in for each other only, and the
-    interval is Student's over clusters [1]_, on a scale that suits the metric (:func:`transform_of`). Percentiles of
-    resampled clusters cover less than they say where there are few: ``benchmarks/coverage.py``. With fewer clusters, or
+    With at least five units, each is left out in turn, those of one class standing in for each other only, and the
+    interval is Student's over units [1]_, on a scale that suits the metric (:func:`transform_of`). Percentiles of
+    resampled units cover less than they say where there are few: ``benchmarks/coverage.py``. With fewer units, or
     when a class is in fewer than five, time is resampled instead: circular blocks within each recording, whose length
     follows from the autocorrelation of the loss (`time_blocks`). Such an interval knows nothing of the spread between
     sessions and says so.
@@ -106,18 +99,17 @@ def score_interval(
     rng = np.random.default_rng(np.random.SeedSequence([seed, 0xC1]))  # the same blocks for every figure of a cell
     rows = metric.rows(y, predicted, n_classes)
     if unit.enough(y, n_classes):
-        return _of_clusters(metric, rows, y, unit, n_classes)
+        return _of_units(metric, rows, y, unit, n_classes)
     if len(np.unique(recording)) == len(recording):
         return _of_too_few(metric, rows, n_classes)
     total = np.zeros((RESAMPLES, rows.shape[1]))
     lengths, sizes = [], []
     for one in np.unique(recording):
-        mine = rows[recording == one]
-        loss = loss_of(metric, y[recording == one], predicted[recording == one])
-        length = block_length(loss)
+        mine = recording == one
+        length = block_length(loss_of(metric, y[mine], predicted[mine]))
         lengths.append(length)
-        sizes.append(len(mine) / length)
-        total += circular_blocks(mine, length, rng)
+        sizes.append(int(mine.sum()) / length)
+        total += circular_blocks(rows[mine], length, rng)
     spread = f"{min(lengths)}" if min(lengths) == max(lengths) else f"{min(lengths)}–{max(lengths)}"
     many = f"{len(lengths)} recording" + ("s" if len(lengths) > 1 else "")
     method = f"block bootstrap in time within {many} (blocks of {spread} rows): spread between sessions is not in it"
@@ -130,10 +122,8 @@ def score_interval(
     return _student(metric, score, float(resampled.std()) * widened, freedom, scale, method)
 
 
-def _of_clusters(
-    metric: Metric, rows: FloatArray, y: npt.NDArray[Any], unit: ReplicateUnits, n_classes: int
-) -> Interval:
-    """Return Student's interval over clusters, from what leaving each out changes."""
+def _of_units(metric: Metric, rows: FloatArray, y: npt.NDArray[Any], unit: ReplicateUnits, n_classes: int) -> Interval:
+    """Return Student's interval over units, from what leaving each out changes."""
     sums, strata = unit.sums(rows), unit.strata(y, n_classes)
     score = float(metric.score(sums.sum(axis=0), n_classes))
     scale = transform_of(metric.name, score, len(y))
@@ -177,14 +167,14 @@ def loss_of(metric: Metric, y: npt.NDArray[Any], predicted: npt.NDArray[Any]) ->
     """Return (n,) what each row adds to the error: its square, or whether the class is wrong."""
     if metric.kind != "regression":
         return np.asarray(y != predicted, dtype=np.float64)
-    squares = np.asarray((predicted - y) ** 2)
+    squares = (predicted - y) ** 2
     return np.asarray(squares.sum(axis=1)) if metric.vector else squares
 
 
 def student_quantile(freedom: Any) -> FloatArray:
     """Return how many standard errors a two-sided interval of 95 % reaches, for each of some degrees of freedom."""
     special = importlib.import_module("scipy.special")
-    return np.asarray(special.stdtrit(np.minimum(freedom, _MOST_FREEDOM), 0.5 + LEVEL / 2), dtype=np.float64)
+    return np.asarray(special.stdtrit(np.minimum(freedom, _MOST_FREEDOM), 0.5 + LEVEL / 2))
 
 
 def two_sided_p(t: float, freedom: float) -> float:
@@ -228,12 +218,8 @@ class ScoreTransform:
 def transform_of(metric: str, score: float, n: int) -> ScoreTransform:
     """Return the scale of a metric on which Student's interval is to be made.
 
-    Parameters
-    ----------
-    score
-        What was scored; no error's interval reaches beyond ten times as much.
-    n
-        Test rows: a share is never nearer to 0 or 1 than half of one.
+    No error's interval reaches beyond ten times its `score`; a share of `n` rows is never nearer to 0 or 1 than half
+    of one.
 
     Notes
     -----

@@ -76,9 +76,8 @@ def reference_floor(task: TaskSpec, metric: Metric, data: Dataset, tested: Answe
     (1 for white noise) takes ``tau`` degrees of freedom, not one: ``E sum (y - mean)² = n sigma² - n var(mean) =
     (n - tau) sigma²``, so that a reference behind a low-pass is measured right too.
     """
-    if metric.name != "rmse" or not isinstance(task.target, ChannelTarget) or task.target.kind != "force":
-        return None, ""
-    if task.target.reduce is not None:
+    target = task.target
+    if metric.name != "rmse" or not isinstance(target, ChannelTarget) or target.kind != "force" or target.reduce:
         return None, ""  # a number of many samples has not the noise of one
     holds: dict[int, FloatArray] = {}
     for place in np.unique(tested.recording).tolist():
@@ -108,7 +107,7 @@ def hold_of(y: npt.NDArray[Any]) -> FloatArray:
     (n, 2): the squared difference of each from the hold's mean, and its part of the degrees of freedom, which are n
     less one, or less than that where noise is correlated.
     """
-    centred = np.asarray(y, dtype=np.float64) - np.mean(y)
+    centred = y - np.mean(y)
     n = len(centred)
     freedom = n - min(integrated_correlation(centred), n / 2)
     return np.column_stack([centred**2, np.full(n, freedom / n)])
@@ -149,7 +148,7 @@ def true_force(task: TaskSpec, data: Dataset, tested: Answers) -> FloatArray | N
     target = task.target
     if not isinstance(target, ChannelTarget) or target.kind != "force" or target.name not in (None, "normal"):
         return None
-    if target.unit != "N" or target.reduce is not None:
+    if target.unit != "N" or target.reduce:
         return None
     out = np.zeros(len(tested))
     for place in np.unique(tested.recording).tolist():

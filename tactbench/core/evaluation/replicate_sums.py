@@ -63,17 +63,10 @@ def _unit(data: Dataset, name: str, tested: Answers) -> ReplicateUnits | None:
 
 def summed(
     metric: Metric, tested: Answers, unit: ReplicateUnits, data: Dataset, floor: Floor | None = None
-) -> dict[str, Any]:  # fmt: skip
+) -> dict[str, Any]:
     """Return what a row keeps of its replicates.
 
-    Parameters
-    ----------
-    tested
-        The test rows, in time order within each recording of a fold.
-    unit
-        What was repeated. Where there are too few of them, the sums are over recordings: no interval rests on them.
-    floor
-        What the holds of the tested recordings say of the reference.
+    Where there are too few of them, the sums are over recordings: no interval rests on them.
     """
     n_classes = len(data.classes)
     if not unit.enough(tested.y_true, n_classes):

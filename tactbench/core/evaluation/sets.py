@@ -50,10 +50,7 @@ def less_rest(X: FloatArray, before: Mask) -> FloatArray:
 def tare_s(data: Dataset) -> float:
     """Return how many seconds every recording can be tared on, the shortest hold of all; 0 if none states one.
 
-    Raises
-    ------
-    NotApplicable
-        If some recordings can be tared and others cannot: their readings would not be of one kind.
+    Recordings of which some only can be tared are refused: their readings would not be of one kind.
     """
     held = [hold_s(table.meta) if unloaded(table).any() else 0.0 for table in data.tables]
     if any(held) and not all(held):
@@ -85,7 +82,7 @@ def moments(X: FloatArray) -> tuple[FloatArray, FloatArray]:
     A constant column's computed deviation is the rounding error of its mean, as large as the number of rows makes it;
     it would turn rounding into a signal. So constancy is looked up, not inferred from the deviation.
     """
-    mean = np.asarray(X.mean(axis=0))
+    mean = X.mean(axis=0)
     deviation = np.sqrt(((X - mean) ** 2).mean(axis=0))
     return mean, np.where(X.max(axis=0) > X.min(axis=0), deviation, 0.0)
 
@@ -100,21 +97,9 @@ class SetRows(Part):
 
 
 def keep(data: Dataset, protocol: ProtocolSpec, masks: Sequence[Mask], what: str, counts: Counter[str]) -> SetRows:
-    """Collect the rows of a set and drop what the protocol drops.
+    """Collect the rows of a set, one (n,) mask a recording, and drop what the protocol drops.
 
-    Parameters
-    ----------
-    masks
-        One (n,) mask a recording.
-    what
-        Name of the set, for messages.
-    counts
-        Told how many rows the three-sigma rule drops, which depends on the set.
-
-    Raises
-    ------
-    DataError
-        If no row is left.
+    `counts` is told how many rows the three-sigma rule drops, which depends on the set, and messages say `what` it is.
     """
     tables = data.tables
     chosen = [mask & asked_for(table, protocol) for table, mask in zip(tables, masks, strict=True)]
@@ -213,19 +198,8 @@ def prepared(assignment: Assignment, data: Dataset, rules: ProtocolSpec, k: int,
 
 
 def causal_mean(X: FloatArray, k: int, segment: npt.NDArray[np.integer]) -> FloatArray:
-    """Return the mean of each row and the up to `k` rows before it in its segment.
+    """Return the mean of each row and the up to `k` rows before it in its segment: (n,) non-decreasing numbers.
 
-    Parameters
-    ----------
-    X
-        (n, features)
-    k
-        Rows looked back; 0 returns `X`. The first rows of a segment average what there is.
-    segment
-        (n,) non-decreasing numbers; a window never crosses from one to another.
-
-    Notes
-    -----
     By cumulative sums of the centred columns: without centring, an offset of 1e8 would leave 1e-8 of its own size as
     error in every difference of sums.
     """

@@ -60,21 +60,10 @@ class SlipReference:
 
 
 def slip_reference(recording: Recording, target: SlipTarget, first_ns: int, counts: Counter[str]) -> SlipReference:
-    """Read and label the reference of a recording.
+    """Read and label the reference of a recording, times counted from `first_ns`.
 
-    Parameters
-    ----------
-    first_ns
-        What times count from.
-    counts
-        Told how many samples of the reference were left out.
-
-    Raises
-    ------
-    NotApplicable
-        If a channel or the coefficient of friction is missing.
-    DataError
-        If the coefficient is no number, or the surface never rests.
+    `counts` is told how many of its samples were left out. Raises NotApplicable if a channel or the coefficient of
+    friction is missing, DataError if the coefficient is no number or the surface never rests.
     """
     name = recording.meta.name
     found = {str(one.name): channels_for(recording, one) for one in _CHANNELS}

@@ -44,12 +44,8 @@ class Assignment:
 def choose_split(task: TaskSpec, protocol: ProtocolSpec, data: Dataset, requested: str | None) -> str:
     """Return the split to use: the one that was requested, or the task's first that the recordings can serve.
 
-    Raises
-    ------
-    UsageError
-        If the requested split cannot be served; the message says which can.
-    NotApplicable
-        If the protocol does not go with the requested split, or it or every split of the task lacks what it needs.
+    Raises UsageError if the requested one cannot be served, NotApplicable if it does not go with the protocol or none
+    of the task's can be served.
     """
     split = _split_for(task, protocol, data, requested)
     if protocol.first_row_only:

@@ -32,15 +32,6 @@ def summarised(data: Dataset, task: TaskSpec, rules: ProtocolSpec) -> Dataset:
     """Return each recording as one row of features, what the protocol drops left out; `data` where none are asked for.
 
     The row stands where the recording ends: it is the first at which the answer can be known.
-
-    Raises
-    ------
-    NotApplicable
-        If the protocol drops single samples by number or value, or a band cannot be observed.
-    DataError
-        If a window has no sample.
-    PluginContractError
-        If the task's own features are not finite numbers of the same names for every recording.
     """
     if not is_summarised(task, rules):
         return data

@@ -28,12 +28,8 @@ class SlipLabels:
 def stick_ratio(tangential_n: FloatArray, normal_n: FloatArray, friction: float) -> FloatArray:
     """Return c/a, the radius that sticks over the contact's: ``(1 - Q/(mu P))^(1/3)``.
 
-    Parameters
-    ----------
-    tangential_n, normal_n
-        (n,) tangential force Q (its sign does not matter) and normal force P [N].
-    friction
-        Static coefficient of friction mu [1], known or measured on the reference alone.
+    Q is the tangential force, of either sign, P the normal one, and mu the static coefficient of friction, known or
+    measured on the reference alone.
 
     Notes
     -----

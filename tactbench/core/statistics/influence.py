@@ -34,15 +34,8 @@ class PairableRows:
 
 
 def together(rows: Sequence[Row]) -> list[PairableRows]:
-    """Return the rows in groups of equal replicates; rows without usable replicates are in none.
+    """Return finished rows of one metric in groups of equal replicates; rows without usable ones are in none.
 
-    Parameters
-    ----------
-    rows
-        Finished rows of one metric.
-
-    Notes
-    -----
     The influence of a replicate is what leaving it out changes (:func:`influences`).
     """
     groups: dict[tuple[Any, ...], list[int]] = {}

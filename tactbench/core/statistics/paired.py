@@ -176,13 +176,7 @@ def _to_own(group: PairableRows) -> FloatArray:
 
 
 def exchanged(first: Row, second: Row) -> tuple[float, float]:
-    """Return the p-value of exchanging two rows' answers within replicates, and the least it can be.
-
-    Parameters
-    ----------
-    first, second
-        Rows whose replicates have the same names and strata.
-    """
+    """Return the p-value of exchanging two rows' answers within the replicates they share, and the least it can be."""
     metric = METRICS[first["metric"]]
     if "scores" in first["replicates"]:
         apart_each = scores_of(first["replicates"], metric.name) - scores_of(second["replicates"], metric.name)
@@ -229,12 +223,7 @@ class FoldDifference:
 def corrected_t(differences: Sequence[float], test_over_train: float) -> FoldDifference | None:
     """Return the corrected resampled t-test of differences over folds; None of fewer than two.
 
-    Parameters
-    ----------
-    differences
-        One a fold.
-    test_over_train
-        Test rows over training rows of a fold; of unequal folds, the mean.
+    `test_over_train` is test rows over training rows of a fold; of unequal folds, the mean.
 
     Notes
     -----
@@ -266,12 +255,7 @@ def over_folds(first: Row, second: Row) -> FoldDifference | None:
 
 
 def holm(p: Sequence[float | None]) -> list[float | None]:
-    """Return p-values corrected for being several, in the order given.
-
-    Parameters
-    ----------
-    p
-        One a declared comparison; None for one that could not be made, which neither counts nor gets a value.
+    """Return p-values corrected for being several; None, of a comparison that could not be made, does not count.
 
     Notes
     -----

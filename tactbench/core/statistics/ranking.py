@@ -124,15 +124,6 @@ def _differed(
 def best_without(rows: Sequence[Row], groups: Sequence[PairableRows]) -> list[int] | None:
     """Return the place in `rows` of the best one without each replicate; None if they do not share replicates.
 
-    Parameters
-    ----------
-    rows
-        Finished rows of one metric.
-    groups
-        What :func:`together` says of them.
-
-    Notes
-    -----
     A first place that leaves with one replicate is no property of the sensor (Huang et al. 2025, Dropping just a
     handful of preferences can change top large language model rankings).
     """
