@@ -125,7 +125,8 @@ def scores(trials: int, seed: int) -> None:
                     y, answered = draw(rng, sessions, spread, level)
                     code = np.repeat(np.arange(sessions), ROWS)
                     k = CLASSES if draw is classes else 0
-                    found = score_interval(METRICS[metric], y.ravel(), answered.ravel(), code, code, "session", k, 0)
+                    unit = ReplicateUnits("session", code, ())
+                    found = score_interval(METRICS[metric], y.ravel(), answered.ravel(), code, unit, k, 0)
                     low, high = percentile(metric, sums_of(metric, y, answered), rng)
                     hits += found.low <= truth <= found.high, low <= truth <= high
                     wider.append((found.high - found.low) / max(high - low, 1e-9))
@@ -152,7 +153,8 @@ def in_time(trials: int, seed: int) -> None:
             for trial in range(trials):
                 y, answered = (one.ravel() for one in draw(rng, 1, 0.0, 1.0, n=n))
                 score = METRICS[metric].of(y, answered, k)
-                found = score_interval(METRICS[metric], y, answered, zeros, zeros, "session", k, trial)
+                unit = ReplicateUnits("session", zeros, ())
+                found = score_interval(METRICS[metric], y, answered, zeros, unit, k, trial)
                 loss = (y != answered) * 1.0 if k else (answered - y) ** 2
                 half = 1.96 * loss.std() / np.sqrt(n) / (1 if k else 2 * np.sqrt(loss.mean()))
                 hits += found.low <= truth <= found.high, abs(score - truth) <= half
@@ -260,7 +262,7 @@ def beyond(trials: int, seed: int) -> None:
                 found = beyond_floor(floor, answers, unit)
                 ours += found.low <= own <= found.high
                 clear += found.low > 0
-                whole = score_interval(METRICS["rmse"], y, answered, session, session, "session", 0, trial)
+                whole = score_interval(METRICS["rmse"], y, answered, session, unit, 0, trial)
                 low, high = (np.sqrt(max(0.0, end**2 - floor.value**2)) for end in (whole.low, whole.high))
                 fixed += low <= own <= high
             share = [f"{100 * count / trials:.1f}" for count in (ours, fixed, clear)]

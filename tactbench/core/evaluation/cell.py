@@ -22,6 +22,7 @@ from tactbench.core.evaluation.dataset import LARGEST, Dataset, load_dataset
 from tactbench.core.evaluation.delay import (
     NO_LINK,
     NO_RATE,
+    Clock,
     answer_delay_ms,
     features_s,
     peak_rss_mb,
@@ -43,7 +44,7 @@ from tactbench.core.evaluation.fitting import (
     voted,
 )
 from tactbench.core.evaluation.frames import band_limit, clocked, framed
-from tactbench.core.evaluation.interval import Interval, ReplicateUnits, score_interval
+from tactbench.core.evaluation.interval import score_interval
 from tactbench.core.evaluation.leaks import leak_stamps
 from tactbench.core.evaluation.metrics import METRICS, Metric, class_f1, confusion, metric_called, vector_details
 from tactbench.core.evaluation.protocols import ProtocolSpec, protocol_called
@@ -70,9 +71,6 @@ from tactbench.core.spec.rig import EstimatorDescriptor
 from tactbench.core.spec.scene import Role
 from tactbench.core.spec.task import TaskSpec, VectorTarget
 from tactbench.core.thread_limit import thread_limit
-
-Clock = Callable[[], float]
-"""Seconds, monotonic."""
 
 
 @dataclass(frozen=True)
@@ -161,11 +159,6 @@ class TaskData:
         return self._joined([table.groups[name] for table in tables])
 
     @property
-    def feature_names(self) -> tuple[str, ...]:
-        """Return the names of the columns of `X`."""
-        return self.data.features
-
-    @property
     def folds(self) -> list[tuple[IntArray, IntArray]]:
         """Return the rows of each fold that train and those that test: a `cv` for scikit-learn."""
         return [
@@ -211,12 +204,10 @@ def load_task(
     assignments = make_splits(data, split, seed, max(estimator.window_grid), one_by_one=split in task.campaigns)
     if not assignments:
         raise DataError("No fold could be made of these recordings.", hint="Choose another --split.")
-    chosen = task.kind == "events" and estimator.threshold is None
-    held_back = [chosen and one.validation is None for one in assignments]
-    assignments = [
-        with_validation(one, data) if back else one for one, back in zip(assignments, held_back, strict=True)
-    ]
-    return TaskData(task, rules, split, recorded, data, tuple(assignments), any(held_back))
+    held_back = task.kind == "events" and estimator.threshold is None and assignments[0].validation is None
+    if held_back:
+        assignments = [with_validation(one, data) for one in assignments]
+    return TaskData(task, rules, split, recorded, data, tuple(assignments), held_back)
 
 
 # --- Folds to fitted models -------------------------------------------------------------------------------------------
@@ -265,7 +256,7 @@ class AnsweredFold:
     batch_rows: int
     sets: Mapping[Role, Answers]
     detected: tuple[Detected, ...] = ()
-    threshold: float = np.inf
+    """test recordings of a task of events, all with the fold's threshold"""
 
 
 def evaluate(
@@ -284,16 +275,8 @@ def evaluate(
     ----------
     estimator
         Any object with ``fit`` and ``predict``, which stays as it is; or one that is to be made anew.
-    clock
-        Returns seconds, monotonic.
-    seed
-        Of what intervals resample.
-    threads
-        Threads that estimator and BLAS may use.
-    latency
-        Whether to measure how long the answer to one row takes.
-    progress
-        Told what is being done.
+    clock, seed, threads, latency, progress
+        As in :class:`CellContext`; `seed` decides what intervals resample.
     """
     if not isinstance(estimator, Configured):
         given = estimator
@@ -376,7 +359,6 @@ def _answer(
     if alone and not made.classes:
         given["train"] = fold.train, asked(fitted.model, fold.train, descriptor, 0)
     detected: tuple[Detected, ...] = ()
-    threshold = np.inf
     if rules is None:
         sets = {role: _rows(*one, made, number) for role, one in given.items()}
     else:
@@ -404,7 +386,6 @@ def _answer(
         batch_rows=len(fold.test),
         sets=kept,
         detected=detected,
-        threshold=threshold,
     )
 
 
@@ -481,14 +462,14 @@ def _result(
     score = metric.of(tested.y_true, tested.y_pred, n_classes)
     if not np.isfinite(score):
         _refuse(descriptor.name, metric, tested)
-    unit = replicates(made, task, data.split, tested.y_true, tested.recording, tested.row)
+    unit = replicates(made, task, data.split, tested)
     scores = {f"fold {one.name}": one.score for one in answered}
     if answered[-1].validation is not None:
         scores["validation"] = answered[-1].validation
     for other in METRICS.values():
         if other.kind == task.kind and other.vector == metric.vector and other is not metric:
             scores[other.name] = other.of(tested.y_true, tested.y_pred, n_classes)
-    remarks = [_answered_from(data), *_of_frames(data, descriptor, answered)]
+    remarks = _of_answers(data, descriptor, answered)
     beside: dict[str, Any] = {}
     floor = None
     if metric.kind == "regression":
@@ -501,7 +482,8 @@ def _result(
         if floor is not None:
             beside["beyond"] = beyond_floor(floor, tested, unit)
         if truth is not None:
-            beside["true"] = metric.of(truth, tested.y_pred), _interval(metric, truth, tested, unit, 0, seed)
+            interval = score_interval(metric, truth, tested.y_pred, tested.recording, unit, 0, seed)
+            beside["true"] = metric.of(truth, tested.y_pred), interval
     else:
         sums = metric.rows(tested.y_true, tested.y_pred, n_classes).sum(axis=0)
         beside["confusion"] = confusion(sums, n_classes).astype(np.int64)
@@ -524,7 +506,7 @@ def _result(
     return Result(
         metric=metric.name,
         score=score,
-        interval=_interval(metric, tested.y_true, tested, unit, n_classes, seed),
+        interval=score_interval(metric, tested.y_true, tested.y_pred, tested.recording, unit, n_classes, seed),
         # R² of labels that never change is undefined; a key that is not there says so, NaN would not even be JSON.
         scores={name: value for name, value in scores.items() if np.isfinite(value)},
         sizes=Sizes(
@@ -574,39 +556,31 @@ def _refuse(estimator: str, metric: Metric, tested: Answers) -> None:
     )
 
 
-def _interval(
-    metric: Metric, truth: npt.NDArray[Any], tested: Answers, unit: ReplicateUnits, n_classes: int, seed: int
-) -> Interval:
-    found = score_interval(metric, truth, tested.y_pred, tested.recording, unit.codes, unit.name, n_classes, seed)
-    return Interval(found.low, found.high, found.method + unit.caveat)
-
-
 def _part_taken(data: TaskData) -> tuple[list[RecordingMeta], dict[str, int], tuple[str, ...]]:
     """Return the recordings that some fold uses, what no fold uses, and stamps of folds that leak."""
     recorded = data.recorded
     folds = [over_rows(one, recorded) for one in data.assignments]
     used = used_rows(folds)
     took_part = [one.meta for one, mask in zip(recorded.tables, used, strict=True) if (mask & one.labelled).any()]
-    left_out = without_part(recorded, data.split, used)
-    if data.split == "shuffled":
-        return took_part, left_out, (SHUFFLED_WHOLE_STAMP if recorded.whole else SHUFFLED_STAMP,)
-    return took_part, left_out, leak_stamps(recorded, folds)
+    if data.split != "shuffled":
+        stamps = leak_stamps(recorded, folds)
+    else:
+        stamps = (SHUFFLED_WHOLE_STAMP if recorded.whole else SHUFFLED_STAMP,)
+    return took_part, without_part(recorded, data.split, used), stamps
 
 
-def _answered_from(data: TaskData) -> str:
-    if data.task.answer_per != "recording":
-        return ""
-    return f"one answer a recording, from {'its first row' if data.rules.first_row_only else data.task.answer_from}"
-
-
-def _of_frames(data: TaskData, descriptor: EstimatorDescriptor, answered: Sequence[AnsweredFold]) -> list[str]:
-    """Return what a reader of scores of frames or events must know."""
+def _of_answers(data: TaskData, descriptor: EstimatorDescriptor, answered: Sequence[AnsweredFold]) -> list[str]:
+    """Return what a reader of scores of recordings, frames or events must know."""
+    if data.task.answer_per == "recording":
+        return [
+            f"one answer a recording, from {'its first row' if data.rules.first_row_only else data.task.answer_from}"
+        ]
     if data.task.answer_per != "frame":
         return []
     remarks = [band_limit(clocked(data.recorded.tables[0], data.rules))]
     if data.held_back:
         remarks.append("no recording has the role validation: thresholds are chosen on a share of the training groups")
-    if data.task.kind == "events" and any(np.isinf(one.threshold) for one in answered):
+    if data.task.kind == "events" and any(np.isinf(one.detected[0].threshold) for one in answered):
         remarks.append(
             f"{descriptor.name}: no threshold kept the bound of false alarms on validation and hit anything: it never "
             "raises an alarm"
@@ -643,5 +617,5 @@ def _thresholds(answered: Sequence[AnsweredFold], rules: EventRules | None) -> d
     """Return the thresholds chosen, by fold where there are several; one that is never reached is not there."""
     if rules is None or rules.own_threshold is not None:
         return {}
-    named = {"threshold" if len(answered) == 1 else f"threshold of fold {one.name}": one.threshold for one in answered}
-    return {name: value for name, value in named.items() if np.isfinite(value)}
+    found = {one.name: one.detected[0].threshold for one in answered if np.isfinite(one.detected[0].threshold)}
+    return {"threshold" if len(answered) == 1 else f"threshold of fold {name}": one for name, one in found.items()}

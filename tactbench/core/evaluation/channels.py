@@ -50,11 +50,11 @@ Found = tuple[str, int, ChannelSpec]
 """Stream, place in it, and what is there."""
 
 
-def channel_on(recording: Recording, target: ChannelTarget, clock: StreamData) -> FloatArray | None:
-    """Return a channel on the clock of a stream, in the unit of `target`; None if there is none."""
+def channel_on(recording: Recording, target: ChannelTarget, clock: StreamData) -> FloatArray:
+    """Return a channel on the clock of a stream, in the unit of `target`; all NaN if there is none."""
     found = channels_for(recording, target)
     if not found:
-        return None
+        return np.full(len(clock.data), np.nan)
     if len(found) > 1:
         names = ", ".join(channel.name for _, _, channel in found)
         raise DataError(
@@ -128,22 +128,10 @@ def require_forward(data: StreamData, recording: str) -> None:
 
 
 def nearest_rows(features: StreamData, other: StreamData, recording: str) -> IntArray:
-    """Return, for every row of `features`, the row of `other` that belongs to it.
+    """Return (n,) which row of `other` belongs to each row of `features`.
 
-    Parameters
-    ----------
-    features, other
-        Streams of the recording named `recording`, (n, …) and (m, …).
-
-    Returns
-    -------
-    IntArray
-        (n,) indices; -1 where the nearest sample is further away than half a median step of the slower clock.
-
-    Raises
-    ------
-    DataError
-        If there is no clock to align by and the numbers of rows differ, or time does not run forward.
+    It is the nearest in time; -1 where that is further away than half a median step of the slower clock. Without a
+    clock, rows belong together if they are equally many.
     """
     n, m = len(features.data), len(other.data)
     if features.t_ns is None or other.t_ns is None:

@@ -192,7 +192,7 @@ def _read(recording: Recording, task: TaskSpec, counts: Counter[str]) -> tuple[t
     reference = None
     if isinstance(task.target, SlipTarget):
         reference = slip_reference(recording, task.target, 0 if clock.t_ns is None else int(clock.t_ns[0]), counts)
-    whole = np.asarray(~np.isnan(X).any(axis=1))
+    whole = ~np.isnan(X).any(axis=1)
     for name, column in columns.items():
         if np.isnan(column).any():
             counts[f"rows left out because {name} has no sample"] += int(np.isnan(column).sum())
@@ -241,7 +241,7 @@ def _own_readings(
     stream: StreamData, clock: StreamData, picked: Sequence[int], values: FloatArray, counts: Counter[str]
 ) -> StreamReadings:
     """Return one stream's features on its own clock, in seconds since the first row of `clock`."""
-    whole = np.asarray(~np.isnan(values).any(axis=1))
+    whole = ~np.isnan(values).any(axis=1)
     if stream is not clock and not whole.all():
         counts[f"rows of {stream.spec.name} left out because a channel has no sample"] += int((~whole).sum())
     time_s = (stream.t_ns - clock.t_ns[0]) * 1e-9 if stream.t_ns is not None and clock.t_ns is not None else None
@@ -267,10 +267,8 @@ def _target(recording: Recording, task: TaskSpec, features: StreamData) -> Label
         return found if task.kind == "classification" else _as_numbers(found, task.target.name, recording.meta.name)
     if isinstance(task.target, SlipTarget):  # of frames, which are made of the recording later
         return np.zeros(len(features.data)), np.ones(len(features.data), dtype=bool)
-    missing = np.full(len(features.data), np.nan)
     targets = task.target.components if isinstance(task.target, VectorTarget) else (task.target,)
-    columns = [channel_on(recording, one, features) for one in targets]
-    y = np.column_stack([missing if one is None else one for one in columns])
+    y = np.column_stack([channel_on(recording, one, features) for one in targets])
     labelled = np.asarray(~np.isnan(y).any(axis=1))
     return (y if isinstance(task.target, VectorTarget) else y[:, 0]), labelled
 

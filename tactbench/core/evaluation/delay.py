@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import TypeVar
 
 import numpy as np
@@ -21,14 +21,14 @@ from tactbench.core.spec.sensor import StreamSpec
 from tactbench.core.spec.task import TaskSpec
 
 T = TypeVar("T")
+Clock = Callable[[], float]
+"""Seconds, monotonic."""
 
 RATE_TOLERANCE = 0.01
 """Relative difference of rates beyond which a remark says so: rates are stated to two or three digits."""
 
 NO_LINK = "link delay unknown: the answer delay is without it"
 NO_RATE = "answer delay unknown: the recordings do not tell their sampling rate"
-_OF_READINGS = ("sampling", "window", "features")
-WARM_UP = 1
 AT_LEAST, AT_MOST = 20, 200
 BUDGET_S = 0.3
 CALLS_OF_P95 = 200
@@ -79,10 +79,9 @@ def stated_delay_ms(
         parts["window"] = 1e3 * target.window_s / 2 if estimator.looks_at == "features" else 0.0
     elif task.answer_per == "recording":
         spans = [0.0 if rules.first_row_only else _span_s(recorded, table, task, rules) for table in recorded.tables]
-        known = [span for span in spans if span is not None]
         parts.pop("window", None)
-        if len(known) == len(spans):
-            parts["window"] = 1e3 * max(known)
+        if (longest := _largest(spans)) is not None:
+            parts["window"] = 1e3 * longest
     return parts, remarks
 
 
@@ -90,21 +89,19 @@ def _reading_delay_ms(data: Dataset, rules: ProtocolSpec, k: int) -> tuple[dict[
     parts: dict[str, float] = {}
     interval_s = _row_interval_s(data)
     remarks: dict[str, None] = {}
-    own: list[float | None] = []
+    waits_ms: list[float | None] = []
     for meta in data.metas:
         for place, stream in enumerate(_used(meta, data)):
             sampled_hz = 1.0 / interval_s if place == 0 and interval_s else stream.rate_hz
             own_hz = meta.own_rates_hz.get(stream.name, stream.rate_hz) or sampled_hz
-            own.append(own_hz)
+            waits_ms.append(1e3 / own_hz if own_hz else None)
             if own_hz and sampled_hz and abs(sampled_hz - own_hz) > RATE_TOLERANCE * own_hz:
                 remarks[f"{stream.name} sampled at {sampled_hz:.4g} Hz; its own rate is {own_hz:.4g} Hz"] = None
-    known = [rate for rate in own if rate]
-    if known and len(known) == len(own):
-        parts["sampling"] = 1e3 / min(known)
+    if (wait_ms := _largest(waits_ms)) is not None:
+        parts["sampling"] = wait_ms
     links = [meta.sensor.link_delay for meta in data.metas]
-    stated = [link.to("ms") for link in links if link is not None]
-    if len(stated) == len(links):
-        parts["link"] = max(stated)
+    if (link_ms := _largest([None if link is None else link.to("ms") for link in links])) is not None:
+        parts["link"] = link_ms
     else:
         remarks[NO_LINK] = None
     if k == 0 or rules.first_row_only:
@@ -121,7 +118,7 @@ def answer_delay_ms(parts_ms: Mapping[str, float], looks_at: str) -> float | Non
 
     An answer that looks at no reading needs ``prediction`` alone. Without ``link`` the sum is a lower bound.
     """
-    needed = ("prediction", *(_OF_READINGS if looks_at == "features" else ()))
+    needed = ("prediction", *(("sampling", "window", "features") if looks_at == "features" else ()))
     return sum(parts_ms.values()) if all(name in parts_ms for name in needed) else None
 
 
@@ -142,8 +139,13 @@ def _row_interval_s(data: Dataset) -> float | None:
         step_s = float(np.median(np.diff(table.time_s))) if timed else 0.0
         rate_hz = _used(table.meta, data)[0].rate_hz
         found.append(step_s or (1.0 / rate_hz if rate_hz else None))
-    known = [interval for interval in found if interval]
-    return max(known) if len(known) == len(found) else None
+    return _largest(found)
+
+
+def _largest(values: Sequence[float | None]) -> float | None:
+    """Return the largest of some numbers; None if one of them is not known."""
+    known = [value for value in values if value is not None]
+    return max(known) if len(known) == len(values) else None
 
 
 def _span_s(data: Dataset, table: Table, task: TaskSpec, rules: ProtocolSpec) -> float | None:
@@ -153,10 +155,9 @@ def _span_s(data: Dataset, table: Table, task: TaskSpec, rules: ProtocolSpec) ->
             interval_s = _row_interval_s(data)
             return None if interval_s is None else len(times_s) * interval_s
         return float(np.ptp(times_s)) if len(times_s) else 0.0
-    lengths = [_length_s(stream) for stream in kept(table, rules)]
-    if any(length is None for length in lengths):
+    length = _largest([_length_s(stream) for stream in kept(table, rules)])
+    if length is None:
         return None
-    length = max(one for one in lengths if one is not None)
     windows = [(one.start, one.end) if one.unit == "s" else (one.start * length, one.end * length)
                for one in task.summaries]  # fmt: skip
     if task.features_by:
@@ -177,7 +178,7 @@ def features_s(
     estimator: EstimatorDescriptor,
     X: FloatArray,
     k: int,
-    clock: Callable[[], float],
+    clock: Clock,
 ) -> float | None:
     """Return the median seconds that the features of one answer take, or None for an answer that looks at no reading.
 
@@ -204,7 +205,7 @@ def features_s(
     return float(np.median(ready_s))
 
 
-def single_row_latency_s(model: Estimator, X: FloatArray, clock: Callable[[], float]) -> FloatArray:
+def single_row_latency_s(model: Estimator, X: FloatArray, clock: Clock) -> FloatArray:
     """Return (calls,) seconds of ``predict`` on one row whose features are ready.
 
     At least 20 calls and at most 200, within 0.3 s where 20 take less; the first is not counted. Rows are spread
@@ -214,7 +215,7 @@ def single_row_latency_s(model: Estimator, X: FloatArray, clock: Callable[[], fl
 
 
 def single_row_preparation_s(
-    X: FloatArray, k: int, clock: Callable[[], float], *, tared: bool = False, at_most: int = AT_MOST
+    X: FloatArray, k: int, clock: Clock, *, tared: bool = False, at_most: int = AT_MOST
 ) -> FloatArray:
     """Return (calls,) seconds of making one row of features ready from the `k` + 1 readings that it is made of.
 
@@ -241,13 +242,12 @@ def calls_s(
     rows: int,
     given: Callable[[int], T],
     work: Callable[[T], object],
-    clock: Callable[[], float],
+    clock: Clock,
     at_most: int = AT_MOST,
 ) -> FloatArray:
     """Return (calls,) seconds of `work` on what is `given` for places spread over `rows`."""
     places = np.linspace(0, rows - 1, at_most).astype(int)
-    for place in places[:WARM_UP]:
-        work(given(place))
+    work(given(places[0]))  # the first call of a library takes longer
     spent: list[float] = []
     for place in np.random.default_rng(0).permutation(places):
         row = given(place)

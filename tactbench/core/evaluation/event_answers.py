@@ -104,7 +104,7 @@ class EventRules:
 
     def alarms(self, one: Scored, threshold: float) -> IntArray:
         """Return when a recording's alarms are known, without the time that computing takes."""
-        return alarms(one.t_ns, np.asarray(one.score >= threshold), self.policy)
+        return alarms(one.t_ns, one.score >= threshold, self.policy)
 
     def items(self, found: Sequence[tuple[Scored, IntArray]], data: Dataset, fold: int) -> Answers:
         """Return what F1 is counted on: events, alarms that hit none, and a line a recording.
@@ -187,7 +187,7 @@ def _frame_scores(tested: Sequence[Detected]) -> dict[str, float]:
     """Return frame scores of gross slip against the rest, over frames that have a label and an answer."""
     pairs = []
     for one in tested:
-        state = one.scored.reference.state(one.scored.t_ns, 1.0)
+        state = one.scored.reference.state(one.scored.t_ns)
         known = (state != UNDECIDED) & ~np.isnan(one.scored.score)
         pairs.append((state[known] == GROSS, one.scored.score[known] >= one.threshold))
     return _scores_of(pairs, 2, "frame {}")

@@ -6,7 +6,7 @@ import itertools
 import warnings
 from collections import Counter
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -16,7 +16,7 @@ from tactbench.core.errors import DataError, PluginContractError, TactbenchError
 from tactbench.core.evaluation.dataset import Dataset
 from tactbench.core.evaluation.metrics import Metric
 from tactbench.core.evaluation.protocols import ProtocolSpec
-from tactbench.core.evaluation.sets import keep, part, scales
+from tactbench.core.evaluation.sets import keep, part, scale_of, taken
 from tactbench.core.evaluation.splits import Assignment, inner_splits
 from tactbench.core.plugins.interfaces import Estimator
 from tactbench.core.plugins.registry import load_object
@@ -31,14 +31,10 @@ Build = Callable[[Mapping[str, Any]], Estimator]
 def builder(
     estimator: EstimatorDescriptor, params: Mapping[str, Any], task: TaskSpec, seed: int, threads: int
 ) -> Build:
-    """Return what makes a fresh estimator from parameters; its imports are done, and one has been made to see.
+    """Return what makes a fresh estimator from parameters, one a component where the task asks for a vector.
 
-    Where the task asks for a vector, it is one estimator a component.
-
-    Raises
-    ------
-    UsageError
-        If the estimator cannot answer this kind of question, or a parameter is not one of its own.
+    Its imports are done, and one has been made to see. Raises UsageError if the estimator cannot answer this kind of
+    question, or a parameter is not one of its own.
     """
     if task.kind not in estimator.kinds:
         raise UsageError(
@@ -65,13 +61,7 @@ def one_model_a_component(task: TaskSpec, build: Build) -> Build:
 
 
 class PerComponent:
-    """A model for each component of a vector, each taught as if it were asked for alone.
-
-    Parameters
-    ----------
-    build
-        Returns a fresh estimator of one number.
-    """
+    """A model for each component of a vector, each made by `build` and taught as if it were asked for alone."""
 
     def __init__(self, build: Callable[[], Estimator]) -> None:
         self._build = build
@@ -93,12 +83,7 @@ def fit(model: Estimator, X: FloatArray, y: npt.NDArray[Any], name: str, counts:
     """Fit `model` to X (n, p) and y (n,) or (n, components).
 
     A warning (a solver that did not converge …) is counted under the estimator's `name` and stands in the row; on
-    standard error nobody would connect it with a score.
-
-    Raises
-    ------
-    DataError
-        If the estimator refuses the data.
+    standard error nobody would connect it with a score. Raises DataError if the estimator refuses the data.
     """
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
@@ -120,15 +105,7 @@ def answers(
 ) -> npt.NDArray[Any]:
     """Return the answers of `model` to X (n, p): (n,) numbers, or class indices below `n_classes` unless it is 0.
 
-    Parameters
-    ----------
-    components
-        Shape of one answer: empty, or (d,) where it is a vector.
-
-    Raises
-    ------
-    PluginContractError
-        If it answers anything else.
+    Each answer has the shape `components`, (d,) where it is a vector. Anything else raises PluginContractError.
     """
     given = np.asarray(model.predict(X))
     wrong = ""
@@ -155,18 +132,13 @@ def asked(model: Estimator, part: Part, descriptor: EstimatorDescriptor, n_class
 
 
 def voted(part: Part, predicted: npt.NDArray[Any], n_classes: int) -> tuple[Part, npt.NDArray[Any]]:
-    """Return the last row of each recording, and the answer to all of its rows.
+    """Return the last row of each recording, and what the (n,) answers to its rows come to.
 
-    Parameters
-    ----------
-    part, predicted
-        Rows in order of recording and time, and the (n,) answers to them.
-    n_classes
-        The answer is the commonest class, of equals the first; where 0, the mean.
+    That is the commonest class, of equals the first; where `n_classes` is 0, the mean. Rows are in order of recording
+    and time.
     """
     places, code, counts = np.unique(part.recording, return_inverse=True, return_counts=True)
-    last = np.cumsum(counts) - 1
-    rows = Part(part.X[last], part.y[last], part.time_s[last], part.recording[last], part.row[last])
+    rows = taken(part, np.cumsum(counts) - 1)
     if not n_classes:
         return rows, np.bincount(code, weights=predicted) / counts
     votes = np.zeros((len(places), n_classes), dtype=np.int64)
@@ -175,20 +147,14 @@ def voted(part: Part, predicted: npt.NDArray[Any], n_classes: int) -> tuple[Part
 
 
 @dataclass(frozen=True)
-class Candidate:
+class Choice:
     """Parameters and window that were tried, and how well they did on the validation data."""
 
     params: dict[str, Any]
     k: int
     score: float
-
-
-@dataclass(frozen=True)
-class Choice(Candidate):
-    """The candidate that was chosen, and those that it was compared with."""
-
-    compared: tuple[Candidate, ...] = ()
-    """all candidates in the order in which they were tried, the chosen one among them"""
+    compared: tuple[Choice, ...] = ()
+    """of the one that was chosen: all in the order in which they were tried, it among them"""
 
 
 def features_of(one: Part, descriptor: EstimatorDescriptor) -> FloatArray:
@@ -212,19 +178,8 @@ def select(
 ) -> Choice | None:
     """Choose the estimator's grid parameters and window for one fold; None if there is nothing to choose.
 
-    The test rows of `assignment` are never looked at.
-
-    Parameters
-    ----------
-    given
-        Parameters the user has fixed: they are not searched.
-    counts
-        Told which fits came with a warning.
-
-    Raises
-    ------
-    DataError
-        If there is no data to choose on.
+    Parameters `given` by the user are not searched, and the test rows of `assignment` are never looked at. `counts` is
+    told which fits came with a warning.
     """
     grid = {name: values for name, values in descriptor.grid.items() if name not in given}
     if not grid and len(descriptor.window_grid) <= 1:
@@ -242,7 +197,7 @@ def select(
         except DataError:
             continue  # one inner set without rows is no reason against the others
         if train.labelled.any() and other.labelled.any():
-            pairs.append(((train, other), scales(protocol, train, other)))
+            pairs.append([(rows, scale_of(protocol, train, rows)) for rows in (train, other)])
     if not pairs:
         raise DataError(
             f"Fold {assignment.name!r} has too few labelled rows to choose hyper-parameters on: some to learn from and "
@@ -250,10 +205,9 @@ def select(
             hint="Fix the parameters in the matrix (estimators: [{params: …}]), or use longer recordings.",
         )
     n_classes = len(data.classes)
-    tried: list[Candidate] = []
-    sign = 1.0 if metric.higher_is_better else -1.0
+    tried: list[Choice] = []
     for k in descriptor.window_grid:
-        filtered = [[part(rows, scale, k) for rows, scale in zip(*pair, strict=True)] for pair in pairs]
+        filtered = [[part(rows, scale, k) for rows, scale in pair] for pair in pairs]
         for values in itertools.product(*grid.values()):
             params = {**given, **dict(zip(grid, values, strict=True))}
             truth, answered = [], []
@@ -265,6 +219,6 @@ def select(
                 truth.append(checked.y)
                 answered.append(combined)
             score = metric.of(np.concatenate(truth), np.concatenate(answered), n_classes)
-            tried.append(Candidate(params, k, score))
-    best = max(tried, key=lambda candidate: sign * candidate.score)  # of equals the first
-    return Choice(best.params, best.k, best.score, tuple(tried))
+            tried.append(Choice(params, k, score))
+    best = max(tried, key=lambda candidate: metric.sign * candidate.score)  # of equals the first
+    return replace(best, compared=tuple(tried))

@@ -11,13 +11,13 @@ import numpy as np
 from tactbench.core.errors import DataError, NotApplicable, PluginContractError
 from tactbench.core.evaluation.dataset import Dataset, Table, require_computable
 from tactbench.core.evaluation.protocols import ProtocolSpec
+from tactbench.core.evaluation.sets import dropped_s
 from tactbench.core.evaluation.summaries import columns_of, in_band, measured, tared_readings
 from tactbench.core.events.labels import GROSS, UNDECIDED
 from tactbench.core.plugins.registry import load_object
 from tactbench.core.samples import FloatArray, IntArray, StreamReadings
 from tactbench.core.spec.events import SlipTarget, nanoseconds
 from tactbench.core.spec.rig import EstimatorDescriptor
-from tactbench.core.spec.summary import Summary
 from tactbench.core.spec.task import TaskSpec
 
 STATES = ("stick", "incipient", "gross")
@@ -28,13 +28,7 @@ Features = tuple[tuple[str, ...], FloatArray]
 
 
 def framed(data: Dataset, task: TaskSpec, rules: ProtocolSpec, estimator: EstimatorDescriptor) -> Dataset:
-    """Return each recording as frames, with the features that `estimator` looks at.
-
-    Raises
-    ------
-    NotApplicable
-        If the protocol drops single samples, or the sensor has nothing that the estimator looks at.
-    """
+    """Return each recording as frames, with the features that `estimator` looks at."""
     if rules.three_sigma or rules.discard_samples or rules.first_row_only:
         raise NotApplicable(
             f"Protocol {rules.name!r} drops single samples; task {task.name!r} looks at windows of consecutive ones.",
@@ -58,8 +52,7 @@ def frame_features(
     def compute(table: Table, ends_ns: IntArray) -> Features:
         ends_s = np.asarray(ends_ns * 1e-9, dtype=np.float64)
         if estimator.looks_at == "reference":
-            place = table.slip.at(ends_ns)
-            share = np.where(place >= 0, table.slip.force_share[np.maximum(place, 0)], np.nan)
+            share = table.slip.at(ends_ns, table.slip.force_share)
             return ("tangential over friction times normal force",), share[:, None]
         if estimator.looks_at != "features":
             return (), np.zeros((len(ends_s), 0))
@@ -69,22 +62,17 @@ def frame_features(
         names: list[str] = []
         columns: list[FloatArray] = []
         for stream in streams:
-            filtered: dict[tuple[float, float], FloatArray] = {}
-            for summary in summaries:
+            asked = [summary for summary in summaries if columns_of(stream, summary)]
+            bands = dict.fromkeys(summary.band_hz for summary in asked)
+            filtered = {band: in_band(stream, band, table.meta.name) for band in bands}
+            for summary in asked:
                 picked = columns_of(stream, summary)
-                if not picked:
-                    continue
-                values = stream.data
-                if summary.band_hz is not None:
-                    if summary.band_hz not in filtered:
-                        filtered[summary.band_hz] = in_band(stream, summary.band_hz, table.meta.name)
-                    values = filtered[summary.band_hz]
-                begin, end = _bounds(summary, target.window_s)
+                scale = 1.0 if summary.unit == "s" else target.window_s
                 first, last = (
                     np.searchsorted(_time(stream), ends_s - target.window_s + edge, side="right")
-                    for edge in (begin, end)
+                    for edge in (summary.start * scale, min(summary.end * scale, target.window_s))
                 )
-                columns.append(measured(values[:, picked], summary.measure, first, last))
+                columns.append(measured(filtered[summary.band_hz][:, picked], summary.measure, first, last))
                 names += [f"{stream.channels[place]} {summary.name}" for place in picked]
         if not columns:
             raise NotApplicable(
@@ -110,7 +98,7 @@ def fastest(streams: Sequence[StreamReadings]) -> StreamReadings:
 
 def clocked(table: Table, rules: ProtocolSpec) -> tuple[StreamReadings, ...]:
     """Return the streams of a recording, tared as the protocol has it; raises NotApplicable if one has no clock."""
-    streams = tuple(tared_readings(stream, table.meta) if rules.tare else stream for stream in table.readings)
+    streams = tared_readings(table, rules)
     for stream in streams:
         if stream.time_s is None:
             raise NotApplicable(
@@ -129,9 +117,7 @@ def frame_times(table: Table, task: TaskSpec, rules: ProtocolSpec) -> IntArray:
     """
     target = slip_target(task)
     streams = clocked(table, rules)
-    begin_s = max(float(_time(stream)[0]) for stream in streams)
-    if rules.discard_hold and table.meta.scene is not None:
-        begin_s = max(begin_s, table.meta.scene.profile.hold.to("s"))
+    begin_s = max(dropped_s(table.meta, rules), *(float(_time(stream)[0]) for stream in streams))
     end_s = min(float(_time(stream)[-1]) for stream in streams)
     first = nanoseconds(begin_s) + nanoseconds(target.window_s)
     ends_ns = np.arange(first, nanoseconds(end_s) + 1, nanoseconds(target.hop_s), dtype=np.int64)
@@ -151,20 +137,19 @@ def _framed(
 ) -> tuple[Table, tuple[str, ...]]:
     all_ends_ns = frame_times(table, task, rules)
     names, X = compute(table, all_ends_ns)
-    answered = np.asarray(~np.isnan(X).any(axis=1))
+    answered = ~np.isnan(X).any(axis=1)
     if not answered.all():
         counts["frames without a sample of some stream"] += int((~answered).sum())
     require_computable(X[answered], "a feature", table.meta)
     ends_ns, row = all_ends_ns[answered], np.flatnonzero(answered)
-    state = table.slip.state(ends_ns, 1.0)
+    state = table.slip.state(ends_ns)
     events = task.kind == "events"
-    place = table.slip.at(ends_ns)
     made = replace(
         table,
         X=X[answered],
         y=(state == GROSS).astype(np.int64) if events else state,
         labelled=np.full(len(row), True) if events else state != UNDECIDED,
-        force=np.where(place >= 0, table.slip.normal_n[np.maximum(place, 0)], np.nan),
+        force=table.slip.at(ends_ns, table.slip.normal_n),
         time_s=np.asarray(ends_ns * 1e-9, dtype=np.float64),
         row=row,
         groups={name: np.full(len(row), column[0]) for name, column in table.groups.items()},
@@ -181,12 +166,6 @@ def slip_target(task: TaskSpec) -> SlipTarget:
 def _time(stream: StreamReadings) -> FloatArray:
     assert stream.time_s is not None
     return stream.time_s
-
-
-def _bounds(summary: Summary, window_s: float) -> tuple[float, float]:
-    """Return where a summary begins and ends within a frame [s]."""
-    scale = 1.0 if summary.unit == "s" else window_s
-    return summary.start * scale, min(summary.end * scale, window_s)
 
 
 def _own_features(

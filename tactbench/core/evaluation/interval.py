@@ -11,11 +11,11 @@ import numpy as np
 import numpy.typing as npt
 
 from tactbench.core.evaluation.metrics import Metric
-from tactbench.core.evaluation.time_blocks import RESAMPLES, block_length, circular_blocks, generator
+from tactbench.core.evaluation.time_blocks import RESAMPLES, block_length, circular_blocks
 from tactbench.core.samples import FloatArray, IntArray
 
 LEVEL = 0.95
-ENOUGH_CLUSTERS = 5
+ENOUGH_UNITS = 5
 """Fewer than this cannot be resampled: the interval would be their range."""
 NOT_ONE = float(np.sqrt(2.0))
 """Standard error of the log-odds of half an error in n rows: where not one was wrong, more may not be known."""
@@ -47,31 +47,47 @@ class ReplicateUnits:
     caveat: str = ""
     """What an interval over them does not know; added to how it was found"""
 
+    def sums(self, rows: FloatArray) -> FloatArray:
+        """Return (units, m) sums of (n, m) summands over the rows of each."""
+        out = np.zeros((int(self.codes.max()) + 1, rows.shape[1]))
+        np.add.at(out, self.codes, rows)
+        return out
+
+    def enough(self, y: npt.NDArray[Any], n_classes: int) -> bool:
+        """Tell whether there are enough of them to resample, of every class that occurs in (n,) labels."""
+        each = [y == one for one in range(n_classes)]
+        own = [self.codes, *(self.codes[mask] for mask in each if mask.any())]
+        return all(len(np.unique(codes)) >= ENOUGH_UNITS for codes in own)
+
+    def strata(self, y: npt.NDArray[Any], n_classes: int) -> IntArray:
+        """Return (units,) numbers, equal for units that may stand in for each other.
+
+        All of them, or class by class where each has one class only: without it a resample could lose a class, and its
+        score would be that of another question.
+        """
+        there = np.zeros((int(self.codes.max()) + 1, max(n_classes, 1)), dtype=bool)
+        there[self.codes, y if n_classes else 0] = True
+        if (there.sum(axis=1) > 1).any():
+            return np.zeros(len(there), dtype=np.int64)
+        return np.unique(there.argmax(axis=1), return_inverse=True)[1].astype(np.int64)
+
 
 def score_interval(
     metric: Metric,
     y: npt.NDArray[Any],
     predicted: npt.NDArray[Any],
     recording: IntArray,
-    cluster: npt.NDArray[Any],
-    cluster_name: str,
+    unit: ReplicateUnits,
     n_classes: int,
     seed: int,
 ) -> Interval:
-    """Return the interval of ``metric.of(y, predicted)``.
-
-    Parameters
-    ----------
-    y, predicted, recording, cluster
-        (n,) truth, prediction, recording and unit of replication of each test row, rows of a recording in time order.
-    cluster_name
-        What a cluster is, for the text.
+    """Return the interval of ``metric.of(y, predicted)``; rows of a recording are in time order.
 
     Notes
     -----
-    With at least five clusters, each is left out in turn, those of one class standing in for each other only, and the
-    interval is Student's over clusters [1]_, on a scale that suits the metric (:func:`transform_of`). Percentiles of
-    resampled clusters cover less than they say where there are few: ``benchmarks/coverage.py``. With fewer clusters, or
+    With at least five units, each is left out in turn, those of one class standing in for each other only, and the
+    interval is Student's over units [1]_, on a scale that suits the metric (:func:`transform_of`). Percentiles of
+    resampled units cover less than they say where there are few: ``benchmarks/coverage.py``. With fewer units, or
     when a class is in fewer than five, time is resampled instead: circular blocks within each recording, whose length
     follows from the autocorrelation of the loss (`time_blocks`). Such an interval knows nothing of the spread between
     sessions and says so.
@@ -80,25 +96,20 @@ def score_interval(
     ----------
     .. [1] Cameron, Gelbach and Miller 2008, Bootstrap-based improvements for inference with clustered errors.
     """
-    rng = generator(seed)
+    rng = np.random.default_rng(np.random.SeedSequence([seed, 0xC1]))  # the same blocks for every figure of a cell
     rows = metric.rows(y, predicted, n_classes)
-    names, number = np.unique(cluster, return_inverse=True)
-    if enough(y, number, n_classes):
-        sums = np.zeros((len(names), rows.shape[1]))
-        np.add.at(sums, number, rows)
-        strata = strata_of(y, number, n_classes)
-        return _of_clusters(metric, sums, strata, cluster_name, n_classes, len(y))
+    if unit.enough(y, n_classes):
+        return _of_units(metric, rows, y, unit, n_classes)
     if len(np.unique(recording)) == len(recording):
         return _of_too_few(metric, rows, n_classes)
     total = np.zeros((RESAMPLES, rows.shape[1]))
     lengths, sizes = [], []
     for one in np.unique(recording):
-        mine = rows[recording == one]
-        loss = loss_of(metric, y[recording == one], predicted[recording == one])
-        length = block_length(loss)
+        mine = recording == one
+        length = block_length(loss_of(metric, y[mine], predicted[mine]))
         lengths.append(length)
-        sizes.append(len(mine) / length)
-        total += circular_blocks(mine, length, rng)
+        sizes.append(int(mine.sum()) / length)
+        total += circular_blocks(rows[mine], length, rng)
     spread = f"{min(lengths)}" if min(lengths) == max(lengths) else f"{min(lengths)}–{max(lengths)}"
     many = f"{len(lengths)} recording" + ("s" if len(lengths) > 1 else "")
     method = f"block bootstrap in time within {many} (blocks of {spread} rows): spread between sessions is not in it"
@@ -111,18 +122,16 @@ def score_interval(
     return _student(metric, score, float(resampled.std()) * widened, freedom, scale, method)
 
 
-def _of_clusters(
-    metric: Metric, sums: FloatArray, strata: IntArray, cluster_name: str, n_classes: int, n: int
-) -> Interval:
-    """Return Student's interval over clusters, from what leaving each out changes."""
+def _of_units(metric: Metric, rows: FloatArray, y: npt.NDArray[Any], unit: ReplicateUnits, n_classes: int) -> Interval:
+    """Return Student's interval over units, from what leaving each out changes."""
+    sums, strata = unit.sums(rows), unit.strata(y, n_classes)
     score = float(metric.score(sums.sum(axis=0), n_classes))
-    scale = transform_of(metric.name, score, n)
+    scale = transform_of(metric.name, score, len(y))
     without = scale.there(metric.score(sums.sum(axis=0) - sums, n_classes))
     without = np.where(np.isfinite(without), without, scale.there(score))  # R² of labels that are all alike
     freedom = len(sums) - len(np.unique(strata))
-    method = (
-        f"jackknife over {len(sums)} {plural(cluster_name)} (Student's t, {freedom} degrees of freedom, {scale.name})"
-    )
+    over = f"{len(sums)} {plural(unit.name)}"
+    method = f"jackknife over {over} (Student's t, {freedom} degrees of freedom, {scale.name}){unit.caveat}"
     deviation = float(np.sqrt((influences(without, strata) ** 2).sum()))
     return _student(metric, score, deviation, freedom, scale, method)
 
@@ -149,43 +158,23 @@ def _of_too_few(metric: Metric, rows: FloatArray, n_classes: int) -> Interval:
     return Interval(float(each.min()), float(each.max()), method)
 
 
-def enough(y: npt.NDArray[Any], cluster: npt.NDArray[Any], n_classes: int) -> bool:
-    """Tell whether there are enough clusters to resample, of every class that occurs."""
-    if len(np.unique(cluster)) < ENOUGH_CLUSTERS:
-        return False
-    return all(len(np.unique(cluster[y == one])) >= ENOUGH_CLUSTERS for one in range(n_classes) if (y == one).any())
-
-
 def plural(name: str) -> str:
     """Return the name of several units."""
     return name + ("es" if name.endswith("s") else "s")
-
-
-def strata_of(y: npt.NDArray[Any], cluster: IntArray, n_classes: int) -> IntArray:
-    """Return (clusters,) numbers, equal for clusters that may stand in for each other.
-
-    All of them, or class by class where each cluster has one class only: without it a resample could lose a class, and
-    its score would be that of another question.
-    """
-    there = np.zeros((int(cluster.max()) + 1, max(n_classes, 1)), dtype=bool)
-    there[cluster, y if n_classes else 0] = True
-    if (there.sum(axis=1) > 1).any():
-        return np.zeros(len(there), dtype=np.int64)
-    return np.unique(there.argmax(axis=1), return_inverse=True)[1].astype(np.int64)
 
 
 def loss_of(metric: Metric, y: npt.NDArray[Any], predicted: npt.NDArray[Any]) -> FloatArray:
     """Return (n,) what each row adds to the error: its square, or whether the class is wrong."""
     if metric.kind != "regression":
         return np.asarray(y != predicted, dtype=np.float64)
-    squares = np.asarray((predicted - y) ** 2)
+    squares = (predicted - y) ** 2
     return np.asarray(squares.sum(axis=1)) if metric.vector else squares
 
 
-def student_quantile(freedom: Any, level: float = LEVEL) -> FloatArray:
-    """Return how many standard errors a two-sided interval of `level` reaches, for each of some degrees of freedom."""
+def student_quantile(freedom: Any) -> FloatArray:
+    """Return how many standard errors a two-sided interval of 95 % reaches, for each of some degrees of freedom."""
     special = importlib.import_module("scipy.special")
-    return np.asarray(special.stdtrit(np.minimum(freedom, _MOST_FREEDOM), 0.5 + level / 2), dtype=np.float64)
+    return np.asarray(special.stdtrit(np.minimum(freedom, _MOST_FREEDOM), 0.5 + LEVEL / 2))
 
 
 def two_sided_p(t: float, freedom: float) -> float:
@@ -229,12 +218,8 @@ class ScoreTransform:
 def transform_of(metric: str, score: float, n: int) -> ScoreTransform:
     """Return the scale of a metric on which Student's interval is to be made.
 
-    Parameters
-    ----------
-    score
-        What was scored; no error's interval reaches beyond ten times as much.
-    n
-        Test rows: a share is never nearer to 0 or 1 than half of one.
+    No error's interval reaches beyond ten times its `score`; a share of `n` rows is never nearer to 0 or 1 than half
+    of one.
 
     Notes
     -----

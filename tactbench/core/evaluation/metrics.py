@@ -35,6 +35,11 @@ class Metric:
     vector: bool = False
     """Truth and predictions are (n, components)."""
 
+    @property
+    def sign(self) -> float:
+        """1 if a higher score is better, else -1."""
+        return 1.0 if self.higher_is_better else -1.0
+
     def of(self, y: npt.NDArray[Any], predicted: npt.NDArray[Any], n_classes: int = 0) -> float:
         """Return the score of `predicted` against `y`; infinite where squares of the answers overflow."""
         with np.errstate(over="ignore", invalid="ignore"):
@@ -65,12 +70,13 @@ def _pairs(y: npt.NDArray[Any], predicted: npt.NDArray[Any], n_classes: int) -> 
     return table
 
 
-def _rmse(sums: FloatArray, _: int) -> FloatArray:
-    return np.asarray(np.sqrt(sums[..., 0] / sums[..., 1]))
-
-
-def _mae(sums: FloatArray, _: int) -> FloatArray:
+def ratio(sums: FloatArray, _: int = 0) -> FloatArray:
+    """Return (…,) the first of (…, m) sums over the second."""
     return np.asarray(sums[..., 0] / sums[..., 1])
+
+
+def _rmse(sums: FloatArray, _: int) -> FloatArray:
+    return np.asarray(np.sqrt(ratio(sums)))
 
 
 def _r2(sums: FloatArray, _: int) -> FloatArray:
@@ -118,8 +124,8 @@ METRICS = {
     metric.name: metric
     for metric in (
         Metric("rmse", "regression", False, _squares, _rmse),
-        Metric("mae", "regression", False, _mean_of(np.abs), _mae),
-        Metric(VECTOR_METRIC, "regression", False, _mean_of(lambda d: np.linalg.norm(d, axis=1)), _mae, vector=True),
+        Metric("mae", "regression", False, _mean_of(np.abs), ratio),
+        Metric(VECTOR_METRIC, "regression", False, _mean_of(lambda d: np.linalg.norm(d, axis=1)), ratio, vector=True),
         Metric("r2", "regression", True, _explained, _r2),
         Metric("accuracy", "classification", True, _pairs, _accuracy),
         Metric("balanced_accuracy", "classification", True, _pairs, _balanced),
@@ -130,7 +136,7 @@ METRICS = {
 
 
 def _excess(sums: FloatArray, _: int) -> FloatArray:
-    return np.asarray(sums[..., 0] / sums[..., 1] - sums[..., 2] / sums[..., 3])
+    return ratio(sums) - ratio(sums[..., 2:])
 
 
 EXCESS = Metric("excess_square", "regression", False, _squares, _excess)

@@ -14,12 +14,11 @@ import numpy as np
 import numpy.typing as npt
 
 from tactbench.core.evaluation.dataset import Dataset, Table
-from tactbench.core.evaluation.interval import ReplicateUnits, enough, influences, student_quantile
-from tactbench.core.evaluation.metrics import Metric
+from tactbench.core.evaluation.interval import ReplicateUnits, influences, student_quantile
+from tactbench.core.evaluation.metrics import Metric, ratio
 from tactbench.core.evaluation.sets import hold_s, unloaded
 from tactbench.core.evaluation.time_blocks import integrated_correlation
 from tactbench.core.samples import Answers, FloatArray, IntArray
-from tactbench.core.spec.recording import RecordingMeta
 from tactbench.core.spec.task import ChannelTarget, TaskSpec
 
 FEWEST = 30
@@ -51,7 +50,7 @@ class Floor:
     @property
     def square(self) -> float:
         """The variance of the reference, pooled over the recordings."""
-        return float(_per_freedom(sum(one.sum(axis=0) for one in self.holds.values())))
+        return float(ratio(sum(one.sum(axis=0) for one in self.holds.values())))
 
     def by_replicate(self, tested: Answers, code: IntArray) -> FloatArray:
         """Return (replicates, 2) sums of squares and degrees of freedom, from (n,) the replicate of each test row.
@@ -77,9 +76,8 @@ def reference_floor(task: TaskSpec, metric: Metric, data: Dataset, tested: Answe
     (1 for white noise) takes ``tau`` degrees of freedom, not one: ``E sum (y - mean)² = n sigma² - n var(mean) =
     (n - tau) sigma²``, so that a reference behind a low-pass is measured right too.
     """
-    if metric.name != "rmse" or not isinstance(task.target, ChannelTarget) or task.target.kind != "force":
-        return None, ""
-    if task.target.reduce is not None:
+    target = task.target
+    if metric.name != "rmse" or not isinstance(target, ChannelTarget) or target.kind != "force" or target.reduce:
         return None, ""  # a number of many samples has not the noise of one
     holds: dict[int, FloatArray] = {}
     for place in np.unique(tested.recording).tolist():
@@ -109,7 +107,7 @@ def hold_of(y: npt.NDArray[Any]) -> FloatArray:
     (n, 2): the squared difference of each from the hold's mean, and its part of the degrees of freedom, which are n
     less one, or less than that where noise is correlated.
     """
-    centred = np.asarray(y, dtype=np.float64) - np.mean(y)
+    centred = y - np.mean(y)
     n = len(centred)
     freedom = n - min(integrated_correlation(centred), n / 2)
     return np.column_stack([centred**2, np.full(n, freedom / n)])
@@ -126,23 +124,18 @@ def beyond_floor(floor: Floor, tested: Answers, unit: ReplicateUnits) -> BeyondF
     """
     loss = (tested.y_pred - tested.y_true) ** 2
     excess = float(loss.mean() - floor.square)
-    if not enough(tested.y_true, unit.codes, 0):
+    if not unit.enough(tested.y_true, 0):
         return BeyondFloor(floor.value, _root(excess), None, None)
-    n = len(unit.labels)
-    sums, held = np.zeros((n, 2)), floor.by_replicate(tested, unit.codes)
-    np.add.at(sums, unit.codes, np.column_stack([loss, np.ones(len(loss))]))
-    without = _per_freedom(sums.sum(axis=0) - sums) - _per_freedom(held.sum(axis=0) - held)
-    carried = influences(without, np.zeros(n, dtype=np.int64))
-    reach = float(student_quantile(n - 1)) * float(np.sqrt(carried @ carried))
+    sums = unit.sums(np.column_stack([loss, np.ones(len(loss))]))
+    held = floor.by_replicate(tested, unit.codes)
+    without = ratio(sums.sum(axis=0) - sums) - ratio(held.sum(axis=0) - held)
+    carried = influences(without, np.zeros(len(sums), dtype=np.int64))
+    reach = float(student_quantile(len(sums) - 1)) * float(np.sqrt(carried @ carried))
     return BeyondFloor(floor.value, _root(excess), _root(excess - reach), _root(excess + reach))
 
 
 def _root(excess: float) -> float:
     return float(np.sqrt(max(0.0, excess)))
-
-
-def _per_freedom(sums: FloatArray) -> FloatArray:
-    return np.asarray(sums[..., 0] / sums[..., 1])
 
 
 def true_force(task: TaskSpec, data: Dataset, tested: Answers) -> FloatArray | None:
@@ -155,20 +148,12 @@ def true_force(task: TaskSpec, data: Dataset, tested: Answers) -> FloatArray | N
     target = task.target
     if not isinstance(target, ChannelTarget) or target.kind != "force" or target.name not in (None, "normal"):
         return None
-    if target.unit != "N" or target.reduce is not None:
+    if target.unit != "N" or target.reduce:
         return None
     out = np.zeros(len(tested))
     for place in np.unique(tested.recording).tolist():
-        mine = tested.recording == place
-        found = _commanded(data.metas[place], tested.time_s[mine])
-        if found is None:
+        mine, meta = tested.recording == place, data.tables[place].meta
+        if meta.scene is None or not meta.simulated or meta.clock == "none" or meta.scene.drive is not None:
             return None
-        out[mine] = found
+        out[mine] = np.interp(tested.time_s[mine], *meta.scene.profile.corners)
     return out
-
-
-def _commanded(meta: RecordingMeta, time_s: FloatArray) -> FloatArray | None:
-    scene = meta.scene
-    if scene is None or not meta.simulated or meta.clock == "none" or scene.drive is not None:
-        return None
-    return np.asarray(np.interp(time_s, *scene.profile.corners))

@@ -20,83 +20,60 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from tactbench.core.evaluation.dataset import Dataset
-from tactbench.core.evaluation.interval import ReplicateUnits, enough, plural, strata_of
+from tactbench.core.evaluation.interval import ReplicateUnits, plural
 from tactbench.core.evaluation.metrics import EXCESS, Metric
 from tactbench.core.evaluation.protocols import shots
 from tactbench.core.evaluation.reference_floor import Floor
 from tactbench.core.evaluation.splits import SPLITS_WITHOUT_GROUPS
-from tactbench.core.samples import Answers, FloatArray, IntArray
+from tactbench.core.samples import Answers, FloatArray
 from tactbench.core.spec.task import TaskSpec
 
 
-def replicates(
-    data: Dataset, task: TaskSpec, split: str, y: npt.NDArray[Any], recording: IntArray, row: IntArray
-) -> ReplicateUnits:
+def replicates(data: Dataset, task: TaskSpec, split: str, tested: Answers) -> ReplicateUnits:
     """Return the unit of replication of every test row.
 
     The coarsest unit of which there are enough to resample: the group that the split keeps apart, or else the session;
     then the groups that the task names; then the recording. If there are not enough of any, the first: the interval
     then resamples time and says so. Groups that some test row is not in cannot be resampled.
-
-    Parameters
-    ----------
-    y, recording, row
-        (n,) truth, recording and row in it of every test row.
     """
     first = "session" if split in SPLITS_WITHOUT_GROUPS or shots(split) else split
     named = [name for name in task.splits if name not in (*SPLITS_WITHOUT_GROUPS, first) and not shots(name)]
     names = list(dict.fromkeys([first, *named, "recording"]))
-    units = [_unit(data, name, recording, row) for name in names]
-    there = [one for one in units if one is not None]
+    units = [_unit(data, name, tested) for name in names]
     for place, one in enumerate(units):
-        if one is not None and enough(y, one.codes, len(data.classes)):
-            return replace(one, caveat=_caveat(names[:place]))
-    return there[0]
+        if one is not None and one.enough(tested.y_true, len(data.classes)):
+            passed_over = " and ".join(map(plural, names[:place]))
+            return replace(one, caveat=f": spread between {passed_over} is not in it" if place else "")
+    return next(one for one in units if one is not None)
 
 
-def _caveat(names: Sequence[str]) -> str:
-    """Return what an interval does not know that passes over coarser units."""
-    return f": spread between {' and '.join(map(plural, names))} is not in it" if names else ""
-
-
-def _unit(data: Dataset, name: str, recording: IntArray, row: IntArray) -> ReplicateUnits | None:
+def _unit(data: Dataset, name: str, tested: Answers) -> ReplicateUnits | None:
     """Return the groups of one name; None if some test row is in none."""
-    values = np.empty(len(recording), dtype=object)
-    for place in np.unique(recording):
-        table = data.tables[place]
+    values = np.empty(len(tested), dtype=object)
+    for place in np.unique(tested.recording):
+        table, mine = data.tables[place], tested.recording == place
         if name not in table.groups:
             return None
-        mine = recording == place
-        values[mine] = table.groups[name][np.searchsorted(table.row, row[mine])]
+        values[mine] = table.groups[name][np.searchsorted(table.row, tested.row[mine])]
     labels, codes = np.unique(values.astype(np.str_), return_inverse=True)
     return ReplicateUnits(name, codes.reshape(-1).astype(np.int64), tuple(labels.tolist()))
 
 
 def summed(
     metric: Metric, tested: Answers, unit: ReplicateUnits, data: Dataset, floor: Floor | None = None
-) -> dict[str, Any]:  # fmt: skip
+) -> dict[str, Any]:
     """Return what a row keeps of its replicates.
 
-    Parameters
-    ----------
-    tested
-        The test rows, in time order within each recording of a fold.
-    unit
-        What was repeated. Where there are too few of them, the sums are over recordings: no interval rests on them.
-    floor
-        What the holds of the tested recordings say of the reference.
+    Where there are too few of them, the sums are over recordings: no interval rests on them.
     """
     n_classes = len(data.classes)
-    if not enough(tested.y_true, unit.codes, n_classes):
+    if not unit.enough(tested.y_true, n_classes):
         places, codes = np.unique(tested.recording, return_inverse=True)
         unit = ReplicateUnits("recording", codes, tuple(data.metas[place].name for place in places))
-    strata = strata_of(tested.y_true, unit.codes, n_classes)
-    summands = metric.rows(tested.y_true, tested.y_pred, n_classes)
-    sums = np.zeros((len(unit.labels), summands.shape[1]))
-    np.add.at(sums, unit.codes, summands)
+    strata = unit.strata(tested.y_true, n_classes)
+    sums = unit.sums(metric.rows(tested.y_true, tested.y_pred, n_classes))
     kept = {
         "unit": unit.name,
         "names": list(unit.labels),

@@ -3,18 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field
-from typing import TYPE_CHECKING, Any
+from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from tactbench.core.evaluation.interval import Interval
+from tactbench.core.evaluation.reference_floor import BeyondFloor
 from tactbench.core.samples import Answers
 from tactbench.core.spec.scene import Role
-
-if TYPE_CHECKING:
-    from tactbench.core.evaluation.reference_floor import BeyondFloor
 
 
 @dataclass(frozen=True)
@@ -91,31 +89,15 @@ class Result:
     """what could not be done, and why"""
 
 
+_NOT_AS_THEY_ARE = ("interval", "sizes", "times", "sets", "beyond", "true")
+"""Fields of a result that have other keys in its row, or none."""
+
+
 def row_of(result: Result) -> dict[str, Any]:
     """Return what a row says of a result, as plain data under the row's keys."""
-    row: dict[str, Any] = {
-        "metric": result.metric,
-        "score": result.score,
-        "ci_low": result.interval.low,
-        "ci_high": result.interval.high,
-        "ci_method": result.interval.method,
-        "tare_s": result.tare_s,
-        "scores": result.scores,
-        "confusion": result.confusion,
-        "classes": result.classes,
-        "events": result.events,
-        "operating_points": result.operating_points,
-        **asdict(result.sizes),
-        **asdict(result.times),
-        "split": result.split,
-        "replicates": result.replicates,
-        "chosen": result.chosen,
-        "search": result.search,
-        "counts": result.counts,
-        "dagger": result.dagger,
-        "stamps": result.stamps,
-        "remarks": result.remarks,
-    }
+    row = {name: value for name, value in vars(result).items() if name not in _NOT_AS_THEY_ARE}
+    row |= {"ci_low": result.interval.low, "ci_high": result.interval.high, "ci_method": result.interval.method}
+    row |= {**vars(result.sizes), **vars(result.times)}
     if result.beyond is not None:
         row |= {"reference_floor": result.beyond.floor, "score_beyond_floor": result.beyond.score}
         row |= {"beyond_floor_ci_low": result.beyond.low, "beyond_floor_ci_high": result.beyond.high}

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, replace
 from typing import Any
 
 import numpy as np
@@ -13,11 +13,9 @@ import numpy.typing as npt
 from tactbench.core.errors import DataError, NotApplicable
 from tactbench.core.evaluation.dataset import Dataset, Table
 from tactbench.core.evaluation.protocols import ProtocolSpec
-from tactbench.core.evaluation.splits import Assignment
+from tactbench.core.evaluation.splits import Assignment, Mask
 from tactbench.core.samples import FloatArray, Fold, IntArray, Part
 from tactbench.core.spec.recording import RecordingMeta
-
-Mask = npt.NDArray[np.bool_]
 
 
 def hold_s(meta: RecordingMeta) -> float:
@@ -52,10 +50,7 @@ def less_rest(X: FloatArray, before: Mask) -> FloatArray:
 def tare_s(data: Dataset) -> float:
     """Return how many seconds every recording can be tared on, the shortest hold of all; 0 if none states one.
 
-    Raises
-    ------
-    NotApplicable
-        If some recordings can be tared and others cannot: their readings would not be of one kind.
+    Recordings of which some only can be tared are refused: their readings would not be of one kind.
     """
     held = [hold_s(table.meta) if unloaded(table).any() else 0.0 for table in data.tables]
     if any(held) and not all(held):
@@ -87,41 +82,24 @@ def moments(X: FloatArray) -> tuple[FloatArray, FloatArray]:
     A constant column's computed deviation is the rounding error of its mean, as large as the number of rows makes it;
     it would turn rounding into a signal. So constancy is looked up, not inferred from the deviation.
     """
-    mean = np.asarray(X.mean(axis=0))
+    mean = X.mean(axis=0)
     deviation = np.sqrt(((X - mean) ** 2).mean(axis=0))
     return mean, np.where(X.max(axis=0) > X.min(axis=0), deviation, 0.0)
 
 
 @dataclass(frozen=True)
-class SetRows:
+class SetRows(Part):
     """The rows of one set before scaling, in order of recording and time."""
 
-    X: FloatArray
-    y: npt.NDArray[np.float64]
     labelled: Mask
-    time_s: FloatArray
-    recording: IntArray
-    row: IntArray
     segment: IntArray
     """Windows stay within one number."""
 
 
 def keep(data: Dataset, protocol: ProtocolSpec, masks: Sequence[Mask], what: str, counts: Counter[str]) -> SetRows:
-    """Collect the rows of a set and drop what the protocol drops.
+    """Collect the rows of a set, one (n,) mask a recording, and drop what the protocol drops.
 
-    Parameters
-    ----------
-    masks
-        One (n,) mask a recording.
-    what
-        Name of the set, for messages.
-    counts
-        Told how many rows the three-sigma rule drops, which depends on the set.
-
-    Raises
-    ------
-    DataError
-        If no row is left.
+    `counts` is told how many rows the three-sigma rule drops, which depends on the set, and messages say `what` it is.
     """
     tables = data.tables
     chosen = [mask & asked_for(table, protocol) for table, mask in zip(tables, masks, strict=True)]
@@ -150,25 +128,22 @@ def keep(data: Dataset, protocol: ProtocolSpec, masks: Sequence[Mask], what: str
         segment = np.cumsum(breaks)
     else:
         segment = recording[good]
-    return SetRows(
-        X=X[good],
-        y=joined(table.y for table in tables)[good],
-        labelled=joined(table.labelled for table in tables)[good],
-        time_s=joined(table.time_s for table in tables)[good],
-        recording=recording[good],
-        row=joined(table.row for table in tables)[good],
-        segment=segment,
+    y, time_s, row, labelled = (
+        joined(getattr(table, name) for table in tables)[good] for name in ("y", "time_s", "row", "labelled")
     )
+    return SetRows(X[good], y, time_s, recording[good], row, labelled, segment)
 
 
 def asked_for(table: Table, protocol: ProtocolSpec) -> Mask:
     """Return (n,) which rows the protocol looks at, by their place in the recording."""
     if protocol.first_row_only:
         return np.asarray(np.arange(len(table.row)) == 0)
-    started: Mask = table.row >= protocol.discard_samples
-    if protocol.discard_hold and table.meta.scene is not None:
-        started = started & (table.time_s >= table.meta.scene.profile.hold.to("s"))
-    return started
+    return np.asarray((table.row >= protocol.discard_samples) & (table.time_s >= dropped_s(table.meta, protocol)))
+
+
+def dropped_s(meta: RecordingMeta, protocol: ProtocolSpec) -> float:
+    """Return how many seconds the protocol drops at the start of a recording: the hold that its scene states."""
+    return meta.scene.profile.hold.to("s") if protocol.discard_hold and meta.scene is not None else 0.0
 
 
 def _within_three_sigma(
@@ -190,17 +165,17 @@ def _within_three_sigma(
 
 def part(kept: SetRows, scale: FeatureScale, k: int) -> Part:
     """Scale and filter a set, and leave the rows that have a label."""
-    X = causal_mean(scale(kept.X), k, kept.segment)
-    there = kept.labelled
-    return Part(
-        X=X[there], y=kept.y[there], time_s=kept.time_s[there], recording=kept.recording[there], row=kept.row[there]
-    )  # fmt: skip
+    return taken(replace(kept, X=causal_mean(scale(kept.X), k, kept.segment)), kept.labelled)
 
 
-def scales(protocol: ProtocolSpec, train: SetRows, other: SetRows) -> tuple[FeatureScale, FeatureScale]:
-    """Return the scales of a training set and another, as the protocol has it."""
-    first = FeatureScale(*moments(train.X))
-    return first, FeatureScale(*moments(other.X)) if protocol.scaled_by == "each set" else first
+def taken(of: Part, rows: Mask | IntArray) -> Part:
+    """Return some rows of a set."""
+    return Part(**{column.name: getattr(of, column.name)[rows] for column in fields(Part)})
+
+
+def scale_of(protocol: ProtocolSpec, train: SetRows, other: SetRows) -> FeatureScale:
+    """Return the scale of a set beside its training set, as the protocol has it."""
+    return FeatureScale(*moments((other if protocol.scaled_by == "each set" else train).X))
 
 
 def prepared(assignment: Assignment, data: Dataset, rules: ProtocolSpec, k: int, counts: Counter[str]) -> Fold:
@@ -215,27 +190,16 @@ def prepared(assignment: Assignment, data: Dataset, rules: ProtocolSpec, k: int,
 
     def scaled(masks: Sequence[Mask], what: str) -> Part:
         kept = keep(data, rules, masks, what, counts)
-        return part(kept, scales(rules, train, kept)[1], k)
+        return part(kept, scale_of(rules, train, kept), k)
 
     test = scaled(assignment.test, "test")
     validation = None if assignment.validation is None else scaled(assignment.validation, "validation")
-    return Fold(assignment.name, part(train, FeatureScale(*moments(train.X)), k), test, validation)
+    return Fold(assignment.name, part(train, scale_of(rules, train, train), k), test, validation)
 
 
 def causal_mean(X: FloatArray, k: int, segment: npt.NDArray[np.integer]) -> FloatArray:
-    """Return the mean of each row and the up to `k` rows before it in its segment.
+    """Return the mean of each row and the up to `k` rows before it in its segment: (n,) non-decreasing numbers.
 
-    Parameters
-    ----------
-    X
-        (n, features)
-    k
-        Rows looked back; 0 returns `X`. The first rows of a segment average what there is.
-    segment
-        (n,) non-decreasing numbers; a window never crosses from one to another.
-
-    Notes
-    -----
     By cumulative sums of the centred columns: without centring, an offset of 1e8 would leave 1e-8 of its own size as
     error in every difference of sums.
     """

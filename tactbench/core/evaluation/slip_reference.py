@@ -5,8 +5,10 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from tactbench.core.errors import DataError, NotApplicable
 from tactbench.core.evaluation.channels import channel_on, channels_for, require_forward
@@ -42,34 +44,26 @@ class SlipReference:
     disturbance: bool
     """Whether the recording as a whole is a disturbance that is no slip"""
 
-    def at(self, ends_ns: IntArray) -> IntArray:
-        """Return (k,) the last sample at or before each time; -1 before the first and after the last one's interval."""
+    def at(self, ends_ns: IntArray, values: npt.NDArray[Any], missing: float = np.nan) -> npt.NDArray[Any]:
+        """Return (k,) of (n,) values of samples that of the last one at or before each time.
+
+        It is `missing` before the first sample and after the last one's interval.
+        """
         place = np.searchsorted(self.t_ns, ends_ns, side="right") - 1
         step = int(np.median(np.diff(self.t_ns))) if self.t_ns.size > 1 else 0
-        return np.where(ends_ns <= self.t_ns[-1] + step, place, -1).astype(np.int64)
+        there = (place >= 0) & (ends_ns <= self.t_ns[-1] + step)
+        return np.where(there, values[np.maximum(place, 0)], missing)
 
-    def state(self, ends_ns: IntArray, scale: float) -> IntArray:
+    def state(self, ends_ns: IntArray, scale: float = 1.0) -> IntArray:
         """Return (k,) states at some times; undecided where the reference has no sample."""
-        place = self.at(ends_ns)
-        return np.asarray(np.where(place >= 0, self.labels[scale].state[np.maximum(place, 0)], UNDECIDED))
+        return self.at(ends_ns, self.labels[scale].state, UNDECIDED)
 
 
 def slip_reference(recording: Recording, target: SlipTarget, first_ns: int, counts: Counter[str]) -> SlipReference:
-    """Read and label the reference of a recording.
+    """Read and label the reference of a recording, times counted from `first_ns`.
 
-    Parameters
-    ----------
-    first_ns
-        What times count from.
-    counts
-        Told how many samples of the reference were left out.
-
-    Raises
-    ------
-    NotApplicable
-        If a channel or the coefficient of friction is missing.
-    DataError
-        If the coefficient is no number, or the surface never rests.
+    `counts` is told how many of its samples were left out. Raises NotApplicable if a channel or the coefficient of
+    friction is missing, DataError if the coefficient is no number or the surface never rests.
     """
     name = recording.meta.name
     found = {str(one.name): channels_for(recording, one) for one in _CHANNELS}

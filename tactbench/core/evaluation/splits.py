@@ -44,12 +44,8 @@ class Assignment:
 def choose_split(task: TaskSpec, protocol: ProtocolSpec, data: Dataset, requested: str | None) -> str:
     """Return the split to use: the one that was requested, or the task's first that the recordings can serve.
 
-    Raises
-    ------
-    UsageError
-        If the requested split cannot be served; the message says which can.
-    NotApplicable
-        If the protocol does not go with the requested split, or it or every split of the task lacks what it needs.
+    Raises UsageError if the requested one cannot be served, NotApplicable if it does not go with the protocol or none
+    of the task's can be served.
     """
     split = _split_for(task, protocol, data, requested)
     if protocol.first_row_only:
@@ -214,7 +210,7 @@ def _in_session(data: Dataset, gap: int) -> Iterator[Assignment]:
         mine = _masks(data, lambda place, table: place in places and table.meta.session == session)  # noqa: B023
         train, test = _cut_in_time(data, mine, gap, fewest=10)
         if any(mask.any() for mask in test):
-            yield Assignment(session, train, test, groups="session")
+            yield Assignment(session, train, test)
 
 
 def _cut_in_time(
@@ -331,8 +327,7 @@ def _classes_in(data: Dataset, masks: Sequence[Mask]) -> set[int]:
 
 def _kinds_in(data: Dataset, masks: Sequence[Mask]) -> set[bool]:
     """Return whether recordings are disturbances, of those that the masks hold."""
-    held = [table.reference for table, mask in zip(data.tables, masks, strict=True) if mask.any()]
-    return {reference.disturbance for reference in held if reference is not None}
+    return {table.slip.disturbance for table, mask in zip(data.tables, masks, strict=True) if mask.any()}
 
 
 def _sizes(tables: Sequence[Table], masks: Sequence[Mask], group: str) -> Counter[str]:

@@ -12,10 +12,10 @@ import numpy as np
 from tactbench.core.errors import DataError, NotApplicable, PluginContractError
 from tactbench.core.evaluation.dataset import Dataset, Table, require_computable
 from tactbench.core.evaluation.protocols import ProtocolSpec
-from tactbench.core.evaluation.sets import hold_s, less_rest
+from tactbench.core.evaluation.sets import dropped_s, hold_s, less_rest
+from tactbench.core.events.labels import spread
 from tactbench.core.plugins.registry import load_object
 from tactbench.core.samples import FloatArray, IntArray, StreamReadings
-from tactbench.core.spec.recording import RecordingMeta
 from tactbench.core.spec.rig import EstimatorDescriptor
 from tactbench.core.spec.summary import Summary
 from tactbench.core.spec.task import TaskSpec
@@ -32,15 +32,6 @@ def summarised(data: Dataset, task: TaskSpec, rules: ProtocolSpec) -> Dataset:
     """Return each recording as one row of features, what the protocol drops left out; `data` where none are asked for.
 
     The row stands where the recording ends: it is the first at which the answer can be known.
-
-    Raises
-    ------
-    NotApplicable
-        If the protocol drops single samples by number or value, or a band cannot be observed.
-    DataError
-        If a window has no sample.
-    PluginContractError
-        If the task's own features are not finite numbers of the same names for every recording.
     """
     if not is_summarised(task, rules):
         return data
@@ -106,13 +97,9 @@ def columns_of(stream: StreamReadings, summary: Summary) -> list[int]:
 
 def kept(table: Table, rules: ProtocolSpec) -> tuple[StreamReadings, ...]:
     """Return the readings that the protocol keeps, tared as it has it; times count from the first of them."""
-    begin_s = 0.0
-    if rules.discard_hold and table.meta.scene is not None and table.meta.clock != "none":
-        begin_s = table.meta.scene.profile.hold.to("s")
-    found = []
-    for stream in table.readings:
-        time_s = stream.time_s
-        data = tared_readings(stream, table.meta).data if rules.tare else stream.data
+    begin_s, found = dropped_s(table.meta, rules), []
+    for stream in tared_readings(table, rules):
+        data, time_s = stream.data, stream.time_s
         if time_s is not None:
             later = time_s >= begin_s
             data, time_s = data[later], time_s[later] - begin_s
@@ -125,18 +112,19 @@ def kept(table: Table, rules: ProtocolSpec) -> tuple[StreamReadings, ...]:
     return tuple(found)
 
 
-def tared_readings(stream: StreamReadings, meta: RecordingMeta) -> StreamReadings:
-    """Return a stream less its mean over the recording's own unloaded hold, where it has a clock and a sample there."""
-    return (
-        stream if stream.time_s is None else replace(stream, data=less_rest(stream.data, stream.time_s < hold_s(meta)))
-    )
+def tared_readings(table: Table, rules: ProtocolSpec) -> tuple[StreamReadings, ...]:
+    """Return the streams of a recording; if the protocol tares, those with a clock less their means over the hold."""
+    return tuple(
+        one if one.time_s is None or not rules.tare
+        else replace(one, data=less_rest(one.data, one.time_s < hold_s(table.meta)))
+        for one in table.readings
+    )  # fmt: skip
 
 
 def summary_of(stream: StreamReadings, summary: Summary, recording: str) -> FloatArray:
     """Return (channels,) numbers, from the samples in the summary's window; a filter has seen those before it too."""
     rows = _window(stream, summary, recording)
-    values = stream.data if summary.band_hz is None else in_band(stream, summary.band_hz, recording)
-    values = values[rows]
+    values = in_band(stream, summary.band_hz, recording)[rows]
     return np.asarray(measured(values, summary.measure, np.array([0]), np.array([len(values)]))[0])
 
 
@@ -145,36 +133,27 @@ def measured(values: FloatArray, measure: str, first: IntArray, last: IntArray) 
 
     Sums are differences of running sums, counted from the first sample, so that no digit depends on later ones.
     """
-    count = (last - first)[:, None].astype(np.float64)
-    some = count > 0
     if measure == "range":
-        found = _extreme(np.maximum, values, first, last) - _extreme(np.minimum, values, first, last)
+        found = spread(values, first, last)
     elif measure == "change":
         found = values[np.maximum(last - 1, 0)] - values[np.minimum(first, len(values) - 1)]
     elif measure == "mean-step":
         steps = np.abs(np.diff(values, axis=0, prepend=values[:1]))
-        begin = np.minimum(first + 1, last)
-        found = _sums(steps, begin, last) / np.maximum(count - 1, 1)
+        found = _means(steps, np.minimum(first + 1, last), last)
     elif measure == "band-energy":
-        found = _sums(values**2, first, last) / np.maximum(count, 1)
+        found = _means(values**2, first, last)
     else:
         centre = values[0]
-        mean = _sums(values - centre, first, last) / np.maximum(count, 1)
+        mean = _means(values - centre, first, last)
         found = mean + centre
         if measure == "deviation":
-            square = _sums((values - centre) ** 2, first, last) / np.maximum(count, 1)
-            found = np.sqrt(np.maximum(square - mean**2, 0.0))
-    return np.asarray(np.where(some, found, np.nan))
+            found = np.sqrt(np.maximum(_means((values - centre) ** 2, first, last) - mean**2, 0.0))
+    return np.where((last > first)[:, None], found, np.nan)
 
 
-def _sums(values: FloatArray, first: IntArray, last: IntArray) -> FloatArray:
+def _means(values: FloatArray, first: IntArray, last: IntArray) -> FloatArray:
     total = np.concatenate([np.zeros((1, values.shape[1])), np.cumsum(values, axis=0)])
-    return np.asarray(total[last] - total[first])
-
-
-def _extreme(of: np.ufunc, values: FloatArray, first: IntArray, last: IntArray) -> FloatArray:
-    padded = np.concatenate([values, values[-1:]])  # reduceat wants every place to exist
-    return np.asarray(of.reduceat(padded, np.column_stack([first, np.maximum(last, first)]).ravel(), axis=0)[::2])
+    return np.asarray((total[last] - total[first]) / np.maximum(last - first, 1)[:, None])
 
 
 def _window(stream: StreamReadings, summary: Summary, recording: str) -> slice:
@@ -199,8 +178,10 @@ def _window(stream: StreamReadings, summary: Summary, recording: str) -> slice:
     return slice(first, last)
 
 
-def in_band(stream: StreamReadings, band_hz: tuple[float, float], recording: str) -> FloatArray:
-    """Return what a causal band-pass leaves of a stream, at rest at its first sample."""
+def in_band(stream: StreamReadings, band_hz: tuple[float, float] | None, recording: str) -> FloatArray:
+    """Return what a causal band-pass leaves of a stream, at rest at its first sample; all of it without a band."""
+    if band_hz is None:
+        return stream.data
     if stream.rate_hz is None:
         raise NotApplicable(
             f"A band in Hz needs a sampling rate, and recording {recording!r} states none for {stream.stream}.",

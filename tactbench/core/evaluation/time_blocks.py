@@ -16,11 +16,6 @@ from tactbench.core.samples import FloatArray
 RESAMPLES = 2000
 
 
-def generator(seed: int) -> np.random.Generator:
-    """Return what blocks of time are drawn with: the same blocks for every figure of a cell."""
-    return np.random.default_rng(np.random.SeedSequence([seed, 0xC1]))
-
-
 def circular_blocks(rows: FloatArray, length: int, rng: np.random.Generator) -> FloatArray:
     """Return (RESAMPLES, m) sums of `rows` resampled in circular blocks, each resample as long as the original."""
     n = len(rows)
@@ -83,11 +78,7 @@ def _lag_window(centred: FloatArray) -> tuple[float, float, float]:
     covariance = np.fft.irfft(np.abs(spectrum) ** 2)[: min(2 * longest, n - 1) + 1] / n
     correlation = covariance[1 : longest + 1] / variance
     small = np.abs(correlation) < 2.0 * np.sqrt(np.log10(n) / n)
-    last = longest
-    for lag in range(len(small) - reach + 1):
-        if small[lag : lag + reach].all():
-            last = lag
-            break
+    last = next((lag for lag in range(len(small) - reach + 1) if small[lag : lag + reach].all()), longest)
     bandwidth = min(2 * max(last, 1), len(covariance) - 1)
     lags = np.arange(-bandwidth, bandwidth + 1)
     ratio = np.abs(lags) / bandwidth

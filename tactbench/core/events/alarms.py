@@ -44,7 +44,7 @@ def alarms(t_ns: IntArray, active: npt.NDArray[np.bool_], policy: AlarmPolicy) -
 
 def _kept(raised_ns: IntArray, refractory_ns: int) -> IntArray:
     """Return the places of the alarms that the refractory time leaves, of alarms in order of time."""
-    if refractory_ns == 0 or raised_ns.size < 2:
+    if refractory_ns == 0:
         return np.arange(raised_ns.size)
     following = np.searchsorted(raised_ns, raised_ns + refractory_ns, side="left").tolist()
     places, place = [], 0

@@ -83,16 +83,17 @@ def threshold_curve(recordings: Sequence[ScoredRecording], policy: AlarmPolicy) 
 
 def _of_one(recording: ScoredRecording, policy: AlarmPolicy) -> ThresholdCurve:
     """Return the curve of one recording: alarms change at values of its score alone, and not at each of them."""
-    found = [(np.inf, alarms(recording.t_ns, np.zeros(recording.score.shape, dtype=bool), policy))]
+    found = [(np.inf, np.zeros(0, dtype=np.int64))]
     for threshold in np.unique(recording.score[~np.isnan(recording.score)])[::-1]:
         raised = alarms(recording.t_ns, recording.score >= threshold, policy)
         if not np.array_equal(raised, found[-1][1]):
             found.append((float(threshold), raised))
-    each = [score_events([recording.truth], [raised], policy) for _, raised in found[::-1]]
+    found.reverse()
+    each = [score_events([recording.truth], [raised], policy) for _, raised in found]
     scores = EventScores(
         np.array([one.n_alarms for one in each]),
         np.array([one.n_false_alarms for one in each]),
         each[0].base_ns,
         np.array([one.latency_s for one in each]),
     )
-    return ThresholdCurve(np.array([threshold for threshold, _ in found[::-1]]), scores)
+    return ThresholdCurve(np.array([threshold for threshold, _ in found]), scores)

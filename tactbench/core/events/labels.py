@@ -28,12 +28,8 @@ class SlipLabels:
 def stick_ratio(tangential_n: FloatArray, normal_n: FloatArray, friction: float) -> FloatArray:
     """Return c/a, the radius that sticks over the contact's: ``(1 - Q/(mu P))^(1/3)``.
 
-    Parameters
-    ----------
-    tangential_n, normal_n
-        (n,) tangential force Q (its sign does not matter) and normal force P [N].
-    friction
-        Static coefficient of friction mu [1], known or measured on the reference alone.
+    Q is the tangential force, of either sign, P the normal one, and mu the static coefficient of friction, known or
+    measured on the reference alone.
 
     Notes
     -----
@@ -108,8 +104,8 @@ def at_rest(t_ns: IntArray, displacement_m: FloatArray, thresholds: SlipThreshol
     last, first = np.searchsorted(t_ns, t_ns + hold, side="left"), np.searchsorted(t_ns, t_ns - hold, side="right") - 1
     ahead, behind = last < n, first >= 0  # where there is so much time
     place = np.arange(n)
-    still = place[ahead][_spread(displacement_m, place[ahead], last[ahead]) <= thresholds.gross_displacement_m]
-    moved = place[behind][_spread(displacement_m, first[behind], place[behind]) > thresholds.gross_displacement_m]
+    still = place[ahead][spread(displacement_m, place[ahead], last[ahead] + 1) <= thresholds.gross_displacement_m]
+    moved = place[behind][spread(displacement_m, first[behind], place[behind] + 1) > thresholds.gross_displacement_m]
     onset = -1
     while (following := np.searchsorted(still, onset)) < still.size:
         begin = still[following]
@@ -120,12 +116,10 @@ def at_rest(t_ns: IntArray, displacement_m: FloatArray, thresholds: SlipThreshol
     return rest
 
 
-def _spread(values: FloatArray, first: IntArray, last: IntArray) -> FloatArray:
-    """Return (k,) largest minus smallest of ``values[first..last]``, both ends included."""
-    if first.size == 0:
-        return np.zeros(0)
-    pairs = np.column_stack([first, last + 1]).ravel()
-    padded = np.append(values, values[-1])  # reduceat wants every place to exist
+def spread(values: FloatArray, first: IntArray, end: IntArray) -> FloatArray:
+    """Return (k, …) largest less smallest of each ``values[first:end]``; what `first` has where that is empty."""
+    pairs = np.column_stack([first, end]).ravel()
+    padded = np.concatenate([values, values[-1:]])  # reduceat wants every place to exist
     return np.asarray(np.maximum.reduceat(padded, pairs)[::2] - np.minimum.reduceat(padded, pairs)[::2])
 
 

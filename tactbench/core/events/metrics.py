@@ -58,7 +58,7 @@ class EventScores:
     @property
     def recall(self) -> FloatArray:
         """Return (...) hits of events."""
-        return _ratio(self.n_hits, np.full_like(self.n_hits, self.latency_s.shape[-1]))
+        return _ratio(self.n_hits, self.latency_s.shape[-1])
 
     @property
     def precision(self) -> FloatArray:
@@ -73,7 +73,7 @@ class EventScores:
     @property
     def false_alarms_per_minute(self) -> FloatArray:
         """Return (...) false alarms per minute of the time base [1/min]."""
-        return _ratio(self.n_false_alarms, np.full(self.n_false_alarms.shape, self.base_ns / 1e9 / 60.0))
+        return _ratio(self.n_false_alarms, self.base_ns / 1e9 / 60.0)
 
     def latency_percentile_s(self, percent: float) -> float:
         """Return a percentile of the latency over hits of one set of alarms, linear between order statistics [s].
@@ -177,7 +177,7 @@ class TimeBase:
         return np.asarray(self.counted[np.searchsorted(self.edge_ns, t_ns, side="right")])
 
 
-def _ratio(part: FloatArray | IntArray, whole: FloatArray | IntArray) -> FloatArray:
+def _ratio(part: IntArray, whole: IntArray | float) -> FloatArray:
     """Return part of whole; NaN where the whole is nothing."""
     nothing = np.full(np.shape(part), np.nan)
     return np.asarray(np.divide(part, whole, out=nothing, where=np.asarray(whole) > 0))

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from tactbench.core.evaluation.interval import LEVEL
+from tactbench.core.evaluation.interval import student_quantile
 from tactbench.core.evaluation.metrics import METRICS
 from tactbench.core.evaluation.replicate_sums import tables_of
 from tactbench.core.samples import FloatArray
@@ -67,23 +67,13 @@ def aggregate(rows: Sequence[Row]) -> Aggregate | None:
     weigh the same, however many replicates they have. Where a replicate has no score of its own (classes live in
     replicates of their own), the task enters with its one score, which varies as the resampled replicates make it.
     """
-    left_out: list[str] = []
-    tasks: list[str] = []
-    values: list[FloatArray] = []
-    drawn: list[FloatArray] = []
-    fewest = 10**9
-    for row in rows:
-        why = _why_not(row)
-        if why:
-            left_out.append(f"{row['task']}: {why}")
-            continue
-        tasks.append(row["task"])
-        own, sampled, clusters = _entries(row)
-        values.append(normalised(row, own))
-        drawn.append(normalised(row, sampled))
-        fewest = min(fewest, clusters)
-    if not values:
+    left_out = tuple(f"{row['task']}: {why}" for row in rows if (why := _why_not(row)))
+    entered = [row for row in rows if not _why_not(row)]
+    if not entered:
         return None
+    tasks = [row["task"] for row in entered]
+    own, sampled, replicates = zip(*map(_entries, entered), strict=True)
+    values, drawn = ([normalised(row, one) for row, one in zip(entered, each, strict=True)] for each in (own, sampled))
     cells = Counter(tasks)
     weights = np.concatenate(
         [np.full(len(own), 1 / len(own) / cells[task]) for task, own in zip(tasks, values, strict=True)]
@@ -91,9 +81,9 @@ def aggregate(rows: Sequence[Row]) -> Aggregate | None:
     value = float(interquartile_mean(np.concatenate(values)[None, :], weights)[0])
     resampled = interquartile_mean(np.concatenate(drawn, axis=1), weights)
     resampled = resampled[np.isfinite(resampled)]
-    tail = _widened_tail(fewest - 1, fewest) if 2 <= fewest < 10**9 else (1 - LEVEL) / 2
+    tail = _widened_tail(min(replicates))
     low, high = np.quantile(resampled, [tail, 1 - tail])
-    return Aggregate(value, float(low), float(high), len(cells), len(weights), tuple(left_out))
+    return Aggregate(value, float(low), float(high), len(cells), len(weights), left_out)
 
 
 def _why_not(row: Row) -> str:
@@ -149,12 +139,11 @@ def interquartile_mean(values: FloatArray, weights: FloatArray) -> FloatArray:
     return np.asarray((sorted_values * inside).sum(axis=1) / inside.sum(axis=1))
 
 
-def _widened_tail(freedom: int, n: int) -> float:
-    """Return the normal tail beyond ``sqrt(n / (n - 1)) t(freedom)``, where n replicates are drawn from the fewest.
+def _widened_tail(n: int) -> float:
+    """Return the normal tail beyond ``sqrt(n / (n - 1)) t(n - 1)``, where n replicates are the fewest that are drawn.
 
     Percentiles of few resampled replicates cover less than they say: they are widened as Student's t would widen a
     normal interval (Hesterberg 2015, What teachers should know about the bootstrap, section 5.3).
     """
     special = importlib.import_module("scipy.special")
-    quantile = special.stdtrit(freedom, 0.5 + LEVEL / 2)
-    return float(special.ndtr(-quantile * np.sqrt(n / (n - 1))))
+    return float(special.ndtr(-student_quantile(n - 1) * np.sqrt(n / (n - 1))))

@@ -34,15 +34,8 @@ class PairableRows:
 
 
 def together(rows: Sequence[Row]) -> list[PairableRows]:
-    """Return the rows in groups of equal replicates; rows without usable replicates are in none.
+    """Return finished rows of one metric in groups of equal replicates; rows without usable ones are in none.
 
-    Parameters
-    ----------
-    rows
-        Finished rows of one metric.
-
-    Notes
-    -----
     The influence of a replicate is what leaving it out changes (:func:`influences`).
     """
     groups: dict[tuple[Any, ...], list[int]] = {}
@@ -62,7 +55,7 @@ def together(rows: Sequence[Row]) -> list[PairableRows]:
             scores = np.array([scores_of(one, metric) for one in several])
             influence = (scores - scores.mean(axis=1, keepdims=True)) / np.sqrt(n * (n - 1))
         else:
-            influence = influences(scores_without(tables_of(several, metric, n_classes), metric, n_classes), codes)
+            influence = influences(scores_without(several, metric, n_classes), codes)
         good = np.isfinite(influence).all(axis=1)
         where = np.array(places, dtype=np.int64)[good]
         found.append(PairableRows(where, names, codes, influence[good], float(n - len(sizes))))
@@ -74,7 +67,8 @@ def scores_of(kept: Mapping[str, Any], metric: str) -> FloatArray:
     return np.asarray(kept["excess" if metric == EXCESS.name else "scores"], dtype=np.float64)
 
 
-def scores_without(sums: FloatArray, metric: str, n_classes: int) -> FloatArray:
-    """Return (rows, replicates) scores without each replicate, from (rows, replicates, m) sums."""
+def scores_without(several: Sequence[dict[str, Any]], metric: str, n_classes: int) -> FloatArray:
+    """Return (rows, replicates) scores without each replicate, from the sums that rows with equal names keep."""
+    sums = tables_of(several, metric, n_classes)
     with np.errstate(divide="ignore", invalid="ignore"):
         return SUMMED[metric].score(sums.sum(axis=1, keepdims=True) - sums, n_classes)

@@ -13,7 +13,7 @@ from typing import Any, Literal
 import numpy as np
 
 from tactbench.core.evaluation.interval import student_quantile, two_sided_p
-from tactbench.core.evaluation.metrics import METRICS, Metric
+from tactbench.core.evaluation.metrics import METRICS
 from tactbench.core.evaluation.replicate_sums import tables_of
 from tactbench.core.samples import FloatArray, IntArray
 from tactbench.core.statistics.influence import PairableRows, scores_of, together
@@ -76,13 +76,12 @@ def difference(first: Row, second: Row) -> Difference:
     The verdict is *better* or *worse* if the interval neither contains 0 nor lies within the task's region of practical
     equivalence, *equivalent* if it lies within, else *undecided*: ranks follow the same rule.
     """
-    metric = METRICS[first["metric"]]
-    sign = 1.0 if metric.higher_is_better else -1.0
+    sign = METRICS[first["metric"]].sign
     first, second = _means(first, second)
     value = float(first["score"] - second["score"])
     groups = together([first, second])
     if len(groups) == 1 and len(groups[0].places) == 2:
-        return _paired(first, second, value, sign, groups[0], metric)
+        return _paired(first, second, value, sign, groups[0])
     return _unpaired(first, second, value, sign, groups)
 
 
@@ -102,7 +101,7 @@ def _means(first: Row, second: Row) -> tuple[Row, Row]:
     return one, other
 
 
-def _paired(first: Row, second: Row, value: float, sign: float, group: PairableRows, metric: Metric) -> Difference:
+def _paired(first: Row, second: Row, value: float, sign: float, group: PairableRows) -> Difference:
     carried = group.influence[0] - group.influence[1]
     deviation = float(np.sqrt(carried @ carried))
     n = len(group.names)
@@ -113,7 +112,7 @@ def _paired(first: Row, second: Row, value: float, sign: float, group: PairableR
         over += ", of the errors beyond the floor"
     own = value + carried * _to_own(group)
     return _difference(
-        value, deviation, group.freedom, sign, _region(first),
+        first, value, deviation, group.freedom,
         p=p,
         smallest_p=smallest,
         effect=value / (deviation * np.sqrt(n)) if deviation > 0 else None,
@@ -131,7 +130,7 @@ def _unpaired(first: Row, second: Row, value: float, sign: float, groups: list[P
     if len(groups) < 2:
         known: dict[str, Any] = dict.fromkeys(("p", "smallest_p", "effect", "improved"))
         return _difference(
-            value, np.inf, np.inf, sign, 0.0,
+            first, value, np.inf, np.inf,
             **known, replicates=0, unit=unit, paired=False, method="not paired (replicates are missing)",
         )  # fmt: skip
     one, other = sorted(groups, key=lambda group: int(group.places[0]))
@@ -141,7 +140,7 @@ def _unpaired(first: Row, second: Row, value: float, sign: float, groups: list[P
     pairs = sign * np.subtract.outer(own[0], own[1])
     freedom = min(one.freedom, other.freedom)
     return _difference(
-        value, deviation, freedom, sign, _region(first),
+        first, value, deviation, freedom,
         p=two_sided_p(value / deviation, freedom) if deviation > 0 else None,
         smallest_p=0.0 if deviation > 0 else None,
         effect=value / spread if spread > 0 else None,
@@ -153,21 +152,17 @@ def _unpaired(first: Row, second: Row, value: float, sign: float, groups: list[P
     )  # fmt: skip
 
 
-def _difference(value: float, deviation: float, freedom: float, sign: float, region: float, **more: Any) -> Difference:
+def _difference(first: Row, value: float, deviation: float, freedom: float, **more: Any) -> Difference:
     if not np.isfinite(deviation):
         return Difference(value, None, None, verdict="undecided", beyond=False, **more)
-    reach = float(student_quantile(freedom)) * deviation
+    reach, region = float(student_quantile(freedom)) * deviation, float(first.get("equivalence") or 0.0)
     low, high = value - reach, value + reach
     verdict: Verdict = "undecided"
     if region > 0 and -region <= low and high <= region:
         verdict = "equivalent"
     elif low > 0 or high < 0:
-        verdict = "better" if value * sign > 0 else "worse"
+        verdict = "better" if value * METRICS[first["metric"]].sign > 0 else "worse"
     return Difference(value, low, high, verdict=verdict, beyond=bool(low > region or high < -region), **more)
-
-
-def _region(row: Row) -> float:
-    return float(row.get("equivalence") or 0.0)
 
 
 def _to_own(group: PairableRows) -> FloatArray:
@@ -181,13 +176,7 @@ def _to_own(group: PairableRows) -> FloatArray:
 
 
 def exchanged(first: Row, second: Row) -> tuple[float, float]:
-    """Return the p-value of exchanging two rows' answers within replicates, and the least it can be.
-
-    Parameters
-    ----------
-    first, second
-        Rows whose replicates have the same names and strata.
-    """
+    """Return the p-value of exchanging two rows' answers within the replicates they share, and the least it can be."""
     metric = METRICS[first["metric"]]
     if "scores" in first["replicates"]:
         apart_each = scores_of(first["replicates"], metric.name) - scores_of(second["replicates"], metric.name)
@@ -234,12 +223,7 @@ class FoldDifference:
 def corrected_t(differences: Sequence[float], test_over_train: float) -> FoldDifference | None:
     """Return the corrected resampled t-test of differences over folds; None of fewer than two.
 
-    Parameters
-    ----------
-    differences
-        One a fold.
-    test_over_train
-        Test rows over training rows of a fold; of unequal folds, the mean.
+    `test_over_train` is test rows over training rows of a fold; of unequal folds, the mean.
 
     Notes
     -----
@@ -271,12 +255,7 @@ def over_folds(first: Row, second: Row) -> FoldDifference | None:
 
 
 def holm(p: Sequence[float | None]) -> list[float | None]:
-    """Return p-values corrected for being several, in the order given.
-
-    Parameters
-    ----------
-    p
-        One a declared comparison; None for one that could not be made, which neither counts nor gets a value.
+    """Return p-values corrected for being several; None, of a comparison that could not be made, does not count.
 
     Notes
     -----

@@ -10,7 +10,6 @@ import numpy.typing as npt
 
 from tactbench.core.evaluation.interval import student_quantile
 from tactbench.core.evaluation.metrics import EXCESS, SUMMED
-from tactbench.core.evaluation.replicate_sums import tables_of
 from tactbench.core.samples import FloatArray, IntArray
 from tactbench.core.statistics.influence import PairableRows, scores_of, scores_without, together
 from tactbench.core.statistics.rank import Rank, beyond_floor, excess_of
@@ -52,10 +51,10 @@ def ranks(rows: Iterable[Row]) -> dict[str, Rank]:
     if not entered:
         return {}
     if beyond_floor(entered):
-        entered = [_excess(row) for row in entered]
-    sign = -1.0 if SUMMED[entered[0]["metric"]].higher_is_better else 1.0
-    entered.sort(key=lambda row: (sign * row["score"], row["cell"]))
-    error = sign * np.array([row["score"] for row in entered], dtype=np.float64)  # the lower, the better
+        entered = [{**row, "score": excess_of(row), "metric": EXCESS.name} for row in entered]
+    sign = SUMMED[entered[0]["metric"]].sign
+    entered.sort(key=lambda row: (-sign * row["score"], row["cell"]))
+    error = -sign * np.array([row["score"] for row in entered], dtype=np.float64)  # the lower, the better
     groups = together(entered)
     better, worse, places, apart, behind = _clearly(entered, groups, error)
     low = np.minimum(1 + better, places)
@@ -69,11 +68,6 @@ def ranks(rows: Iterable[Row]) -> dict[str, Rank]:
     }  # fmt: skip
 
 
-def _excess(row: Row) -> Row:
-    """Return a row of a RMSE as that of its mean square beyond the floor, which may be below zero."""
-    return {**row, "score": excess_of(row), "metric": EXCESS.name}
-
-
 def _clearly(
     rows: Sequence[Row], groups: Sequence[PairableRows], error: FloatArray
 ) -> tuple[IntArray, IntArray, IntArray, npt.NDArray[np.bool_], npt.NDArray[np.bool_]]:
@@ -83,8 +77,7 @@ def _clearly(
     before and than the first.
     """
     n = len(rows)
-    mean = _means(rows, groups, error)
-    deviation, freedom = _own_errors(n, groups)
+    mean, deviation, freedom = _differed(rows, groups, error)
     distinct, which = np.unique(freedom, return_inverse=True)
     wide = student_quantile(distinct) ** 2
     same = float(rows[0].get("equivalence") or 0.0)
@@ -109,41 +102,28 @@ def _clearly(
     return clear.sum(axis=1), clear.sum(axis=0), places, apart, clear[:, 0]
 
 
-def _means(rows: Sequence[Row], groups: Sequence[PairableRows], error: FloatArray) -> FloatArray:
-    """Return (n,) what differences are taken of: `error`, or the mean over replicates with scores of their own."""
-    found = error.copy()
+def _differed(
+    rows: Sequence[Row], groups: Sequence[PairableRows], error: FloatArray
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return (n,) what differences are taken of, its standard error and its degrees of freedom.
+
+    That is `error`, or the mean over replicates with scores of their own; a row without replicates has infinite ones.
+    """
+    mean, deviation, freedom = error.copy(), np.full(len(rows), np.inf), np.full(len(rows), np.inf)
     metric = rows[0]["metric"]
-    sign = -1.0 if SUMMED[metric].higher_is_better else 1.0
-    for group in groups:
-        for place in group.places.tolist():
-            kept = rows[place]["replicates"]
-            if "scores" in kept:
-                found[place] = sign * scores_of(kept, metric).mean()
-    return found
-
-
-def _own_errors(n: int, groups: Sequence[PairableRows]) -> tuple[FloatArray, FloatArray]:
-    """Return (n,) standard errors and degrees of freedom, infinite of a row without replicates."""
-    deviation = np.full(n, np.inf)
-    freedom = np.full(n, np.inf)
     for group in groups:
         deviation[group.places] = np.linalg.norm(group.influence, axis=1)
         freedom[group.places] = group.freedom
-    return deviation, freedom
+        for place in group.places.tolist():
+            kept = rows[place]["replicates"]
+            if "scores" in kept:
+                mean[place] = -SUMMED[metric].sign * scores_of(kept, metric).mean()
+    return mean, deviation, freedom
 
 
 def best_without(rows: Sequence[Row], groups: Sequence[PairableRows]) -> list[int] | None:
     """Return the place in `rows` of the best one without each replicate; None if they do not share replicates.
 
-    Parameters
-    ----------
-    rows
-        Finished rows of one metric.
-    groups
-        What :func:`together` says of them.
-
-    Notes
-    -----
     A first place that leaves with one replicate is no property of the sensor (Huang et al. 2025, Dropping just a
     handful of preferences can change top large language model rankings).
     """
@@ -156,6 +136,5 @@ def best_without(rows: Sequence[Row], groups: Sequence[PairableRows]) -> list[in
         without = np.array([np.median(np.delete(each, place, axis=1), axis=1) for place in range(each.shape[1])]).T
     else:
         n_classes = len(rows[0]["classes"])
-        without = scores_without(tables_of(kept, metric, n_classes), metric, n_classes)
-    best = np.argmax(without, axis=0) if SUMMED[metric].higher_is_better else np.argmin(without, axis=0)
-    return [int(place) for place in best]
+        without = scores_without(kept, metric, n_classes)
+    return np.argmax(SUMMED[metric].sign * without, axis=0).tolist()  # type: ignore[no-any-return]

@@ -78,8 +78,8 @@ def _of_all(name: str, members: Sequence[Row]) -> dict[str, Any]:
         return dict(first)
     done = [row for row in members if row["status"] == "done"]
     if not done:
-        unknown: dict[str, Any] = {"recordings_right": None, "recordings_asked": None, "replicates": {}, "cell": name}
-        return {**first, **_counted([first], len(members), "replicate", []), **unknown}
+        counted = _counted([first], len(members), "replicate", [])
+        return {**first, **counted, "replicates": {}, "cell": name, **_right(done)}
     found = _of_campaigns(done) if done[0]["simulated"] else _of_sessions(done)
     return {**found, "cell": name, "repeat": first["repeat"], "remarks": _remarks(members, done), **_right(done)}
 

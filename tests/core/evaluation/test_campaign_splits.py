@@ -58,10 +58,16 @@ def test_no_group_of_the_test_rows_is_in_training_nor_where_parameters_are_chose
         assert test
         assert not test & values(data, group, fold.train)
         tested += sorted(test)
-        for learn, check in inner_splits(data, fold):
-            assert not test & (values(data, group, learn) | values(data, group, check))
-            for inner, outer in zip(learn, fold.train, strict=True):
-                assert not (inner & ~outer).any(), "only training rows are looked at to choose"
+        inner = inner_splits(data, fold)
+        assert 1 <= len(inner) <= 5
+        for learn, check in inner:
+            learned, checked = values(data, group, learn), values(data, group, check)
+            assert checked
+            assert not test & (learned | checked)
+            assert len(inner) == 1 or not learned & checked
+            for one, other, outer in zip(learn, check, fold.train, strict=True):
+                assert not (one & other).any()
+                np.testing.assert_array_equal(one | other, outer, "all training rows are used, and no others")
     assert len(tested) == len(set(tested)), "every group is tested once"
     if not shots(split):
         assert len(folds) == len(tested), "each group is left out alone"

@@ -5,33 +5,26 @@ import pytest
 
 from tactbench.core.errors import DataError, NotApplicable
 from tactbench.core.evaluation.dataset import load_dataset
-from tactbench.core.recording.writer import RecordingWriter
 from tactbench.core.samples import Quality
-from tactbench.core.spec.recording import RecordingMeta
-from tactbench.plugin import Block, ChannelSpec, SensorSpec, Source, StreamSpec
+from tactbench.plugin import Block, ChannelSpec, StreamSpec
 
-from .made import force_task, record
-from .test_karl2016 import ramp
+from .made import force_task, ramp, record, sensor_of, write
 
 MS = 1_000_000
 
 
-def two_streams(path, taxels, vibration, force, *, unit="N"):
-    """A sensor with taxels at 100 Hz and vibration at its own times; the force on its own clock too."""
-    sensor = SensorSpec(
-        name="two", title="Two clocks", principle="none", principle_source=Source(tag="assumed", reference="a test"),
-        streams=(
-            StreamSpec(name="slow", channels=(ChannelSpec(name="t0", kind="taxel"),)),
-            StreamSpec(name="fast", channels=(ChannelSpec(name="v0", kind="ac_pressure"),)),
-        ),
-    )  # fmt: skip
+def two_streams(path, taxels, vibration, force, *, unit="N", missing=None):
+    """A sensor with taxels at 100 Hz and vibration at its own times; the force on its own clock, not always there."""
+    sensor = sensor_of(
+        StreamSpec(name="slow", channels=(ChannelSpec(name="t0", kind="taxel"),)),
+        StreamSpec(name="fast", channels=(ChannelSpec(name="v0", kind="ac_pressure"),)),
+    )
     reference = StreamSpec(name="ft", channels=(ChannelSpec(name="fz", kind="force", unit=unit),))
-    meta = RecordingMeta(name=path.stem, sensor=sensor, reference=(reference,), rig="made")
-    with RecordingWriter(path, meta) as writer:
-        for name, (t_ms, values) in (("slow", taxels), ("fast", vibration), ("ft", force)):
-            times = (np.asarray(t_ms) * MS).astype(np.int64)
-            writer.append(Block(name, times, np.asarray(values, dtype=np.float64)[:, None]))
-    return path
+    blocks = [
+        Block(name, (t_ms * MS).astype(np.int64), values[:, None], missing if name == "ft" else None)
+        for name, (t_ms, values) in (("slow", taxels), ("fast", vibration), ("ft", force))
+    ]
+    return write(path, sensor, *blocks, reference=(reference,))
 
 
 def test_features_of_several_streams_stand_on_the_clock_of_the_first(tmp_path):
@@ -56,11 +49,7 @@ def test_the_force_is_the_nearest_sample_in_the_unit_of_the_task(tmp_path):
     (table,) = load_dataset(force_task(), [path]).tables
     np.testing.assert_allclose(table.y, late, rtol=1e-12)
     assert table.labelled.all()
-
-
-def test_a_force_in_counts_is_refused_and_not_called_newtons(tmp_path):
-    slow = np.arange(0.0, 100.0, 10.0)
-    path = two_streams(tmp_path / "a.h5", (slow, slow), (slow, slow), (slow, slow), unit="count")
+    path = two_streams(tmp_path / "b.h5", (slow, slow), (slow, slow), (slow, slow), unit="count")
     with pytest.raises(DataError, match="'fz' is recorded in 'count', which is no 'N'"):
         load_dataset(force_task(), [path])
 
@@ -85,20 +74,10 @@ def test_flagged_samples_are_kept_and_counted(tmp_path):
 
 def test_samples_marked_missing_are_no_labels_whatever_number_stands_there(tmp_path):
     """-1 for "no sample" must not become a force of -1 N."""
-    X, _ = ramp(0, n=50)
-    sensor = SensorSpec(
-        name="made", title="t", principle="none", principle_source=Source(tag="assumed", reference="a test"),
-        streams=(StreamSpec(name="taxels", channels=(ChannelSpec(name="t0", kind="taxel"),)),),
-    )  # fmt: skip
-    reference = StreamSpec(name="ft", channels=(ChannelSpec(name="fz", kind="force", unit="N"),))
+    t = np.arange(0.0, 500.0, 10.0)
     missing = np.tile([0, int(Quality.MISSING)], 25).astype(np.uint8)[:, None]
-    with RecordingWriter(
-        tmp_path / "a.h5", RecordingMeta(name="a", sensor=sensor, reference=(reference,), rig="made")
-    ) as writer:
-        times = np.arange(50, dtype=np.int64) * 10 * MS
-        writer.append(Block("taxels", times, X[:, :1]))
-        writer.append(Block("ft", times, np.where(missing, -1.0, 2.0), missing))
-    data = load_dataset(force_task(), [tmp_path / "a.h5"])
+    force = np.where(missing[:, 0], -1.0, 2.0)
+    data = load_dataset(force_task(), [two_streams(tmp_path / "a.h5", (t, t), (t, t), (t, force), missing=missing)])
     assert data.counts["of 50 rows have no force sample and were left out"] == 25
     assert set(data.tables[0].y[data.tables[0].labelled]) == {2.0}
 

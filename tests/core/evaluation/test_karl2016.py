@@ -14,7 +14,7 @@ from tactbench.core.evaluation.sets import FeatureScale, keep, moments, part
 from tactbench.core.evaluation.splits import make_splits
 from tactbench.core.plugins.registry import load_object, load_registry
 
-from .made import evaluated, force_task, record
+from .made import evaluated, force_task, ramp, record
 
 ESTIMATORS = load_registry().estimators
 ROLES = ("train", "validation", "test")
@@ -23,13 +23,6 @@ ROLES = ("train", "validation", "test")
 def three(folder, make, **more):
     return [record(folder / f"{role}.h5", *make(place), role=role, session=role, **more)
             for place, role in enumerate(ROLES)]  # fmt: skip
-
-
-def ramp(seed, n=1600, gain=(50.0, -20.0, 7.0), noise=1.0, label_noise=0.0):
-    rng = np.random.default_rng(seed)
-    force = np.linspace(0.0, 5.0, n)
-    X = 1000 + force[:, None] * np.array(gain) + rng.normal(0, noise, (n, len(gain)))
-    return X, force + rng.normal(0, label_noise, n)
 
 
 def sets(paths, role, k=0):

@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from .made import evaluated, force_task, record
-from .test_karl2016 import ramp
+from .made import evaluated, force_task, ramp, record, sessions
 
 
 def stamps(paths, split="session"):
@@ -12,7 +11,7 @@ def stamps(paths, split="session"):
 
 
 def test_sessions_of_their_own_have_no_stamp(tmp_path):
-    paths = [record(tmp_path / f"{n}.h5", *ramp(n, n=200), session=str(n)) for n in range(3)]
+    paths = sessions(tmp_path)
     assert stamps(paths) == ()
     assert stamps(paths, "in-session") == ()
 

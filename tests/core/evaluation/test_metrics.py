@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from scipy import stats
 from sklearn import metrics as reference
 
-from tactbench.core.evaluation.interval import influences, score_interval, transform_of
+from tactbench.core.evaluation.interval import ReplicateUnits, influences, score_interval, transform_of
 from tactbench.core.evaluation.metrics import METRICS
 
 seeds = st.integers(0, 2**32 - 1)
@@ -35,7 +35,8 @@ def test_classification_metrics_are_those_of_scikit_learn(seed, n, classes):
 
 
 def interval(y, p, recording, cluster, metric="rmse", n_classes=0, seed=0):
-    return score_interval(METRICS[metric], y, p, recording, cluster, "session", n_classes, seed)
+    unit = ReplicateUnits("session", cluster, ())
+    return score_interval(METRICS[metric], y, p, recording, unit, n_classes, seed)
 
 
 def test_sessions_are_resampled_where_there_are_enough():
@@ -114,7 +115,7 @@ def test_a_scale_and_back_is_where_it_began(metric, value):
 def over_sessions(error, metric="rmse", y=None, classes=0):
     code = np.repeat(np.arange(len(error)), error.shape[1])
     y = np.zeros(error.size, dtype=np.int64 if classes else np.float64) if y is None else y
-    return score_interval(METRICS[metric], y, error.ravel(), code, code, "session", classes, 0)
+    return interval(y, error.ravel(), code, code, metric, classes)
 
 
 def test_where_not_one_was_wrong_the_interval_has_width():

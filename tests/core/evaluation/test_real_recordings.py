@@ -5,15 +5,14 @@ splits, units and labels, and a forest of thirty is within 0.02 N and 0.01 of on
 named from an iCub's first frames are tested beside the import of the files, which takes the longest.
 """
 
-import time
 from pathlib import Path
 
 import pytest
 
-from tactbench.core.evaluation.cell import CellContext, evaluate_cell
 from tactbench.core.evaluation.dataset import load_dataset
 from tactbench.core.plugins.registry import load_registry
 from tactbench.core.recording.mapping import import_tables
+from tests.core.evaluation.made import evaluated
 
 REGISTRY = load_registry()
 MAPPINGS = Path(__file__).resolve().parents[3] / "examples" / "mappings"
@@ -37,21 +36,9 @@ def grasps(shared_data, tmp_path_factory):
     return load_dataset(REGISTRY.tasks["grasp-stability"].spec, paths)
 
 
-def run(task, data, split, estimator="forest", protocol="deployable"):
+def run(task, data, split, estimator="forest"):
     params = {"n_estimators": 30} if estimator == "forest" else {}
-    return evaluate_cell(
-        CellContext(
-            REGISTRY.tasks[task].spec,
-            REGISTRY.estimators[estimator],
-            params,
-            protocol,
-            split,
-            seed=0,
-            clock=time.perf_counter,
-            latency=False,
-        ),
-        data,
-    )
+    return evaluated(REGISTRY.tasks[task].spec, data, estimator, split=split, params=params, seed=0)
 
 
 def folds(result):

@@ -5,19 +5,11 @@ import pytest
 
 from tactbench.core.evaluation.interval import ReplicateUnits
 from tactbench.core.evaluation.metrics import METRICS
-from tactbench.core.evaluation.reference_floor import (
-    FEWEST,
-    Floor,
-    beyond_floor,
-    hold_of,
-)
+from tactbench.core.evaluation.reference_floor import FEWEST, Floor, beyond_floor, hold_of
 from tactbench.core.samples import Answers
 from tactbench.core.spec.drive import ForceLoop
-from tactbench.core.spec.profile import ForceRamp
-from tactbench.core.spec.quantity import assumed
-from tactbench.core.spec.scene import Scene
 
-from .made import evaluated, force_task, record
+from .made import evaluated, force_task, held, record
 
 SIGMA = 0.6875
 RMSE = METRICS["rmse"]
@@ -90,40 +82,24 @@ def test_a_reference_without_noise_leaves_the_rmse_as_it_is():
     assert beyond_floor(floor, answers, unit).score == 0.0
 
 
-def scene(name, hold=7.2, **more):
-    samples = more.pop("samples", 400)
-    profile = ForceRamp(hold=assumed(hold, "s", "a test"), samples=samples, **more.pop("profile", {}))
-    return Scene(name=name, profile=profile, **more)
-
-
-def recorded(folder, task, *, sigma=SIGMA, simulated=True, **how):
-    """Three recordings of 60 s whose reference errs, and whose taxel is the true force."""
+def result_of(folder, *, simulated=True, scenes=True, hold=7.2, samples=400, **how):
+    """What three recordings of 60 s come to, whose reference errs and whose taxels are the true force."""
     folder.mkdir()
     rng = np.random.default_rng(5)
     paths = []
+    t_ns = (np.arange(samples) * 60 / samples * 1e9).astype(np.int64)
+    true = np.interp(t_ns * 1e-9, [0, hold, 60], [0, 0, 5])
     for role in ("train", "validation", "test"):
-        planned = scene(role, **how) if how.pop("scenes", True) else None
-        n = 400 if planned is None else planned.profile.samples
-        t_ns = (np.arange(n) * 60 / n * 1e9).astype(np.int64)
-        true = np.interp(t_ns * 1e-9, [0, how.get("hold", 7.2), 60], [0, 0, 5])
-        force = true + sigma * rng.standard_normal(n)
-        X = true[:, None] * [1.0, 2.0, -1.0] + 1e-3 * rng.standard_normal((n, 3))
-        paths.append(record(folder / f"{role}.h5", X, force, t_ns=t_ns, role=role, session=role, scene=planned,
+        force = true + SIGMA * rng.standard_normal(samples)
+        X = true[:, None] * [1.0, 2.0, -1.0] + 1e-3 * rng.standard_normal((samples, 3))
+        scene = held(role, hold, samples=samples, **how) if scenes else None
+        paths.append(record(folder / f"{role}.h5", X, force, t_ns=t_ns, role=role, session=role, scene=scene,
                             simulated=simulated))  # fmt: skip
-        if planned is None:
-            how["scenes"] = False
-    return paths
-
-
-TASK = force_task(protocols=("deployable",), splits=("roles",))
-
-
-def result_of(paths):
-    return evaluated(TASK, paths, split="roles")
+    return evaluated(force_task(protocols=("deployable",), splits=("roles",)), paths, split="roles")
 
 
 def test_a_cell_tells_its_floor_and_the_error_against_the_true_force(tmp_path):
-    result = result_of(recorded(tmp_path / "a", TASK, samples=4000))
+    result = result_of(tmp_path / "a", samples=4000)
     assert result.beyond.floor == pytest.approx(SIGMA, rel=0.1), "480 samples: 3.2 % standard error"
     assert result.score == pytest.approx(SIGMA, rel=0.1)
     assert result.true[0] < 0.1, "the taxels know the force"
@@ -146,13 +122,13 @@ def test_a_cell_tells_its_floor_and_the_error_against_the_true_force(tmp_path):
     ],
 )
 def test_without_a_hold_that_tells_there_is_no_floor_and_the_row_says_why(tmp_path, how, why):
-    result = result_of(recorded(tmp_path / "a", TASK, **how))
+    result = result_of(tmp_path / "a", **how)
     assert result.beyond is None
     assert any(why in remark for remark in result.remarks)
     assert "floor" not in result.replicates
 
 
 def test_only_a_simulated_force_without_a_loop_is_known_truly(tmp_path):
-    assert result_of(recorded(tmp_path / "a", TASK)).true is not None
-    assert result_of(recorded(tmp_path / "b", TASK, simulated=False)).true is None
-    assert result_of(recorded(tmp_path / "c", TASK, drive=ForceLoop())).true is None
+    assert result_of(tmp_path / "a").true is not None
+    assert result_of(tmp_path / "b", simulated=False).true is None
+    assert result_of(tmp_path / "c", drive=ForceLoop()).true is None

@@ -8,10 +8,9 @@ import pytest
 from tactbench.core.evaluation.dataset import load_dataset
 from tactbench.core.evaluation.metrics import METRICS
 from tactbench.core.evaluation.replicate_sums import replicates, tables_of
+from tactbench.core.samples import Answers
 
-from .made import force_task, label_task, record
-from .test_karl2016 import ramp
-from .test_splits import grasps, run, sessions
+from .made import evaluated, force_task, grasps, label_task, ramp, record, sessions
 
 
 def again(result):
@@ -24,24 +23,22 @@ def again(result):
 @pytest.mark.parametrize("metric", ["rmse", "mae", "r2"])
 @pytest.mark.parametrize("names", [("a", "b", "c"), tuple("fedcba")])
 def test_the_score_of_a_number_follows_from_the_sums(tmp_path, metric, names):
-    result = run(sessions(tmp_path, names, n=90), "session", force_task(metric=metric))
+    result = evaluated(force_task(metric=metric), sessions(tmp_path, names, n=90))
     assert again(result) == pytest.approx(result.score, rel=1e-12)
+    if len(names) < 5:
+        kept = result.replicates
+        assert (kept["unit"], kept["names"], kept["strata"]) == ("recording", list(names), None)
 
 
 @pytest.mark.parametrize("metric", ["accuracy", "balanced_accuracy", "macro_f1"])
 def test_the_score_of_a_class_follows_from_the_sums_exactly(tmp_path, metric):
     """Counts are whole numbers: nothing is rounded."""
-    result = run([grasps(tmp_path, seed=1), grasps(tmp_path, seed=2)], "object", label_task(metric=metric))
+    paths = [grasps(tmp_path, seed=1), grasps(tmp_path, seed=2)]
+    result = evaluated(label_task(metric=metric), paths, "logistic", split="object")
     assert again(result) == result.score
     assert result.replicates["unit"] == "object"
     assert result.replicates["names"] == sorted(f"thing {place}" for place in range(12))
     assert all(isinstance(value, int) for line in result.replicates["sums"] for value in line)
-
-
-def test_of_few_sessions_the_sums_of_each_recording_are_kept(tmp_path):
-    kept = run(sessions(tmp_path, n=200), "session", estimator="mean", params={}).replicates
-    assert (kept["unit"], kept["names"], kept["strata"]) == ("recording", list("abc"), None)
-    assert all(line[1] == 200 for line in kept["sums"])
 
 
 def test_classes_that_live_in_recordings_of_their_own_are_strata(tmp_path):
@@ -51,7 +48,7 @@ def test_classes_that_live_in_recordings_of_their_own_are_strata(tmp_path):
                labels={"kind": cap})
         for role in ("train", "test") for cap in range(2) for number in range(5)
     ]  # fmt: skip
-    kept = run(paths, "roles", label_task(), "chance", params={}).replicates
+    kept = evaluated(label_task(), paths, "chance", split="roles").replicates
     assert kept["names"] == [f"test{cap}{number}" for cap in range(2) for number in range(5)]
     assert kept["strata"] == [0] * 5 + [1] * 5
 
@@ -61,8 +58,7 @@ def test_trials_of_one_session_stand_in_for_each_other(tmp_path):
         record(tmp_path / f"{place}.h5", *ramp(place, n=40), session="one", role="train" if place < 2 else "test")
         for place in range(9)
     ]
-    task = force_task(protocols=("deployable",))
-    method = run(paths, "roles", task, "mean", params={}).interval.method
+    method = evaluated(force_task(), paths, "mean", split="roles").interval.method
     assert method.startswith("jackknife over 7 recordings ")
     assert method.endswith("): spread between sessions is not in it")
 
@@ -74,7 +70,9 @@ def test_a_unit_is_found_for_each_row_by_its_number(tmp_path):
     notes = {"press": np.repeat(np.arange(6), 10)}
     data = load_dataset(force_task(), [record(tmp_path / "a.h5", X, force, annotations=notes)])
     table = data.tables[0]
-    unit = replicates(data, force_task(splits=("press",)), "press", table.y, np.zeros(50, dtype=np.int64), table.row)
+    first = np.zeros(50, dtype=np.int64)
+    tested = Answers(table.y, table.y, first, table.row, first, table.time_s, table.y)
+    unit = replicates(data, force_task(splits=("press",)), "press", tested)
     assert unit.name == "press"
     assert unit.codes.tolist() == (table.row // 10).tolist()
     assert unit.labels == tuple(f"1/{number}" for number in range(6))

@@ -11,26 +11,9 @@ from tactbench.core.errors import DataError, NotApplicable, UsageError
 from tactbench.core.evaluation.dataset import load_dataset
 from tactbench.core.evaluation.protocols import DEPLOYABLE
 from tactbench.core.evaluation.sets import FeatureScale, causal_mean, keep, part
-from tactbench.core.evaluation.splits import choose_split, make_splits
+from tactbench.core.evaluation.splits import choose_split, inner_splits, make_splits
 
-from .made import evaluated, force_task, label_task, record
-from .test_karl2016 import ramp
-
-
-def sessions(folder, names=("a", "b", "c"), n=200, **more):
-    return [record(folder / f"{name}.h5", *ramp(place, n=n), session=name, **more)
-            for place, name in enumerate(names)]  # fmt: skip
-
-
-def grasps(folder, role=None, objects=12, each=20, seed=0):
-    rng = np.random.default_rng(seed)
-    names = np.repeat([f"thing {place}" for place in range(objects)], each)
-    y = rng.integers(0, 2, len(names))
-    X = rng.normal(size=(len(names), 3)) + y[:, None] + 3 * rng.normal(size=(objects, 3)).repeat(each, axis=0)
-    return record(
-        folder / f"grasps{role}{seed}.h5", X, t_ns=None, role=role, session=f"file {seed}",
-        annotations={"object": names, "kind": np.where(y, "slipped", "stable")},
-    )  # fmt: skip
+from .made import evaluated, force_task, grasps, label_task, ramp, record, sessions
 
 
 def run(paths, split=None, task=None, estimator="forest", params=None, **more):
@@ -54,33 +37,36 @@ def test_training_and_test_rows_are_disjoint_and_every_free_row_is_tested_once(t
         assert all((count == 1).all() for count in tested)
 
 
-def test_in_session_trains_on_the_past_and_tests_on_the_future(tmp_path):
-    data = load_dataset(force_task(), sessions(tmp_path))
-    for fold in make_splits(data, "in-session", 0):
-        for table, train, test in zip(data.tables, fold.train, fold.test, strict=True):
-            if test.any():
-                assert table.time_s[train].max() < table.time_s[test].min()
-                assert train.sum() == pytest.approx(0.8 * len(train), abs=1)
+def filtered(data, fold, k):
+    """The training rows of a fold behind the window, not scaled."""
+    return part(keep(data, DEPLOYABLE, fold.train, "t", Counter()), FeatureScale(np.zeros(3), np.ones(3)), k)
 
 
 @settings(max_examples=30, deadline=None)
-@given(st.integers(0, 60), st.integers(0, 2**32 - 1))
-def test_a_window_never_reaches_across_a_split(tmp_path_factory, k, seed):
-    """Changing every test row must leave every training row as it was, and the other way round."""
-    folder = tmp_path_factory.mktemp("windows")
-    X, force = ramp(0, n=120)
-    rng = np.random.default_rng(seed)
-    split = str(rng.choice(["in-session", "session"]))
-    for name in ("a", "b"):
-        record(folder / f"{name}.h5", X + (name == "b"), force, session=name)
-    paths = [folder / "a.h5", folder / "b.h5"]
-    data = load_dataset(force_task(), paths)
+@given(st.integers(0, 60), st.sampled_from(["in-session", "session"]))
+def test_a_window_never_reaches_across_a_split(tmp_path_factory, k, split):
+    """Changing every test row must leave every training row as it was."""
+    data = load_dataset(force_task(), sessions(tmp_path_factory.mktemp("windows"), ("a", "b"), n=120))
     for fold in make_splits(data, split, 0):
-        before = part(keep(data, DEPLOYABLE, fold.train, "t", Counter()), FeatureScale(np.zeros(3), np.ones(3)), k)
+        before = filtered(data, fold, k)
         for table, test in zip(data.tables, fold.test, strict=True):
-            table.X[test] += rng.normal(size=(int(test.sum()), 3)) * 1e6
-        after = part(keep(data, DEPLOYABLE, fold.train, "t", Counter()), FeatureScale(np.zeros(3), np.ones(3)), k)
-        assert np.array_equal(before.X, after.X)
+            table.X[test] += 1e6
+        assert np.array_equal(before.X, filtered(data, fold, k).X)
+
+
+@settings(max_examples=20, deadline=None)
+@given(st.integers(0, 60))
+def test_a_cut_in_time_leaves_a_gap_of_the_longest_window(tmp_path_factory, gap):
+    data = load_dataset(force_task(), sessions(tmp_path_factory.mktemp("gap"), ("a", "b")))
+    folds = make_splits(data, "in-session", 0, gap=gap)
+    assert [fold.name for fold in folds] == ["a", "b"]
+    for fold in folds:
+        (inner,) = inner_splits(data, fold, gap)
+        for before, after in ((fold.train, fold.test), inner):
+            for a, b in zip(before, after, strict=True):
+                if b.any():
+                    assert np.flatnonzero(b)[0] - np.flatnonzero(a)[-1] == gap + 1, "the past trains, the future tests"
+        assert max(test.sum() for test in fold.test) == 0.2 * 200
 
 
 @given(
@@ -124,16 +110,6 @@ def test_a_split_that_cannot_be_served_is_refused_with_those_that_can(tmp_path):
         run(paths[:1], "session")
 
 
-def test_a_dropped_out_taxel_never_reaches_an_estimator(tmp_path):
-    X, force = ramp(0, n=300)
-    X[10:20, 1] = np.nan
-    X[30, 0] = np.inf
-    paths = [record(tmp_path / f"{name}.h5", X, force, session=name) for name in "ab"]
-    result = run(paths)
-    assert result.counts["rows left out because t1 has no sample"] == 20
-    assert result.sizes.n_test == 2 * 289
-
-
 def test_a_recording_that_its_source_calls_unreliable_is_left_out_and_counted(tmp_path):
     paths = sessions(tmp_path)
     paths.append(record(tmp_path / "bad.h5", *ramp(7), session="d", excluded="declared unreliable"))
@@ -162,7 +138,6 @@ def test_a_dropped_out_row_is_skipped_by_the_window_which_does_not_start_anew(tm
     X[50, 1] = np.nan
     paths = [record(tmp_path / f"{name}.h5", X, force, session=name) for name in "ab"]
     data = load_dataset(force_task(), paths)
-    one = part(keep(data, DEPLOYABLE, make_splits(data, "session", 0)[0].train, "t", Counter()),
-               FeatureScale(np.zeros(3), np.ones(3)), 5)  # fmt: skip
+    one = filtered(data, make_splits(data, "session", 0)[0], 5)
     after = int(np.flatnonzero(one.row == 52)[0])
     np.testing.assert_allclose(one.X[after], X[[46, 47, 48, 49, 51, 52]].mean(axis=0), rtol=1e-12)

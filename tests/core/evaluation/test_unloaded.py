@@ -10,23 +10,18 @@ from tactbench.core.evaluation.dataset import load_dataset
 from tactbench.core.evaluation.protocols import DEPLOYABLE
 from tactbench.core.evaluation.sets import hold_s, prepared, tare_s, tared
 from tactbench.core.evaluation.splits import make_splits
-from tactbench.core.spec.profile import ForceRamp
 from tactbench.core.spec.quantity import assumed
-from tactbench.core.spec.scene import Scene
 
-from .made import evaluated, force_task, record
+from .made import evaluated, force_task, held, record
 
 NOT_TARED = "not tared: no recording states an unloaded hold"
 TASK = force_task(protocols=("deployable", "deployable-untared"), splits=("roles",))
 HOLD, ROWS = 40, 200
 
 
-def scene(name, hold=0.4, start=0.0, duration=2.0):
-    profile = ForceRamp(
-        hold=assumed(hold, "s", "a test"), start=assumed(start, "N", "a test"),
-        duration=assumed(duration, "s", "a test"), samples=ROWS,
-    )  # fmt: skip
-    return Scene(name=name, profile=profile)
+def scene(name, hold=0.4, start=0.0):
+    start, duration = assumed(start, "N", "a test"), assumed(2.0, "s", "a test")
+    return held(name, hold, start=start, duration=duration, samples=ROWS)
 
 
 def three(folder, offsets=(0.0, 0.0, 0.0), **how):

@@ -14,13 +14,9 @@ MS = 1_000_000
 
 def policy(before=0.05, after=0.2, refractory=0.0, merge=0.0, minimum=0.0, time="non-events"):
     return AlarmPolicy(
-        window_before_s=before,
-        window_after_s=after,
-        refractory_s=refractory,
-        merge_gap_s=merge,
-        minimum_length_s=minimum,
-        false_alarm_time=time,
-    )
+        window_before_s=before, window_after_s=after, refractory_s=refractory, merge_gap_s=merge,
+        minimum_length_s=minimum, false_alarm_time=time,
+    )  # fmt: skip
 
 
 def seconds(*values):
@@ -36,32 +32,21 @@ def truth(events=(), disturbance=False, span=(0.0, 60.0)):
 
 milliseconds = st.integers(0, 8).map(lambda ms: ms / 1000)
 policies = st.builds(
-    policy,
-    before=milliseconds,
-    after=milliseconds,
-    refractory=milliseconds,
-    merge=milliseconds,
-    minimum=milliseconds,
-    time=st.sampled_from(["disturbances", "non-events"]),
-)
-times = st.lists(st.integers(-40, 40), max_size=12).map(lambda ms: np.asarray(ms, dtype=np.int64) * MS)
+    policy, before=milliseconds, after=milliseconds, refractory=milliseconds, merge=milliseconds,
+    minimum=milliseconds, time=st.sampled_from(["disturbances", "non-events"]),
+)  # fmt: skip
 clocks = st.lists(st.integers(1, 4), max_size=30).map(lambda steps: np.cumsum(np.asarray(steps, dtype=np.int64)) * MS)
 stretches = st.lists(st.tuples(st.integers(0, 60), st.integers(0, 15)), max_size=3).map(
     lambda pairs: np.asarray([(begin, begin + length) for begin, length in pairs], dtype=np.int64).reshape(-1, 2) * MS
 )
 truths = st.builds(
     lambda events, disturbance, length: GroundTruth(events, disturbance, (0, length * MS)),
-    stretches,
-    st.booleans(),
-    st.integers(0, 90),
-)
+    stretches, st.booleans(), st.integers(0, 90),
+)  # fmt: skip
 
 
 @st.composite
 def scored_recordings(draw):
     """Few distinct scores, so that ties are common, and some frames without an answer."""
-    clock = draw(clocks)
-    score = draw(
-        arrays.arrays(np.float64, clock.size, elements=st.sampled_from([0.0, 1.0, 2.0, 2.5, 3.0, 7.0, np.nan]))
-    )
-    return ScoredRecording(clock, score, draw(truths))
+    clock, few = draw(clocks), st.sampled_from([0.0, 1.0, 2.0, 2.5, 3.0, 7.0, np.nan])
+    return ScoredRecording(clock, draw(arrays.arrays(np.float64, clock.size, elements=few)), draw(truths))

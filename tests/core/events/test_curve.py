@@ -31,17 +31,6 @@ def test_the_curve_is_each_threshold_on_its_own(recordings, rules):
         assert_same(curve.at(threshold), at_one(recordings, threshold, rules))
 
 
-def walk(seed, n=2000, step_s=0.01, jitter=0.0):
-    """Return a score that wanders and rises after each of three onsets, on a clock that need not be even."""
-    rng = np.random.default_rng(seed)
-    clock = seconds(*(step_s * (np.arange(n) + jitter * rng.uniform(0.0, 1.0, n))))
-    score = np.convolve(rng.normal(0.0, 1.0, n), np.ones(5) / 5, "same")
-    events = [(onset, onset + 0.5) for onset in (4.0, 9.0, 15.0)]
-    for onset, end in events:
-        score[round(onset / step_s) + 3 : round(end / step_s)] += 1.5
-    return ScoredRecording(clock, score, truth(events, span=(0.0, 20.0)))
-
-
 @given(st.lists(scored_recordings(), min_size=1, max_size=2), policies, st.sampled_from([0.0, 500.0, 1e6]))
 def test_the_operating_point_is_the_best_that_is_allowed(recordings, rules, bound):
     curve = threshold_curve(recordings, rules)
@@ -72,7 +61,8 @@ def test_of_thresholds_of_equal_recall_the_fewest_false_positives_decide_and_the
 
 
 def test_a_detector_that_hits_nothing_within_the_bound_never_raises_an_alarm():
-    worthless = walk(1)
-    score = np.where((worthless.t_ns // 10**9) % 2 == 1, 1.0, 0.0)
-    curve = threshold_curve([ScoredRecording(worthless.t_ns, score, worthless.truth)], policy(before=0.0, after=0.01))
+    # On in every other second, from 1 s on; the onset at 4 s allows an alarm within 10 ms.
+    clock = seconds(*np.arange(0.0, 20.0, 0.01))
+    worthless = ScoredRecording(clock, (clock // 10**9 % 2).astype(float), truth([(4.0, 4.5)], span=(0.0, 20.0)))
+    curve = threshold_curve([worthless], policy(before=0.0, after=0.01))
     assert curve.operating_point(0.0) == np.inf

@@ -8,15 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tactbench.core.errors import DataError
-from tactbench.core.events.labels import (
-    GROSS,
-    INCIPIENT,
-    STICK,
-    UNDECIDED,
-    at_rest,
-    slip_labels,
-    stick_ratio,
-)
+from tactbench.core.events.labels import GROSS, INCIPIENT, STICK, UNDECIDED, at_rest, slip_labels, stick_ratio
 from tactbench.core.spec.events import THRESHOLDS
 from tests.core.events.made import MS, clocks, seconds
 
@@ -25,18 +17,19 @@ SPEED = 0.01
 """Of the drag [m/s]."""
 
 
-def drag(step_s=0.001):
+def drag():
     """Return a press, a hold, a rising pull, a slip from 1.0 s to 1.5 s, a hold, and a lift at 2.0 s."""
-    t = step_s * np.arange(round(2.5 / step_s))
+    t = 0.001 * np.arange(2500)
     displacement = SPEED * np.clip(t - 1.0, 0.0, 0.5)
     normal = np.where(t < 2.0, P, 0.0)
     pull = np.interp(t, [0.0, 0.5, 1.0, 1.5, 1.55, 2.5], [0.0, 0.0, MU * P, MU * P, 0.0, 0.0])
     return t, displacement, pull, normal
 
 
-def labelled(shift_s=0):
-    t, displacement, pull, normal = drag()
-    return t, slip_labels(seconds(*t) + shift_s * 10**9, displacement, pull, normal, MU, THRESHOLDS)
+def labelled(factor=1.0, keep=slice(None)):
+    """Return times and labels of a part of the drag, under thresholds times `factor`."""
+    t, displacement, pull, normal = (one[keep] for one in drag())
+    return t, slip_labels(seconds(*t), displacement, pull, normal, MU, THRESHOLDS.scaled(factor))
 
 
 def test_a_drag_has_one_slip_whose_onset_is_the_threshold_over_the_speed_late():
@@ -72,8 +65,7 @@ def test_motion_in_the_air_and_motion_from_the_first_sample_are_no_events():
     aloft = slip_labels(seconds(*t), displacement, pull, np.zeros_like(normal), MU, THRESHOLDS)
     assert aloft.gross_ns.shape == (0, 2)
     assert np.all(aloft.state == UNDECIDED)
-    late = t >= 1.2
-    moving = slip_labels(seconds(*t[late]), displacement[late], pull[late], normal[late], MU, THRESHOLDS)
+    _, moving = labelled(keep=t >= 1.2)
     assert moving.gross_ns.shape == (0, 2)
     assert np.any(moving.state == GROSS)
 
@@ -118,20 +110,14 @@ def test_a_slip_as_short_as_a_sample_is_a_slip(samples):
 
 
 def test_a_surface_that_never_rests_is_refused():
-    t, displacement, pull, normal = drag()
-    middle = (t > 1.1) & (t < 1.4)
     with pytest.raises(DataError, match="never rests"):
-        slip_labels(seconds(*t[middle]), displacement[middle], pull[middle], normal[middle], MU, THRESHOLDS)
+        labelled(keep=slice(1101, 1400))
 
 
 def test_halved_and_doubled_thresholds_move_the_labels_the_way_they_say():
-    t, displacement, pull, normal = drag()
-    scales = {
-        factor: slip_labels(seconds(*t), displacement, pull, normal, MU, THRESHOLDS.scaled(factor))
-        for factor in (0.5, 1.0, 2.0)
-    }
-    onsets = [scales[factor].gross_ns[0, 0] / 1e9 for factor in (0.5, 1.0, 2.0)]
+    found = [labelled(factor)[1] for factor in (0.5, 1.0, 2.0)]
+    onsets = [one.gross_ns[0, 0] / 1e9 for one in found]
     late = THRESHOLDS.gross_displacement_m / SPEED
     assert onsets == pytest.approx([1.0 + late / 2, 1.0 + late, 1.0 + 2 * late], abs=2.1e-3)
-    begins = [int(np.argmax(scales[factor].state == INCIPIENT)) for factor in (0.5, 1.0, 2.0)]
+    begins = [int(np.argmax(one.state == INCIPIENT)) for one in found]
     assert begins == sorted(begins)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from tactbench.core.evaluation.interval import score_interval
+from tactbench.core.evaluation.interval import ReplicateUnits, score_interval
 from tactbench.core.evaluation.metrics import METRICS
 from tactbench.core.statistics.paired import difference
 from tactbench.core.statistics.ranking import ranks
@@ -38,10 +38,11 @@ def test_the_interval_of_a_score_covers_the_truth(synthetic, metric, sessions):
     truth = synthetic.truth_of(metric, draw, 0.5, 1.0)
     rng = np.random.default_rng([1, sessions])
     code = np.repeat(np.arange(sessions), synthetic.ROWS)
+    unit = ReplicateUnits("session", code, ())
     hits = 0
     for _ in range(TRIALS):
         y, answered = draw(rng, sessions, 0.5, 1.0)
-        found = score_interval(METRICS[metric], y.ravel(), answered.ravel(), code, code, "session", k, 0)
+        found = score_interval(METRICS[metric], y.ravel(), answered.ravel(), code, unit, k, 0)
         hits += found.low <= truth <= found.high
     assert hits >= FEWEST
 

@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from tactbench.core.errors import NotApplicable
-from tactbench.core.evaluation.interval import score_interval
+from tactbench.core.evaluation.interval import ReplicateUnits, score_interval
 from tactbench.core.evaluation.metrics import Metric, metric_called
 from tactbench.core.report.figures.group import Group, Panel, Remark
 from tactbench.core.report.figures.sketch import Sketch, coloured, heading, marks, metric_name
@@ -96,8 +96,8 @@ def _band(metric: Metric, test: Answers, inside: npt.NDArray[np.bool_], n_classe
     if not inside.any():
         return Band(0.0, 0.0, 0.0, 0)
     alone = replace(metric, rows=lambda y, predicted, n: metric.rows(y, predicted, n) * inside[:, None])
-    no_groups = np.zeros(len(test), dtype=np.int64)  # sessions are not resampled: the test set is one
-    found = score_interval(alone, test.y_true, test.y_pred, test.recording, no_groups, "session", n_classes, seed)
+    one = ReplicateUnits("session", np.zeros(len(test), dtype=np.int64), ())  # sessions are not resampled
+    found = score_interval(alone, test.y_true, test.y_pred, test.recording, one, n_classes, seed)
     value = metric.of(test.y_true[inside], test.y_pred[inside], n_classes)
     return Band(value, found.low, found.high, int(inside.sum()))
 

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from tactbench.core.errors import DataError, NotApplicable
 from tactbench.core.evaluation.dataset import load_dataset
 from tactbench.core.evaluation.protocols import KARL2016
-from tactbench.core.evaluation.sets import keep, part, scales
+from tactbench.core.evaluation.sets import keep, part, scale_of
 from tactbench.core.evaluation.splits import make_splits
 from tactbench.core.plugins.registry import load_object
 from tactbench.core.report import embedding
@@ -97,8 +97,8 @@ def test_the_features_are_those_the_estimator_answered_from(finished):
     task = REGISTRY.tasks["curvature"].spec
     data = load_dataset(task, material.recordings(row))
     (roles,) = make_splits(data, "roles", row["seed"])
-    train, other = (keep(data, KARL2016, masks, "set", Counter()) for masks in (roles.train, roles.test))
-    learnt = part(train, scales(KARL2016, train, other)[0], 0)
+    train = keep(data, KARL2016, roles.train, "set", Counter())
+    learnt = part(train, scale_of(KARL2016, train, train), 0)
     forest = REGISTRY.estimators["forest"]
     settings = {**forest.params, **row["params"]}
     model = load_object(forest.where)(kind="classification", seed=row["seed"], threads=1, **settings)
