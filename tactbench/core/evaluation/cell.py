@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import copy
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import Any
@@ -92,8 +92,6 @@ class CellContext:
     """that estimator and BLAS may use"""
     latency: bool = True
     """whether to measure how long the answer to one row takes"""
-    progress: Callable[[str], None] | None = None
-    """told what is being done"""
 
 
 def evaluate_cell(context: CellContext, recordings: Sequence[Path] | Dataset) -> Result:
@@ -113,7 +111,7 @@ def evaluate_cell(context: CellContext, recordings: Sequence[Path] | Dataset) ->
     build = builder(estimator, context.params, task, seed, context.threads)
     return evaluate(
         Configured(without_windows(estimator, task), build, context.params), data, clock=context.clock, seed=seed,
-        threads=context.threads, latency=context.latency, progress=context.progress,
+        threads=context.threads, latency=context.latency,
     )  # fmt: skip
 
 
@@ -267,7 +265,6 @@ def evaluate(
     seed: int = 0,
     threads: int = 1,
     latency: bool = True,
-    progress: Callable[[str], None] | None = None,
 ) -> Result:
     """Answer a task with an estimator, and measure how well and at what cost.
 
@@ -275,7 +272,7 @@ def evaluate(
     ----------
     estimator
         Any object with ``fit`` and ``predict``, which stays as it is; or one that is to be made anew.
-    clock, seed, threads, latency, progress
+    clock, seed, threads, latency
         As in :class:`CellContext`; `seed` decides what intervals resample.
     """
     if not isinstance(estimator, Configured):
@@ -288,8 +285,6 @@ def evaluate(
     answered: list[AnsweredFold] = []
     with thread_limit(threads):
         for number, assignment in enumerate(data.assignments):
-            if progress is not None:
-                progress(f"{descriptor.name}: {assignment.name}")
             fitted = _fit(estimator, data, assignment, metric, counts, clock)
             answered.append(_answer(fitted, data, descriptor, metric, rules, number, clock))
         times, delay_remarks = _times(fitted, answered, data, descriptor, clock, threads, latency=latency)

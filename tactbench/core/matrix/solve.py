@@ -6,7 +6,7 @@ import json
 import os
 import random
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -85,15 +85,13 @@ Solved = tuple[Row, "dict[str, Answers]"]
 """A row of plain data, and the answers by role."""
 
 
-def solve(job: Job, concurrency: int = 1, progress: Callable[[str], None] | None = None) -> Solved:
+def solve(job: Job, concurrency: int = 1) -> Solved:
     """Evaluate one cell; raises whatever its plugins and recordings raise.
 
     Parameters
     ----------
     concurrency
         Pieces of work of the run that may be at work beside this one, itself included.
-    progress
-        Called with what is being done.
     """
     cell, task, estimator, recordings, *_ = job
     folder = Path.cwd()
@@ -113,7 +111,7 @@ def solve(job: Job, concurrency: int = 1, progress: Callable[[str], None] | None
     data = dataset(task, recordings)
     context = CellContext(
         task, estimator, dict(cell.params), cell.protocol, cell.split, seed=cell.seed, clock=time.perf_counter,
-        progress=progress, latency=cell.timed,
+        latency=cell.timed,
     )  # fmt: skip
     result = evaluate_cell(context, data)
     row = {

@@ -49,7 +49,7 @@ def test_equal_circumstances_give_equal_provenance_without_clock_person_host_or_
     assert found["distributions"]["numpy"] == metadata.version("numpy")
     assert (found["seed"], found["host"]) == (1, host_id())
     assert found["memory_mb"] > 0
-    assert found["threads"]
+    assert found["threads"] == os.environ["OMP_NUM_THREADS"]
 
 
 def test_a_strangers_plugin_is_told_with_its_source_and_nothing_is_imported_for_it(tmp_path):
