@@ -11,14 +11,13 @@ import sys
 from contextlib import closing
 from dataclasses import fields
 
-import h5py
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from tactbench.core.errors import FolderError, FormatError
 from tactbench.core.matrix.store import Store
-from tactbench.core.matrix.store import cell_file as format_of_cells
+from tactbench.core.matrix.store.cell_file import FORMAT, read_cell
 from tactbench.core.samples import Answers
 from tests.conftest import ROOT
 from tests.core.pool.patience import ending, files_up_to
@@ -80,15 +79,10 @@ def test_the_latest_of_a_name_counts(tmp_path):
     assert (len(found.answers(key(1))["test"]), found.finished(key(1))["repeats"]) == (3, 3)
 
 
-def _of_another_version(path):
-    with h5py.File(path, "a") as file:
-        file.attrs["format"] = "tactbench-cell 1"
-
-
 DAMAGES = {
     "cut": lambda path: path.write_bytes(path.read_bytes()[:-1]),
     "empty": lambda path: path.write_bytes(b""),
-    "of another version": _of_another_version,
+    "of another version": lambda path: path.write_bytes(path.read_bytes().replace(FORMAT, b"tactbench-cell 1 ")),
     "no HDF5": lambda path: path.write_text("a, b, c"),
 }
 
@@ -115,21 +109,17 @@ def test_a_damaged_file_is_told_left_out_and_replaced(tmp_path, damage):
 def sound(tmp_path_factory):
     folder = tmp_path_factory.mktemp("sound")
     with Store(folder).hold() as store:
-        made = kept(store, "a")
-    return made, file_of(folder, "a").read_bytes(), folder / "changed.h5"
+        kept(store, "a")
+    return file_of(folder, "a").read_bytes(), folder / "changed.h5"
 
 
 @given(place=st.floats(0, 1, exclude_max=True), flip=st.integers(1, 255))
-def test_a_changed_byte_is_seen_or_changes_nothing(sound, place, flip):
-    made, content, path = sound
+def test_a_changed_byte_is_seen(sound, place, flip):
+    content, path = sound
     where = int(place * len(content))
     path.write_bytes(content[:where] + bytes([content[where] ^ flip]) + content[where + 1 :])
-    try:
-        found = format_of_cells.read_cell(path)
-    except FormatError:
-        return
-    assert (found.row, found.sections) == (made, SECTIONS)
-    assert found.answers["test"].y_pred.tobytes() == answers(3).y_pred.tobytes()
+    with pytest.raises(FormatError):
+        read_cell(path)
 
 
 def _older(index, folder):
