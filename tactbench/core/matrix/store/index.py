@@ -18,7 +18,7 @@ from tactbench.core.errors import FormatError
 from tactbench.core.matrix.store.cell_file import CellFile, read_cell
 from tactbench.core.spec.row import FORMAT
 
-VERSION = 1
+VERSION = 2
 _LOCKED_S = 10.0
 """Seconds to wait for another process that writes the index."""
 _TYPES = {str: "TEXT", int: "INTEGER", bool: "INTEGER", float: "REAL"}
