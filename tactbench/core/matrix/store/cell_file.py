@@ -50,7 +50,7 @@ class CellFile:
         import numpy as np
 
         head = {"row": self.row, "sections": self.sections, "provenance": self.provenance, "ended_ns": self.ended_ns}
-        text = json.dumps(head, sort_keys=True, allow_nan=False).encode()
+        text = json.dumps(head, allow_nan=False).encode()
         image = io.BytesIO()
         with h5py.File(image, "w", userblock_size=_USER_BLOCK) as file:
             file["head"] = np.bytes_(text)
