@@ -13,25 +13,20 @@ from tactbench.core.evaluation.protocols import PROTOCOLS, protocol_called
 from tactbench.core.evaluation.sets import causal_mean
 from tactbench.core.plugins.registry import load_registry
 from tactbench.plugin import Block, ForceRamp, RigDescriptor, Scene, StreamSpec, assumed
-from tests.core.evaluation.made import evaluated, force_task, record
+from tests.core.evaluation.made import evaluated, force_task, ramp, record
 
 TASK = force_task(protocols=tuple(PROTOCOLS))
 STEP_NS = 12_000_000  # 12 ms, as the paper's 5000 samples in 60 s
 K = 40
 
 
-def pressed(folder, *, t_ns="12 ms", own_hz=None, n=400):
+def pressed(folder, *, t_ns="12 ms", own_hz=None, n=1000):
     """Three recordings, one a role, of a sensor without a rate or a link of its own."""
-    rng = np.random.default_rng(7)
-    folder.mkdir(exist_ok=True)
-    paths = []
-    for role in ("train", "validation", "test"):
-        force = np.linspace(0.0, 5.0, n + 600)
-        clock = np.arange(len(force), dtype=np.int64) * STEP_NS if t_ns == "12 ms" else t_ns
-        X = force[:, None] * [3.0, -1.0] + 0.1 * rng.standard_normal((len(force), 2))
-        paths.append(record(folder / f"{role}.h5", X, force, t_ns=clock, role=role, session=role,
-                            own_rates_hz=own_hz or {}))  # fmt: skip
-    return paths
+    folder.mkdir()
+    clock = np.arange(n, dtype=np.int64) * STEP_NS if t_ns == "12 ms" else t_ns
+    return [record(folder / f"{role}.h5", *ramp(place, n=n), t_ns=clock, role=role, session=role,
+                   own_rates_hz=own_hz or {})
+            for place, role in enumerate(("train", "validation", "test"))]  # fmt: skip
 
 
 def with_link(data, link):
