@@ -68,18 +68,12 @@ def test_the_window_of_every_protocol_is_the_group_delay_of_the_filter_it_runs(t
 
 
 def test_a_quicker_sensor_waits_less_for_its_next_sample_and_the_scene_says_what_it_did(tmp_path):
-    said = []
-    for own_hz in (50.0, 1 / 0.012, 100.0):
+    for own_hz, said in ((50.0, "its own rate is 50 Hz"), (1 / 0.012, ""), (100.0, "its own rate is 100 Hz")):
         data = load_dataset(TASK, pressed(tmp_path / f"{own_hz:.0f}", own_hz={"taxels": own_hz}))
         parts, remarks = reading_delay_ms(with_link(data, assumed(0.5, "ms", "a test")))
-        assert parts["sampling"] == pytest.approx(1e3 / own_hz)
-        assert parts["window"] == pytest.approx(240.0), "at the rate of the recordings"
-        assert parts["link"] == 0.5
-        said.append(remarks)
-    assert said == [
-        ("taxels sampled at 83.33 Hz; its own rate is 50 Hz",), (),
-        ("taxels sampled at 83.33 Hz; its own rate is 100 Hz",),
-    ]  # fmt: skip
+        # The window is at the rate of the recordings.
+        assert parts == pytest.approx({"sampling": 1e3 / own_hz, "window": 240.0, "link": 0.5})
+        assert remarks == ((f"taxels sampled at 83.33 Hz; {said}",) if said else ())
 
 
 def test_what_is_not_known_is_absent_and_said(tmp_path):
@@ -99,11 +93,9 @@ def test_the_delay_of_a_cell_is_the_sum_of_its_parts_on_a_clock_that_counts_read
     assert untimed.times.answer_delay_ms is None, "without the times of a machine there is no sum"
     assert NO_LINK not in untimed.remarks
     result = evaluated(TASK, paths, OLS, "deployable-untared", "roles", latency=True)
-    # One tick passes between the two looks at the clock around each call.
-    tick_ms = 1e3 * 2.0**-10
-    assert result.times.delay_parts_ms == pytest.approx(
-        {"sampling": 12.0, "window": 240.0, "features": tick_ms, "prediction": tick_ms}
-    )
+    tick_ms = 1e3 * 2.0**-10  # passes between the two looks at the clock around each call
+    parts = {"sampling": 12.0, "window": 240.0, "features": tick_ms, "prediction": tick_ms}
+    assert result.times.delay_parts_ms == pytest.approx(parts)
     assert result.times.answer_delay_ms == pytest.approx(252.0 + 2 * tick_ms)
     assert result.times.latency_n == 200
     assert result.times.latency_ms_p95 is not None

@@ -139,12 +139,9 @@ def test_without_validation_recordings_a_share_of_the_training_groups_serves(tmp
     assert result.score == 1.0
 
 
-def test_without_disturbances_no_threshold_can_be_chosen(paths):
+def test_without_disturbances_or_a_reference_nothing_is_answered_and_what_is_missing_is_named(paths, tmp_path):
     with pytest.raises(DataError, match="no disturbance to count false alarms on"):
         run([path for path in paths if path.stem.endswith("slip")])
-
-
-def test_what_is_missing_of_the_reference_is_named(tmp_path):
     path = record(tmp_path / "blind.h5", slips=True, seed=1, reference=False)
     with pytest.raises(NotApplicable, match="'blind' has no normal, no tangential, no slip"):
         load_dataset(TASK, [path])

@@ -5,8 +5,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tactbench.core.leaderboard.table import build_table
 from tactbench.core.statistics.paired import difference
+from tactbench.core.statistics.ranking import ranks
 from tactbench.core.statistics.replicates import (
     FEWEST,
     MedianInterval,
@@ -43,12 +43,10 @@ def test_eight_replicates_are_one_row_with_their_median_and_its_interval():
 
 
 @pytest.mark.parametrize("n", [1, 4])
-def test_fewer_than_five_have_no_interval_and_no_rank(n):
+def test_fewer_than_five_have_no_interval_and_share_a_rank(n):
     rows = over_replicates([*replicates(SCORES[:n]), *replicates(SCORES[1 : n + 1], "b")])
     assert all(one["ci_low"] is None and one["ci_high"] is None for one in rows)
-    lines = build_table(rows).blocks[0].lines
-    assert [line.cells[0] for line in lines] == ["1=", "1="]
-    assert [line.placing.low for line in lines] == [None, None]
+    assert {(one.place, one.low, one.high) for one in ranks(rows).values()} == {(1, 1, 2)}
 
 
 def test_rows_are_the_same_in_any_order_and_aggregated_once():
