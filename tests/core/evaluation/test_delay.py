@@ -13,7 +13,7 @@ from tactbench.core.evaluation.protocols import PROTOCOLS, protocol_called
 from tactbench.core.evaluation.sets import causal_mean
 from tactbench.core.plugins.registry import load_registry
 from tactbench.plugin import Block, ForceRamp, RigDescriptor, Scene, StreamSpec, assumed
-from tests.core.evaluation.made import evaluated, force_task, ramp, record
+from tests.core.evaluation.made import evaluated, force_task, ramp, record, sensor
 
 TASK = force_task(protocols=tuple(PROTOCOLS))
 STEP_NS = 12_000_000  # 12 ms, as the paper's 5000 samples in 60 s
@@ -27,16 +27,6 @@ def pressed(folder, *, t_ns="12 ms", own_hz=None, n=1000):
     return [record(folder / f"{role}.h5", *ramp(place, n=n), t_ns=clock, role=role, session=role,
                    own_rates_hz=own_hz or {})
             for place, role in enumerate(("train", "validation", "test"))]  # fmt: skip
-
-
-def with_link(data, link):
-    """The data of a sensor that states its link."""
-
-    def linked(table):
-        sensor = table.meta.sensor.model_copy(update={"link_delay": link})
-        return replace(table, meta=table.meta.model_copy(update={"sensor": sensor}))
-
-    return replace(data, tables=tuple(map(linked, data.tables)))
 
 
 OLS = load_registry().estimators["ols"].model_copy(update={"window_grid": (K,)})
@@ -70,7 +60,9 @@ def test_the_window_of_every_protocol_is_the_group_delay_of_the_filter_it_runs(t
 def test_a_quicker_sensor_waits_less_for_its_next_sample_and_the_scene_says_what_it_did(tmp_path):
     for own_hz, said in ((50.0, "its own rate is 50 Hz"), (1 / 0.012, ""), (100.0, "its own rate is 100 Hz")):
         data = load_dataset(TASK, pressed(tmp_path / f"{own_hz:.0f}", own_hz={"taxels": own_hz}))
-        parts, remarks = reading_delay_ms(with_link(data, assumed(0.5, "ms", "a test")))
+        linked = sensor().model_copy(update={"link_delay": assumed(0.5, "ms", "a test")})
+        tables = [replace(one, meta=one.meta.model_copy(update={"sensor": linked})) for one in data.tables]
+        parts, remarks = reading_delay_ms(replace(data, tables=tuple(tables)))
         # The window is at the rate of the recordings.
         assert parts == pytest.approx({"sampling": 1e3 / own_hz, "window": 240.0, "link": 0.5})
         assert remarks == ((f"taxels sampled at 83.33 Hz; {said}",) if said else ())
@@ -118,12 +110,12 @@ class SlowRig:
 
 
 def test_a_recording_keeps_the_rate_of_the_sensor_that_it_was_not_sampled_at(tmp_path):
-    sensor = load_registry().sensors["ideal"]
-    (own,) = sensor.spec.streams
+    ideal = load_registry().sensors["ideal"]
+    (own,) = ideal.spec.streams
     rig = RigDescriptor(name="slow", title="slow", where="nowhere:none")
     for rate, kept in ((25.0, {"taxels": 100.0}), (100.0, {})):
         stream = StreamSpec.model_validate({**own.model_dump(), "rate_hz": rate})
-        done = acquire(SlowRig((stream,)), sensor, rig, Scene(name="s", profile=ForceRamp()), role=None, seed=1,
+        done = acquire(SlowRig((stream,)), ideal, rig, Scene(name="s", profile=ForceRamp()), role=None, seed=1,
                        path=tmp_path / f"{rate:.0f}.h5", clock=lambda: 0.0, provenance={})  # fmt: skip
         assert done.meta.own_rates_hz == kept
-        assert done.meta.sensor.link_delay == sensor.spec.link_delay
+        assert done.meta.sensor.link_delay == ideal.spec.link_delay

@@ -13,7 +13,7 @@ from tactbench.core.evaluation.protocols import protocol_called
 from tactbench.core.evaluation.summaries import summary_of
 from tactbench.core.plugins.registry import load_registry
 from tactbench.core.samples import StreamReadings
-from tactbench.plugin import EstimatorDescriptor, Summary
+from tactbench.plugin import Summary
 from tactbench.tasks import slip, slip_state
 from tests.core.evaluation.made import evaluated
 from tests.core.evaluation.made_slip import campaign, record
@@ -32,12 +32,6 @@ def paths(tmp_path_factory):
     return campaign(tmp_path_factory.mktemp("campaign"))
 
 
-def stream_of(n=400, rate_hz=200.0, seed=3):
-    rng = np.random.default_rng(seed)
-    time_s = np.cumsum(rng.uniform(0.2, 1.8, n)) / rate_hz  # uneven: nothing is resampled
-    return StreamReadings("made", ("a", "b"), ("taxel", "taxel"), rng.normal(40.0, 3.0, (n, 2)), time_s, rate_hz)
-
-
 @pytest.mark.parametrize(
     "summary",
     [
@@ -49,9 +43,10 @@ def stream_of(n=400, rate_hz=200.0, seed=3):
     ids=lambda summary: summary.name,
 )
 def test_a_frame_is_the_summary_of_its_own_samples(paths, summary):
-    table = load_dataset(TASK, paths[:1]).tables[0]
-    stream = stream_of()
-    table = replace(table, readings=(stream,))
+    rng = np.random.default_rng(3)
+    time_s = np.cumsum(rng.uniform(0.2, 1.8, 400)) / 200.0  # uneven: nothing is resampled
+    stream = StreamReadings("made", ("a", "b"), ("taxel", "taxel"), rng.normal(40.0, 3.0, (400, 2)), time_s, 200.0)
+    table = replace(load_dataset(TASK, paths[:1]).tables[0], readings=(stream,))
     frames = frame_times(table, TASK, protocol_called("deployable-untared"))
     estimator = REGISTRY.estimators["frame-difference"].model_copy(update={"summaries": (summary,)})
     _, X = frame_features(TASK, protocol_called("deployable-untared"), estimator)(table, frames)
@@ -183,10 +178,7 @@ def test_states_are_answered_a_frame_and_shown_under_other_thresholds(paths):
 
 
 def test_code_for_features_must_give_a_line_a_frame(paths):
-    wrong = EstimatorDescriptor(
-        name="wrong", title="?", kinds=("events",), where="tactbench.estimators.slip_detectors:mean_feature",
-        frames_by=f"{__name__}:one_line",
-    )  # fmt: skip
+    wrong = REGISTRY.estimators["wavelet-energy"].model_copy(update={"frames_by": f"{__name__}:one_line"})
     with pytest.raises(PluginContractError, match=r"shape \(1, 1\) for \d+ frames"):
         framed(load_dataset(TASK, paths[:1]), TASK, RULES, wrong)
 

@@ -21,12 +21,12 @@ def three(folder, make, **more):
             for place, role in enumerate(ROLES)]  # fmt: skip
 
 
-def sets(paths, role, k=0):
+def sets(paths, role):
     data = load_dataset(force_task(), paths)
     (assignment,) = make_splits(data, "roles", 0)
     counts = Counter()
     kept = keep(data, KARL2016, getattr(assignment, role), role, counts)
-    return kept, part(kept, FeatureScale(*moments(kept.X)), k), counts
+    return kept, part(kept, FeatureScale(*moments(kept.X)), 0), counts
 
 
 def test_the_first_600_samples_are_dropped(tmp_path):
@@ -78,13 +78,6 @@ def test_a_channel_that_never_changes_becomes_zero_and_is_reported(tmp_path):
     result = run(paths)
     assert result.counts["folds in which t2 never changes in training"] == 1
     assert np.isfinite(result.score)
-
-
-def test_the_window_is_the_mean_over_t_minus_k_to_t_within_one_recording(tmp_path):
-    kept, one, _ = sets(three(tmp_path, ramp), "train", k=20)
-    z = FeatureScale(*moments(kept.X))(kept.X)
-    for t in (0, 1, 19, 20, 21, 999):
-        np.testing.assert_allclose(one.X[t], z[max(0, t - 20) : t + 1].mean(axis=0), atol=1e-12)
 
 
 def run(paths, estimator="lasso", **more):

@@ -12,23 +12,15 @@ from tactbench.core.events.metrics import score_events
 from tests.core.events.made import policies, scored_recordings
 
 
-def at_one(recordings, threshold, rules):
-    """Return the scores at one threshold, by way of its alarms."""
-    raised = [alarms(one.t_ns, one.score >= threshold, rules) for one in recordings]
-    return score_events([one.truth for one in recordings], raised, rules)
-
-
-def assert_same(one, other):
-    assert (one.n_alarms, one.n_false_alarms, one.base_ns) == (other.n_alarms, other.n_false_alarms, other.base_ns)
-    assert np.array_equal(one.latency_s, other.latency_s, equal_nan=True)
-
-
 @given(st.lists(scored_recordings(), max_size=3), policies)
 def test_the_curve_is_each_threshold_on_its_own(recordings, rules):
     curve = threshold_curve(recordings, rules)
     # Every score that occurs, between them, below and above all; the rows of the curve themselves.
     for threshold in (-1.0, 0.0, 0.5, 1.0, 1.5, 2.0, 2.25, 2.5, 2.75, 3.0, 5.0, 7.0, 8.0, np.inf, *curve.threshold):
-        assert_same(curve.at(threshold), at_one(recordings, threshold, rules))
+        raised = [alarms(one.t_ns, one.score >= threshold, rules) for one in recordings]
+        alone, row = score_events([one.truth for one in recordings], raised, rules), curve.at(threshold)
+        assert (row.n_alarms, row.n_false_alarms, row.base_ns) == (alone.n_alarms, alone.n_false_alarms, alone.base_ns)
+        assert np.array_equal(row.latency_s, alone.latency_s, equal_nan=True)
 
 
 @given(st.lists(scored_recordings(), min_size=1, max_size=2), policies, st.sampled_from([0.0, 500.0, 1e6]))
