@@ -10,7 +10,7 @@ from tactbench.core.evaluation.protocols import DEPLOYABLE
 from tactbench.core.evaluation.splits import choose_split, inner_splits, make_splits, shots, training_sessions
 from tactbench.plugin import load_registry
 
-from .made import force_task, record
+from .made import force_task, record, sessions
 
 TASKS = {task.spec.name: task.spec for task in load_registry().tasks}
 CAMPAIGNS = [(name, split) for name, task in TASKS.items() for split in task.campaigns]
@@ -87,20 +87,14 @@ def test_few_shots_train_on_nested_sets_and_test_on_the_same(loaded, name):
 
 
 def test_sessions_are_taken_in_order_of_their_numbers(tmp_path):
-    X = np.zeros((ROWS, 2)) + np.arange(ROWS)[:, None]
-    names = ("day-10", "day-9", "day-2", "both", "last")
-    roles = ("train", "train", "train", "train", "test")
-    paths = [record(tmp_path / f"{name}.h5", X, np.arange(ROWS), session=name, role=role)
-             for name, role in zip(names, roles, strict=True)]  # fmt: skip
-    paths.append(record(tmp_path / "again.h5", X, np.arange(ROWS), session="both", role="test"))
-    data = load_dataset(force_task(), paths)
+    (tmp_path / "test").mkdir()
+    paths = sessions(tmp_path, ("day-10", "day-9", "day-2", "both"), ROWS, role="train")
+    data = load_dataset(force_task(), paths + sessions(tmp_path / "test", ("both", "last"), ROWS, role="test"))
     assert training_sessions(data) == ["day-2", "day-9", "day-10"], "a session with a test recording never trains"
 
 
 def test_a_fold_says_whether_its_radius_lies_between_those_of_training(loaded):
     folds = make_splits(loaded("inverse-radius", "cap_radius_mm"), "cap_radius_mm", 0, one_by_one=True)
     told = {fold.name.removeprefix("cap_radius_mm ").split(", ")[0]: fold.name.split(", ")[1] for fold in folds}
-    assert told == {
-        "5.0": "extrapolated", "flat": "extrapolated",
-        **dict.fromkeys(("7.5", "10.0", "20.0", "40.0"), "interpolated"),
-    }  # fmt: skip
+    between = dict.fromkeys(("7.5", "10.0", "20.0", "40.0"), "interpolated")
+    assert told == between | {"5.0": "extrapolated", "flat": "extrapolated"}

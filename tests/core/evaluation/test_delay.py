@@ -13,35 +13,20 @@ from tactbench.core.evaluation.protocols import PROTOCOLS, protocol_called
 from tactbench.core.evaluation.sets import causal_mean
 from tactbench.core.plugins.registry import load_registry
 from tactbench.plugin import Block, ForceRamp, RigDescriptor, Scene, StreamSpec, assumed
-from tests.core.evaluation.made import evaluated, force_task, record
+from tests.core.evaluation.made import evaluated, force_task, ramp, record, sensor
 
 TASK = force_task(protocols=tuple(PROTOCOLS))
 STEP_NS = 12_000_000  # 12 ms, as the paper's 5000 samples in 60 s
 K = 40
 
 
-def pressed(folder, *, t_ns="12 ms", own_hz=None, n=400):
+def pressed(folder, *, t_ns="12 ms", own_hz=None, n=1000):
     """Three recordings, one a role, of a sensor without a rate or a link of its own."""
-    rng = np.random.default_rng(7)
-    folder.mkdir(exist_ok=True)
-    paths = []
-    for role in ("train", "validation", "test"):
-        force = np.linspace(0.0, 5.0, n + 600)
-        clock = np.arange(len(force), dtype=np.int64) * STEP_NS if t_ns == "12 ms" else t_ns
-        X = force[:, None] * [3.0, -1.0] + 0.1 * rng.standard_normal((len(force), 2))
-        paths.append(record(folder / f"{role}.h5", X, force, t_ns=clock, role=role, session=role,
-                            own_rates_hz=own_hz or {}))  # fmt: skip
-    return paths
-
-
-def with_link(data, link):
-    """The data of a sensor that states its link."""
-
-    def linked(table):
-        sensor = table.meta.sensor.model_copy(update={"link_delay": link})
-        return replace(table, meta=table.meta.model_copy(update={"sensor": sensor}))
-
-    return replace(data, tables=tuple(map(linked, data.tables)))
+    folder.mkdir()
+    clock = np.arange(n, dtype=np.int64) * STEP_NS if t_ns == "12 ms" else t_ns
+    return [record(folder / f"{role}.h5", *ramp(place, n=n), t_ns=clock, role=role, session=role,
+                   own_rates_hz=own_hz or {})
+            for place, role in enumerate(("train", "validation", "test"))]  # fmt: skip
 
 
 OLS = load_registry().estimators["ols"].model_copy(update={"window_grid": (K,)})
@@ -73,18 +58,14 @@ def test_the_window_of_every_protocol_is_the_group_delay_of_the_filter_it_runs(t
 
 
 def test_a_quicker_sensor_waits_less_for_its_next_sample_and_the_scene_says_what_it_did(tmp_path):
-    said = []
-    for own_hz in (50.0, 1 / 0.012, 100.0):
+    for own_hz, said in ((50.0, "its own rate is 50 Hz"), (1 / 0.012, ""), (100.0, "its own rate is 100 Hz")):
         data = load_dataset(TASK, pressed(tmp_path / f"{own_hz:.0f}", own_hz={"taxels": own_hz}))
-        parts, remarks = reading_delay_ms(with_link(data, assumed(0.5, "ms", "a test")))
-        assert parts["sampling"] == pytest.approx(1e3 / own_hz)
-        assert parts["window"] == pytest.approx(240.0), "at the rate of the recordings"
-        assert parts["link"] == 0.5
-        said.append(remarks)
-    assert said == [
-        ("taxels sampled at 83.33 Hz; its own rate is 50 Hz",), (),
-        ("taxels sampled at 83.33 Hz; its own rate is 100 Hz",),
-    ]  # fmt: skip
+        linked = sensor().model_copy(update={"link_delay": assumed(0.5, "ms", "a test")})
+        tables = [replace(one, meta=one.meta.model_copy(update={"sensor": linked})) for one in data.tables]
+        parts, remarks = reading_delay_ms(replace(data, tables=tuple(tables)))
+        # The window is at the rate of the recordings.
+        assert parts == pytest.approx({"sampling": 1e3 / own_hz, "window": 240.0, "link": 0.5})
+        assert remarks == ((f"taxels sampled at 83.33 Hz; {said}",) if said else ())
 
 
 def test_what_is_not_known_is_absent_and_said(tmp_path):
@@ -104,11 +85,9 @@ def test_the_delay_of_a_cell_is_the_sum_of_its_parts_on_a_clock_that_counts_read
     assert untimed.times.answer_delay_ms is None, "without the times of a machine there is no sum"
     assert NO_LINK not in untimed.remarks
     result = evaluated(TASK, paths, OLS, "deployable-untared", "roles", latency=True)
-    # One tick passes between the two looks at the clock around each call.
-    tick_ms = 1e3 * 2.0**-10
-    assert result.times.delay_parts_ms == pytest.approx(
-        {"sampling": 12.0, "window": 240.0, "features": tick_ms, "prediction": tick_ms}
-    )
+    tick_ms = 1e3 * 2.0**-10  # passes between the two looks at the clock around each call
+    parts = {"sampling": 12.0, "window": 240.0, "features": tick_ms, "prediction": tick_ms}
+    assert result.times.delay_parts_ms == pytest.approx(parts)
     assert result.times.answer_delay_ms == pytest.approx(252.0 + 2 * tick_ms)
     assert result.times.latency_n == 200
     assert result.times.latency_ms_p95 is not None
@@ -131,12 +110,12 @@ class SlowRig:
 
 
 def test_a_recording_keeps_the_rate_of_the_sensor_that_it_was_not_sampled_at(tmp_path):
-    sensor = load_registry().sensors["ideal"]
-    (own,) = sensor.spec.streams
+    ideal = load_registry().sensors["ideal"]
+    (own,) = ideal.spec.streams
     rig = RigDescriptor(name="slow", title="slow", where="nowhere:none")
     for rate, kept in ((25.0, {"taxels": 100.0}), (100.0, {})):
         stream = StreamSpec.model_validate({**own.model_dump(), "rate_hz": rate})
-        done = acquire(SlowRig((stream,)), sensor, rig, Scene(name="s", profile=ForceRamp()), role=None, seed=1,
+        done = acquire(SlowRig((stream,)), ideal, rig, Scene(name="s", profile=ForceRamp()), role=None, seed=1,
                        path=tmp_path / f"{rate:.0f}.h5", clock=lambda: 0.0, provenance={})  # fmt: skip
         assert done.meta.own_rates_hz == kept
-        assert done.meta.sensor.link_delay == sensor.spec.link_delay
+        assert done.meta.sensor.link_delay == ideal.spec.link_delay

@@ -13,10 +13,7 @@ from tactbench.core.evaluation.protocols import protocol_called
 from tactbench.core.evaluation.summaries import summary_of
 from tactbench.core.plugins.registry import load_registry
 from tactbench.core.samples import StreamReadings
-from tactbench.plugin import (
-    EstimatorDescriptor,
-    Summary,
-)
+from tactbench.plugin import Summary
 from tactbench.tasks import slip, slip_state
 from tests.core.evaluation.made import evaluated
 from tests.core.evaluation.made_slip import campaign, record
@@ -35,12 +32,6 @@ def paths(tmp_path_factory):
     return campaign(tmp_path_factory.mktemp("campaign"))
 
 
-def stream_of(n=400, rate_hz=200.0, seed=3):
-    rng = np.random.default_rng(seed)
-    time_s = np.cumsum(rng.uniform(0.2, 1.8, n)) / rate_hz  # uneven: nothing is resampled
-    return StreamReadings("made", ("a", "b"), ("taxel", "taxel"), rng.normal(40.0, 3.0, (n, 2)), time_s, rate_hz)
-
-
 @pytest.mark.parametrize(
     "summary",
     [
@@ -52,15 +43,14 @@ def stream_of(n=400, rate_hz=200.0, seed=3):
     ids=lambda summary: summary.name,
 )
 def test_a_frame_is_the_summary_of_its_own_samples(paths, summary):
-    table = load_dataset(TASK, paths[:1]).tables[0]
-    stream = stream_of()
-    table = replace(table, readings=(stream,))
+    rng = np.random.default_rng(3)
+    time_s = np.cumsum(rng.uniform(0.2, 1.8, 400)) / 200.0  # uneven: nothing is resampled
+    stream = StreamReadings("made", ("a", "b"), ("taxel", "taxel"), rng.normal(40.0, 3.0, (400, 2)), time_s, 200.0)
+    table = replace(load_dataset(TASK, paths[:1]).tables[0], readings=(stream,))
     frames = frame_times(table, TASK, protocol_called("deployable-untared"))
     estimator = REGISTRY.estimators["frame-difference"].model_copy(update={"summaries": (summary,)})
     _, X = frame_features(TASK, protocol_called("deployable-untared"), estimator)(table, frames)
-    begin, end = (
-        (summary.start * 0.1, summary.end * 0.1) if summary.unit == "recording" else (summary.start, summary.end)
-    )
+    begin, end = np.array([summary.start, summary.end]) * (0.1 if summary.unit == "recording" else 1.0)
     for place in range(0, len(X), 17):
         at = frames[place] * 1e-9 - 0.1
         inside = (stream.time_s > at + begin) & (stream.time_s <= at + end)
@@ -126,11 +116,7 @@ def test_a_sensor_without_vibration_is_refused_with_its_band_or_answers_by_what_
 
 def test_the_threshold_comes_from_validation_alone(paths, tmp_path):
     quiet = [path for path in paths if not path.stem.startswith("test")]
-    silent = [
-        record(tmp_path / f"test-{place}-{slips}.h5", slips=slips, seed=place, loud=1.0, role="test", session="test")
-        for place in range(3)
-        for slips in (True, False)
-    ]  # fmt: skip
+    silent = campaign(tmp_path, ("test",), loud=1.0)
     loud, other = run(paths), run([*quiet, *silent])
     assert loud.chosen == other.chosen
     assert other.events["misses"] == 3  # nothing to hear in these
@@ -138,27 +124,19 @@ def test_the_threshold_comes_from_validation_alone(paths, tmp_path):
 
 
 def test_without_validation_recordings_a_share_of_the_training_groups_serves(tmp_path):
-    result = run(_two_sessions(tmp_path))
+    paths = [
+        record(tmp_path / f"{session}-{place}-{slips}.h5", slips=slips, seed=100 * number + 10 * place + slips,
+               role="test" if session == "c" else "train", session=session)
+        for number, session in enumerate("abc") for place in range(2) for slips in (True, False)
+    ]  # fmt: skip
+    result = run(paths)
     assert any("no recording has the role validation" in one for one in result.remarks)
     assert result.score == 1.0
 
 
-def _two_sessions(folder):
-    return [
-        record(folder / f"{session}-{place}-{slips}.h5", slips=slips, seed=100 * number + 10 * place + slips,
-               role="test" if session == "c" else "train", session=session)
-        for number, session in enumerate("abc")
-        for place in range(2)
-        for slips in (True, False)
-    ]  # fmt: skip
-
-
-def test_without_disturbances_no_threshold_can_be_chosen(paths):
+def test_without_disturbances_or_a_reference_nothing_is_answered_and_what_is_missing_is_named(paths, tmp_path):
     with pytest.raises(DataError, match="no disturbance to count false alarms on"):
         run([path for path in paths if path.stem.endswith("slip")])
-
-
-def test_what_is_missing_of_the_reference_is_named(tmp_path):
     path = record(tmp_path / "blind.h5", slips=True, seed=1, reference=False)
     with pytest.raises(NotApplicable, match="'blind' has no normal, no tangential, no slip"):
         load_dataset(TASK, [path])
@@ -194,18 +172,13 @@ def test_states_are_answered_a_frame_and_shown_under_other_thresholds(paths):
     result = run(paths, "logistic", asked)
     assert result.classes == ("stick", "incipient", "gross")
     assert result.score > 0.4  # a third is chance
-    assert {
-        "balanced accuracy with label thresholds halved",
-        "macro F1 with label thresholds doubled",
-    } <= result.scores.keys()
+    names = {"balanced accuracy with label thresholds halved", "macro F1 with label thresholds doubled"}
+    assert names <= result.scores.keys()
     assert run(paths, "majority", asked).score == pytest.approx(1 / 3, abs=1e-9)
 
 
 def test_code_for_features_must_give_a_line_a_frame(paths):
-    wrong = EstimatorDescriptor(
-        name="wrong", title="?", kinds=("events",), where="tactbench.estimators.slip_detectors:mean_feature",
-        frames_by=f"{__name__}:one_line",
-    )  # fmt: skip
+    wrong = REGISTRY.estimators["wavelet-energy"].model_copy(update={"frames_by": f"{__name__}:one_line"})
     with pytest.raises(PluginContractError, match=r"shape \(1, 1\) for \d+ frames"):
         framed(load_dataset(TASK, paths[:1]), TASK, RULES, wrong)
 

@@ -5,7 +5,7 @@ import pytest
 
 from tactbench.core.errors import NotApplicable
 from tactbench.core.plugins.registry import load_registry
-from tests.core.evaluation.made import evaluated, force_task, label_task, record
+from tests.core.evaluation.made import evaluated, force_task, label_task, record, sessions
 
 REGISTRY = load_registry()
 TASK = label_task("object", splits=("recording", "shuffled"))
@@ -31,26 +31,17 @@ def test_offsets_before_contact_name_the_object_and_contact_alone_does_not(tmp_p
     told = run(grasps(tmp_path_factory.mktemp("told"), offset=3.0))
     silent = grasps(tmp_path_factory.mktemp("silent"), offset=0.0)
     assert told.score > 0.95
+    assert sorted(told.sets["test"].recording.tolist()) == list(range(36)), "one row a recording is tested"
+    assert set(told.sets["test"].row.tolist()) == {0}
+    assert told.split == "recording"
     # 36 first rows of noise, three classes: the standard error of guessing is 0.08; three of them.
     assert run(silent).score < 1 / 3 + 0.24
     assert run(silent, "deployable").score > 0.7, "contact, from row 5 of 20 on, does tell"
 
 
-def test_one_row_a_recording_is_tested_and_the_others_are_counted(tmp_path):
-    result = run(grasps(tmp_path, offset=3.0))
-    assert result.sizes.n_test == 36
-    assert sorted(result.sets["test"].recording.tolist()) == list(range(36))
-    assert set(result.sets["test"].row.tolist()) == {0}
-    assert len(result.sizes.fold_sizes) == 5
-    assert result.split == run(sorted(tmp_path.glob("*.h5")), "deployable").split == "recording"
-
-
 def test_an_answer_that_changes_within_a_recording_is_skipped_with_the_reason(tmp_path):
-    rng = np.random.default_rng(0)
-    paths = [record(tmp_path / f"s{place}.h5", rng.normal(size=(30, 3)), rng.normal(size=30), session=str(place))
-             for place in range(3)]  # fmt: skip
-    with pytest.raises(NotApplicable, match="changes within recording 's0'"):
-        run(paths, task=force_task())
+    with pytest.raises(NotApplicable, match="changes within recording 'a'"):
+        run(sessions(tmp_path), task=force_task())
 
 
 def test_too_few_first_rows_have_no_interval_and_say_so(tmp_path):

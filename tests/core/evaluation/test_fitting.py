@@ -53,14 +53,11 @@ def test_an_answer_that_cannot_be_scored_is_refused_naming_the_estimator(given, 
         answers(Answering(given), np.zeros((3, 2)), "theirs", n_classes)
 
 
-def test_a_warning_is_counted_under_the_name_of_the_estimator():
+def test_what_an_estimator_warns_of_is_counted_and_what_it_refuses_is_an_error_under_its_name():
     counts = Counter()
     for _ in range(2):
         fit(Answering(None, "did not converge"), np.zeros((3, 1)), np.arange(3), "theirs", counts)
     assert counts == {"fits of theirs with a RuntimeWarning": 2}
-
-
-def test_data_an_estimator_refuses_is_an_error_with_its_name():
     with pytest.raises(DataError, match="'theirs' could not be fitted to 3 rows of 1 features: too small"):
         fit(Answering(None, ValueError("too small")), np.zeros((3, 1)), np.arange(3), "theirs", Counter())
 
@@ -71,10 +68,8 @@ def test_a_score_that_is_undefined_is_left_out_or_refused_never_nan(tmp_path):
         record(tmp_path / "a.h5", X, force, session="a", role="train"),
         record(tmp_path / "b.h5", X, np.full(200, 2.0), session="b", role="test"),
     ]
-    task = force_task(protocols=("deployable",))
-    result = evaluated(task, paths, "mean", split="roles")
+    result = evaluated(force_task(), paths, "mean", split="roles")
     assert "r2" not in result.scores
-    assert np.isfinite(list(result.scores.values())).all()
     with pytest.raises(DataError, match="r2 of 200 test rows is undefined"):
         evaluated(force_task(metric="r2"), paths, "mean", split="roles")
 
@@ -98,11 +93,10 @@ def test_the_same_seed_gives_the_same_score_bit_by_bit_with_one_thread_or_two(tm
              for place, name in enumerate("ab")]  # fmt: skip
     results = [
         evaluated(force_task(), paths, "forest", params={"n_estimators": 20}, seed=seed, threads=threads)
-        for seed, threads in ((0, 1), (0, 2), (0, 2), (1, 1))
+        for seed, threads in ((0, 1), (0, 2), (1, 1))
     ]
-    first, second, third, other = results
+    first, second, other = results
     assert np.array_equal(first.sets["test"].y_pred, second.sets["test"].y_pred)
-    assert np.array_equal(second.sets["test"].y_pred, third.sets["test"].y_pred)
     assert (first.score, first.interval) == (second.score, second.interval)
     assert other.score != first.score
 
@@ -111,9 +105,8 @@ def test_the_same_seed_gives_the_same_score_bit_by_bit_with_one_thread_or_two(tm
 def test_a_number_that_cannot_be_computed_with_is_named(tmp_path, what):
     X, force = ramp(0, n=200)
     (X[:, 1] if what == "t1" else force)[100:] = 1e300
-    paths = [record(tmp_path / "a.h5", X, force, session="1"), record(tmp_path / "b.h5", *ramp(1, n=200), session="2")]
     with pytest.raises(DataError, match=rf"In recording 'a', {what} reaches 1e\+300"):
-        evaluated(force_task(), paths, split="session")
+        load_task(force_task(), [record(tmp_path / "a.h5", X, force)], "deployable")
 
 
 def test_a_class_that_no_training_row_has_is_named(tmp_path):
@@ -127,10 +120,9 @@ def test_a_class_that_no_training_row_has_is_named(tmp_path):
 
 
 def test_any_object_with_fit_and_predict_is_evaluated_as_a_plugin_is(tmp_path):
-    paths = sessions(tmp_path)
-    data, given = load_task(force_task(), paths, "deployable"), Answering()
+    data, given = load_task(force_task(), sessions(tmp_path), "deployable"), Answering()
     result = evaluate(given, data, clock=ticking())
-    assert result.score == pytest.approx(evaluated(force_task(), paths, "mean").score, rel=1e-12)
+    assert result.score == pytest.approx(evaluated(force_task(), data.recorded, "mean").score, rel=1e-12)
     assert not hasattr(given, "mean"), "copies are fitted"
     row = json.loads(json.dumps(row_of(result)))
     assert row.keys() <= RowModel.model_fields.keys()
@@ -143,8 +135,7 @@ def test_any_object_with_fit_and_predict_is_evaluated_as_a_plugin_is(tmp_path):
 
 
 def test_answers_that_overflow_are_named(tmp_path):
-    paths = [record(tmp_path / f"{name}.h5", *ramp(0, n=100), session=name) for name in "ab"]
-    data = load_task(force_task(), paths, "deployable")
+    data = load_task(force_task(), sessions(tmp_path, "ab", n=100), "deployable")
     far = Answering(np.full(100, 1e308))
     with pytest.raises(PluginContractError, match=r"'Answering' answered with numbers up to 1e\+308: .* overflows"):
         evaluate(far, data, clock=ticking())

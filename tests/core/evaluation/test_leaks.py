@@ -27,10 +27,9 @@ def test_one_recording_under_two_sessions_or_roles(tmp_path, split):
 
 
 def test_a_piece_of_a_training_recording_at_another_time(tmp_path):
-    X, force = ramp(0, n=200)
-    other, other_force = ramp(1, n=200)
-    mixed = np.concatenate([other[:150], X[100:150]]), np.concatenate([other_force[:150], force[100:150]])
-    paths = [record(tmp_path / "a.h5", X, force, session="1"), record(tmp_path / "b.h5", *mixed, session="2")]
+    one, other = ramp(0, n=200), ramp(1, n=200)
+    mixed = [np.concatenate([theirs[:150], ours[100:150]]) for ours, theirs in zip(one, other, strict=True)]
+    paths = [record(tmp_path / "a.h5", *one, session="1"), record(tmp_path / "b.h5", *mixed, session="2")]
     assert stamps(paths)[0].startswith("leaks: 25%")
 
 

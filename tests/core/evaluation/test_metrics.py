@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from scipy import stats
+from scipy import signal, stats
 from sklearn import metrics as reference
 
 from tactbench.core.evaluation.interval import ReplicateUnits, influences, score_interval, transform_of
@@ -60,21 +60,13 @@ def test_a_class_in_few_sessions_is_never_resampled_away():
     assert found.low < METRICS["macro_f1"].of(y, p, 5) < found.high
 
 
-def autoregressive(rng, n, a):
-    x = np.empty(n)
-    x[0] = rng.normal() / np.sqrt(1 - a * a)
-    for t in range(1, n):
-        x[t] = a * x[t - 1] + rng.normal()
-    return x
-
-
 def test_the_block_interval_covers_the_truth_where_errors_have_memory():
     rng = np.random.default_rng(4)
     hits, naive = 0, 0
     trials, n, a = 120, 1500, 0.8
     truth = 1 / np.sqrt(1 - a * a)
     for trial in range(trials):
-        error = autoregressive(rng, n, a)
+        error = signal.lfilter([1.0], [1.0, -a], rng.normal(size=n + 100))[100:]
         zeros = np.zeros(n, dtype=int)
         found = interval(np.zeros(n), error, zeros, zeros, seed=trial)
         hits += found.low <= truth <= found.high

@@ -18,22 +18,20 @@ REGISTRY = load_registry()
 MAPPINGS = Path(__file__).resolve().parents[3] / "examples" / "mappings"
 
 
-def recordings(shared_data, folder, mapping, root):
-    report = import_tables(MAPPINGS / f"{mapping}.yaml", root=shared_data / root, out=folder)
-    return [recording.path for recording in report.recordings]
+def loaded(task, mapping, root, folder):
+    report = import_tables(MAPPINGS / f"{mapping}.yaml", root=root, out=folder)
+    return load_dataset(REGISTRY.tasks[task].spec, [recording.path for recording in report.recordings])
 
 
 @pytest.fixture(scope="module")
 def presses(shared_data, tmp_path_factory):
-    paths = recordings(shared_data, tmp_path_factory.mktemp("eflesh"), "eflesh-normal", "eflesh")
-    return load_dataset(REGISTRY.tasks["force"].spec, paths)
+    return loaded("force", "eflesh-normal", shared_data / "eflesh", tmp_path_factory.mktemp("eflesh"))
 
 
 @pytest.fixture(scope="module")
 def grasps(shared_data, tmp_path_factory):
-    folder = tmp_path_factory.mktemp("biotacsp")
-    paths = recordings(shared_data, folder, "biotacsp-stability", "biotacsp-stability-v2")
-    return load_dataset(REGISTRY.tasks["grasp-stability"].spec, paths)
+    root = shared_data / "biotacsp-stability-v2"
+    return loaded("grasp-stability", "biotacsp-stability", root, tmp_path_factory.mktemp("biotacsp"))
 
 
 def run(task, data, split, estimator="forest"):

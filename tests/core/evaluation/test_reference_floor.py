@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy import signal
 
 from tactbench.core.evaluation.interval import ReplicateUnits
 from tactbench.core.evaluation.metrics import METRICS
@@ -12,36 +13,26 @@ from tactbench.core.spec.drive import ForceLoop
 from .made import evaluated, force_task, held, record
 
 SIGMA = 0.6875
-RMSE = METRICS["rmse"]
-
-
-def pooled(holds):
-    return Floor(dict(enumerate(map(hold_of, holds)))).value
 
 
 def low_passed(rng, n, memory):
     """White noise behind a first-order low-pass, of deviation SIGMA, settled before it begins."""
     settled = 20 * int(1 / (1 - memory))
     white = rng.standard_normal(n + settled) * SIGMA * np.sqrt(1 - memory**2)
-    out = np.empty(n + settled)
-    last = 0.0
-    for place, one in enumerate(white.tolist()):
-        last = memory * last + one
-        out[place] = last
-    return out[settled:]
+    return signal.lfilter([1.0], [1.0, -memory], white)[settled:]
 
 
 @pytest.mark.parametrize(("n", "memory"), [(600, 0.0), (120, 0.0), (12, 0.0), (600, 0.5), (600, 0.9), (120, 0.8)])
 def test_the_variance_of_a_hold_is_unbiased_white_or_filtered_long_or_short(n, memory):
     """Over 400 recordings: 3 % of the deviation is 6 % of the variance."""
     rng = np.random.default_rng(11)
-    noise = [low_passed(rng, n, memory) if memory else SIGMA * rng.standard_normal(n) for _ in range(400)]
+    noise = [low_passed(rng, n, memory) for _ in range(400)]
     offsets = rng.normal(0, 5, len(noise))
-    floor = pooled([one + offset for one, offset in zip(noise, offsets, strict=True)])
+    holds = {place: hold_of(one + offset) for place, (one, offset) in enumerate(zip(noise, offsets, strict=True))}
     # Correlated samples are worth n (1 - m²) / (1 + m²) independent ones: three standard errors of so many, at most
     # 3 %, and no less than what the estimated correlation of a short hold is known to leave (1.3 % at 0.8 of 120).
     worth = len(noise) * (n - 1) * (1 - memory**2) / (1 + memory**2)
-    assert floor == pytest.approx(SIGMA, rel=min(0.03, max(3 / np.sqrt(2 * worth), 0.015)))
+    assert Floor(holds).value == pytest.approx(SIGMA, rel=min(0.03, max(3 / np.sqrt(2 * worth), 0.015)))
 
 
 def asked(error, *, rows=4400, hold=600, recordings=1, seed=0, sigma=SIGMA):
@@ -74,12 +65,11 @@ def test_the_error_of_its_own_comes_out_from_below_the_noise(error, recordings, 
 
 
 def test_a_reference_without_noise_leaves_the_rmse_as_it_is():
-    answers, unit, floor = asked(0.5, sigma=0.0, seed=2)
-    found = beyond_floor(floor, answers, unit)
-    assert found.floor == 0.0
-    assert found.score == pytest.approx(RMSE.of(answers.y_true, answers.y_pred), rel=1e-12)
-    answers, unit, floor = asked(0.0, sigma=0.0, seed=2)
-    assert beyond_floor(floor, answers, unit).score == 0.0
+    for error in (0.5, 0.0):
+        answers, unit, floor = asked(error, sigma=0.0, seed=2)
+        found = beyond_floor(floor, answers, unit)
+        assert found.floor == 0.0
+        assert found.score == pytest.approx(METRICS["rmse"].of(answers.y_true, answers.y_pred), rel=1e-12)
 
 
 def result_of(folder, *, simulated=True, scenes=True, hold=7.2, samples=400, **how):

@@ -23,9 +23,10 @@ def run(paths, split=None, task=None, estimator="forest", params=None, **more):
 
 @pytest.mark.parametrize("split", ["session", "in-session", "shuffled", "object"])
 def test_training_and_test_rows_are_disjoint_and_every_free_row_is_tested_once(tmp_path, split):
-    paths = [grasps(tmp_path, seed=1), grasps(tmp_path, seed=2)] if split == "object" else sessions(tmp_path)
-    task = label_task() if split == "object" else force_task()
-    data = load_dataset(task, paths)
+    if split == "object":
+        data = load_dataset(label_task(), [grasps(tmp_path, seed=1), grasps(tmp_path, seed=2)])
+    else:
+        data = load_dataset(force_task(), sessions(tmp_path))
     folds = make_splits(data, split, 0)
     tested = [np.zeros(len(table.row), dtype=int) for table in data.tables]
     for fold in folds:
@@ -96,10 +97,8 @@ def test_a_shuffled_split_is_stamped_and_never_the_default(tmp_path):
 
 def test_an_official_test_set_is_touched_by_split_roles_only(tmp_path):
     paths = [grasps(tmp_path, "train", seed=1), grasps(tmp_path, "test", seed=2)]
-    by_object = run(paths, "object", label_task())
-    assert set(by_object.sets["test"].recording.tolist()) == {0}
-    by_roles = run(paths, "roles", label_task())
-    assert set(by_roles.sets["test"].recording.tolist()) == {1}
+    for split, tested in (("object", 0), ("roles", 1)):
+        assert set(run(paths, split, label_task()).sets["test"].recording.tolist()) == {tested}
 
 
 def test_a_split_that_cannot_be_served_is_refused_with_those_that_can(tmp_path):

@@ -1,6 +1,7 @@
 """Taring on the unloaded hold: offsets of a recording do not matter, and nothing after the hold changes a reading."""
 
 from collections import Counter
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -52,15 +53,10 @@ def test_constant_offsets_of_recordings_change_nothing_where_they_are_tared(tmp_
 
 @pytest.mark.parametrize("first_changed", [HOLD, 120, ROWS - 1])
 def test_later_rows_change_no_earlier_reading(tmp_path, first_changed):
-    """The last fold's readings under `deployable`, its window included, before the first row that was altered."""
-    paths = three(tmp_path / "a")
-    (altered,) = [path for path in paths if path.stem == "test"]
-    data = load_dataset(TASK, paths)
-    table = data.tables[paths.index(altered)]
-    X = table.X.copy()
-    X[first_changed:] += 1000.0
-    other = record(tmp_path / "test.h5", X, table.y, role="test", session="test", scene=scene("test"))
-    changed = load_dataset(TASK, [*(path for path in paths if path != altered), other])
+    """The readings of the fold under `deployable`, its window included, before the first row that was altered."""
+    data = load_dataset(TASK, three(tmp_path / "a"))
+    *others, table = data.tables
+    altered = replace(table, X=table.X + 1000.0 * (np.arange(ROWS) >= first_changed)[:, None])
 
     def readings(source):
         (roles,) = make_splits(source, "roles", 1)
@@ -68,8 +64,9 @@ def test_later_rows_change_no_earlier_reading(tmp_path, first_changed):
         return fold.test.X[fold.test.row < first_changed]
 
     # The filter sums up about the set's mean, so that rounding knows of later rows; what was altered is 1000.
-    np.testing.assert_allclose(readings(changed), readings(data), rtol=0, atol=1e-10)
-    np.testing.assert_array_equal(tared(changed.tables[-1])[:first_changed], tared(table)[:first_changed])
+    changed = readings(replace(data, tables=(*others, altered)))
+    np.testing.assert_allclose(changed, readings(data), rtol=0, atol=1e-10)
+    np.testing.assert_array_equal(tared(altered)[:first_changed], tared(table)[:first_changed])
 
 
 def test_recordings_without_a_hold_are_as_they_are_and_the_row_says_so(tmp_path):

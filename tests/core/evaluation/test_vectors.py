@@ -21,25 +21,23 @@ MIX = np.array([[3.0, 1.0, -2.0], [0.5, -4.0, 1.0]])
 def place_task(**more):
     return force_task(**{
         "name": "place", "target": VectorTarget(names=("x", "y"), unit="mm"), "metric": "mean_euclidean_error",
-        "unit": "mm", "protocols": ("deployable", "karl2016"), "splits": ("roles", "session", "shuffled", "few-shot-2"),
-        "estimators": ("ols",), "baselines": ("mean", "time-index"), **more,
+        "unit": "mm", **more,
     })  # fmt: skip
 
 
-def presses(folder, number=12, n=60, noise=0.0, seed=3, missing=0, wander=2e-4, **more):
+def presses(folder, n=60, noise=0.0, missing=0, roles=("train",) * 6 + ("test",) * 6):
     """Recordings at a place each [m], wandering a little about it; the first `missing` rows have no place."""
-    rng = np.random.default_rng(seed)
+    rng = np.random.default_rng(3)
     paths = []
-    for place in range(number):
-        where = rng.uniform(-0.005, 0.005, 2) + rng.normal(0, wander, (n, 2))
-        X = 1e3 * where @ MIX + rng.normal(0, noise, (n, 3)) if noise else 1e3 * where @ MIX
+    for place, role in enumerate(roles):
+        where = rng.uniform(-0.005, 0.005, 2) + rng.normal(0, 2e-4, (n, 2))
+        X = 1e3 * where @ MIX + noise * rng.normal(size=(n, 3))
         quality = np.zeros((n, 2), dtype=np.uint8)
         quality[:missing, 1] = Quality.MISSING
-        role = "train" if place < number // 2 else "test"
         t_ns = np.arange(n, dtype=np.int64) * 10_000_000
         blocks = Block("taxels", t_ns, X), Block("place", t_ns, where, quality)
-        about = {"session": f"s{place}", "role": role, **{name: each(place) for name, each in more.items()}}
-        paths.append(write(folder / f"p{place:02d}.h5", sensor(3), *blocks, reference=(PLACE,), **about))
+        about = {"reference": (PLACE,), "session": f"s{place}", "role": role}
+        paths.append(write(folder / f"p{place:02d}.h5", sensor(3), *blocks, **about))
     return paths
 
 
@@ -79,21 +77,16 @@ def test_each_component_is_learnt_as_if_it_were_asked_for_alone(tmp_path, estima
 
 
 def test_parameters_are_chosen_by_the_error_of_the_whole_vector(tmp_path):
-    paths = presses(tmp_path, role=lambda place: ("train", "validation", "test")[place % 3], noise=3.0)
+    paths = presses(tmp_path, roles=("train", "validation", "test") * 4, noise=3.0)
     result = run(place_task(), paths, "ridge")
     assert {one["k"] for one in result.search} == set(REGISTRY.estimators["ridge"].window_grid)
     assert result.scores["validation"] == min(one["score"] for one in result.search)
 
 
-def test_a_row_without_one_component_has_no_label(tmp_path):
-    result = run(place_task(), presses(tmp_path, missing=15))
+def test_rows_without_a_component_have_no_label_and_intervals_and_replicates_are_of_the_vectors(tmp_path):
+    result = run(place_task(), presses(tmp_path, noise=3.0, missing=15))
     assert result.sizes.n_test == 6 * 45
-    left_out = {what: number for what, number in result.counts.items() if "left out" in what}
-    assert left_out == {"of 720 rows have no position samples called 'x' and 'y' and were left out": 12 * 15}
-
-
-def test_intervals_and_replicates_are_of_the_vectors(tmp_path):
-    result = run(place_task(), presses(tmp_path, noise=3.0))
+    assert result.counts["of 720 rows have no position samples called 'x' and 'y' and were left out"] == 12 * 15
     assert result.interval.method.startswith("jackknife over 6 sessions")
     assert result.interval.low < result.score < result.interval.high
     sums = tables_of([dict(result.replicates)], "mean_euclidean_error", 0)[0].sum(axis=0)

@@ -16,7 +16,7 @@ A = np.array([1.20, 1.35, 0.90, 1.10, 1.60, 1.05, 1.45])
 B = np.array([1.00, 1.30, 0.95, 0.80, 1.30, 1.00, 1.10])
 
 
-def test_equal_sessions_of_a_mean_give_students_paired_interval():
+def test_equal_sessions_of_a_mean_give_students_paired_interval_and_the_p_value_of_all_exchanges():
     """Of a mean over sessions of equal size the jackknife is the textbook."""
     found = difference(mae_row("a", A), mae_row("b", B))
     known = stats.ttest_rel(A, B).confidence_interval(0.95)
@@ -25,10 +25,6 @@ def test_equal_sessions_of_a_mean_give_students_paired_interval():
     assert found.effect == pytest.approx((A - B).mean() / (A - B).std(ddof=1), rel=1e-9)
     assert found.improved == pytest.approx(1 / 7)  # errors: the first is better in one session of seven
     assert (found.verdict, found.replicates, found.unit, found.paired) == ("worse", 7, "session", True)
-
-
-def test_the_p_value_is_that_of_all_exchanges():
-    found = difference(mae_row("a", A), mae_row("b", B))
     known = stats.permutation_test(
         (A, B), lambda a, b, axis: np.mean(a - b, axis=axis), permutation_type="samples", vectorized=True
     )
@@ -109,13 +105,11 @@ def test_holms_own_steps():
     assert holm([]) == []
 
 
-D = [0.02, 0.05, -0.01, 0.04, 0.03, 0.06, 0.01, 0.02, 0.05, 0.03]
-
-
 def test_the_corrected_test_by_hand():
-    """Mean 0.03, variance 0.00045 + …: ten folds, one tenth tested, nine trained on."""
-    found = corrected_t(D, 1 / 9)
-    deviation = np.sqrt((1 / 10 + 1 / 9) * np.var(D, ddof=1))
+    """Ten folds, one tenth tested, nine trained on."""
+    d = [0.02, 0.05, -0.01, 0.04, 0.03, 0.06, 0.01, 0.02, 0.05, 0.03]
+    found = corrected_t(d, 1 / 9)
+    deviation = np.sqrt((1 / 10 + 1 / 9) * np.var(d, ddof=1))
     assert found.mean == pytest.approx(0.03)
     assert found.p == pytest.approx(2 * stats.t.sf(0.03 / deviation, 9), rel=1e-9)
     assert found.high - found.mean == pytest.approx(stats.t.ppf(0.975, 9) * deviation, rel=1e-9)

@@ -22,21 +22,28 @@ def board(seed, cells=6, replicates=8, spread=0.3, **more):
     ]
 
 
+def places(rows):
+    return [one.place for one in ranks(rows).values()]
+
+
+def renamed(row):
+    """The row with other replicates: it cannot be paired any more."""
+    names = [f"other {place}" for place in range(8)]
+    return row | {"replicates": row["replicates"] | {"names": names}}
+
+
 def test_pairing_tells_apart_what_two_intervals_would_not():
     """The sessions differ by far more than the sensors do, and alike for both."""
     session = np.linspace(1, 9, 8)
-    pair = [mae_row("a", session), mae_row("b", session + np.linspace(0.09, 0.11, 8))]
-    assert [one.place for one in ranks(pair).values()] == [1, 2]
-    pair[1]["replicates"]["names"] = [f"other {place}" for place in range(8)]
-    assert [one.place for one in ranks(pair).values()] == [1, 1]
+    one, other = mae_row("a", session), mae_row("b", session + np.linspace(0.09, 0.11, 8))
+    assert places([one, other]) == [1, 2]
+    assert places([one, renamed(other)]) == [1, 1]
 
 
-def test_what_is_practically_the_same_shares_a_rank():
-    means = np.linspace(1, 2, 8)
-    near = np.linspace(0.009, 0.011, 8)
-    for same, places in ((None, [1, 2]), (0.02, [1, 1]), (0.005, [1, 2])):
-        pair = [mae_row("a", means, equivalence=same), mae_row("b", means + near, equivalence=same)]
-        assert [one.place for one in ranks(pair).values()] == places
+@pytest.mark.parametrize(("same", "expected"), [(None, [1, 2]), (0.02, [1, 1]), (0.005, [1, 2])])
+def test_what_is_practically_the_same_shares_a_rank(same, expected):
+    means, near = np.linspace(1, 2, 8), np.linspace(0.009, 0.011, 8)
+    assert places([mae_row("a", means, equivalence=same), mae_row("b", means + near, equivalence=same)]) == expected
 
 
 @settings(max_examples=25, deadline=None)
@@ -45,8 +52,8 @@ def test_order_and_names_change_nothing(seed, spread, order):
     rows = board(seed, spread=spread)
     found = ranks(rows)
     assert ranks([rows[place] for place in order]) == found
-    renamed = ranks([one | {"cell": f"x{order[place]}"} for place, one in enumerate(rows)])
-    assert [renamed[f"x{order[place]}"] for place in range(6)] == list({c: found[c] for c in sorted(found)}.values())
+    called = ranks([one | {"cell": f"x{order[place]}"} for place, one in enumerate(rows)])
+    assert [called[f"x{order[place]}"] for place in range(6)] == [found[name] for name in sorted(found)]
 
 
 @settings(max_examples=25, deadline=None)
@@ -65,10 +72,9 @@ def test_a_row_without_replicates_is_told_from_none():
 
 
 def test_baselines_and_failures_have_no_rank():
-    rows = board(5, cells=3)
-    assert ranks([rows[0], rows[1] | {"is_baseline": True}, rows[2] | {"status": "failed", "score": None}]).keys() == {
-        "c0"
-    }
+    one, other, third = board(5, cells=3)
+    failed = third | {"status": "failed", "score": None}
+    assert ranks([one, other | {"is_baseline": True}, failed]).keys() == {"c0"}
     assert ranks([]) == {}
 
 
@@ -78,10 +84,7 @@ def force_row(cell, errors, holds, **more):
     sums = np.column_stack([np.multiply(errors, n), np.full(len(errors), n)])
     made = row(cell, sums, **more)
     made["replicates"]["floor"] = [[one * held, held] for one in holds]
-    floor = float(np.sqrt(np.mean(holds)))
-    excess = made["score"] ** 2 - floor**2
-    beyond = float(np.sqrt(max(0.0, excess)))
-    return made | {"reference_floor": floor, "score_beyond_floor": beyond}
+    return made | {"reference_floor": float(np.sqrt(np.mean(holds)))}
 
 
 def noisy(rng, own, sessions=8, sigma=0.6875, scatter=0.002):
@@ -107,23 +110,20 @@ def test_a_floor_that_two_answers_share_does_not_blur_their_difference():
     rng = np.random.default_rng(2)
     errors, holds = noisy(rng, 0.2, scatter=0.1)
     rows = [force_row("a", errors, holds), force_row("b", errors + 0.005 + 1e-4 * rng.standard_normal(8), holds)]
-    assert [one.place for one in ranks(rows).values()] == [1, 2]
-    other = noisy(rng, 0.2, scatter=0.1)
-    apart = [rows[0], force_row("c", other[0] + 0.005, other[1])]
-    apart[1]["replicates"]["names"] = [f"other {place}" for place in range(8)]
-    assert {one.place for one in ranks(apart).values()} == {1}, "of two references it does not"
+    assert places(rows) == [1, 2]
+    other, its_holds = noisy(rng, 0.2, scatter=0.1)
+    assert places([rows[0], renamed(force_row("c", other + 0.005, its_holds))]) == [1, 1], (
+        "of two references it does not"
+    )
 
 
-@pytest.mark.parametrize(("same", "places"), [(0.0, [1, 2]), (0.03, [1, 2]), (0.08, [1, 1])])
-def test_practically_the_same_is_said_of_the_error_and_not_of_its_square(same, places):
+@pytest.mark.parametrize(("same", "expected"), [(0.0, [1, 2]), (0.03, [1, 2]), (0.08, [1, 1])])
+def test_practically_the_same_is_said_of_the_error_and_not_of_its_square(same, expected):
     """0.20 and 0.25 N differ by 0.05 N, and their squares by 0.0225 N²."""
     rng = np.random.default_rng(3)
     holds = np.full(8, 0.5)
-    pair = [
-        force_row(name, own**2 + holds + 1e-5 * rng.standard_normal(8), holds, equivalence=same)
-        for name, own in (("a", 0.2), ("b", 0.25))
-    ]
-    assert [one.place for one in ranks(pair).values()] == places
+    errors = {name: own**2 + holds + 1e-5 * rng.standard_normal(8) for name, own in (("a", 0.2), ("b", 0.25))}
+    assert places([force_row(name, one, holds, equivalence=same) for name, one in errors.items()]) == expected
 
 
 @pytest.mark.parametrize("seed", range(20))
@@ -132,11 +132,8 @@ def test_neighbours_with_different_places_are_separated(seed):
     rows = []
     for place in range(10):
         scores = 0.5 + 0.02 * place + rng.normal(0, rng.choice([0.002, 0.03]), 8)
-        rows.append(board(1)[0] | {
-            "cell": f"c{place}", "score": float(np.median(scores)),
-            "replicates": {"unit": "replicate", "names": [str(one) for one in range(8)], "strata": None,
-                           "scores": scores.tolist()},
-        })  # fmt: skip
+        made = mae_row(f"c{place}", scores, score=float(np.median(scores)))
+        rows.append(made | {"replicates": made["replicates"] | {"scores": scores.tolist()}})
     found = ranks(rows)
     rows.sort(key=lambda row: row["score"])
     for one, other in itertools.pairwise(rows):

@@ -5,9 +5,15 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tactbench.core.leaderboard.table import build_table
 from tactbench.core.statistics.paired import difference
-from tactbench.core.statistics.replicates import FEWEST, median_interval, over_replicates, recordings_right
+from tactbench.core.statistics.ranking import ranks
+from tactbench.core.statistics.replicates import (
+    FEWEST,
+    MedianInterval,
+    median_interval,
+    over_replicates,
+    recordings_right,
+)
 from tests.core.leaderboard.rows import row
 
 
@@ -37,12 +43,10 @@ def test_eight_replicates_are_one_row_with_their_median_and_its_interval():
 
 
 @pytest.mark.parametrize("n", [1, 4])
-def test_fewer_than_five_have_no_interval_and_no_rank(n):
+def test_fewer_than_five_have_no_interval_and_share_a_rank(n):
     rows = over_replicates([*replicates(SCORES[:n]), *replicates(SCORES[1 : n + 1], "b")])
     assert all(one["ci_low"] is None and one["ci_high"] is None for one in rows)
-    lines = build_table(rows).blocks[0].lines
-    assert [line.cells[0] for line in lines] == ["1=", "1="]
-    assert [line.placing.low for line in lines] == [None, None]
+    assert {(one.place, one.low, one.high) for one in ranks(rows).values()} == {(1, 1, 2)}
 
 
 def test_rows_are_the_same_in_any_order_and_aggregated_once():
@@ -52,18 +56,13 @@ def test_rows_are_the_same_in_any_order_and_aggregated_once():
     assert over_replicates(rows[::-1]) == found
 
 
-def test_a_stopped_replicate_is_told_and_takes_no_other_down():
-    rows = replicates(SCORES)
+def test_what_some_replicates_remark_is_told_with_their_number_and_a_stopped_one_takes_no_other_down():
+    rows = [one | {"remarks": ["always", *(["at times"] if one["seed"] < 3 else [])]} for one in replicates(SCORES)]
     rows[2] |= {"status": "timeout", "score": None, "reason": "10 s were not enough"}
     (found,) = over_replicates(rows)
     assert (found["status"], found["n_replicates"]) == ("done", 7)
-    assert "replicate with seed 3: timeout: 10 s were not enough" in found["remarks"]
-
-
-def test_what_all_replicates_remark_is_told_once_and_what_some_do_with_their_number():
-    rows = [one | {"remarks": ["always", *(["at times"] if one["seed"] < 3 else [])]} for one in replicates(SCORES)]
-    (found,) = over_replicates(rows)
-    assert found["remarks"] == ["always", "in 2 of 8 replicates: at times"]
+    stopped = "replicate with seed 3: timeout: 10 s were not enough"
+    assert found["remarks"] == ["always", "in 2 of 7 replicates: at times", stopped]
 
 
 def test_recordings_keep_the_interval_over_their_sessions_and_lose_one_that_is_not_over_sessions():
@@ -73,14 +72,9 @@ def test_recordings_keep_the_interval_over_their_sessions_and_lose_one_that_is_n
         (found,) = over_replicates([one])
         assert (found["ci_low"] is not None) is kept
         assert (found["n_replicates"], found["replicate_unit"]) == ((6, "session") if kept else (1, "session"))
-
-
-def test_seeds_asked_of_the_same_recordings_are_no_replicates():
-    rows = [one | {"simulated": False} for one in replicates(SCORES)]
-    (found,) = over_replicates(rows)
-    assert found["n_replicates"] == 1
+    (found,) = over_replicates([one | {"simulated": False} for one in replicates(SCORES)])
+    assert (found["n_replicates"], found["ci_low"]) == (1, None), "seeds asked of the same recordings are no replicates"
     assert found["score"] in SCORES
-    assert found["ci_low"] is None
 
 
 def test_errors_of_force_are_compared_beyond_their_floor():
@@ -93,9 +87,8 @@ def test_errors_of_force_are_compared_beyond_their_floor():
     one, other = over_replicates(rows)
     found = difference(one, other)
     assert "beyond the floor" in found.method
-    assert found.value == pytest.approx(
-        sum(a - b for a, b in zip(one["replicates"]["beyond"], other["replicates"]["beyond"], strict=True)) / 8
-    )
+    own, others = (each["replicates"]["beyond"] for each in (one, other))
+    assert found.value == pytest.approx(np.mean(own) - np.mean(others))
 
 
 def test_recordings_classified_rightly_are_counted_by_most_of_their_samples():
@@ -108,25 +101,16 @@ def test_recordings_classified_rightly_are_counted_by_most_of_their_samples():
     assert recordings_right(row(replicates=kept)) is None
 
 
-VALUES = st.lists(st.floats(-1e6, 1e6), min_size=FEWEST, max_size=30)
-
-
-def test_five_have_their_range_and_say_how_little_it_covers():
-    found = median_interval([3.0, 1.0, 5.0, 2.0, 4.0])
-    assert (found.low, found.high) == (1.0, 5.0)
-    assert found.level == 1 - 2 / 2**5
-
-
-def test_ends_of_eight_are_those_of_the_published_formula():
+def test_five_have_their_range_and_eight_the_ends_of_the_published_formula():
+    assert median_interval([3.0, 1.0, 5.0, 2.0, 4.0]) == MedianInterval(1.0, 5.0, 1 - 2 / 2**5)
     # Hettmansperger and Sheather 1986, n = 8, k = 1: 0.9922 and 0.9297 enclose 0.95.
     share = (127 / 128 - 0.95) / (127 / 128 - 119 / 128)
     weight = 7 * share / (1 + 6 * share)
     found = median_interval([float(place) for place in range(8)])
-    assert found.low == pytest.approx(weight, rel=1e-12)
-    assert found.high == pytest.approx(7 - weight, rel=1e-12)
+    assert (found.low, found.high) == pytest.approx((weight, 7 - weight), rel=1e-12)
 
 
-@given(VALUES)
+@given(st.lists(st.floats(-1e6, 1e6), min_size=FEWEST, max_size=30))
 def test_the_sample_median_lies_in_it_and_order_does_not_matter(values):
     found = median_interval(values)
     assert found.low <= np.median(values) <= found.high
