@@ -45,7 +45,7 @@ from tactbench.core.evaluation.fitting import (
 )
 from tactbench.core.evaluation.frames import band_limit, clocked, framed
 from tactbench.core.evaluation.interval import score_interval
-from tactbench.core.evaluation.leaks import leak_stamps
+from tactbench.core.evaluation.leaks import copied_channels, leak_stamps
 from tactbench.core.evaluation.metrics import METRICS, Metric, class_f1, confusion, metric_called, vector_details
 from tactbench.core.evaluation.protocols import ProtocolSpec, protocol_called
 from tactbench.core.evaluation.reference_floor import beyond_floor, reference_floor, true_force
@@ -561,7 +561,7 @@ def _part_taken(data: TaskData) -> tuple[list[RecordingMeta], dict[str, int], tu
         stamps = leak_stamps(recorded, folds)
     else:
         stamps = (SHUFFLED_WHOLE_STAMP if recorded.whole else SHUFFLED_STAMP,)
-    return took_part, without_part(recorded, data.split, used), stamps
+    return took_part, without_part(recorded, data.split, used), (*copied_channels(recorded), *stamps)
 
 
 def _of_answers(data: TaskData, descriptor: EstimatorDescriptor, answered: Sequence[AnsweredFold]) -> list[str]:

@@ -35,18 +35,22 @@ def replicates(data: Dataset, task: TaskSpec, split: str, tested: Answers) -> Re
     """Return the unit of replication of every test row.
 
     The coarsest unit of which there are enough to resample: the group that the split keeps apart, or else the session;
-    then the groups that the task names; then the recording. If there are not enough of any, the first: the interval
-    then resamples time and says so. Groups that some test row is not in cannot be resampled.
+    then the groups that the task names; then the recording; then the groups within recordings, such as presses. If
+    there are not enough of any, the first: the interval then resamples time and says so. Groups that some test row is
+    not in cannot be resampled.
     """
     first = "session" if split in SPLITS_WITHOUT_GROUPS or shots(split) else split
     named = [name for name in task.splits if name not in (*SPLITS_WITHOUT_GROUPS, first) and not shots(name)]
     names = list(dict.fromkeys([first, *named, "recording"]))
-    units = [_unit(data, name, tested) for name in names]
+    within = sorted(set(data.tables[0].groups) - set(names))
+    there = [one for one in (_unit(data, name, tested) for name in names) if one is not None]
+    finer = [one for one in (_unit(data, name, tested) for name in within) if one is not None]
+    units = [*there, *sorted(finer, key=lambda one: len(one.labels))]
     for place, one in enumerate(units):
-        if one is not None and one.enough(tested.y_true, len(data.classes)):
-            passed_over = " and ".join(map(plural, names[:place]))
+        if one.enough(tested.y_true, len(data.classes)):
+            passed_over = " and ".join(plural(other.name) for other in units[:place])
             return replace(one, caveat=f": spread between {passed_over} is not in it" if place else "")
-    return next(one for one in units if one is not None)
+    return units[0]
 
 
 def _unit(data: Dataset, name: str, tested: Answers) -> ReplicateUnits | None:

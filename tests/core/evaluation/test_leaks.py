@@ -40,3 +40,13 @@ def test_a_sensor_at_rest_repeats_itself_and_is_no_leak(tmp_path):
         X[:200], force[:200] = 7.0, 0.0
         paths.append(record(tmp_path / f"{n}.h5", X, force, session=str(n)))
     assert stamps(paths) == ()
+
+
+@pytest.mark.parametrize(("noise", "stamped"), [(0.0, True), (1e-3, False)])
+def test_a_channel_that_is_the_target_but_for_scale_and_offset(tmp_path, noise, stamped):
+    paths = []
+    for n in range(2):
+        X, force = ramp(n, n=200)
+        X[:, 1] = 3.0 - 40.0 * (force + noise * np.random.default_rng(n).standard_normal(200))
+        paths.append(record(tmp_path / f"{n}.h5", X, force, session=str(n)))
+    assert any("is the target but for scale and offset" in stamp for stamp in stamps(paths)) == stamped
