@@ -14,9 +14,9 @@ from tactbench.core.cli.selection import SELECTING, requested_matrix
 from tactbench.core.cli.tables import (
     DEFAULT_FOLDER,
     TABLE_FORMATS,
-    VIEW,
     check_destination,
     print_table,
+    questions_of,
     view_of,
 )
 from tactbench.core.cli.threads import keep_threads
@@ -35,7 +35,6 @@ _REASON_CHARACTERS = 200
 @click.option("--yes", is_flag=True, help="Ask nobody: what has to be done at a rig of real devices is done.")
 @click.option("--format", "shape", type=click.Choice(TABLE_FORMATS), default="table", show_default=True,
               help="How the leaderboard is printed.")  # fmt: skip
-@options(*VIEW)
 @click.pass_context
 def command(
     ctx: click.Context,
@@ -43,8 +42,6 @@ def command(
     out: Path,
     yes: bool,
     shape: str,
-    wide: bool,
-    notes: bool,
     engine: EngineName | None,
     jobs: int | None,
     timeout: float | None,
@@ -91,8 +88,8 @@ def command(
         )  # fmt: skip
     provenance = provenance_of(store, outcome.rows)
     rows = with_levels(over_replicates(outcome.rows), store.folder, store.provenance)
-    table = build_table(rows, provenance)
-    print_table(table, shape, view_of(store.folder, wide=wide, notes=notes))
+    table = build_table(rows, provenance, questions=questions_of(rows))
+    print_table(table, shape, view_of(store.folder))
     for by in ("protocol", "split") if shape == "table" else ():
         if comparisons := compare(rows, by):  # once more, side by side
             print_comparisons(comparisons)
@@ -105,11 +102,11 @@ def _so_far(rows: Sequence[Mapping[str, Any]]) -> str:
     """Return the table of the replicates that are finished, as wide as the terminal."""
     from tactbench.core.cli.screen import console
     from tactbench.core.leaderboard.table import build_table
-    from tactbench.core.leaderboard.view import DEFAULT_VIEW, grids
+    from tactbench.core.leaderboard.view import grids
     from tactbench.core.statistics.replicates import over_replicates
     from tactbench.core.tables.terminal import plain_text
 
-    return plain_text(grids(build_table(over_replicates(rows)), DEFAULT_VIEW), console().width)
+    return plain_text(grids(build_table(over_replicates(rows))), console().width)
 
 
 def _farewell(outcome: Outcome, rows: Sequence[Mapping[str, Any]], folder: Path, shape: str) -> None:

@@ -196,25 +196,23 @@ def xlsx(table: Table) -> bytes:
     for number, block in enumerate(table.blocks, 1):
         rows = [next(every) for _ in block.lines]
         used = [name for name in names if any(row[name] not in (None, "") for row in rows)]
-        sheet = book.create_sheet(_sheet_name(block.title, number))
+        sheet = book.create_sheet(_sheet_name(f"{number} {rows[0]['task']} {rows[0]['protocol']}"))
         sheet.freeze_panes = "A3"
-        put(sheet, [block.title])
+        put(sheet, [f"{block.title}. {block.setting}. {block.origin}"])
         put(sheet, [f"score: {metric_name(rows[0])}" if name == "score" else name for name in used])
         for row in rows:
             put(sheet, [row[name] for name in used])
     sheet = book.create_sheet("notes")
-    for text in (*table.notes, *(section.title for section in table.sections), *table.footer):
+    for text in (*(one for block in table.blocks for one in block.verdict), *table.notes, *table.footer):
         put(sheet, [text])
     out = io.BytesIO()
     book.save(out)
     return out.getvalue()
 
 
-def _sheet_name(title: str, number: int) -> str:
-    """Return a name that Excel takes: the block's number, task and protocol."""
-    parts = title.split(" · ")
-    name = re.sub(r"[^\w .-]+", " ", " ".join((str(number), parts[0], *parts[2:3])))
-    return name[:_LONGEST_NAME].strip()
+def _sheet_name(text: str) -> str:
+    """Return a name that Excel takes."""
+    return re.sub(r"[^\w .-]+", " ", text)[:_LONGEST_NAME].strip()
 
 
 def _value(value: Any) -> Any:
