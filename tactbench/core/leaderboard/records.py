@@ -7,14 +7,12 @@ from __future__ import annotations
 
 import io
 import math
-import re
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from typing import Any
 
 import tactbench
 from tactbench.core.errors import UsageError
 from tactbench.core.leaderboard.columns import SHOWN
-from tactbench.core.leaderboard.names import metric_name
 from tactbench.core.leaderboard.table import Table
 from tactbench.core.spec.row import FORMAT, JSON_KEYS, NESTED, OF_REPLICATES
 from tactbench.core.tables import csv_text as csv_format
@@ -73,9 +71,8 @@ APART = ("traceback", "classes")
 
 FORMAT_VERSION = "1"
 _RANKS = {"rank": int, "rank_low": int, "rank_high": int, "rank_tied": bool}
-_FIRST = (*RANK_KEYS, "sensor", "estimator", "score")
-_LONGEST_NAME, _LONGEST_TEXT = 31, 32_767
-"""Characters that Excel takes in a sheet's name and in a cell."""
+_LONGEST_TEXT = 32_767
+"""Characters that Excel takes in a cell."""
 
 
 def keys(table: Table) -> tuple[str, ...]:
@@ -94,11 +91,10 @@ def records(table: Table) -> Iterator[tuple[dict[str, Any], dict[str, str]]]:
         yield row, {SHOWN[name]: text for name, text in line.texts.items()}
 
 
-def flat_records(table: Table) -> tuple[list[str], Iterator[list[Any]]]:
+def flat_records(table: Table) -> tuple[list[str], list[list[Any]]]:
     """Return names of columns and lines for formats whose cells hold one value: lists and tables are JSON."""
     names = [*keys(table), *RANK_KEYS, *(f"shown_{SHOWN[name]}" for name in table.columns)]
-    lines = ([*(_flat(*one) for one in row.items()), *shown.values()] for row, shown in records(table))
-    return names, lines
+    return names, [[*(_flat(*one) for one in row.items()), *shown.values()] for row, shown in records(table)]
 
 
 def _flat(key: str, value: Any) -> Any:
@@ -133,22 +129,17 @@ def parquet(table: Table) -> bytes:
         raise _lacking("Parquet", "pyarrow", "parquet", error) from error
     types = {bool: pa.bool_(), float: pa.float64(), int: pa.int64(), str: pa.string()}
     names, lines = flat_records(table)
-    kinds = list(map(_kind, names))
     metadata = {
         "tactbench.format": "tactbench-leaderboard",
         "tactbench.format_version": FORMAT_VERSION,
         "tactbench.version": tactbench.__version__,
         "tactbench.provenance": json_text(list(table.provenance), sort_keys=True),
     }
-    schema = pa.schema([(name, types[kind]) for name, kind in zip(names, kinds, strict=True)], metadata=metadata)
-    columns = list(zip(*lines, strict=True)) or [()] * len(names)
+    schema = pa.schema([(name, types[_kind(name)]) for name in names], metadata=metadata)
     out = io.BytesIO()
     try:
-        arrays = [
-            [None if one is None else float(one) for one in column] if kind is float else list(column)
-            for column, kind in zip(columns, kinds, strict=True)
-        ]
-        pq.write_table(pa.table(arrays, schema=schema), out, compression="zstd")
+        columns = zip(*lines, strict=True) if lines else [()] * len(names)
+        pq.write_table(pa.table(list(map(list, columns)), schema=schema), out, compression="zstd")
     except (pa.ArrowException, OverflowError) as error:
         raise UsageError(f"These rows do not fit Parquet: {error}.", hint="Use --format json.") from error
     return out.getvalue()
@@ -168,9 +159,7 @@ def _kind(name: str) -> type:
 
 
 def xlsx(table: Table) -> bytes:
-    """Return a table's records as a workbook: a sheet a block, numbers as numbers, and a sheet of notes.
-
-    Keys without any value in a block and those of lists are left out.
+    """Return a table's records as a workbook: numbers as numbers, no formula, and a sheet of what is said of them.
 
     Raises
     ------
@@ -183,39 +172,26 @@ def xlsx(table: Table) -> bytes:
     except ImportError as error:
         raise _lacking("An Excel file", "openpyxl", "xlsx", error) from error
     book = Workbook(write_only=True)
-
-    def put(sheet: Any, values: Any) -> None:
-        cells = [WriteOnlyCell(sheet, value=_value(value)) for value in values]
-        for cell in cells:
-            if isinstance(cell.value, str):
-                cell.data_type = "s"  # never a formula: names may come from strangers
-        sheet.append(cells)
-
-    every = (values for values, _ in records(table))
-    names = [*_FIRST, *(key for key in keys(table) if key not in NESTED and key not in _FIRST)]
-    for number, block in enumerate(table.blocks, 1):
-        rows = [next(every) for _ in block.lines]
-        used = [name for name in names if any(row[name] not in (None, "") for row in rows)]
-        sheet = book.create_sheet(_sheet_name(f"{number} {rows[0]['task']} {rows[0]['protocol']}"))
-        sheet.freeze_panes = "A3"
-        put(sheet, [f"{block.title}. {block.setting}. {block.origin}"])
-        put(sheet, [f"score: {metric_name(rows[0])}" if name == "score" else name for name in used])
+    names, lines = flat_records(table)
+    said = [(one,) for block in table.blocks for one in (block.title, block.setting, block.origin, *block.verdict)]
+    sheets: dict[str, list[Iterable[Any]]] = {
+        "leaderboard": [names, *lines],
+        "notes": [*said, *((one,) for one in (*table.notes, *table.footer))],
+    }
+    for title, rows in sheets.items():
+        sheet = book.create_sheet(title)
         for row in rows:
-            put(sheet, [row[name] for name in used])
-    sheet = book.create_sheet("notes")
-    for text in (*(one for block in table.blocks for one in block.verdict), *table.notes, *table.footer):
-        put(sheet, [text])
+            cells = [WriteOnlyCell(sheet, value=_value(value)) for value in row]
+            for cell in cells:
+                if isinstance(cell.value, str):
+                    cell.data_type = "s"  # never a formula: names may come from strangers
+            sheet.append(cells)
     out = io.BytesIO()
     book.save(out)
     return out.getvalue()
 
 
-def _sheet_name(text: str) -> str:
-    """Return a name that Excel takes."""
-    return re.sub(r"[^\w .-]+", " ", text)[:_LONGEST_NAME].strip()
-
-
 def _value(value: Any) -> Any:
     if isinstance(value, float):
         return value if math.isfinite(value) else None
-    return value if isinstance(value, int | bool | None) else visible(str(value))[:_LONGEST_TEXT]
+    return value if isinstance(value, int | None) else visible(str(value))[:_LONGEST_TEXT]
