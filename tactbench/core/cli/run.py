@@ -91,10 +91,10 @@ def command(
     table = build_table(rows, provenance, questions=questions_of(rows))
     print_table(table, shape, view_of(store.folder))
     for by in ("protocol", "split") if shape == "table" else ():
-        if comparisons := compare(rows, by):  # once more, side by side
+        if comparisons := compare(rows, by):
             print_comparisons(comparisons)
     write_tables(rows, store.folder, provenance, table)
-    _farewell(outcome, rows, store.folder, shape)
+    _farewell(outcome, rows, store.folder)
     ctx.exit(1 if outcome.failures else 0)
 
 
@@ -109,8 +109,8 @@ def _so_far(rows: Sequence[Mapping[str, Any]]) -> str:
     return plain_text(grids(build_table(over_replicates(rows))), console().width)
 
 
-def _farewell(outcome: Outcome, rows: Sequence[Mapping[str, Any]], folder: Path, shape: str) -> None:
-    """Say what there is now, where it lies and what to try next."""
+def _farewell(outcome: Outcome, rows: Sequence[Mapping[str, Any]], folder: Path) -> None:
+    """Say what there is now, and where it lies."""
     from tactbench.core.cli.screen import remark
 
     answers = len(outcome.rows)
@@ -119,8 +119,6 @@ def _farewell(outcome: Outcome, rows: Sequence[Mapping[str, Any]], folder: Path,
            f"computed now; {outcome.recorded} recordings made now.")  # fmt: skip
     remark(f"Files: {folder}/leaderboard.html, .md, .csv, .json; results.sqlite; recordings/; cells/")
     tell_stopped(outcome.failures, folder)
-    if shape == "table":
-        _suggest(rows)
 
 
 def tell_stopped(rows: Sequence[Mapping[str, Any]], folder: Path) -> None:
@@ -144,36 +142,3 @@ def one_line(reason: str) -> str:
     from tactbench.core.tables.text import cut, visible
 
     return cut(visible(" ".join(str(reason).split())), _REASON_CHARACTERS)
-
-
-def _suggest(rows: Sequence[Mapping[str, Any]]) -> None:
-    """Say what to try next, fitting to what was just run."""
-    from tactbench.core.cli.screen import remark
-    from tactbench.core.evaluation.protocols import is_probe
-    from tactbench.core.tables.text import command_line
-
-    row = rows[0]
-    if row["simulated"]:
-        whole = all(len({row[key] for row in rows}) > 1 for key in ("sensor", "task"))
-        first = (
-            {"tactbench report": "all of it as one page"} if whole else {"tactbench run": "the paper's whole matrix"}
-        )
-        tries = first | {
-            command_line(
-                "tactbench", "run", "--task", row["task"], "--protocol", "deployable"
-            ): "as in use: tared before each press",
-            "tactbench leaderboard --format latex": "the table for a paper: SIM, † and intervals stay in it",
-            command_line("tactbench", "show", row["sensor"]): "what the sensor is, and who says so",
-        }
-    else:
-        probe = {"tactbench run … --probe": "what the recordings give away: first frame alone, shuffled rows"}
-        probed = any(is_probe(row["protocol"]) for row in rows)
-        other = "all" if any(row["estimator"] == "forest" for row in rows) else "forest"
-        tries = ({} if probed else probe) | {
-            f"tactbench run … --estimator {other}": "other answers (see tactbench list estimators)",
-            "tactbench inspect FILE": "what is in a recording, and whether it is healthy",
-        }
-    width = max(len(command) for command in tries)
-    remark("Try next:")
-    for command_text, why in tries.items():
-        remark(f"  {command_text:<{width}}  {why}")

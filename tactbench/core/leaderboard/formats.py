@@ -34,8 +34,8 @@ SUFFIXES = {
 IN_FOLDER = ("md", "csv", "json", "html")
 """A run's result folder has these, ``leaderboard.md`` and so on; the others are made when asked for."""
 _IN_A_PAPER = ("sensor", "estimator", "score", "interval", "published")
-_NAMES = {"sensor": r"p{0.12\columnwidth}", "estimator": r"p{0.22\columnwidth}"}
-"""Columns of names, in which LaTeX breaks lines."""
+_COLUMNS = {"sensor": "l", "estimator": r"p{0.24\columnwidth}", "notes": "l"}
+"""How LaTeX sets columns that are no numbers: long names of estimators go on in a further line."""
 
 
 def show(table: Table, console: Console, view: View = DEFAULT_VIEW) -> None:
@@ -75,14 +75,14 @@ def _in_a_paper(block: Block, grid: TextTable, view: View, number: int) -> str:
         grid,
         title=_caption(block),
         columns=(*names, "notes"),
-        headings=(*grid.only(names).headers, ""),
+        headings=(*("\n".join(head.rsplit(" ", 1)) for head in grid.only(names).headers), ""),
         lines=tuple(
             (*(line[name].replace(" … ", "–") for name in names), mark)
             for line, mark in zip(lines, marked, strict=True)
         ),
     ).compact()
     rule = grid.kinds.index("baseline") if "baseline" in grid.kinds[1:] else None
-    columns = "".join(_NAMES.get(name, "l" if name == "notes" else "r") for name in table.columns)
+    columns = "".join(_COLUMNS.get(name, "r") for name in table.columns)
     return latex_table(table, notes, number=number, columns=f"@{{}}{columns}@{{}}", rule=rule)
 
 

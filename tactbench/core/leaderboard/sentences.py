@@ -16,7 +16,7 @@ from tactbench.core.spec.status import STOPPED
 from tactbench.core.statistics.rank import Rank, beyond_floor
 from tactbench.core.statistics.replicates import FEWEST, counted, percent
 from tactbench.core.tables.numbers import interval, score, score_with_unit
-from tactbench.core.tables.text import command_line, cut
+from tactbench.core.tables.text import cut
 
 MOST_ABOVE, MOST_BELOW = 2, 4
 MOST_NAMES = 4
@@ -232,7 +232,7 @@ def _ended(rows: Sequence[Row], stopped: bool) -> Iterator[Note]:
     ended = f"; {others} more ended otherwise" if others else ""
     reason = str(members[0]["reason"]).rstrip(".")
     text = f"{', '.join(names[:MOST_NAMES])}{more} {members[0]['status']}{ended}: {reason}."
-    yield Note(text, f" `{command_line('tactbench', 'why', str(members[0]['cell']))}`" if stopped else "")
+    yield Note(text, " `tactbench why CELL` tells more." if stopped else "")
 
 
 def _stamps(board: Board) -> Iterator[Note]:

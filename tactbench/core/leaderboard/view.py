@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from tactbench.core.errors import UnknownNameError
+from tactbench.core.evaluation.protocols import is_probe
 from tactbench.core.leaderboard.blocks import Block
 from tactbench.core.leaderboard.columns import COLUMNS, DEFAULT, NUMERIC, SHOWN, Line
 from tactbench.core.leaderboard.names import Row, grouped, metric_name
@@ -159,6 +160,8 @@ def commands(table: Table, view: View = DEFAULT_VIEW) -> tuple[str, ...]:
         command_line("tactbench", "report", *where): "figures and every detail",
         command_line("tactbench", "leaderboard", *where, "--format", "latex"): paper,
     }
+    if not first["simulated"] and not any(is_probe(row["protocol"]) for row in table.rows):
+        found["tactbench run … --probe"] = "what the recordings give away"
     width = max(map(len, found))
     return tuple(
         f"{'' if place else 'Next: ':6}{command:<{width}}  {what}"

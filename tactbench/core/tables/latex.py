@@ -42,6 +42,8 @@ def latex_table(
 ) -> str:
     """Return a table as LaTeX, its title as the caption; text between backticks is code elsewhere.
 
+    A heading may have two lines.
+
     Parameters
     ----------
     number
@@ -51,6 +53,7 @@ def latex_table(
     rule
         The line above which there is a rule.
     """
+    heads = zip(*(head.rpartition("\n")[::2] for head in table.headers), strict=True)
     environment = "table" if columns else "table*"
     lines = [" & ".join(map(tex, line)) + r" \\" for line in table.lines]
     if rule is not None:
@@ -64,7 +67,7 @@ def latex_table(
         rf"\label{{{_label(table.title, number)}}}",
         rf"\begin{{tabular}}{{{columns or ''.join('r' if right else 'l' for right in table.right)}}}",
         r"\toprule",
-        " & ".join(map(tex, table.headers)) + r" \\",
+        *(" & ".join(map(tex, row)) + r" \\" for row in heads if any(row)),
         r"\midrule",
         *lines,
         r"\bottomrule",

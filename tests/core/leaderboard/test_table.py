@@ -96,7 +96,7 @@ def test_shuffled_rows_and_probes_come_after_what_is_kept_apart():
 @pytest.mark.parametrize("status", ["failed", "crashed", "timeout", "out-of-memory"])
 def test_a_stopped_cell_is_a_line_with_its_reason_and_the_command_to_look_into_it(status):
     rows = [row(), *(row(name, status=status, score=None, reason="the plug was pulled.") for name in "bcdefg")]
-    said = f"b/lasso, c/lasso, d/lasso, e/lasso and 2 more {status}: the plug was pulled. `tactbench why b/question/"
+    said = f"b/lasso, c/lasso, d/lasso, e/lasso and 2 more {status}: the plug was pulled. `tactbench why CELL`"
     for text in (to_markdown(rows).replace("\\", ""), plain_text(build_table(rows))):
         assert status.upper() in text
         assert said in text
