@@ -14,37 +14,23 @@ import tactbench
 from tactbench.core.errors import UsageError
 from tactbench.core.leaderboard.columns import SHOWN
 from tactbench.core.leaderboard.table import Table
-from tactbench.core.spec.row import FORMAT, JSON_KEYS, NESTED, OF_REPLICATES
+from tactbench.core.spec.row import FORMAT, JSON_KEYS, NESTED, OF_REPLICATES, RowModel
 from tactbench.core.tables import csv_text as csv_format
 from tactbench.core.tables.text import json_text, visible
 
 RANK_KEYS = ("rank", "rank_low", "rank_high", "rank_tied")
 """Where a row stands in its block; they follow the keys of the row."""
 
-GROUPS: dict[str, tuple[str, ...]] = {
-    "Configuration": (
-        "cell", "key", "sensor", "task", "rig", "simulated", "emulated", "protocol", "dagger", "split", "estimator",
-        "is_baseline", "looks_at", "answer_per", "answer_from", "declared_task", "repeat", "repeats", "seed",
-        "threads",
-    ),
-    "Answer": (
-        "status", "reason", "signal", "metric", "unit", "score", "ci_low", "ci_high", "ci_method",
-        "reference_floor", "score_beyond_floor", "beyond_floor_ci_low", "beyond_floor_ci_high", "true_score",
-        "true_ci_low", "true_ci_high", "tare_s", "baseline",
-        "published", "published_reference", "published_remark", "equivalence", "reference_score", "n_recordings",
-        "n_sessions", "n_train", "n_test",
-    ),
-    "Times and memory": (
-        "sim_s", "search_s", "fit_s", "predict_s", "batch_rows", "latency_ms_p50", "latency_ms_p95",
-        "latency_ms_max", "latency_n", "answer_delay_ms",
-        "wall_s", "peak_rss_mb", "host", "concurrency", "made_by",
-    ),
-}  # fmt: skip
+_STARTS = {"Configuration": "cell", "Answer": "status", "Times and memory": "sim_s", "What it rests on": "simulated"}
+_PLACES = [*map(list(RowModel.model_fields).index, _STARTS.values()), len(RowModel.model_fields)]
+_BETWEEN = {
+    title: list(RowModel.model_fields)[first:after]
+    for title, first, after in zip(_STARTS, _PLACES, _PLACES[1:], strict=False)
+}
+GROUPS = {title: tuple(key for key in keys if key not in NESTED) for title, keys in _BETWEEN.items()}
 """Single values; a key that is in no group comes last, so that none is ever left out."""
 
-OF_THE_MACHINE = frozenset(GROUPS["Times and memory"]) | {
-    "delay_parts_ms", "threads", "search", "recordings", "key", "events", "operating_points",
-}  # fmt: skip
+OF_THE_MACHINE = {*_BETWEEN["Times and memory"], "search", "recordings", "key", "events", "operating_points"}
 """Keys that machine, place or hour decide, not the seed alone."""
 
 TITLES = {
