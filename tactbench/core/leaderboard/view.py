@@ -73,7 +73,7 @@ def grids(table: Table, view: View = DEFAULT_VIEW) -> list[TextTable]:
 def _grid(block: Block, view: View) -> TextTable:
     lines: list[_Texts] = [({**line.texts, CELL: visible(_cell(line.row))}, line.kind) for line in block.lines]
     if not view.wide and not view.columns:
-        lines = _with_trivial_once(block, lines)
+        lines = _with_trivial_once(lines)
     names = view.columns or (*COLUMNS, CELL) if view.wide or view.columns else DEFAULT
     names = tuple(name for name in names if name in lines[0][0])
     table = TextTable(
@@ -86,18 +86,17 @@ def _grid(block: Block, view: View) -> TextTable:
     return table if view.columns else table.compact(keep=("place",))
 
 
-def _with_trivial_once(block: Block, lines: Sequence[_Texts]) -> list[_Texts]:
+def _with_trivial_once(lines: Sequence[_Texts]) -> list[_Texts]:
     """Return lines with one in place of a trivial answer of each sensor, where their scores agree to the last digit."""
-    answers = [one for one in lines if one[1] != "baseline"]
-    trivial = [texts for texts, kind in lines if kind == "baseline"]
-    sensors = {line.texts["sensor"] for line in block.lines if line.kind != "skipped"}
-    merged = []
-    for members in grouped(trivial, lambda texts: texts["estimator"]).values():
-        same = {name: text if all(one[name] == text for one in members) else "" for name, text in members[0].items()}
-        everywhere = len(members) > 1 and {one["sensor"] for one in members} == sensors
-        merged += [same] if everywhere and same["score"] else members
-    ended = [one for one in answers if one[1] not in ("result",)]
-    return [*(one for one in answers if one[1] == "result"), *((texts, "baseline") for texts in merged), *ended]
+    sensors = {texts["sensor"] for texts, kind in lines if kind in ("result", "baseline")}
+    found: list[_Texts] = []
+    for (kind, _), same in grouped(
+        lines, lambda one: (one[1], one[0]["estimator"] if one[1] == "baseline" else "")
+    ).items():
+        alike = {name: text if all(one[name] == text for one, _ in same) else "" for name, text in same[0][0].items()}
+        once = kind == "baseline" and len(same) > 1 and {one["sensor"] for one, _ in same} == sensors and alike["score"]
+        found += [(alike, kind)] if once else same
+    return found
 
 
 def full_grid(block: Block) -> TextTable:
@@ -143,8 +142,8 @@ def headings(names: Sequence[str], block: Block) -> tuple[str, ...]:
     rows = [line.row for line in block.lines]
     unit = "" if rows[0]["unit"] == "1" else visible(f" [{rows[0]['unit']}]")
     levels = {percent(row.get("n_replicates"), row.get("replicate_unit")) for row in rows if row["ci_low"] is not None}
-    level = levels.pop() if len(levels) == 1 else "95 %"
-    shown = {"score": metric_name(rows[0]), "interval": f"{level} interval", "notes": ""}
+    interval = f"{levels.pop()} interval" if len(levels) == 1 else "interval"
+    shown = {"score": metric_name(rows[0]), "interval": interval, "notes": ""}
     shown |= {name: f"{name}{unit}" for name in ("beyond floor", "true error")}
     return tuple(shown.get(name, name) for name in names)
 
