@@ -56,31 +56,29 @@ def markdown(table: Table, view: View = DEFAULT_VIEW) -> str:
 
 
 def latex(table: Table, view: View = DEFAULT_VIEW) -> str:
-    """Return the blocks as LaTeX for one column of a paper, or with the columns that were asked for over both."""
-    blocks = enumerate(zip(table.blocks, grids(table, view), strict=True), 1)
-    parts = [_in_a_paper(block, grid, view, number) for number, (block, grid) in blocks]
+    """Return the blocks as LaTeX, each a table for one column of a paper; what was probed goes over both."""
+    names = view.columns or _IN_A_PAPER
+    blocks = zip(table.blocks, grids(table, replace(view, wide=False, columns=())), strict=True)
+    parts = [_in_a_paper(block, grid, names, number) for number, (block, grid) in enumerate(blocks, 1)]
     parts += [latex_table(one, one.notes, number=number) for number, one in enumerate(table.sections, len(parts) + 1)]
     return "\n".join(parts)
 
 
-def _in_a_paper(block: Block, grid: TextTable, view: View, number: int) -> str:
+def _in_a_paper(block: Block, grid: TextTable, names: Sequence[str], number: int) -> str:
     """Return a block as LaTeX; a paper gives no commands, and no places unless they were asked for."""
-    notes = [f"{note.text.rstrip('.')}." for note in block.notes if note.printed]
-    if view.wide or view.columns:
-        return latex_table(replace(grid, title=_caption(block)), notes, number=number)
     lines = [dict(zip(grid.columns, line, strict=True)) for line in grid.lines]
     marked = [line.get("notes") or (NO_BETTER if line.get("place") == NO_BETTER else "") for line in lines]
-    names = [name for name in _IN_A_PAPER if name in grid.columns]
+    names = [name for name in names if name in grid.columns and name != "notes"]
+    shown = (tuple(line[name].replace(" … ", "–") for name in names) for line in lines)
+    heads = dict(zip(grid.columns, grid.headers, strict=True))
     table = replace(
         grid,
         title=_caption(block),
         columns=(*names, "notes"),
-        headings=(*("\n".join(head.rsplit(" ", 1)) for head in grid.only(names).headers), ""),
-        lines=tuple(
-            (*(line[name].replace(" … ", "–") for name in names), mark)
-            for line, mark in zip(lines, marked, strict=True)
-        ),
+        headings=(*("\n".join(heads[name].rsplit(" ", 1)) for name in names), ""),
+        lines=tuple((*line, mark) for line, mark in zip(shown, marked, strict=True)),
     ).compact()
+    notes = [f"{note.text.rstrip('.')}." for note in block.notes if note.printed]
     rule = grid.kinds.index("baseline") if "baseline" in grid.kinds[1:] else None
     columns = "".join(_COLUMNS.get(name, "r") for name in table.columns)
     return latex_table(table, notes, number=number, columns=f"@{{}}{columns}@{{}}", rule=rule)

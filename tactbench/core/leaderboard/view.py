@@ -74,16 +74,37 @@ def _grid(block: Block, view: View) -> TextTable:
     lines: list[_Texts] = [({**line.texts, CELL: visible(_cell(line.row))}, line.kind) for line in block.lines]
     if not view.wide and not view.columns:
         lines = _with_trivial_once(lines)
-    names = view.columns or (*COLUMNS, CELL) if view.wide or view.columns else DEFAULT
+    names = view.columns or ((*COLUMNS, CELL) if view.wide else DEFAULT)
     names = tuple(name for name in names if name in lines[0][0])
-    table = TextTable(
-        block.title, names, tuple(tuple(texts[name] for name in names) for texts, _ in lines), NUMERIC - {"place"},
-        headings=headings(names, block), kinds=tuple(kind for _, kind in lines), origin=block.origin,
-        summary=(block.setting, *block.verdict), notes=tuple(map(str, block.notes)),
-        first_to_go=() if view.columns else _FIRST_TO_GO, unbroken=frozenset({CELL}),
-    )  # fmt: skip
+    table = replace(
+        _text_table(block, names, [[texts[name] for name in names] for texts, _ in lines]),
+        numeric=NUMERIC - {"place"},
+        kinds=tuple(kind for _, kind in lines),
+        first_to_go=() if view.columns else _FIRST_TO_GO,
+        unbroken=frozenset({CELL}),
+    )
     # A column of dashes says that nobody has a place.
     return table if view.columns else table.compact(keep=("place",))
+
+
+def full_grid(block: Block) -> TextTable:
+    """Return a block with every column and row, what numbers are sorted by, and why cells did not end well."""
+    names = (*block.lines[0].texts, "reason")
+    return _text_table(block, names, [[*_entries(line), _reason(line.row)] for line in block.lines]).compact()
+
+
+def _text_table(block: Block, names: Sequence[str], lines: Sequence[Sequence[str]]) -> TextTable:
+    return TextTable(
+        block.title,
+        tuple(names),
+        tuple(map(tuple, lines)),
+        NUMERIC,
+        headings=headings(names, block),
+        kinds=tuple(line.kind for line in block.lines),
+        origin=block.origin,
+        summary=(block.setting, *block.verdict),
+        notes=tuple(map(str, block.notes)),
+    )
 
 
 def _with_trivial_once(lines: Sequence[_Texts]) -> list[_Texts]:
@@ -97,16 +118,6 @@ def _with_trivial_once(lines: Sequence[_Texts]) -> list[_Texts]:
         once = kind == "baseline" and len(same) > 1 and {one["sensor"] for one, _ in same} == sensors and alike["score"]
         found += [(alike, kind)] if once else same
     return found
-
-
-def full_grid(block: Block) -> TextTable:
-    """Return a block with every column and row, what numbers are sorted by, and why cells did not end well."""
-    names = (*block.lines[0].texts, "reason")
-    return TextTable(
-        block.title, names, tuple((*_entries(line), _reason(line.row)) for line in block.lines), NUMERIC,
-        headings=(*headings(names[:-1], block), "reason"), kinds=tuple(line.kind for line in block.lines),
-        origin=block.origin, summary=(block.setting, *block.verdict), notes=tuple(map(str, block.notes)),
-    ).compact()  # fmt: skip
 
 
 def _entries(line: Line) -> list[str]:

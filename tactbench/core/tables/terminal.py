@@ -87,7 +87,7 @@ def _print_table(table: TextTable, console: Console) -> list[str]:
         grid.add_row(*(Text(line[place]) for place in widths), style=_STYLE.get(kind, ""))
     from rich.padding import Padding
 
-    console.print(Padding(grid, (0, 0, 0, _MARGIN)))
+    console.print(Padding(grid, (0, 0, 0, _MARGIN)), width=max(taken, console.width), crop=False)
     if table.notes:
         console.print()
     return [table.headers[place] for place in range(len(table.columns)) if place not in widths]
@@ -113,7 +113,7 @@ def _widths(table: TextTable, room: int) -> dict[int, int]:
     for name in table.first_to_go:
         if sum(least[place] + _GAP for place in widths) - _GAP > room and name in table.columns:
             del widths[table.columns.index(name)]
-    kept = {place for place in widths if table.columns[place] in table.unbroken}
+    kept = {place for place in widths if table.columns[place] in table.unbroken | table.numeric}
     for bound in (least, {place: least[place] if place in kept else _LEAST for place in least}):
         while sum(width + _GAP for width in widths.values()) - _GAP > room:
             slack = [place for place, width in widths.items() if width > bound[place]]
@@ -121,6 +121,4 @@ def _widths(table: TextTable, room: int) -> dict[int, int]:
                 break
             # Headings first: breaking one costs a single line.
             widths[max(slack, key=lambda place: (widths[place] > body[place], widths[place]))] -= 1
-        if table.first_to_go:
-            break
     return widths
