@@ -55,14 +55,12 @@ def command(
     """
     check_destination(shape)
     keep_threads()
-    from tactbench.core.cli.comparisons import print_comparisons
     from tactbench.core.cli.operator import TerminalOperator
     from tactbench.core.cli.plugins import tell_failed
     from tactbench.core.cli.progress import progress
     from tactbench.core.cli.results import provenance_of
     from tactbench.core.leaderboard.formats import write_tables
     from tactbench.core.leaderboard.levels import with_levels
-    from tactbench.core.leaderboard.side_by_side import compare
     from tactbench.core.leaderboard.table import build_table
     from tactbench.core.matrix.run import EngineChoice, run_matrix
     from tactbench.core.matrix.store import Store
@@ -90,9 +88,6 @@ def command(
     rows = with_levels(over_replicates(outcome.rows), store.folder, store.provenance)
     table = build_table(rows, provenance, questions=questions_of(rows))
     print_table(table, shape, view_of(store.folder))
-    for by in ("protocol", "split") if shape == "table" else ():
-        if comparisons := compare(rows, by):
-            print_comparisons(comparisons)
     write_tables(rows, store.folder, provenance, table)
     _farewell(outcome, rows, store.folder)
     ctx.exit(1 if outcome.failures else 0)

@@ -15,7 +15,7 @@ from typing import Any
 from tactbench.core.evaluation.protocols import is_probe
 from tactbench.core.leaderboard.columns import Line, line_of
 from tactbench.core.leaderboard.names import Row, distinct, grouped, hardware_name, metric_name, sign_of
-from tactbench.core.leaderboard.sentences import Board, Note, above, below
+from tactbench.core.leaderboard.sentences import NO_BETTER, Board, Note, above, below
 from tactbench.core.leaderboard.trivial import Bars, error_of
 from tactbench.core.leaderboard.trivial import no_better as no_better
 from tactbench.core.statistics.rank import Rank, beyond_floor, excess_of
@@ -69,9 +69,11 @@ def _block(key: _Key, members: Sequence[Row], columns: Sequence[str], question: 
     trivial = sorted((row for row in finished if row["is_baseline"]), key=lambda row: (row["sensor"], error_of(row)))
     stopped = sorted((row for row in members if row["status"] != "done"), key=lambda row: row["status"])
     board = Board(placed, unplaced, trivial, stopped, unranked, bars, times)
+    few = unranked == "few"
     lines = [
-        *(line_of(row, placing, columns, board.marks(row)) for row, placing in placed),
-        *(line_of(row, None, columns, board.marks(row)) for row in (*unplaced, *trivial)),
+        *(line_of(row, None if few else placing, columns, board.marks(row)) for row, placing in placed),
+        *(line_of(row, None, columns, board.marks(row), NO_BETTER) for row in unplaced),
+        *(line_of(row, None, columns, board.marks(row), _trivial_place(row)) for row in trivial),
         *(line_of(row, None, columns, ()) for row in stopped),
     ]
     direction = "lower" if sign_of(members[0]) > 0 else "higher"
@@ -87,6 +89,10 @@ def _block(key: _Key, members: Sequence[Row], columns: Sequence[str], question: 
         verdict=tuple(map(visible, above(board))),
         notes=tuple(Note(visible(one.text), visible(one.hint), one.printed) for one in below(board)),
     )
+
+
+def _trivial_place(row: Row) -> str:
+    return "oracle" if row.get("looks_at") == "reference" else ""
 
 
 def _origin(finished: Sequence[Row], hardware: str) -> str:

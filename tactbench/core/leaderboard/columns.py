@@ -131,25 +131,19 @@ class Line:
         return sorted_by(self.row) if sorted_by and self.kind in ("result", "baseline") else None
 
 
-def line_of(row: Row, placing: Rank | None, names: Sequence[str], marks: Sequence[str]) -> Line:
-    """Return the line of a row: one without a place is no better than trivial, trivial, or did not end well."""
+def line_of(row: Row, placing: Rank | None, names: Sequence[str], marks: Sequence[str], place: str = "") -> Line:
+    """Return the line of a row; `place` stands there where it has none."""
     if row["status"] != "done":
         texts = {"sensor": visible(str(row["sensor"])), "estimator": answer_name(row), "score": row["status"].upper()}
         kind: Kind = "failed" if row["status"] in STOPPED else "skipped"
         return Line(row, {name: texts.get(name, "") for name in names}, kind)
-    ranked = {"place": _place(placing, row), "notes": " ".join(marks)}
+    if placing:
+        place = f"{placing.place}=" if placing.tied else str(placing.place)
+    ranked = {"place": place, "notes": " ".join(marks)}
     texts = {name: ranked[name] if name in ranked else OF_ROWS[name].text(row) for name in names}
     # An absent value is empty: the dash means one thing, that an answer has no place.
     texts = {name: "" if text == ABSENT and name != "place" else text for name, text in texts.items()}
     return Line(row, texts, "baseline" if row["is_baseline"] else "result", placing)
-
-
-def _place(one: Rank | None, row: Row) -> str:
-    if one is None and row["is_baseline"]:
-        return "oracle" if row.get("looks_at") == "reference" else ""
-    if one is None:
-        return ABSENT
-    return f"{one.place}=" if one.tied else str(one.place)
 
 
 def row_interval(row: Row) -> str:

@@ -84,7 +84,8 @@ def _grid(block: Block, view: View) -> TextTable:
         unbroken=frozenset({CELL}),
     )
     # A column of dashes says that nobody has a place.
-    return table if view.columns else table.compact(keep=("place",))
+    keep = ("place",) if any(texts["place"] for texts, _ in lines) else ()
+    return table if view.columns else table.compact(keep)
 
 
 def full_grid(block: Block) -> TextTable:
