@@ -294,7 +294,7 @@ def _how(board: Board) -> Iterator[Note]:
     for unit, rows in over.items():
         parts.append(f"Interval: over {_counts([row['n_replicates'] for row in rows], unit)}")
     if any(rank.tied for _, rank in board.placed) and not board.unranked:
-        parts.append("= cannot be told apart")
+        parts.append("= not all of these can be told apart")
     sentences = ["; ".join(parts)] if parts else []
     if board.times and any(row.get("answer_delay_ms") is not None for row in board.answers):
         sentences.append("Delay: sampling, link, window, computing")
