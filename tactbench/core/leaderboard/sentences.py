@@ -176,7 +176,8 @@ def _timed(board: Board) -> str:
     timed = list(dict.fromkeys(answer_name(bar) for bar in bars if bar.get("looks_at") == "time"))
     if not timed:
         return ""
-    return f"{' and '.join(timed)} reads no sensor, only the time since the press began: such a score needs no touch."
+    reads = "reads" if len(timed) == 1 else "read"
+    return f"{' and '.join(timed)} {reads} no sensor, only the time: such a score needs no touch."
 
 
 def _published(board: Board) -> str:

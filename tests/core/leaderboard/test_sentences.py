@@ -231,7 +231,7 @@ ABOVE = {
     r"(?:The only answer|None of (\d+) answers) scores (?:no )?better than the trivial one of its own sensor "
     r"\((.*)\)\.":
         lambda t, n, b: not t.better and int(n or 1) == len(t.answers) and t.bars(b, t.answers),
-    r"time reads no sensor, only the time since the press began: such a score needs no touch\.":
+    r"time reads no sensor, only the time: such a score needs no touch\.":
         lambda t: any(t.bar(o)["looks_at"] == "time" for o in [*t.worse, *t.unshown]),
     r"Published values: (.*?)(?:; that concerns the simulation, not the sensors)?\.": lambda t, a: t.beside(a),
 }  # fmt: skip
