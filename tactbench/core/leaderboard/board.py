@@ -34,7 +34,7 @@ LONGEST_NOTE = 4_000
 MOST_NOTES = 2_000
 MOST_LINES = 500
 """Lines of a table below the blocks; `leaderboard.md` has them all."""
-DURATIONS = ("delay", "latency p50", "p95", "fit", "sim", "batch/row")
+DURATIONS = ("delay after touch", "latency p50", "latency p95", "training", "simulation")
 """Columns that a score can be drawn against."""
 _SCRIPTS = ("read.js", "text.js", "cells.js", "tables.js", "matrix.js", "pareto.js", "start.js")
 _DATA_HERE = "{the data}"
@@ -125,7 +125,7 @@ def _head(table: Table, lines: Sequence[Line]) -> dict[str, Any]:
 
 def _is_simulated(block: Block) -> bool:
     """Return whether a block stands among simulated ones; a cell that was not begun does not know it of itself."""
-    return SIMULATED in block.title.split(" · ")[2:] or any(line.row["simulated"] for line in block.lines)
+    return block.origin.startswith(("SIMULATED", SIMULATED)) or any(line.row["simulated"] for line in block.lines)
 
 
 def _column(name: str, lines: Sequence[Line]) -> dict[str, Any]:
