@@ -30,11 +30,11 @@ if TYPE_CHECKING:
     from rich.console import Console
 
 SUFFIXES = {
-    ".json": "json", ".csv": "csv", ".md": "md", ".tex": "latex", ".html": "html", ".parquet": "parquet",
-    ".xlsx": "xlsx", ".txt": "table",
+    ".json": "json", ".csv": "csv", ".md": "md", ".tex": "latex", ".parquet": "parquet", ".xlsx": "xlsx",
+    ".txt": "table",
 }  # fmt: skip
 """The format that a file is meant to have, by how its name ends."""
-IN_FOLDER = ("md", "csv", "json", "html")
+IN_FOLDER = ("md", "csv", "json")
 """A run's result folder has these, ``leaderboard.md`` and so on; the others are made when asked for."""
 COLUMN_PT = 229.0
 """Width of one column of a two-column paper, in points: of the class article 229.5, of others 239 (84 mm) and more."""
@@ -125,13 +125,6 @@ def _broken(cells: Sequence[str], widths: Mapping[int, float]) -> list[tuple[str
     return list(zip_longest(*parts, fillvalue=""))
 
 
-def page(table: Table) -> str:
-    """Return the page of a table: one HTML file, every cell behind its numbers, times among them."""
-    from tactbench.core.leaderboard.board import page_of
-
-    return page_of(table)
-
-
 def rendered(table: Table, shape: str, view: View = WHOLE, width: int = 240) -> bytes:
     """Return a leaderboard in a format that `SUFFIXES` names.
 
@@ -152,7 +145,7 @@ def rendered(table: Table, shape: str, view: View = WHOLE, width: int = 240) -> 
     if shape in ("md", "latex"):
         text = markdown(table, view) if shape == "md" else latex(table, view)
     else:
-        text = {"csv": csv_text, "json": json_array, "html": page}[shape](table)
+        text = csv_text(table) if shape == "csv" else json_array(table)
     return text.encode("utf-8", "replace")
 
 

@@ -21,9 +21,8 @@ from tactbench.core.leaderboard.view import DEFAULT_VIEW, WHOLE, View, grids, no
 from tactbench.core.tables.csv_text import guarded, unguarded
 from tactbench.core.tables.fitting import pieces
 from tactbench.core.tables.latex import points
-from tests.core.leaderboard.rendering import to_csv, to_json, to_latex, to_markdown, to_page, to_parquet
+from tests.core.leaderboard.rendering import to_csv, to_json, to_latex, to_markdown, to_parquet
 
-from .board.reading import read_page, values
 from .rows import row
 from .strategies import HOSTILE, some_rows, texts
 from .tex import as_set, untex
@@ -188,16 +187,6 @@ def test_nothing_is_cut_off_or_broken_within_a_word(rows, width, view):
     words = [piece for grid in grids(table, view) for line in grid.lines for cell in line for piece in pieces(cell)]
     if max(map(cell_len, words)) < 12 and "cell" not in view.columns:
         assert max(cell_len(line) for line in text.splitlines()) <= width
-
-
-@settings(max_examples=30)
-@given(some_rows())
-def test_the_page_shows_the_cells_of_the_table(rows):
-    head, columns, _ = read_page(to_page(rows))
-    table = build_table(rows)
-    assert tuple(columns) == table.columns
-    cells = list(zip(*map(values, columns.values()), strict=True))
-    assert [one_spaced(cells[place]) for place in head["order"]] == [one_spaced(line) for line in lines_of(table)]
 
 
 @given(texts)

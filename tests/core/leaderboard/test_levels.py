@@ -104,7 +104,6 @@ def test_check_keeps_the_level_and_every_table_shows_it(verbs, kept):
     assert {row["shown"]["level"] for row in shown} == {"silver"}
     assert re.search(r"\| pad +\| silver +\|", verbs("leaderboard", "kept", "--format", "md").stdout)
     assert "shown_level" in verbs("leaderboard", "kept", "--format", "csv").stdout
-    assert ">silver<" in verbs("leaderboard", "kept", "--format", "html").stdout
     assert "level" not in verbs("leaderboard", "kept", "--no-times").stdout  # no seed decides it
     notes = sensors_section(ReportData(open_results(store, installed()))).notes
     assert "Levels that `tactbench check` has computed: pad silver." in notes
