@@ -17,9 +17,9 @@ from tactbench.core.leaderboard.levels import (
 )
 from tactbench.core.matrix.store import Store
 from tactbench.core.plugins.registry import installed
+from tactbench.core.report.page import sensors_section
 from tactbench.core.report.results import open_results
 from tactbench.core.report.section import ReportData
-from tactbench.core.report.sensors import sensors_section
 from tests.core.matrix import made
 
 PAD = {"distribution": "acme", "version": "1.2", "package": "acme_pad", "source": "abc", "commit": ""}
