@@ -72,7 +72,7 @@ def make_report(results: Results, out: Path, progress: Progress, *, draw: Drawer
             f"The report cannot be written to {out}: {error.strerror or error}.",
             hint="Give another folder with --out.",
         ) from error
-    lacking = [one for one in page.missing if not any(reason in one for reason in trouble)]
+    lacking = [one for one in page.missing if not one.endswith(trouble)]
     return Report(
         page=out / "index.html",
         reproduction=published_table(results.registry, readable),

@@ -41,6 +41,8 @@ if TYPE_CHECKING:
 TITLE = "tactbench: tactile sensors, what they answer and what it costs"
 MOST_TASKS = 2
 """So many tasks are named in the first section; the leaderboards have them all."""
+MOST_WHOLE = 200
+"""Cells of which the page has whatever there is: each further one takes a file to be read and 20 kB."""
 _READINGS = 5
 """So many first lines of a sensor's details are about readings; `tactbench show --all` has the parameters."""
 
@@ -55,17 +57,14 @@ def answers_section(subject: ReportData) -> Section:
     paragraphs = ["SIM: simulated by a twin of the sensor; no sensor was touched."] if simulated else []
     paragraphs += [*_published(subject), *list(found.values())[:MOST_TASKS]]
     pictures = tuple(_picture(one) for one in subject.drawn if one.name == PUBLISHED)
-    return Section("answers", "What came out", tuple(paragraphs), pictures=pictures)
+    return Section(paragraphs=tuple(paragraphs), pictures=pictures)
 
 
 def _published(subject: ReportData) -> list[str]:
     """Return how many published numbers lie in the interval of ours."""
     verdicts = Counter(line.verdict for line in reproduce(subject.results.registry, subject.rows))
-    inside, judged = verdicts["inside"], verdicts["inside"] + verdicts["outside"]
-    if judged:
-        return [f"Published numbers in the 95 % interval of ours: {inside} of {judged}."]
-    few = f"Published numbers beside ours: {verdicts['no interval']}; ours are of too few replicates for an interval."
-    return [few] if verdicts["no interval"] else []
+    judged = verdicts["inside"] + verdicts["outside"]
+    return [f"Published numbers in the 95 % interval of ours: {verdicts['inside']} of {judged}."] if judged else []
 
 
 def leaderboards_section(subject: ReportData) -> Section:
@@ -78,7 +77,7 @@ def leaderboards_section(subject: ReportData) -> Section:
             "table. All of them are in `leaderboard.csv` in the result folder."
         )
     tables = tuple(_grid(block, lines) for block, lines in subject.blocks)
-    return Section("leaderboards", "Leaderboard", tuple(paragraphs), tables, notes=table.notes)
+    return Section(paragraphs=tuple(paragraphs), tables=tables, notes=table.notes)
 
 
 def _grid(block: Block, lines: Sequence[Line]) -> TextTable:
@@ -97,17 +96,14 @@ def _grid(block: Block, lines: Sequence[Line]) -> TextTable:
 def published_section(subject: ReportData) -> Section:
     """Return the section of published numbers."""
     table = published_table(subject.results.registry, subject.rows)
-    missing = () if table.lines else ("No task installed here states any.",)
-    return Section("reproduction", "Published numbers", tables=(table,) if table.lines else (), missing=missing)
+    return Section(tables=(table,) if table.lines else ())
 
 
 def figures_section(subject: ReportData) -> Section:
     """Return the section of figures: those that were drawn for this page."""
     pictures = tuple(_picture(one) for one in subject.drawn if one.name != PUBLISHED)
-    none = "None was drawn from these results: `tactbench run` makes what the paper's figures show."
-    missing = subject.undrawn or (() if pictures else (none,))
     paragraphs = ("The same figures lie beside this page as `figures/*.pdf` and `figures/*.png`.",) if pictures else ()
-    return Section("figures", "Figures", paragraphs, pictures=pictures, missing=missing)
+    return Section(paragraphs=paragraphs, pictures=pictures, missing=subject.undrawn)
 
 
 def _picture(one: SavedFigure) -> Picture:
@@ -123,7 +119,7 @@ def compared_section(subject: ReportData) -> Section:
         "`--protocol` and `--split` ask otherwise."
     )
     return Section(
-        "compared", "Across protocols, splits and tasks", tables=tuple(table.compact() for table in tables),
+        tables=tuple(table.compact() for table in tables),
         missing=() if tables else (lacks,),
     )  # fmt: skip
 
@@ -140,7 +136,7 @@ def costs_section(subject: ReportData) -> Section:
     some = next(timed, None)
     command = command_line("tactbench", "cost", *(("--sensor", some["sensor"], "--task", some["task"]) if some else ()))
     lacks = f"What an answer costs in time beside its score: `{command}`; of the simulation: `tactbench cost --twin`."
-    return Section("cost", "What accuracy costs in time", tables=tables, pictures=pictures,
+    return Section(tables=tables, pictures=pictures,
                    missing=() if tables or pictures else (lacks,))  # fmt: skip
 
 
@@ -154,10 +150,8 @@ def sensors_section(subject: ReportData) -> Section:
     command = command_line("tactbench", "show", *found, "--all")
     parts = (("Sensor comparison", table_one(specs)), ("Readings", of_sensors(specs)[:_READINGS])) if specs else ()
     return Section(
-        "sensors",
-        "Sensors (the paper's Table I)",
-        (f"Every parameter of these sensors, and who states it: `{command}`.",) if specs else (),
-        tuple(sensor_table(name, specs, properties, with_source=True).compact() for name, properties in parts),
+        paragraphs=(f"Every parameter of these sensors, and who states it: `{command}`.",) if specs else (),
+        tables=tuple(sensor_table(name, specs, properties, with_source=True).compact() for name, properties in parts),
         notes=(f"Levels that `tactbench check` has computed: {listed}.",) if levels else (),
         missing=tuple(f"{name}: neither installed nor in a recording of these results."
                       for name, spec in found.items() if spec is None),
@@ -181,20 +175,22 @@ def _spec(name: str, subject: ReportData) -> SensorSpec | None:
 
 def cells_section(subject: ReportData) -> Section:
     """Return the details of every cell of the leaderboard."""
-    several = "Of several replicates, key, recordings, candidates and effects are those of the first."
-    return Section(
-        "cells",
-        "Details of each cell",
-        (several,) if any(row["repeats"] > 1 for row in subject.rows) else (),
-        details=tuple(details(row, subject.results) for row in subject.shown),
-    )
+    whole = len(subject.shown) <= MOST_WHOLE
+    paragraphs = [] if whole else [
+        f"More than {MOST_WHOLE} cells: scores of recordings, effects, candidates and confusion are left out here; "
+        "each cell's own file, `cells/KEY.h5`, has them."
+    ]  # fmt: skip
+    if any(row["repeats"] > 1 for row in subject.rows):
+        paragraphs.append("Of several replicates, key, recordings, candidates and effects are those of the first.")
+    found = tuple(details(row, subject.results if whole else None) for row in subject.shown)
+    return Section(paragraphs=tuple(paragraphs), details=found)
 
 
 def about_section(subject: ReportData) -> Section:
     """Return how many cells ended how, and who computed them, with what, where."""
     counts = Counter(str(row["status"]) for row in subject.rows)
     statuses = ", ".join(f"{count} {status}" for status, count in sorted(counts.items()))
-    return Section("about", "Made by", (f"Cells: {statuses}.", *subject.leaderboard.footer))
+    return Section(paragraphs=(f"Cells: {statuses}.", *subject.leaderboard.footer))
 
 
 # Anchor, title and maker of each section: a section that cannot be made says so under its own title.
@@ -205,7 +201,7 @@ SECTIONS: tuple[tuple[str, str, Callable[[ReportData], Section]], ...] = (
     ("figures", "Figures", figures_section),
     ("compared", "Across protocols, splits and tasks", compared_section),
     ("cost", "What accuracy costs in time", costs_section),
-    ("sensors", "Sensors", sensors_section),
+    ("sensors", "Sensors (the paper's Table I)", sensors_section),
     ("cells", "Details of each cell", cells_section),
     ("about", "Made by", about_section),
 )
@@ -231,7 +227,7 @@ def make_page(subject: ReportData) -> Page:
     broken: list[str] = []
     for anchor, title, make in SECTIONS:
         try:
-            sections.append(make(subject))
+            sections.append(replace(make(subject), anchor=anchor, title=title))
         except Exception as error:
             reason = f"This section cannot be made from these results: {type(error).__name__}: {error}"
             broken.append(f"{title}: {reason}")

@@ -91,4 +91,4 @@ class SavedFigure:
     caption: str
     """What is on the axes and how to read it, in sentences a paper could use."""
     png: Path
-    pdf: Path
+    """Its PDF lies beside it."""

@@ -83,8 +83,8 @@ class Details:
 class Section:
     """A part of the page. Text between backticks is shown as code; none of it is markup."""
 
-    anchor: str
-    title: str
+    anchor: str = ""
+    title: str = ""
     paragraphs: tuple[str, ...] = ()
     tables: tuple[TextTable, ...] = ()
     pictures: tuple[Picture, ...] = ()

@@ -38,9 +38,8 @@ def draw_one(material, folder, progress=None, remark=print):
     figure.subplots().plot(answers.y_true, answers.y_pred, ".")
     drawn = SavedFigure(
         "predicted-against-true", "Predicted against true", "Force: truth across, prediction upwards, newtons.",
-        folder / "one.png", folder / "one.pdf",
+        folder / "one.png",
     )  # fmt: skip
     figure.savefig(drawn.png)
-    figure.savefig(drawn.pdf)
     remark("Curvature is not drawn: this is a test.")
     return [drawn]

@@ -54,7 +54,7 @@ def material(results):
 @pytest.fixture
 def subject(material, tmp_path):
     (other,) = draw_one(material, tmp_path)
-    return ReportData(material, [other, SavedFigure("published-and-ours", "Both", "Marks.", other.png, other.pdf)])
+    return ReportData(material, [other, SavedFigure("published-and-ours", "Both", "Marks.", other.png)])
 
 
 def with_rows(material, *rows):
@@ -185,7 +185,7 @@ def test_a_comparison_s_numbers_lead_each_to_their_cell(material):
 
 
 def test_a_section_that_cannot_be_made_takes_no_other_with_it(material, tmp_path):
-    gone = SavedFigure("gone", "Gone", "It was deleted.", tmp_path / "gone.png", tmp_path / "gone.pdf")
+    gone = SavedFigure("gone", "Gone", "It was deleted.", tmp_path / "gone.png")
     page = make_page(ReportData(material, [gone]))
     assert len(page.broken) == 1
     assert page.broken[0].startswith("Figures: This section cannot be made from these results: FileNotFoundError")

@@ -10,7 +10,6 @@ from tactbench.core.errors import NotApplicable
 from tactbench.core.report.figures.group import Group, Panel, Remark, Sketch, class_name, with_unit
 from tactbench.core.report.figures.style import COLUMN_IN, PAGE_IN, panels
 from tactbench.core.samples import FloatArray, IntArray
-from tactbench.core.spec.task import LabelTarget
 from tactbench.core.tables.numbers import score
 
 if TYPE_CHECKING:
@@ -35,9 +34,8 @@ def draw(group: Group, remark: Remark) -> Sketch:
         raise NotApplicable("no cell has a confusion matrix")
     roles = ("validation", "test") if any("validation" in panel.answers for panel in shown) else ("test",)
     wide = max(len(panel.row["classes"]) for panel in shown) >= WIDE_FROM
-    height = 3.0 if len(roles) == 1 else 3.1 if wide else 1.4
+    height = 3.0 if wide or len(roles) == 1 else 1.4
     figure, axes = panels(len(shown), len(roles), height, width_in=PAGE_IN if wide and len(roles) > 1 else COLUMN_IN)
-    unit = group.task.target.unit if isinstance(group.task.target, LabelTarget) else "1"
     for place, panel in enumerate(shown):
         tables = matrices(panel)
         for here, role in zip(axes[place], roles, strict=True):
@@ -46,12 +44,12 @@ def draw(group: Group, remark: Remark) -> Sketch:
                 continue
             _matrix(here, tables[role], panel.row["classes"])
             here.set_title(f"{panel.sensor}, {role}")
-            here.set_xlabel(with_unit("answered", unit))
-        axes[place, 0].set_ylabel(with_unit(f"true {group.quantity}", unit))
+            here.set_xlabel(with_unit("answered", group.unit))
+        axes[place, 0].set_ylabel(with_unit(f"true {group.quantity}", group.unit))
     scores = ", ".join(f"{panel.sensor} {score(panel.row['score'], group.task.unit)}" for panel in shown)
     caption = (
-        f"Rows are the true {with_unit(group.quantity, unit)}, columns the answer; numbers are per cent of the row, "
-        f"whose count of {group.task.answer_per}s stands on the right (n). {group.metric} of the test set: {scores}."
+        f"Rows are the true {group.quantity}, columns the answer; numbers are per cent of the row, whose "
+        f"count of {group.task.answer_per}s stands on the right (n). {group.metric} of the test set: {scores}."
     )
     return group.sketch("confusion", f"Which {group.quantity} is taken for which?", caption, figure)
 

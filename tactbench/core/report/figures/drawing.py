@@ -104,11 +104,9 @@ def save(sketch: Sketch, folder: Path) -> SavedFigure:
     """Write a figure as PNG and PDF, each whole, without dates: the same figure is the same bytes."""
     # Without the version of what drew it either.
     apart = {"png": {"Software": None}, "pdf": {"CreationDate": None, "Creator": "tactbench", "Producer": None}}
-    paths = {}
     for ending, dpi in (("png", PNG_DPI), ("pdf", RASTER_DPI)):
         content = io.BytesIO()
         sketch.figure.savefig(content, format=ending, dpi=dpi, metadata=apart[ending])
         sketch.figure.set_layout_engine("none")  # the first drawing has put everything in its place
-        paths[ending] = folder / f"{sketch.name}.{ending}"
-        replace_file(paths[ending], content.getvalue())
-    return SavedFigure(sketch.name, sketch.title, sketch.caption, paths["png"], paths["pdf"])
+        replace_file(folder / f"{sketch.name}.{ending}", content.getvalue())
+    return SavedFigure(sketch.name, sketch.title, sketch.caption, folder / f"{sketch.name}.png")

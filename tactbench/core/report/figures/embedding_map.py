@@ -18,7 +18,6 @@ from tactbench.core.report.figures.style import MARKERS, cycled, legend, ordered
 from tactbench.core.report.results import Results
 from tactbench.core.report.smoothing import WINDOW_S, smoothed_force
 from tactbench.core.samples import Answers, FloatArray, IntArray
-from tactbench.core.spec.task import LabelTarget
 
 AT_MOST = 1000
 """Points of an embedding: more take longer and hide each other in a column's width."""
@@ -59,8 +58,7 @@ def draw(group: Group, remark: Remark) -> Sketch:
             here.spines[:].set_visible(True)
     if shade is not None:
         figure.colorbar(shade, ax=axes[:, 1], shrink=0.8, aspect=30, pad=0.02, label="force [N]")
-    unit = group.task.target.unit if isinstance(group.task.target, LabelTarget) else "1"
-    legend(figure, axes[:, 0], title=with_unit(group.quantity, unit), markerscale=1.8, handletextpad=0.1)
+    legend(figure, axes[:, 0], title=with_unit(group.quantity, group.unit), markerscale=1.8, handletextpad=0.1)
     points = ", ".join(f"{panel.sensor} {len(rows)} of {len(panel.answers['test'])}" for panel, rows, _ in found)
     caption = (
         f"t-SNE of the test set's features as the estimator saw them; left by {group.quantity}, right by reference "

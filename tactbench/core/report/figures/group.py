@@ -90,6 +90,12 @@ class Group:
         return (target.name if target.name and len(target.name) > 2 else target.kind).replace("_", " ")
 
     @property
+    def unit(self) -> str:
+        """The unit of that."""
+        target = self.task.target
+        return target.unit if isinstance(target, LabelTarget) else self.task.unit
+
+    @property
     def heading(self) -> str:
         """What stands above a figure: question, answer, protocol with its marks, SIM; in lines that fit a column."""
         row = self.row
@@ -146,8 +152,6 @@ def groups(results: Results, remark: Remark) -> list[Group]:
     for row in results.rows:
         if row["status"] == "done":
             alike.setdefault((row["task"], row["protocol"], row["split"], row["rig"]), []).append(row)
-        elif not row["is_baseline"]:
-            remark(f"{row['cell']} is in no figure: {row['status']}: {row['reason']}")
     made = [_group(results, rows, remark) for rows in alike.values()]
     return [group for group in made if group is not None]
 

@@ -54,12 +54,10 @@ def draw(group: Group, remark: Remark) -> Sketch:
         here.set_title(panel.sensor)
     axes[0].set_ylabel("median onset latency [ms]")
     legend(figure, axes)
-    silent = [f"{row['sensor']}/{answer_name(row)}" for row, found in zip(rows, points, strict=True) if not len(found)]
-    missing = f" Not shown, with fewer hits at every bound: {', '.join(sorted(silent))}." if silent else ""
     caption = (
         "Median onset latency on test recordings against false alarms a minute of their disturbances, at thresholds "
         "that validation recordings chose for several bounds of false alarms. A mark is as large as its recall, and is "
-        f"left out below {LEAST_RECALL:g}: latencies are over hits alone.{missing}"
+        f"left out below {LEAST_RECALL:g}: latencies are over hits alone."
     )
     return group.sketch("latency-and-false-alarms", "How many false alarms buy an earlier one?", caption, figure)
 

@@ -9,7 +9,7 @@ from tactbench.core.evaluation.metrics import distances
 from tactbench.core.report.figures.group import Group, Remark, Sketch, with_unit
 from tactbench.core.report.figures.style import GREY, tiled
 from tactbench.core.samples import Answers, FloatArray
-from tactbench.core.spec.row import HIGH_ERROR, MEDIAN_ERROR
+from tactbench.core.spec.row import MEDIAN_ERROR
 from tactbench.core.spec.task import VectorTarget
 from tactbench.core.tables.numbers import score_with_unit
 
@@ -34,21 +34,18 @@ def draw(group: Group, remark: Remark) -> Sketch:
     figure, axes = tiled(len(group.panels), ACROSS, 2.5)
     maps = [places(panel.answers["test"]) for panel in group.panels]
     most = max(float(error.max()) for _, _, error in maps)
-    numbers = []
     for here, panel, (true, answered, error) in zip(axes, group.panels, maps, strict=True):
         here.plot(*np.stack([true, answered]).transpose(2, 0, 1), "-", color=GREY, linewidth=0.6, zorder=1)
         dots = here.scatter(true[:, 0], true[:, 1], c=error, s=12, vmin=0.0, vmax=most, cmap="viridis_r", linewidths=0)
-        scores = panel.row["scores"]
-        here.set_title(f"{panel.sensor}, median {score_with_unit(scores[MEDIAN_ERROR], unit)}")
+        here.set_title(f"{panel.sensor}, median {score_with_unit(panel.row['scores'][MEDIAN_ERROR], unit)}")
         here.set_aspect("equal")
         here.set_xlabel(with_unit(target.names[0], unit))
         here.set_ylabel(with_unit(target.names[1], unit))
-        numbers.append(f"{panel.sensor} {score_with_unit(scores[HIGH_ERROR], unit)}")
     figure.colorbar(dots, ax=axes, location="bottom", label=with_unit("mean error", unit), shrink=0.6, aspect=30)
     caption = (
         "Error of the answered contact location over the skin, in the coordinates of its reference. A dot is a place "
         f"of the test set, the mean of the test rows within one of {CELLS} by {CELLS} cells; its colour is their mean "
-        f"error, the line from it leads to the mean answer. 95th percentile: {', '.join(numbers)}."
+        "error, the line from it leads to the mean answer."
     )
     return group.sketch("location-map", "Where on the skin is the answered location off?", caption, figure)
 
