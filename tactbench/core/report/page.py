@@ -85,9 +85,9 @@ def _grid(block: Block, lines: Sequence[Line]) -> TextTable:
     names = [name for name in lines[0].texts if name in (*DEFAULT, *OF_FLOOR)]
     texts = []
     for line in lines:
-        row = line.row
-        cells = [Entry(line.texts[name], finite(line.value(name)), cell=row["cell"]) for name in names]
-        texts.append((*cells, "" if row["status"] == "done" else f"{row['status']}: {row['reason']}"))
+        row, cells = line.row, {"score": str(line.row["cell"])}
+        entries = [Entry(line.texts[name], finite(line.value(name)), cell=cells.get(name, "")) for name in names]
+        texts.append((*entries, "" if row["status"] == "done" else f"{row['status']}: {row['reason']}"))
     kinds = [line.kind for line in lines]
     table = text_table(block.title, (*names, "reason"), texts, numeric=NUMERIC, kinds=kinds)
     return replace(table, summary=block.verdict)

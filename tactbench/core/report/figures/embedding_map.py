@@ -58,7 +58,8 @@ def draw(group: Group, remark: Remark) -> Sketch:
             here.spines[:].set_visible(True)
     if shade is not None:
         figure.colorbar(shade, ax=axes[:, 1], shrink=0.8, aspect=30, pad=0.02, label="force [N]")
-    legend(figure, axes[:, 0], title=with_unit(group.quantity, group.unit), markerscale=1.8, handletextpad=0.1)
+    title = with_unit(group.quantity, group.unit)
+    legend(figure, axes[:, 0], ncols=6, title=title, markerscale=1.8, handletextpad=0.1, columnspacing=0.8)
     points = ", ".join(f"{panel.sensor} {len(rows)} of {len(panel.answers['test'])}" for panel, rows, _ in found)
     caption = (
         f"t-SNE of the test set's features as the estimator saw them; left by {group.quantity}, right by reference "

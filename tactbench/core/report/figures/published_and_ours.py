@@ -67,9 +67,7 @@ def _panel(here: Axes, lines: Sequence[tuple[Reproduction, Any]], colours: Mappi
     here.set_yticks(range(len(lines)), [f"{row['sensor']}, {answer_name(row)}" for _, row in lines])
     for label, (_, row) in zip(here.get_yticklabels(), lines, strict=True):
         label.set_color(colours[row["sensor"]])
-    here.tick_params(axis="y", length=0)
     here.set_ylim(len(lines) - 0.4, -0.6)
-    here.margins(x=0.08)
     here.grid(axis="x", linewidth=0.4, color=GREY, alpha=0.3)
     row = lines[0][1]
     better = "lower" if row["metric"] in LOWER_IS_BETTER else "higher"

@@ -10,7 +10,7 @@ import numpy.typing as npt
 from tactbench.core.errors import NotApplicable
 from tactbench.core.evaluation.metrics import metric_called
 from tactbench.core.report.figures.group import Group, Panel, Remark, Sketch
-from tactbench.core.report.figures.style import DASHES, GREY, MARKERS, cycled, legend, panels
+from tactbench.core.report.figures.style import GREY, MARKERS, cycled, legend, panels
 from tactbench.core.report.smoothing import WINDOW_S, smoothed_force
 from tactbench.core.samples import FloatArray
 from tactbench.core.tables.numbers import whole
@@ -37,7 +37,7 @@ def draw(group: Group, remark: Remark) -> Sketch:
         scores, rows = banded(group, panel)
         here.plot(
             BANDS, scores, color=group.colours[panel.sensor], marker=cycled(MARKERS, place), markersize=4,
-            linestyle=cycled(DASHES, place), label=panel.sensor,
+            label=panel.sensor,
         )  # fmt: skip
         counts.append(f"{panel.sensor} {', '.join(map(whole, rows))}")
         trivial = group.baselines.get(panel.sensor)

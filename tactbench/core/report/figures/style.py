@@ -22,7 +22,6 @@ BLACK, GREY = "#000000", "#767676"
 LINES = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", BLACK)
 """Of things without an order: Okabe and Ito 2008, Color universal design."""
 MARKERS = ("o", "s", "^", "D", "v", "P", "X", "*", "<", ">")
-DASHES = ("-", "--", "-.", ":", (0, (5, 1, 1, 1, 1, 1)))
 
 _RC: dict[str, Any] = {
     "font.family": "DejaVu Sans",  # comes with matplotlib: the same figure on every machine
@@ -31,11 +30,8 @@ _RC: dict[str, Any] = {
     **dict.fromkeys(("legend.fontsize", "figure.titlesize"), FONT_PT),
     **dict.fromkeys(("axes.linewidth", "xtick.major.width", "ytick.major.width"), 0.6),
     **dict.fromkeys(("axes.spines.top", "axes.spines.right", "legend.frameon"), False),
-    "axes.titlepad": 3.0,
-    "lines.linewidth": 1.0,
     "figure.constrained_layout.h_pad": 0.06,
     "pdf.fonttype": 42,  # publishers refuse type 3
-    "savefig.facecolor": "white",
     "text.parse_math": False,  # a name with two dollar signs is a name
 }
 
@@ -90,7 +86,7 @@ def legend(figure: Figure, shown: Iterable[Axes], **more: Any) -> None:
         handles, labels = here.get_legend_handles_labels()
         entries.update(zip(labels, handles, strict=True))
     ncols = 3 if figure.get_figwidth() > COLUMN_IN else 2
-    figure.legend(entries.values(), entries.keys(), loc="outside lower center", ncols=ncols, **more)
+    figure.legend(entries.values(), entries.keys(), loc="outside lower center", **{"ncols": ncols, **more})
 
 
 def corner(axes: Axes, text: str) -> None:
