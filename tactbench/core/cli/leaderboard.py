@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
 from tactbench.core.cli.comparisons import COMPARISON_FORMATS, print_comparisons
-from tactbench.core.cli.options import options
 from tactbench.core.cli.results import opened, provenance_of, shown_rows
-from tactbench.core.cli.tables import DEFAULT_FOLDER, TABLE_FORMATS, VIEW, format_of, print_table, view_of
+from tactbench.core.cli.tables import DEFAULT_FOLDER, TABLE_FORMATS, format_of, print_table, questions_of, view_of
 from tactbench.core.leaderboard import AXES
 
 if TYPE_CHECKING:
@@ -34,7 +34,7 @@ def _filters(command: Any) -> Any:
 @click.option("--best", type=click.IntRange(min=1), is_flag=False, flag_value=1, metavar="[N]",
               help="Only the first N answers of each sensor in each block; N is 1 where it is left out.")  # fmt: skip
 @click.option("--columns", metavar="A,B,…", help="These columns, for example sensor,score,cell.")
-@options(*VIEW)
+@click.option("--wide", is_flag=True, help="All columns.")
 @click.option("--format", "shape", type=click.Choice(TABLE_FORMATS),
               help="How it is shown; default: table, or what the name of the file given with --to says.")  # fmt: skip
 @click.option("--to", "-o", "to", type=click.Path(path_type=Path, dir_okay=False), metavar="FILE",
@@ -44,14 +44,14 @@ def _filters(command: Any) -> Any:
               help="Only what a seed decides, no times and hosts: the same bytes on every machine.")  # fmt: skip
 def command(
     folder: Path, shape: str | None, to: Path | None, by: str | None, times: bool, best: int | None,
-    columns: str | None, wide: bool, notes: bool, **filters: tuple[str, ...],
+    columns: str | None, wide: bool, **filters: tuple[str, ...],
 ) -> None:  # fmt: skip
     """Show the table of all results in a folder, in any format. FOLDER is what `run --out` wrote."""
     from tactbench.core.cli.tables import check_destination
 
     shape = format_of(shape, to)
     check_destination(shape, to)
-    view = view_of(folder, wide=wide, notes=notes, columns=columns, shape=shape)
+    view = view_of(folder, wide=wide, columns=columns, shape=shape)
     _show(opened(folder), shape, to, by, times, best, view, filters)
 
 
@@ -64,9 +64,11 @@ def _show(
     from tactbench.core.leaderboard.table import build_table
     from tactbench.core.leaderboard.view import best
 
-    rows = _only(shown_rows(store), filters)
+    every = shown_rows(store)
+    rows = _only(every, filters)
+    view = replace(view, all_rows=len(rows) == len(every))
     if by is None:
-        table = build_table(rows, provenance_of(store, rows), times=times)
+        table = build_table(rows, provenance_of(store, rows), times=times, questions=questions_of(rows))
         print_table(best(table, count) if count else table, shape, view, to=to)
     elif to is not None or not times or count:
         raise UsageError("A comparison is printed whole, and has no times.", hint="Leave out --to, --best, --no-times.")

@@ -14,9 +14,9 @@ from tactbench.core.cli.selection import SELECTING, requested_matrix
 from tactbench.core.cli.tables import (
     DEFAULT_FOLDER,
     TABLE_FORMATS,
-    VIEW,
     check_destination,
     print_table,
+    questions_of,
     view_of,
 )
 from tactbench.core.cli.threads import keep_threads
@@ -35,7 +35,6 @@ _REASON_CHARACTERS = 200
 @click.option("--yes", is_flag=True, help="Ask nobody: what has to be done at a rig of real devices is done.")
 @click.option("--format", "shape", type=click.Choice(TABLE_FORMATS), default="table", show_default=True,
               help="How the leaderboard is printed.")  # fmt: skip
-@options(*VIEW)
 @click.pass_context
 def command(
     ctx: click.Context,
@@ -43,8 +42,6 @@ def command(
     out: Path,
     yes: bool,
     shape: str,
-    wide: bool,
-    notes: bool,
     engine: EngineName | None,
     jobs: int | None,
     timeout: float | None,
@@ -58,14 +55,12 @@ def command(
     """
     check_destination(shape)
     keep_threads()
-    from tactbench.core.cli.comparisons import print_comparisons
     from tactbench.core.cli.operator import TerminalOperator
     from tactbench.core.cli.plugins import tell_failed
     from tactbench.core.cli.progress import progress
     from tactbench.core.cli.results import provenance_of
     from tactbench.core.leaderboard.formats import write_tables
     from tactbench.core.leaderboard.levels import with_levels
-    from tactbench.core.leaderboard.side_by_side import compare
     from tactbench.core.leaderboard.table import build_table
     from tactbench.core.matrix.run import EngineChoice, run_matrix
     from tactbench.core.matrix.store import Store
@@ -91,13 +86,10 @@ def command(
         )  # fmt: skip
     provenance = provenance_of(store, outcome.rows)
     rows = with_levels(over_replicates(outcome.rows), store.folder, store.provenance)
-    table = build_table(rows, provenance)
-    print_table(table, shape, view_of(store.folder, wide=wide, notes=notes))
-    for by in ("protocol", "split") if shape == "table" else ():
-        if comparisons := compare(rows, by):  # once more, side by side
-            print_comparisons(comparisons)
+    table = build_table(rows, provenance, questions=questions_of(rows))
+    print_table(table, shape, view_of(store.folder))
     write_tables(rows, store.folder, provenance, table)
-    _farewell(outcome, rows, store.folder, shape)
+    _farewell(outcome, rows, store.folder)
     ctx.exit(1 if outcome.failures else 0)
 
 
@@ -105,15 +97,15 @@ def _so_far(rows: Sequence[Mapping[str, Any]]) -> str:
     """Return the table of the replicates that are finished, as wide as the terminal."""
     from tactbench.core.cli.screen import console
     from tactbench.core.leaderboard.table import build_table
-    from tactbench.core.leaderboard.view import DEFAULT_VIEW, grids
+    from tactbench.core.leaderboard.view import grids
     from tactbench.core.statistics.replicates import over_replicates
     from tactbench.core.tables.terminal import plain_text
 
-    return plain_text(grids(build_table(over_replicates(rows)), DEFAULT_VIEW), console().width)
+    return plain_text(grids(build_table(over_replicates(rows))), console().width)
 
 
-def _farewell(outcome: Outcome, rows: Sequence[Mapping[str, Any]], folder: Path, shape: str) -> None:
-    """Say what there is now, where it lies and what to try next."""
+def _farewell(outcome: Outcome, rows: Sequence[Mapping[str, Any]], folder: Path) -> None:
+    """Say what there is now, and where it lies."""
     from tactbench.core.cli.screen import remark
 
     answers = len(outcome.rows)
@@ -122,8 +114,6 @@ def _farewell(outcome: Outcome, rows: Sequence[Mapping[str, Any]], folder: Path,
            f"computed now; {outcome.recorded} recordings made now.")  # fmt: skip
     remark(f"Files: {folder}/leaderboard.md, .csv, .json; results.sqlite; recordings/; cells/")
     tell_stopped(outcome.failures, folder)
-    if shape == "table":
-        _suggest(rows)
 
 
 def tell_stopped(rows: Sequence[Mapping[str, Any]], folder: Path) -> None:
@@ -147,36 +137,3 @@ def one_line(reason: str) -> str:
     from tactbench.core.tables.text import cut, visible
 
     return cut(visible(" ".join(str(reason).split())), _REASON_CHARACTERS)
-
-
-def _suggest(rows: Sequence[Mapping[str, Any]]) -> None:
-    """Say what to try next, fitting to what was just run."""
-    from tactbench.core.cli.screen import remark
-    from tactbench.core.evaluation.protocols import is_probe
-    from tactbench.core.tables.text import command_line
-
-    row = rows[0]
-    if row["simulated"]:
-        whole = all(len({row[key] for row in rows}) > 1 for key in ("sensor", "task"))
-        first = (
-            {"tactbench report": "all of it as one page"} if whole else {"tactbench run": "the paper's whole matrix"}
-        )
-        tries = first | {
-            command_line(
-                "tactbench", "run", "--task", row["task"], "--protocol", "deployable"
-            ): "as in use: tared before each press",
-            "tactbench leaderboard --format latex": "the table for a paper: SIM, † and intervals stay in it",
-            command_line("tactbench", "show", row["sensor"]): "what the sensor is, and who says so",
-        }
-    else:
-        probe = {"tactbench run … --probe": "what the recordings give away: first frame alone, shuffled rows"}
-        probed = any(is_probe(row["protocol"]) for row in rows)
-        other = "all" if any(row["estimator"] == "forest" for row in rows) else "forest"
-        tries = ({} if probed else probe) | {
-            f"tactbench run … --estimator {other}": "other answers (see tactbench list estimators)",
-            "tactbench inspect FILE": "what is in a recording, and whether it is healthy",
-        }
-    width = max(len(command) for command in tries)
-    remark("Try next:")
-    for command_text, why in tries.items():
-        remark(f"  {command_text:<{width}}  {why}")

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Iterable, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -20,16 +21,8 @@ FOR_PEOPLE = ("table", "md", "latex")
 NO_TEXT = ("parquet", "xlsx")
 DEFAULT_FOLDER = Path("tactbench-results")
 
-VIEW = (
-    click.option(
-        "--wide", is_flag=True, help="All columns. Default: eight; in LaTeX what one column of a paper holds."
-    ),
-    click.option("--notes", is_flag=True, help="All notes and the whole provenance. Default: the first three."),
-)
-"""Given to `view_of`."""
 
-
-def view_of(folder: Path, *, wide: bool, notes: bool, columns: str | None = None, shape: str = "table") -> View:
+def view_of(folder: Path, *, wide: bool = False, columns: str | None = None, shape: str = "table") -> View:
     """Return what is printed of a table.
 
     Parameters
@@ -51,7 +44,16 @@ def view_of(folder: Path, *, wide: bool, notes: bool, columns: str | None = None
         )
     names = [name.strip() for name in columns.split(",")] if columns is not None else []
     where = "" if folder == DEFAULT_FOLDER else str(folder)
-    return View(wide=wide, notes=notes, columns=known_columns(names), folder=where)
+    return View(wide=wide, columns=known_columns(names), folder=where)
+
+
+def questions_of(rows: Iterable[Mapping[str, Any]]) -> dict[str, str]:
+    """Return what the tasks of rows ask, by name; a task that is not installed asks nothing."""
+    from tactbench.core.plugins.registry import installed
+
+    tasks = installed().tasks
+    names = {str(row["task"]) for row in rows}.intersection(tasks.names())
+    return {name: tasks[name].spec.question for name in names}
 
 
 def format_of(shape: str | None, to: Path | None) -> str:

@@ -15,7 +15,9 @@ from typing import Any
 from tactbench.core.evaluation.protocols import is_probe
 from tactbench.core.leaderboard.columns import Line, line_of
 from tactbench.core.leaderboard.names import Row, distinct, grouped, hardware_name, metric_name, sign_of
-from tactbench.core.leaderboard.verdict import verdict_of
+from tactbench.core.leaderboard.sentences import NO_BETTER, Board, Note, above, below
+from tactbench.core.leaderboard.trivial import Bars, error_of
+from tactbench.core.leaderboard.trivial import no_better as no_better
 from tactbench.core.statistics.rank import Rank, beyond_floor, excess_of
 from tactbench.core.statistics.replicates import FEWEST
 from tactbench.core.tables.text import visible
@@ -23,6 +25,8 @@ from tactbench.core.tables.text import visible
 _Key = tuple[str, str, str, str]
 MOST_RANKED = 20_000
 """Answers of one block beyond which comparing all pairs takes too long."""
+PLACED_OVER = ("replicate", "session", None)
+"""What places may rest on: what is recorded anew. None: a row that does not say."""
 
 
 @dataclass(frozen=True)
@@ -30,27 +34,73 @@ class Block:
     """Rows that may be compared."""
 
     title: str
+    """Task and question."""
+    setting: str
+    """Metric, protocol and split."""
+    origin: str
+    """Simulated, emulated or measured."""
     lines: tuple[Line, ...]
-    unranked: str = ""
-    """Why there are no rank intervals; empty where there are."""
     verdict: tuple[str, ...] = ()
-    """What its rows come to, in sentences."""
+    """What its rows come to: two sentences at most."""
+    notes: tuple[Note, ...] = ()
+    """What marks and numbers mean: four at most."""
 
 
 def blocks_of(
-    rows: Sequence[Row], columns: Sequence[str], letters: Mapping[str, str], times: bool
+    rows: Sequence[Row], columns: Sequence[str], questions: Mapping[str, str], *, times: bool
 ) -> tuple[Block, ...]:
-    """Arrange rows, in the order of their cells' names, into ranked blocks; verdicts name costs only with `times`."""
-    blocks = []
-    for key, members in sorted(_grouped(rows).items(), key=lambda group: _order(group[0])):
-        arranged, unranked = _arranged(members)
-        lines = tuple(line_of(row, placing, columns, letters) for row, placing in arranged)
-        ranked = [(row, placing) for row, placing in arranged if placing is not None]
-        below = sum(line.kind == "result" and line.placing is None for line in lines)
-        trivial = [line.row for line in lines if line.kind == "baseline"]
-        verdict = tuple(map(visible, verdict_of(ranked, below, trivial, times=times)))
-        blocks.append(Block(_title(key, members), lines, unranked, verdict))
-    return tuple(blocks)
+    """Arrange rows, in the order of their cells' names, into ranked blocks."""
+    groups = sorted(_grouped(rows).items(), key=lambda group: _order(group[0]))
+    return tuple(_block(key, members, columns, questions.get(key[0], ""), times) for key, members in groups)
+
+
+def _block(key: _Key, members: Sequence[Row], columns: Sequence[str], question: str, times: bool) -> Block:
+    task, protocol, split, hardware = key
+    bars = Bars(members)
+    finished = [row for row in members if row["status"] == "done"]
+    answers = [row for row in finished if not row["is_baseline"]]
+    entered = [row for row in answers if not bars.no_better(row)]
+    # What is equal stays in the order of the names.
+    ordered = sorted(zip(errors(entered), entered, strict=True), key=lambda one: (one[0], error_of(one[1])))
+    found, unranked = places([row for _, row in ordered])
+    # Of equal place stays the better one first.
+    placed = sorted(((row, found[row["cell"]]) for _, row in ordered), key=lambda one: one[1].place)
+    unplaced = sorted((row for row in answers if bars.no_better(row)), key=error_of)
+    trivial = sorted((row for row in finished if row["is_baseline"]), key=lambda row: (row["sensor"], error_of(row)))
+    stopped = sorted((row for row in members if row["status"] != "done"), key=lambda row: row["status"])
+    board = Board(placed, unplaced, trivial, stopped, unranked, bars, times)
+    few = unranked == "few"
+    lines = [
+        *(line_of(row, None if few else placing, columns, board.marks(row)) for row, placing in placed),
+        *(line_of(row, None, columns, board.marks(row), NO_BETTER) for row in unplaced),
+        *(line_of(row, None, columns, board.marks(row), _trivial_place(row)) for row in trivial),
+        *(line_of(row, None, columns, ()) for row in stopped),
+    ]
+    direction = "lower" if sign_of(members[0]) > 0 else "higher"
+    setting = [f"{metric_name(members[0])}, {direction} is better", f"protocol {protocol}"]
+    setting += [f"split {split}"] if split else []
+    return Block(
+        title=visible(
+            f"{task[:1].upper()}{task[1:]}" + (f": {question[:1].lower()}{question[1:]}" if question else "")
+        ),
+        setting=visible(" · ".join(setting)),
+        origin=visible(_origin(finished, hardware)),
+        lines=tuple(lines),
+        verdict=tuple(map(visible, above(board))),
+        notes=tuple(Note(visible(one.text), visible(one.hint), one.printed) for one in below(board)),
+    )
+
+
+def _trivial_place(row: Row) -> str:
+    return "oracle" if row.get("looks_at") == "reference" else ""
+
+
+def _origin(finished: Sequence[Row], hardware: str) -> str:
+    if not finished:
+        return "nothing finished"
+    if finished[0].get("emulated"):
+        return f"EMULATED devices (rig {finished[0]['rig']}): no sensor was touched"
+    return "SIMULATED: no sensor was touched" if finished[0]["simulated"] else f"MEASURED ({hardware})"
 
 
 def _order(key: _Key) -> tuple[Any, ...]:
@@ -82,47 +132,18 @@ def _grouped(rows: Sequence[Row]) -> dict[_Key, list[Row]]:
     return grouped(rows, key)
 
 
-def _arranged(members: Sequence[Row]) -> tuple[list[tuple[Row, Rank | None]], str]:
-    """Return the rows of a block in order with their places, and why places have no intervals, if so."""
-    finished = [row for row in members if row["status"] == "done"]
-    answers = [row for row in finished if not row["is_baseline"] and not no_better(row)]
-    # What is equal stays in the order of the names.
-    ordered = sorted(zip(errors(answers), answers, strict=True), key=lambda one: (one[0], _error(one[1])))
-    found, unranked = places([row for _, row in ordered])
-    # Of equal place stays the better one first.
-    results = sorted(((row, found[row["cell"]]) for _, row in ordered), key=lambda one: one[1].place)
-    unplaced = [
-        *sorted((row for row in finished if not row["is_baseline"] and no_better(row)), key=_error),
-        *sorted((row for row in finished if row["is_baseline"]), key=lambda row: (row["sensor"], _error(row))),
-        *sorted((row for row in members if row["status"] != "done"), key=lambda row: row["status"]),
-    ]
-    return [*results, *((row, None) for row in unplaced)], unranked
-
-
-def _error(row: Row) -> float:
-    """Return a score as a number that is the lower the better; one that is no finite number is the worst."""
-    return sign_of(row) * row["score"] if math.isfinite(row["score"]) else math.inf
-
-
-def no_better(row: Row) -> bool:
-    """Return whether an answer is no better than the trivial one and gets no place."""
-    baseline = row.get("baseline")
-    return baseline is not None and _error(row) >= sign_of(row) * baseline
-
-
 def places(results: Sequence[Row]) -> tuple[dict[str, Rank], str]:
     """Return where each of `results` stands, by the name of its cell, and why there are no rank intervals, if so.
 
     They are the finished answers of one block, no baselines, the best score first. A row without replicates enters
     with its own interval.
     """
-    if any(row.get("n_replicates") is not None and row["n_replicates"] < FEWEST for row in results):
-        shared = Rank(1, None, None, len(results) > 1)
-        return dict.fromkeys((row["cell"] for row in results), shared), f"fewer than {FEWEST} replicates carry them"
+    if not all(_may_be_placed(row) for row in results):
+        return {row["cell"]: Rank(1, None, None, len(results) > 1) for row in results}, "few"
     if not results:
         return {}, ""
     if not any(row.get("replicates") for row in results):
-        unranked = "rows keep no replicates"
+        unranked = "these rows keep no replicates"
     elif len(results) > MOST_RANKED:
         unranked = f"there are more than {MOST_RANKED} answers"
     elif not all(math.isfinite(row["score"]) for row in results):
@@ -141,6 +162,11 @@ def places(results: Sequence[Row]) -> tuple[dict[str, Rank], str]:
     return dict(zip((row["cell"] for row in results), by_score, strict=True)), unranked
 
 
+def _may_be_placed(row: Row) -> bool:
+    count = row.get("n_replicates")
+    return count is None or (count >= FEWEST and row.get("replicate_unit") in PLACED_OVER)
+
+
 def errors(results: Sequence[Row]) -> list[float]:
     """Return what answers of one metric are ordered by, the lower the better.
 
@@ -149,12 +175,4 @@ def errors(results: Sequence[Row]) -> list[float]:
     """
     if beyond_floor(results):
         return [one if math.isfinite(one) else math.inf for one in map(excess_of, results)]
-    return list(map(_error, results))
-
-
-def _title(key: _Key, members: Sequence[Row]) -> str:
-    task, protocol, split, hardware = key
-    direction = "lower" if sign_of(members[0]) > 0 else "higher"
-    dagger = " †" if any(row["dagger"] for row in members) else ""
-    metric = f"{metric_name(members[0])}, {direction} is better"
-    return visible(" · ".join([task, metric, f"{protocol}{dagger}", *([f"split {split}"] if split else []), hardware]))
+    return list(map(error_of, results))

@@ -2,26 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
-from itertools import accumulate, zip_longest
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from tactbench.core.errors import UsageError
 from tactbench.core.files import replace_file
-from tactbench.core.leaderboard import view as viewed
 from tactbench.core.leaderboard.blocks import Block
-from tactbench.core.leaderboard.columns import INTERVALS
-from tactbench.core.leaderboard.names import Row
-from tactbench.core.leaderboard.notes import RANKS, interval_notes
+from tactbench.core.leaderboard.names import Row, distinct
 from tactbench.core.leaderboard.records import csv_text, json_array, parquet, xlsx
+from tactbench.core.leaderboard.sentences import NO_BETTER
 from tactbench.core.leaderboard.table import Table, build_table
-from tactbench.core.leaderboard.view import DEFAULT_VIEW, WHOLE, View, document
+from tactbench.core.leaderboard.view import DEFAULT_VIEW, WHOLE, View, document, grids
+from tactbench.core.statistics.replicates import counted
 from tactbench.core.tables import markdown as markdown_format
 from tactbench.core.tables import terminal
-from tactbench.core.tables.fitting import fit, wrapped
-from tactbench.core.tables.latex import SEP_PT, latex_table, points, tex
+from tactbench.core.tables.latex import latex_table
 from tactbench.core.tables.numbers import whole
 from tactbench.core.tables.text import visible
 from tactbench.core.tables.text_table import TextTable
@@ -36,10 +33,9 @@ SUFFIXES = {
 """The format that a file is meant to have, by how its name ends."""
 IN_FOLDER = ("md", "csv", "json")
 """A run's result folder has these, ``leaderboard.md`` and so on; the others are made when asked for."""
-COLUMN_PT = 229.0
-"""Width of one column of a two-column paper, in points: of the class article 229.5, of others 239 (84 mm) and more."""
-_IN_A_COLUMN = ("sensor", "estimator", "score", "beyond floor", "95 % interval", "95 % beyond", "published")
-_FIRST_TO_GO = ("published", "score")
+_IN_A_PAPER = ("sensor", "estimator", "score", "interval", "published")
+_COLUMNS = {"sensor": "l", "estimator": r"p{0.24\columnwidth}", "notes": "l"}
+"""How LaTeX sets columns that are no numbers: long names of estimators go on in a further line."""
 
 
 def show(table: Table, console: Console, view: View = DEFAULT_VIEW) -> None:
@@ -53,76 +49,59 @@ def plain_text(table: Table, width: int = 240, view: View = DEFAULT_VIEW) -> str
 
 
 def markdown(table: Table, view: View = DEFAULT_VIEW) -> str:
-    """Return a leaderboard as Markdown, a heading a block."""
-    return markdown_format.markdown(document(table, view))
+    """Return a leaderboard as Markdown, a heading a block, with its provenance."""
+    parts: list[TextTable | Sequence[str]] = [*grids(table, view), *table.sections]
+    parts += [table.footer] if table.footer else []
+    return markdown_format.markdown(parts)
 
 
 def latex(table: Table, view: View = DEFAULT_VIEW) -> str:
-    """Return the table as LaTeX, a table a block; notes and footer stand below the last block.
-
-    What is printed by default fits one column of a two-column paper; all columns make a table over both.
-    """
-    parts: list[str] = []
-    whole_width = view.wide or bool(view.columns)
-    last = len(table.blocks) - 1
-    for place, (block, grid) in enumerate(zip(table.blocks, viewed.grids(table, view), strict=True)):
-        # A paper's table shows no ranks.
-        shown = [note for note in viewed.notes(table, view) if whole_width or note != RANKS]
-        notes = [*shown, *viewed.footer(table, view)] if place == last else []
-        if not whole_width:
-            grid = grid.only([name for name in grid.columns if name in _IN_A_COLUMN])
-        grid = replace(grid, title=_caption(block, grid))
-        parts += latex_table(grid, notes, number=place) if whole_width else _in_a_column(grid, notes, number=place)
-    for number, section in enumerate(viewed.sections(table, view), len(table.blocks)):
-        parts += latex_table(section, section.notes, number=number)
-    parts += [f"% {tex(text)}" for text in viewed.commands(table, view)]
-    return "\n".join(parts) + "\n"
+    """Return the blocks as LaTeX, each a table for one column of a paper; what was probed goes over both."""
+    names = view.columns or _IN_A_PAPER
+    blocks = zip(table.blocks, grids(table, replace(view, wide=False, columns=())), strict=True)
+    parts = [_in_a_paper(block, grid, names, number) for number, (block, grid) in enumerate(blocks, 1)]
+    parts += [latex_table(one, one.notes, number=number) for number, one in enumerate(table.sections, len(parts) + 1)]
+    return "\n".join(parts)
 
 
-def _caption(block: Block, grid: TextTable) -> str:
-    """Return the title of a block, its verdict, how many samples were tested and what its intervals are."""
-    rows = [line.row for line in block.lines if line.row["status"] == "done" and not line.row["is_baseline"]]
-    counts = sorted({row["n_test"] for row in rows if row["n_test"] is not None})
-    n = f"n = {'–'.join(map(whole, dict.fromkeys((counts[0], counts[-1]))))} test samples" if counts else ""
-    task = f"{visible(str(block.lines[0].row['task']))}: "
-    how = [f"95 % {text.removeprefix(task)}" for text in interval_notes(rows)] if rows else []
-    rule = "Below the rule: trivial answers" if "#" not in grid.columns and _first_trivial(grid) else ""
-    sentences = [text.rstrip(".") for text in (block.title, *grid.summary[:1], n, *how, rule) if text]
-    return f"{'. '.join(sentences)}."
-
-
-def _in_a_column(grid: TextTable, notes: Sequence[str], *, number: int) -> list[str]:
-    """Return a table as LaTeX: of one column, long texts broken into further lines."""
-    places = {name: place for place, name in enumerate(grid.columns)}
-    gap = 2 * SEP_PT
-    intervals = {places[name] for name in INTERVALS if name in places}
-    widths, hidden = fit(
-        grid.headers, grid.lines, {places["sensor"], places["estimator"], *intervals}, room=COLUMN_PT - gap, gap=gap,
-        measure=points, first_to_go=[places[name] for name in _FIRST_TO_GO if name in places], broken_last=intervals,
-    )  # fmt: skip
-    if hidden:
-        notes = [*notes, f"There was no room for: {', '.join(grid.headers[place] for place in hidden)}."]
-    lines = [_broken(cells, widths) for cells in grid.lines]
-    begins = [0, *accumulate(map(len, lines))]
-    kept = replace(
+def _in_a_paper(block: Block, grid: TextTable, names: Sequence[str], number: int) -> str:
+    """Return a block as LaTeX; a paper gives no commands, and no places unless they were asked for."""
+    lines = [dict(zip(grid.columns, line, strict=True)) for line in grid.lines]
+    marked = [line.get("notes") or (NO_BETTER if line.get("place") == NO_BETTER else "") for line in lines]
+    names = [name for name in names if name in grid.columns and name != "notes"]
+    shown = (tuple(line[name].replace(" … ", "–") for name in names) for line in lines)
+    heads = dict(zip(grid.columns, grid.headers, strict=True))
+    table = replace(
         grid,
-        columns=tuple(grid.columns[place] for place in widths),
-        headings=(),
-        lines=tuple(line for one in lines for line in one),
-    )
-    rules = [begins[place] for place in _first_trivial(grid)]
-    heads = _broken(grid.headers, widths)
-    return latex_table(kept, notes, headings=heads, number=number, over_both=False, rules=rules)
+        title=_caption(block),
+        columns=(*names, "notes"),
+        headings=(*("\n".join(heads[name].rsplit(" ", 1)) for name in names), ""),
+        lines=tuple((*line, mark) for line, mark in zip(shown, marked, strict=True)),
+    ).compact()
+    notes = [f"{note.text.rstrip('.')}." for note in block.notes if note.printed]
+    rule = grid.kinds.index("baseline") if "baseline" in grid.kinds[1:] else None
+    columns = "".join(_COLUMNS.get(name, "r") for name in table.columns)
+    return latex_table(table, notes, number=number, columns=f"@{{}}{columns}@{{}}", rule=rule)
 
 
-def _first_trivial(grid: TextTable) -> list[int]:
-    """Return the place of the first trivial answer, if a table of one column, which shows no ranks, has some."""
-    return [grid.kinds.index("baseline")] if "baseline" in grid.kinds and grid.kinds[0] != "baseline" else []
-
-
-def _broken(cells: Sequence[str], widths: Mapping[int, float]) -> list[tuple[str, ...]]:
-    parts: Iterable[list[str]] = (wrapped(cells[place], room, points) for place, room in widths.items())
-    return list(zip_longest(*parts, fillvalue=""))
+def _caption(block: Block) -> str:
+    """Return the title of a block, its setting, where it comes from, and how many samples and what intervals are of."""
+    rows = [line.row for line in block.lines if line.kind == "result"]
+    counts = sorted({row["n_test"] for row in rows if row["n_test"] is not None})
+    over = distinct(
+        ("", (row["n_replicates"], row["replicate_unit"]))
+        for row in rows
+        if row["ci_low"] is not None and row.get("n_replicates")
+    ).get("", [])
+    sentences = [block.title, block.setting.replace(" · ", ", "), block.origin]
+    if counts:
+        sentences.append(f"n = {'–'.join(map(whole, dict.fromkeys((counts[0], counts[-1]))))} test samples")
+    if len(over) == 1:
+        number, unit = over[0]
+        sentences.append(f"Intervals are over {counted(number, 'campaign' if unit == 'replicate' else visible(unit))}")
+    if any(line.kind == "baseline" for line in block.lines):
+        sentences.append("Below the rule: trivial answers")
+    return " ".join(sentence if sentence.endswith("?") else f"{sentence}." for sentence in sentences)
 
 
 def rendered(table: Table, shape: str, view: View = WHOLE, width: int = 240) -> bytes:

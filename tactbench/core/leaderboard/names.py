@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping
 from typing import Any, TypeVar
 
-from tactbench.core.evaluation.protocols import is_probe
 from tactbench.core.spec.row import LOWER_IS_BETTER as LOWER_IS_BETTER
 from tactbench.core.tables.text import visible
 
@@ -57,16 +56,6 @@ def hardware_name(row: Row) -> str:
     if row.get("emulated"):
         return f"{EMULATED} (rig {row['rig']})"
     return SIMULATED if row["simulated"] else f"rig {row['rig']}"
-
-
-def question_name(row: Row) -> str:
-    """Return sensor and task: what was asked of whom."""
-    return visible(f"{row['sensor']}/{row['task']}")
-
-
-def answer_or_probe(row: Row) -> str:
-    """Return the estimator or, for a probe, its protocol: what makes no sense to probe makes none with any other."""
-    return visible(str(row["protocol"])) if is_probe(row["protocol"]) else answer_name(row)
 
 
 def grouped(members: Iterable[_Value], key: Callable[[_Value], _Key]) -> dict[_Key, list[_Value]]:

@@ -10,9 +10,9 @@ from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 from tactbench.core.errors import UnknownNameError
-from tactbench.core.leaderboard.names import EMULATED, SIMULATED, Row, answer_name, grouped, hardware_name, metric_name
+from tactbench.core.leaderboard.names import Row, answer_name, grouped, hardware_name, metric_name
 from tactbench.core.spec.matrix import ComparisonChoice
-from tactbench.core.statistics.aggregate import Aggregate, aggregate
+from tactbench.core.statistics.aggregate import aggregate
 from tactbench.core.statistics.paired import Difference, FoldDifference, difference, holm, over_folds
 from tactbench.core.tables.numbers import ABSENT, interval, score, signed, suffix
 from tactbench.core.tables.text_table import TextTable
@@ -61,15 +61,15 @@ def comparisons(rows: Sequence[Row], first: str, second: str, task: str | None =
         If these rows have no such task, no sensor and no estimator of such a name, or not both names are of one kind.
     """
     rows = _in_task(rows, task)
-    sensors, estimators = grouped(rows, lambda row: str(row["sensor"])), grouped(rows, answer_name)
-    if first in sensors and second in sensors:
-        return _compared("sensors", first, second, *map(_answers, (sensors[first], sensors[second])))
-    if first in estimators and second in estimators:
-        return _compared("estimators", first, second, estimators[first], estimators[second])
-    if first in estimators:
-        raise UnknownNameError("estimator in these results", second, estimators)
-    if first in sensors:
-        raise UnknownNameError("sensor in these results", second, sensors)
+    sensors = grouped(_answers(rows), lambda row: str(row["sensor"]))
+    estimators = grouped(rows, answer_name)
+    kinds: dict[Kind, Mapping[str, Sequence[Row]]] = {"sensors": sensors, "estimators": estimators}
+    for kind, named in kinds.items():
+        if first in named and second in named:
+            return _compared(kind, first, second, named[first], named[second])
+    for kind, named in kinds.items():
+        if first in named:
+            raise UnknownNameError(f"{kind[:-1]} in these results", second, named)
     raise UnknownNameError("sensor or estimator in these results", first, [*sensors, *estimators])
 
 
@@ -156,11 +156,8 @@ def _why_alone(alone: Key, missing: str, others: Iterable[Key]) -> str:
     """Return why a row with the key `alone` has nothing to stand against among `others`, which are of `missing`."""
     hardware, protocol, split, *rest = alone
     near = [key for key in others if list(key[3:]) == rest]
-    elsewhere = {key[0] for key in near if key[1:3] == (protocol, split)} - {hardware}
-    if any(name.startswith(EMULATED) for name in (*elsewhere, hardware)) and elsewhere:
-        return "EMULATED is never compared with SIM or hardware"
-    if any((name == SIMULATED) != (hardware == SIMULATED) for name in elsewhere):
-        return "SIM is never compared with hardware"
+    if any(key[0] != hardware and key[1:3] == (protocol, split) for key in near):
+        return "SIM is never compared with hardware, EMULATED with neither"
     if any(key[:2] == (hardware, protocol) for key in near):
         return f"{missing} was asked with another split"
     if any(key[0] == hardware for key in near):
@@ -236,60 +233,53 @@ def probability(p: float | None) -> str:
 
 def notes_of(comparisons: Sequence[PairwiseComparison]) -> list[str]:
     """Return what must be known to read the tables."""
-    found = [pair for pair in comparisons if pair.difference is not None]
+    found = [(pair, pair.difference) for pair in comparisons if pair.difference is not None]
     if not found:
         return []
     notes = [
         "A − B is in the metric's unit; p is of no difference at all, by exchanging A and B within replicates; effect "
         "is the difference over the standard deviation of the replicates' differences; n counts replicates."
     ]
-    for pair in found:
-        assert pair.difference is not None, "these were compared"
+    for pair, apart in found:
         task, region = pair.row["task"], pair.row.get("equivalence")
-        notes.append(f"{task}: {pair.difference.method}.")
-        notes.append(
-            f"{task}: scores within {region:g}{suffix(pair.row['unit'])} are practically the same."
-            if region
-            else f"{task} declares no region of practical equivalence."
-        )
-        least = pair.difference.smallest_p
-        if least and least > 0.01:
-            notes.append(f"{pair.difference.replicates} replicates cannot give a p below {least:.2g}.")
+        same = f"scores within {region:g}{suffix(pair.row['unit'])} are practically the same" if region else ""
+        notes.append(f"{task}: {apart.method}; {same or 'no region of practical equivalence is declared'}.")
+        if apart.smallest_p and apart.smallest_p > 0.01:
+            notes.append(f"{apart.replicates} replicates cannot give a p below {apart.smallest_p:.2g}.")
         if pair.folds:
             notes.append(
                 f"p folds: {pair.folds.method}; training data of folds overlap, so p over replicates is too small "
                 "for a claim about estimators trained anew."
             )
-    if all(pair.declared for pair in found):
-        notes.append("p Holm is corrected for all declared comparisons of these results.")
-    elif any(pair.declared for pair in found):
-        notes.append("p Holm is corrected for all declared comparisons; the others are exploratory.")
+    if any(pair.declared for pair, _ in found):
+        notes.append("p Holm is corrected for all declared comparisons of these results; others are exploratory.")
     else:
         notes.append("None of these was declared in the matrix: exploratory, p is not corrected for being one of many.")
-    if any(pair.row["simulated"] for pair in found):
+    if any(pair.row["simulated"] for pair, _ in found):
         notes.append("SIM, EMULATED: simulated by the twin; says nothing of hardware.")
-    return list(dict.fromkeys([*notes, *_averages(found)]))
+    return list(dict.fromkeys([*notes, *_averages([pair for pair, _ in found])]))
 
 
 def _averages(found: Sequence[PairwiseComparison]) -> list[str]:
     """Return the interquartile mean over tasks of either, where two tasks or more were compared under one protocol."""
     notes = []
     for (_, protocol), pairs in grouped(found, lambda pair: (hardware_name(pair.row), pair.row["protocol"])).items():
-        one = aggregate([pair.first_row for pair in pairs if pair.first_row is not None])
-        other = aggregate([pair.second_row for pair in pairs if pair.second_row is not None])
+        one, other = (
+            aggregate([row for row in rows if row is not None])
+            for rows in zip(*((pair.first_row, pair.second_row) for pair in pairs), strict=True)
+        )
         if len({pair.row["task"] for pair in pairs}) < 2 or one is None or other is None:
             continue
         left_out = "".join(f" Left out: {reason}." for reason in dict.fromkeys(one.left_out + other.left_out))
+        means = ", ".join(
+            f"{name} {side.value:.3f} ({interval(side.low, side.high, '1')})"
+            for name, side in ((pairs[0].first, one), (pairs[0].second, other))
+        )
         notes.append(
             f"Interquartile mean over {one.tasks} tasks under {protocol} ({one.entries} scores; 0 is the trivial "
-            f"baseline, 1 the reference): {pairs[0].first} {_average(one)}, {pairs[0].second} {_average(other)}."
-            f"{left_out}"
+            f"baseline, 1 the reference): {means}.{left_out}"
         )
     return notes
-
-
-def _average(side: Aggregate) -> str:
-    return f"{side.value:.3f} ({interval(side.low, side.high, '1')})"
 
 
 def record_of(pair: PairwiseComparison) -> dict[str, Any]:

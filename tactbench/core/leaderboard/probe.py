@@ -9,7 +9,7 @@ from typing import Any
 
 from tactbench.core.evaluation.protocols import DEPLOYABLE, FIRST_FRAME
 from tactbench.core.leaderboard.names import Row, answer_name, grouped, sensor_name, sign_of
-from tactbench.core.leaderboard.verdict import against_trivial, best_trivials, comparison_key
+from tactbench.core.leaderboard.trivial import Bars
 from tactbench.core.tables.numbers import ABSENT, interval, score, score_with_unit, suffix
 from tactbench.core.tables.text import visible
 from tactbench.core.tables.text_table import Entry, TextTable, sort_value
@@ -33,7 +33,7 @@ def build_probe(rows: Sequence[Row]) -> TextTable | None:
     """Put each finished answer under `deployable` beside its probes; None if nothing was probed."""
     asked = (row for row in rows if row["protocol"] == FIRST_FRAME.name or row["split"] in ("shuffled", None))
     probes = grouped(asked, lambda row: _key(row, row["protocol"]))
-    best = best_trivials(rows)
+    bars = Bars(rows)
     lines: list[tuple[str, ...]] = []
     skipped: dict[str, None] = {}
     for row in rows:
@@ -45,7 +45,7 @@ def build_probe(rows: Sequence[Row]) -> TextTable | None:
         shuffled = _probe_of(row, probes, DEPLOYABLE.name, "shuffled")
         if first is None and shuffled is None:
             continue
-        lines.append(_line(row, shuffled, first, best.get(comparison_key(row))))
+        lines.append(_line(row, shuffled, first, bars))
         if first is not None and first["status"] == "skipped":
             skipped[visible(f"{row['sensor']}/{row['task']}: {first['reason']}")] = None
     if not lines:
@@ -74,9 +74,9 @@ def _probe_of(row: Row, probes: Mapping[tuple[Any, ...], list[Row]], protocol: s
     return None
 
 
-def _line(row: Row, shuffled: Row | None, first: Row | None, trivial: Row | None) -> tuple[str, ...]:
-    unit = row["unit"]
-    found = [*_about_trivial(row, trivial), *_about_first(row, first), *_about_shuffled(row, shuffled)]
+def _line(row: Row, shuffled: Row | None, first: Row | None, bars: Bars) -> tuple[str, ...]:
+    unit, trivial = row["unit"], bars.trivial(row)
+    found = [*_about_trivial(row, bars), *_about_first(row, first), *_about_shuffled(row, shuffled)]
     bar = score(row["baseline"], unit) if trivial is None else f"{score(trivial['score'], unit)} {answer_name(trivial)}"
     shown = {"shuffled": shuffled, "first frame alone": first}
     between = interval(row["ci_low"], row["ci_high"], unit)
@@ -96,14 +96,15 @@ def _shown(row: Row | None) -> str:
     return str(row["status"])
 
 
-def _about_trivial(row: Row, trivial: Row | None) -> Iterator[str]:
+def _about_trivial(row: Row, bars: Bars) -> Iterator[str]:
     """Yield that the best trivial answer scores as well, or that the interval does not exclude it."""
+    trivial = bars.trivial(row)
     if trivial is None:
         return
     values = f"{score(trivial['score'], row['unit'])} of {score_with_unit(row['score'], row['unit'])}"
-    if _skill(trivial["score"], row["score"], row) >= 0:
+    if bars.no_better(row):
         yield f"TRIVIAL: {answer_name(trivial)} scores {values}"
-    elif against_trivial(row, trivial["score"]):
+    elif bars.unshown(row):
         yield f"not shown to be better than {answer_name(trivial)}: {values}"
 
 

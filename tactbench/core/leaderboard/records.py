@@ -7,46 +7,30 @@ from __future__ import annotations
 
 import io
 import math
-import re
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from typing import Any
 
 import tactbench
 from tactbench.core.errors import UsageError
 from tactbench.core.leaderboard.columns import SHOWN
-from tactbench.core.leaderboard.names import metric_name
 from tactbench.core.leaderboard.table import Table
-from tactbench.core.spec.row import FORMAT, JSON_KEYS, NESTED, OF_REPLICATES
+from tactbench.core.spec.row import FORMAT, JSON_KEYS, NESTED, OF_REPLICATES, RowModel
 from tactbench.core.tables import csv_text as csv_format
 from tactbench.core.tables.text import json_text, visible
 
 RANK_KEYS = ("rank", "rank_low", "rank_high", "rank_tied")
 """Where a row stands in its block; they follow the keys of the row."""
 
-GROUPS: dict[str, tuple[str, ...]] = {
-    "Configuration": (
-        "cell", "key", "sensor", "task", "rig", "simulated", "emulated", "protocol", "dagger", "split", "estimator",
-        "is_baseline", "looks_at", "answer_per", "answer_from", "declared_task", "repeat", "repeats", "seed",
-        "threads",
-    ),
-    "Answer": (
-        "status", "reason", "signal", "metric", "unit", "score", "ci_low", "ci_high", "ci_method",
-        "reference_floor", "score_beyond_floor", "beyond_floor_ci_low", "beyond_floor_ci_high", "true_score",
-        "true_ci_low", "true_ci_high", "tare_s", "baseline",
-        "published", "published_reference", "published_remark", "equivalence", "reference_score", "n_recordings",
-        "n_sessions", "n_train", "n_test",
-    ),
-    "Times and memory": (
-        "sim_s", "search_s", "fit_s", "predict_s", "batch_rows", "latency_ms_p50", "latency_ms_p95",
-        "latency_ms_max", "latency_n", "answer_delay_ms",
-        "wall_s", "peak_rss_mb", "host", "concurrency", "made_by",
-    ),
-}  # fmt: skip
+_STARTS = {"Configuration": "cell", "Answer": "status", "Times and memory": "sim_s", "What it rests on": "simulated"}
+_PLACES = [*map(list(RowModel.model_fields).index, _STARTS.values()), len(RowModel.model_fields)]
+_BETWEEN = {
+    title: list(RowModel.model_fields)[first:after]
+    for title, first, after in zip(_STARTS, _PLACES, _PLACES[1:], strict=False)
+}
+GROUPS = {title: tuple(key for key in keys if key not in NESTED) for title, keys in _BETWEEN.items()}
 """Single values; a key that is in no group comes last, so that none is ever left out."""
 
-OF_THE_MACHINE = frozenset(GROUPS["Times and memory"]) | {
-    "delay_parts_ms", "threads", "search", "recordings", "key", "events", "operating_points",
-}  # fmt: skip
+OF_THE_MACHINE = {*_BETWEEN["Times and memory"], "search", "recordings", "key", "events", "operating_points"}
 """Keys that machine, place or hour decide, not the seed alone."""
 
 TITLES = {
@@ -73,9 +57,8 @@ APART = ("traceback", "classes")
 
 FORMAT_VERSION = "1"
 _RANKS = {"rank": int, "rank_low": int, "rank_high": int, "rank_tied": bool}
-_FIRST = (*RANK_KEYS, "sensor", "estimator", "score")
-_LONGEST_NAME, _LONGEST_TEXT = 31, 32_767
-"""Characters that Excel takes in a sheet's name and in a cell."""
+_LONGEST_TEXT = 32_767
+"""Characters that Excel takes in a cell."""
 
 
 def keys(table: Table) -> tuple[str, ...]:
@@ -94,11 +77,10 @@ def records(table: Table) -> Iterator[tuple[dict[str, Any], dict[str, str]]]:
         yield row, {SHOWN[name]: text for name, text in line.texts.items()}
 
 
-def flat_records(table: Table) -> tuple[list[str], Iterator[list[Any]]]:
+def flat_records(table: Table) -> tuple[list[str], list[list[Any]]]:
     """Return names of columns and lines for formats whose cells hold one value: lists and tables are JSON."""
     names = [*keys(table), *RANK_KEYS, *(f"shown_{SHOWN[name]}" for name in table.columns)]
-    lines = ([*(_flat(*one) for one in row.items()), *shown.values()] for row, shown in records(table))
-    return names, lines
+    return names, [[*(_flat(*one) for one in row.items()), *shown.values()] for row, shown in records(table)]
 
 
 def _flat(key: str, value: Any) -> Any:
@@ -133,22 +115,17 @@ def parquet(table: Table) -> bytes:
         raise _lacking("Parquet", "pyarrow", "parquet", error) from error
     types = {bool: pa.bool_(), float: pa.float64(), int: pa.int64(), str: pa.string()}
     names, lines = flat_records(table)
-    kinds = list(map(_kind, names))
     metadata = {
         "tactbench.format": "tactbench-leaderboard",
         "tactbench.format_version": FORMAT_VERSION,
         "tactbench.version": tactbench.__version__,
         "tactbench.provenance": json_text(list(table.provenance), sort_keys=True),
     }
-    schema = pa.schema([(name, types[kind]) for name, kind in zip(names, kinds, strict=True)], metadata=metadata)
-    columns = list(zip(*lines, strict=True)) or [()] * len(names)
+    schema = pa.schema([(name, types[_kind(name)]) for name in names], metadata=metadata)
     out = io.BytesIO()
     try:
-        arrays = [
-            [None if one is None else float(one) for one in column] if kind is float else list(column)
-            for column, kind in zip(columns, kinds, strict=True)
-        ]
-        pq.write_table(pa.table(arrays, schema=schema), out, compression="zstd")
+        columns = zip(*lines, strict=True) if lines else [()] * len(names)
+        pq.write_table(pa.table(list(map(list, columns)), schema=schema), out, compression="zstd")
     except (pa.ArrowException, OverflowError) as error:
         raise UsageError(f"These rows do not fit Parquet: {error}.", hint="Use --format json.") from error
     return out.getvalue()
@@ -168,9 +145,7 @@ def _kind(name: str) -> type:
 
 
 def xlsx(table: Table) -> bytes:
-    """Return a table's records as a workbook: a sheet a block, numbers as numbers, and a sheet of notes.
-
-    Keys without any value in a block and those of lists are left out.
+    """Return a table's records as a workbook: numbers as numbers, no formula, and a sheet of what is said of them.
 
     Raises
     ------
@@ -183,41 +158,26 @@ def xlsx(table: Table) -> bytes:
     except ImportError as error:
         raise _lacking("An Excel file", "openpyxl", "xlsx", error) from error
     book = Workbook(write_only=True)
-
-    def put(sheet: Any, values: Any) -> None:
-        cells = [WriteOnlyCell(sheet, value=_value(value)) for value in values]
-        for cell in cells:
-            if isinstance(cell.value, str):
-                cell.data_type = "s"  # never a formula: names may come from strangers
-        sheet.append(cells)
-
-    every = (values for values, _ in records(table))
-    names = [*_FIRST, *(key for key in keys(table) if key not in NESTED and key not in _FIRST)]
-    for number, block in enumerate(table.blocks, 1):
-        rows = [next(every) for _ in block.lines]
-        used = [name for name in names if any(row[name] not in (None, "") for row in rows)]
-        sheet = book.create_sheet(_sheet_name(block.title, number))
-        sheet.freeze_panes = "A3"
-        put(sheet, [block.title])
-        put(sheet, [f"score: {metric_name(rows[0])}" if name == "score" else name for name in used])
+    names, lines = flat_records(table)
+    said = [(one,) for block in table.blocks for one in (block.title, block.setting, block.origin, *block.verdict)]
+    sheets: dict[str, list[Iterable[Any]]] = {
+        "leaderboard": [names, *lines],
+        "notes": [*said, *((one,) for one in (*table.notes, *table.footer))],
+    }
+    for title, rows in sheets.items():
+        sheet = book.create_sheet(title)
         for row in rows:
-            put(sheet, [row[name] for name in used])
-    sheet = book.create_sheet("notes")
-    for text in (*table.notes, *(section.title for section in table.sections), *table.footer):
-        put(sheet, [text])
+            cells = [WriteOnlyCell(sheet, value=_value(value)) for value in row]
+            for cell in cells:
+                if isinstance(cell.value, str):
+                    cell.data_type = "s"  # never a formula: names may come from strangers
+            sheet.append(cells)
     out = io.BytesIO()
     book.save(out)
     return out.getvalue()
 
 
-def _sheet_name(title: str, number: int) -> str:
-    """Return a name that Excel takes: the block's number, task and protocol."""
-    parts = title.split(" · ")
-    name = re.sub(r"[^\w .-]+", " ", " ".join((str(number), parts[0], *parts[2:3])))
-    return name[:_LONGEST_NAME].strip()
-
-
 def _value(value: Any) -> Any:
     if isinstance(value, float):
         return value if math.isfinite(value) else None
-    return value if isinstance(value, int | bool | None) else visible(str(value))[:_LONGEST_TEXT]
+    return value if isinstance(value, int | None) else visible(str(value))[:_LONGEST_TEXT]

@@ -6,24 +6,20 @@ escapes what its own syntax would act on, and changes no digit.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from operator import itemgetter
-from typing import Any
 
 from tactbench.core.leaderboard.blocks import Block, blocks_of
-from tactbench.core.leaderboard.columns import Line, columns, host_letters, timing_notes
+from tactbench.core.leaderboard.columns import Line, columns
+from tactbench.core.leaderboard.events import events_table
 from tactbench.core.leaderboard.names import Row
-from tactbench.core.leaderboard.notes import notes_of
 from tactbench.core.leaderboard.probe import build_probe
-from tactbench.core.leaderboard.sections import sections_of
 from tactbench.core.tables.text import cut, visible
 from tactbench.core.tables.text_table import TextTable
 
-_REPLICATES = "One a replicate, which is everything recorded anew; scores are medians, intervals those of the median."
-MOST_SEEDS = 12
 LONGEST = 1000
-"""Characters of a sentence in the footer; the whole provenance lies in the result folder."""
+"""Characters of a sentence on the provenance; the whole of it lies in the result folder."""
 
 
 @dataclass(frozen=True)
@@ -32,13 +28,10 @@ class Table:
 
     blocks: tuple[Block, ...]
     columns: tuple[str, ...]
-    notes: tuple[str, ...]
     sections: tuple[TextTable, ...] = ()
-    """Tables below the blocks: events, averages over tasks, published figures, what was probed."""
-    footer: tuple[str, ...] = ()
-    """Who computed this, with what, where."""
+    """Tables below the blocks: events, and what was probed."""
     provenance: tuple[Row, ...] = ()
-    """The same as data."""
+    """Who computed this, with what, where."""
     times: bool = True
     """Whether the table has what no seed decides: times, memory, hosts."""
 
@@ -52,9 +45,31 @@ class Table:
         """The rows, in the order of the lines."""
         return [line.row for line in self.lines]
 
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """The notes of all blocks, each once."""
+        return tuple(dict.fromkeys(str(note) for block in self.blocks for note in block.notes))
 
-def build_table(rows: Sequence[Row], provenance: Sequence[Row] = (), *, times: bool = True) -> Table:
-    """Arrange `rows` into blocks, ranked, with their notes.
+    @property
+    def footer(self) -> tuple[str, ...]:
+        """The provenance in sentences, for the files."""
+        from tactbench.core.provenance.gather import foot
+
+        try:
+            made_by = foot(self.provenance) if self.provenance else ()
+        except (AttributeError, ArithmeticError, LookupError, TypeError, ValueError):
+            made_by = ("The provenance of these rows cannot be read.",)  # a stranger's folder may say anything
+        return tuple(cut(visible(sentence), LONGEST) for sentence in made_by)
+
+
+def build_table(
+    rows: Sequence[Row],
+    provenance: Sequence[Row] = (),
+    *,
+    times: bool = True,
+    questions: Mapping[str, str] | None = None,
+) -> Table:
+    """Arrange `rows` into blocks, ranked, with what is said of them.
 
     Parameters
     ----------
@@ -64,40 +79,12 @@ def build_table(rows: Sequence[Row], provenance: Sequence[Row] = (), *, times: b
         What is known of the runs they are from: see `tactbench.core.provenance.gather`.
     times
         False: the table of what a seed decides, the same on every machine; no times, no hosts, no provenance.
+    questions
+        What tasks ask, by name.
     """
-    known = tuple(provenance) if times else ()
-    rows = sorted(rows, key=itemgetter("cell"))
-    letters = host_letters(rows) if times else {}
-    names = columns(rows, times=times)
-    blocks = blocks_of(rows, names, letters, times)
+    names = columns(times=times)
+    blocks = blocks_of(sorted(rows, key=itemgetter("cell")), names, questions or {}, times=times)
     ordered = [line.row for block in blocks for line in block.lines]
-    notes = (*notes_of(ordered, blocks), *(timing_notes(rows, letters, known) if times else ()))
-    sections = tuple(one for one in (*sections_of(ordered, times=times), build_probe(ordered)) if one is not None)
-    return Table(blocks, names, notes, sections, _footer(rows, known, times), known, times)
-
-
-def _footer(rows: Sequence[Row], provenance: Sequence[Row], times: bool) -> tuple[str, ...]:
-    """Return how many runs a table is of, and who computed them, with what, where."""
-    seeds = _seeds(seed for row in rows for seed in row.get("seeds") or [row["seed"]])
-    if not times:
-        return (f"Times, memory and hosts are left out: a seed decides all that stands here. {seeds}",)
-    runs = len({row.get("made_by") for row in rows} - {None, ""})
-    of_runs = f" of {runs} kind{'s' if runs != 1 else ''} of runs (versions, machine, settings)" if runs else ""
-    if any((row.get("n_replicates") or 0) > 1 and row.get("replicate_unit") == "replicate" for row in rows):
-        seeds += f" {_REPLICATES}"
-    from tactbench.core.provenance.gather import foot
-
-    try:
-        made_by = foot(provenance) if provenance else ()
-    except (AttributeError, ArithmeticError, LookupError, TypeError, ValueError):
-        made_by = ("The provenance of these rows cannot be read.",)  # a stranger's folder may say anything
-    return (f"{len(rows)} cells{of_runs}. {seeds}", *(cut(visible(sentence), LONGEST) for sentence in made_by))
-
-
-def _seeds(values: Iterable[Any]) -> str:
-    seeds = sorted({seed for seed in values if isinstance(seed, int)})
-    if not seeds:
-        return "Seeds are not known."
-    listed = ", ".join(map(str, seeds[:MOST_SEEDS]))
-    more = f" and {len(seeds) - MOST_SEEDS} more" if len(seeds) > MOST_SEEDS else ""
-    return f"{'Seeds' if len(seeds) > 1 else 'Seed'}: {listed}{more}."
+    sections = (events_table(ordered) if times else None, build_probe(ordered))
+    found = tuple(section for section in sections if section is not None)
+    return Table(blocks, names, found, tuple(provenance) if times else (), times)

@@ -1,4 +1,4 @@
-"""What of a table is printed for people: eight columns and three notes, or all of them."""
+"""What of a table is printed for people."""
 
 from __future__ import annotations
 
@@ -7,24 +7,22 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from tactbench.core.errors import UnknownNameError
+from tactbench.core.evaluation.protocols import is_probe
 from tactbench.core.leaderboard.blocks import Block
-from tactbench.core.leaderboard.columns import COLUMNS, INTERVALS, NUMERIC, SHOWN
-from tactbench.core.leaderboard.names import Row, metric_name
+from tactbench.core.leaderboard.columns import COLUMNS, DEFAULT, NUMERIC, SHOWN, Line
+from tactbench.core.leaderboard.names import Row, grouped, metric_name
 from tactbench.core.leaderboard.table import Table
-from tactbench.core.statistics.replicates import counted, percent
-from tactbench.core.tables.numbers import ABSENT
+from tactbench.core.statistics.replicates import percent
 from tactbench.core.tables.text import command_line, visible
-from tactbench.core.tables.text_table import Entry, TextTable, finite, text_table
+from tactbench.core.tables.text_table import Entry, TextTable, finite
 
 CELL = "cell"
-"""The column of cells' names, as `why` and `rerun` take them."""
-DEFAULT = ("#", "sensor", "level", "estimator", "score", "95 % interval", "published", "delay", "fit")
-OF_FLOOR = ("#", "sensor", "level", "estimator", "score", "beyond floor", "95 % beyond", "published", "delay")
-"""Where a block has errors beyond the floor of the reference: what its ranks go by, with its interval."""
-MOST_NOTES = 3
+"""The column of cells' names, as `why` takes them."""
+_Texts = tuple[dict[str, str], str]
+"""The texts of a line by column, and its kind."""
 _FIRST_TO_GO = (
-    "cell", "batch/row", "p95", "sessions", "n test", "sim", "baseline", "latency p50", "rank 95 %", "fit",
-    "true error", "level", "95 % interval", "published", "delay", "95 % beyond",
+    "cell", "latency p95", "latency p50", "simulation", "test samples", "true error", "interval beyond floor",
+    "recordings right", "one campaign", "training", "level", "published", "delay after touch",
 )  # fmt: skip
 """Columns that a terminal does without, in this order; those that were asked for by name are never left out."""
 
@@ -34,17 +32,17 @@ class View:
     """What is printed of a table."""
 
     wide: bool = False
-    """All columns, and the tables that only give details."""
-    notes: bool = False
-    """All notes and the whole provenance."""
+    """All columns."""
     columns: tuple[str, ...] = ()
     """These columns instead; see `known_columns`."""
     folder: str = ""
     """The result folder, for commands that are named; empty: the default one."""
+    all_rows: bool = True
+    """Whether the folder has no other rows: a short name of a cell is then no other's."""
 
 
 DEFAULT_VIEW = View()
-WHOLE = View(wide=True, notes=True)
+WHOLE = View(wide=True)
 
 
 def known_columns(names: Sequence[str]) -> tuple[str, ...]:
@@ -62,53 +60,76 @@ def known_columns(names: Sequence[str]) -> tuple[str, ...]:
     return tuple(dict.fromkeys(known[name] for name in names))
 
 
-def document(table: Table, view: View) -> list[TextTable | tuple[str, ...]]:
+def document(table: Table, view: View = DEFAULT_VIEW) -> list[TextTable | tuple[str, ...]]:
     """Return the tables and notes that are printed, from above."""
-    sentences = (*notes(table, view), *commands(table, view))
-    parts: list[TextTable | tuple[str, ...]] = [*grids(table, view), sentences, *sections(table, view)]
-    return [part for part in (*parts, footer(table, view)) if part]
+    return [*grids(table, view), *table.sections, *([commands(table, view)] if table.blocks else [])]
 
 
-def grids(table: Table, view: View) -> list[TextTable]:
+def grids(table: Table, view: View = DEFAULT_VIEW) -> list[TextTable]:
     """Return what is printed of a table's blocks."""
     return [_grid(block, view) for block in table.blocks]
 
 
 def _grid(block: Block, view: View) -> TextTable:
-    texts = [{**line.texts, CELL: visible(_cell(line.row))} for line in block.lines]
-    if all("†" in text["score"] for text, line in zip(texts, block.lines, strict=True) if line.row["status"] == "done"):
-        # The title has it: not repeated behind every score.
-        texts = [{**text, "score": text["score"].replace(" †", "")} for text in texts]
-    if view.columns:
-        names = [name for name in view.columns if name in texts[0]]
-    elif view.wide:
-        names = [name for name in texts[0] if any(text[name].strip(ABSENT) for text in texts)]
-    else:
-        floor = any(text.get("beyond floor", ABSENT) != ABSENT for text in texts)
-        names = [name for name in (OF_FLOOR if floor else DEFAULT) if name in texts[0]]
-    rows = [line.row for line in block.lines]
-    return TextTable(
-        block.title, tuple(names), tuple(tuple(text[name] for name in names) for text in texts), NUMERIC,
-        headings=tuple(header(name, rows) for name in names), kinds=tuple(line.kind for line in block.lines),
-        summary=block.verdict, first_to_go=() if view.columns else _FIRST_TO_GO, intervals=frozenset(INTERVALS),
+    lines: list[_Texts] = [({**line.texts, CELL: visible(_cell(line.row))}, line.kind) for line in block.lines]
+    if not view.wide and not view.columns:
+        lines = _with_trivial_once(lines)
+    names = view.columns or ((*COLUMNS, CELL) if view.wide else DEFAULT)
+    names = tuple(name for name in names if name in lines[0][0])
+    table = replace(
+        _text_table(block, names, [[texts[name] for name in names] for texts, _ in lines]),
+        numeric=NUMERIC - {"place"},
+        kinds=tuple(kind for _, kind in lines),
+        first_to_go=() if view.columns else _FIRST_TO_GO,
         unbroken=frozenset({CELL}),
-    )  # fmt: skip
+    )
+    # A column of dashes says that nobody has a place.
+    keep = ("place",) if any(texts["place"] for texts, _ in lines) else ()
+    return table if view.columns else table.compact(keep)
 
 
 def full_grid(block: Block) -> TextTable:
-    """Return a block with every column, what numbers are sorted by, and why cells did not end well."""
-    lines = []
-    for line in block.lines:
-        row = line.row
-        texts = [
-            text
-            if name not in NUMERIC or text in ("", ABSENT)
-            else Entry(text, finite(line.value(name)), cell=row["cell"])
-            for name, text in line.texts.items()
-        ]
-        lines.append([*texts, "" if row["status"] == "done" else visible(f"{row['status']}: {row['reason']}")])
-    columns, kinds = (*block.lines[0].texts, "reason"), [line.kind for line in block.lines]
-    return replace(text_table(block.title, columns, lines, numeric=NUMERIC, kinds=kinds), summary=block.verdict)
+    """Return a block with every column and row, what numbers are sorted by, and why cells did not end well."""
+    names = (*block.lines[0].texts, "reason")
+    return _text_table(block, names, [[*_entries(line), _reason(line.row)] for line in block.lines]).compact()
+
+
+def _text_table(block: Block, names: Sequence[str], lines: Sequence[Sequence[str]]) -> TextTable:
+    return TextTable(
+        block.title,
+        tuple(names),
+        tuple(map(tuple, lines)),
+        NUMERIC,
+        headings=headings(names, block),
+        kinds=tuple(line.kind for line in block.lines),
+        origin=block.origin,
+        summary=(block.setting, *block.verdict),
+        notes=tuple(map(str, block.notes)),
+    )
+
+
+def _with_trivial_once(lines: Sequence[_Texts]) -> list[_Texts]:
+    """Return lines with one in place of a trivial answer of each sensor, where their scores agree to the last digit."""
+    sensors = {texts["sensor"] for texts, kind in lines if kind in ("result", "baseline")}
+    found: list[_Texts] = []
+    for (kind, _), same in grouped(
+        lines, lambda one: (one[1], one[0]["estimator"] if one[1] == "baseline" else "")
+    ).items():
+        alike = {name: text if all(one[name] == text for one, _ in same) else "" for name, text in same[0][0].items()}
+        once = kind == "baseline" and len(same) > 1 and {one["sensor"] for one, _ in same} == sensors and alike["score"]
+        found += [(alike, kind)] if once else same
+    return found
+
+
+def _entries(line: Line) -> list[str]:
+    return [
+        text if name not in NUMERIC or not text else Entry(text, finite(line.value(name)), cell=line.row["cell"])
+        for name, text in line.texts.items()
+    ]
+
+
+def _reason(row: Row) -> str:
+    return "" if row["status"] == "done" else visible(f"{row['status']}: {row['reason']}")
 
 
 def _cell(row: Row) -> str:
@@ -117,68 +138,46 @@ def _cell(row: Row) -> str:
     return name.removesuffix(f"/{row.get('repeat')}") if row.get("repeats") == 1 else name
 
 
-def header(name: str, rows: Sequence[Row]) -> str:
-    """Return what stands above a column of a block: a score by its metric and unit, an interval by what it is over."""
-    first = rows[0]
-    if name == "score":
-        return metric_name(first)
-    if name in ("beyond floor", "true error"):
-        return name if first["unit"] == "1" else f"{name} [{visible(str(first['unit']))}]"
-    if name == "95 % interval" and all(row.get("n_replicates") and row["ci_low"] is None for row in rows):
-        return "range"
-    if name not in INTERVALS:
-        return name
-    end = "ci_low" if name == "95 % interval" else "beyond_floor_ci_low"
-    found = {(row.get("n_replicates"), row.get("replicate_unit")) for row in rows if row.get(end) is not None}
-    number, unit = found.pop() if len(found) == 1 else (None, None)
-    if not number:
-        return name  # they differ in what they are over, or do not know it
-    level = percent(first.get("n_replicates"), first.get("replicate_unit"))
-    over = f"over {counted(number, visible(str(unit or 'replicate')))}"
-    return f"{level} {over}" if name == "95 % interval" else f"{name.replace('95 %', level)}, {over}"
+def _short(row: Row, rows: Sequence[Row]) -> str:
+    """Return the shortest name of a cell that `why` takes: sensor, task and estimator where no other cell has them."""
+
+    def parts(one: Row) -> tuple[str, ...]:
+        names = _cell(one).split("/")
+        return (*names[:2], names[-1])
+
+    alike = [one for one in rows if parts(one) == parts(row)]
+    return "/".join(parts(row)) if len(alike) == 1 else _cell(row)
 
 
-def sections(table: Table, view: View) -> tuple[TextTable, ...]:
-    """Return the tables to print below the blocks."""
-    return tuple(
-        replace(section, first_to_go=section.columns[:0:-1], intervals=frozenset(INTERVALS))
-        for section in table.sections
-        if view.wide or not section.detail
-    )
+def headings(names: Sequence[str], block: Block) -> tuple[str, ...]:
+    """Return what stands above columns: a score by its metric and unit, an interval by its level."""
+    rows = [line.row for line in block.lines]
+    unit = "" if rows[0]["unit"] == "1" else visible(f" [{rows[0]['unit']}]")
+    levels = {percent(row.get("n_replicates"), row.get("replicate_unit")) for row in rows if row["ci_low"] is not None}
+    interval = f"{levels.pop()} interval" if len(levels) == 1 else "interval"
+    shown = {"score": metric_name(rows[0]), "interval": interval, "notes": ""}
+    shown |= {name: f"{name}{unit}" for name in ("beyond floor", "true error")}
+    return tuple(shown.get(name, name) for name in names)
 
 
-def notes(table: Table, view: View) -> tuple[str, ...]:
-    """Return the notes to print, the most important first."""
-    return table.notes if view.notes else table.notes[:MOST_NOTES]
-
-
-def commands(table: Table, view: View) -> tuple[str, ...]:
-    """Return the command that shows what is not printed, and the one that tells what a row rests on."""
-    hidden = len(table.notes) - len(notes(table, view))
-    more, options = [], []
-    if hidden or len(footer(table, view)) < len(table.footer):
-        more.append(f"{hidden} more note{'s' if hidden != 1 else ''}" if hidden else "the whole provenance")
-        options.append("--notes")
-    if not view.wide and not view.columns:
-        details = [section.title.split(" · ")[0].lower() for section in table.sections if section.detail]
-        more += ["all columns", *details]
-        options.append("--wide")
+def commands(table: Table, view: View = DEFAULT_VIEW) -> tuple[str, ...]:
+    """Return what to do next: commands, and what each shows."""
     where, out = ((view.folder,), ("--out", view.folder)) if view.folder else ((), ())
-    found = []
-    if more:
-        listed = " and ".join(filter(None, (", ".join(more[:-1]), more[-1])))
-        shown = command_line("tactbench", "leaderboard", *where, *options)
-        found.append(f"{listed[0].upper()}{listed[1:]}: `{shown}`.")
-    first = next((line.row for line in table.lines if line.kind == "result"), None)
-    if first is not None:
-        why = command_line("tactbench", "why", _cell(first), *out)
-        found.append(f"What a row rests on, its delay part by part: `{why}`.")
-    return tuple(found)
-
-
-def footer(table: Table, view: View) -> tuple[str, ...]:
-    """Return the provenance to print."""
-    return table.footer if view.notes else table.footer[:1]
+    first = next((line.row for line in table.lines if line.kind == "result"), table.rows[0])
+    paper = "for a paper, marked “simulated”" if first["simulated"] else "for a paper"
+    name = _short(first, table.rows) if view.all_rows else _cell(first)
+    found = {
+        command_line("tactbench", "why", name, *out): "what this score rests on",
+        command_line("tactbench", "report", *where): "figures and every detail",
+        command_line("tactbench", "leaderboard", *where, "--format", "latex"): paper,
+    }
+    if not first["simulated"] and not any(is_probe(row["protocol"]) for row in table.rows):
+        found["tactbench run … --probe"] = "what the recordings give away"
+    width = max(map(len, found))
+    return tuple(
+        f"{'' if place else 'Next: ':6}{command:<{width}}  {what}"
+        for place, (command, what) in enumerate(found.items())
+    )
 
 
 def best(table: Table, count: int) -> Table:
@@ -191,7 +190,6 @@ def best(table: Table, count: int) -> Table:
             found[line.row["sensor"]] += line.kind == "result"
             if line.kind == "result" and found[line.row["sensor"]] <= count:
                 kept.append(line)
-        blocks.append(replace(block, lines=tuple(kept)))
-    which = "the first answer" if count == 1 else f"the first {count} answers"
-    note = f"Of each block only {which} of each sensor; places are those among all answers."
-    return replace(table, blocks=tuple(block for block in blocks if block.lines), notes=(note, *table.notes))
+        setting = f"{block.setting} · of each sensor the first {count}, places among all"
+        blocks.append(replace(block, lines=tuple(kept), setting=setting))
+    return replace(table, blocks=tuple(block for block in blocks if block.lines))

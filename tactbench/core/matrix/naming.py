@@ -17,7 +17,9 @@ _SHOWN = 8
 
 
 def meant(given: str, names: Sequence[str]) -> str:
-    """Return the name of the cell that `given` stands for: its name, or a part of only one name.
+    """Return the name of the cell that `given` stands for: its name, a part of only one name, or some of its parts.
+
+    ``biotac/curvature/forest`` is ``biotac/curvature/twin/karl2016/forest/1`` where no other cell has these parts.
 
     The replicates of a cell differ in the last part of their names alone: what names them all, with or without that
     part, stands for the first of them.
@@ -34,7 +36,11 @@ def meant(given: str, names: Sequence[str]) -> str:
     """
     if given in names:
         return given
-    found = [name for name in names if _parts(name)[0] == given] or [name for name in names if given in name]
+    found = (
+        [name for name in names if _parts(name)[0] == given]
+        or [name for name in names if given in name]
+        or [name for name in names if _is_short(given, name)]
+    )
     if len({_parts(name)[0] for name in found}) == 1:
         return min(found, key=lambda name: _parts(name)[1])
     if not found:
@@ -48,6 +54,12 @@ def meant(given: str, names: Sequence[str]) -> str:
         f"{given!r} is part of the names of {len(found)} cells.",
         hint=f"Give more of the name of one: {', '.join(found[:_SHOWN])}{more}.",
     )
+
+
+def _is_short(given: str, name: str) -> bool:
+    """Return whether the parts of `given` are parts of a name, in their order."""
+    parts = iter(name.split("/"))
+    return all(one in parts for one in given.split("/"))
 
 
 def _parts(name: str) -> tuple[str, int]:

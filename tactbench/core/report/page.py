@@ -5,7 +5,7 @@ from __future__ import annotations
 import base64
 import hashlib
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from importlib import resources
@@ -15,10 +15,10 @@ import tactbench
 from tactbench.core.cost.ladder_file import read_ladders
 from tactbench.core.errors import TactbenchError
 from tactbench.core.leaderboard import AXES
-from tactbench.core.leaderboard.columns import NUMERIC, Line
+from tactbench.core.leaderboard.columns import DEFAULT
 from tactbench.core.leaderboard.levels import KEY as LEVEL
 from tactbench.core.leaderboard.side_by_side import compare
-from tactbench.core.leaderboard.view import DEFAULT, OF_FLOOR
+from tactbench.core.leaderboard.view import full_grid
 from tactbench.core.recording.reader import read_meta
 from tactbench.core.report.cells import details
 from tactbench.core.report.costs import ladder_table
@@ -30,13 +30,12 @@ from tactbench.core.report.results import SavedFigure
 from tactbench.core.report.section import MOST_ROWS, Picture, ReportData, Section
 from tactbench.core.spec.sensor import SensorSpec
 from tactbench.core.tables.text import command_line
-from tactbench.core.tables.text_table import WORDY, Entry, TextTable, finite, sort_value, text_table
+from tactbench.core.tables.text_table import WORDY, sort_value
 
 if TYPE_CHECKING:
     from jinja2 import Environment
     from markupsafe import Markup
 
-    from tactbench.core.leaderboard.blocks import Block
 
 TITLE = "tactbench: tactile sensors, what they answer and what it costs"
 MOST_TASKS = 2
@@ -52,7 +51,7 @@ def answers_section(subject: ReportData) -> Section:
     found: dict[str, str] = {}
     for block in subject.leaderboard.blocks:
         if block.verdict:
-            found.setdefault(str(block.lines[0].row["task"]), f"{block.title}: {block.verdict[0]}")
+            found.setdefault(str(block.lines[0].row["task"]), f"{block.title} {block.verdict[0]}")
     simulated = any(row["simulated"] for row in subject.rows if row["status"] == "done")
     paragraphs = ["SIM: simulated by a twin of the sensor; no sensor was touched."] if simulated else []
     paragraphs += [*_published(subject), *list(found.values())[:MOST_TASKS]]
@@ -69,28 +68,15 @@ def _published(subject: ReportData) -> list[str]:
 
 def leaderboards_section(subject: ReportData) -> Section:
     """Return the section of leaderboards, failed and skipped cells with their reasons."""
-    table = subject.leaderboard
-    paragraphs = ["A score leads to everything that is known about its cell."]
+    paragraphs = ["A number leads to everything that is known about its cell."]
     if len(subject.shown) < len(subject.rows):
         paragraphs.append(
             f"More than {MOST_ROWS} cells: {len(subject.shown)} of {len(subject.rows)} are shown, the first of each "
             "table. All of them are in `leaderboard.csv` in the result folder."
         )
-    tables = tuple(_grid(block, lines) for block, lines in subject.blocks)
-    return Section(paragraphs=tuple(paragraphs), tables=tables, notes=table.notes)
-
-
-def _grid(block: Block, lines: Sequence[Line]) -> TextTable:
-    """Return a block with what numbers are sorted by, and why cells did not end well."""
-    names = [name for name in lines[0].texts if name in (*DEFAULT, *OF_FLOOR)]
-    texts = []
-    for line in lines:
-        row, cells = line.row, {"score": str(line.row["cell"])}
-        entries = [Entry(line.texts[name], finite(line.value(name)), cell=cells.get(name, "")) for name in names]
-        texts.append((*entries, "" if row["status"] == "done" else f"{row['status']}: {row['reason']}"))
-    kinds = [line.kind for line in lines]
-    table = text_table(block.title, (*names, "reason"), texts, numeric=NUMERIC, kinds=kinds)
-    return replace(table, summary=block.verdict)
+    shown = (full_grid(replace(block, lines=tuple(lines))) for block, lines in subject.blocks)
+    tables = tuple(table.only((*DEFAULT, "reason")) for table in shown)
+    return Section(paragraphs=tuple(paragraphs), tables=tables)
 
 
 def published_section(subject: ReportData) -> Section:
@@ -112,8 +98,7 @@ def _picture(one: SavedFigure) -> Picture:
 
 def compared_section(subject: ReportData) -> Section:
     """Return the tables below the leaderboard: events, means over tasks, probes, comparisons."""
-    ours = [table for table in subject.leaderboard.sections if not table.title.startswith("Published")]
-    tables = (*ours, *(table for by in AXES for table in compare(subject.rows, by)))
+    tables = (*subject.leaderboard.sections, *(table for by in AXES for table in compare(subject.rows, by)))
     lacks = (
         "No question was asked in two ways: `tactbench run --probe` adds shuffled rows and the first frame alone, "
         "`--protocol` and `--split` ask otherwise."

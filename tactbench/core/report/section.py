@@ -36,7 +36,8 @@ class ReportData:
     @cached_property
     def leaderboard(self) -> Table:
         """The rows as ranked tables."""
-        return build_table(self.rows, self.results.provenance())
+        questions = {one.name: one.spec.question for one in self.results.registry.tasks}
+        return build_table(self.rows, self.results.provenance(), questions=questions)
 
     @cached_property
     def blocks(self) -> list[tuple[Block, Sequence[Line]]]:

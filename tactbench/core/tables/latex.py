@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import unicodedata
-from collections.abc import Collection, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 
 from tactbench.core.tables.text_table import TextTable
 
@@ -25,105 +25,63 @@ _ACCENTS = {
 _LIGATURE = re.compile(r"-(?=-)|`(?=`)|'(?=')|[!?](?=`)|,(?=,)")
 """The first of two characters that TeX draws as one."""
 
-PAGE_PT = 469.0
-"""Width of the text of a two-column paper over both columns, in points."""
-SEP_PT = 2.5
-"""``\\tabcolsep`` of a table."""
 
-
-def points(text: str) -> float:
-    r"""Return the width of `text` in cmr8 (10 pt documents' ``\footnotesize``), in points, by the font's metrics."""
-    return sum(map(_points, text))
-
-
-def _points(character: str) -> float:
-    if character in _WIDTHS:
-        return _WIDTHS[character]
-    parts = unicodedata.normalize("NFD", character)
-    letter, known = parts[0], parts[0] in _WIDTHS and parts[1:] in _ACCENTS
-    return _WIDTHS[letter] + 0.5 if known else points(f"U+{ord(character):04X}")
-
-
-_WIDTHS = {
-    character: width
-    for width, characters in (
-        (1.42, "\u202f"), (2.37, "!',.:;<[]`il|"), (2.6, "fj"), (2.84, "- "), (3.07, "_I"), (3.31, "()t"), (3.32, "r"),
-        (3.36, "s"), (3.78, "cez†‡"), (4.02, ">?"), (4.26, '"$*/0123456789^ago{}~–‖\\'), (4.37, "J"), (4.49, "kqvxy"),
-        (4.73, "Sbdhnpu"), (5.12, "µμ"), (5.2, "Z"), (5.31, "L"), (5.55, "F"), (5.79, "EP"), (6.02, "B"),
-        (6.14, "CTw"), (6.26, "R"), (6.37, "AHNUVXY"), (6.49, "D"), (6.61, "K"), (6.62, "&+=@OQ<>×±−≤≥"), (6.67, "G"),
-        (7.09, "#%m"), (7.79, "M"), (8.51, "—"), (8.73, "W"), (12.3, "…"),
-    )
-    for character in characters
-}  # fmt: skip
-"""Read off with ``\\wd`` of a box for each character in ``\\footnotesize`` of the class article, rounded up; ``…`` with
-the wider space that follows it."""
+def latex(tables: Iterable[TextTable | Sequence[str]]) -> str:
+    """Return tables as LaTeX over both columns of a paper, notes below the table that they follow."""
+    found: list[tuple[TextTable, list[str]]] = []
+    for part in tables:
+        if isinstance(part, TextTable):
+            found.append((part, [*part.notes]))
+        elif found:
+            found[-1][1].extend(part)
+    return "\n".join(latex_table(one, notes, number=place) for place, (one, notes) in enumerate(found, 1))
 
 
 def latex_table(
-    grid: TextTable,
-    notes: Iterable[str],
-    *,
-    headings: Iterable[Iterable[str]] = (),
-    number: int = 0,
-    over_both: bool = True,
-    rules: Collection[int] = (),
-) -> list[str]:
-    """Return a table as lines of LaTeX, columns of numbers to the right, notes below.
+    table: TextTable, notes: Iterable[str] = (), *, number: int = 1, columns: str = "", rule: int | None = None
+) -> str:
+    """Return a table as LaTeX, its title as the caption; text between backticks is code elsewhere.
+
+    A heading may have two lines.
 
     Parameters
     ----------
-    headings
-        Lines of headings, if there is not one.
     number
-        Of the table among those of one file, from 0: its label ends in it, counted from 1.
-    over_both
-        Whether it goes over both columns of a two-column paper.
-    rules
-        Lines above which there is a rule.
+        Of the table among those of one file: its label ends in it.
+    columns
+        Of the ``tabular``, for a table of one column of a paper; empty: over both columns, numbers to the right.
+    rule
+        The line above which there is a rule.
     """
-    lines, heads = grid.lines, list(headings) or [grid.headers]
-    table = "table*" if over_both else "table"
-    widths = [max(map(points, texts)) for texts in zip(grid.headers, *lines, strict=True)]
-    too_wide = over_both and sum(widths) + 2 * SEP_PT * len(widths) > PAGE_PT
-    return [
-        rf"\begin{{{table}}}[t]",
+    heads = zip(*(head.rpartition("\n")[::2] for head in table.headers), strict=True)
+    environment = "table" if columns else "table*"
+    lines = [" & ".join(map(tex, line)) + r" \\" for line in table.lines]
+    if rule is not None:
+        lines.insert(rule, r"\midrule")
+    return "\n".join([
+        rf"\begin{{{environment}}}[t]",
         r"\centering",
         r"\footnotesize",
-        rf"\setlength{{\tabcolsep}}{{{SEP_PT:g}pt}}",
-        rf"\caption{{{tex(grid.title)}}}",
-        rf"\label{{{_label(grid.title, number)}}}",
-        r"\par\smallskip",
-        *([r"\resizebox{\textwidth}{!}{% of the package graphicx"] if too_wide else []),
-        rf"\begin{{tabular}}{{{''.join('r' if right else 'l' for right in grid.right)}}}",
+        r"\setlength{\tabcolsep}{2.5pt}",
+        rf"\caption{{{tex(table.title)}}}",
+        rf"\label{{{_label(table.title, number)}}}",
+        rf"\begin{{tabular}}{{{columns or ''.join('r' if right else 'l' for right in table.right)}}}",
         r"\toprule",
-        *(" & ".join(map(tex, line)) + r" \\" for line in heads),
+        *(" & ".join(map(tex, row)) + r" \\" for row in heads if any(row)),
         r"\midrule",
-        *("\\midrule\n" * (place in rules) + " & ".join(map(tex, line)) + r" \\" for place, line in enumerate(lines)),
+        *lines,
         r"\bottomrule",
-        r"\end{tabular}" + "}" * too_wide,
-        # Text between backticks is code elsewhere.
+        r"\end{tabular}",
         *(rf"\par\smallskip\raggedright {tex(note.replace('`', ''))}" for note in notes),
-        rf"\end{{{table}}}",
+        rf"\end{{{environment}}}",
         "",
-    ]
-
-
-def latex(parts: Iterable[TextTable | Sequence[str]]) -> str:
-    """Return tables as LaTeX, notes below the table that they follow."""
-    tables: list[tuple[TextTable, list[str]]] = []
-    for part in parts:
-        if isinstance(part, TextTable):
-            tables.append((part, [*part.notes]))
-        elif tables:
-            tables[-1][1].extend(part)
-    lines = [line for number, (table, notes) in enumerate(tables) for line in latex_table(table, notes, number=number)]
-    return "\n".join(lines) + "\n"
+    ])  # fmt: skip
 
 
 def _label(title: str, number: int) -> str:
     """Return a label of what the title begins with, and of the table's number: ``tab:tactbench-force-1``."""
-    first = re.sub(r"[^A-Za-z0-9]+", "-", title.split(" · ")[0].split(":")[0]).strip("-").lower()
-    return f"tab:tactbench-{first or 'table'}-{number + 1}"
+    first = re.sub(r"[^A-Za-z0-9]+", "-", re.split(" · |[:.,]", title)[0]).strip("-").lower()
+    return f"tab:tactbench-{first or 'table'}-{number}"
 
 
 def tex(text: str) -> str:

@@ -21,6 +21,7 @@ def _table(table: TextTable) -> list[str]:
     """Return a table as lines of Markdown: a heading, sentences, columns of numbers to the right, notes."""
     return [
         f"### {_heading(table.title)}\n",
+        *([f"{markdown_note(table.origin)}\n"] if table.origin else []),
         *(f"{markdown_note(text)}\n" for text in table.summary),
         "| " + " | ".join(markdown_text(name) for name in table.headers) + " |",
         "|" + "|".join("---:" if right else "---" for right in table.right) + "|",

@@ -14,6 +14,12 @@ def score(value: float | None, unit: str) -> str:
     return f"{value:.3f}" if unit == "1" else f"{value:.4f}" if -10 < value < 10 else f"{value:.2f}"
 
 
+def coarse(value: float | None, unit: str) -> str:
+    """Return a score with a decimal less: for the range of single scores."""
+    text = score(value, unit)
+    return text if value is None else f"{value:.{len(text.partition('.')[2]) - 1}f}"
+
+
 def interval(low: float | None, high: float | None, unit: str) -> str:
     """Return an interval in the digits of its score."""
     return ABSENT if low is None or high is None else f"{score(low, unit)} … {score(high, unit)}"

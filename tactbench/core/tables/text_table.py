@@ -49,22 +49,20 @@ class TextTable:
     """What stands above the columns, if not their names."""
     kinds: tuple[str, ...] = ()
     """One word a line, by which it looks other than plain: ``result``, ``baseline``, ``failed``, ``alarm`` …"""
+    origin: str = ""
+    """Where the numbers come from, to the right of the title: simulated or measured."""
     summary: tuple[str, ...] = ()
     """Sentences below the title."""
     notes: tuple[str, ...] = ()
     """Sentences below the lines."""
-    detail: bool = False
-    """Whether it only gives details of what stands in other tables, and is printed with them all."""
     records: tuple[Mapping[str, Any], ...] = ()
     """The same as numbers; all have the same keys."""
     anchor: str = ""
     """Where links to the whole table lead; empty: nowhere."""
     first_to_go: tuple[str, ...] = ()
-    """Columns that a terminal leaves out, in this order, where it is too narrow even with broken texts."""
-    intervals: frozenset[str] = frozenset()
-    """Columns of numbers that may be broken into two lines."""
+    """Columns that a terminal leaves out, in this order, where it is too narrow even with texts broken at spaces."""
     unbroken: frozenset[str] = frozenset()
-    """Columns of texts that may not: they are typed elsewhere."""
+    """Columns of texts that are not broken: they are typed elsewhere."""
 
     @property
     def headers(self) -> tuple[str, ...]:
@@ -81,12 +79,13 @@ class TextTable:
         """Whether it has sentences in its fields: on a narrow screen its lines are stacked, field below field."""
         return any(len(text) > WORDY for line in self.lines for text in line)
 
-    def compact(self) -> TextTable:
-        """Return the table without the columns in which no line says anything."""
+    def compact(self, keep: Collection[str] = ()) -> TextTable:
+        """Return the table without the columns in which no line says anything, but for those to `keep`."""
         if not self.lines:
             return self
         texts = zip(self.columns, zip(*self.lines, strict=True), strict=True)
-        return self.only([name for name, column in texts if any(text.strip(ABSENT) for text in column)])
+        said = [name for name, column in texts if name in keep or any(text.strip(ABSENT) for text in column)]
+        return self.only(said)
 
     def only(self, names: Collection[str]) -> TextTable:
         """Return the table with these of its columns."""

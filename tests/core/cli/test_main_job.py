@@ -67,7 +67,7 @@ def test_the_files_of_a_run(ran):
     assert json.loads((out / "leaderboard.json").read_text()) == rows
     with (out / "leaderboard.csv").open() as file:
         assert len(list(csv.DictReader(file))) == len(rows)
-    assert "| base | icub SIM | time-index |" in (out / "leaderboard.md").read_text()
+    assert "|  | icub | time-index |" in (out / "leaderboard.md").read_text()
     store = Store(out)
     assert {store.provenance(row["made_by"])["distributions"]["numpy"] for row in store.rows()}
     assert not list(out.rglob("*.partial"))

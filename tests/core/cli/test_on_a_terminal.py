@@ -97,8 +97,8 @@ def test_the_table_so_far_comes_with_each_replicate_and_stays_off_the_end(tmp_pa
     command = [*FORCE]
     command[command.index("--repeats") + 1] = "2"
     with started(tmp_path, command) as (process, ours):
-        seen = read_until(ours, "Try next:", 100)
+        seen = read_until(ours, "Files:", 100)
         assert process.wait(60) == 0
     assert seen.index("recording and evaluating") < seen.index("RMSE")
-    assert seen.index("one replicate") < seen.index("2 replicates"), "the table is shown once a replicate is complete"
-    assert "recording and evaluating" not in seen[seen.rindex("2 replicates") :], "the last table alone is left"
+    assert seen.index("1 campaign") < seen.index("2 campaigns"), "the table is shown once a replicate is complete"
+    assert "recording and evaluating" not in seen[seen.rindex("2 campaigns") :], "the last table alone is left"

@@ -42,11 +42,6 @@ def test_what_was_asked_again_is_found_again(here):
         assert "0 computed now; 0 recordings made now" in here(*RUN, *more).stderr
 
 
-def test_the_notes_say_it(here):
-    assert "placement_scatter_mm 0.3" in here("leaderboard", "--notes").stdout
-    assert "taxel_white_count 2.0" in here("leaderboard", "--notes").stdout
-
-
 def test_why_says_it(here):
     assert "placement_scatter_mm 0.3" in here("why", CELL).stdout
     facts = json.loads(here("why", CELL, "--format", "json").stdout)

@@ -57,7 +57,7 @@ def test_two_estimators_are_compared_sensor_by_sensor_and_a_baseline_may_be_one(
 @pytest.mark.parametrize(
     ("more", "why"),
     [
-        ({"simulated": False, "rig": "replay"}, "SIM is never compared with hardware"),
+        ({"simulated": False, "rig": "replay"}, "SIM is never compared with hardware, EMULATED with neither"),
         ({"protocol": "karl2016"}, "b was asked under another protocol"),
         ({"split": "roles"}, "b was asked with another split"),
         ({"task": "other"}, "b has no such cell"),

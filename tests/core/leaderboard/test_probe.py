@@ -121,13 +121,6 @@ def test_a_probe_that_makes_no_sense_says_why():
     assert table.notes[-1] == "a/question: Each is one reading."
 
 
-def test_a_first_frame_that_tells_nothing_is_not_held_against_the_sensor():
-    notes = build_table([classed(0.2, "first-frame"), classed(0.2)]).notes
-    (note,) = [note for note in notes if "the trivial baseline" in note]
-    assert note.startswith("a/question/lasso (deployable, split recording) is no better than")
-    assert "--probe" not in note, "these rows are probed"
-
-
 @pytest.mark.parametrize(
     ("scores", "says"),
     [

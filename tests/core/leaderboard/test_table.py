@@ -1,121 +1,175 @@
-import csv
+"""What stands together, in what order, in which columns."""
+
 import io
-import json
+import random
+import sys
 
 import pytest
-from rich.console import Console
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
-from tactbench.core.leaderboard.formats import show
-from tactbench.core.leaderboard.notes import count_texts
-from tactbench.core.leaderboard.records import JSON_KEYS, OF_REPLICATES, RANK_KEYS
+from tactbench.core.errors import UnknownNameError, UsageError
+from tactbench.core.leaderboard.columns import COLUMNS, SHOWN
+from tactbench.core.leaderboard.formats import plain_text
+from tactbench.core.leaderboard.notes import count_texts, picked
+from tactbench.core.leaderboard.records import xlsx
 from tactbench.core.leaderboard.table import build_table
-from tactbench.core.leaderboard.view import DEFAULT_VIEW, WHOLE
+from tactbench.core.leaderboard.view import View, best, commands, grids, known_columns
 from tactbench.core.tables.numbers import duration, score
 from tests.core.leaderboard.rendering import to_csv, to_json, to_latex, to_markdown
 
 from .rows import row
+from .strategies import some_rows
+
+FLOOR = {"reference_floor": 0.6875, "score_beyond_floor": 0.1234, "beyond_floor_ci_low": 0.0,
+         "beyond_floor_ci_high": 0.2, "true_score": 0.0512}  # fmt: skip
 
 
-def test_lower_is_better_is_ranked_upwards_and_baselines_have_no_rank():
-    table = build_table([row("a", score=0.7), row("b", score=0.5), row("a", "mean", score=1.4)])
-    (block,) = table.blocks
-    assert [(line.cells[0], line.cells[1], line.kind) for line in block.lines] == [
-        ("1", "b SIM", "result"), ("2", "a SIM", "result"), ("base", "a SIM", "baseline"),
+def lines(rows, *columns):
+    (block,) = build_table(rows).blocks
+    return [tuple(line.texts[name] for name in columns) for line in block.lines]
+
+
+@pytest.mark.parametrize(
+    ("scores", "more", "found"),
+    [
+        ((0.7, 0.5), {}, [("1", "b"), ("2", "a")]),
+        ((0.7, 0.9), {"metric": "macro_f1", "unit": "1"}, [("1", "b"), ("2", "a")]),
+        ((0.5, 0.5, 0.9), {}, [("1=", "a"), ("1=", "b"), ("3", "c")]),
+    ],
+)
+def test_the_best_stands_first_and_equal_scores_share_a_place(scores, more, found):
+    rows = [row(name, score=value, **more) for name, value in zip("abc", scores, strict=False)]
+    assert lines(rows, "place", "sensor") == lines(rows[::-1], "place", "sensor") == found
+
+
+def test_trivial_answers_have_no_place_and_what_is_no_better_has_a_dash():
+    rows = [
+        row(),
+        row("a", "mean", 0.7),
+        row(estimator="ols", score=0.8),
+        row(estimator="x", score=None, status="failed"),
+    ]
+    assert lines(rows, "place", "estimator", "score") == [
+        ("1", "lasso", "0.5000"), ("–", "ols", "0.8000"), ("", "mean", "0.7000"), ("", "x", "FAILED"),
     ]  # fmt: skip
 
 
-def test_higher_is_better_is_ranked_downwards():
-    rows = [row(name, score=value, metric="macro_f1", unit="1") for name, value in (("a", 0.7), ("b", 0.9))]
-    assert [line.cells[1] for line in build_table(rows).blocks[0].lines] == ["b SIM", "a SIM"]
+def test_errors_are_ordered_by_what_is_beyond_the_floor_where_all_have_one():
+    rows = [row("a", score=0.71, **FLOOR), row("b", score=0.75, **FLOOR | {"reference_floor": 0.74})]
+    assert lines(rows, "sensor", "beyond floor") == [("b", "0.1234"), ("a", "0.1234")]
 
 
-def test_equal_scores_share_a_rank():
-    lines = build_table([row("a"), row("b"), row("c", score=0.9)]).blocks[0].lines
-    assert [line.cells[0] for line in lines] == ["1=", "1=", "3"]
+@settings(max_examples=40)
+@given(some_rows(most=5), st.randoms(use_true_random=False))
+def test_every_row_is_one_line_in_whatever_order_they_come_and_no_block_mixes_what_is_not_comparable(rows, rng):
+    blocks = build_table(rows).blocks
+    assert sorted(line.row["cell"] for block in blocks for line in block.lines) == sorted(one["cell"] for one in rows)
+    for block in blocks:
+        done = [line.row for line in block.lines if line.row["status"] == "done"]
+        assert len({(one["task"], one["protocol"], one["split"], one["simulated"]) for one in done}) <= 1
+        assert len({one["rig"] for one in done if not one["simulated"]}) <= 1
+    other = list(rows)
+    rng.shuffle(other)
+    for form in (to_json, to_csv, to_markdown, to_latex):
+        assert form(rows) == form(other)
 
 
-def test_sim_and_hardware_protocols_and_splits_never_share_a_block():
-    rows = [row(), row("b", simulated=False), row("c", protocol="karl2016"), row("d", split="shuffled")]
-    assert len(build_table(rows).blocks) == 4
+def test_a_cell_that_was_not_begun_stands_with_those_of_its_rig_where_these_agree():
+    stopped = row("c", status="failed", score=None, simulated=False, split=None, reason="no")
+    (block,) = build_table([row(), stopped]).blocks
+    assert block.origin.startswith("SIMULATED")
+    assert [line.kind for line in block.lines] == ["result", "failed"]
+    assert [len(one.lines) for one in build_table([row(), row("b", split="roles"), stopped]).blocks] == [1, 1, 1]
 
 
-def test_a_failed_row_stands_in_the_table_with_its_reason():
-    table = build_table([row(), row("b", status="failed", score=None, reason="the plug was pulled")])
-    assert table.blocks[0].lines[-1].cells[3] == "FAILED"
-    assert any("the plug was pulled" in note for note in table.notes)
+def test_shuffled_rows_and_probes_come_after_what_is_kept_apart():
+    rows = [row(split="shuffled"), row(protocol="first-frame"), row(split="trial"), row(task="another", split="z")]
+    random.Random(1).shuffle(rows)
+    blocks = build_table(rows, questions={"another": "Which one?"}).blocks
+    assert [block.title for block in blocks] == ["Another: which one?", *["Question"] * 3]
+    assert ["trial" in blocks[1].setting, "first-frame" in blocks[2].setting, "shuffled" in blocks[3].setting] == [
+        True
+    ] * 3
 
 
-def test_an_answer_no_better_than_the_trivial_one_is_called_that():
-    """Only where its whole interval says so; where that holds the trivial score, it is not shown to be better."""
-    rows = [row(score=1.35, baseline=1.4), row("b", score=0.5, baseline=1.4), row("c", score=1.6, baseline=1.4)]
-    notes = [note for note in build_table(rows).notes if "trivial" in note]
-    assert [note.split(", 1.4")[0] for note in notes] == [
-        "a/question/lasso (deployable, split session) is not shown to be better than the trivial baseline",
-        "c/question/lasso (deployable, split session) is no better than the trivial baseline",
-    ]
+@pytest.mark.parametrize("status", ["failed", "crashed", "timeout", "out-of-memory"])
+def test_a_stopped_cell_is_a_line_with_its_reason_and_the_command_to_look_into_it(status):
+    rows = [row(), *(row(name, status=status, score=None, reason="the plug was pulled.") for name in "bcdefg")]
+    said = f"b/lasso, c/lasso, d/lasso, e/lasso and 2 more {status}: the plug was pulled. `tactbench why CELL`"
+    for text in (to_markdown(rows).replace("\\", ""), plain_text(build_table(rows))):
+        assert status.upper() in text
+        assert said in text
+    assert "the plug was pulled" in to_csv(rows)
+    assert "why" not in to_latex(rows)
 
 
-def test_the_trivial_answer_that_wins_is_named_whatever_it_looks_at():
-    common = {"baseline": 1.4, "simulated": False, "rig": "replay"}
-    trivial = [
-        row(estimator="mean", score=1.4, is_baseline=True, looks_at="nothing", **common),
-        row(estimator="time-index", score=0.17, is_baseline=True, looks_at="time", **common | {"baseline": 0.17}),
-    ]
-    notes = build_table([row(estimator="forest", score=0.5, **common), *trivial]).notes
-    (note,) = [note for note in notes if "no better" in note]
-    assert note == (
-        "a/question/forest (deployable, split session) is no better than the trivial time-index, which reads no "
-        "sensor, only the time, 0.1700 N; see how the recordings differ before blaming the sensor: "
-        "`tactbench run --sensor a --task question --rig replay --recordings DIR --probe`."
-    )
+def test_a_trivial_answer_stands_once_where_all_sensors_agree_on_its_digits():
+    rows = [row(name, estimator, score) for name in "ab" for estimator, score in (("lasso", 0.5), ("mean", 1.4))]
+    (grid,) = grids(build_table(rows))
+    assert [line[1:4] for line in grid.lines][2:] == [("", "mean", "1.4000")]
+    rows[1]["score"] = 1.3
+    (grid,) = grids(build_table(rows))
+    assert [line[1:4] for line in grid.lines][2:] == [("a", "mean", "1.3000"), ("b", "mean", "1.4000")]
 
 
-def test_notes_name_the_split_they_speak_of_where_there_are_several():
-    known = {"counts": {"rows lost": 3}, "ci_method": "jackknife", "looks_at": "features", "reference_floor": 0.1}
-    one, other = row(**known), row(split="press", **known | {"counts": {"rows lost": 4}, "ci_method": "blocks"})
-    notes = build_table([one, other, row("b", split="press", **known)]).notes
-    for text in (
-        "a/question (split session): rows lost: 3.", "a/question (split press): rows lost: 4.",
-        "question (split press): interval by blocks.", "question: interval by jackknife.",
-    ):  # fmt: skip
-        assert text in notes
-    (floor,) = [note for note in notes if note.startswith("Floor")]
-    assert "a/question (split session) 0.1000 N" in floor
-    assert "a/question (split press) 0.1000 N" in floor
-    assert not any("(split" in note for note in build_table([one]).notes)
+def test_columns_that_say_nothing_are_left_out_and_others_shown_if_asked_for():
+    (grid,) = grids(build_table([row()]))
+    assert grid.headers == ("place", "sensor", "estimator", "RMSE [N]", "95 % interval", "training")
+    (grid,) = grids(build_table([row(**FLOOR)]), View(wide=True))
+    assert {"beyond floor [N]", "true error [N]", "test samples", "latency p50", "cell"} <= set(grid.headers)
+    (grid,) = grids(build_table([row()]), View(columns=known_columns(["cell", "score", "rank", "cell"])))
+    assert grid.columns == ("cell", "score", "place")
+    assert grid.lines == (("a/question/twin/deployable:session/lasso", "0.5000", "1"),)
+    with pytest.raises(UnknownNameError, match=r"Did you mean 'score'.*Known: .*cell"):
+        known_columns(["scor"])
+    assert known_columns([*COLUMNS, "cell"]) == (*COLUMNS, "cell")
+    assert len(set(SHOWN.values())) == len(COLUMNS)
 
 
-def test_marks_are_explained():
-    table = build_table([row(dagger=True, stamps=["leaks: rows of one press are on both sides"])])
-    assert table.blocks[0].lines[0].cells[3].endswith("† ‡")
-    assert any(note.startswith("†") for note in table.notes)
-    assert any("rows of one press" in note for note in table.notes)
-    assert any(note.startswith("SIM") for note in table.notes)
+def test_a_narrow_terminal_breaks_texts_between_words_then_leaves_columns_out_and_says_so():
+    three = {"n_replicates": 3, "replicate_unit": "replicate", "score_min": 0.1, "score_max": 0.9}
+    rows = [row(estimator="an-estimator", params={"of": "some length"}, answer_delay_ms=5.0, published=1.0, **three)]
+    for width in (64, 80, 240):
+        text = plain_text(build_table(rows), width)
+        assert max(len(line) for line in text.splitlines() if "tactbench" not in line) <= width
+        assert ("Too narrow for: one campaign" in text) == (width < 240)
+        assert "0.4000 … 0.6000" in text
 
 
-def test_json_and_csv_hold_every_key_of_every_row():
-    rows = [row(), row("b", status="failed", score=None)]
-    keys = (*JSON_KEYS, *OF_REPLICATES, *RANK_KEYS, "shown")
-    assert [tuple(entry) for entry in json.loads(to_json(rows))] == [keys, keys]
-    read = list(csv.DictReader(io.StringIO(to_csv(rows))))
-    assert float(read[0]["score"]) == 0.5
-    assert read[1]["score"] == ""
+def test_the_commands_name_the_folder_and_the_shortest_name_of_a_cell():
+    rows = [row(), row(protocol="karl2016", estimator="ols")]
+    (why, report, latex) = commands(build_table(rows), View(folder="my results"))
+    assert "tactbench why a/question/lasso --out 'my results'" in why
+    assert "tactbench report 'my results'" in report
+    assert "tactbench leaderboard 'my results' --format latex" in latex
+    rows.append(row(protocol="karl2016"))
+    assert "why a/question/twin/deployable:session/lasso " in commands(build_table(rows))[0]
 
 
-@pytest.mark.parametrize("text", [to_markdown, to_latex])
-def test_names_from_plugins_cannot_break_a_table(text):
-    shown = text([row("a|b<script>&_%")])
-    assert "<script>" not in shown.replace(r"\&", "") or text is to_latex
-    assert r"a|b" not in shown or text is to_latex
-    if text is to_latex:
-        assert r"\&\_\%" in shown
-        assert r"\toprule" in shown
+def test_the_best_of_each_sensor_keep_the_places_they_have_among_all():
+    rows = [row(name, estimator, score=score) for name, estimator, score in (
+        ("a", "lasso", 0.5), ("a", "ols", 0.6), ("b", "lasso", 0.7), ("b", "mean", 1.4),
+    )]  # fmt: skip
+    (block,) = best(build_table(rows), 1).blocks
+    assert [line.cells[:3] for line in block.lines] == [("1", "a", ""), ("3", "b", "")]
+    assert "places among all" in block.setting
 
 
-def test_markup_in_a_name_is_text_on_the_terminal():
-    out = io.StringIO()
-    show(build_table([row("[bold red]a[/]")]), Console(file=out, width=200))
-    assert "[bold red]a[/]" in out.getvalue()
+def test_a_workbook_has_numbers_as_numbers_and_no_formula(monkeypatch):
+    from openpyxl import load_workbook
+
+    rows = [row("=1+1", score=0.25, published=0.7), row("b", protocol="karl2016", estimator="mean")]
+    book = load_workbook(io.BytesIO(xlsx(build_table(rows, [{"host": "h"}]))))
+    assert book.sheetnames == ["leaderboard", "notes"]
+    names, values, _ = book["leaderboard"].iter_rows(values_only=True)
+    read = dict(zip(names, values, strict=True))
+    assert (read["score"], read["published"], read["rank"], read["rank_tied"]) == (0.25, 0.7, 1, False)
+    assert {one.data_type for line in book["leaderboard"] for one in line if one.value == "=1+1"} == {"s"}
+    assert any("SIMULATED" in str(one) for (one,) in book["notes"].iter_rows(values_only=True))
+    monkeypatch.setitem(sys.modules, "openpyxl", None)
+    with pytest.raises(UsageError, match=r"pip install 'tactbench\[xlsx\]'"):
+        xlsx(build_table([row()]))
 
 
 @pytest.mark.parametrize(
@@ -131,48 +185,13 @@ def test_scores_with_a_unit_have_four_decimals():
     assert (score(0.68754, "N"), score(0.60488, "1"), score(None, "1")) == ("0.6875", "0.605", "–")
 
 
-def test_a_narrow_terminal_breaks_texts_between_words_then_drops_columns_and_says_so():
-    def shown(width, view=DEFAULT_VIEW):
-        out = io.StringIO()
-        show(build_table([row("a-sensor-of-some-name", sim_s=1.0)]), Console(file=out, width=width), view)
-        assert max(len(line.rstrip()) for line in out.getvalue().splitlines()) <= width
-        return out.getvalue()
-
-    place = next(n for n, line in enumerate(shown(90).splitlines()) if "a-sensor-of-some-name" in line)
-    first, second = shown(90).splitlines()[place : place + 2]
-    assert "0.5000" in first
-    assert second.strip() == "SIM"
-    assert "too narrow" not in shown(90)
-    assert "too narrow for: fit. They are in the files" in shown(80)
-    assert "too narrow for: cell, batch/row" in shown(80, WHOLE).replace("\n ", " ")
-    assert "a-sensor-of-some-name SIM" in shown(240, WHOLE)
-    assert "too narrow" not in shown(240, WHOLE)
-
-
-def test_counts_are_summed_over_sets_and_the_busiest_channels_come_first():
-    counts = {
-        f"{one} rows with T{place} beyond three sigma": place for one in ("training", "test") for place in range(7)
-    }
+def test_what_was_left_out_and_chosen_is_told_in_words():
+    counts = {f"{one} rows with T{n} beyond three sigma": n for one in ("training", "test") for n in range(7)}
     counts |= {f"{one} rows before the press begins": 600 for one in ("training", "test")}
     assert count_texts(counts) == [
         "rows before the press begins: 1200",
         "rows beyond three sigma in T6 12, T5 10, T4 8, T3 6 and 3 more channels",
     ]
-
-
-def test_latex_keeps_ordinary_spaces_and_sets_thin_ones_in_numbers():
-    text = to_latex([row(n_test=4400)])
-    assert r"4\,400" in text
-    assert "lower is better" in text
-
-
-def test_notes_that_say_the_same_of_several_answers_are_one():
-
-    from tactbench.core.leaderboard.notes import interval_notes
-
-    method = "block bootstrap in time within 5 recordings (blocks of {} rows): spread between sessions is not in it"
-    rows = [{"task": "curvature", "is_baseline": False, "ci_method": method.format(blocks)} for blocks in (17, 198)]
-    (told,) = interval_notes(rows)
-    assert told.endswith("within 5 recordings: spread between sessions is not in it.")
-    (alone,) = interval_notes(rows[:1])
-    assert "(blocks of 17 rows)" in alone
+    assert picked(row(chosen={"k": 40, "lambda_": 0.2})) == (
+        "k = 40 samples before the newest in the mean filter, lambda = 0.2 (parameter of lasso)"
+    )

@@ -48,11 +48,9 @@ def test_nobody_who_is_no_better_has_a_place(metric, good, bad):
     places = {line.row["cell"]: line.cells[0] for line in block.lines}
     assert places.pop("a-lasso") == "1"
     assert places.pop("b-lasso") == "–"
-    assert set(places.values()) == {"base"}
+    assert set(places.values()) == {""}
     kinds = {line.row["cell"]: line.kind for line in block.lines}
     assert kinds["b-lasso"] == "result"
     order = [line.row["cell"] for line in block.lines]
     assert order[:2] == ["a-lasso", "b-lasso"]
-    (note,) = [note for note in table.notes if "before blaming the sensor" in note]
-    assert note.startswith("b/question/lasso (deployable, split session) is no")
-    assert "`tactbench run --sensor b --task question --probe`" in note
+    assert any(note.startswith("–  no better than the trivial answer of its own sensor") for note in table.notes)

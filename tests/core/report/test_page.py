@@ -30,9 +30,9 @@ HOSTILE = "<script>alert('`x`')</script><img src=x onerror=alert(1)> & \"quoted\
 STRUCTURE = """\
 What came out [1 figure]
 Leaderboard [filter]
-  curvature: # sensor estimator score 95 % interval delay fit
-  force: # sensor estimator score 95 % interval beyond floor published delay fit
-  grasp-stability: sensor estimator score reason
+  Curvature: which of five spherical caps touches the sensor?: sensor estimator macro F1 delay after touch training
+  Force: how large is the normal force?: sensor estimator RMSE [N] beyond floor [N] published delay after touch training
+  Grasp-stability: will the object slip when it is lifted?: sensor estimator accuracy reason
 Published numbers
   Published numbers, and ours: number published ours 95 % interval verdict
 Figures [1 figure]
@@ -72,7 +72,7 @@ def structure(html):
         lines.append(re.search("<h2.*?>(.*?)</h2>", part)[1] + (f" [{', '.join(counts)}]" if counts else ""))
         for title, head in re.findall(r'<p class="caption">(.*?)</p>.*?<thead>(.*?)</thead>', own, flags=re.S):
             columns = re.findall(r"<th[^>]*>(.*?)</th>", head)
-            lines.append(f"  {title.partition(' · ')[0]}: {' '.join(columns)}")
+            lines.append(f"  {title.partition(' <span')[0]}: {' '.join(columns)}")
     return "\n".join(lines).replace("&#39;", "'") + "\n"
 
 

@@ -28,7 +28,7 @@
     heading.setAttribute("aria-sort", "none");
   }
 
-  // The filter leaves the lines of the leaderboard that have all its words, in the line or in its table's title.
+  // The filter leaves the lines of the leaderboard that have all its words, in the line or above its table.
   const filter = document.getElementById("filter");
   if (filter) {
     const blocks = [...document.querySelectorAll("#leaderboards .block")];
@@ -37,7 +37,7 @@
       const asked = filter.value.toLowerCase().split(/\s+/);
       let found = 0;
       for (const block of blocks) {
-        const title = block.querySelector(".caption").textContent;
+        const title = block.querySelector(".caption").textContent + block.querySelector(".verdict")?.textContent;
         block.hidden = true;
         for (const line of block.querySelectorAll("tbody tr")) {
           const text = [title, ...[...line.cells].map((cell) => cell.textContent)].join(" ").toLowerCase();

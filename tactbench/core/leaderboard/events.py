@@ -1,0 +1,63 @@
+"""What detectors of events say besides their F1: misses, latency and false alarms."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+from tactbench.core.leaderboard.names import Row, answer_name, distinct
+from tactbench.core.tables.numbers import ABSENT
+from tactbench.core.tables.text import visible
+from tactbench.core.tables.text_table import TextTable
+
+_FIGURES = {
+    "precision": ("precision", ".2f"),
+    "recall": ("recall", ".2f"),
+    "misses": ("misses", "g"),
+    "latency p50 [ms]": ("onset latency p50 ms", ".0f"),
+    "p95 [ms]": ("onset latency p95 ms", ".0f"),
+    "false alarms/min": ("false alarms per minute", ".2g"),
+    "slipped [mm]": ("displacement at detection p50 mm", ".2f"),
+    "frames: balanced accuracy": ("frame balanced accuracy", ".2f"),
+    "macro F1": ("frame macro F1", ".2f"),
+    "compute [s/s]": ("compute s per s of signal", ".2g"),
+}
+"""Columns, and which figure each shows how."""
+_NOTE = (
+    "Latency: from the labelled onset to the alarm, with the time that the detector computes; negative is early; over "
+    "hits alone. Slipped: the median displacement from onset to alarm. Compute: seconds a second of signal."
+)
+
+
+def events_table(rows: Sequence[Row]) -> TextTable | None:
+    """Return what finished rows say of events; None if none says anything."""
+    finished = [row for row in rows if row["status"] == "done" and row.get("events")]
+    lines = []
+    for row in finished:
+        figures = row["events"]
+        texts = {name: _figure(figures, key, form) for name, (key, form) in _FIGURES.items()}
+        if "misses" in figures:
+            texts["misses"] += f" of {figures['events']:g}"
+        lines.append((visible(row["task"]), visible(row["sensor"]), answer_name(row), *texts.values()))
+    policies = distinct((str(row["answer_from"]), str(row["task"])) for row in finished)
+    oracles = dict.fromkeys(answer_name(row) for row in finished if row.get("looks_at") == "reference")
+    return (
+        TextTable(
+            "Events, at the threshold that validation recordings chose",
+            ("task", "sensor", "estimator", *_FIGURES),
+            tuple(lines),
+            frozenset(_FIGURES),
+            kinds=tuple("baseline" if row["is_baseline"] else "result" for row in finished),
+            notes=(
+                _NOTE,
+                *(visible(f"{', '.join(tasks)}: {policy}.") for policy, tasks in policies.items() if policy),
+                *(f"{name} reads the reference sensor: an oracle, and no bar." for name in oracles),
+            ),
+        )
+        if lines
+        else None
+    )
+
+
+def _figure(figures: Mapping[str, float | None], key: str, form: str) -> str:
+    value = figures.get(key)
+    return ABSENT if value is None else f"{value:{form}}"

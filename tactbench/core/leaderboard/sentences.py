@@ -1,0 +1,318 @@
+"""What is said above and below a block: a closed list, each with the condition under which it is true.
+
+docs/tables.md has the list. At most two sentences stand above and four notes below; what comes first here comes first
+there. Everything else that is known of a row is told by ``tactbench why`` and by the report.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+from tactbench.core.leaderboard.names import Row, answer_name, distinct, grouped, sign_of
+from tactbench.core.leaderboard.trivial import Bars
+from tactbench.core.spec.status import STOPPED
+from tactbench.core.statistics.rank import Rank, beyond_floor
+from tactbench.core.statistics.replicates import FEWEST, counted, percent
+from tactbench.core.tables.numbers import interval, score, score_with_unit
+from tactbench.core.tables.text import cut
+
+MOST_ABOVE, MOST_BELOW = 2, 4
+MOST_NAMES = 4
+"""Answers that a sentence names; it counts the others."""
+LONGEST = 300
+"""Characters of a note; `why`, JSON, CSV and Parquet have the whole reason of a cell."""
+NO_BETTER, UNSHOWN, STAMPED = "–", "*", "‡"
+
+
+class Note(NamedTuple):
+    """A line below a table."""
+
+    text: str
+    hint: str = ""
+    """What follows on a screen: a command, which a paper does not print."""
+    printed: bool = False
+    """Whether a paper's table needs it: it explains a mark there, or how the scores came about."""
+
+    def __str__(self) -> str:
+        return f"{self.text}{self.hint}"
+
+
+@dataclass(frozen=True)
+class Board:
+    """The rows of a block."""
+
+    placed: Sequence[tuple[Row, Rank]]
+    """Answers better than the trivial one of their sensor, in order."""
+    unplaced: Sequence[Row]
+    """The other answers."""
+    trivial: Sequence[Row]
+    stopped: Sequence[Row]
+    """Cells without a score."""
+    unranked: str
+    """Why places rest on no intervals; empty where they do."""
+    bars: Bars
+    times: bool
+    """Whether the table has times."""
+
+    @property
+    def answers(self) -> list[Row]:
+        """The answers, those with a place first."""
+        return [*(row for row, _ in self.placed), *self.unplaced]
+
+    def name(self, row: Row) -> str:
+        """Return what tells a row from the others: the estimator, with the sensor where there are several."""
+        several = len({one["sensor"] for one in (*self.answers, *self.trivial)}) > 1
+        return f"{row['sensor']}/{answer_name(row)}" if several else answer_name(row)
+
+    def names(self, rows: Sequence[Row]) -> str:
+        """Return the names of rows, some of them if there are many."""
+        more = [f"{len(rows) - MOST_NAMES} more"] if len(rows) > MOST_NAMES else []
+        return ", ".join([*map(self.name, rows[:MOST_NAMES]), *more])
+
+    def marks(self, row: Row) -> list[str]:
+        """Return the marks of a finished row, other than its place."""
+        unshown = not row["is_baseline"] and not self.bars.no_better(row) and self.bars.unshown(row)
+        return [*([UNSHOWN] if unshown else []), *([STAMPED] if row["stamps"] else [])]
+
+    def bars_of(self, rows: Sequence[Row]) -> str:
+        """Return the trivial answers that rows are held against, with their scores."""
+        several = len({row["sensor"] for row in self.answers}) > 1
+        texts = (
+            f"{row['sensor']}/" * several
+            + f"{self.bars.name(row)} {score_with_unit(self.bars.score(row), row['unit'])}"
+            for row in rows
+        )
+        found = list(dict.fromkeys(texts))
+        return ", ".join(found[:MOST_NAMES]) + (" …" if len(found) > MOST_NAMES else "")
+
+
+def above(board: Board) -> tuple[str, ...]:
+    """Return the sentences above a table."""
+    sentences = (_outcome(board), _timed(board) or _published(board))
+    return tuple(sentence for sentence in sentences if sentence)
+
+
+def _outcome(board: Board) -> str:
+    """Return who is best, or that it cannot be told."""
+    if not board.placed:
+        return _none_better(board)
+    (first, leader), *others = board.placed
+    name = board.name(first)
+    where = "In simulation " if first["simulated"] and not first.get("emulated") else ""
+    quality = "the smallest error beyond the floor" if _by_floor(board) else "the best score"
+    if board.unranked == "few":
+        return f"{_too_few([row for row, _ in board.placed])} {name} has {quality}."
+    if board.unranked or leader.low is None:
+        return f"Places are by score alone: {board.unranked or 'an answer has no interval'}."
+    if board.bars.unshown(first):
+        return (
+            f"{where}{name} has {quality}, and is not shown to be better than the trivial "
+            f"{board.bars.name(first)} of its own sensor."
+        )
+    if not others:
+        if board.bars.score(first) is None:
+            return "" if board.unplaced else f"{name} is the only answer."
+        only = "the only answer" if not board.unplaced else f"the only of {len(board.answers)} answers that is"
+        return f"{where}{name} is {only} better than the trivial one of its own sensor ({board.bars_of([first])})."
+    alike = [row for row, rank in others if not rank.behind]
+    if alike:
+        return f"{where}{name} has {quality}; {board.names(alike)} cannot be told from it."
+    return f"{where}{name} is best, ahead of {_ahead(board, first, others[0][0])}."
+
+
+def _by_floor(board: Board) -> bool:
+    return beyond_floor([row for row, _ in board.placed])
+
+
+def _none_better(board: Board) -> str:
+    count = len(board.unplaced)
+    if not count:
+        return ""
+    whom = "The only answer scores no" if count == 1 else f"None of {count} answers scores"
+    return f"{whom} better than the trivial one of its own sensor ({board.bars_of(board.unplaced)})."
+
+
+def _too_few(rows: Sequence[Row]) -> str:
+    """Return that there are too few campaigns, or sessions, to say more."""
+    if any(row.get("replicate_unit") != "replicate" for row in rows):
+        of_each = " of each class" if rows[0]["classes"] else ""
+        return f"Too few tested sessions for places, which need {FEWEST}{of_each}."
+    have = _counts([row["n_replicates"] for row in rows], "campaign")
+    more = " (`--repeats 8`)" if rows[0]["repeats"] < FEWEST else ""
+    return f"{have}: too few for intervals and places, which need {FEWEST}{more}."
+
+
+def _ahead(board: Board, first: Row, second: Row) -> str:
+    """Return of whom the best answer is ahead, how often, and by how much."""
+    from tactbench.core.statistics.paired import difference  # numerics
+
+    found = difference(first, second)
+    name, unit, sign = board.name(second), first["unit"], -sign_of(first)
+    if found.low is None or found.high is None or sign * found.value <= 0:
+        return name
+    low, high = sorted((sign * found.low, sign * found.high))
+    key = "beyond" if _kept("beyond", first, second) else "scores"
+    scores = _kept(key, first, second)
+    mean = ("mean " if scores else "") + "difference" + (" beyond the floor" if key == "beyond" else "")
+    by = f"({mean} {score(sign * found.value, unit)}, {percent(None, None)} {interval(low, high, unit)})"
+    if not found.paired or not scores:
+        return f"{name} {by}"
+    wins = sum(sign * (one - other) > 0 for one, other in zip(*scores, strict=True))
+    return f"{name} in {wins} of {counted(len(scores[0]), 'campaign')} {by}"
+
+
+def _kept(key: str, *rows: Row) -> list[list[float]]:
+    """Return what is kept under `key` of the replicates of all rows; nothing if one has none."""
+    found = [(row.get("replicates") or {}).get(key) for row in rows]
+    return [] if None in found else found  # type: ignore[return-value]
+
+
+def _timed(board: Board) -> str:
+    """Return what an answer reads that knows only the time, where one of its own sensor's is not shown to be better."""
+    held = [row for row in board.answers if board.bars.no_better(row) or board.bars.unshown(row)]
+    bars = [trivial for row in held if (trivial := board.bars.trivial(row)) is not None]
+    timed = list(dict.fromkeys(answer_name(bar) for bar in bars if bar.get("looks_at") == "time"))
+    if not timed:
+        return ""
+    return f"{' and '.join(timed)} reads no sensor, only the time since the press began: such a score needs no touch."
+
+
+def _published(board: Board) -> str:
+    """Return where published figures lie beside the intervals of ours."""
+    rows = [row for row in (*board.answers, *board.trivial) if _has_figure(row)]
+    if not rows:
+        return ""
+    alone = len({row["sensor"] for row in rows}) == len(rows)
+    figures = grouped(rows, lambda row: _beside(row["ci_low"], row["ci_high"], row["published"]))
+    parts: list[str] = []
+    for where, members in figures.items():
+        shown = [(row["sensor"] if alone else board.name(row), score(row["published"], row["unit"])) for row in members]
+        verb = f" {'lies' if len(shown) == 1 else 'lie'}" if not parts else ""
+        listed = ", ".join(f"{name} {value}" for name, value in shown)
+        parts.append(f"{listed}{verb} {where} {'it' if parts else 'our interval'}")
+    tail = "; that concerns the simulation, not the sensors" if rows[0]["simulated"] else ""
+    return f"Published values: {', '.join(parts)}{tail}."
+
+
+def _has_figure(row: Row) -> bool:
+    return row.get("published") is not None and row["ci_low"] is not None and row["ci_high"] is not None
+
+
+def _beside(low: float, high: float, value: float) -> str:
+    return "inside" if low <= value <= high else "below" if value < low else "above"
+
+
+def below(board: Board) -> tuple[Note, ...]:
+    """Return the notes below a table."""
+    notes = (
+        *_ended(board.stopped, True),
+        *_stamps(board),
+        *_footnotes(board),
+        *_protocol(board),
+        *_floors(board),
+        *_how(board),
+        *_hosts(board),
+        *_ended(board.stopped, False),
+    )
+    return tuple(note._replace(text=cut(note.text, LONGEST)) for note in notes)[:MOST_BELOW]
+
+
+def _ended(rows: Sequence[Row], stopped: bool) -> Iterator[Note]:
+    """Yield which cells did not finish, or were skipped, and why."""
+    chosen = [row for row in rows if (row["status"] in STOPPED) is stopped]
+    alike = list(grouped(chosen, lambda row: (row["status"], row["reason"])).values())
+    if not alike:
+        return
+    members = alike[0]
+    names = list(dict.fromkeys(f"{row['sensor']}/{answer_name(row)}" for row in members))
+    more = f" and {len(names) - MOST_NAMES} more" if len(names) > MOST_NAMES else ""
+    others = len(chosen) - len(members)
+    ended = f"; {others} more ended otherwise" if others else ""
+    reason = str(members[0]["reason"]).rstrip(".")
+    text = f"{', '.join(names[:MOST_NAMES])}{more} {members[0]['status']}{ended}: {reason}."
+    yield Note(text, " `tactbench why CELL` tells more." if stopped else "")
+
+
+def _stamps(board: Board) -> Iterator[Note]:
+    rows = (*board.answers, *board.trivial)
+    stamps = list(dict.fromkeys(str(stamp) for row in rows for stamp in row["stamps"] or ()))
+    if stamps:
+        yield Note(f"{STAMPED}  {'; '.join(stamps)}", printed=True)
+
+
+def _footnotes(board: Board) -> Iterator[Note]:
+    """Yield what the marks of answers mean that are not better than a trivial one, or not shown to be."""
+    if board.unplaced and board.placed:
+        yield Note(
+            f"{NO_BETTER}  no better than the trivial answer of its own sensor ({board.bars_of(board.unplaced)})",
+            printed=True,
+        )
+    unshown = [row for row, _ in board.placed if UNSHOWN in board.marks(row)]
+    if unshown:
+        yield Note(
+            f"{UNSHOWN}  not shown to be better than the trivial answer of its own sensor ({board.bars_of(unshown)})",
+            printed=True,
+        )
+
+
+def _protocol(board: Board) -> Iterator[Note]:
+    flattered = [row for row in (*board.answers, *board.trivial) if row["dagger"]]
+    if flattered:
+        name = flattered[0]["protocol"]
+        yield Note(f"Protocol {name} uses statistics of the test set, as no sensor in use can",
+                   "; `--protocol deployable` does not.", True)  # fmt: skip
+
+
+def _floors(board: Board) -> Iterator[Note]:
+    """Yield what errors beyond the floor are, where the reference errs too."""
+    known = [row for row in board.answers if row.get("reference_floor") is not None]
+    if not known:
+        return
+    floors = distinct((str(row["sensor"]), row["reference_floor"]) for row in known)
+    unit = known[0]["unit"]
+    ends = {sensor: dict.fromkeys((min(found), max(found))) for sensor, found in floors.items()}
+    each = ", ".join(f"{sensor} {' … '.join(score(end, unit) for end in found)}" for sensor, found in ends.items())
+    by = "; places go by it" if board.placed and _by_floor(board) else ""
+    yield Note(f"Beyond floor: the root of RMSE² − floor²{by}. Floor: the reference's own noise ({each}).")
+
+
+def _how(board: Board) -> Iterator[Note]:
+    """Yield what scores, intervals, places and delays are."""
+    parts = []
+    campaigns = [row for row in board.answers if row.get("replicate_unit") == "replicate"]
+    if campaigns:
+        counts = [row["n_replicates"] for row in campaigns]
+        what = "Score, interval" if any(row["ci_low"] is not None for row in campaigns) else "Score"
+        range_of = "; one campaign: lowest … highest" if max(counts) > 1 else ""
+        parts.append(
+            f"{what}: median over {_counts(counts, 'campaign')}, each simulated anew with its own seed{range_of}"
+        )
+    sessions = [row for row in board.answers if row["ci_low"] is not None and row not in campaigns]
+    over = grouped((row for row in sessions if row.get("n_replicates")), lambda row: str(row["replicate_unit"]))
+    for unit, rows in over.items():
+        parts.append(f"Interval: over {_counts([row['n_replicates'] for row in rows], unit)}")
+    if any(rank.tied for _, rank in board.placed) and not board.unranked:
+        parts.append("= cannot be told apart")
+    sentences = ["; ".join(parts)] if parts else []
+    if board.times and any(row.get("answer_delay_ms") is not None for row in board.answers):
+        sentences.append("Delay: sampling, link, window, computing")
+    if sentences:
+        yield Note(f"{'. '.join(sentences)}.")
+
+
+def _counts(counts: Sequence[int], unit: str) -> str:
+    """Return how many of a unit rows are over, from the fewest to the most."""
+    least, most = min(counts), max(counts)
+    return counted(most, unit) if least == most else f"{least} to {counted(most, unit)}"
+
+
+def _hosts(board: Board) -> Iterator[Note]:
+    """Yield that times cannot be compared."""
+    timed = [row for row in (*board.answers, *board.trivial) if row["fit_s"] is not None] if board.times else []
+    hosts = len({str(row.get("host") or "") for row in timed})
+    at_once = max((int(row.get("concurrency") or 1) for row in timed), default=1)
+    why = [f"taken on {hosts} hosts"] * (hosts > 1) + [f"taken while up to {at_once} cells ran"] * (at_once > 1)
+    if why:
+        yield Note(f"Times cannot be compared: {' and '.join(why)}.")

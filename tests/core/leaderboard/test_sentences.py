@@ -1,0 +1,256 @@
+"""What is said above and below a table is true of its rows; docs/tables.md has the list."""
+
+import json
+import re
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from tactbench.core.leaderboard.formats import plain_text
+from tactbench.core.leaderboard.table import build_table
+from tactbench.core.statistics.ranking import ranks as ranked
+from tactbench.core.statistics.replicates import over_replicates
+from tests.core.leaderboard.rendering import to_json
+
+from .rows import row
+
+RECORDED = {"simulated": False, "rig": "replay"}
+
+
+def answers(sensor, score, time_index, **more):
+    """An answer from readings, beside what the time alone gives on the same sensor, and a mean."""
+    return [
+        row(sensor, "forest", score, baseline=1.9, **more),
+        row(sensor, "time-index", time_index, is_baseline=True, looks_at="time", **more),
+        row(sensor, "mean", 1.9, is_baseline=True, looks_at="nothing", **more),
+    ]
+
+
+def ranks(rows):
+    return {one["cell"].split("/")[0]: one["rank"] for one in json.loads(to_json(rows)) if not one["is_baseline"]}
+
+
+def test_the_time_index_of_another_device_says_nothing_of_this_one():
+    rows = [*answers("alike", 0.6, 0.17, **RECORDED), *answers("shuffled", 0.5, 1.85, **RECORDED)]
+    assert "these scores need no touch" not in " ".join(plain_text(build_table(rows), 140).split())
+    assert ranks(rows) == {"alike": None, "shuffled": 1}
+
+
+def test_one_session_is_not_said_of_five():
+    few = {**RECORDED, "n_replicates": 1, "replicate_unit": "session", "n_sessions": 5, "ci_low": None, "ci_high": None}
+    text = plain_text(build_table([row("a", **few), row("b", score=0.6, **few)]), 140)
+    assert "one session" not in text
+    assert "1 session" not in text
+
+
+def test_what_is_no_better_than_the_time_index_of_its_own_sensor_has_no_place():
+    rows = [*answers("a", 0.5, 0.17), *answers("b", 0.6, 1.85)]
+    assert ranks(rows) == {"a": None, "b": 1}
+
+
+@st.composite
+def boards(draw):
+    """Cells of one question as a result folder holds them: of simulated campaigns, or of recorded sessions."""
+    simulated = draw(st.booleans())
+    error = draw(st.booleans()) or not simulated
+    floor = draw(st.sampled_from([None, 0.1])) if error and simulated else None
+    repeats = draw(st.integers(1, 9))
+    rng = np.random.default_rng(draw(st.integers(0, 2**32 - 1)))
+    common = 0.1 * rng.standard_normal(repeats)
+    rows = []
+    for sensor in draw(st.sampled_from(["a", "ab", "abc"])):
+        for estimator in draw(
+            st.sampled_from(
+                [["ols"], ["ols", "lasso"], ["ols", "time", "mean"], ["ols", "lasso", "forest", "time", "mean"]]
+            )
+        ):
+            spread = rng.choice([0.0, 0.01, 0.3])
+            each = np.clip(rng.choice([0.3, 0.5, 0.8]) + common + spread * rng.standard_normal(repeats), 0.01, 0.99)
+            more = {
+                "looks_at": {"time": "time", "mean": "nothing"}.get(estimator, "features"),
+                "is_baseline": estimator in ("time", "mean"),
+                "published": draw(st.sampled_from([None, None, 0.2, 0.5])),
+                "dagger": draw(st.booleans()) if not rows else rows[0]["dagger"],
+                "stamps": draw(st.sampled_from([[], [], ["It leaks."]])),
+                "answer_delay_ms": draw(st.sampled_from([None, 20.0])),
+                "host": draw(st.sampled_from(["h", "h", "i"])),
+                **({} if error else {"metric": "macro_f1", "unit": "1", "classes": [0, 1]}),
+            }
+            if not simulated:
+                squares = each.round(6) ** 2
+                kept = {
+                    "unit": draw(st.sampled_from(["session", "recording", "press"])),
+                    "names": list(map(str, range(repeats))),
+                    "strata": None,
+                    "sums": [[10.0, 10.0 * one] for one in squares],
+                }
+                score = float(np.sqrt(squares.mean()))
+                ends = {"ci_low": score - 0.1, "ci_high": score + 0.1, "n_sessions": 5}
+                rows.append(row(sensor, estimator, score, replicates=kept, **ends, **RECORDED, **more))
+                continue
+            for seed, one in enumerate(map(float, each), 1):
+                known = (
+                    {"reference_floor": floor, "score_beyond_floor": max(0.0, one**2 - floor**2) ** 0.5}
+                    if floor
+                    else {}
+                )
+                cell = f"{sensor}/question/twin/deployable/{estimator}/{seed}"
+                rows.append(
+                    row(sensor, estimator, one, seed=seed, repeat=seed, repeats=repeats, cell=cell, **known, **more)
+                )
+    return over_replicates(rows)
+
+
+class Truth:
+    """A board by the rows alone, and what each sentence says of it."""
+
+    def __init__(self, rows):
+        self.rows = sorted(rows, key=lambda one: one["cell"])  # of equal trivial answers the first
+        self.sign = 1.0 if rows[0]["metric"] == "rmse" else -1.0
+        self.answers = [one for one in rows if not one["is_baseline"]]
+        self.better = [one for one in self.answers if not self.reaches(one, one["score"])]
+        self.worse = [one for one in self.answers if one not in self.better]
+        self.unshown = [one for one in self.better if self.reaches(one, one["ci_high" if self.sign > 0 else "ci_low"])]
+        self.several = len({one["sensor"] for one in rows}) > 1
+        self.floor = all(one.get("reference_floor") is not None for one in self.better)
+        self.ranks = ranked(self.better) if self.better and all(map(self.enough, self.better)) else None
+
+    @staticmethod
+    def enough(one):
+        return one["n_replicates"] >= 5 and one["replicate_unit"] in ("replicate", "session")
+
+    def bar(self, one):
+        """The best trivial answer of the same sensor."""
+        own = [other for other in self.rows if other["is_baseline"] and other["sensor"] == one["sensor"]]
+        return min(own, key=lambda other: self.sign * other["score"], default=None)
+
+    def reaches(self, one, value):
+        bar = self.bar(one)
+        return bar is not None and value is not None and self.sign * value >= self.sign * bar["score"]
+
+    def name(self, one):
+        return f"{one['sensor']}/{one['estimator']}" if self.several else one["estimator"]
+
+    def called(self, text):
+        found = [one for one in self.rows if self.name(one) == text]
+        assert len(found) == 1, text
+        return found[0]
+
+    def order(self, one):
+        kept = one["replicates"]
+        return float(np.median(kept["excess"])) if self.floor and kept else self.sign * one["score"]
+
+    def leads(self, name):
+        mine = self.order(self.called(name))
+        return all(mine <= self.order(other) + 1e-12 for other in self.better)
+
+    def bars(self, text, rows):
+        """Whether a list in brackets names the trivial answers of these rows with their scores."""
+        unit = "" if self.sign < 0 else " N"
+        several = len({one["sensor"] for one in self.answers}) > 1
+        expected = {
+            f"{self.bar(one)['sensor']}/" * several + f"{self.bar(one)['estimator']} "
+            + f"{self.bar(one)['score']:.{3 if self.sign < 0 else 4}f}{unit}"
+            for one in rows
+        }  # fmt: skip
+        return set(text.split(", ")) == expected
+
+    def ahead(self, name, other, wins, count, value):
+        first, second = self.called(name), self.called(other)
+        assert self.ranks[first["cell"]].place == 1
+        assert all(self.ranks[one["cell"]].behind for one in self.better if one is not first)
+        if wins is None:
+            return self.leads(name)
+        key = "beyond" if "beyond" in first["replicates"] else "scores"
+        apart = self.sign * (np.array(second["replicates"][key]) - np.array(first["replicates"][key]))
+        assert float(value) == pytest.approx(apart.mean(), abs=6e-4)
+        return self.leads(name) and (int(wins), int(count)) == ((apart > 0).sum(), len(apart))
+
+    def beside(self, text):
+        where = None
+        for part in re.split(r", | and ", text):
+            name, value, said = re.fullmatch(r"(\S+) ([\d.]+)(?: (.*))?", part).groups()
+            where = said or where
+            alike = [
+                one for one in self.rows if name in (one["sensor"], self.name(one)) and one["published"] is not None
+            ]
+            assert any(f"{one['published']:.{3 if self.sign < 0 else 4}f}" == value for one in alike)
+        return where is not None
+
+    def counts(self, text, rows):
+        numbers = [int(one) for one in re.findall(r"\d+", text)]
+        return (min(numbers), max(numbers)) == tuple(f(one["n_replicates"] for one in rows) for f in (min, max))
+
+
+NAME = r"(?:In simulation )?(\S+)"
+QUALITY = "(?:the best score|the smallest error beyond the floor)"
+ABOVE = {
+    rf"{NAME} is best, ahead of (\S+)(?: in (\d+) of (\d+) campaigns)?"
+    r"(?: \((?:mean )?difference(?: beyond the floor)? ([\d.]+)(?: N)?, 95 % .*\))?\.":
+        lambda t, a, b, k, n, d: t.ahead(a, b, k, n, d),
+    rf"{NAME} has {QUALITY}; (.*?)(?:, \d+ more)? cannot be told from it\.":
+        lambda t, a, b: t.leads(a) and all(not t.ranks[t.called(one)["cell"]].behind for one in b.split(", ")),
+    rf"{NAME} has {QUALITY}, and is not shown to be better than the "
+    r"trivial (\S+) of its own sensor\.":
+        lambda t, a, b: t.leads(a) and t.called(a) in t.unshown and t.bar(t.called(a))["estimator"] == b,
+    rf"{NAME} is the only answer\.": lambda t, a: t.answers == [t.called(a)] and t.bar(t.called(a)) is None,
+    rf"{NAME} is the only answer better than the trivial one of its own sensor \((.*)\)\.":
+        lambda t, a, b: t.better == t.answers == [t.called(a)] and t.bars(b, t.better),
+    rf"{NAME} is the only of (\d+) answers that is better than the trivial one of its own sensor \((.*)\)\.":
+        lambda t, a, n, b: t.better == [t.called(a)] and int(n) == len(t.answers) and t.bars(b, t.better),
+    r"(.*campaigns?): too few for intervals and places, which need 5(?: \(`--repeats 8`\))?\. (\S+) has .*\.":
+        lambda t, n, a: t.counts(n, t.better) and min(o["n_replicates"] for o in t.better) < 5 and t.leads(a),
+    r"Too few tested sessions for places, which need 5(?: of each class)?\. (\S+) has .*\.":
+        lambda t, a: not all(map(t.enough, t.better)) and t.leads(a),
+    r"(?:The only answer|None of (\d+) answers) scores (?:no )?better than the trivial one of its own sensor "
+    r"\((.*)\)\.":
+        lambda t, n, b: not t.better and int(n or 1) == len(t.answers) and t.bars(b, t.answers),
+    r"time reads no sensor, only the time since the press began: such a score needs no touch\.":
+        lambda t: any(t.bar(o)["looks_at"] == "time" for o in [*t.worse, *t.unshown]),
+    r"Published values: (.*?)(?:; that concerns the simulation, not the sensors)?\.": lambda t, a: t.beside(a),
+}  # fmt: skip
+BELOW = {
+    r"‡  It leaks\.": lambda t: any(one["stamps"] for one in t.rows),
+    r"–  no better than the trivial answer of its own sensor \((.*)\)":
+        lambda t, b: t.bars(b, t.worse),
+    r"\*  not shown to be better than the trivial answer of its own sensor \((.*)\)": lambda t, b: t.bars(b, t.unshown),
+    r"Protocol deployable uses statistics of the test set, .*": lambda t: any(one["dagger"] for one in t.rows),
+    r"Beyond floor: the root of RMSE² − floor²(; places go by it)?\. Floor: .* \((?:[abc] 0\.1000(?:, )?)+\)\.":
+        lambda t, by: bool(by) == (bool(t.better) and t.floor),
+    r"Score(, interval)?: median over (.*? campaigns?), each simulated anew .*?; = cannot be told apart.*":
+        lambda t, i, n: t.tied() and t.counts(n, t.answers),
+    r"(?:Score(, interval)?: median over (.*? campaigns?), each simulated anew with its own seed[^=]*)":
+        lambda t, i, n: t.counts(n, t.answers) and bool(i) == any(o["ci_low"] is not None for o in t.answers),
+    r"Interval: over (.*?)\..*|Interval: over (.*?); = cannot.*":
+        lambda t, n, m: t.counts(n or m, [o for o in t.answers if o["ci_low"] is not None]),
+    r"Delay: sampling, link, window, computing\.": lambda t: any(o["answer_delay_ms"] is not None for o in t.answers),
+    r"Times cannot be compared: taken on 2 hosts\.": lambda t: len({o["host"] for o in t.rows}) == 2,
+}  # fmt: skip
+Truth.tied = lambda self: any(rank.tied for rank in self.ranks.values())
+
+
+def holds(text, known, truth):
+    """Whether a sentence is on the list and true."""
+    for pattern, says in known.items():
+        if found := re.fullmatch(pattern, text):
+            return bool(says(truth, *found.groups()))
+    return False
+
+
+@settings(max_examples=300, deadline=None)
+@given(boards())
+def test_what_is_said_is_on_the_list_short_and_true(rows):
+    (block,) = build_table(rows).blocks
+    truth = Truth(rows)
+    assert len(block.verdict) <= 2
+    assert len(block.notes) <= 4
+    for text in block.verdict:
+        assert holds(text, ABOVE, truth), text
+    for note in block.notes:
+        assert holds(note.text, BELOW, truth), note
+    for line in block.lines:
+        if line.kind == "result":
+            assert (line.texts["place"] == "–") == (line.row not in truth.better)
+            assert ("*" in line.texts["notes"]) == (line.row in truth.unshown)
