@@ -176,7 +176,8 @@ def _timed(board: Board) -> str:
     timed = list(dict.fromkeys(answer_name(bar) for bar in bars if bar.get("looks_at") == "time"))
     if not timed:
         return ""
-    return f"{' and '.join(timed)} reads no sensor, only the time since the press began: such a score needs no touch."
+    reads = "reads" if len(timed) == 1 else "read"
+    return f"{' and '.join(timed)} {reads} no sensor, only the time: such a score needs no touch."
 
 
 def _published(board: Board) -> str:
@@ -294,7 +295,7 @@ def _how(board: Board) -> Iterator[Note]:
     for unit, rows in over.items():
         parts.append(f"Interval: over {_counts([row['n_replicates'] for row in rows], unit)}")
     if any(rank.tied for _, rank in board.placed) and not board.unranked:
-        parts.append("= cannot be told apart")
+        parts.append("= not all of these can be told apart")
     sentences = ["; ".join(parts)] if parts else []
     if board.times and any(row.get("answer_delay_ms") is not None for row in board.answers):
         sentences.append("Delay: sampling, link, window, computing")

@@ -41,4 +41,4 @@ def test_with_replicates_ties_share_a_place_and_every_place_has_an_interval(rows
         assert line.cells[0] == f"{place}{'=' if tied else ''}"
         assert (line.placing.low, line.placing.high) == (low, high)
     assert [line.cells[0] for line in lines] == ["1=", "1=", "3"]
-    assert any("= cannot be told apart" in note for note in table.notes)
+    assert any("= not all of these can be told apart" in note for note in table.notes)

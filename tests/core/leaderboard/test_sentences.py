@@ -76,6 +76,7 @@ def boards(draw):
                 "stamps": draw(st.sampled_from([[], [], ["It leaks."]])),
                 "answer_delay_ms": draw(st.sampled_from([None, 20.0])),
                 "host": draw(st.sampled_from(["h", "h", "i"])),
+                "concurrency": draw(st.sampled_from([None, 1, 4])),
                 **({} if error else {"metric": "macro_f1", "unit": "1", "classes": [0, 1]}),
             }
             if not simulated:
@@ -100,6 +101,14 @@ def boards(draw):
                 rows.append(
                     row(sensor, estimator, one, seed=seed, repeat=seed, repeats=repeats, cell=cell, **known, **more)
                 )
+    more = RECORDED if not simulated else {}
+    for place in range(draw(st.sampled_from([0, 0, 1, 6]))):
+        ended = {
+            "status": draw(st.sampled_from(["failed", "skipped"])),
+            "reason": draw(st.sampled_from(["No.", "None."])),
+        }
+        alike = {key: rows[0][key] for key in ("metric", "unit", "dagger", "split")}
+        rows.append(row("a", f"x{place}", None, fit_s=None, **alike, **ended, **more))
     return over_replicates(rows)
 
 
@@ -107,7 +116,10 @@ class Truth:
     """A board by the rows alone, and what each sentence says of it."""
 
     def __init__(self, rows):
-        self.rows = sorted(rows, key=lambda one: one["cell"])  # of equal trivial answers the first
+        # Of equal trivial answers the first.
+        self.rows = sorted((one for one in rows if one["status"] == "done"), key=lambda one: one["cell"])
+        self.stopped = [one for one in rows if one["status"] != "done"]
+        rows = self.rows
         self.sign = 1.0 if rows[0]["metric"] == "rmse" else -1.0
         self.answers = [one for one in rows if not one["is_baseline"]]
         self.better = [one for one in self.answers if not self.reaches(one, one["score"])]
@@ -179,6 +191,18 @@ class Truth:
             assert any(f"{one['published']:.{3 if self.sign < 0 else 4}f}" == value for one in alike)
         return where is not None
 
+    def tied(self):
+        """Whether a place is shared, and each that is holds neighbours that the data do not separate."""
+        groups = {}
+        for rank in self.ranks.values():
+            groups.setdefault(rank.place, []).append(rank)
+        shared = [group for group in groups.values() if len(group) > 1]
+        return bool(shared) and all(any(not rank.apart for rank in group[1:]) for group in shared)
+
+    def ended(self, status, others, reason):
+        family = [one for one in self.stopped if one["status"] == status]
+        return len([one for one in family if one["reason"] != reason]) == others < len(family)
+
     def counts(self, text, rows):
         numbers = [int(one) for one in re.findall(r"\d+", text)]
         return (min(numbers), max(numbers)) == tuple(f(one["n_replicates"] for one in rows) for f in (min, max))
@@ -207,7 +231,7 @@ ABOVE = {
     r"(?:The only answer|None of (\d+) answers) scores (?:no )?better than the trivial one of its own sensor "
     r"\((.*)\)\.":
         lambda t, n, b: not t.better and int(n or 1) == len(t.answers) and t.bars(b, t.answers),
-    r"time reads no sensor, only the time since the press began: such a score needs no touch\.":
+    r"time reads no sensor, only the time: such a score needs no touch\.":
         lambda t: any(t.bar(o)["looks_at"] == "time" for o in [*t.worse, *t.unshown]),
     r"Published values: (.*?)(?:; that concerns the simulation, not the sensors)?\.": lambda t, a: t.beside(a),
 }  # fmt: skip
@@ -219,16 +243,19 @@ BELOW = {
     r"Protocol deployable uses statistics of the test set, .*": lambda t: any(one["dagger"] for one in t.rows),
     r"Beyond floor: the root of RMSE² − floor²(; places go by it)?\. Floor: .* \((?:[abc] 0\.1000(?:, )?)+\)\.":
         lambda t, by: bool(by) == (bool(t.better) and t.floor),
-    r"Score(, interval)?: median over (.*? campaigns?), each simulated anew .*?; = cannot be told apart.*":
+    r"Score(, interval)?: median over (.*? campaigns?), each simulated anew .*?; = not all of these .*":
         lambda t, i, n: t.tied() and t.counts(n, t.answers),
     r"(?:Score(, interval)?: median over (.*? campaigns?), each simulated anew with its own seed[^=]*)":
         lambda t, i, n: t.counts(n, t.answers) and bool(i) == any(o["ci_low"] is not None for o in t.answers),
-    r"Interval: over (.*?)\..*|Interval: over (.*?); = cannot.*":
+    r"Interval: over (.*?)\..*|Interval: over (.*?); = not all.*":
         lambda t, n, m: t.counts(n or m, [o for o in t.answers if o["ci_low"] is not None]),
     r"Delay: sampling, link, window, computing\.": lambda t: any(o["answer_delay_ms"] is not None for o in t.answers),
-    r"Times cannot be compared: taken on 2 hosts\.": lambda t: len({o["host"] for o in t.rows}) == 2,
+    r"Times cannot be compared: (taken on 2 hosts)?(?: and )?(taken while up to 4 cells ran)?\.":
+        lambda t, hosts, many: bool(hosts) == (len({o["host"] for o in t.rows}) == 2)
+        and bool(many) == any(o["concurrency"] == 4 for o in t.rows),
+    r"a/x.*?(?: and (\d+) more)? (failed|skipped)(?:; (\d+) more ended otherwise)?: (\w+\.)":
+        lambda t, more, status, others, reason: t.ended(status, int(others or 0), reason),
 }  # fmt: skip
-Truth.tied = lambda self: any(rank.tied for rank in self.ranks.values())
 
 
 def holds(text, known, truth):
