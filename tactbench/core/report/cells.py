@@ -17,7 +17,7 @@ from tactbench.core.samples import Answers
 from tactbench.core.tables.text_table import ABSENT, Entry, TextTable, finite, text_table
 
 _TEXTS = ("traceback", "log")
-_APART = {"classes", "confusion", "fold_sizes", *_TEXTS}
+_APART = ("classes", "confusion", "fold_sizes")
 """Keys of a row that have places of their own."""
 
 
@@ -27,7 +27,9 @@ def details(row: Row, results: Results | None) -> Details:
     Without `results`, scores of recordings and whatever is a table are left out.
     """
     said = {name: value for name, value in row.items() if value not in (None, "", [], {}, ())}
-    pairs = {title: {name: _text(said[name]) for name in names if name in said} for title, names in GROUPS.items()}
+    single = {name: _text(value) for name, value in said.items() if not isinstance(value, Mapping | list | tuple)}
+    pairs = {title: {name: single.pop(name) for name in names if name in single} for title, names in GROUPS.items()}
+    pairs["Also"] = {name: text for name, text in single.items() if name not in _TEXTS}
     of = f", replicate {row['repeat']} of {row['repeats']}" if row["repeats"] > 1 else ""
     tested = results.answers(row).get("test") if results and row["status"] == "done" else None
     classes = list(map(str, row.get("classes") or ()))
@@ -37,17 +39,16 @@ def details(row: Row, results: Results | None) -> Details:
         f"Score of each recording{of}": recording_scores(row, tested),
         TITLES["confusion"]: [{"true": true} | dict(zip(classes, answered, strict=False)) for true, answered in counts],
     }
-    grouped = {name for names in GROUPS.values() for name in names} | _APART
-    for name in (*TITLES, *sorted(said.keys() - TITLES.keys() - grouped)):
+    for name in (*TITLES, *sorted(said.keys() - TITLES.keys())):
         value, title = said.get(name), TITLES.get(name, name)
-        if name not in said or name in _APART:
+        if name in _APART:
             continue
         if isinstance(value, Mapping):
             pairs[title] = {str(key): _text(one) for key, one in value.items() if not str(key).startswith("fold ")}
         elif isinstance(value, list | tuple) and all(isinstance(one, Mapping) for one in value):
             records[title] = value
-        else:
-            pairs.setdefault("Also", {})[title] = _text(value)
+        elif isinstance(value, list | tuple):
+            pairs["Also"][title] = _text(value)
     return Details(
         cell=str(row["cell"]),
         status=str(row["status"]),

@@ -121,6 +121,7 @@ def test_everything_that_a_row_knows_is_on_the_page(material):
         told = [name.removeprefix("fold ") for name in told]
         assert [what for what in told if " ".join(what.split()) not in text] == []
     assert all(told in text for told in ("seen", "3.25", "second"))
+    assert "{'" not in text
 
 
 def test_text_from_plugins_is_text(material):
