@@ -1,6 +1,5 @@
 """A real page of a real small run, opened in a headless Chromium that speaks to nobody."""
 
-import json
 import os
 import shutil
 from pathlib import Path
@@ -44,14 +43,11 @@ def chromium():
 
 @pytest.fixture(scope="session")
 def page(tmp_path_factory) -> Path:
-    """The page of a small run, with a figure, a cost file and skipped cells."""
+    """The page of a small run, with a figure and skipped cells."""
     folder = make_results(tmp_path_factory.mktemp("page") / "results")
     material = open_results(Store(folder), load_registry())
-    (folder / "cost").mkdir()
-    row = next(row for row in material.rows if row["status"] == "done")
+    row = next(row for row in material.rows if row["status"] == "done" and row["task"] == "force")
     row["fit_s"] = 2.5  # as on a slow machine: its neighbours' times are in milliseconds
-    points = [{"key": row["key"], "seconds": seconds} for seconds in (0.5, 20.0, 3.0)]
-    (folder / "cost" / "icub-force.json").write_text(json.dumps(points))
     return make_report(material, folder / "report", None, draw=draw_one).page
 
 

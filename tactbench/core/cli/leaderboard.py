@@ -38,7 +38,7 @@ def _filters(command: Any) -> Any:
 @click.option("--format", "shape", type=click.Choice(TABLE_FORMATS),
               help="How it is shown; default: table, or what the name of the file given with --to says.")  # fmt: skip
 @click.option("--to", "-o", "to", type=click.Path(path_type=Path, dir_okay=False), metavar="FILE",
-              help="Write a file: .txt, .md, .csv, .json, .tex, .html, .parquet, .xlsx.")  # fmt: skip
+              help="Write a file: .txt, .md, .csv, .json, .tex, .parquet, .xlsx.")  # fmt: skip
 @click.option("--compare", "by", type=click.Choice(AXES), help="Show these side by side instead.")
 @click.option("--no-times", "times", flag_value=False, default=True, type=bool,
               help="Only what a seed decides, no times and hosts: the same bytes on every machine.")  # fmt: skip
@@ -50,7 +50,7 @@ def command(
     from tactbench.core.cli.tables import check_destination
 
     shape = format_of(shape, to)
-    check_destination(shape, to, times=times)
+    check_destination(shape, to)
     view = view_of(folder, wide=wide, columns=columns, shape=shape)
     _show(opened(folder), shape, to, by, times, best, view, filters)
 

@@ -10,7 +10,7 @@ import click
 from tactbench.core.cli.threads import keep_threads
 
 if TYPE_CHECKING:
-    from tactbench.core.report.making import Drawer, Report
+    from tactbench.core.report.making import Report
 
 
 @click.command(name="report")
@@ -21,18 +21,11 @@ if TYPE_CHECKING:
     metavar="DIR",
     help="Where page and figures are put; default: FOLDER/report.",
 )
-@click.option(
-    "--open",
-    "shown",
-    type=click.Choice(("no", "yes")),
-    default="no",
-    show_default=True,
-    help="Show the page in the browser.",
-)
+@click.option("--open", "shown", is_flag=True, help="Show the page in the browser.")
 @click.option("--format", "shape", type=click.Choice(("table", "md", "json", "csv")), default="table",
               show_default=True, help="How the published numbers and ours are printed.")  # fmt: skip
 @click.pass_context
-def command(ctx: click.Context, folder: Path, out: Path | None, shown: str, shape: str) -> None:
+def command(ctx: click.Context, folder: Path, out: Path | None, shown: bool, shape: str) -> None:
     """Make one page of all results in FOLDER, which is what `run --out` wrote.
 
     The published numbers are printed beside ours.
@@ -50,23 +43,16 @@ def command(ctx: click.Context, folder: Path, out: Path | None, shown: str, shap
     for sentence in store.troubles:
         remark(f"{folder}: {sentence}")
     with progress() as display:
-        made = make_report(results, out or folder / "report", display, draw=_drawer())
+        made = make_report(results, out or folder / "report", display)
     _print(made, shape)
     for sentence in made.missing:
         remark(f"Left out: {sentence}")
     for sentence in made.broken:
         remark(f"Failed: {sentence}")
     remark(f"Page: {made.page}")
-    if shown == "yes":
+    if shown:
         click.launch(str(made.page))
     ctx.exit(1 if made.broken else 0)
-
-
-def _drawer() -> Drawer:
-    """Return what draws the paper's figures."""
-    from tactbench.core.report.figures import draw_figures
-
-    return draw_figures
 
 
 def _print(made: Report, shape: str) -> None:

@@ -112,7 +112,7 @@ def _farewell(outcome: Outcome, rows: Sequence[Mapping[str, Any]], folder: Path)
     of = f"{len(rows)} cells" if answers == len(rows) else f"{len(rows)} cells over their replicates"
     remark(f"\n{of}: {answers - outcome.computed} of {answers} answers were found finished, {outcome.computed} "
            f"computed now; {outcome.recorded} recordings made now.")  # fmt: skip
-    remark(f"Files: {folder}/leaderboard.html, .md, .csv, .json; results.sqlite; recordings/; cells/")
+    remark(f"Files: {folder}/leaderboard.md, .csv, .json; results.sqlite; recordings/; cells/")
     tell_stopped(outcome.failures, folder)
 
 

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from tactbench.core.leaderboard.table import Table
     from tactbench.core.leaderboard.view import View
 
-TABLE_FORMATS = ("table", "json", "md", "latex", "csv", "parquet", "xlsx", "html")
+TABLE_FORMATS = ("table", "json", "md", "latex", "csv", "parquet", "xlsx")
 FOR_PEOPLE = ("table", "md", "latex")
 """Formats that print less than everything."""
 NO_TEXT = ("parquet", "xlsx")
@@ -80,18 +80,16 @@ def format_of(shape: str | None, to: Path | None) -> str:
     return shape or str(named)
 
 
-def check_destination(shape: str, to: Path | None = None, *, times: bool = True) -> None:
-    """Refuse to write bytes to a terminal, and a page without times.
+def check_destination(shape: str, to: Path | None = None) -> None:
+    """Refuse to write bytes to a terminal.
 
     Raises
     ------
     UsageError
-        If `shape` is no text and stdout is a terminal, or `shape` is the page and `times` is false.
+        If `shape` is no text and stdout is a terminal.
     """
     from tactbench.core.errors import UsageError
 
-    if shape == "html" and not times:
-        raise UsageError("The page shows every cell in full, times too.", hint="Use another --format.")
     if shape in NO_TEXT and to is None and sys.stdout.isatty():
         raise UsageError(
             f"{'Parquet' if shape == 'parquet' else 'An Excel file'} is no text for a terminal.",

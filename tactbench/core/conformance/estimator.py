@@ -308,7 +308,7 @@ def constant_features_are_borne(subject: Subject) -> None:
 
 @check("estimator", needs=("answers-have-the-shape",), level="silver")
 def linear_is_linear(subject: Subject) -> None:
-    """Tables and reports tell linear answers from others by the descriptor's word.
+    """`show` and `cost` tell linear estimators from others by the descriptor's word.
 
     Set linear=False, or None where it is not known.
     """

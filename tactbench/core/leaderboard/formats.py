@@ -27,11 +27,11 @@ if TYPE_CHECKING:
     from rich.console import Console
 
 SUFFIXES = {
-    ".json": "json", ".csv": "csv", ".md": "md", ".tex": "latex", ".html": "html", ".parquet": "parquet",
-    ".xlsx": "xlsx", ".txt": "table",
+    ".json": "json", ".csv": "csv", ".md": "md", ".tex": "latex", ".parquet": "parquet", ".xlsx": "xlsx",
+    ".txt": "table",
 }  # fmt: skip
 """The format that a file is meant to have, by how its name ends."""
-IN_FOLDER = ("md", "csv", "json", "html")
+IN_FOLDER = ("md", "csv", "json")
 """A run's result folder has these, ``leaderboard.md`` and so on; the others are made when asked for."""
 _IN_A_PAPER = ("sensor", "estimator", "score", "interval", "published")
 _COLUMNS = {"sensor": "l", "estimator": r"p{0.24\columnwidth}", "notes": "l"}
@@ -104,13 +104,6 @@ def _caption(block: Block) -> str:
     return " ".join(sentence if sentence.endswith("?") else f"{sentence}." for sentence in sentences)
 
 
-def page(table: Table) -> str:
-    """Return the page of a table: one HTML file, every cell behind its numbers, times among them."""
-    from tactbench.core.leaderboard.board import page_of
-
-    return page_of(table)
-
-
 def rendered(table: Table, shape: str, view: View = WHOLE, width: int = 240) -> bytes:
     """Return a leaderboard in a format that `SUFFIXES` names.
 
@@ -131,7 +124,7 @@ def rendered(table: Table, shape: str, view: View = WHOLE, width: int = 240) -> 
     if shape in ("md", "latex"):
         text = markdown(table, view) if shape == "md" else latex(table, view)
     else:
-        text = {"csv": csv_text, "json": json_array, "html": page}[shape](table)
+        text = csv_text(table) if shape == "csv" else json_array(table)
     return text.encode("utf-8", "replace")
 
 

@@ -1,87 +1,107 @@
-"""Every cell, with everything that its row knows."""
+"""Everything that is known about a cell."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
+from pathlib import PurePosixPath
 from typing import Any
 
-from tactbench.core.leaderboard.records import APART, GROUPS, TITLES
-from tactbench.core.report.section import Details, ReportData, Section
+import numpy as np
+
+from tactbench.core.evaluation.metrics import METRICS
+from tactbench.core.leaderboard.names import METRIC_NAMES
+from tactbench.core.leaderboard.records import GROUPS, TITLES
+from tactbench.core.report.results import Results
+from tactbench.core.report.section import Details, Row
+from tactbench.core.samples import Answers
 from tactbench.core.tables.text_table import ABSENT, Entry, TextTable, finite, text_table
 
-Row = Mapping[str, Any]
+_TEXTS = ("traceback", "log")
+_APART = ("classes", "confusion", "fold_sizes")
+"""Keys of a row that have places of their own."""
 
 
-def cells_section(subject: ReportData) -> Section:
-    """Return the section of cells."""
-    paragraphs: tuple[str, ...] = (
-        "Everything that is known about each cell. Times are in the unit that ends their name.",
-    )
-    if any(len(row.get("seeds") or []) > 1 for row in subject.rows):
-        paragraphs += ("Of several replicates, key, recordings, candidates and effects are those of the first.",)
-    return Section(
-        "cells",
-        "Every cell",
-        paragraphs=paragraphs,
-        details=tuple(_details(row, subject.anchors) for row in subject.rows),
-    )
+def details(row: Row, results: Results | None) -> Details:
+    """Return what a cell's row says, what is empty left out, and the scores of its folds and recordings.
 
-
-def _details(row: Row, anchors: Mapping[str, str]) -> Details:
-    single = {name for name, value in row.items() if not isinstance(value, Mapping | list | tuple)} - set(APART)
-    grouped = {name for names in GROUPS.values() for name in names} | set(TITLES)
-    groups = {**GROUPS, "Also": tuple(sorted(single - grouped))}
-    tables = [_pairs(title, ((name, row[name]) for name in names if name in single)) for title, names in groups.items()]
-    lists = []
-    for name in (*TITLES, *sorted(set(row) - set(TITLES) - single - set(APART))):
-        value, title = row.get(name), TITLES.get(name, name)
-        if name == "confusion" and value:
-            tables.append(_confusion(title, value, row["classes"]))
-        elif isinstance(value, Mapping) and value:
-            tables.append(_pairs(title, value.items()))
-        elif isinstance(value, list | tuple) and value:
-            if all(isinstance(one, Mapping) for one in value):
-                tables.append(_records(title, value))
-            else:
-                lists.append((title, tuple(map(_text, value))))
+    Without `results`, scores of recordings and whatever is a table are left out.
+    """
+    said = {name: value for name, value in row.items() if value not in (None, "", [], {}, ())}
+    single = {name: _text(value) for name, value in said.items() if not isinstance(value, Mapping | list | tuple)}
+    pairs = {title: {name: single.pop(name) for name in names if name in single} for title, names in GROUPS.items()}
+    pairs["Also"] = {name: text for name, text in single.items() if name not in _TEXTS}
+    of = f", replicate {row['repeat']} of {row['repeats']}" if row["repeats"] > 1 else ""
+    tested = results.answers(row).get("test") if results and row["status"] == "done" else None
+    classes = list(map(str, row.get("classes") or ()))
+    counts = zip(classes, said.get("confusion", ()), strict=False)
+    records: dict[str, Sequence[Mapping[str, Any]]] = {
+        "Score of each fold": _folds(row),
+        f"Score of each recording{of}": recording_scores(row, tested),
+        TITLES["confusion"]: [{"true": true} | dict(zip(classes, answered, strict=False)) for true, answered in counts],
+    }
+    for name in (*TITLES, *sorted(said.keys() - TITLES.keys())):
+        value, title = said.get(name), TITLES.get(name, name)
+        if name in _APART:
+            continue
+        if isinstance(value, Mapping):
+            pairs[title] = {str(key): _text(one) for key, one in value.items() if not str(key).startswith("fold ")}
+        elif isinstance(value, list | tuple) and all(isinstance(one, Mapping) for one in value):
+            records[title] = value
+        elif isinstance(value, list | tuple):
+            pairs["Also"][title] = _text(value)
     return Details(
-        anchor=anchors[row["cell"]],
-        title=str(row["cell"]),
+        cell=str(row["cell"]),
         status=str(row["status"]),
-        tables=tuple(table for table in tables if table.lines),
-        lists=tuple(lists),
-        traceback=str(row.get("traceback") or ""),
+        pairs={title: own for title, own in pairs.items() if own},
+        tables=tuple(_records(title, own) for title, own in records.items() if own and (results or "fold" in title)),
+        texts={name: str(said[name]) for name in _TEXTS if name in said},
     )
 
 
-def _pairs(title: str, pairs: Iterable[tuple[str, Any]]) -> TextTable:
-    return text_table(title, ("name", "value"), [(str(name), _entry(value)) for name, value in pairs])
+def _folds(row: Row) -> list[dict[str, Any]]:
+    """Return the score of each fold, of replicates their mean, and how many rows it learned from and answered."""
+    sizes = row.get("fold_sizes") or {}
+    return [
+        {"fold": name.removeprefix("fold "), "score": value}
+        | dict(zip(("training rows", "test rows"), sizes.get(name, ()), strict=False))
+        for name, value in (row.get("scores") or {}).items()
+        if name.startswith("fold ")
+    ]
+
+
+def recording_scores(row: Row, tested: Answers | None) -> list[dict[str, Any]]:
+    """Return name, number of rows and score of each test recording that a cell was answered from.
+
+    Of classes the share of right answers, since a recording may hold one class alone; of events nothing, since a
+    recording may hold none.
+    """
+    metric = METRICS.get(str(row["metric"]))
+    if tested is None or metric is None or metric.kind == "events":
+        return []
+    if metric.kind == "classification":
+        metric = METRICS["accuracy"]
+    found = []
+    for number in np.unique(tested.recording):
+        own = tested.recording == number
+        value = metric.of(tested.y_true[own], tested.y_pred[own], len(row["classes"] or ()))
+        name = METRIC_NAMES.get(metric.name, metric.name)
+        recording = PurePosixPath(row["recordings"][number]).stem
+        found.append({"recording": recording, "test rows": int(own.sum()), name: value})
+    return found
 
 
 def _records(title: str, records: Sequence[Mapping[str, Any]]) -> TextTable:
     columns = list(dict.fromkeys(str(name) for record in records for name in record))
     numeric = [name for name in columns if any(finite(record.get(name)) is not None for record in records)]
-    return text_table(
-        title, columns, [[_entry(record.get(name)) for name in columns] for record in records], numeric=numeric
-    )
-
-
-def _confusion(title: str, table: Sequence[Sequence[int]], classes: Sequence[Any]) -> TextTable:
-    names = [f"{label}" for label in classes]
-    columns = ("true", *(f"as {name}" for name in names))
-    lines = [[Entry(name), *map(_entry, counts)] for name, counts in zip(names, table, strict=True)]
-    return text_table(title, columns, lines, numeric=columns[1:])
-
-
-def _entry(value: Any) -> Entry:
-    if value is None or value == "":
-        return Entry(ABSENT)
-    if isinstance(value, bool):
-        return Entry("yes" if value else "no")
-    return Entry(_text(value), finite(value))
+    lines = [[Entry(_text(record.get(name)), finite(record.get(name))) for name in columns] for record in records]
+    return text_table(title, columns, lines, numeric=numeric)
 
 
 def _text(value: Any) -> str:
+    if value is None or value == "":
+        return ABSENT
+    if isinstance(value, bool):
+        return "yes" if value else "no"
     if isinstance(value, list | tuple):
-        return ", ".join(map(_text, value))
+        return ("\n" if any(isinstance(one, str) for one in value) else ", ").join(map(_text, value))
     return f"{value:.6g}" if isinstance(value, float) else str(value)

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 from tactbench.core.spec.quantity import Quantity, Source
-from tactbench.core.spec.sensor import ChannelKind, ChannelSpec, PhysicalRange, SensorSpec, Statement
+from tactbench.core.spec.sensor import ChannelKind, SensorSpec, Statement
 from tactbench.core.spec.skin import SheetTable
 from tactbench.core.tables.text_table import TextTable
 
@@ -44,41 +45,27 @@ class Property:
 
 def table_one(sensors: Sequence[SensorSpec]) -> list[Property]:
     """Return the paper's Table I for any sensors."""
-    rows = [
-        _row("# taxels", sensors, lambda sensor: _text(_number_of_taxels(sensor))),
-        _row("measurement principle", sensors, lambda s: Fact(s.principle, s.principle_source.tag,
-                                                              s.principle_source.reference)),
-    ]  # fmt: skip
-    rows += [
-        Property(title, tuple(_range(sensor, kind, which) for sensor in sensors)) for title, kind, which in _TABLE_ONE
-    ]
-    return rows
+    ranges = {title: partial(_range, kind=kind, which=which) for title, kind, which in _TABLE_ONE}
+    return _properties(sensors, {"# taxels": _number_of_taxels, "measurement principle": _principle, **ranges})
 
 
 def data_sheets(sensors: Sequence[SensorSpec]) -> list[Property]:
     """Return the sensors as devices: range, size, mass, interface, power, availability."""
-    return [
-        Property(name.replace("_", " "), tuple(_of_device(sensor, name) for sensor in sensors)) for name in OF_DEVICES
-    ]
+    return _properties(sensors, {name.replace("_", " "): partial(_of_device, name=name) for name in OF_DEVICES})
 
 
 def details(sensors: Sequence[SensorSpec]) -> list[Property]:
     """Return what else the specs say: clocks, converters, rest levels, skin, parameters, noise."""
-    rows = [
-        _row("streams", sensors, _streams),
-        _row("delay of a reading", sensors, _delay),
-        _row("taxel reading", sensors, _reading),
-        _row("taxel at rest", sensors, _rest),
-        _row("under load", sensors, _sign),
-        _row("positions", sensors, _positions),
-    ]
+    looks = {
+        "streams": _streams, "delay of a reading": _delay, "taxel reading": _reading, "taxel at rest": _rest,
+        "under load": _sign, "positions": _positions,
+    }  # fmt: skip
     tables = [_quantities(sensor) for sensor in sensors]
     titles = dict.fromkeys(title for table in tables for title in table)
-    rows += [
-        Property(title, tuple(_quantity(table[title]) if title in table else Fact(ABSENT) for table in tables))
-        for title in titles
+    stated = {title: [table.get(title) for table in tables] for title in titles}
+    return _properties(sensors, looks) + [
+        Property(title, tuple(_fact(one, one.source if one else None) for one in row)) for title, row in stated.items()
     ]
-    return rows
 
 
 def sensor_table(
@@ -108,36 +95,34 @@ def parameters_markdown(sensors: Sequence[SensorSpec]) -> str:
     return "\n".join(parts)
 
 
-def _row(title: str, sensors: Sequence[SensorSpec], look: Callable[[SensorSpec], Fact]) -> Property:
-    return Property(title, tuple(look(sensor) for sensor in sensors))
+def _properties(sensors: Sequence[SensorSpec], looks: Mapping[str, Callable[[SensorSpec], Fact]]) -> list[Property]:
+    return [Property(title, tuple(map(look, sensors))) for title, look in looks.items()]
 
 
-def _text(text: str) -> Fact:
-    return Fact(text)
-
-
-def _sourced(text: str, source: Source | None) -> Fact:
+def _fact(stated: object, source: Source | None = None) -> Fact:
+    text = ABSENT if stated is None else str(stated)
     return Fact(text, source.tag, source.reference) if source else Fact(text)
 
 
 def _range(sensor: SensorSpec, kind: ChannelKind, which: str) -> Fact:
-    for channel in sensor.channels(kind):
-        found = getattr(channel, which)
-        if found is not None:
-            return _sourced(str(found), found.source)
-    return Fact(ABSENT)
+    found = next((one for one in (getattr(channel, which) for channel in sensor.channels(kind)) if one), None)
+    return _fact(found, found.source if found else None)
 
 
-def _number_of_taxels(sensor: SensorSpec) -> str:
+def _principle(sensor: SensorSpec) -> Fact:
+    return _fact(sensor.principle, sensor.principle_source)
+
+
+def _number_of_taxels(sensor: SensorSpec) -> Fact:
     sites, channels = len(sensor.sites("taxel")), len(sensor.channels("taxel"))
-    return str(sites) if sites == channels else f"{sites}, of {channels} channels"
+    return Fact(str(sites) if sites == channels else f"{sites}, of {channels} channels")
 
 
 def _of_device(sensor: SensorSpec, name: str) -> Fact:
-    stated: PhysicalRange | Quantity | Statement | None = getattr(sensor.data_sheet, name)
+    stated = getattr(sensor.data_sheet, name)
     if stated is None:
         return Fact(UNKNOWN if sensor.data_sheet.exists else ABSENT)
-    return _sourced(stated.text if isinstance(stated, Statement) else str(stated), stated.source)
+    return _fact(stated.text if isinstance(stated, Statement) else stated, stated.source)
 
 
 def _streams(sensor: SensorSpec) -> Fact:
@@ -145,23 +130,21 @@ def _streams(sensor: SensorSpec) -> Fact:
     for stream in sensor.streams:
         rate = f"{stream.rate_hz:g} Hz" if stream.rate_hz else "rate not stated"
         parts.append(f"{stream.name}: {len(stream.channels)} ch., {rate}")
-    return _sourced("; ".join(parts), sensor.streams[0].rate_source)
+    return _fact("; ".join(parts), sensor.streams[0].rate_source)
 
 
 def _delay(sensor: SensorSpec) -> Fact:
     """Return the parts of an answer's delay that are the sensor's own: an interval of each stream, and the link."""
     parts = [f"{stream.name} {1e3 / stream.rate_hz:.3g} ms" for stream in sensor.streams if stream.rate_hz]
     sampling = f"sampling interval {', '.join(parts) or 'not stated'}"
-    if sensor.link_delay is None:
-        return Fact(f"{sampling}; link not stated")
-    return _sourced(f"{sampling}; link {sensor.link_delay}", sensor.link_delay.source)
+    link = sensor.link_delay
+    return _fact(f"{sampling}; link {link or 'not stated'}", link.source if link else None)
 
 
 def _reading(sensor: SensorSpec) -> Fact:
-    taxels = sensor.channels("taxel")
-    if not taxels:
+    first = next(iter(sensor.channels("taxel")), None)
+    if first is None:
         return Fact(ABSENT)
-    first = taxels[0]
     if first.lower is None or first.upper is None:
         return Fact(first.unit)
     return Fact(f"{first.lower:g}–{first.upper:g} {first.unit}")
@@ -171,10 +154,9 @@ def _rest(sensor: SensorSpec) -> Fact:
     rests = [channel.rest for channel in sensor.channels("taxel") if channel.rest is not None]
     if not rests:
         return Fact(ABSENT)
-    values = [rest.value for rest in rests]
-    low, high = min(values), max(values)
+    low, high = min(rest.value for rest in rests), max(rest.value for rest in rests)
     text = f"{low:g} {rests[0].unit}" if low == high else f"{low:.4g}–{high:.4g} {rests[0].unit}"
-    return _sourced(text, rests[0].source)
+    return _fact(text, rests[0].source)
 
 
 def _sign(sensor: SensorSpec) -> Fact:
@@ -183,10 +165,9 @@ def _sign(sensor: SensorSpec) -> Fact:
 
 
 def _positions(sensor: SensorSpec) -> Fact:
-    placed: list[ChannelSpec] = [channel for channel in sensor.channels("taxel") if channel.position_m]
-    if not placed:
-        return Fact(ABSENT)
-    return _sourced(f"{len(placed)} of {len(sensor.channels('taxel'))} known", placed[0].position_source)
+    taxels = sensor.channels("taxel")
+    placed = [channel for channel in taxels if channel.position_m]
+    return _fact(f"{len(placed)} of {len(taxels)} known", placed[0].position_source) if placed else Fact(ABSENT)
 
 
 def _quantities(sensor: SensorSpec) -> dict[str, Quantity]:
@@ -195,7 +176,7 @@ def _quantities(sensor: SensorSpec) -> dict[str, Quantity]:
         found["link delay"] = sensor.link_delay
     if sensor.skin is not None:
         found.update(_named("skin", sensor.skin))
-    found.update({f"{name.replace('_', ' ')}": quantity for name, quantity in sensor.parameters.items()})
+    found.update({name.replace("_", " "): quantity for name, quantity in sensor.parameters.items()})
     usual = sensor.settable()
     found.update(usual)
     for scenario in sensor.scenarios:
@@ -207,20 +188,14 @@ def _quantities(sensor: SensorSpec) -> dict[str, Quantity]:
 def _named(prefix: str, model: object) -> Iterable[tuple[str, Quantity]]:
     for name in getattr(type(model), "model_fields", {}):
         value = getattr(model, name)
+        words = name.replace("_", " ")
         if isinstance(value, Quantity):
-            yield f"{prefix}: {name.replace('_', ' ')}", value
+            yield f"{prefix}: {words}", value
         elif isinstance(value, SheetTable):
             for end, length in (("least", value.least_mm), ("most", value.most_mm)):
-                yield (
-                    f"{prefix}: {name.replace('_', ' ')}, {end}",
-                    Quantity(value=length, unit="mm", source=value.source),
-                )
-        elif hasattr(type(value), "model_fields"):
-            yield from _named(f"{prefix} {name.replace('_', ' ')}", value)
+                yield f"{prefix}: {words}, {end}", Quantity(value=length, unit="mm", source=value.source)
         elif isinstance(value, tuple):
             for place, item in enumerate(value, start=1):
-                yield from _named(f"{prefix} {name.replace('_', ' ')} {place}", item)
-
-
-def _quantity(quantity: Quantity) -> Fact:
-    return Fact(str(quantity), quantity.source.tag, quantity.source.reference)
+                yield from _named(f"{prefix} {words} {place}", item)
+        else:
+            yield from _named(f"{prefix} {words}", value)

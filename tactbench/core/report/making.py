@@ -10,6 +10,7 @@ from typing import Any
 from tactbench.core.errors import UnwritableError, UsageError
 from tactbench.core.files import replace_file
 from tactbench.core.matrix.progress import Progress
+from tactbench.core.report.figures.drawing import draw_figures
 from tactbench.core.report.page import make_page
 from tactbench.core.report.published import published_table, records, reproduce
 from tactbench.core.report.results import Results, SavedFigure
@@ -33,13 +34,8 @@ class Report:
     broken: tuple[str, ...]
 
 
-def make_report(results: Results, out: Path, progress: Progress, *, draw: Drawer | None = None) -> Report:
+def make_report(results: Results, out: Path, progress: Progress, *, draw: Drawer = draw_figures) -> Report:
     """Draw the figures and write the page: ``index.html`` and ``figures/`` in `out`.
-
-    Parameters
-    ----------
-    draw
-        Draws the figures; None: the page has none.
 
     Raises
     ------
@@ -49,7 +45,7 @@ def make_report(results: Results, out: Path, progress: Progress, *, draw: Drawer
         If `out` refuses the page or the figures; an earlier page is then still whole.
     """
     readable = tuple(row for row in results.rows if set(JSON_KEYS) <= set(row))
-    foreign = [str(row.get("cell")) for row in results.rows if row not in readable]
+    foreign = [row for row in results.rows if row not in readable]
     if not any(row["status"] == "done" for row in readable):
         raise UsageError(
             f"No cell in {results.store.folder} has finished, or all are of another version: there is nothing to "
@@ -57,12 +53,18 @@ def make_report(results: Results, out: Path, progress: Progress, *, draw: Drawer
             hint="Finish some with `tactbench run --out DIR`.",
         )
     results = replace(results, rows=readable)
+    drawn: Sequence[SavedFigure] = ()
+    undrawn: list[str] = []
+    trouble: tuple[str, ...] = ()
     try:
         (out / "figures").mkdir(parents=True, exist_ok=True)
-        undrawn: list[str] = []
-        drawn, trouble = _drawn(results, out / "figures", progress, draw, undrawn.append)
-        subject = ReportData(results, drawn, (*undrawn, *trouble))
-        page = make_page(subject)
+        try:
+            drawn = draw(results, out / "figures", progress, undrawn.append)
+        except OSError:
+            raise
+        except Exception as error:  # does not take the tables with it
+            trouble = (f"The figures could not be drawn: {type(error).__name__}: {error}",)
+        page = make_page(ReportData(results, drawn, (*undrawn, *trouble)))
         # A lone surrogate, which JSON may hold, is no UTF-8: a question mark then.
         replace_file(out / "index.html", page.html.encode("utf-8", "replace"))
     except OSError as error:
@@ -70,26 +72,11 @@ def make_report(results: Results, out: Path, progress: Progress, *, draw: Drawer
             f"The report cannot be written to {out}: {error.strerror or error}.",
             hint="Give another folder with --out.",
         ) from error
-    lacking = tuple(one for one in page.missing if not any(reason in one for reason in trouble))
-    rows_left_out = [f"{name}: its row is of another version; run it again" for name in foreign]
+    lacking = [one for one in page.missing if not one.endswith(trouble)]
     return Report(
         page=out / "index.html",
-        reproduction=published_table(subject),
+        reproduction=published_table(results.registry, readable),
         records=records(reproduce(results.registry, readable)),
-        missing=(*lacking, *rows_left_out),
+        missing=(*lacking, *(f"{row.get('cell')}: its row is of another version; run it again" for row in foreign)),
         broken=(*page.broken, *trouble),
     )
-
-
-def _drawn(
-    results: Results, folder: Path, progress: Progress, draw: Drawer | None, remark: Callable[[str], None]
-) -> tuple[Sequence[SavedFigure], tuple[str, ...]]:
-    """Return the figures, and why there are none: drawing that fails does not take the tables with it."""
-    if draw is None:
-        return (), ()
-    try:
-        return draw(results, folder, progress, remark), ()
-    except OSError:
-        raise
-    except Exception as error:
-        return (), (f"The figures could not be drawn: {type(error).__name__}: {error}",)

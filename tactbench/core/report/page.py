@@ -2,66 +2,193 @@
 
 from __future__ import annotations
 
+import base64
+import hashlib
+from collections import Counter
+from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import lru_cache
+from importlib import resources
+from typing import TYPE_CHECKING
 
+import tactbench
+from tactbench.core.cost.ladder_file import read_ladders
+from tactbench.core.errors import TactbenchError
+from tactbench.core.leaderboard import AXES
+from tactbench.core.leaderboard.columns import DEFAULT
+from tactbench.core.leaderboard.levels import KEY as LEVEL
+from tactbench.core.leaderboard.side_by_side import compare
 from tactbench.core.leaderboard.view import full_grid
-from tactbench.core.report.cells import cells_section
-from tactbench.core.report.compared import compared_section
-from tactbench.core.report.costs import costs_section
-from tactbench.core.report.figures.published_and_ours import COLUMN
+from tactbench.core.recording.reader import read_meta
+from tactbench.core.report.cells import details
+from tactbench.core.report.costs import ladder_table
+from tactbench.core.report.datasheet import details as of_sensors
+from tactbench.core.report.datasheet import sensor_table, table_one
 from tactbench.core.report.figures.published_and_ours import NAME as PUBLISHED
-from tactbench.core.report.findings import findings_section
-from tactbench.core.report.opening import about_section, answers_section
-from tactbench.core.report.published import published_section
+from tactbench.core.report.published import published_table, reproduce
 from tactbench.core.report.results import SavedFigure
-from tactbench.core.report.section import Maker, Picture, ReportData, Section, block_anchor
-from tactbench.core.report.sensors import sensors_section
-from tactbench.core.tables.html import render
+from tactbench.core.report.section import MOST_ROWS, Picture, ReportData, Section
+from tactbench.core.spec.sensor import SensorSpec
+from tactbench.core.tables.text import command_line
+from tactbench.core.tables.text_table import WORDY, sort_value
+
+if TYPE_CHECKING:
+    from jinja2 import Environment
+    from markupsafe import Markup
+
+
+TITLE = "tactbench: tactile sensors, what they answer and what it costs"
+MOST_TASKS = 2
+"""So many tasks are named in the first section; the leaderboards have them all."""
+MOST_WHOLE = 200
+"""Cells of which the page has whatever there is: each further one takes a file to be read and 20 kB."""
+_READINGS = 5
+"""So many first lines of a sensor's details are about readings; `tactbench show --all` has the parameters."""
+
+
+def answers_section(subject: ReportData) -> Section:
+    """Return the first section: what came out in three sentences, and published scores and ours in one picture."""
+    found: dict[str, str] = {}
+    for block in subject.leaderboard.blocks:
+        if block.verdict:
+            found.setdefault(str(block.lines[0].row["task"]), f"{block.title} {block.verdict[0]}")
+    simulated = any(row["simulated"] for row in subject.rows if row["status"] == "done")
+    paragraphs = ["SIM: simulated by a twin of the sensor; no sensor was touched."] if simulated else []
+    paragraphs += [*_published(subject), *list(found.values())[:MOST_TASKS]]
+    pictures = tuple(_picture(one) for one in subject.drawn if one.name == PUBLISHED)
+    return Section(paragraphs=tuple(paragraphs), pictures=pictures)
+
+
+def _published(subject: ReportData) -> list[str]:
+    """Return how many published numbers lie in the interval of ours."""
+    verdicts = Counter(line.verdict for line in reproduce(subject.results.registry, subject.rows))
+    judged = verdicts["inside"] + verdicts["outside"]
+    return [f"Published numbers in the 95 % interval of ours: {verdicts['inside']} of {judged}."] if judged else []
 
 
 def leaderboards_section(subject: ReportData) -> Section:
     """Return the section of leaderboards, failed and skipped cells with their reasons."""
-    table = subject.leaderboard
-    tables = tuple(
-        replace(subject.linked(full_grid(block)), anchor=block_anchor(place))
-        for place, block in enumerate(table.blocks)
-    )
-    paragraphs = ("Click a heading to sort by it; click it again to turn the order round.",)
-    return Section("leaderboards", "Leaderboards", paragraphs=paragraphs, tables=tables, notes=table.notes)
+    paragraphs = ["A number leads to everything that is known about its cell."]
+    if len(subject.shown) < len(subject.rows):
+        paragraphs.append(
+            f"More than {MOST_ROWS} cells: {len(subject.shown)} of {len(subject.rows)} are shown, the first of each "
+            "table. All of them are in `leaderboard.csv` in the result folder."
+        )
+    shown = (full_grid(replace(block, lines=tuple(lines))) for block, lines in subject.blocks)
+    tables = tuple(table.only((*DEFAULT, "reason")) for table in shown)
+    return Section(paragraphs=tuple(paragraphs), tables=tables)
 
 
-def picture(one: SavedFigure, subject: ReportData) -> Picture:
-    """Return a figure with the cells that it shows."""
-    by_key = {row["key"]: row["cell"] for row in subject.rows if row["key"]}
-    cells = tuple((by_key[key], subject.anchors[by_key[key]]) for key in one.keys if key in by_key)
-    return Picture(one.title, one.caption, one.png.read_bytes(), cells)
+def published_section(subject: ReportData) -> Section:
+    """Return the section of published numbers."""
+    table = published_table(subject.results.registry, subject.rows)
+    return Section(tables=(table,) if table.lines else ())
 
 
-def pictures_section(subject: ReportData) -> Section:
+def figures_section(subject: ReportData) -> Section:
     """Return the section of figures: those that were drawn for this page."""
-    drawn = [one for one in subject.drawn if one.name not in (PUBLISHED, COLUMN)]
-    if not drawn:
-        none = "None was drawn from these results: `tactbench run` makes what the paper's figures show."
-        return Section("figures", "Figures", missing=subject.undrawn or (none,))
-    pictures = tuple(picture(one, subject) for one in drawn)
-    paragraphs = ("The same figures lie beside this page as `figures/*.pdf` and `figures/*.png`.",)
-    return Section("figures", "Figures", paragraphs=paragraphs, pictures=pictures, missing=subject.undrawn)
+    pictures = tuple(_picture(one) for one in subject.drawn if one.name != PUBLISHED)
+    paragraphs = ("The same figures lie beside this page as `figures/*.pdf` and `figures/*.png`.",) if pictures else ()
+    return Section(paragraphs=paragraphs, pictures=pictures, missing=subject.undrawn)
 
 
-TITLE = "tactbench: tactile sensors, what they answer and what it costs"
+def _picture(one: SavedFigure) -> Picture:
+    return Picture(one.title, one.caption, one.png.read_bytes())
+
+
+def compared_section(subject: ReportData) -> Section:
+    """Return the tables below the leaderboard: events, means over tasks, probes, comparisons."""
+    tables = (*subject.leaderboard.sections, *(table for by in AXES for table in compare(subject.rows, by)))
+    lacks = (
+        "No question was asked in two ways: `tactbench run --probe` adds shuffled rows and the first frame alone, "
+        "`--protocol` and `--split` ask otherwise."
+    )
+    return Section(
+        tables=tuple(table.compact() for table in tables),
+        missing=() if tables else (lacks,),
+    )  # fmt: skip
+
+
+def costs_section(subject: ReportData) -> Section:
+    """Return the section of what `tactbench cost` has left in the folder."""
+    folder = subject.results.store.folder
+    tables = tuple(map(ladder_table, read_ladders(folder)))
+    pictures = tuple(
+        Picture(path.stem, "As `tactbench cost` has drawn it.", path.read_bytes())
+        for path in sorted((folder / "cost").glob("*.png"))
+    )
+    timed = (row for row in subject.rows if row["status"] == "done" and row["answer_per"] != "recording")
+    some = next(timed, None)
+    command = command_line("tactbench", "cost", *(("--sensor", some["sensor"], "--task", some["task"]) if some else ()))
+    lacks = f"What an answer costs in time beside its score: `{command}`; of the simulation: `tactbench cost --twin`."
+    return Section(tables=tables, pictures=pictures,
+                   missing=() if tables or pictures else (lacks,))  # fmt: skip
+
+
+def sensors_section(subject: ReportData) -> Section:
+    """Return the comparison of the sensors that the results are about."""
+    names = dict.fromkeys(str(row["sensor"]) for row in subject.rows)
+    found = {name: _spec(name, subject) for name in names}
+    specs = [spec for spec in found.values() if spec is not None]
+    levels = {str(row["sensor"]): str(row[LEVEL]) for row in subject.rows if LEVEL in row}
+    listed = ", ".join(f"{name} {level}" for name, level in levels.items())
+    command = command_line("tactbench", "show", *found, "--all")
+    parts = (("Sensor comparison", table_one(specs)), ("Readings", of_sensors(specs)[:_READINGS])) if specs else ()
+    return Section(
+        paragraphs=(f"Every parameter of these sensors, and who states it: `{command}`.",) if specs else (),
+        tables=tuple(sensor_table(name, specs, properties, with_source=True).compact() for name, properties in parts),
+        notes=(f"Levels that `tactbench check` has computed: {listed}.",) if levels else (),
+        missing=tuple(f"{name}: neither installed nor in a recording of these results."
+                      for name, spec in found.items() if spec is None),
+    )  # fmt: skip
+
+
+def _spec(name: str, subject: ReportData) -> SensorSpec | None:
+    """Return a sensor's spec: the installed one, else the one that a recording carries."""
+    registry = subject.results.registry
+    try:
+        if name in registry.sensors:
+            return registry.sensors[name].spec
+        for row in subject.rows:
+            if row["sensor"] == name:
+                for path in subject.results.recordings(row):
+                    return read_meta(path).sensor
+    except TactbenchError:
+        pass  # given twice, or a damaged file: the section says that it is not known
+    return None
+
+
+def cells_section(subject: ReportData) -> Section:
+    """Return the details of every cell of the leaderboard."""
+    whole = len(subject.shown) <= MOST_WHOLE
+    paragraphs = [] if whole else [
+        f"More than {MOST_WHOLE} cells: scores of recordings, effects, candidates and confusion are left out here; "
+        "each cell's own file, `cells/KEY.h5`, has them."
+    ]  # fmt: skip
+    if any(row["repeats"] > 1 for row in subject.rows):
+        paragraphs.append("Of several replicates, key, recordings, candidates and effects are those of the first.")
+    found = tuple(details(row, subject.results if whole else None) for row in subject.shown)
+    return Section(paragraphs=tuple(paragraphs), details=found)
+
+
+def about_section(subject: ReportData) -> Section:
+    """Return how many cells ended how, and who computed them, with what, where."""
+    counts = Counter(str(row["status"]) for row in subject.rows)
+    statuses = ", ".join(f"{count} {status}" for status, count in sorted(counts.items()))
+    return Section(paragraphs=(f"Cells: {statuses}.", *subject.leaderboard.footer))
+
 
 # Anchor, title and maker of each section: a section that cannot be made says so under its own title.
-SECTIONS: tuple[tuple[str, str, Maker], ...] = (
+SECTIONS: tuple[tuple[str, str, Callable[[ReportData], Section]], ...] = (
     ("answers", "What came out", answers_section),
-    ("reproduction", "Published numbers, and ours", published_section),
-    ("leaderboards", "Leaderboards", leaderboards_section),
-    ("figures", "Figures", pictures_section),
-    ("findings", "The paper's findings", findings_section),
-    ("sensors", "Sensors", sensors_section),
-    ("compared", "The same questions asked otherwise", compared_section),
+    ("leaderboards", "Leaderboard", leaderboards_section),
+    ("reproduction", "Published numbers", published_section),
+    ("figures", "Figures", figures_section),
+    ("compared", "Across protocols, splits and tasks", compared_section),
     ("cost", "What accuracy costs in time", costs_section),
-    ("cells", "Every cell", cells_section),
-    ("about", "What this was made of", about_section),
+    ("sensors", "Sensors (the paper's Table I)", sensors_section),
+    ("cells", "Details of each cell", cells_section),
+    ("about", "Made by", about_section),
 )
 
 
@@ -85,13 +212,53 @@ def make_page(subject: ReportData) -> Page:
     broken: list[str] = []
     for anchor, title, make in SECTIONS:
         try:
-            sections.append(make(subject))
+            sections.append(replace(make(subject), anchor=anchor, title=title))
         except Exception as error:
             reason = f"This section cannot be made from these results: {type(error).__name__}: {error}"
             broken.append(f"{title}: {reason}")
             sections.append(Section(anchor, title, missing=(reason,)))
     missing = [f"{section.title}: {lacked}" for section in sections for lacked in section.missing]
-    html = render(
-        "tactbench.core.report", "page.html", title=TITLE, styles=["page.css"], scripts=["page.js"], sections=sections
-    )
+    style, script = _text("page.css"), _text("page.js")
+    html = (
+        _environment()
+        .get_template("page.html")
+        .render(
+            title=TITLE, version=tactbench.__version__, sections=sections, anchors=subject.anchors, style=style,
+            script=script, style_hash=_digest(style), script_hash=_digest(script),
+        )
+    )  # fmt: skip
     return Page(f"{html}\n", tuple(one for one in missing if one not in broken), tuple(broken))
+
+
+@lru_cache(maxsize=1)
+def _environment() -> Environment:
+    """Return what renders the template; everything in it is escaped."""
+    from jinja2 import Environment, PackageLoader, StrictUndefined
+
+    loader = PackageLoader("tactbench.core.report", "template")
+    environment = Environment(loader=loader, autoescape=True, undefined=StrictUndefined)
+    environment.globals["wordy"] = WORDY
+    environment.filters.update(prose=_prose, sort_value=sort_value, base64=lambda png: base64.b64encode(png).decode())
+    return environment
+
+
+def _text(name: str) -> Markup:
+    from markupsafe import Markup
+
+    return Markup((resources.files("tactbench.core.report") / "template" / name).read_text(encoding="utf-8"))
+
+
+def _digest(text: str) -> str:
+    """Return what a Content-Security-Policy calls the text by."""
+    return "sha256-" + base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()
+
+
+def _prose(text: str) -> Markup:
+    """Return text with what stands between backticks as code; everything in it is escaped."""
+    from markupsafe import Markup, escape
+
+    parts = str(text).split("`")
+    if len(parts) % 2 == 0:  # a backtick without its partner is a backtick
+        return escape(str(text))
+    shown = [Markup("<code>{}</code>").format(part) if place % 2 else escape(part) for place, part in enumerate(parts)]
+    return Markup("").join(shown)

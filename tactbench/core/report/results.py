@@ -25,8 +25,6 @@ class Results:
 
     Parameters
     ----------
-    store
-        The folder.
     registry
         Where specs of sensors and tasks are looked up.
     rows
@@ -47,6 +45,11 @@ class Results:
     def replicate(self, row: Row) -> Row:
         """Return the row of the one replicate whose answers and recordings a cell's row leads to."""
         return self.replicates.get(str(row["key"]), row)
+
+    def provenance(self) -> list[dict[str, Any]]:
+        """Return what is known of the runs that the rows are from."""
+        made_by = sorted({str(row["made_by"]) for row in self.rows if row.get("made_by")})
+        return [known for known in map(self.store.provenance, made_by) if known]
 
     def recordings(self, row: Mapping[str, Any]) -> list[Path]:
         """Return the files of a cell's recordings, in the order that ``Answers.recording`` counts.
@@ -84,9 +87,8 @@ class SavedFigure:
     name: str
     """Short, fit for a file name and an anchor: ``force-against-time``."""
     title: str
+    """The question that it answers."""
     caption: str
     """What is on the axes and how to read it, in sentences a paper could use."""
     png: Path
-    pdf: Path
-    keys: tuple[str, ...]
-    """Keys of the cells it shows."""
+    """Its PDF lies beside it."""

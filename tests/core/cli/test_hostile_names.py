@@ -8,7 +8,7 @@ import pytest
 
 from tactbench.core.matrix.store import Store
 from tactbench.core.plugins.registry import load_registry
-from tactbench.core.report.costs import costs_section
+from tactbench.core.report.page import costs_section
 from tactbench.core.report.results import Results
 from tactbench.core.report.section import ReportData
 from tests.core.evaluation.made import record

@@ -30,7 +30,7 @@ def test_a_folder_shows_the_same_table_as_its_run(ran):
 
 
 def test_what_was_just_computed_and_what_is_read_again_give_the_same_files(ran):
-    kept = [ran.folder / "out" / f"leaderboard.{ending}" for ending in ("md", "csv", "json", "html")]
+    kept = [ran.folder / "out" / f"leaderboard.{ending}" for ending in ("md", "csv", "json")]
     before = [path.read_bytes() for path in kept]
     ran(*RUN)
     assert [path.read_bytes() for path in kept] == before
@@ -42,7 +42,6 @@ def test_every_format_goes_to_a_file_named_for_it(ran):
         (".csv", "csv"),
         (".json", "json"),
         (".tex", "latex"),
-        (".html", "html"),
         (".txt", "table"),
     ):
         ran("leaderboard", "out", "--to", f"table{suffix}")
@@ -165,10 +164,6 @@ def test_what_is_no_result_folder_is_told_in_a_sentence(verbs, content):
     assert "Traceback" not in refused.stderr
     assert "tactbench run" in refused.stderr
     assert not (verbs.folder / "there" / "recordings").exists()
-
-
-def test_the_page_has_no_form_without_times(ran):
-    assert "Use another --format" in ran("leaderboard", "out", "--format", "html", "--no-times", code=2).stderr
 
 
 def test_a_comparison_is_not_written_to_files(ran):

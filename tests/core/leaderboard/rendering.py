@@ -1,6 +1,6 @@
 """Rows in each format, as the command writes their table."""
 
-from tactbench.core.leaderboard.formats import latex, markdown, page
+from tactbench.core.leaderboard.formats import latex, markdown
 from tactbench.core.leaderboard.records import csv_text, json_array, parquet
 from tactbench.core.leaderboard.table import build_table
 from tactbench.core.leaderboard.view import DEFAULT_VIEW
@@ -24,7 +24,3 @@ def to_latex(rows, provenance=(), *, times=True, view=DEFAULT_VIEW):
 
 def to_parquet(rows, provenance=(), *, times=True):
     return parquet(build_table(rows, provenance, times=times))
-
-
-def to_page(rows, provenance=()):
-    return page(build_table(rows, provenance))

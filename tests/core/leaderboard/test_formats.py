@@ -19,9 +19,8 @@ from tactbench.core.leaderboard.records import JSON_KEYS, OF_REPLICATES, OF_THE_
 from tactbench.core.leaderboard.table import build_table
 from tactbench.core.leaderboard.view import DEFAULT_VIEW, WHOLE, View, grids
 from tactbench.core.tables.csv_text import guarded, unguarded
-from tests.core.leaderboard.rendering import to_csv, to_json, to_latex, to_markdown, to_page, to_parquet
+from tests.core.leaderboard.rendering import to_csv, to_json, to_latex, to_markdown, to_parquet
 
-from .board.reading import read_page, values
 from .rows import row
 from .strategies import HOSTILE, some_rows, texts
 from .tex import as_set, untex
@@ -157,16 +156,6 @@ def test_no_number_is_broken_and_no_word_where_there_is_room(rows, width, view):
             parts = cells if column in grid.numeric else [word for one in cells for word in one.split()]
             if column not in gone and not view.columns and max(map(cell_len, [*parts, ""])) < 12:
                 assert [part for part in parts if part not in text] == []
-
-
-@settings(max_examples=30)
-@given(some_rows())
-def test_the_page_shows_the_cells_of_the_table(rows):
-    head, columns, _ = read_page(to_page(rows))
-    table = build_table(rows)
-    assert tuple(columns) == table.columns
-    cells = list(zip(*map(values, columns.values()), strict=True))
-    assert [one_spaced(cells[place]) for place in head["order"]] == [one_spaced(line) for line in lines_of(table)]
 
 
 @given(texts)

@@ -17,9 +17,9 @@ from tactbench.core.leaderboard.levels import (
 )
 from tactbench.core.matrix.store import Store
 from tactbench.core.plugins.registry import installed
+from tactbench.core.report.page import sensors_section
 from tactbench.core.report.results import open_results
 from tactbench.core.report.section import ReportData
-from tactbench.core.report.sensors import sensors_section
 from tests.core.matrix import made
 
 PAD = {"distribution": "acme", "version": "1.2", "package": "acme_pad", "source": "abc", "commit": ""}
@@ -104,7 +104,6 @@ def test_check_keeps_the_level_and_every_table_shows_it(verbs, kept):
     assert {row["shown"]["level"] for row in shown} == {"silver"}
     assert re.search(r"\| pad +\| silver +\|", verbs("leaderboard", "kept", "--format", "md").stdout)
     assert "shown_level" in verbs("leaderboard", "kept", "--format", "csv").stdout
-    assert ">silver<" in verbs("leaderboard", "kept", "--format", "html").stdout
     assert "level" not in verbs("leaderboard", "kept", "--no-times").stdout  # no seed decides it
     notes = sensors_section(ReportData(open_results(store, installed()))).notes
     assert "Levels that `tactbench check` has computed: pad silver." in notes

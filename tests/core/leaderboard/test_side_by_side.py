@@ -1,10 +1,8 @@
 """The same question asked in several ways, side by side."""
 
 import numpy as np
-import pytest
 
 from tactbench.core.leaderboard.side_by_side import compare
-from tactbench.core.report.figures.few_shot import few_shot_curves
 
 from .rows import row
 
@@ -66,12 +64,3 @@ def test_folds_stand_in_order_of_their_numbers():
     assert table.columns[2:] == ("5.0, extrapolated", "10.0, interpolated", "flat, extrapolated")
     assert [record["score"] for record in table.records] == [3.0, 2.0, 4.0]
     assert table.lines[0][2:] == ("3.0000", "2.0000", "4.0000")
-
-
-def test_a_few_shot_curve_is_numbers_in_order_of_the_sessions():
-    rows = [row(split=f"few-shot-{n}", score=1.0 / n, baseline=1.5) for n in (10, 1, 2)]
-    rows += [row("b", split="few-shot-1"), row(split="roles"), row(split="few-shot-5", status="failed", score=None)]
-    (curve,) = few_shot_curves(rows)
-    assert (curve.sensor, curve.estimator, curve.baseline) == ("a", "lasso", 1.5)
-    assert [point[0] for point in curve.points] == [1, 2, 10]
-    assert curve.points[2] == pytest.approx((10, 0.1, 0.0, 0.2))

@@ -33,14 +33,13 @@ def draw_one(material, folder, progress=None, remark=print):
     """Draw the predictions of the first cell that has any against the truth."""
     from matplotlib.figure import Figure
 
-    row, answers = next((row, found["test"]) for row in material.rows if (found := material.answers(row)))
+    answers = next(found["test"] for row in material.rows if (found := material.answers(row)))
     figure = Figure(figsize=(4, 3))
     figure.subplots().plot(answers.y_true, answers.y_pred, ".")
     drawn = SavedFigure(
         "predicted-against-true", "Predicted against true", "Force: truth across, prediction upwards, newtons.",
-        folder / "one.png", folder / "one.pdf", (row["key"],),
+        folder / "one.png",
     )  # fmt: skip
     figure.savefig(drawn.png)
-    figure.savefig(drawn.pdf)
     remark("Curvature is not drawn: this is a test.")
     return [drawn]

@@ -7,11 +7,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from tactbench.core.errors import NotApplicable
-from tactbench.core.report.figures.group import Group, Panel, Remark
-from tactbench.core.report.figures.sketch import Sketch, heading, marks, metric_name, quantity, sensors, with_unit
+from tactbench.core.report.figures.group import Group, Panel, Remark, Sketch, class_name, with_unit
 from tactbench.core.report.figures.style import COLUMN_IN, PAGE_IN, panels
 from tactbench.core.samples import FloatArray, IntArray
-from tactbench.core.spec.task import LabelTarget
 from tactbench.core.tables.numbers import score
 
 if TYPE_CHECKING:
@@ -34,37 +32,26 @@ def draw(group: Group, remark: Remark) -> Sketch:
     shown = [panel for panel in group.panels if panel.row["confusion"] is not None]
     if not shown:
         raise NotApplicable("no cell has a confusion matrix")
-    n_classes = max(len(panel.row["classes"]) for panel in shown)
-    validated = any("validation" in panel.answers for panel in shown)
-    columns = 2 if validated else 1
-    wide = n_classes >= WIDE_FROM
-    height = (3.1 if wide else 1.4) if validated else 3.0
-    figure, axes = panels(len(shown), columns, height, width_in=PAGE_IN if wide and validated else COLUMN_IN)
-    unit = group.task.target.unit if isinstance(group.task.target, LabelTarget) else "1"
+    roles = ("validation", "test") if any("validation" in panel.answers for panel in shown) else ("test",)
+    wide = max(len(panel.row["classes"]) for panel in shown) >= WIDE_FROM
+    height = 3.0 if wide or len(roles) == 1 else 1.4
+    figure, axes = panels(len(shown), len(roles), height, width_in=PAGE_IN if wide and len(roles) > 1 else COLUMN_IN)
     for place, panel in enumerate(shown):
         tables = matrices(panel)
-        for column, role in enumerate(("validation", "test") if validated else ("test",)):
-            here = axes[place, column]
+        for here, role in zip(axes[place], roles, strict=True):
             if role not in tables:
                 here.set_visible(False)
                 continue
             _matrix(here, tables[role], panel.row["classes"])
             here.set_title(f"{panel.sensor}, {role}")
-            if column == 0 or "validation" not in tables:
-                here.set_ylabel(with_unit(f"true {quantity(group.task)}", unit))
-            if place == len(shown) - 1:
-                here.set_xlabel(with_unit("answered", unit))
-    figure.suptitle(heading(group))
-    metric = metric_name(group.task)
+            here.set_xlabel(with_unit("answered", group.unit))
+        axes[place, 0].set_ylabel(with_unit(f"true {group.quantity}", group.unit))
     scores = ", ".join(f"{panel.sensor} {score(panel.row['score'], group.task.unit)}" for panel in shown)
-    left = "left the validation set, right the test set" if validated else "the test set"
     caption = (
-        f"Confusion matrices, one row a sensor ({sensors(group)}): {left}. Rows are the true "
-        f"{with_unit(quantity(group.task), unit)}, columns the answer; numbers are per cent of the row, whose "
-        f"count of {group.task.answer_per}s stands on the right (n). A perfect answer would be a clear diagonal. "
-        f"{metric} of the test set: {scores}.{marks(group)}"
+        f"Rows are the true {group.quantity}, columns the answer; numbers are per cent of the row, whose "
+        f"count of {group.task.answer_per}s stands on the right (n). {group.metric} of the test set: {scores}."
     )
-    return Sketch("confusion", f"Confusion of {quantity(group.task)}", caption, group, figure)
+    return group.sketch("confusion", f"Which {group.quantity} is taken for which?", caption, figure)
 
 
 def matrices(panel: Panel) -> dict[str, IntArray]:
@@ -72,8 +59,7 @@ def matrices(panel: Panel) -> dict[str, IntArray]:
     found = {"test": np.asarray(panel.row["confusion"], dtype=np.int64)}
     validation = panel.answers.get("validation")
     if validation is not None:
-        n = len(panel.row["classes"])
-        found["validation"] = np.zeros((n, n), dtype=np.int64)
+        found["validation"] = np.zeros_like(found["test"])
         np.add.at(found["validation"], (validation.y_true.astype(int), validation.y_pred.astype(int)), 1)
     return found
 
@@ -88,20 +74,15 @@ def _matrix(here: Axes, table: IntArray, classes: list[Any]) -> None:
     share = shares(table)
     n = len(classes)
     here.imshow(share, cmap="Blues", vmin=0.0, vmax=1.0, aspect="equal")
-    names = [f"{one:g}" if isinstance(one, int | float) else str(one) for one in classes]
-    turned = 90 if max(len(name) for name in names) > 4 and n > 3 else 0
-    here.set_xticks(range(n), names, rotation=turned)
+    names = list(map(class_name, classes))
+    here.set_xticks(range(n), names, rotation=90 if max(map(len, names)) > 4 and n > 3 else 0)
     here.set_yticks(range(n), names)
     here.tick_params(length=0)
-    for side in here.spines.values():
-        side.set_visible(False)
+    here.spines[:].set_visible(False)
     if n > NUMBERS_UP_TO:
         return
+    for (i, j), one in np.ndenumerate(share):
+        here.text(j, i, f"{100 * one:.0f}", ha="center", va="center", color="white" if one > 0.55 else "black")
     for i in range(n):
-        for j in range(n):
-            here.text(
-                j, i, f"{100 * share[i, j]:.0f}", ha="center", va="center",
-                color="white" if share[i, j] > 0.55 else "black",
-            )  # fmt: skip
         here.text(n - 0.35, i, str(table[i].sum()), ha="left", va="center")
     here.text(n - 0.35, -0.6, "n", ha="left", va="bottom")

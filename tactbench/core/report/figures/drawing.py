@@ -2,42 +2,42 @@
 
 from __future__ import annotations
 
+import io
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 from tactbench.core.errors import TactbenchError, UsageError
-from tactbench.core.evaluation.protocols import shots
+from tactbench.core.files import replace_file
 from tactbench.core.matrix.progress import Progress
 from tactbench.core.report.figures import (
     confusion,
     embedding_map,
     latency_and_false_alarms,
     location_map,
-    one_event,
     prediction_against_time,
     residuals,
     score_by_force,
-    validation_curve,
 )
-from tactbench.core.report.figures.few_shot import draw_few_shot
-from tactbench.core.report.figures.group import Group, Remark, groups
+from tactbench.core.report.figures.group import Group, Remark, Sketch, groups
 from tactbench.core.report.figures.published_and_ours import draw_published
-from tactbench.core.report.figures.saving import save
-from tactbench.core.report.figures.sketch import Sketch
 from tactbench.core.report.figures.style import styled
 from tactbench.core.report.results import Results, SavedFigure
-from tactbench.core.spec.task import TaskSpec, VectorTarget
+from tactbench.core.spec.task import VectorTarget
 
 Draw = Callable[[Group, Remark], Sketch]
 """A group of cells to a figure; raises NotApplicable where it does not apply, and tells of panels it leaves out."""
 
 FIGURES: dict[str, tuple[Draw, ...]] = {
-    "regression": (prediction_against_time.draw, residuals.draw, validation_curve.draw),
-    "vector": (location_map.draw, residuals.draw, validation_curve.draw),
-    "events": (one_event.draw, latency_and_false_alarms.draw),
-    "classification": (confusion.draw, score_by_force.draw, embedding_map.draw, validation_curve.draw),
+    "regression": (prediction_against_time.draw, residuals.draw),
+    "vector": (location_map.draw, residuals.draw),
+    "events": (latency_and_false_alarms.draw,),
+    "classification": (confusion.draw, score_by_force.draw, embedding_map.draw),
 }
 """By kind of task, vectors apart, in the order of a report."""
+
+PNG_DPI, RASTER_DPI = 150, 300
+"""Of a picture, and of dense clouds of points inside a PDF."""
 
 
 def draw_figures(
@@ -47,8 +47,6 @@ def draw_figures(
 
     Parameters
     ----------
-    results
-        The results.
     folder
         Where the files go; made if it is not there. Nothing else is written into it.
     progress
@@ -72,42 +70,43 @@ def draw_figures(
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise UsageError(f"The folder {folder} cannot be made: {error.strerror}.", hint="Give another one.") from error
-    work = [(group, draw) for group in _worth_drawing(results, say) for draw in _figures_of(group.task)]
-    refused: dict[tuple[str, str], list[str]] = {}
+    work: list[tuple[str, str, Callable[[], Sketch | None]]] = []  # what is drawn, of which cells, and by what
+    for group in groups(results, say):
+        kind = "vector" if isinstance(group.task.target, VectorTarget) else group.task.kind
+        for draw in FIGURES[kind]:
+            what = f"{draw.__module__.rpartition('.')[2].replace('_', ' ')} of {group.task.name}"
+            work.append(
+                (what, f" under {group.row['protocol']}, split {group.row['split']}", partial(draw, group, say))
+            )
     if not work:
         return []
+    work.insert(0, ("picture of published scores and ours", "", partial(draw_published, results)))
     drawn: list[SavedFigure] = []
-    try:
-        drawn += draw_published(results, folder)
-    except Exception as error:
-        say(f"No picture of published scores and ours: {type(error).__name__}: {error}")
+    refused: dict[tuple[str, str], list[str]] = {}
     reporter.begin("drawing", len(work))
     with styled():
-        for group, draw in work:
-            what = f"{draw.__module__.rpartition('.')[2].replace('_', ' ')} of {group.task.name}"
+        for what, where, make in work:
             reporter.working(what)
             try:
-                sketch = draw(group, say)
-                drawn.append(save(sketch, folder))
+                sketch = make()
+                if sketch is not None:
+                    drawn.append(save(sketch, folder))
             except Exception as error:
                 why = str(error) if isinstance(error, TactbenchError) else f"{type(error).__name__}: {error}"
-                refused.setdefault((what, why), []).append(f"{group.row['protocol']}, split {group.row['split']}")
+                refused.setdefault((what, why), []).append(where)
             reporter.advance(what)
-    for (what, why), where in refused.items():
-        say(f"No {what} under {'; '.join(where)}: {why}")
-    try:
-        drawn += draw_few_shot(results, folder)
-    except Exception as error:
-        say(f"No figure of few sessions: {type(error).__name__}: {error}")
+    for (what, why), places in refused.items():
+        say(f"No {what}{';'.join(places)}: {why}")
     return drawn
 
 
-def _figures_of(task: TaskSpec) -> tuple[Draw, ...]:
-    return FIGURES["vector" if isinstance(task.target, VectorTarget) else task.kind]
-
-
-def _worth_drawing(results: Results, say: Remark) -> list[Group]:
-    """Return the groups of cells, few-shot splits left to the one figure that shows them all."""
-    found = groups(results, say)
-    few = [group for group in found if shots(group.row["split"])]
-    return [group for group in found if len(few) < 2 or group not in few]
+def save(sketch: Sketch, folder: Path) -> SavedFigure:
+    """Write a figure as PNG and PDF, each whole, without dates: the same figure is the same bytes."""
+    # Without the version of what drew it either.
+    apart = {"png": {"Software": None}, "pdf": {"CreationDate": None, "Creator": "tactbench", "Producer": None}}
+    for ending, dpi in (("png", PNG_DPI), ("pdf", RASTER_DPI)):
+        content = io.BytesIO()
+        sketch.figure.savefig(content, format=ending, dpi=dpi, metadata=apart[ending])
+        sketch.figure.set_layout_engine("none")  # the first drawing has put everything in its place
+        replace_file(folder / f"{sketch.name}.{ending}", content.getvalue())
+    return SavedFigure(sketch.name, sketch.title, sketch.caption, folder / f"{sketch.name}.png")

@@ -1,24 +1,28 @@
-"""A test set as a map: near points look alike to the estimator."""
+"""A test set as a map, the t-SNE of the features an estimator saw: near points look alike to it."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+import importlib
+from collections import Counter
+from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
-from tactbench.core.errors import NotApplicable, TactbenchError
-from tactbench.core.report.embedding import ITERATIONS, Embedding, embed
-from tactbench.core.report.figures.group import Group, Panel, Remark
-from tactbench.core.report.figures.sketch import Sketch, heading, marks, quantity, with_unit
-from tactbench.core.report.figures.style import MARKERS, cycled, ordered, panels
+from tactbench.core.errors import DataError, NotApplicable, TactbenchError
+from tactbench.core.evaluation.cell import load_task
+from tactbench.core.evaluation.fitting import features_of
+from tactbench.core.evaluation.sets import prepared
+from tactbench.core.report.figures.group import Group, Panel, Remark, Sketch, class_name, with_unit
+from tactbench.core.report.figures.style import MARKERS, cycled, legend, ordered, panels
+from tactbench.core.report.results import Results
 from tactbench.core.report.smoothing import WINDOW_S, smoothed_force
-from tactbench.core.samples import FloatArray
-from tactbench.core.spec.task import LabelTarget
+from tactbench.core.samples import Answers, FloatArray, IntArray
 
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.colorizer import ColorizingArtist
-
+AT_MOST = 1000
+"""Points of an embedding: more take longer and hide each other in a column's width."""
+PERPLEXITY = 30.0
+ITERATIONS = 1000
 SMALLEST_PT2, LARGEST_PT2 = 1.5, 9.0
 """Areas of the points of least and of most force."""
 
@@ -31,79 +35,107 @@ def draw(group: Group, remark: Remark) -> Sketch:
     NotApplicable
         If no sensor's test set can be embedded.
     """
-    found: list[tuple[Panel, Embedding]] = []
+    found: list[tuple[Panel, IntArray, FloatArray]] = []
     for panel in group.panels:
         try:
-            found.append((panel, embed(group.results, panel.row, panel.answers["test"])))
+            found.append((panel, *embed(group.results, panel.row, panel.answers["test"])))
         except TactbenchError as error:
             remark(f"No embedding of {panel.row['cell']}: {error}")
     if not found:
         raise NotApplicable("no test set can be embedded")
-    force = {panel.sensor: smoothed_force(panel.answers["test"])[embedding.rows] for panel, embedding in found}
-    known = np.concatenate([values[np.isfinite(values)] for values in force.values()])
     figure, axes = panels(len(found), 2, 1.55)
-    words = quantity(group.task)
-    unit = group.task.target.unit if isinstance(group.task.target, LabelTarget) else "1"
-    shade: ColorizingArtist | None = None
-    for place, (panel, embedding) in enumerate(found):
-        by_class, by_force = axes[place]
-        _classes(by_class, panel, embedding)
-        if len(known):
-            shade = _forces(by_force, embedding, force[panel.sensor], float(known.min()), float(known.max()))
-        for here, what in ((by_class, words), (by_force, "force")):
+    forces = [smoothed_force(panel.answers["test"])[rows] for panel, rows, _ in found]
+    known = [force for own in forces for force in own[np.isfinite(own)]]
+    shade: Any = None
+    for (by_class, by_force), (panel, rows, xy), force in zip(axes, found, forces, strict=True):
+        _classes(by_class, panel.row["classes"], panel.answers["test"].y_true[rows], xy)
+        if known:
+            shade = _forces(by_force, force, xy, min(known), max(known))
+        for here, what in ((by_class, group.quantity), (by_force, "force")):
             here.set_title(f"{panel.sensor}, by {what}")
             here.set(xticks=[], yticks=[])
             here.set_aspect("equal", adjustable="datalim")
-            for side in here.spines.values():
-                side.set_visible(True)
-    figure.suptitle(heading(group, "test set, t-SNE"))
+            here.spines[:].set_visible(True)
     if shade is not None:
-        bar = figure.colorbar(shade, ax=axes[:, 1], shrink=0.8, aspect=30, pad=0.02)
-        bar.set_label("force [N]")
-        bar.outline.set_linewidth(0.4)
-    handles, labels = axes[0, 0].get_legend_handles_labels()
-    figure.legend(
-        handles, labels, loc="outside lower center", ncols=min(len(labels), 6), title=with_unit(words, unit),
-        markerscale=1.8, handletextpad=0.1, columnspacing=0.8,
-    )  # fmt: skip
-    title = f"Test set in two dimensions, by {words} and force"
-    return Sketch("embedding", title, _caption(group, found), group, figure)
+        figure.colorbar(shade, ax=axes[:, 1], shrink=0.8, aspect=30, pad=0.02, label="force [N]")
+    title = with_unit(group.quantity, group.unit)
+    legend(figure, axes[:, 0], ncols=6, title=title, markerscale=1.8, handletextpad=0.1, columnspacing=0.8)
+    points = ", ".join(f"{panel.sensor} {len(rows)} of {len(panel.answers['test'])}" for panel, rows, _ in found)
+    caption = (
+        f"t-SNE of the test set's features as the estimator saw them; left by {group.quantity}, right by reference "
+        f"force (centred mean over {WINDOW_S:g} s; larger and lighter points are more force). Test rows shown: "
+        f"{points}; perplexity {PERPLEXITY:g} or a third of the points, {ITERATIONS} iterations from the principal "
+        f"components, seed {group.row['seed']}. Near points look alike to the estimator; distances between clusters, "
+        "their sizes and the axes mean little."
+    )
+    return group.sketch("embedding", f"Which test rows look alike, by {group.quantity} and force?", caption, figure)
 
 
-def _classes(here: Axes, panel: Panel, embedding: Embedding) -> None:
-    classes = panel.row["classes"]
-    label = panel.answers["test"].y_true[embedding.rows]
+def _classes(here: Any, classes: Sequence[Any], label: IntArray, xy: FloatArray) -> None:
     for place, (one, colour) in enumerate(zip(classes, ordered(len(classes)), strict=True)):
-        mine = embedding.xy[label == place]
         here.plot(
-            mine[:, 0], mine[:, 1], linestyle="none", marker=cycled(MARKERS, place), markersize=2.0, markeredgewidth=0,
-            color=colour, label=f"{one:g}" if isinstance(one, int | float) else str(one), rasterized=True,
+            *xy[label == place].T, linestyle="none", marker=cycled(MARKERS, place), markersize=2.0, markeredgewidth=0,
+            color=colour, label=class_name(one), rasterized=True,
         )  # fmt: skip
 
 
-def _forces(here: Axes, embedding: Embedding, force_n: FloatArray, low: float, high: float) -> ColorizingArtist:
+def _forces(here: Any, force_n: FloatArray, xy: FloatArray, low: float, high: float) -> Any:
     there = np.isfinite(force_n)
     share = (force_n[there] - low) / max(high - low, np.finfo(np.float64).tiny)
     return here.scatter(
-        embedding.xy[there, 0], embedding.xy[there, 1], c=force_n[there], cmap="cividis", vmin=low, vmax=high,
-        s=SMALLEST_PT2 + (LARGEST_PT2 - SMALLEST_PT2) * share, linewidths=0, rasterized=True,
+        *xy[there].T, c=force_n[there], cmap="cividis", vmin=low, vmax=high, linewidths=0, rasterized=True,
+        s=SMALLEST_PT2 + (LARGEST_PT2 - SMALLEST_PT2) * share,
     )  # fmt: skip
 
 
-def _caption(group: Group, found: list[tuple[Panel, Embedding]]) -> str:
-    points = "; ".join(
-        f"{panel.sensor} {len(embedding.rows)} points ({_every(embedding.every)} of {len(panel.answers['test'])} test "
-        f"rows), perplexity {embedding.perplexity:g}, divergence left {embedding.divergence:.2f}"
-        for panel, embedding in found
-    )
-    return (
-        f"t-SNE of the test set's features as the estimator saw them, one row a sensor; left by "
-        f"{quantity(group.task)}, right by reference force (centred mean over {WINDOW_S:g} s; larger and "
-        f"lighter points are more force). {points}; {ITERATIONS} iterations from the principal components, seed "
-        f"{group.row['seed']}. Near points look alike to the estimator; distances between clusters, their sizes and "
-        f"the axes mean little.{marks(group)}"
-    )
+def embed(results: Results, row: dict[str, Any], test: Answers) -> tuple[IntArray, FloatArray]:
+    """Return (points,) rows of a cell's test set and (points, 2) the t-SNE [1]_ of what its estimator saw of them.
+
+    Raises
+    ------
+    NotApplicable
+        If the test set is in several folds, each with features of its own, or too small.
+    DataError
+        If the recordings are not those the cell was answered from.
+
+    Notes
+    -----
+    Every n-th row, n the smallest that leaves at most `AT_MOST`. Computed on one thread, since the order of summation
+    decides the last bits and t-SNE is chaotic.
+
+    References
+    ----------
+    .. [1] van der Maaten and Hinton 2008, Visualizing data using t-SNE.
+    """
+    if np.ptp(test.fold):
+        raise NotApplicable(f"split {row['split']!r} has a test set a fold, and no two are scaled alike")
+    rows = np.arange(0, len(test), -(-len(test) // AT_MOST), dtype=np.int64)
+    perplexity = min(PERPLEXITY, (len(rows) - 1) / 3)
+    if perplexity < 1:
+        raise NotApplicable(f"{len(rows)} test rows have no neighbourhoods")
+    features = _features(results, row, test)[rows]
+    manifold = importlib.import_module("sklearn.manifold")
+    threads = importlib.import_module("threadpoolctl")
+    model = manifold.TSNE(
+        perplexity=perplexity, max_iter=ITERATIONS, init="pca", learning_rate="auto", random_state=int(row["seed"]),
+        n_jobs=1,
+    )  # fmt: skip
+    with threads.threadpool_limits(limits=1):
+        return rows, np.asarray(model.fit_transform(features), dtype=np.float64)
 
 
-def _every(step: int) -> str:
-    return "all" if step == 1 else f"one in {step}"
+def _features(results: Results, row: dict[str, Any], test: Answers) -> FloatArray:
+    """Return (n, features) of the test set as the estimator saw them: kept, scaled and filtered by the protocol."""
+    task = results.registry.tasks[row["task"]].spec
+    estimator = results.registry.estimators[row["estimator"]]
+    paths = results.recordings(row)
+    data = load_task(task, paths, row["protocol"], row["split"], estimator=estimator, seed=row["seed"])
+    if data.data.vote:
+        raise NotApplicable("a recording is answered by its frames, and has no features of its own")
+    k = int(row["chosen"].get("k", estimator.window_grid[0]))
+    test_part = prepared(data.assignments[0], data.data, data.rules, k, Counter()).test
+    if not (np.array_equal(test_part.recording, test.recording) and np.array_equal(test_part.row, test.row)):
+        raise DataError(
+            f"The recordings of {row['cell']} give other test rows than were answered.", hint="Run it again."
+        )
+    return features_of(test_part, estimator)

@@ -1,20 +1,40 @@
-"""Which cells stand in one figure: those that differ in nothing but the sensor."""
+"""Which cells stand in one figure: those that differ in nothing but the sensor. What their figures say of them."""
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any
+from functools import cached_property
+from textwrap import fill
+from typing import TYPE_CHECKING, Any
 
 from tactbench.core.errors import TactbenchError
-from tactbench.core.leaderboard.names import answer_name
+from tactbench.core.leaderboard.names import METRIC_NAMES, answer_name
 from tactbench.core.matrix.store import Row
 from tactbench.core.report.figures.style import sensor_colours
 from tactbench.core.report.results import Results
 from tactbench.core.samples import Answers
-from tactbench.core.spec.task import TaskSpec
+from tactbench.core.spec.events import SlipTarget
+from tactbench.core.spec.task import LabelTarget, TaskSpec, VectorTarget
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 Remark = Callable[[str], None]
+_LINE = 64
+"""Letters that fit above a column, wide ones too."""
+
+
+@dataclass(frozen=True)
+class Sketch:
+    """A figure before it is saved."""
+
+    name: str
+    """Short and unique among the figures of a folder, whatever else is in it."""
+    title: str
+    caption: str
+    figure: Figure
 
 
 @dataclass(frozen=True)
@@ -47,15 +67,77 @@ class Group:
         """What all panels have in common, and the first one's own."""
         return self.panels[0].row
 
-    @property
+    @cached_property
     def colours(self) -> dict[str, str]:
         """A colour a sensor, the same in all figures of the folder."""
         return sensor_colours(self.results.rows)
 
     @property
-    def keys(self) -> tuple[str, ...]:
-        """Keys of the cells."""
-        return tuple(str(panel.row["key"]) for panel in self.panels)
+    def metric(self) -> str:
+        """The metric as the tables call it."""
+        return METRIC_NAMES.get(self.task.metric, self.task.metric)
+
+    @property
+    def quantity(self) -> str:
+        """What the task asks for, in words."""
+        target = self.task.target
+        if isinstance(target, SlipTarget):
+            return "state of slip"
+        if isinstance(target, LabelTarget):
+            return target.name.removesuffix(f"_{target.unit}").replace("_", " ")
+        if isinstance(target, VectorTarget):
+            return f"{target.kind} ({', '.join(target.names)})"
+        return (target.name if target.name and len(target.name) > 2 else target.kind).replace("_", " ")
+
+    @property
+    def unit(self) -> str:
+        """The unit of that."""
+        target = self.task.target
+        return target.unit if isinstance(target, LabelTarget) else self.task.unit
+
+    @property
+    def heading(self) -> str:
+        """What stands above a figure: question, answer, protocol with its marks, SIM; in lines that fit a column."""
+        row = self.row
+        parts = [row["task"], answer_name(row), row["protocol"] + (" †" if row["dagger"] else "")]
+        if row["split"] not in (None, "roles"):
+            parts.append(f"split {row['split']}" + (" ‡" if row["stamps"] else ""))
+        parts += ["SIM" if row["simulated"] else f"rig {row['rig']}", *self._shown()]
+        return fill(" · ".join(parts), _LINE)
+
+    def _shown(self) -> list[str]:
+        """Return which of several replicates a figure of single answers shows; of recordings, which of the seeds."""
+        row = self.row
+        what = "replicate" if row["simulated"] else "seed"
+        return [f"{what} {row['repeat']} of {row['repeats']}"] if row["repeats"] > 1 else []
+
+    def sketch(self, kind: str, title: str, caption: str, figure: Figure) -> Sketch:
+        """Return the group's figure of a kind, with its heading, and what its marks mean in the caption."""
+        row = self.row
+        parts = (kind, row["task"], row["protocol"], row["split"], answer_name(row))
+        words = "-".join(filter(None, (*parts, "" if row["simulated"] else row["rig"])))
+        name = re.sub(r"[^a-z0-9]+", "-", words.lower()).strip("-")
+        figure.suptitle(self.heading)
+        marks = [MARKS[key] for key in MARKS if row[key]] + [f"‡: {stamp}" for stamp in row["stamps"]]
+        marks += [f"Shown: {one}; the tables are over all of them." for one in self._shown()]
+        return Sketch(name, title, " ".join((caption, *marks)), figure)
+
+
+MARKS = {
+    "simulated": "SIM: simulated, no hardware was touched.",
+    "dagger": "†: each set, the test set too, is scaled by its own mean and deviation.",
+}
+"""By the key of a row that the mark stands for."""
+
+
+def class_name(one: Any) -> str:
+    """Return a class as it is shown."""
+    return f"{one:g}" if isinstance(one, int | float) else str(one)
+
+
+def with_unit(words: str, unit: str) -> str:
+    """Return the label of an axis."""
+    return words if unit == "1" else f"{words} [{unit}]"
 
 
 def groups(results: Results, remark: Remark) -> list[Group]:
@@ -70,8 +152,6 @@ def groups(results: Results, remark: Remark) -> list[Group]:
     for row in results.rows:
         if row["status"] == "done":
             alike.setdefault((row["task"], row["protocol"], row["split"], row["rig"]), []).append(row)
-        elif not row["is_baseline"]:
-            remark(f"{row['cell']} is in no figure: {row['status']}: {row['reason']}")
     made = [_group(results, rows, remark) for rows in alike.values()]
     return [group for group in made if group is not None]
 
@@ -112,5 +192,4 @@ def _panels(results: Results, rows: list[Row], remark: Remark) -> dict[str, Pane
             found[row["sensor"]] = Panel(results.replicate(row), answers)
         else:
             remark(f"{row['cell']} is in no figure: cells/{row['key']}.h5 cannot be read. Run it again.")
-    order = list(dict.fromkeys(row["sensor"] for row in rows))
-    return {sensor: found[sensor] for sensor in order if sensor in found}
+    return found

@@ -10,11 +10,8 @@ import numpy as np
 from tactbench.core.errors import NotApplicable
 from tactbench.core.evaluation.event_answers import BOUNDS_PER_MINUTE
 from tactbench.core.leaderboard.names import answer_name
-from tactbench.core.report.figures.group import Group, Remark
-from tactbench.core.report.figures.sketch import Sketch, heading, marks
+from tactbench.core.report.figures.group import Group, Remark, Sketch
 from tactbench.core.report.figures.style import LINES, MARKERS, PAGE_IN, cycled, legend, panels
-
-Row = Mapping[str, Any]
 
 LEAST_RECALL = 0.25
 """A latency over fewer hits than such a share of the slips is not shown."""
@@ -30,15 +27,19 @@ def draw(group: Group, remark: Remark) -> Sketch:
     NotApplicable
         If no detector of the group has an operating point with enough hits.
     """
-    rows = [row for row in group.results.rows if _stands_here(row, group.row) and row.get("operating_points")]
-    points = {str(row["cell"]): _points(row) for row in rows}
-    if not any(len(one) for one in points.values()):
+    same = ("task", "protocol", "split", "rig")
+    rows = [
+        row
+        for row in group.results.rows
+        if row["status"] == "done" and row.get("operating_points") and all(row[key] == group.row[key] for key in same)
+    ]
+    points = [_points(row) for row in rows]
+    if not any(map(len, points)):
         raise NotApplicable(f"no detector finds {LEAST_RECALL:.0%} of the slips at any bound of false alarms")
     names = sorted({answer_name(row) for row in rows})
-    figure, axes = panels(1, len(group.panels), 2.2, width_in=PAGE_IN, sharey=True)
-    for here, panel in zip(axes.flat, group.panels, strict=True):
-        for row in rows:
-            found = points[str(row["cell"])]
+    figure, (axes,) = panels(1, len(group.panels), 2.2, width_in=PAGE_IN, sharey=True)
+    for here, panel in zip(axes, group.panels, strict=True):
+        for row, found in zip(rows, points, strict=True):
             if row["sensor"] != panel.sensor or not len(found):
                 continue
             place = names.index(answer_name(row))
@@ -51,27 +52,20 @@ def draw(group: Group, remark: Remark) -> Sketch:
         here.set_xlim(left=-0.1)
         here.set_xlabel("false alarms a minute of disturbances")
         here.set_title(panel.sensor)
-    axes[0, 0].set_ylabel("median onset latency [ms]")
-    figure.suptitle(heading(group))
-    legend(figure, axes.flat)
-    silent = sorted({f"{row['sensor']}/{answer_name(row)}" for row in rows if not len(points[str(row["cell"])])})
-    missing = f" Not shown, with fewer hits at every bound: {', '.join(silent)}." if silent else ""
+    axes[0].set_ylabel("median onset latency [ms]")
+    legend(figure, axes)
     caption = (
         "Median onset latency on test recordings against false alarms a minute of their disturbances, at thresholds "
         "that validation recordings chose for several bounds of false alarms. A mark is as large as its recall, and is "
-        f"left out below {LEAST_RECALL:g}: latencies are over hits alone.{missing}{marks(group)}"
+        f"left out below {LEAST_RECALL:g}: latencies are over hits alone."
     )
-    return Sketch("latency-and-false-alarms", "Latency against false alarms", caption, group, figure)
+    return group.sketch("latency-and-false-alarms", "How many false alarms buy an earlier one?", caption, figure)
 
 
-def _stands_here(row: Row, like: Row) -> bool:
-    return row["status"] == "done" and all(row[key] == like[key] for key in ("task", "protocol", "split", "rig"))
-
-
-def _points(row: Row) -> np.ndarray[Any, np.dtype[np.float64]]:
+def _points(row: Mapping[str, Any]) -> np.ndarray[Any, np.dtype[np.float64]]:
     """Return (k, 3) false alarms a minute, median latency [ms] and recall, each operating point once."""
     found = {
-        (point["false alarms per minute"], point["onset latency p50 ms"], point["recall"]): None
+        (point["false alarms per minute"], point["onset latency p50 ms"], point["recall"])
         for point in row["operating_points"]
         if "false alarms per minute" in point and point.get("recall", 0.0) >= LEAST_RECALL
     }
