@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, field
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from tactbench.core.errors import TactbenchError
 from tactbench.core.samples import Quality
@@ -103,7 +103,6 @@ class DeviceCheck:
 def check_devices(
     rig_file: RigFile,
     registry: Registry,
-    sensors: Sequence[str],
     *,
     seconds: float,
     clock: Clock,
@@ -113,8 +112,6 @@ def check_devices(
 
     Parameters
     ----------
-    sensors
-        Those of the file that are looked at.
     seconds
         How long each device is read.
     clock
@@ -133,8 +130,6 @@ def check_devices(
 
     checks = []
     for name, entry in rig_file.entries().items():
-        if name in rig_file.sensors and name not in sensors:
-            continue
         check = DeviceCheck(name, str(getattr(entry, "device", name)), entry.link, entry.emulated)
         checks.append(check)
         if entry.emulated:
@@ -323,10 +318,3 @@ def _problems(found: StreamCheck) -> list[str]:
         if number and not (mark == "GAP" and found.lost)
     ]
     return sentences
-
-
-def as_plain(checks: Sequence[DeviceCheck]) -> list[dict[str, Any]]:
-    """Return the checks for JSON."""
-    from dataclasses import asdict
-
-    return [asdict(check) for check in checks]

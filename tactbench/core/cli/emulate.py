@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from tactbench.core.cli.options import options
-from tactbench.core.cli.scenes import PRESS, indenter_of, profile_of, scene_of
+from tactbench.core.cli.scenes import PROFILE, profile_of, scene_of
 from tactbench.core.cli.screen import remark
 
 if TYPE_CHECKING:
@@ -32,98 +31,58 @@ STATUS_S = 5.0
 @click.command(name="emulate")
 @click.argument("names", nargs=-1, metavar="[DEVICE]...")
 @click.option("--rig-file", type=click.Path(path_type=Path), metavar="FILE",
-              help="Start every device of this rig file whose link is `emulated`.")  # fmt: skip
-@options(*PRESS)
-@click.option("--presses", type=click.IntRange(min=1), metavar="N", help="End after so many; default: with Ctrl-C.")
-@click.option("--fault", "faults", multiple=True, metavar="DEVICE:FAULT",
-              help="Something wrong with a device: biotac:parity:every=100, net-ft:unplug:start_s=20.")  # fmt: skip
-@click.option("--physics", metavar="RIG", help="The simulated rig that presses; default twin, or the rig file's.")
-@click.option(
-    "--seed", type=click.IntRange(min=0), metavar="N", help="Of all that is drawn; default 1, or the rig file's."
-)
-@click.option("--can", type=click.Choice(["slcan", "udp_multicast"]), default="slcan", show_default=True,
-              help="How CAN devices are reached from other programs.")  # fmt: skip
-@click.option("--write-rig-file", type=click.Path(path_type=Path), metavar="FILE",
-              help="Write the rig file with the devices' links there, too.")  # fmt: skip
+              help="Start every device of this file whose link is `emulated`, with its faults.")  # fmt: skip
+@PROFILE
+@click.option("--presses", type=click.IntRange(min=1), metavar="N", help="Number of presses. Default: until Ctrl-C.")
+@click.option("--write-rig-file", "out", type=click.Path(path_type=Path), metavar="FILE",
+              help="Also write the printed rig file, with the devices' links, to FILE.")  # fmt: skip
 def command(
     names: tuple[str, ...],
     rig_file: Path | None,
-    cap_mm: float | None,
-    indenter: str | None,
     profile: str | None,
-    force_n: float | None,
-    seconds: float | None,
     presses: int | None,
-    faults: tuple[str, ...],
-    physics: str | None,
-    seed: int | None,
-    can: Any,
-    write_rig_file: Path | None,
+    out: Path | None,
 ) -> None:
     """Start emulated sensors and devices on links of this machine, pressed by a simulated rig.
 
     DEVICE is a sensor or device by name, for example: tactbench emulate biotac net-ft. What another program needs to
     open them is printed as a rig file.
     """
+    from itertools import count
+
     from tactbench.core.errors import UsageError
     from tactbench.core.plugins.registry import load_registry
+    from tactbench.core.plugins.rig_devices import descriptor_of, emulated_device, options_of
     from tactbench.core.plugins.rig_files import load_rig_file
+    from tactbench.core.spec.rig_file import EmulationSettings
+    from tactbench.devices.emulation.emulated_devices import EmulatedDevices
 
     if bool(names) == (rig_file is not None):
         raise UsageError(
             "Either devices or a rig file say what to emulate.",
             hint="For example: tactbench emulate biotac net-ft; `tactbench list devices` names more.",
         )
+    if out is not None and out.exists() and not out.read_text(encoding="utf-8", errors="replace").startswith(HEAD):
+        raise UsageError(f"{out} is there already, and not from `tactbench emulate`.", hint="Give another name.")
     registry = load_registry()
     file = load_rig_file(rig_file, registry) if rig_file is not None else None
     entries = _named(registry, names) if file is None else file.entries()
-    settings = {} if file is None else dict(file.emulation)
-    shape, path = indenter_of(registry, indenter), profile_of(registry, profile)
+    how = EmulationSettings() if file is None else file.emulation
 
-    def pressed(sensor: SensorDescriptor | None) -> Scene:
-        return scene_of("press", cap_mm, force_n, seconds, sensor, shape, path)
-
-    presser = Presser(
-        registry,
-        settings.get("physics", "twin") if physics is None else physics,
-        {name: pressed(registry.sensors[name]) for name in _sensors(entries)},
-        pressed(None),
-        settings.get("seed", 1) if seed is None else seed,
-    )
-    emulate(registry, with_faults(entries, faults), presser, file, can=can, presses=presses, out=write_rig_file)
-
-
-def emulate(
-    registry: Registry,
-    entries: Mapping[str, DeviceEntry],
-    presser: Presser,
-    file: RigFile | None,
-    *,
-    can: Any,
-    presses: int | None,
-    out: Path | None,
-) -> None:
-    """Start what is emulated in `entries`, say where it is, and press until it is enough."""
-    from itertools import count
-
-    from tactbench.core.errors import UsageError
-    from tactbench.core.plugins.rig_devices import descriptor_of, emulated_device, options_of
-    from tactbench.devices.emulation.emulated_devices import EmulatedDevices
-
-    if out is not None and out.exists() and not out.read_text(encoding="utf-8", errors="replace").startswith(HEAD):
-        raise UsageError(f"{out} is there already, and not from `tactbench emulate`.", hint="Give another name.")
+    load = profile_of(registry, profile)
+    scenes = {name: scene_of("press", registry.sensors[name], profile=load) for name in _sensors(entries)}
+    presser = Presser(registry, how.physics, scenes, scene_of("press", None, profile=load), how.seed)
     devices: dict[str, EmulatedDevice] = {}
-    complete: dict[str, DeviceEntry] = {}
     for name, entry in entries.items():
         descriptor = descriptor_of(registry, name, entry)
-        complete[name] = entry.model_copy(update={"options": options_of(descriptor, entry)})
+        entries[name] = entry.model_copy(update={"options": options_of(descriptor, entry)})
         if entry.emulated:
             devices[name] = emulated_device(descriptor, name, entry, presser.senses(name), presser.seed)
     if not devices:
         raise UsageError("No device in the rig file is emulated.", hint="Write `link: emulated` for one.")
     presser.draw(1)
-    with EmulatedDevices(devices, time="real", can=can) as emulated:
-        _say_where(emulated, complete, file, out)
+    with EmulatedDevices(devices, time="real") as emulated:
+        _say_where(emulated, entries, file, out)
         for number in count(1) if presses is None else range(1, presses + 1):
             if number > 1:
                 presser.draw(number)
@@ -216,22 +175,6 @@ class _ForceAlone:
         t_s = np.arange(self._profile.samples) * self._profile.duration.to("s") / self._profile.samples
         force_n = np.interp(t_s, *self._profile.corners)
         yield Block("force_torque", np.round(t_s * 1e9).astype(np.int64), force_n[:, None])
-
-
-def with_faults(entries: Mapping[str, DeviceEntry], faults: Sequence[str]) -> dict[str, DeviceEntry]:
-    """Return the entries with faults given as ``DEVICE:FAULT``; raises UsageError for a device that is not emulated."""
-    from tactbench.core.errors import UnknownNameError
-
-    changed = dict(entries)
-    for text in faults:
-        given, _, fault = text.partition(":")
-        emulated = {name: name for name, entry in entries.items() if entry.emulated}
-        emulated |= {getattr(entries[name], "device", name): name for name in emulated}
-        if given not in emulated:
-            raise UnknownNameError("emulated device", given, emulated)
-        entry = changed[emulated[given]]
-        changed[emulated[given]] = entry.model_copy(update={"faults": (*entry.faults, fault)})
-    return changed
 
 
 def _named(registry: Registry, names: Sequence[str]) -> dict[str, DeviceEntry]:

@@ -29,7 +29,7 @@ def oracle_checks(registry: Registry, rig: str) -> list[Check]:
     """Return the rig's checks against its oracles; raises UsageError if it offers none."""
     where = registry.rigs[rig].verification
     if where is None:
-        raise UsageError(f"The rig {rig!r} brings no oracles.", hint="Choose another with --rig.")
+        raise UsageError(f"The rig {rig!r} brings no oracles.", hint="See `tactbench show` with its name.")
     return list(load_object(where)())
 
 
@@ -43,7 +43,9 @@ def likeness_checks(registry: Registry, rig: str, sensors: Sequence[str], record
     """
     where = registry.rigs[rig].likeness
     if where is None:
-        raise UsageError(f"The rig {rig!r} is not held against real sensors.", hint="Choose another with --rig.")
+        raise UsageError(
+            f"The rig {rig!r} is not held against real sensors.", hint="See `tactbench show` with its name."
+        )
     chosen_sensors = [registry.sensors[name] for name in sensors] or [
         sensor for sensor in registry.sensors if getattr(sensor.spec, "likeness", ())
     ]
@@ -113,18 +115,10 @@ def _lines(rows: Sequence[Found]) -> list[dict[str, str]]:
     for check, verdict, spent in rows:
         first = check.name != before
         before = check.name
-        lines.append(
-            {
-                "": "ok" if verdict.met else "MISS",
-                "check": check.name if first else "",
-                "what": verdict.name,
-                "found": f"{verdict.found:.4g}",
-                "allowed": _allowed(verdict),
-                "unit": "" if verdict.unit == "1" else verdict.unit,
-                "s": f"{spent:.1f}" if first else "",
-                "source": verdict.source,
-            }
-        )
+        entries = ("ok" if verdict.met else "MISS", check.name if first else "", verdict.name, f"{verdict.found:.4g}",
+                   _allowed(verdict), "" if verdict.unit == "1" else verdict.unit, f"{spent:.1f}" if first else "",
+                   verdict.source)  # fmt: skip
+        lines.append(dict(zip(_COLUMNS, entries, strict=True)))
     return lines
 
 
@@ -138,19 +132,11 @@ def _allowed(verdict: Verdict) -> str:
 
 def _record(check: Check, verdict: Verdict, spent: float) -> dict[str, Any]:
     return {
-        "group": check.group,
-        "check": check.name,
-        "title": check.title,
-        "verdict": verdict.name,
-        "met": verdict.met,
-        "found": _finite(verdict.found),
-        "low": _finite(verdict.low),
-        "high": _finite(verdict.high),
-        "unit": verdict.unit,
-        "source": verdict.source,
-        "note": verdict.note,
-        "seconds": spent,
-    }
+        **{name: getattr(check, name) for name in ("group", "title")}, "check": check.name,
+        "verdict": verdict.name, "met": verdict.met,
+        **{name: _finite(getattr(verdict, name)) for name in ("found", "low", "high")},
+        "unit": verdict.unit, "source": verdict.source, "note": verdict.note, "seconds": spent,
+    }  # fmt: skip
 
 
 def _finite(number: float) -> float | None:

@@ -21,7 +21,7 @@ def sensors_section(subject: ReportData) -> Section:
     found = {name: _spec(name, subject) for name in names}
     specs = [spec for spec in found.values() if spec is not None]
     unknown = tuple(
-        f"{name}: neither installed nor in a recording of these results; see `tactbench plugins`."
+        f"{name}: neither installed nor in a recording of these results; see `tactbench list plugins`."
         for name, spec in found.items()
         if spec is None
     )

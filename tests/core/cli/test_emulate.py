@@ -36,7 +36,7 @@ def emulate(monkeypatch, tmp_path, capsys):
     return call
 
 
-SHORT = ("--seconds", "0.5", "--presses", "2")
+SHORT = ("--profile", "ramp:duration=0.5", "--presses", "2")
 
 
 def test_the_rig_file_printed_is_the_one_written_and_opens_the_devices(emulate, tmp_path):
@@ -71,7 +71,7 @@ def test_the_rig_file_printed_is_the_one_written_and_opens_the_devices(emulate, 
 
 
 def test_a_force_sensor_alone_feels_the_force_alone(emulate):
-    code, out, err = emulate("scale", "--seconds", "0.1", "--presses", "1")
+    code, out, err = emulate("scale", "--profile", "ramp:duration=0.1", "--presses", "1")
     assert code == 0
     assert out.startswith("force: udp://127.0.0.1:")
     assert "A rig file needs a sensor" in err

@@ -31,7 +31,7 @@ from tests.links.ends import pty
 COLOUR = re.compile(r"\x1b\[[0-9;]*[34][0-7][0-9;]*m")
 TWO_AND_A_HALF = ("╶─╮ ╭─╴╭─╮", "╭─╯ ╰─╮│ │", "╰─╴.╶─╯╰─╯ N")
 WIRED = ROOT / "tests" / "third_party" / "wired"
-RECORD = ("-m", "tactbench", "record", "--sensor", "icub", "--cap-mm", "10", "--out", "press.h5", "--live")
+RECORD = ("-m", "tactbench", "record", "--sensor", "icub", "--indenter", "cap:radius=10", "--out", "press.h5", "--live")
 
 
 @contextmanager
@@ -168,7 +168,17 @@ def test_a_recording_of_the_twin_leaves_its_last_state(tmp_path):
 @contextmanager
 def wired(tmp_path, seconds):
     """Record a pad on a line that the test speaks for; give the terminal and the far end of the line."""
-    command = ["-m", "tactbench", "record", "--sensor", "wired-pad", "--rig", "wired-rig", "--seconds", seconds]
+    command = [
+        "-m",
+        "tactbench",
+        "record",
+        "--sensor",
+        "wired-pad",
+        "--rig",
+        "wired-rig",
+        "--profile",
+        f"ramp:duration={seconds}",
+    ]
     with pty() as line:
         address = f"serial://{line.name}?baud=115200"
         options = {"cwd": tmp_path, "path": [WIRED], "WIRED_LINK": address}

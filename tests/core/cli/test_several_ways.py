@@ -40,7 +40,7 @@ def test_protocols_and_splits_side_by_side(tmp_path):
     verbs = Verbs(tmp_path, here=True)
     asked = ("run", "--repeats", "1", "--sensor", "icub", "--task", "force", "--estimator", "ols", "--out", "out")
     asked += ("--protocol", "karl2016", "--protocol", "deployable", "--split", "roles", "--split", "unit")
-    done = verbs(*asked, "--rung", "closed-form", "--no-latency")  # the cheapest
+    done = verbs(*asked, "--set", "rung=closed-form")  # the cheapest
     assert "by protocol" in done.stdout
     assert "by split" in done.stdout
     rows = json.loads((verbs.folder / "out" / "leaderboard.json").read_text())

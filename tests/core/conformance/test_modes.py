@@ -82,16 +82,16 @@ def test_reading_a_recording_imports_no_code_of_the_plugin(verbs, tmp_path):
 
 
 def test_nothing_is_opened_without_a_yes(verbs):
-    asked = verbs("check", "parallel-manipulator", "--invasive", "--rig-file", str(EXAMPLE), code=2)
+    asked = verbs("check", "parallel-manipulator", "--rig-file", str(EXAMPLE), code=2)
     assert "nobody is there" in asked.stderr
     assert "--yes" in asked.stderr
     assert asked.stdout == ""
 
 
 def test_an_invasive_check_needs_the_rig_file_of_that_rig(verbs):
-    assert "--rig-file" in verbs("check", "icub", "--invasive", code=2).stderr
+    assert "--rig-file" in verbs("check", "icub", code=2).stderr
     assert "--invasive" in verbs("check", "icub", "--rig-file", __file__, code=2).stderr
-    other = verbs("check", "bench", "--invasive", "--rig-file", str(EXAMPLE), "--yes", code=2)
+    other = verbs("check", "bench", "--rig-file", str(EXAMPLE), "--yes", code=2)
     assert "The rig file is for the rig 'parallel-manipulator'" in other.stderr
 
 
@@ -109,7 +109,7 @@ def quick(tmp_path, **changes):
 
 
 def test_an_emulated_rig_presses_lets_go_and_retreats(verbs, tmp_path):
-    done = verbs("check", "parallel-manipulator", "--invasive", "--rig-file", quick(tmp_path), "--yes",
+    done = verbs("check", "parallel-manipulator", "--rig-file", quick(tmp_path), "--yes",
                  "--format", "json")  # fmt: skip
     assert {status for status, _ in of_the_press(done).values()} == {"passed"}
     assert len(of_the_press(done)) == 5
@@ -118,7 +118,7 @@ def test_an_emulated_rig_presses_lets_go_and_retreats(verbs, tmp_path):
 
 def test_a_press_that_the_guard_ends_fails_and_is_not_repeated(verbs, tmp_path):
     file = quick(tmp_path, force__faults=["saturated:start_s=3"])
-    done = verbs("check", "parallel-manipulator", "--invasive", "--rig-file", file, "--yes", "--format", "json", code=1)
+    done = verbs("check", "parallel-manipulator", "--rig-file", file, "--yes", "--format", "json", code=1)
     found = of_the_press(done)
     status, text = found.pop("real-rig-presses")
     assert status == "failed"
@@ -130,7 +130,7 @@ def test_a_hand_at_the_bench_is_not_expected_to_follow(verbs, tmp_path):
     said = yaml.safe_load(EXAMPLE.with_name("bench-emulated.yaml").read_text(encoding="utf-8"))
     said["sensors"].pop("biotac")
     (tmp_path / "rig.yaml").write_text(yaml.safe_dump(said), encoding="utf-8")
-    done = verbs("check", "bench", "--invasive", "--rig-file", "rig.yaml", "--yes", "--format", "json")
+    done = verbs("check", "bench", "--rig-file", "rig.yaml", "--yes", "--format", "json")
     found = of_the_press(done)
     assert found.pop("real-rig-presses") == ("passed", "")
     assert set(found.values()) == {("skipped", "nothing in it moves by itself: a hand presses")}

@@ -5,7 +5,7 @@ import json
 
 def test_those_that_fail_are_reported_and_stop_nothing(verbs):
     plugins = ("good", "broken", "misspelt", "twin_name")
-    found = json.loads(verbs("plugins", "--format", "json", plugins=plugins, code=1).stdout)
+    found = json.loads(verbs("list", "plugins", "--format", "json", plugins=plugins, code=1).stdout)
     (row,) = [row for row in found["plugins"] if row["distribution"] == "acme-tactile"]
     assert (row["status"], row["version"], row["brings"]) == ("loaded", "1.2.0", ["sensor acme-pad"])
     reasons = {row["distribution"]: row["reason"] for row in found["plugins"] if row["status"] == "failed"}

@@ -28,7 +28,8 @@ def rig_check(tmp_path):
         path.write_text("\n".join(lines), encoding="utf-8")
         env = {**os.environ, "PYTHONPATH": f"{ROOT}{os.pathsep}{tmp_path}", "COLUMNS": "200", "PYTHONWARNINGS": "error"}
         return subprocess.run(
-            [sys.executable, "-m", "tactbench", "rig", "check", str(path)], env=env, capture_output=True, text=True,
+            [sys.executable, "-m", "tactbench", "doctor", "--seconds", "0", "--rig-file", str(path)],
+            env=env, capture_output=True, text=True,
             timeout=60,
         )  # fmt: skip
 
