@@ -13,6 +13,7 @@ from tactbench.core.errors import MappingError, TactbenchError
 from tactbench.core.recording.mapping import import_tables
 from tactbench.core.recording.reader import open_recording
 from tactbench.core.samples import Quality
+from tests.conftest import ROOT
 
 SOURCE = {"tag": "assumed", "reference": "made up for a test"}
 TAXELS = {"columns": "1..3", "name": "t{column}", "kind": "taxel", "unit": "count"}
@@ -342,6 +343,7 @@ def test_words_for_no_sample(run, put):
         ("", ("no rows",)),
         ("0,nan,2,3,4\n1,nan,2,3,5\n", ("column 1 (channel t1) has no sample in any of 2 rows",)),
         ("0,1,2,3\n1,1,2,3\n", ("no column 4: it has 4",)),
+        ("0\t1\t2\t3\t4\n1\t1\t2\t3\t4\n", ("press.csv is separated by tabs, and not by ','", '"\\t"')),
     ],
 )
 def test_tables_that_do_not_fit(run, put, tmp_path, text, says):
@@ -402,3 +404,36 @@ def test_what_is_no_file_in_place_of_a_table_is_named(run, tmp_path, make, says)
     make(tmp_path / "data" / "press.csv")
     refused(run, tmp_path, f"press.csv (table 'table') {says}")
     assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize("columns", ["1..3", "1..4"])
+def test_a_force_among_the_sensors_columns_is_warned_of(run, put, columns):
+    put("press.csv", rows(force=lambda row: (row - 15) ** 2))
+    (made,) = run(streams__taxels__channels=[{**TAXELS, "columns": columns}]).recordings
+    warned = [(one.severity, one.channels) for one in made.findings if one.check == "target-among-features"]
+    assert warned == ([] if columns == "1..3" else [("warning", ("t4",))])
+
+
+@pytest.mark.parametrize(
+    ("rate_hz", "says"), [(None, "ms read as s?"), (100.0, "ms read as s?"), (1e-4, "s read as ms?")]
+)
+def test_times_in_a_wrong_unit_are_warned_of(run, put, rate_hz, says):
+    put("press.csv", "".join(f"{10 * row},{row},2,3,{row}\n" for row in range(40)))
+    stated = {} if rate_hz is None else {"streams__taxels__rate_hz": rate_hz, "streams__taxels__rate_source": SOURCE}
+    (made,) = run(**stated).recordings
+    assert any(one.check == "rate" and one.message.endswith(says) for one in made.findings)
+
+
+def test_the_shipped_mapping_of_slip_directions_reads_a_misspelt_object(run, put):
+    said = yaml.safe_load((ROOT / "examples/mappings/biotacsp-slip-direction.yaml").read_text())
+    header = ",".join(f"ff_e{number}" for number in range(1, 25))
+    put("csvs/n/strippes305.csv", f"{header}\n" + "".join(f"{','.join([str(row)] * 24)}\n" for row in range(9)))
+    (made,) = run(said).recordings
+    with open_recording(made.path) as recording:
+        assert recording.meta.name == "n-strippes-305"
+        assert recording.meta.labels == {
+            "direction": "north",
+            "slip": "slipped",
+            "object": "striped",
+            "set": "textures",
+        }
