@@ -84,7 +84,7 @@ def test_results_of_ones_own_come_first_and_say_what_they_lack(ran):
 
 def test_json_has_the_wish_the_criteria_and_what_is_unknown(verbs):
     told = json.loads(verbs("choose", *WISH, "--score", "0.2", "--format", "json").stdout)
-    assert told["wish"] == {"max_delay_ms": 2, "range_n": 5, "rate_hz": 10, "max_error": 0.2, "min_score": None}
+    assert told["wish"] == {"max_delay_ms": 2, "range_n": 5, "rate_hz": 10, "score": 0.2}
     assert (told["protocol"], told["split"]) == ("deployable", "roles")
     (choice,) = told["choices"]
     assert {one["sensor"] for one in choice["candidates"]} == {"biotac", "icub"}

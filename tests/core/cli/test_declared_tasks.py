@@ -102,7 +102,7 @@ def test_one_import_and_one_run_answer_a_question_of_a_table(after, imported):
     assert "answers are vectors (x, y): one model per component" in row["remarks"]
     assert "0 computed now" in pad(*run).stderr, "what was declared decides the key as a task does"
     assert "identical" in pad("why", "where/replay/deployable/knn", "--again").stdout
-    assert "hit" in pad("why", "where/replay/deployable/knn").stdout
+    assert "reuses it" in pad("why", "where/replay/deployable/knn").stdout
     with unrendered():
         pad("report")
     drawn = {path.name for path in (pad.folder / "tactbench-results" / "report" / "figures").iterdir()}
