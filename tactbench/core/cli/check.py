@@ -22,7 +22,8 @@ if TYPE_CHECKING:
 @click.command(name="check")
 @click.argument("name")
 @click.option("--recording", type=click.Path(path_type=Path, exists=True, dir_okay=False), metavar="FILE",
-              help="Also check this recording of the sensor.")  # fmt: skip
+              help="Check this recording of the sensor, importing no code of the plugin.")  # fmt: skip
+@click.option("--passive", is_flag=True, help="With --recording: add the checks that run without it.")
 @click.option("--rig-file", type=click.Path(path_type=Path, exists=True, dir_okay=False), metavar="FILE",
               help="Also open the device's line, or press with the rig, as this file says; prompts first.")  # fmt: skip
 @YES
@@ -31,8 +32,8 @@ if TYPE_CHECKING:
 @format_option("table", "json")
 @click.pass_context
 def command(
-    ctx: click.Context, name: str, recording: Path | None, rig_file: Path | None, yes: bool, out: Path | None,
-    shape: str,
+    ctx: click.Context, name: str, recording: Path | None, passive: bool, rig_file: Path | None, yes: bool,
+    out: Path | None, shape: str,
 ) -> None:  # fmt: skip
     """Check whether a plugin conforms: a sensor, rig, device, task, estimator, effect, indenter or profile.
 
@@ -64,7 +65,9 @@ def command(
     sensors = [one for one in subjects if one.kind == "sensor"]
     if (recording or out) and not sensors and not wrong:
         raise UsageError(f"{name} is no sensor.", hint="--recording and --out are for sensors: leave them out.")
-    modes: list[Mode] = ["passive"]
+    modes: list[Mode] = ["passive"] if passive or recording is None else []
+    if out is not None and not modes:
+        raise UsageError("--out stores a level, which a recording alone has not.", hint="Add --passive.")
     if recording is not None:
         modes.append("recording")
         subjects = sensors
@@ -162,9 +165,7 @@ def _print(report: CheckReport) -> None:
     for one in report.skipped:
         reasons.setdefault(one.text, []).append(one.check)
     for text, names in reasons.items():
-        _line("skipped", "yellow", f"{', '.join(names)}: {text}")
-    if report.passed:
-        _line("passed", "green", ", ".join(one.check for one in report.passed))
+        _line("skipped", "yellow", f"{len(names)} checks: {text}" if len(names) > 1 else f"{names[0]}: {text}")
     click.secho(report.summary, bold=True)
 
 

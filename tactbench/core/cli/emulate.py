@@ -70,7 +70,8 @@ def command(
     how = EmulationSettings() if file is None else file.emulation
 
     load = profile_of(registry, profile)
-    scenes = {name: scene_of("press", registry.sensors[name], profile=load) for name in _sensors(entries)}
+    pressed = [name for name, entry in entries.items() if entry.emulated and not hasattr(entry, "device")]
+    scenes = {name: scene_of("press", registry.sensors[name], profile=load) for name in pressed}
     presser = Presser(registry, how.physics, scenes, scene_of("press", None, profile=load), how.seed)
     devices: dict[str, EmulatedDevice] = {}
     for name, entry in entries.items():
@@ -198,17 +199,12 @@ def _named(registry: Registry, names: Sequence[str]) -> dict[str, DeviceEntry]:
     return entries
 
 
-def _sensors(entries: Mapping[str, DeviceEntry]) -> list[str]:
-    """Return the names of the emulated sensors."""
-    return [name for name, entry in entries.items() if entry.emulated and not hasattr(entry, "device")]
-
-
 def _say_where(
     emulated: EmulatedDevices, entries: Mapping[str, DeviceEntry], file: RigFile | None, out: Path | None
 ) -> None:
     import yaml
 
-    from tactbench.core.spec.rig_file import FORCE
+    from tactbench.core.spec.rig_file import FORCE, RigFile
     from tactbench.core.tables.text import command_line
 
     found: dict[str, Any] = {
@@ -217,48 +213,34 @@ def _say_where(
         else entry
         for name, entry in entries.items()
     }
-    sensors = [name for name, entry in found.items() if not hasattr(entry, "device")]
+    sensors = {name: entry for name, entry in found.items() if not hasattr(entry, "device")}
     if not sensors:
         for name, address in emulated.addresses.items():
             click.echo(f"{name}: {address}")
         remark("A rig file needs a sensor beside them: name one, too, to have one written.")
         return
-    text: dict[str, Any] = {"version": 1, "rig": "bench" if file is None else file.rig}
-    if file is not None and file.title:
-        text["title"] = file.title
-    plain = {}
-    for name, entry in found.items():
-        fields = entry.model_dump(mode="json", exclude_defaults=True)
-        plain[name] = {key: fields[key] for key in ("device", *fields) if key in fields}
-    text["sensors"] = {name: plain.pop(name) for name in sensors}
-    if FORCE in plain:
-        text[FORCE] = plain.pop(FORCE)
-    if plain:
-        text["devices"] = plain
-    if file is not None and file.settings:
-        text["settings"] = file.settings
-    written = f"{HEAD}\n{yaml.safe_dump(text, sort_keys=False)}"
+    others = {name: entry for name, entry in found.items() if name not in sensors and name != FORCE}
+    parts = {"sensors": sensors, "force": found.get(FORCE), "devices": others}
+    rig = RigFile(rig="bench", **parts) if file is None else file.model_copy(update=parts)
+    plain = rig.model_dump(mode="json", exclude_defaults=True, exclude={"emulation", "version"})
+    written = f"{HEAD}\n{yaml.safe_dump({'version': 1, **plain}, sort_keys=False)}"
     click.echo(written, nl=False)
     if out is not None:
         out.write_text(written, encoding="utf-8")
     else:
         remark("Save the above as rig.yaml, or have it written with --write-rig-file.")
     name = "rig.yaml" if out is None else str(out)
-    words = ("--rig", text["rig"], "--rig-file", name, "--sensor", sensors[0], "--live", "--out", "press.h5")
+    words = ("--rig", rig.rig, "--rig-file", name, "--sensor", next(iter(sensors)), "--live", "--out", "press.h5")
     remark(f"Record in another terminal:  {command_line('tactbench', 'record', *words)}")
     remark("Ctrl-C ends the devices.")
 
 
 def _press(emulated: EmulatedDevices, presser: Presser, number: int, presses: int | None) -> None:
     """Press once, and say how it goes."""
-    profile = presser.alone.profile
-    over_s = presser.start(emulated.clock() * 1e-9)
+    profile, over_s = presser.alone.profile, presser.start(emulated.clock() * 1e-9)
     of = "" if presses is None else f" of {presses}"
     remark(f"Press {number}{of}: {profile.largest_n:g} N after {profile.duration.to('s'):g} s")
     while (now_s := emulated.clock() * 1e-9) < over_s:
         emulated.advance(round(1e9 * min(now_s + STATUS_S, over_s)))
-        passed = "; ".join(
-            f"{name} {from_host} bytes in, {to_host} out"
-            for name, (from_host, to_host) in emulated.passed_bytes.items()
-        )
-        remark(f"  {profile.duration.to('s') - max(0.0, over_s - emulated.clock() * 1e-9):.0f} s: {passed}")
+        passed = (f"{name} {here} bytes in, {there} out" for name, (here, there) in emulated.passed_bytes.items())
+        remark(f"  {'; '.join(passed)}")

@@ -172,7 +172,7 @@ LINE = 1 + PAD.splitlines().index("tasks:")
 @pytest.mark.parametrize(
     ("old", "new", "says"),
     [
-        ("names: [x, y]", "names: [x]", "target.names"),
+        ("names: [x, y]", "names: []", "target.names"),
         (
             "names: [x, y]",
             "names: [x, z]",

@@ -17,6 +17,6 @@ def test_those_that_fail_are_reported_and_stop_nothing(verbs):
     assert "copycat-tactile" in refusal
     listed = verbs("list", "sensors", plugins=plugins)
     assert "biotac" in listed.stdout
-    assert "tactbench plugins" in listed.stderr
+    assert "tactbench list plugins" in listed.stderr
     run = ("run", "--sensor", "acme-pad", "--task", "force", "--repeats", "1")
     assert "copycat-tactile" in verbs(*run, plugins=plugins, code=2).stderr

@@ -40,8 +40,8 @@ def rig_check(tmp_path):
     ("settings", "code", "said"),
     [
         ("{force_ceiling: 5}", 2, r"rig\.yaml:4.*force_ceiling_n"),
-        ("{force_ceiling_n: 5}", 0, "5 N.*Nothing is refused"),
-        ("{force_ceiling_n: 12}", 1, "12 N.*The frame bears 10 N"),
+        ("{force_ceiling_n: 5}", 0, "5 N.*Nothing was opened"),
+        ("{force_ceiling_n: 12}", 1, "refused: The frame bears 10 N.*12 N"),
     ],
 )
 def test_its_file_is_checked_and_its_check_is_printed(rig_check, settings, code, said):
