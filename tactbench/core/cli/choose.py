@@ -141,8 +141,7 @@ def _print(choice: Choice, heading: str) -> None:
 
 
 def _table(choice: Choice) -> TextTable:
-    from tactbench.core.choosing.choosing import interval_text
-    from tactbench.core.tables.numbers import score
+    from tactbench.core.tables.numbers import ABSENT, interval, score
     from tactbench.core.tables.text_table import TextTable
 
     wishes = dict.fromkeys(one.wish for candidate in choice.candidates for one in candidate.criteria)
@@ -152,7 +151,8 @@ def _table(choice: Choice) -> TextTable:
         entries = {
             criterion.wish: ": ".join(filter(None, (criterion.state, criterion.text))) for criterion in one.criteria
         }
-        known = f"{score(one.score, choice.unit)}, {interval_text(one, choice.unit)}"
+        ends = interval(one.low, one.high, choice.unit)
+        known = f"{score(one.score, choice.unit)}, {'no interval' if ends == ABSENT else ends}"
         wished = f"; {entries['score']}" if "score" in entries else ""
         lines.append((f"{one.sensor} / {one.estimator}", known + wished, *(entries.get(wish, "") for wish in head[2:])))
     return TextTable(f"score: {choice.quantity}", head, tuple(lines))

@@ -9,15 +9,13 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from tactbench.core.cli.grid import print_grid, print_records
 from tactbench.core.cli.screen import remark
 
 if TYPE_CHECKING:
     from tactbench.core.cost.precision import Skipped
     from tactbench.core.cost.task_score import TaskScore
     from tactbench.core.plugins.cost import CostPoint, CostStudy
-
-_COLUMNS = ("", "way", "time", "rms", "worst", "unit", "noise / 3", "front", "reason")
-_SCORES = ("rung", "score", "against the finest", "simulated in", "reason")
 
 Scores = Mapping[tuple[str, str], "TaskScore"]
 """By sensor and rung."""
@@ -72,60 +70,43 @@ def show_twin(sensors: tuple[str, ...], out: Path, shape: str, *, rounds: int, t
     records = [_record(point, scores) for point in points] + [_absent(one, scores) for one in skipped]
     keys = list(dict.fromkeys(key for record in records for key in record))
     records = [{key: record.get(key) for key in keys} for record in records]
-    _show(points, skipped, scores, records, study, shape)
+    if shape == "table":
+        _show(points, skipped, scores, study)
+    else:
+        print_records(records, shape)
     _write(points, records, study, out)
 
 
-def _show(
-    points: Sequence[CostPoint], skipped: Sequence[Skipped], scores: Scores, records: Sequence[dict[str, Any]],
-    study: CostStudy, shape: str,
-) -> None:  # fmt: skip
-    from tactbench.core.cli.grid import print_grid, print_records
+def _show(points: Sequence[CostPoint], skipped: Sequence[Skipped], scores: Scores, study: CostStudy) -> None:
     from tactbench.core.cost.precision import diagrams, precise, verdict
 
-    if shape != "table":
-        print_records(records, shape)
-        return
     for (subject, observable), group in diagrams(points).items():
         best = precise(group)
-        lines = [_line(point, point in best) for point in group]
+        lines = []
+        for point in group:
+            marks = ("default",) * point.default + ("front",) * (point in best)
+            texts = {key: _text(value) for key, value in _record(point, scores).items() if key not in point.settings}
+            lines.append({"": ", ".join(marks), **texts})
+        columns = [key for key in lines[0] if key not in ("sensor", "observable", "default", "reason")]
+        numeric = (
+            "seconds",
+            "error_rms",
+            "error_worst",
+            "noise",
+            *(key for key in columns if key.startswith("score_")),
+        )
         kinds = ["result" if point.default else "" for point in group]
-        print_grid(f"{subject}, {observable}: {study.title}", _COLUMNS, lines, kinds=kinds,
-                   numeric=("time", "rms", "worst", "noise / 3"))  # fmt: skip
+        print_grid(f"{subject}, {observable}: {study.title}", columns, lines, kinds=kinds, numeric=numeric)
         click.echo(verdict(group))
     for one in skipped:
         click.echo(f"{one.subject}, {one.label}: {one.reason}")
     remark(study.reference)
-    for subject in dict.fromkeys(sensor for sensor, _ in scores):
-        own = {rung: one for (sensor, rung), one in scores.items() if sensor == subject}
-        first = next(iter(own.values()))
-        finest = next((one.score for one in reversed(own.values()) if one.score is not None), None)
-        title = f"{subject}, {first.task}: {first.metric} by {first.estimator} (SIM), one replicate"
-        lines = [_score_line(rung, one, finest) for rung, one in own.items()]
-        print_grid(title, _SCORES, lines, numeric=_SCORES[1:4])
+    for estimator in dict.fromkeys(one.estimator for one in scores.values()):
+        remark(f"Scores are by {estimator}, of one replicate recorded at that rung with the same draws (SIM).")
 
 
-def _score_line(rung: str, one: TaskScore, finest: float | None) -> dict[str, str]:
-    from tactbench.core.tables.numbers import score_with_unit
-
-    if one.score is None:
-        return {"rung": rung, "reason": one.reason}
-    apart = "" if finest is None else f"{one.score - finest:+.2g}"
-    spent = "" if one.sim_s is None else f"{one.sim_s:.2f} s"
-    return dict(zip(_SCORES, (rung, score_with_unit(one.score, one.unit), apart, spent), strict=False))
-
-
-def _line(point: CostPoint, on_front: bool) -> dict[str, str]:
-    return {
-        "": "default" if point.default else "",
-        "way": point.label,
-        "time": f"{1e3 * point.seconds:.1f} ms",
-        "rms": f"{point.error:.3g}",
-        "worst": f"{point.worst:.3g}",
-        "unit": point.unit,
-        "noise / 3": f"{point.floor / 3:.3g}" if math.isfinite(point.floor) else "",
-        "front": "*" if on_front else "",
-    }
+def _text(value: Any) -> str:
+    return f"{value:.4g}" if isinstance(value, float) else "" if value is None else str(value)
 
 
 def _record(point: CostPoint, scores: Scores) -> dict[str, Any]:

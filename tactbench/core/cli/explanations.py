@@ -115,14 +115,16 @@ def _print_scores(sensor: str, chosen: TaskScore, every: TaskScore) -> None:
         return
     moved = every.score - chosen.score
     same = "All effects instead of those chosen: the very same score."
-    click.echo(same if not moved else f"All effects instead of those chosen move the score by {moved:+.2g}.")
+    click.echo(f"All effects instead of those chosen move the score by {moved:+.2g}." if moved else same)
     if chosen.sim_s is not None and every.sim_s:
         saved = every.sim_s - chosen.sim_s
-        seconds = f"{saved:.2f} of {every.sim_s:.2f} s of the processor for {every.recordings} recordings"
+        share = f", {100 * saved / every.sim_s:.0f} %"
         if abs(saved) < _SMALLEST_DIFFERENCE * every.sim_s:
-            click.echo(f"Leaving out the others saved {seconds}: no more than one run each tells apart.")
-        else:
-            click.echo(f"Leaving out the others saved {seconds}, {100 * saved / every.sim_s:.0f} %.")
+            share = ": no more than one run each tells apart"
+        click.echo(
+            f"Leaving out the others saved {saved:.2f} of {every.sim_s:.2f} s of the processor for {every.recordings} "
+            f"recordings{share}."
+        )
 
 
 def _alike(rig: Explaining, sensor: SensorDescriptor, scenes: list[Scene]) -> list[list[Scene]]:

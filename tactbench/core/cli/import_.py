@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from tactbench.core.recording.mapping import ImportReport
 
 MOST_NAMED = 12
-"""Channels of recordings that are named for what they lack; the others are added up."""
+"""Findings that are printed, the worst first."""
 PAIRS = "KEY=VALUE"
 
 
@@ -132,29 +132,24 @@ def summary(report: ImportReport, folder: Path) -> list[str]:
     ]
     if report.tasks:
         lines.append(f"  tasks of their own, in {folder / FILE}: {', '.join(report.tasks)}")
-    without = [(one, channel, count) for one in report.recordings for channel, count in one.missing.items()]
-    for recording, channel, count in without[:MOST_NAMED]:
-        lines.append(
-            f"  {recording.name}: {channel} has no sample in {count} of {recording.rows} rows; they are marked, "
-            "and no evaluation uses them"
-        )
-    if len(without) > MOST_NAMED:
-        every = ", ".join(f"{channel} {count}" for channel, count in report.missing.items())
-        lines.append(f"  … and so in other recordings; rows without a sample in all of them: {every}")
+    if report.missing:
+        counts = ", ".join(f"{channel} {count}" for channel, count in report.missing.items())
+        lines.append(f"  rows without a sample, marked and left out of every evaluation: {counts}")
     for reason, count in report.excluded.items():
         names = [recording.name for recording in report.recordings if recording.excluded == reason]
         shown = ", ".join(names[:3]) + (" …" if count > 3 else "")
         lines.append(f"  {count} recordings are marked as excluded ({shown}): {reason}")
-    expected = ("missing", "excluded")
     found = Counter(
         (finding.severity, finding.message)
         for recording in report.recordings
         for finding in recording.findings
-        if finding.check not in expected
+        if finding.check not in ("missing", "excluded")
     )
-    for (severity, message), count in found.most_common(12):
+    order = ("error", "warning", "info")
+    worst = sorted(found.items(), key=lambda item: (order.index(item[0][0]), -item[1]))
+    for (severity, message), count in worst[:MOST_NAMED]:
         where = f" (in {count} of {len(report.recordings)} recordings)" if len(report.recordings) > 1 else ""
         lines.append(f"  {severity}: {message}{where}")
-    if len(found) > 12:
-        lines.append(f"  … and {len(found) - 12} more remarks; see `tactbench inspect`")
+    if len(worst) > MOST_NAMED:
+        lines.append(f"  … and {len(worst) - MOST_NAMED} more remarks; see `tactbench inspect`")
     return lines

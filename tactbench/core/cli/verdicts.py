@@ -95,19 +95,14 @@ def print_verdicts(found: Sequence[Found], shape: str, *, real: bool) -> None:
             rows = [one for one in found if one[0].group == group]
             kinds = ["" if verdict.met else "failed" for _, verdict, _ in rows]
             print_grid(group, _COLUMNS, _lines(rows), numeric=("found", "s"), kinds=kinds)
-        notes: dict[str, list[str]] = {}
+        notes: dict[str, dict[str, None]] = {}
         for check, verdict, _ in found:
             if not verdict.met and verdict.note:
-                notes.setdefault(verdict.note, []).append(_named(check, verdict))
+                notes.setdefault(verdict.note, {})[f"{check.name}, {verdict.name}"] = None
         for note, names in notes.items():
             remark(f"Missed: {'; '.join(names)}:\n  {note}")
     met = sum(verdict.met for _, verdict, _ in found)
-    what = "inside what real sensors show" if real else "within their bounds"
-    remark(f"{met} of {len(found)} {what}.")
-
-
-def _named(check: Check, verdict: Verdict) -> str:
-    return check.name if verdict.name in check.name else f"{check.name}, {verdict.name}"
+    remark(f"{met} of {len(found)} {'inside what real sensors show' if real else 'within their bounds'}.")
 
 
 def _lines(rows: Sequence[Found]) -> list[dict[str, str]]:

@@ -203,7 +203,6 @@ def test_what_to_do_about_what_is_unknown():
     assert "run `tactbench run --sensor a --task question --protocol deployable --estimator lasso`" in told
     assert "it has no interval" in told
     assert "the force range of a: not stated" in told
-    assert "length, mass, interface, power and availability of a" in told
     assert "how other scores: no result here; run `tactbench run --sensor other" in told
     assert "oracle" not in told
     assert choice.left_out == ("gone: there is no finished answer beside trivial ones.",)

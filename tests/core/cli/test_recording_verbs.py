@@ -39,7 +39,7 @@ def tables(verbs):
 def test_import_then_inspect(tables):
     done = tables("import", "mapping.yaml", "--out", "recordings")
     assert "2 recordings of pad, 100 rows, from 2 files" in done.stdout
-    assert "one: fz has no sample in 25 of 50 rows" in done.stdout
+    assert "rows without a sample, marked and left out of every evaluation: fz 50" in done.stdout
     assert "warning: taxel b constant (in 2 of 2 recordings)" in done.stdout
     assert "importing" in done.stderr
     shown = tables("inspect", "recordings/one.h5").stdout
