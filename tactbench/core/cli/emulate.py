@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+import math
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -14,12 +15,9 @@ from tactbench.core.cli.screen import remark
 
 if TYPE_CHECKING:
     from tactbench.core.plugins.registry import Registry
-    from tactbench.core.samples import Block
-    from tactbench.core.spec.profile import ForceProfile
     from tactbench.core.spec.rig import SensorDescriptor
     from tactbench.core.spec.rig_file import DeviceEntry, RigFile
     from tactbench.core.spec.scene import Scene
-    from tactbench.core.spec.sensor import StreamSpec
     from tactbench.devices.emulation.emulated_devices import EmulatedDevice, EmulatedDevices
     from tactbench.devices.emulation.scene_samples import SceneSamples
 
@@ -122,6 +120,7 @@ class Presser:
             raise UsageError(f"The rig {self.physics!r} is not simulated.", hint="Use twin.")
         self._rig = load_object(descriptor.where)(rig_context(self.registry))
         self._drawn: dict[str, SceneSamples] = {}
+        self._began_s = math.inf
 
     def draw(self, number: int) -> None:
         """Compute press `number`, 1 being the first; nothing is pressed until it is started."""
@@ -135,47 +134,34 @@ class Presser:
             with self._rig.open(sensor, observed, seed=self.seed + number - 1) as acquisition:
                 profile = scene.profile
                 drawn[name] = SceneSamples(acquisition, profile.duration.to("s"), rest_s=profile.hold_s)
-        if not drawn:
-            profile = self.alone.profile
-            drawn[""] = SceneSamples(_ForceAlone(profile), profile.duration.to("s"), rest_s=profile.hold_s)
         self._drawn = drawn
 
     def start(self, at_s: float) -> float:
         """Begin to press at `at_s` on the devices' clock; return when it is over."""
+        self._began_s = at_s
         for samples in self._drawn.values():
             samples.start(at_s)
-        return max(samples.over_s for samples in self._drawn.values())
+        alone_s = at_s + self.alone.profile.duration.to("s")
+        return max((samples.over_s for samples in self._drawn.values()), default=alone_s)
 
     def senses(self, name: str) -> Any:
         """Return what a device senses: a sensor its own press, any other device that of the first sensor."""
 
         def sensed(t_s: float) -> Mapping[str, float]:
             drawn = self._drawn
+            if not self.scenes:
+                return {"fz": self._force_n(t_s - self._began_s)}
             return drawn[name if name in drawn else next(iter(drawn))](t_s) if drawn else {}
 
         return sensed
 
-
-class _ForceAlone:
-    """The force of a profile without anything pressed."""
-
-    def __init__(self, profile: ForceProfile) -> None:
-        from tactbench.core.spec.sensor import ChannelSpec, StreamSpec
-
-        self._profile = profile
-        self.streams: tuple[StreamSpec, ...] = ()
-        self.reference: tuple[StreamSpec, ...] = (
-            StreamSpec(name="force_torque", channels=(ChannelSpec(name="fz", kind="force", unit="N", sign=1),)),
-        )
-
-    def __iter__(self) -> Iterator[Block]:
+    def _force_n(self, passed_s: float) -> float:
+        """Return the force where nothing is pressed, so long after the press began."""
         import numpy as np
 
-        from tactbench.core.samples import Block
-
-        t_s = np.arange(self._profile.samples) * self._profile.duration.to("s") / self._profile.samples
-        force_n = np.interp(t_s, *self._profile.corners)
-        yield Block("force_torque", np.round(t_s * 1e9).astype(np.int64), force_n[:, None])
+        profile = self.alone.profile
+        within = 0.0 <= passed_s < profile.duration.to("s")
+        return float(np.interp(passed_s if within else 0.0, *profile.corners))
 
 
 def _named(registry: Registry, names: Sequence[str]) -> dict[str, DeviceEntry]:

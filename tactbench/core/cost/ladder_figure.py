@@ -10,7 +10,6 @@ from tactbench.core.cost.ladder import Ladder
 from tactbench.core.cost.ladder_rows import LOOPS_HZ, Record
 from tactbench.core.cost.precision import MARKS
 
-_TRIVIAL = ("#888888", ".")
 _QUARTILES = {"fit_s": ("fit_s_q1", "fit_s_q3"), "answer_delay_ms": ("answer_delay_ms_q1", "answer_delay_ms_q3")}
 
 
@@ -18,16 +17,14 @@ def draw_ladder(ladder: Ladder, paths: Sequence[Path], metric: str = "") -> Any:
     """Draw the ladder, save it under every one of `paths`, and return the figure.
 
     `metric` is the score's name for people. Upwards is the score with its interval, across the median time with its
-    quartiles, by decades. The line is the front, in steps: between two estimators there is none. Vertical lines in the
-    second panel are the periods of control loops.
+    quartiles, by decades; trivial answers are left out. The line is the front, in steps: between two estimators there
+    is none. Vertical lines in the second panel are the periods of control loops.
     """
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
     about = ladder.about
-    rows, beyond = _near(
-        [row for row in ladder.rows if row["status"] == "done" and row["fit_s"] is not None], about["higher_is_better"]
-    )
+    rows = [row for row in ladder.rows if row["fit_s"] is not None and not row["is_baseline"]]
     marks = _marks(rows)
     figure = Figure(figsize=(13, 5.6), layout="constrained", dpi=150)
     FigureCanvasAgg(figure)
@@ -56,11 +53,6 @@ def draw_ladder(ladder: Ladder, paths: Sequence[Path], metric: str = "") -> Any:
         panels[1].axvline(1e3 / rate, color="black", ls="--", lw=0.8, zorder=0)
         panels[1].annotate(f"{rate} Hz", (1e3 / rate, 1.0), xycoords=("data", "axes fraction"), xytext=(0, 2),
                            textcoords="offset points", ha="center", va="bottom", fontsize=8)  # fmt: skip
-    if beyond:
-        worse, height, side = ("below", 0.01, "bottom") if about["higher_is_better"] else ("above", 0.99, "top")
-        listed = ", ".join(f"{row['estimator']} at {row['score']:.3g}" for row in beyond)
-        panels[0].annotate(f"further {worse}: {listed}", (0.01, height), xycoords="axes fraction", va=side, fontsize=8,
-                           color="#555555")  # fmt: skip
     unit = "" if about["unit"] == "1" else f" [{about['unit']}]"
     better = "higher" if about["higher_is_better"] else "lower"
     known = any(row["ci_low"] is not None for row in rows)
@@ -74,21 +66,6 @@ def draw_ladder(ladder: Ladder, paths: Sequence[Path], metric: str = "") -> Any:
     return figure
 
 
-def _near(rows: Sequence[Record], higher_is_better: bool) -> tuple[list[Record], list[Record]]:
-    """Return the rows to be drawn, and the trivial ones so far off that the others would shrink to a line.
-
-    Off is what lies further from the worst of the others than these are from each other.
-    """
-    scores = [row["score"] for row in rows if not row["is_baseline"]]
-    if not scores:
-        return list(rows), []
-    spread = max(scores) - min(scores)
-    limit = min(scores) - spread if higher_is_better else max(scores) + spread
-    off = [row for row in rows if row["is_baseline"]
-           and (row["score"] < limit if higher_is_better else row["score"] > limit)]  # fmt: skip
-    return [row for row in rows if row not in off], off
-
-
 def _ends(row: Record) -> tuple[float, float]:
     """Return the ends of a score's interval; the score itself where too few replicates carry one."""
     low, high = row["ci_low"], row["ci_high"]
@@ -99,9 +76,8 @@ def _marks(rows: Sequence[Record]) -> dict[str, tuple[str, str]]:
     """Return the colour, the same in a family, and the shape of each estimator."""
     families: dict[str, list[str]] = {}
     for row in rows:
-        if not row["is_baseline"]:
-            families.setdefault(row["family"], []).append(row["estimator"])
-    marks = {row["estimator"]: _TRIVIAL for row in rows}
+        families.setdefault(row["family"], []).append(row["estimator"])
+    marks = {}
     for place, (_, members) in enumerate(sorted(families.items())):
         for number, name in enumerate(members):
             marks[name] = MARKS[place % len(MARKS)][0], MARKS[number % len(MARKS)][1]
