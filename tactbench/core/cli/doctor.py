@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import click
 
 from tactbench.core.cli.options import FiniteRange, format_option
-from tactbench.core.tables.text import json_text
+from tactbench.core.tables.text import json_text, visible
 
 if TYPE_CHECKING:
     from tactbench.core.cli.device_check import DeviceCheck, StreamCheck
@@ -111,12 +111,12 @@ def _print(
 
     for text in problems:
         click.secho("Wrong: ", fg="red", bold=True, nl=False)
-        click.echo(text)
+        click.echo(visible(text))
     for one in host:
         if one.state == "missing":
             click.secho("Missing: ", fg="yellow", nl=False)
             name = f"extra {one.name}" if one.kind == "extra" else one.name
-            click.echo(f"{name}: {'. '.join(filter(None, (one.text, one.hint)))}")
+            click.echo(visible(f"{name}: {'. '.join(filter(None, (one.text, one.hint)))}"))
     for table in would.tables if would else ():
         print_table(table.title, table.head, table.rows)
     streams = [row for check in checks for stream in check.streams for row in _stream(check, stream)]
@@ -126,10 +126,11 @@ def _print(
         said = ", ".join(f"{name} {value}" for name, value in check.identity.items())
         remarks = [*check.remarks, *(f"{number} {name}" for name, number in check.counts.items())]
         state = "wrong" if check.problems else "answers" if said or check.streams else "not asked"
-        click.echo(f"{check.name} ({check.device}, {check.link}): {'; '.join(filter(None, (state, said, *remarks)))}")
+        text = f"{check.name} ({check.device}, {check.link}): {'; '.join(filter(None, (state, said, *remarks)))}"
+        click.echo(visible(text))
     works = [f"{one.name} ({one.text})" if one.text else one.name for one in host if one.state == "works"]
     names = ", ".join(one["name"] for one in _drivers(registry))
-    click.echo(f"Works: {', '.join(works)}. Drivers or emulators of {names}.")
+    click.echo(visible(f"Works: {', '.join(works)}. Drivers or emulators of {names}."))
 
 
 def _stream(check: DeviceCheck, stream: StreamCheck) -> Iterator[tuple[str, ...]]:

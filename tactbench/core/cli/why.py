@@ -181,7 +181,7 @@ def _first(fields: list[Field]) -> list[Field]:
 
 def _aligned(fields: list[Field]) -> list[str]:
     width = max(len(name) for name, _ in fields)
-    return [visible(f"{name:<{width}}  {value}").rstrip() for name, value in fields]
+    return [visible(f"{name:<{width}}  {value}".rstrip()) for name, value in fields]
 
 
 def _repeated(found: StoredCell) -> dict[str, Any]:
