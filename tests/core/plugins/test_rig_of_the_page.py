@@ -13,7 +13,7 @@ ROOT = Path(__file__).parents[3]
 
 @pytest.fixture
 def rig_check(tmp_path):
-    """Install the page's rig, and run `tactbench rig check` on settings."""
+    """Install the page's rig, and run `tactbench doctor` on settings."""
     page = (ROOT / "docs" / "plugins.md").read_text(encoding="utf-8")
     (code,) = re.findall(r"```python\n# acme_rig\.py\n(.*?)```", page, flags=re.DOTALL)
     (tmp_path / "acme_rig.py").write_text(code, encoding="utf-8")
