@@ -72,7 +72,7 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as folder:
         plain = arrays(sensor, Path(folder))
     field = {name: of_seed(plain, name, 1) for name in names}
-    times = measure(field, rounds=rounds, budget_s=float("inf"), threads=1, seed=1, clock=time.perf_counter,
+    times = measure(field, rounds=rounds, budget_s=float("inf"), seed=1, clock=time.perf_counter,
                     progress=Progress())  # fmt: skip
     for name, timing in times.items():
         if timing.trouble is not None:

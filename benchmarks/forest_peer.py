@@ -3,7 +3,7 @@
 Five made-up sets of 300 rows by 20 features, two thirds to train on, and forests of 5, 10, 20 and 40 trees: each way
 fits the same 20 forests and prints accuracies. Whole processes, one thread, turn and turn about; before every cold run
 results are removed. tactbench also makes an interval from 2,000 resamples for every cell; what else it measures by
-default, the latency of single rows, is left out by ``--no-latency`` where it is compared with the plain script, and
+default, the latency of single rows, is left out (``latency: false``) where it is compared with the plain script, and
 compared, where it is not, with a plain script that measures the same latency (200 rows a cell, at most 0.3 s).
 What is remembered beyond one result folder, byte code by Python and digests of sources by tactbench, is warm from the
 first turn on, as where either was used before; a cold run that has to read all sources anew stands beside.

@@ -35,7 +35,7 @@ TWIN = (
     "--sensor", "icub", "--task", "curvature", "--repeats", "2", "--estimator", "lda", "--estimator", "logistic",
     "--estimator", "knn",
 )  # fmt: skip
-TRIVIAL = ("--task", "nothing-asked", "--estimator", "nothing", "--no-latency")
+TRIVIAL = ("--task", "nothing-asked", "--estimator", "nothing")
 
 
 def started(arguments: list[str], folder: Path) -> subprocess.Popen[bytes]:

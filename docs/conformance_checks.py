@@ -11,6 +11,7 @@ from tactbench.core.conformance.check import KINDS
 from tactbench.core.conformance.kit import CHECKS, OF_THE_LIST
 
 DOCUMENT = Path(__file__).with_name("conformance.md")
+OPTIONS = {"invasive": "rig-file", "recording": "recording"}
 BEGIN, END = "<!-- checks -->\n", "<!-- end of checks -->\n"
 
 
@@ -19,7 +20,7 @@ def table() -> str:
     head = "| check | of | level | why it exists | what to do when it fails |\n|---|---|---|---|---|\n"
     rows = []
     for check in (*CHECKS, *OF_THE_LIST):
-        mode = "" if check.mode == "passive" else f", `--{check.mode}`"
+        mode = "" if check.mode == "passive" else f", `--{OPTIONS[check.mode]}`"
         of = "all" if len(check.kinds) == len(KINDS) else ", ".join(check.kinds)
         why, cure = (text.replace("``", "`").replace("|", "\\|") for text in (check.why, check.cure))
         rows.append(f"| `{check.name}` | {of} | {check.level}{mode} | {why} | {cure} |\n")

@@ -212,7 +212,18 @@ def test_a_simulation_says_the_same_whatever_number_of_threads_blas_was_started_
     for threads in ("1", "2"):
         path = tmp_path / threads / "press.h5"
         env = {**os.environ, "OPENBLAS_NUM_THREADS": threads, "OMP_NUM_THREADS": threads}
-        command = [sys.executable, "-m", "tactbench", "record", "--sensor", "icub", "--cap-mm", "5", "--seconds", "10"]
+        command = [
+            sys.executable,
+            "-m",
+            "tactbench",
+            "record",
+            "--sensor",
+            "icub",
+            "--indenter",
+            "cap:radius=5",
+            "--profile",
+            "ramp:duration=10",
+        ]
         subprocess.run([*command, "--out", path], env=env, check=True, capture_output=True)
         digests.add(content_digest(path))
     assert len(digests) == 1

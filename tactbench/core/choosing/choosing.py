@@ -25,13 +25,17 @@ from tactbench.core.choosing.criteria import (
 )
 from tactbench.core.leaderboard.blocks import no_better
 from tactbench.core.leaderboard.names import LOWER_IS_BETTER, answer_name, hardware_name, metric_name, sensor_name
-from tactbench.core.spec.sensor import DataSheet, SensorSpec
+from tactbench.core.spec.sensor import SensorSpec
 from tactbench.core.spec.task import TaskSpec
-from tactbench.core.tables.numbers import ABSENT, interval
 from tactbench.core.tables.text import command_line, visible
 
-_OF_DEVICES = ("length", "mass", "interface", "power", "availability")
-"""Facts of a data sheet that no wish asks for and every integrator needs."""
+_STEPS = {
+    "answer delay": "run `{run}`; or ask its maker, or measure it",
+    "force range": "ask its maker, or load it and measure",
+    "rate": "ask its maker, or measure it on your set-up",
+    "trivial answer": "run `{run}`",
+}
+"""What to do about a wish of which is not known whether it is met."""
 
 
 @dataclass(frozen=True)
@@ -126,21 +130,15 @@ class _Choosing:
             if not no_better(row):
                 by_sensor.setdefault(row["sensor"], []).append(self.candidate(row))
         chosen = sorted((min(found, key=self.order) for found in by_sensor.values()), key=self.order)
-        left_out = [
-            f"{visible(name)}: no answer of it is better than a trivial one; `{self.run(name, '--probe')}` says why."
-            for name in trivial
-            if name not in by_sensor
-        ]
-        left_out += [
-            f"{visible(name)}: there is no finished answer beside trivial ones."
-            for name in dict.fromkeys(row["sensor"] for row in self.rows)
-            if name not in trivial
-        ]
-        left_out += [
-            f"{visible(one.row['sensor'])}: it exists as a definition only."
-            for one in chosen
-            if not self.exists(one.row["sensor"])
-        ]
+        left_out = []
+        for name in dict.fromkeys([*trivial, *(row["sensor"] for row in self.rows)]):
+            if name not in trivial:
+                left_out.append(f"{visible(name)}: there is no finished answer beside trivial ones.")
+            elif name not in by_sensor:
+                why = self.run(name, "--probe")
+                left_out.append(f"{visible(name)}: no answer of it is better than a trivial one; `{why}` says why.")
+            elif not self.exists(name):
+                left_out.append(f"{visible(name)}: it exists as a definition only.")
         chosen = [one for one in chosen if self.exists(one.row["sensor"])]
         unknown = dict.fromkeys(sentence for one in chosen for sentence in self.unknown(one))
         unknown.update(dict.fromkeys(self.of_all(chosen)))
@@ -195,20 +193,11 @@ class _Choosing:
 
     def unknown(self, one: Candidate) -> Iterable[str]:
         """Yield what is not known of a candidate, and what to do about it."""
-        sensor, row = visible(one.row["sensor"]), one.row
-        again = self.run(row["sensor"], "--estimator", row["estimator"])
+        sensor = visible(one.row["sensor"])
+        again = self.run(one.row["sensor"], "--estimator", one.row["estimator"])
         for criterion in one.named("unknown"):
-            if criterion.wish == "answer delay":
-                step = "ask its maker, or measure it" if row.get("delay_parts_ms") else f"run `{again}`"
-                yield f"how late {sensor} / {one.estimator} answers: {criterion.text}; {step}."
-            elif criterion.wish == "force range":
-                yield f"the force range of {sensor}: {criterion.text}; ask its maker, or load it and measure."
-            elif criterion.wish == "rate":
-                yield f"the rate of {sensor}: {criterion.text}; ask its maker, or measure it on your set-up."
-            elif criterion.wish == "score":
-                yield f"the score of {sensor} over the wished range: {criterion.text}."
-            else:
-                yield f"whether {sensor} / {one.estimator} beats a trivial answer; run `{again}`."
+            step = _STEPS.get(criterion.wish, "").format(run=again)
+            yield f"the {criterion.wish} of {sensor}: {criterion.text}{f'; {step}' if step else ''}."
         if one.low is None or one.high is None:
             yield f"how sure the score of {sensor} is: it has no interval; run `{again} --repeats 8`."
 
@@ -221,14 +210,6 @@ class _Choosing:
                 yield "up to which force these scores hold: the rows do not say how hard was pressed."
             elif wished > pressed:
                 yield f"any error beyond {newtons(pressed)}: the scenes of {self.task.name} press no harder."
-        lacking: dict[str, list[str]] = {}
-        for name in (one.row["sensor"] for one in chosen):
-            sheet = self.sensors[name].data_sheet if name in self.sensors else DataSheet()
-            facts = [visible(fact) for fact in _OF_DEVICES if getattr(sheet, fact) is None]
-            if facts:
-                lacking.setdefault(listed(facts), []).append(name)
-        for facts_text, names in lacking.items():
-            yield f"{facts_text} of {listed(names)}; `{command_line('tactbench', 'show', *names)}` has what is stated."
         if chosen and all(one.row["simulated"] for one in chosen):
             replay = command_line(
                 "tactbench", "run", "--rig", "replay", "--recordings", "DIR", "--task", self.task.name
@@ -261,9 +242,3 @@ def _apart(one: Candidate, other: Candidate) -> bool:
     if one.low is None or one.high is None or other.low is None or other.high is None:
         return False
     return one.high < other.low or other.high < one.low
-
-
-def interval_text(one: Candidate, unit: str) -> str:
-    """Return a candidate's interval, or that it has none."""
-    found = interval(one.low, one.high, unit)
-    return "no interval" if found == ABSENT else found

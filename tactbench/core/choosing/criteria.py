@@ -31,10 +31,8 @@ class Wish(NamedTuple):
     """Largest normal force that must be told [N]."""
     rate_hz: float | None = None
     """Smallest rate of answers [Hz]."""
-    max_error: float | None = None
-    """Largest score of a metric that is an error [the metric's unit]."""
-    min_score: float | None = None
-    """Smallest score of any other metric."""
+    score: float | None = None
+    """Worst score [the metric's unit]: the largest of an error, the smallest of any other metric."""
 
 
 @dataclass(frozen=True)
@@ -72,7 +70,7 @@ def criteria_of(
     Parameters
     ----------
     figure
-        What is held against `max_error` or `min_score`.
+        What is compared with the wished score.
     spec
         Of the sensor; None: not installed, so that its range and rate are unknown.
     """
@@ -164,7 +162,7 @@ def _sampled(task: TaskSpec, spec: SensorSpec | None) -> tuple[float | None, boo
 
 def _score(figure: ScoreInterval, wish: Wish, task: TaskSpec, pressed: float | None) -> Criterion | None:
     lower = task.metric in LOWER_IS_BETTER
-    wished = wish.max_error if lower else wish.min_score
+    wished = wish.score
     if wished is None:
         return None
 

@@ -8,9 +8,8 @@ from typing import TYPE_CHECKING
 
 import click
 
-from tactbench.core.cli.options import FiniteRange
+from tactbench.core.cli.options import YES, format_option
 from tactbench.core.cli.threads import keep_threads
-from tactbench.core.spec.bounds import MOST_SECONDS
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -19,44 +18,28 @@ if TYPE_CHECKING:
     from tactbench.core.conformance.subject import Subject
     from tactbench.core.spec.rig_file import RigFile
 
-_KINDS = ("sensor", "rig", "device", "task", "estimator", "effect", "indenter", "profile")
-
 
 @click.command(name="check")
 @click.argument("name")
-@click.option("--kind", type=click.Choice(_KINDS), help="Of several things of that name, this one alone.")
 @click.option("--recording", type=click.Path(path_type=Path, exists=True, dir_okay=False), metavar="FILE",
-              help="Read this recording of the sensor, and nothing else.")  # fmt: skip
-@click.option("--passive", is_flag=True, help="Run the checks that open nothing also beside --recording.")
-@click.option("--invasive", is_flag=True, help="Also open the device's line, or press with the rig.")
+              help="Check this recording of the sensor, importing no code of the plugin.")  # fmt: skip
+@click.option("--passive", is_flag=True, help="With --recording: add the checks that run without it.")
 @click.option("--rig-file", type=click.Path(path_type=Path, exists=True, dir_okay=False), metavar="FILE",
-              help="Which devices stand on which lines, for --invasive.")  # fmt: skip
-@click.option("--yes", is_flag=True, help="Do not ask before something is opened or moves.")
-@click.option("--all", "every", is_flag=True, help="Also list the checks that passed.")
-@click.option("--timeout", type=FiniteRange(min=1, max=MOST_SECONDS), default=30.0, show_default=True, metavar="S",
-              help="Seconds that one check may take.")  # fmt: skip
-@click.option("--out", type=click.Path(path_type=Path, exists=True, file_okay=False), metavar="FOLDER",
-              help="Keep the level in this result folder: its tables show it beside the sensor.")  # fmt: skip
-@click.option("--format", "shape", type=click.Choice(("table", "json")), default="table", show_default=True)
+              help="Also open the device's line, or press with the rig, as this file says; prompts first.")  # fmt: skip
+@YES
+@click.option("--out", type=click.Path(path_type=Path, exists=True, file_okay=False), metavar="DIR",
+              help="Store a sensor's level in this result folder; its tables show it.")  # fmt: skip
+@format_option("table", "json")
 @click.pass_context
 def command(
-    ctx: click.Context,
-    name: str,
-    kind: str | None,
-    recording: Path | None,
-    passive: bool,
-    invasive: bool,
-    rig_file: Path | None,
-    yes: bool,
-    every: bool,
-    timeout: float,
-    out: Path | None,
-    shape: str,
-) -> None:
-    """Check a sensor, rig, device, task, estimator, effect, indenter or profile, or all that a plugin brings.
+    ctx: click.Context, name: str, recording: Path | None, passive: bool, rig_file: Path | None, yes: bool,
+    out: Path | None, shape: str,
+) -> None:  # fmt: skip
+    """Check whether a plugin conforms: a sensor, rig, device, task, estimator, effect, indenter or profile.
 
-    By default nothing is opened and nothing moves; docs/conformance.md lists the checks. Exit code 1 if a check failed
-    or fewer ran than every plugin of that kind can run, 2 if nothing is called NAME.
+    NAME is one of these, or a plugin: then all it brings is checked. Without --rig-file nothing is opened and nothing
+    moves; docs/conformance.md lists the checks. Exit code 1 if a check failed or fewer ran than every plugin of that
+    kind can run, 2 if nothing is called NAME.
     """
     keep_threads()
     from tactbench.core.cli.operator import TerminalOperator
@@ -69,48 +52,33 @@ def command(
     from tactbench.core.plugins.rig_files import load_rig_file
     from tactbench.core.tables.text import json_text
 
-    if (rig_file is not None) != invasive:
-        raise UsageError(
-            "--invasive and --rig-file FILE go together: the file says which devices are opened.",
-            hint="Give both, or neither.",
-        )
     registry = load_registry()
-    kinds = tuple(one for one in KINDS if kind in (None, one))
     wrong = [f"{row.entry_point}: {row.reason}" for row in plugins_named(registry, name) if row.status == "failed"]
     try:
-        subjects = subjects_named(registry, name, kinds)
+        subjects = subjects_named(registry, name, KINDS)
     except UnknownNameError as error:
         wrong = list(failed_plugins(registry))
         if not wrong:
             raise
         subjects = []
         remark(error.message)
-    modes: tuple[Mode, ...] = ("passive",) if passive or recording is None else ()
-    modes += ("invasive",) if invasive else ()
-    modes += ("recording",) if recording is not None else ()
+    sensors = [one for one in subjects if one.kind == "sensor"]
+    if (recording or out) and not sensors and not wrong:
+        raise UsageError(f"{name} is no sensor.", hint="--recording and --out are for sensors: leave them out.")
+    modes: list[Mode] = ["passive"] if passive or recording is None else []
+    if out is not None and not modes:
+        raise UsageError("--out stores a level, which a recording alone has not.", hint="Add --passive.")
     if recording is not None:
-        subjects = [one for one in subjects if one.kind == "sensor"]
-        if not subjects and not wrong:
-            raise UsageError(f"{name} is no sensor, and a recording is of one.", hint="Leave --recording out.")
-    if out is not None and ("passive" not in modes or not any(one.kind == "sensor" for one in subjects)):
-        raise UsageError(
-            "--out keeps the level of a sensor, and none is computed here.",
-            hint="Name a sensor, and add --passive beside --recording.",
-        )
+        modes.append("recording")
+        subjects = sensors
     if out is not None:
         opened(out)
     if rig_file is not None:
+        modes.append("invasive")
         _ask(subjects, load_rig_file(rig_file, registry), yes)
+    operator = TerminalOperator(yes=yes)
     reports = [
-        run_checks(
-            one,
-            modes=modes,
-            recording=recording,
-            rig_file=rig_file,
-            operator=TerminalOperator(yes=yes),
-            timeout_s=timeout,
-        )
-        for one in subjects
+        run_checks(one, modes=modes, recording=recording, rig_file=rig_file, operator=operator) for one in subjects
     ]
     if out is not None:
         for checked, report in zip(subjects, reports, strict=True):
@@ -120,10 +88,9 @@ def command(
         click.echo(json_text({"failed_plugins": wrong, "checked": [_plain(one) for one in reports]}, indent=1))
     else:
         for text in wrong:
-            click.secho("could not be loaded  ", fg="red", nl=False)
-            click.echo(text)
+            _line("could not be loaded", "red", text)
         for report in reports:
-            _print(report, every)
+            _print(report)
     ctx.exit(1 if wrong or not all(one.ok for one in reports) or not reports else 0)
 
 
@@ -145,7 +112,7 @@ def _ask(subjects: Sequence[Subject], file: RigFile, yes: bool) -> None:
         return
     if not sys.stdin.isatty():
         raise UsageError(
-            "--invasive asks before anything moves, and nobody is there.", hint="Add --yes if all is clear."
+            "--rig-file asks before anything moves, and nobody is there.", hint="Add --yes if all is clear."
         )
     known = {*file.sensors, *(getattr(one, "device", None) for one in file.entries().values())}
     lines = [one.name for one in subjects if one.kind in ("sensor", "device") and one.name in known]
@@ -184,29 +151,26 @@ def _plain(report: CheckReport) -> dict[str, object]:
     }  # fmt: skip
 
 
-def _print(report: CheckReport, every: bool) -> None:
+def _print(report: CheckReport) -> None:
     from tactbench.core.conformance.kit import checks_of
-    from tactbench.core.tables.text import visible_lines
 
     cures = {one.name: one for one in checks_of(report.kind, *report.modes)}
-    if every:
-        for one in report.passed:
-            click.secho("passed   ", fg="green", nl=False)
-            click.echo(one.check)
+    for one in report.failed:
+        _line("FAILED", "red", f"{one.check}: {one.where}: {one.text}")
+        if one.check in cures:
+            click.echo(f"          why: {cures[one.check].why}\n          do:  {cures[one.check].cure}")
+    for one in report.expected:
+        _line("expected", "yellow", f"{one.check}: {one.text}")
     reasons: dict[str, list[str]] = {}
     for one in report.skipped:
         reasons.setdefault(one.text, []).append(one.check)
     for text, names in reasons.items():
-        click.secho("skipped  ", fg="yellow", nl=False)
-        click.echo(visible_lines(f"{len(names)} checks: {text}" if len(names) > 1 else f"{names[0]}: {text}"))
-        if every and len(names) > 1:
-            click.echo(f"         {', '.join(names)}")
-    for one in report.expected:
-        click.secho("expected ", fg="yellow", nl=False)
-        click.echo(visible_lines(f"{one.check}: {one.text}"))
-    for one in report.failed:
-        click.secho("FAILED   ", fg="red", bold=True, nl=False)
-        click.echo(visible_lines(f"{one.check}: {one.where}: {one.text}"))
-        if one.check in cures:
-            click.echo(f"         why: {cures[one.check].why}\n         do:  {cures[one.check].cure}")
+        _line("skipped", "yellow", f"{len(names)} checks: {text}" if len(names) > 1 else f"{names[0]}: {text}")
     click.secho(report.summary, bold=True)
+
+
+def _line(word: str, colour: str, text: str) -> None:
+    from tactbench.core.tables.text import visible_lines
+
+    click.secho(f"{word:<8}  ", fg=colour, bold=word.isupper(), nl=False)
+    click.echo(visible_lines(text))

@@ -3,18 +3,16 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from tactbench.core.cli.options import FiniteRange
+from tactbench.core.cli.options import ABOVE_0, format_option
 from tactbench.core.cli.results import is_results, opened, shown_rows
 
 if TYPE_CHECKING:
     from tactbench.core.choosing.choosing import Choice
-    from tactbench.core.choosing.criteria import Wish
     from tactbench.core.spec.task import TaskSpec
     from tactbench.core.tables.text_table import TextTable
 
@@ -23,26 +21,21 @@ _DEFAULT = Path("tactbench-results")
 _PREFERRED = "deployable"
 
 
-def _positive(option: str, words: str) -> Callable[[Any], Any]:
-    return click.option(option, type=FiniteRange(min=0, min_open=True), metavar="X", help=words)
-
-
 @click.command(name="choose")
 @click.argument("folder", type=click.Path(path_type=Path), required=False)
-@click.option("--task", "task_name", required=True, metavar="NAME", help="What the sensor is to tell.")
-@_positive("--max-delay-ms", "Largest delay from the touch to the answer, in ms.")
-@_positive("--range-n", "Largest normal force to be told, in N.")
-@_positive("--rate-hz", "Smallest rate of answers, in Hz.")
-@_positive("--max-error", "Largest error, in the task's unit; of force beyond the noise of its reference.")
-@_positive("--min-score", "Smallest score, where the task has one and no error.")
-@click.option("--protocol", metavar="NAME", help="Default: deployable, what a sensor in use can do.")
-@click.option("--split", metavar="NAME", help="Default: the first of the task's splits that there are results of.")
-@click.option("--format", "shape", type=click.Choice(("table", "json")), default="table", show_default=True)
+@click.option("--task", "task_name", required=True, metavar="NAME", help="Task.")
+@click.option("--max-delay-ms", type=ABOVE_0, metavar="X", help="Largest delay from touch to answer.")
+@click.option("--range-n", type=ABOVE_0, metavar="X", help="Largest normal force to measure.")
+@click.option("--rate-hz", type=ABOVE_0, metavar="X", help="Smallest rate of answers.")
+@click.option("--score", type=ABOVE_0, metavar="X",
+              help="Worst score to accept, in the task's unit; of force beyond the reference's noise.")  # fmt: skip
+@click.option("--protocol", metavar="NAME", help="Evaluation protocol. Default: deployable.")
+@format_option("table", "json")
 def command(
     folder: Path | None, task_name: str, max_delay_ms: float | None, range_n: float | None, rate_hz: float | None,
-    max_error: float | None, min_score: float | None, protocol: str | None, split: str | None, shape: str,
+    score: float | None, protocol: str | None, shape: str,
 ) -> None:  # fmt: skip
-    """Say which sensor meets a wish, which misses it by how much, and what is unknown.
+    """Find the sensor that meets given requirements; say which miss them by how much, and what is unknown.
 
     FOLDER is what `run --out` wrote; default: tactbench-results, and the results that came with tactbench where that
     has none of the task.
@@ -54,10 +47,9 @@ def command(
 
     registry = load_registry()
     task = registry.tasks[task_name].spec
-    wish = Wish(max_delay_ms, range_n, rate_hz, max_error, min_score)
-    _check(wish, task)
+    wish = Wish(max_delay_ms, range_n, rate_hz, score)
     rows, origin = _results(folder, task)
-    rows, heading = _selected(rows, task, protocol, split)
+    rows, heading = _selected(rows, task, protocol)
     choices = choose(rows, wish, task, {one.name: one.spec for one in registry.sensors})
     if shape == "json":
         content = {"task": task.name, "wish": wish._asdict(), "results": origin, "protocol": rows[0]["protocol"],
@@ -69,19 +61,6 @@ def command(
     from tactbench.core.cli.screen import console
 
     console().print(f"From {origin}.", markup=False)
-
-
-def _check(wish: Wish, task: TaskSpec) -> None:
-    from tactbench.core.errors import UsageError
-    from tactbench.core.leaderboard.names import LOWER_IS_BETTER
-
-    lower = task.metric in LOWER_IS_BETTER
-    if wish.min_score is not None and lower:
-        raise UsageError(f"The {task.metric} of {task.name} is an error.", hint="Give --max-error instead.")
-    if wish.max_error is not None and not lower:
-        raise UsageError(
-            f"The {task.metric} of {task.name} is a score, and no error.", hint="Give --min-score instead."
-        )
 
 
 def _results(folder: Path | None, task: TaskSpec) -> tuple[list[Row], str]:
@@ -122,7 +101,7 @@ def _shipped() -> tuple[list[Row], str]:
     return rows, made
 
 
-def _selected(rows: list[Row], task: TaskSpec, protocol: str | None, split: str | None) -> tuple[list[Row], str]:
+def _selected(rows: list[Row], task: TaskSpec, protocol: str | None) -> tuple[list[Row], str]:
     """Return the rows of one protocol and split, and what they are called."""
     from tactbench.core.errors import UnknownNameError
 
@@ -132,9 +111,7 @@ def _selected(rows: list[Row], task: TaskSpec, protocol: str | None, split: str 
     if chosen not in protocols:
         raise UnknownNameError("protocol with results", chosen, protocols)
     splits = list(dict.fromkeys(str(row["split"]) for row in done if row["protocol"] == chosen))
-    kept = split or next((name for name in task.splits if name in splits), splits[0])
-    if kept not in splits:
-        raise UnknownNameError("split with results", kept, splits)
+    kept = next((name for name in task.splits if name in splits), splits[0])
     found = [row for row in rows if row["protocol"] == chosen and str(row["split"]) in (kept, "None")]
     dagger = " † (uses test-set statistics, as no sensor in use can)" if any(row["dagger"] for row in found) else ""
     unasked = protocol is None and chosen != _PREFERRED
@@ -164,8 +141,7 @@ def _print(choice: Choice, heading: str) -> None:
 
 
 def _table(choice: Choice) -> TextTable:
-    from tactbench.core.choosing.choosing import interval_text
-    from tactbench.core.tables.numbers import score
+    from tactbench.core.tables.numbers import ABSENT, interval, score
     from tactbench.core.tables.text_table import TextTable
 
     wishes = dict.fromkeys(one.wish for candidate in choice.candidates for one in candidate.criteria)
@@ -175,7 +151,8 @@ def _table(choice: Choice) -> TextTable:
         entries = {
             criterion.wish: ": ".join(filter(None, (criterion.state, criterion.text))) for criterion in one.criteria
         }
-        known = f"{score(one.score, choice.unit)}, {interval_text(one, choice.unit)}"
+        ends = interval(one.low, one.high, choice.unit)
+        known = f"{score(one.score, choice.unit)}, {'no interval' if ends == ABSENT else ends}"
         wished = f"; {entries['score']}" if "score" in entries else ""
         lines.append((f"{one.sensor} / {one.estimator}", known + wished, *(entries.get(wish, "") for wish in head[2:])))
     return TextTable(f"score: {choice.quantity}", head, tuple(lines))

@@ -1,82 +1,141 @@
-"""``tactbench cost``: what accuracy costs in time."""
+"""``tactbench cost``: what accuracy costs in time, of estimators or of the simulated rig."""
 
 from __future__ import annotations
 
+from contextlib import suppress
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING
 
 import click
 
-from tactbench.core.cli.options import FiniteRange
+from tactbench.core.cli.options import RESULTS, format_option
 from tactbench.core.cli.threads import keep_threads
-from tactbench.core.spec.bounds import MOST_REPEATS
+from tactbench.core.tables.text import json_text
+
+if TYPE_CHECKING:
+    from tactbench.core.cost.ladder import Ladder
+    from tactbench.core.matrix.store import Store
+    from tactbench.core.plugins.registry import Registry
+    from tactbench.core.spec.matrix import MatrixSpec
 
 
 @click.command(name="cost")
 @click.option("--twin", is_flag=True, help="Of the simulated rig instead: error against seconds per recording.")
-@click.option("--sensor", "sensors", multiple=True, metavar="NAME", help="Of which sensor; with --twin also several.")
-@click.option("--task", metavar="NAME",
-              help="Which question the estimators answer; with --twin whose score is looked at, rung by rung (default: "
-                   "the tasks of the default matrix).")  # fmt: skip
+@click.option("--sensor", "sensors", multiple=True, metavar="NAME", help="Sensor; with --twin repeatable.")
+@click.option("--task", metavar="NAME", help="Task; with --twin the task to score with each rung's recordings.")
 @click.option("--estimator", "estimators", multiple=True, metavar="NAME",
-              help="What answers; may be repeated. Default: every one for this kind of question. With --twin one; "
-                   "default: a quick, linear one.")  # fmt: skip
-@click.option(
-    "--rung",
-    "rungs",
-    multiple=True,
-    metavar="NAME",
-    help="With --twin: a rung whose recordings are scored; may be repeated. Default: all but the dearest.",
-)
-@click.option("--score/--no-score", default=True, help="With --twin: whether rungs are scored at all.")
-@click.option("--rig", metavar="NAME", help="What carries out the scenes: twin (default), replay …")
-@click.option("--recordings", type=click.Path(path_type=Path), metavar="DIR", help="Recordings for --rig replay.")
-@click.option("--protocol", metavar="NAME", help="How recordings become X and y; default: the task's first.")
-@click.option("--split", metavar="NAME", help="What is kept apart; default: the task's first that fits.")
-@click.option("--seed", type=click.IntRange(min=0), default=1, show_default=True, metavar="N")
-@click.option("--repeats", type=click.IntRange(min=1, max=MOST_REPEATS), default=1, show_default=True, metavar="N",
-              help="Replicates that scores are over, five or more for intervals; times are of the first.")  # fmt: skip
+              help="Estimator; repeatable. Default: every one that fits.")  # fmt: skip
+@click.option("--recordings", type=click.Path(path_type=Path), metavar="DIR", help="Recordings to replay.")
+@click.option("--protocol", metavar="NAME", help="Evaluation protocol. Default: the task's first.")
 @click.option("--rounds", type=click.IntRange(min=1), default=5, show_default=True, metavar="N",
-              help="How often everything is timed, turn and turn about.")  # fmt: skip
-@click.option("--threads", type=click.IntRange(min=1), default=1, show_default=True, metavar="N",
-              help="Threads that estimators and BLAS may use while they are timed.")  # fmt: skip
-@click.option("--budget", type=FiniteRange(min=0), default=20.0, show_default=True, metavar="SECONDS",
-              help="What took longer once is not timed again in later rounds; its row says so.")  # fmt: skip
-@click.option("--out", type=click.Path(path_type=Path), metavar="DIR",
-              help="Result folder, as of `run`; files and cells go into its folder cost. Default: tactbench-results. "
-                   "With --twin: the folder of the files themselves; default: tactbench-results/cost.")  # fmt: skip
-@click.option("--format", "shape", type=click.Choice(("table", "json", "csv")), default="table", show_default=True)
+              help="Number of timing rounds.")  # fmt: skip
+@RESULTS
+@format_option("table", "json", "csv")
 def command(
-    twin: bool, sensors: tuple[str, ...], task: str | None, rig: str | None, out: Path | None, shape: str, threads: int,
-    rungs: tuple[str, ...], score: bool, **options: Any,
+    twin: bool, sensors: tuple[str, ...], task: str | None, estimators: tuple[str, ...], recordings: Path | None,
+    protocol: str | None, rounds: int, out: Path, shape: str,
 ) -> None:  # fmt: skip
     """Measure what accuracy costs in time, and draw it.
 
     Of estimators: score against fit time and answer delay, for one sensor and task. Of the simulated rig: --twin, error
-    in counts against seconds, and what its rungs do to the score.
+    in counts against seconds, and with --task what its rungs do to the score. Files go into the folder cost of the
+    result folder.
     """
-    keep_threads(1 if twin else threads)
+    keep_threads()
     from tactbench.core.errors import UsageError
 
     if twin:
+        if estimators or recordings or protocol:
+            raise UsageError("--twin takes --sensor, --task and --rounds.", hint="Leave the others out.")
         from tactbench.core.cli.cost_twin import show_twin
 
-        if len(options["estimators"]) > 1:
-            raise UsageError("--twin has one estimator answer.", hint="Give --estimator once.")
-        show_twin(
-            sensors, rig, out or Path("tactbench-results") / "cost", shape, rounds=options["rounds"], task=task,
-            rungs=rungs, estimator=next(iter(options["estimators"]), None), scoring=score, seed=options["seed"],
-        )  # fmt: skip
+        show_twin(sensors, out / "cost", shape, rounds=rounds, task=task)
         return
-    if rungs or not score:
-        raise UsageError("--rung and --no-score belong to --twin.", hint="Leave them out, or add --twin.")
     if len(sensors) != 1 or task is None:
         raise UsageError(
             "Say what the cost is asked of.",
             hint="Of estimators: --sensor NAME --task NAME, one of each. Of the simulated rig: --twin.",
         )
-    from tactbench.core.cli.cost_ladder import show_ladder
+    import time
 
-    show_ladder(
-        sensors[0], task, rig=rig, threads=threads, out=out or Path("tactbench-results"), shape=shape, **options
-    )
+    from tactbench.core.cli.progress import progress
+    from tactbench.core.cli.screen import remark
+    from tactbench.core.cost.ladder import climb
+    from tactbench.core.cost.ladder_file import write_ladder
+    from tactbench.core.leaderboard.names import METRIC_NAMES
+    from tactbench.core.plugins.declared import declared_in, with_declared
+    from tactbench.core.plugins.registry import load_registry
+    from tactbench.core.tables.csv_text import csv_of_records
+
+    registry = with_declared(load_registry(), declared_in(recordings))
+    matrix = _matrix(registry, sensors[0], task, recordings, protocol, estimators)
+    store = _store(out, sensors[0], task)
+    with progress() as display:
+        ladder = climb(
+            matrix, registry, store, rounds=rounds, clock=time.perf_counter, progress=display, recordings=recordings
+        )
+    if shape == "json":
+        click.echo(json_text(ladder.rows, indent=1))
+    elif shape == "csv":
+        click.echo(csv_of_records(ladder.rows), nl=False)
+    else:
+        _print(ladder)
+    paths = write_ladder(ladder, out, METRIC_NAMES.get(ladder.about["metric"], ""))
+    remark(f"Files: {', '.join(map(str, paths))}")
+
+
+def _matrix(
+    registry: Registry, sensor: str, task: str, recordings: Path | None, protocol: str | None,
+    estimators: tuple[str, ...],
+) -> MatrixSpec:  # fmt: skip
+    from tactbench.core.spec.matrix import EstimatorChoice, MatrixSpec, TaskChoice
+
+    rig = "twin" if recordings is None else "replay"
+    if protocol is None and not registry.rigs[rig].simulated:
+        protocol = "deployable"  # as `run` has it: the paper's protocol needs the paper's three roles
+    answerers = tuple(EstimatorChoice(name=name) for name in estimators or ("all",))
+    choice = TaskChoice(name=task, protocol=protocol, estimators=answerers)
+    return MatrixSpec(rig=rig, seed=1, repeats=1, sensors=(sensor,), tasks=(choice,))
+
+
+def _store(out: Path, sensor: str, task: str) -> Store:
+    """Return the folder of the ladder's own cells, `out`/cost, which no leaderboard of `out` shows.
+
+    What a run has finished of the same question, and what it recorded with the sensor, is linked into it and not done
+    again; what cannot be linked is.
+    """
+    from tactbench.core.matrix.store import Store
+
+    store = Store(out / "cost")
+    rows = Store(out).rows() if (out / "cells").is_dir() else []
+    finished_of = ("done", sensor, task)
+    finished = [row for row in rows if (row["status"], row["sensor"], row["task"]) == finished_of]
+    cells = [Path("cells", f"{row['key']}.h5") for row in finished]
+    recordings = [path.relative_to(out) for path in (out / "recordings" / sensor).glob("*.h5")]
+    for path in (*cells, *recordings):
+        link = store.folder / path
+        with suppress(OSError):
+            link.parent.mkdir(parents=True, exist_ok=True)
+            link.hardlink_to(out / path)
+    return store
+
+
+def _print(ladder: Ladder) -> None:
+    from tactbench.core.cli.grid import print_grid
+    from tactbench.core.cli.screen import remark
+    from tactbench.core.cost.ladder_file import DEFINITIONS
+    from tactbench.core.report.costs import COLUMNS, RIGHT, line, title
+
+    about = ladder.about
+    lines = [line(row, about["unit"]) for row in ladder.rows]
+    kinds = ["result" if row["front_fit"] or row["front_delay"] else "" for row in ladder.rows]
+    print_grid(title(about), COLUMNS, lines, numeric=RIGHT, kinds=kinds)
+    if about["load"] is not None and about["load"] > about["cores"]:
+        remark(
+            f"The machine was busy: {about['load']:.1f} processes wanted its {about['cores']} cores. Others' work is "
+            "in these times, most of all in the 95th percentiles; time on an idle machine before you quote them."
+        )
+    for text in about["remarks"]:
+        remark(f"{text[0].upper()}{text[1:]}.")
+    for key, text in DEFINITIONS.items():
+        remark(f"{key}: {text}.")

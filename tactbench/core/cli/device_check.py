@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, field
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from tactbench.core.errors import TactbenchError
 from tactbench.core.samples import Quality
@@ -103,7 +103,6 @@ class DeviceCheck:
 def check_devices(
     rig_file: RigFile,
     registry: Registry,
-    sensors: Sequence[str],
     *,
     seconds: float,
     clock: Clock,
@@ -113,8 +112,6 @@ def check_devices(
 
     Parameters
     ----------
-    sensors
-        Those of the file that are looked at.
     seconds
         How long each device is read.
     clock
@@ -133,8 +130,6 @@ def check_devices(
 
     checks = []
     for name, entry in rig_file.entries().items():
-        if name in rig_file.sensors and name not in sensors:
-            continue
         check = DeviceCheck(name, str(getattr(entry, "device", name)), entry.link, entry.emulated)
         checks.append(check)
         if entry.emulated:
@@ -271,13 +266,9 @@ def _noise(spec: StreamSpec, values: FloatArray) -> tuple[Noise, ...]:
         groups.setdefault((channel.kind, channel.unit), []).append(place)
     found = []
     for (kind, unit), places in groups.items():
-        sds: dict[str, float] = {}
-        means: dict[str, float] = {}
-        for place in places:
-            good = values[:, place][np.isfinite(values[:, place])]
-            if len(good) > 1:
-                sds[spec.channels[place].name] = float(good.std(ddof=1))
-                means[spec.channels[place].name] = float(good.mean())
+        columns = {spec.channels[place].name: values[np.isfinite(values[:, place]), place] for place in places}
+        good = {name: column for name, column in columns.items() if len(column) > 1}
+        sds = {name: float(column.std(ddof=1)) for name, column in good.items()}
         noisiest = max(sds, key=sds.__getitem__, default="")
         found.append(
             Noise(
@@ -288,7 +279,7 @@ def _noise(spec: StreamSpec, values: FloatArray) -> tuple[Noise, ...]:
                 sd_largest=sds.get(noisiest),
                 noisiest=noisiest,
                 constant=tuple(name for name, sd in sds.items() if sd == 0),
-                means=means,
+                means={name: float(column.mean()) for name, column in good.items()},
             )
         )
     return tuple(found)
@@ -303,30 +294,21 @@ _MEANING = {
 
 
 def _problems(found: StreamCheck) -> list[str]:
-    sentences = []
+    name, sentences = found.stream, []
     if found.rate_hz is not None and found.nominal_hz is not None:
         allowed = RATE_TOLERANCE + 2 / found.rows + 2 * HELD_S * found.rate_hz / found.rows
         if abs(found.rate_hz / found.nominal_hz - 1) > allowed:
             sentences.append(
-                f"Stream {found.stream} came at {found.rate_hz:.4g} Hz, stated are {found.nominal_hz:.4g} Hz. "
+                f"Stream {name} came at {found.rate_hz:.4g} Hz, stated are {found.nominal_hz:.4g} Hz. "
                 "Is the device set up for another rate, or the link too slow for it?"
             )
     if found.lost:
         sentences.append(
-            f"Of stream {found.stream}, {found.lost} rows are lost by its numbers: is the host or the bus too busy?"
+            f"Of stream {name}, {found.lost} rows are lost by its numbers: is the host or the bus too busy?"
         )
     if found.unordered:
-        sentences.append(f"Of stream {found.stream}, {found.unordered} rows came twice or late: what lies between?")
-    sentences += [
-        f"Of stream {found.stream}, {number} of {found.rows} rows {_MEANING[mark]}"
-        for mark, number in found.marks.items()
-        if number and not (mark == "GAP" and found.lost)
+        sentences.append(f"Of stream {name}, {found.unordered} rows came twice or late: what lies between?")
+    marks = {mark: number for mark, number in found.marks.items() if number and not (mark == "GAP" and found.lost)}
+    return sentences + [
+        f"Of stream {name}, {number} of {found.rows} rows {_MEANING[mark]}" for mark, number in marks.items()
     ]
-    return sentences
-
-
-def as_plain(checks: Sequence[DeviceCheck]) -> list[dict[str, Any]]:
-    """Return the checks for JSON."""
-    from dataclasses import asdict
-
-    return [asdict(check) for check in checks]

@@ -2,25 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+import math
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from tactbench.core.cli.options import options
-from tactbench.core.cli.scenes import PRESS, indenter_of, profile_of, scene_of
+from tactbench.core.cli.scenes import PROFILE, profile_of, scene_of
 from tactbench.core.cli.screen import remark
 
 if TYPE_CHECKING:
     from tactbench.core.plugins.registry import Registry
-    from tactbench.core.samples import Block
-    from tactbench.core.spec.profile import ForceProfile
     from tactbench.core.spec.rig import SensorDescriptor
     from tactbench.core.spec.rig_file import DeviceEntry, RigFile
     from tactbench.core.spec.scene import Scene
-    from tactbench.core.spec.sensor import StreamSpec
     from tactbench.devices.emulation.emulated_devices import EmulatedDevice, EmulatedDevices
     from tactbench.devices.emulation.scene_samples import SceneSamples
 
@@ -32,98 +29,59 @@ STATUS_S = 5.0
 @click.command(name="emulate")
 @click.argument("names", nargs=-1, metavar="[DEVICE]...")
 @click.option("--rig-file", type=click.Path(path_type=Path), metavar="FILE",
-              help="Start every device of this rig file whose link is `emulated`.")  # fmt: skip
-@options(*PRESS)
-@click.option("--presses", type=click.IntRange(min=1), metavar="N", help="End after so many; default: with Ctrl-C.")
-@click.option("--fault", "faults", multiple=True, metavar="DEVICE:FAULT",
-              help="Something wrong with a device: biotac:parity:every=100, net-ft:unplug:start_s=20.")  # fmt: skip
-@click.option("--physics", metavar="RIG", help="The simulated rig that presses; default twin, or the rig file's.")
-@click.option(
-    "--seed", type=click.IntRange(min=0), metavar="N", help="Of all that is drawn; default 1, or the rig file's."
-)
-@click.option("--can", type=click.Choice(["slcan", "udp_multicast"]), default="slcan", show_default=True,
-              help="How CAN devices are reached from other programs.")  # fmt: skip
-@click.option("--write-rig-file", type=click.Path(path_type=Path), metavar="FILE",
-              help="Write the rig file with the devices' links there, too.")  # fmt: skip
+              help="Start every device of this file whose link is `emulated`, with its faults.")  # fmt: skip
+@PROFILE
+@click.option("--presses", type=click.IntRange(min=1), metavar="N", help="Number of presses. Default: until Ctrl-C.")
+@click.option("--write-rig-file", "out", type=click.Path(path_type=Path), metavar="FILE",
+              help="Also write the printed rig file, with the devices' links, to FILE.")  # fmt: skip
 def command(
     names: tuple[str, ...],
     rig_file: Path | None,
-    cap_mm: float | None,
-    indenter: str | None,
     profile: str | None,
-    force_n: float | None,
-    seconds: float | None,
     presses: int | None,
-    faults: tuple[str, ...],
-    physics: str | None,
-    seed: int | None,
-    can: Any,
-    write_rig_file: Path | None,
+    out: Path | None,
 ) -> None:
     """Start emulated sensors and devices on links of this machine, pressed by a simulated rig.
 
     DEVICE is a sensor or device by name, for example: tactbench emulate biotac net-ft. What another program needs to
     open them is printed as a rig file.
     """
+    from itertools import count
+
     from tactbench.core.errors import UsageError
     from tactbench.core.plugins.registry import load_registry
+    from tactbench.core.plugins.rig_devices import descriptor_of, emulated_device, options_of
     from tactbench.core.plugins.rig_files import load_rig_file
+    from tactbench.core.spec.rig_file import EmulationSettings
+    from tactbench.devices.emulation.emulated_devices import EmulatedDevices
 
     if bool(names) == (rig_file is not None):
         raise UsageError(
             "Either devices or a rig file say what to emulate.",
             hint="For example: tactbench emulate biotac net-ft; `tactbench list devices` names more.",
         )
+    if out is not None and out.exists() and not out.read_text(encoding="utf-8", errors="replace").startswith(HEAD):
+        raise UsageError(f"{out} is there already, and not from `tactbench emulate`.", hint="Give another name.")
     registry = load_registry()
     file = load_rig_file(rig_file, registry) if rig_file is not None else None
     entries = _named(registry, names) if file is None else file.entries()
-    settings = {} if file is None else dict(file.emulation)
-    shape, path = indenter_of(registry, indenter), profile_of(registry, profile)
+    how = EmulationSettings() if file is None else file.emulation
 
-    def pressed(sensor: SensorDescriptor | None) -> Scene:
-        return scene_of("press", cap_mm, force_n, seconds, sensor, shape, path)
-
-    presser = Presser(
-        registry,
-        settings.get("physics", "twin") if physics is None else physics,
-        {name: pressed(registry.sensors[name]) for name in _sensors(entries)},
-        pressed(None),
-        settings.get("seed", 1) if seed is None else seed,
-    )
-    emulate(registry, with_faults(entries, faults), presser, file, can=can, presses=presses, out=write_rig_file)
-
-
-def emulate(
-    registry: Registry,
-    entries: Mapping[str, DeviceEntry],
-    presser: Presser,
-    file: RigFile | None,
-    *,
-    can: Any,
-    presses: int | None,
-    out: Path | None,
-) -> None:
-    """Start what is emulated in `entries`, say where it is, and press until it is enough."""
-    from itertools import count
-
-    from tactbench.core.errors import UsageError
-    from tactbench.core.plugins.rig_devices import descriptor_of, emulated_device, options_of
-    from tactbench.devices.emulation.emulated_devices import EmulatedDevices
-
-    if out is not None and out.exists() and not out.read_text(encoding="utf-8", errors="replace").startswith(HEAD):
-        raise UsageError(f"{out} is there already, and not from `tactbench emulate`.", hint="Give another name.")
+    load = profile_of(registry, profile)
+    pressed = [name for name, entry in entries.items() if entry.emulated and not hasattr(entry, "device")]
+    scenes = {name: scene_of("press", registry.sensors[name], profile=load) for name in pressed}
+    presser = Presser(registry, how.physics, scenes, scene_of("press", None, profile=load), how.seed)
     devices: dict[str, EmulatedDevice] = {}
-    complete: dict[str, DeviceEntry] = {}
     for name, entry in entries.items():
         descriptor = descriptor_of(registry, name, entry)
-        complete[name] = entry.model_copy(update={"options": options_of(descriptor, entry)})
+        entries[name] = entry.model_copy(update={"options": options_of(descriptor, entry)})
         if entry.emulated:
             devices[name] = emulated_device(descriptor, name, entry, presser.senses(name), presser.seed)
     if not devices:
         raise UsageError("No device in the rig file is emulated.", hint="Write `link: emulated` for one.")
     presser.draw(1)
-    with EmulatedDevices(devices, time="real", can=can) as emulated:
-        _say_where(emulated, complete, file, out)
+    with EmulatedDevices(devices, time="real") as emulated:
+        _say_where(emulated, entries, file, out)
         for number in count(1) if presses is None else range(1, presses + 1):
             if number > 1:
                 presser.draw(number)
@@ -162,6 +120,7 @@ class Presser:
             raise UsageError(f"The rig {self.physics!r} is not simulated.", hint="Use twin.")
         self._rig = load_object(descriptor.where)(rig_context(self.registry))
         self._drawn: dict[str, SceneSamples] = {}
+        self._began_s = math.inf
 
     def draw(self, number: int) -> None:
         """Compute press `number`, 1 being the first; nothing is pressed until it is started."""
@@ -175,63 +134,34 @@ class Presser:
             with self._rig.open(sensor, observed, seed=self.seed + number - 1) as acquisition:
                 profile = scene.profile
                 drawn[name] = SceneSamples(acquisition, profile.duration.to("s"), rest_s=profile.hold_s)
-        if not drawn:
-            profile = self.alone.profile
-            drawn[""] = SceneSamples(_ForceAlone(profile), profile.duration.to("s"), rest_s=profile.hold_s)
         self._drawn = drawn
 
     def start(self, at_s: float) -> float:
         """Begin to press at `at_s` on the devices' clock; return when it is over."""
+        self._began_s = at_s
         for samples in self._drawn.values():
             samples.start(at_s)
-        return max(samples.over_s for samples in self._drawn.values())
+        alone_s = at_s + self.alone.profile.duration.to("s")
+        return max((samples.over_s for samples in self._drawn.values()), default=alone_s)
 
     def senses(self, name: str) -> Any:
         """Return what a device senses: a sensor its own press, any other device that of the first sensor."""
 
         def sensed(t_s: float) -> Mapping[str, float]:
             drawn = self._drawn
+            if not self.scenes:
+                return {"fz": self._force_n(t_s - self._began_s)}
             return drawn[name if name in drawn else next(iter(drawn))](t_s) if drawn else {}
 
         return sensed
 
-
-class _ForceAlone:
-    """The force of a profile without anything pressed."""
-
-    def __init__(self, profile: ForceProfile) -> None:
-        from tactbench.core.spec.sensor import ChannelSpec, StreamSpec
-
-        self._profile = profile
-        self.streams: tuple[StreamSpec, ...] = ()
-        self.reference: tuple[StreamSpec, ...] = (
-            StreamSpec(name="force_torque", channels=(ChannelSpec(name="fz", kind="force", unit="N", sign=1),)),
-        )
-
-    def __iter__(self) -> Iterator[Block]:
+    def _force_n(self, passed_s: float) -> float:
+        """Return the force where nothing is pressed, so long after the press began."""
         import numpy as np
 
-        from tactbench.core.samples import Block
-
-        t_s = np.arange(self._profile.samples) * self._profile.duration.to("s") / self._profile.samples
-        force_n = np.interp(t_s, *self._profile.corners)
-        yield Block("force_torque", np.round(t_s * 1e9).astype(np.int64), force_n[:, None])
-
-
-def with_faults(entries: Mapping[str, DeviceEntry], faults: Sequence[str]) -> dict[str, DeviceEntry]:
-    """Return the entries with faults given as ``DEVICE:FAULT``; raises UsageError for a device that is not emulated."""
-    from tactbench.core.errors import UnknownNameError
-
-    changed = dict(entries)
-    for text in faults:
-        given, _, fault = text.partition(":")
-        emulated = {name: name for name, entry in entries.items() if entry.emulated}
-        emulated |= {getattr(entries[name], "device", name): name for name in emulated}
-        if given not in emulated:
-            raise UnknownNameError("emulated device", given, emulated)
-        entry = changed[emulated[given]]
-        changed[emulated[given]] = entry.model_copy(update={"faults": (*entry.faults, fault)})
-    return changed
+        profile = self.alone.profile
+        within = 0.0 <= passed_s < profile.duration.to("s")
+        return float(np.interp(passed_s if within else 0.0, *profile.corners))
 
 
 def _named(registry: Registry, names: Sequence[str]) -> dict[str, DeviceEntry]:
@@ -255,17 +185,12 @@ def _named(registry: Registry, names: Sequence[str]) -> dict[str, DeviceEntry]:
     return entries
 
 
-def _sensors(entries: Mapping[str, DeviceEntry]) -> list[str]:
-    """Return the names of the emulated sensors."""
-    return [name for name, entry in entries.items() if entry.emulated and not hasattr(entry, "device")]
-
-
 def _say_where(
     emulated: EmulatedDevices, entries: Mapping[str, DeviceEntry], file: RigFile | None, out: Path | None
 ) -> None:
     import yaml
 
-    from tactbench.core.spec.rig_file import FORCE
+    from tactbench.core.spec.rig_file import FORCE, RigFile
     from tactbench.core.tables.text import command_line
 
     found: dict[str, Any] = {
@@ -274,48 +199,34 @@ def _say_where(
         else entry
         for name, entry in entries.items()
     }
-    sensors = [name for name, entry in found.items() if not hasattr(entry, "device")]
+    sensors = {name: entry for name, entry in found.items() if not hasattr(entry, "device")}
     if not sensors:
         for name, address in emulated.addresses.items():
             click.echo(f"{name}: {address}")
         remark("A rig file needs a sensor beside them: name one, too, to have one written.")
         return
-    text: dict[str, Any] = {"version": 1, "rig": "bench" if file is None else file.rig}
-    if file is not None and file.title:
-        text["title"] = file.title
-    plain = {}
-    for name, entry in found.items():
-        fields = entry.model_dump(mode="json", exclude_defaults=True)
-        plain[name] = {key: fields[key] for key in ("device", *fields) if key in fields}
-    text["sensors"] = {name: plain.pop(name) for name in sensors}
-    if FORCE in plain:
-        text[FORCE] = plain.pop(FORCE)
-    if plain:
-        text["devices"] = plain
-    if file is not None and file.settings:
-        text["settings"] = file.settings
-    written = f"{HEAD}\n{yaml.safe_dump(text, sort_keys=False)}"
+    others = {name: entry for name, entry in found.items() if name not in sensors and name != FORCE}
+    parts = {"sensors": sensors, "force": found.get(FORCE), "devices": others}
+    rig = RigFile(rig="bench", **parts) if file is None else file.model_copy(update=parts)
+    plain = rig.model_dump(mode="json", exclude_defaults=True, exclude={"emulation", "version"})
+    written = f"{HEAD}\n{yaml.safe_dump({'version': 1, **plain}, sort_keys=False)}"
     click.echo(written, nl=False)
     if out is not None:
         out.write_text(written, encoding="utf-8")
     else:
         remark("Save the above as rig.yaml, or have it written with --write-rig-file.")
     name = "rig.yaml" if out is None else str(out)
-    words = ("--rig", text["rig"], "--rig-file", name, "--sensor", sensors[0], "--live", "--out", "press.h5")
+    words = ("--rig", rig.rig, "--rig-file", name, "--sensor", next(iter(sensors)), "--live", "--out", "press.h5")
     remark(f"Record in another terminal:  {command_line('tactbench', 'record', *words)}")
     remark("Ctrl-C ends the devices.")
 
 
 def _press(emulated: EmulatedDevices, presser: Presser, number: int, presses: int | None) -> None:
     """Press once, and say how it goes."""
-    profile = presser.alone.profile
-    over_s = presser.start(emulated.clock() * 1e-9)
+    profile, over_s = presser.alone.profile, presser.start(emulated.clock() * 1e-9)
     of = "" if presses is None else f" of {presses}"
     remark(f"Press {number}{of}: {profile.largest_n:g} N after {profile.duration.to('s'):g} s")
     while (now_s := emulated.clock() * 1e-9) < over_s:
         emulated.advance(round(1e9 * min(now_s + STATUS_S, over_s)))
-        passed = "; ".join(
-            f"{name} {from_host} bytes in, {to_host} out"
-            for name, (from_host, to_host) in emulated.passed_bytes.items()
-        )
-        remark(f"  {profile.duration.to('s') - max(0.0, over_s - emulated.clock() * 1e-9):.0f} s: {passed}")
+        passed = (f"{name} {here} bytes in, {there} out" for name, (here, there) in emulated.passed_bytes.items())
+        remark(f"  {'; '.join(passed)}")

@@ -9,12 +9,13 @@ import click
 from tactbench.core.cli.grid import print_grid, print_records
 from tactbench.core.cli.progress import progress
 from tactbench.core.cli.screen import remark
-from tactbench.core.cost.task_score import in_unit, quick_estimator, task_score, with_all_effects
-from tactbench.core.errors import NotApplicable, UnknownNameError, UsageError
+from tactbench.core.cost.task_score import quick_estimator, task_score
+from tactbench.core.errors import NotApplicable, UsageError
 from tactbench.core.leaderboard.names import METRIC_NAMES
 from tactbench.core.plugins.registry import load_object
 from tactbench.core.plugins.taking_part import rig_context
 from tactbench.core.spec.scene import Simulation
+from tactbench.core.tables.numbers import score_with_unit
 
 if TYPE_CHECKING:
     from tactbench.core.cost.task_score import TaskScore
@@ -24,39 +25,23 @@ if TYPE_CHECKING:
     from tactbench.core.spec.scene import Scene
 
 _COLUMNS = ("", "effect", "cost", "if left out", "reason")
-_WAYS = 2
-_LONGEST_S = 60.0
-"""Seconds that recordings may take for a score that nobody asked for by name."""
+LONGEST_S = 60.0
+"""Seconds that recordings may take for the score."""
 _SMALLEST_DIFFERENCE = 0.1
 """Share by which two times of one run each differ on a machine that does other things as well."""
 _SCORE_COLUMNS = ("effects", "score", "simulated in")
 
 
 def print_explanations(
-    registry: Registry,
-    rig_name: str,
-    sensor_name: str,
-    task_name: str,
-    scene_name: str | None,
-    simulation: Simulation | None,
-    rounds: int,
+    registry: Registry, rig_name: str, sensor_name: str, task_name: str, simulation: Simulation | None, rounds: int,
     shape: str,
-    *,
-    scoring: bool | None = False,
-    estimator: str | None = None,
-    seed: int = 1,
-) -> None:
-    """Print the plans of a task's scenes, one table for each different set of effects.
+) -> None:  # fmt: skip
+    """Print the plans of a task's scenes, one table for each different set of effects, and what they do to the score.
 
     Parameters
     ----------
-    scoring
-        Also record the whole task twice, with the effects chosen and with all, and print both scores and times. None:
-        if the recordings take less than a minute, by what one has been measured to cost.
-    estimator
-        What answers then; None: a quick one.
-    seed
-        Of those recordings.
+    rounds
+        Recordings that each effect is timed with; 0: no times, and no score.
 
     Raises
     ------
@@ -68,37 +53,50 @@ def print_explanations(
     sensor = registry.sensors[sensor_name]
     rig: Explaining = load_object(registry.rigs[rig_name].where)(rig_context(registry))
     if not hasattr(rig, "explain"):
-        raise UsageError(f"The rig {rig_name!r} does not explain its plans.", hint="Choose another with --rig.")
-    scenes = _scenes(registry, task_name, scene_name, simulation)
-    answerer = "" if scoring is False else estimator or quick_estimator(registry, task_name)
+        raise UsageError(f"The rig {rig_name!r} does not explain its plans.", hint="Ask twin.")
+    scenes = [planned.scene for planned in registry.tasks[task_name].spec.scenes]
+    if not scenes:
+        raise UsageError(
+            f"Task {task_name!r} plans no scenes: only recordings made elsewhere can answer it.",
+            hint="Choose another task; see `tactbench list tasks`.",
+        )
+    if simulation:
+        scenes = [scene.simulated_as(simulation) for scene in scenes]
     records: list[dict[str, Any]] = []
     expected_s = left_out_s = 0.0
     for group in _alike(rig, sensor, scenes):
         rows = rig.explain(sensor, group[0], rounds=rounds)
         if shape == "table":
             _print(sensor_name, task_name, group, rows, rounds)
-        records += [_record(sensor_name, task_name, group, row) for row in rows]
-        expected_s += _WAYS * len(group) * sum(row.cost_s or 0.0 for row in rows if row.entry.included)
+        about = {"sensor": sensor_name, "task": task_name, "scene": group[0].name, "scenes": len(group)}
+        records += [{**about, **_record(row)} for row in rows]
+        expected_s += 2 * len(group) * sum(row.cost_s or 0.0 for row in rows if row.entry.included)
         left_out_s += len(group) * sum(row.cost_s or 0.0 for row in rows if not row.entry.included)
-    if scoring is None and expected_s > _LONGEST_S:
+    if rounds and expected_s > LONGEST_S:
         remark(f"No score: recording the task with the effects chosen and with all would take about {expected_s:.0f} "
-               "s. --score does it all the same.")  # fmt: skip
-    elif scoring is not False:
+               "s. `tactbench run`, without and with --effects +all, does it.")  # fmt: skip
+    elif rounds:
+        answerer = quick_estimator(registry, task_name)
         with progress() as display:
             chosen, every = (
-                task_score(
-                    registry, rig_name, sensor_name, task_name, variant, estimator=answerer, seed=seed, progress=display
-                )
-                for variant in (simulation or Simulation(), with_all_effects(simulation))
+                task_score(registry, rig_name, sensor_name, task_name, variant, estimator=answerer, progress=display)
+                for variant in (simulation or Simulation(), _with_all_effects(simulation or Simulation()))
             )
         if shape == "table":
             _print_scores(sensor_name, chosen, every)
-            if rounds:
-                click.echo(f"Effect by effect, by the costs above, those left out take {1e3 * left_out_s:.1f} ms.")
-        scores = _score_fields(chosen, every)
+            click.echo(f"Effect by effect, by the costs above, those left out take {1e3 * left_out_s:.1f} ms.")
+        scores = {
+            "score": chosen.score, "score_all_effects": every.score, "score_metric": chosen.metric,
+            "score_estimator": chosen.estimator, "score_reason": chosen.reason or every.reason, "sim_s": chosen.sim_s,
+            "sim_s_all_effects": every.sim_s,
+        }  # fmt: skip
         records = [{**record, **scores} for record in records]
     if shape != "table":
         print_records(records, shape)
+
+
+def _with_all_effects(simulation: Simulation) -> Simulation:
+    return simulation.model_copy(update={"effects": (*simulation.effects, "+all")})
 
 
 def _print_scores(sensor: str, chosen: TaskScore, every: TaskScore) -> None:
@@ -106,7 +104,7 @@ def _print_scores(sensor: str, chosen: TaskScore, every: TaskScore) -> None:
     lines = [
         {
             "effects": name,
-            "score": one.reason if one.score is None else in_unit(one.score, one.unit),
+            "score": one.reason if one.score is None else score_with_unit(one.score, one.unit),
             "simulated in": "" if one.sim_s is None else f"{one.sim_s:.2f} s",
         }
         for name, one in (("chosen", chosen), ("all", every))
@@ -117,39 +115,16 @@ def _print_scores(sensor: str, chosen: TaskScore, every: TaskScore) -> None:
         return
     moved = every.score - chosen.score
     same = "All effects instead of those chosen: the very same score."
-    click.echo(same if not moved else f"All effects instead of those chosen move the score by {moved:+.2g}.")
+    click.echo(f"All effects instead of those chosen move the score by {moved:+.2g}." if moved else same)
     if chosen.sim_s is not None and every.sim_s:
         saved = every.sim_s - chosen.sim_s
-        seconds = f"{saved:.2f} of {every.sim_s:.2f} s of the processor for {every.recordings} recordings"
+        share = f", {100 * saved / every.sim_s:.0f} %"
         if abs(saved) < _SMALLEST_DIFFERENCE * every.sim_s:
-            click.echo(f"Leaving out the others saved {seconds}: no more than one run each tells apart.")
-        else:
-            click.echo(f"Leaving out the others saved {seconds}, {100 * saved / every.sim_s:.0f} %.")
-
-
-def _score_fields(chosen: TaskScore, every: TaskScore) -> dict[str, Any]:
-    return {
-        "score": chosen.score,
-        "score_all_effects": every.score,
-        "score_metric": chosen.metric,
-        "score_estimator": chosen.estimator,
-        "score_reason": chosen.reason or every.reason,
-        "sim_s": chosen.sim_s,
-        "sim_s_all_effects": every.sim_s,
-    }
-
-
-def _scenes(registry: Registry, task: str, scene_name: str | None, simulation: Simulation | None) -> list[Scene]:
-    planned = {item.scene.name: item.scene for item in registry.tasks[task].spec.scenes}
-    if not planned:
-        raise UsageError(
-            f"Task {task!r} plans no scenes: only recordings made elsewhere can answer it.",
-            hint="Choose another task; see `tactbench list tasks`.",
+            share = ": no more than one run each tells apart"
+        click.echo(
+            f"Leaving out the others saved {saved:.2f} of {every.sim_s:.2f} s of the processor for {every.recordings} "
+            f"recordings{share}."
         )
-    if scene_name is not None and scene_name not in planned:
-        raise UnknownNameError(f"scene of task {task!r}", scene_name, planned)
-    scenes = [planned[scene_name]] if scene_name is not None else list(planned.values())
-    return [scene.simulated_as(simulation) if simulation else scene for scene in scenes]
 
 
 def _alike(rig: Explaining, sensor: SensorDescriptor, scenes: list[Scene]) -> list[list[Scene]]:
@@ -193,18 +168,9 @@ def _change(row: Explained) -> str:
     return f"{'~' if entry.included else '<='} {entry.change:.3g} {entry.unit}"
 
 
-def _record(sensor: str, task: str, group: list[Scene], row: Explained) -> dict[str, Any]:
+def _record(row: Explained) -> dict[str, Any]:
+    entry = row.entry
     return {
-        "sensor": sensor,
-        "task": task,
-        "scene": group[0].name,
-        "scenes": len(group),
-        "effect": row.entry.effect,
-        "included": row.entry.included,
-        "asked": row.entry.asked,
-        "reason": row.entry.reason,
-        "change": row.entry.change,
-        "unit": row.entry.unit,
-        "cost_s": row.cost_s,
-        "remark": row.remark,
-    }
+        "effect": entry.effect, "included": entry.included, "asked": entry.asked, "reason": entry.reason,
+        "change": entry.change, "unit": entry.unit, "cost_s": row.cost_s, "remark": row.remark,
+    }  # fmt: skip

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING, Any, get_args
 
 import click
 
@@ -16,61 +16,54 @@ if TYPE_CHECKING:
     from tactbench.core.recording.device_log import ImportedLog
     from tactbench.core.recording.health import Finding
     from tactbench.core.recording.mapping import ImportReport
-    from tactbench.core.spec.scene import Role
 
 MOST_NAMED = 12
-"""Channels of recordings that are named for what they lack; the others are added up."""
+"""Findings that are printed, the worst first."""
 PAIRS = "KEY=VALUE"
 
 
 @click.command(name="import")
 @click.argument("source", metavar="MAPPING|LOG", type=click.Path(path_type=Path))
 @click.option("--root", type=click.Path(path_type=Path), metavar="DIR",
-              help="Folder of the data set; default: that of the mapping file.")  # fmt: skip
+              help="Folder of the data set. Default: that of the mapping.")  # fmt: skip
 @click.option("--out", type=click.Path(path_type=Path), metavar="DIR|FILE",
-              help="Folder of the recordings; default: recordings/<name of the mapping>. Of a log: the recording; "
-              "default: recordings/<name of the log>.h5.")  # fmt: skip
-@click.option("--replace", is_flag=True, help="Replace recordings of the same name that hold something else.")
+              help="Output folder; of a log, the output file. Default: recordings/NAME[.h5].")  # fmt: skip
+@click.option("--replace", is_flag=True, help="Overwrite recordings that hold something else.")
 @click.option("--sensor", metavar="NAME", help="Read a log of this sensor's own tools.")
-@click.option("--option", "options", multiple=True, metavar=PAIRS,
-              help="For the reader of the log, such as board=14; may be repeated.")  # fmt: skip
-@click.option("--session", metavar="NAME", help="Of the log: recordings of one session were made without re-mounting.")
-@click.option("--role", type=click.Choice(("train", "validation", "test")), help="Of the log, in a split by roles.")
+@click.option(
+    "--option", "options", multiple=True, metavar=PAIRS, help="Option of the log's reader: board=14; repeatable."
+)
 @click.option("--label", "labels", multiple=True, metavar=PAIRS,
-              help="Of the log: what was pressed, such as cap_radius_mm=4; may be repeated.")  # fmt: skip
+              help="Label of a log's recording: cap_radius_mm=4, session=a, role=test; repeatable.")  # fmt: skip
 @click.pass_context
 def command(
-    ctx: click.Context,
-    source: Path,
-    root: Path | None,
-    out: Path | None,
-    replace: bool,
-    sensor: str | None,
-    options: tuple[str, ...],
-    session: str | None,
-    role: str | None,
-    labels: tuple[str, ...],
-) -> None:
-    """Turn foreign tables into recordings, as MAPPING (a YAML file) says, or with --sensor a LOG into one.
+    ctx: click.Context, source: Path, root: Path | None, out: Path | None, replace: bool, sensor: str | None,
+    options: tuple[str, ...], labels: tuple[str, ...],
+) -> None:  # fmt: skip
+    """Convert foreign tables, as MAPPING (a YAML file) says, or with --sensor a LOG, into recordings.
 
     All of them are written, or none. What was marked as "no sample" is counted. See docs/mappings.md. Exit code 1 if
     what was written has an error, as `inspect` finds them.
     """
     if sensor is None:
-        if options or labels or session is not None or role is not None:
-            raise click.UsageError("--option, --session, --role and --label are for logs: name the --sensor.")
+        if options or labels:
+            raise click.UsageError("--option and --label are for logs: name the --sensor.")
         sound = _import_tables(source, root, out, replace)
         ctx.exit(0 if sound else 1)
     if root is not None:
         raise click.UsageError("--root is for mappings: leave it out, or --sensor.")
     from tactbench.core.plugins.registry import load_registry
     from tactbench.core.recording.device_log import import_log
+    from tactbench.core.spec.scene import Role
 
     target = Path("recordings") / f"{source.stem}.h5" if out is None else out
+    named = _pairs("--label", labels)
+    session, role = str(named.pop("session", "1")), named.pop("role", None)
+    if role is not None and role not in get_args(Role):
+        raise click.UsageError(f"--label role={role}: one of {', '.join(get_args(Role))} is expected.")
     made = import_log(
-        source, load_registry().sensors[sensor], _pairs("--option", options), out=target,
-        session="1" if session is None else session, role=cast("Role | None", role), labels=_pairs("--label", labels),
-        replace=replace,
+        source, load_registry().sensors[sensor], _pairs("--option", options), out=target, session=session, role=role,
+        labels=named, replace=replace,
     )  # fmt: skip
     for line in log_summary(made, target):
         click.echo(visible(line))
@@ -139,29 +132,24 @@ def summary(report: ImportReport, folder: Path) -> list[str]:
     ]
     if report.tasks:
         lines.append(f"  tasks of their own, in {folder / FILE}: {', '.join(report.tasks)}")
-    without = [(one, channel, count) for one in report.recordings for channel, count in one.missing.items()]
-    for recording, channel, count in without[:MOST_NAMED]:
-        lines.append(
-            f"  {recording.name}: {channel} has no sample in {count} of {recording.rows} rows; they are marked, "
-            "and no evaluation uses them"
-        )
-    if len(without) > MOST_NAMED:
-        every = ", ".join(f"{channel} {count}" for channel, count in report.missing.items())
-        lines.append(f"  … and so in other recordings; rows without a sample in all of them: {every}")
+    if report.missing:
+        counts = ", ".join(f"{channel} {count}" for channel, count in report.missing.items())
+        lines.append(f"  rows without a sample, marked and left out of every evaluation: {counts}")
     for reason, count in report.excluded.items():
         names = [recording.name for recording in report.recordings if recording.excluded == reason]
         shown = ", ".join(names[:3]) + (" …" if count > 3 else "")
         lines.append(f"  {count} recordings are marked as excluded ({shown}): {reason}")
-    expected = ("missing", "excluded")
     found = Counter(
         (finding.severity, finding.message)
         for recording in report.recordings
         for finding in recording.findings
-        if finding.check not in expected
+        if finding.check not in ("missing", "excluded")
     )
-    for (severity, message), count in found.most_common(12):
+    order = ("error", "warning", "info")
+    worst = sorted(found.items(), key=lambda item: (order.index(item[0][0]), -item[1]))
+    for (severity, message), count in worst[:MOST_NAMED]:
         where = f" (in {count} of {len(report.recordings)} recordings)" if len(report.recordings) > 1 else ""
         lines.append(f"  {severity}: {message}{where}")
-    if len(found) > 12:
-        lines.append(f"  … and {len(found) - 12} more remarks; see `tactbench inspect`")
+    if len(worst) > MOST_NAMED:
+        lines.append(f"  … and {len(worst) - MOST_NAMED} more remarks; see `tactbench inspect`")
     return lines

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
+from tactbench.core.cli.options import format_option
 from tactbench.core.tables.text import json_text, visible
 
 if TYPE_CHECKING:
@@ -17,10 +19,10 @@ COLOURS = {"error": "red", "warning": "yellow", "info": "blue"}
 
 @click.command(name="inspect")
 @click.argument("files", nargs=-1, required=True, type=click.Path(path_type=Path), metavar="FILE...")
-@click.option("--format", "shape", type=click.Choice(("table", "json")), default="table", show_default=True)
-@click.option("--salvage", is_flag=True, help="Read what a crash left behind, or what is still being made (….partial).")
+@format_option("table", "json")
+@click.option("--salvage", is_flag=True, help="Read an unfinished file (….partial), after a crash or while recording.")
 @click.option("--rescue", type=click.Path(path_type=Path), metavar="OUT",
-              help="Also turn the one FILE that a crash left behind into the recording OUT.")  # fmt: skip
+              help="Convert the one unfinished FILE into the recording OUT.")  # fmt: skip
 @click.pass_context
 def command(ctx: click.Context, files: tuple[Path, ...], shape: str, salvage: bool, rescue: Path | None) -> None:
     """Show what is in recordings: streams, channels, rates, and whether they are healthy.
@@ -92,14 +94,26 @@ def _stream(recording: Recording, name: str) -> dict[str, Any]:
 
 
 def _print(about: dict[str, Any]) -> None:
-    meta = about["meta"]
     click.secho(visible(about["file"]), bold=True)
+    for text in _lines(about):
+        click.echo(f"  {visible(text)}")
+    for finding in about["findings"]:
+        click.secho(f"  {finding['severity']}: ", fg=COLOURS[finding["severity"]], nl=False)
+        click.echo(visible(finding["message"]))
+    if not about["findings"]:
+        click.echo("  healthy: nothing was found")
+    if not about["complete"]:
+        click.echo("  unfinished: this is what a crash left behind")
+    click.echo(f"  content {about['content_sha256'][:16]}{' (verified)' if about['complete'] else ''}")
+
+
+def _lines(about: dict[str, Any]) -> Iterator[str]:
+    """Yield what a recording is, of what, and how it was made."""
+    meta = about["meta"]
     texts = [f"session {meta['session']}", f"clock {meta['clock']}"]
     texts += [f"{name} {meta[name]}" for name in ("trial", "role") if meta[name]]
     mark = " (EMULATED)" if meta["emulation"] else " (SIM)" if meta["simulated"] else ""
-    _say(f"  {about['sensor']} on {meta['rig']}{mark}; {'; '.join(texts)}")
-    if meta["labels"]:
-        _say("  labels: " + ", ".join(f"{name} = {value}" for name, value in meta["labels"].items()))
+    yield f"{about['sensor']} on {meta['rig']}{mark}; {'; '.join(texts)}"
     for stream in about["streams"]:
         rate = "no rate"
         if stream["mean_rate_hz"]:
@@ -108,33 +122,19 @@ def _print(about: dict[str, Any]) -> None:
             f"{len(one['names'])} {one['kind']} [{one['unit']}] {_ends(one['names'])}" for one in stream["channels"]
         )
         notes = f"; labels {', '.join(stream['annotations'])}" if stream["annotations"] else ""
-        _say(f"  {stream['stream']} ({stream['of']}): {stream['rows']} rows, {rate}, {channels}{notes}")
+        yield f"{stream['stream']} ({stream['of']}): {stream['rows']} rows, {rate}, {channels}{notes}"
     for name, clock in meta["clocks"].items():
-        _say(f"  clock of {name}: {_clock(clock)}")
+        yield f"clock of {name}: {_clock(clock)}"
     if meta["emulation"]:
-        _say(f"  emulated: {_emulation(meta['emulation'])}")
-    for title, taken in (("effects", True), ("left out", False)):
-        names = [
-            f"{one['effect']}{' (asked)' if one['asked'] else ''}" for one in meta["plan"] if one["included"] == taken
-        ]
-        if names:
-            _say(f"  {title}: {', '.join(names)}")
-    if meta["assumptions"]:
-        _say("  assumed: " + ", ".join(f"{name} = {value}" for name, value in meta["assumptions"].items()))
-    for finding in about["findings"]:
-        click.secho(f"  {finding['severity']}: ", fg=COLOURS[finding["severity"]], nl=False)
-        _say(finding["message"])
-    if not about["findings"]:
-        _say("  healthy: nothing was found")
-    for remark in meta["remarks"]:
-        _say(f"  remark: {remark}")
-    if not about["complete"]:
-        _say("  unfinished: this is what a crash left behind")
-    _say(f"  content {about['content_sha256'][:16]}{' (verified)' if about['complete'] else ''}")
-
-
-def _say(text: str) -> None:
-    click.echo(visible(text))
+        yield f"emulated: {_emulation(meta['emulation'])}"
+    plan = {taken: [one["effect"] + " (asked)" * one["asked"] for one in meta["plan"] if one["included"] == taken]
+            for taken in (True, False)}  # fmt: skip
+    pairs = {title: [f"{name} = {value}" for name, value in meta[key].items()]
+             for title, key in (("labels", "labels"), ("assumed", "assumptions"))}  # fmt: skip
+    for title, words in {"effects": plan[True], "left out": plan[False], **pairs}.items():
+        if words:
+            yield f"{title}: {', '.join(words)}"
+    yield from (f"remark: {remark}" for remark in meta["remarks"])
 
 
 def _clock(clock: dict[str, Any]) -> str:
@@ -145,23 +145,20 @@ def _clock(clock: dict[str, Any]) -> str:
         drifts = [line["drift"] * 1e6 for line in lines]
         bounds = [line["bound_ns"] for line in lines]
         within = "no bound" if None in bounds else f"within {max(bounds) * 1e-6:.3g} ms"
-        text += (
-            f", on the host's by {clock['method']} ({len(lines)} lines, drift {min(drifts):.3g} to {max(drifts):.3g} "
-            f"ppm, {within})"
-        )
+        drift = f"drift {min(drifts):.3g} to {max(drifts):.3g} ppm"
+        text += f", on the host's by {clock['method']} ({len(lines)} lines, {drift}, {within})"
     if any(clock["delay_ns"]):
         low, high = (edge * 1e-6 for edge in clock["delay_ns"])
         text += f"; least delay {low:.3g} to {high:.3g} ms, not taken off"
-    text += "".join(f"; {name}: {clock[name]}" for name in ("wraps", "breaks") if clock[name])
-    return text
+    return text + "".join(f"; {name}: {clock[name]}" for name in ("wraps", "breaks") if clock[name])
 
 
 def _emulation(emulation: dict[str, Any]) -> str:
     factor = f" (factor {emulation['factor']:.3g})" if emulation["factor"] else ""
-    text = f"{', '.join(emulation['devices']) or 'devices'} in {emulation['time']} time{factor}"
-    if emulation["physics"]:
-        text += f", moved by {emulation['physics']}"
-    return text + f", seed {emulation['seed']}" + "".join(f"; fault {fault}" for fault in emulation["faults"])
+    moved = f", moved by {emulation['physics']}" if emulation["physics"] else ""
+    faults = "".join(f"; fault {fault}" for fault in emulation["faults"])
+    devices = ", ".join(emulation["devices"]) or "devices"
+    return f"{devices} in {emulation['time']} time{factor}{moved}, seed {emulation['seed']}{faults}"
 
 
 def _ends(names: list[str]) -> str:

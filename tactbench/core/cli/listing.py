@@ -1,45 +1,82 @@
-"""``tactbench list``: what there is to choose from."""
+"""``tactbench list``: what there is to choose from, and which plugins could not be used."""
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING, Any
+
 import click
 
-from tactbench.core.cli.plugins import tell_failed
+from tactbench.core.cli.options import format_option
 from tactbench.core.tables.text import json_text
 
-SCENARIOS = "scenarios"
+if TYPE_CHECKING:
+    from tactbench.core.plugins.registry import Registry
+
+SCENARIOS, PLUGINS = "scenarios", "plugins"
 FAMILIES = ("sensors", "rigs", "devices", "tasks", "estimators", "effects", "indenters", "profiles", SCENARIOS)
 
 
 @click.command(name="list")
-@click.argument("family", type=click.Choice(FAMILIES), required=False)
-@click.option("--format", "shape", type=click.Choice(("table", "json")), default="table", show_default=True)
-def command(family: str | None, shape: str) -> None:
-    """List what is installed: devices are force sensors and motors, scenarios are of sensors."""
+@click.argument("family", type=click.Choice((*FAMILIES, PLUGINS)), required=False)
+@format_option("table", "json")
+@click.pass_context
+def command(ctx: click.Context, family: str | None, shape: str) -> None:
+    """List what is installed.
+
+    Devices are force sensors and motors; scenarios belong to sensors. `plugins` lists installed plugins and why one
+    could not be used; its exit code is 1 if one could not.
+    """
     from tactbench.core.plugins.registry import load_registry
 
     registry = load_registry()
-    families = (family,) if family else FAMILIES
-    found = {
-        name: {
-            descriptor.name: getattr(descriptor, "title", None) or descriptor.spec.title
-            for descriptor in registry.families()[name]
-        }
-        for name in families
-        if name != SCENARIOS
-    }
-    if SCENARIOS in families:
-        stated = [(name, sensor) for sensor in registry.sensors for name in sensor.spec.scenarios]
-        found[SCENARIOS] = {
-            name: "; ".join(f"{one.name}: {one.spec.scenarios[name].title}" for also, one in stated if also == name)
-            for name, _ in stated
-        }
+    if family == PLUGINS:
+        _plugins(registry, shape)
+        ctx.exit(1 if registry.failures or registry.refused else 0)
+    found = {name: _titles(registry, name) for name in ((family,) if family else FAMILIES)}
     if shape == "json":
         click.echo(json_text(found, indent=1))
         return
     for name, entries in found.items():
         click.secho(name, bold=True)
-        width = max((len(entry) for entry in entries), default=0)
+        width = max(map(len, entries), default=0)
         for entry, title in entries.items():
             click.echo(f"  {entry:<{width}}  {title}")
     tell_failed(registry)
+
+
+def _titles(registry: Registry, family: str) -> dict[str, str]:
+    if family != SCENARIOS:
+        members: Any = registry.families()[family]
+        return {one.name: getattr(one, "title", None) or one.spec.title for one in members}
+    found: dict[str, str] = {}
+    for sensor in registry.sensors:
+        for name, scenario in sensor.spec.scenarios.items():
+            before = f"{found[name]}; " if name in found else ""
+            found[name] = f"{before}{sensor.name}: {scenario.title}"
+    return found
+
+
+def _plugins(registry: Registry, shape: str) -> None:
+    from dataclasses import asdict
+
+    refused = [str(error) for error in registry.refused]
+    if shape == "json":
+        click.echo(json_text({"plugins": [asdict(row) for row in registry.plugins], "refused": refused}, indent=1))
+        return
+    width = max((len(row.entry_point) for row in registry.plugins), default=0)
+    for row in sorted(registry.plugins, key=lambda row: row.status == "loaded"):
+        loaded = row.status == "loaded"
+        click.secho(f"{row.entry_point:<{width}}  ", nl=False, bold=True)
+        click.secho(f"{row.status:<7}", nl=False, fg="green" if loaded else "red")
+        click.echo(f"{row.distribution} {row.version}  {', '.join(row.brings) if loaded else row.reason}")
+    for text in refused:
+        click.secho(text, fg="red")
+
+
+def tell_failed(registry: Registry) -> None:
+    """Say on stderr which plugins could not be used; nothing if all could."""
+    from tactbench.core.cli.screen import remark
+
+    if registry.failures or registry.refused:
+        names = [row.entry_point for row in registry.failures] + [error.message for error in registry.refused]
+        remark(f"Some plugins could not be used: {'; '.join(names)}. See `tactbench list plugins`.")

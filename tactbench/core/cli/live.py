@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import sys
 import threading
-from abc import ABC, abstractmethod
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Self
@@ -16,6 +15,8 @@ from tactbench.core.cli.stream_state import StreamState, Watched
 
 if TYPE_CHECKING:
     from types import TracebackType
+
+    from rich.console import Console
 
     from tactbench.core.plugins.interfaces import Acquisition, Rig
     from tactbench.core.samples import Block
@@ -31,7 +32,8 @@ LINE_S = 5.0
 class LiveView:
     """Shows on stderr what is being recorded, from when the rig knows its streams to the end of the ``with`` block.
 
-    Give the rig of :meth:`beside` and :meth:`watch` to `acquire`. Nothing is drawn in the thread that calls `watch`.
+    Give the rig of :meth:`beside` and :meth:`watch` to `acquire`. It is drawn in a thread of its own: a slow terminal
+    holds nothing back, and Ctrl-C comes amid no picture.
 
     Parameters
     ----------
@@ -45,8 +47,10 @@ class LiveView:
         self._scene = scene
         self._title = title
         self._states: dict[str, StreamState] = {}
-        self.watched: Watched | None = None
-        self._drawing: _Drawing | None = None
+        self._watched: Watched | None = None
+        self._console: Console | None = None
+        self._over = threading.Event()
+        self._thread: threading.Thread | None = None
 
     def beside(self, rig: Rig) -> Rig:
         """Return a rig that does what `rig` does, and tells this view of its streams once they are known."""
@@ -56,10 +60,15 @@ class LiveView:
         """Begin to draw."""
         sensor = tuple(map(StreamState, acquisition.streams))
         reference = tuple(map(StreamState, acquisition.reference))
-        self.watched = Watched(self._title, self._scene, sensor, reference)
-        self._states = {state.spec.name: state for state in self.watched.streams}
-        self._drawing = _drawing_of(self.watched)
-        self._drawing.start()
+        self._watched = Watched(self._title, self._scene, sensor, reference)
+        self._states = {state.spec.name: state for state in self._watched.streams}
+        if sys.stderr.isatty() and os.environ.get("TERM", "").lower() not in ("dumb", "unknown"):
+            from rich.console import Console
+
+            # A way of its own to the terminal, whatever becomes of stderr meanwhile.
+            terminal = os.fdopen(os.dup(sys.stderr.fileno()), "w", encoding="utf-8", errors="replace")
+            self._console = Console(file=terminal, highlight=False)
+        self._start()
 
     def watch(self, block: Block) -> None:
         """Remember the newest of a block: no waiting, no drawing, no reference to the block is kept."""
@@ -70,14 +79,39 @@ class LiveView:
     @contextmanager
     def paused(self) -> Iterator[None]:
         """Leave the terminal alone for a while, for somebody who is asked something."""
-        if self._drawing is None:
-            yield
-            return
-        self._drawing.stop()
+        was_drawing = self._thread is not None
+        self._stop()
         try:
             yield
         finally:
-            self._drawing.start()
+            if was_drawing:
+                self._start()
+
+    def _start(self) -> None:
+        self._over.clear()
+        self._thread = threading.Thread(target=self._draw, name="live view")
+        self._thread.start()
+
+    def _stop(self) -> None:
+        self._over.set()
+        if self._thread is not None:
+            self._thread.join()
+            self._thread = None
+
+    def _draw(self) -> None:
+        """Draw until it is over: on the terminal's second screen, or a line now and then."""
+        assert self._watched is not None
+        if self._console is None:
+            while not self._over.wait(LINE_S):
+                remark(one_line(self._watched))
+            return
+        from rich.live import Live
+
+        frame = Frame(self._watched)
+        with Live(frame, console=self._console, screen=True, auto_refresh=False, redirect_stdout=False,
+                  redirect_stderr=False) as live:  # fmt: skip
+            while not self._over.wait(1 / REFRESHES_PER_S):
+                live.refresh()
 
     def __enter__(self) -> Self:
         return self
@@ -85,10 +119,15 @@ class LiveView:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
     ) -> None:
-        if self._drawing is not None:
-            self._drawing.stop()
-            self._drawing.show_last()
-            self._drawing = None
+        """Leave the terminal as it was, and the last state on it."""
+        self._stop()
+        if self._watched is None:
+            return
+        if self._console is None:
+            remark(one_line(self._watched))
+            return
+        with self._console.file:
+            self._console.print(Frame(self._watched), end="")
 
 
 class _ObservedRig:
@@ -103,82 +142,6 @@ class _ObservedRig:
         with self._rig.open(sensor, scene, seed=seed) as acquisition:
             self._view.begin(acquisition)
             yield acquisition
-
-
-def _drawing_of(watched: Watched) -> _Drawing:
-    """Return what fits stderr: a terminal that can move its cursor, or anything else."""
-    if sys.stderr.isatty() and os.environ.get("TERM", "").lower() not in ("dumb", "unknown"):
-        return _Screen(watched)
-    return _Lines(watched)
-
-
-class _Drawing(ABC):
-    """Draws in a thread of its own: a slow terminal holds nothing back, and Ctrl-C comes amid no picture."""
-
-    def __init__(self) -> None:
-        self._over = threading.Event()
-        self._thread: threading.Thread | None = None
-
-    def start(self) -> None:
-        self._over.clear()
-        self._thread = threading.Thread(target=self._draw, name="live view")
-        self._thread.start()
-
-    def stop(self) -> None:
-        """Leave the terminal as it was; does nothing if that is done."""
-        self._over.set()
-        if self._thread is not None and self._thread.is_alive():
-            self._thread.join()
-
-    @abstractmethod
-    def _draw(self) -> None:
-        """Draw until it is over."""
-
-    @abstractmethod
-    def show_last(self) -> None:
-        """Leave the last state behind, once stopped; the last call."""
-
-
-class _Screen(_Drawing):
-    """The terminal's second screen, which a change of its size leaves whole; the last state on the first one."""
-
-    def __init__(self, watched: Watched) -> None:
-        from rich.console import Console
-
-        super().__init__()
-        # A way of its own to the terminal, whatever becomes of stderr meanwhile.
-        self._terminal = os.fdopen(os.dup(sys.stderr.fileno()), "w", encoding="utf-8", errors="replace")
-        self._console = Console(file=self._terminal, highlight=False)
-        self._frame = Frame(watched)
-
-    def _draw(self) -> None:
-        from rich.live import Live
-
-        with Live(
-            self._frame, console=self._console, screen=True, auto_refresh=False, redirect_stdout=False,
-            redirect_stderr=False,
-        ) as live:  # fmt: skip
-            while not self._over.wait(1 / REFRESHES_PER_S):
-                live.refresh()
-
-    def show_last(self) -> None:
-        with self._terminal:
-            self._console.print(self._frame)
-
-
-class _Lines(_Drawing):
-    """A line every few seconds."""
-
-    def __init__(self, watched: Watched) -> None:
-        super().__init__()
-        self._watched = watched
-
-    def _draw(self) -> None:
-        while not self._over.wait(LINE_S):
-            remark(one_line(self._watched))
-
-    def show_last(self) -> None:
-        remark(one_line(self._watched))
 
 
 def one_line(watched: Watched) -> str:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import click
@@ -24,6 +25,9 @@ class FiniteRange(click.FloatRange):
         return number
 
 
+ABOVE_0 = FiniteRange(min=0, min_open=True)
+
+
 def options(*several: Callable[[Command], Command]) -> Callable[[Command], Command]:
     """Return a decorator that adds options to a verb, in this order in its help."""
 
@@ -35,29 +39,24 @@ def options(*several: Callable[[Command], Command]) -> Callable[[Command], Comma
     return add
 
 
+def format_option(*shapes: str) -> Callable[[Command], Command]:
+    """Return the option ``--format``, whose value is called `shape`; the first of `shapes` is its default."""
+    return click.option("--format", "shape", type=click.Choice(shapes), default=shapes[0], show_default=True,
+                        help="Output format.")  # fmt: skip
+
+
+YES = click.option("--yes", is_flag=True, help="Do not prompt.")
+RESULTS = click.option("--out", type=click.Path(path_type=Path), default=Path("tactbench-results"), show_default=True,
+                       metavar="DIR", help="Result folder.")  # fmt: skip
+
 ENGINE = (
-    click.option(
-        "--engine",
-        type=click.Choice(("in-process", "isolated", "dask")),
-        help="Where cells are carried out: in child processes (the default), on a Dask cluster, or in the run's "
-        "own process, without limits, for a debugger.",
-    ),
-    click.option(
-        "--jobs", type=click.IntRange(min=1), metavar="N", help="Processes at once. Default: one for each usable core."
-    ),
-    click.option(
-        "--timeout",
-        type=FiniteRange(min=0, min_open=True, max=MOST_SECONDS),
-        metavar="SECONDS",
-        help="What one cell, or one recording, may take. Default: no limit, since a slow estimator on much data may "
-        "rightly take hours.",
-    ),
-    click.option(
-        "--memory",
-        type=click.IntRange(min=1, max=MOST_MEMORY_MB),
-        metavar="MB",
-        help="Memory that one cell, or one recording, may take beyond the libraries that all share. "
-        "Default: no limit; if the system runs out of it, cells are ended first.",
-    ),
-    click.option("--scheduler", metavar="ADDRESS", help="Dask scheduler for --engine dask. Default: a local cluster."),
-)
+    click.option("--engine", type=click.Choice(("in-process", "isolated", "dask")), default="isolated",
+                 show_default=True,
+                 help="Run cells in child processes, on a Dask cluster, or in this process (for a debugger)."),
+    click.option("--jobs", type=click.IntRange(min=1), metavar="N",
+                 help="Parallel worker processes. Default: one per usable core."),
+    click.option("--timeout", type=FiniteRange(min=0, min_open=True, max=MOST_SECONDS), metavar="SECONDS",
+                 help="Time limit per cell and per recording. Default: none."),
+    click.option("--memory", type=click.IntRange(min=1, max=MOST_MEMORY_MB), metavar="MB",
+                 help="Memory limit per cell and per recording, beside shared libraries. Default: none."),
+)  # fmt: skip

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
-from typing import Any
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any, NamedTuple
 
 from tactbench.core.evaluation.protocols import PROTOCOLS, shots
 from tactbench.core.leaderboard.names import LOWER_IS_BETTER, METRIC_NAMES
@@ -18,12 +17,11 @@ from tactbench.core.spec.rig import (
     IndenterDescriptor,
     ProfileDescriptor,
     RigDescriptor,
+    TaskDescriptor,
 )
 from tactbench.core.spec.scene import Scene
 from tactbench.core.spec.task import ChannelTarget, Published, TaskSpec, VectorTarget
 from tactbench.core.tables.numbers import suffix
-
-Pair = tuple[str, str]
 
 _SPLITS = {
     "roles": "trained on scenes of role train, tested on those of role test",
@@ -33,8 +31,7 @@ _SPLITS = {
 }
 
 
-@dataclass(frozen=True)
-class Section:
+class Section(NamedTuple):
     """Lines of two columns, or a table with a head."""
 
     title: str
@@ -42,48 +39,55 @@ class Section:
     head: Sequence[str] = ()
 
 
-@dataclass(frozen=True)
-class Page:
-    """A page for people."""
+def page_of(descriptor: Any) -> tuple[str, list[Section]]:
+    """Return the title and the sections of a descriptor of any kind but a sensor."""
+    if isinstance(descriptor, TaskDescriptor):
+        task = descriptor.spec
+        return f"Task {task.name}: {task.title}", _task(task)
+    kind = type(descriptor).__name__.removesuffix("Descriptor")
+    sections = [
+        Section("", [*_facts(descriptor), *([("code", descriptor.where)] if hasattr(descriptor, "where") else [])])
+    ]
+    if isinstance(descriptor, IndenterDescriptor | ProfileDescriptor):
+        numbers = _numbers(descriptor)
+        lines = [(name, f"{one.default:g}", one.unit, one.range, one.text) for name, one in numbers.items()]
+        if lines:
+            sections.append(Section("Given by", lines, ("name", "default", "unit", "may be", "what it is")))
+    return f"{kind} {descriptor.name}: {descriptor.title}", sections
 
-    title: str
-    sections: list[Section] = field(default_factory=list)
 
-
-def task_page(task: TaskSpec) -> Page:
+def _task(task: TaskSpec) -> list[Section]:
     """Return what a task asks, of which recordings, under which rules, and what others have published."""
     direction = "lower" if task.metric in LOWER_IS_BETTER else "higher"
+    optional = f"; where a sensor has them {', '.join(task.optional_features)}" if task.optional_features else ""
     facts = [
         ("question", task.question),
         ("target", _target(task)),
         *([("one answer", f"a {task.answer_per}, from {task.answer_from}")] if task.answer_per != "sample" else []),
-        ("looks at", f"channels of kind {', '.join(task.features)}{_where_there(task.optional_features)}"),
+        ("looks at", f"channels of kind {', '.join(task.features)}{optional}"),
         ("metric", f"{METRIC_NAMES.get(task.metric, task.metric)}{suffix(task.unit)}, {direction} is better"),
         ("the same in practice", "nobody has said" if task.equivalence is None
                                  else f"a difference of up to {task.equivalence:g}{suffix(task.unit)}"),
         ("estimators", f"{', '.join(task.estimators)} when none is asked for"),
         ("baselines", f"{', '.join(task.baselines)}: trivial answers, in every table"),
     ]  # fmt: skip
-    page = Page(f"Task {task.name}: {task.title}", [Section("", facts)])
-    page.sections.append(
-        Section("Recordings", _scenes(task), ("role", "scenes", "indenter", "placement", "force", "duration"))
-        if task.scenes
-        else Section("Recordings", [("", "made elsewhere: run it with --rig replay --recordings DIR")])
+    recordings = Section("Recordings", [("", "made elsewhere: run it with --rig replay --recordings DIR")])
+    if task.scenes:
+        head = ("role", "scenes", "indenter", "placement", "force", "duration")
+        recordings = Section("Recordings", _scenes(task), head)
+    protocols = [(name, _protocol(name)) for name in task.protocols]
+    splits = [(name, _split(task, name)) for name in task.splits]
+    published = [_published(one, task.unit) for one in task.published]
+    others = (
+        ("Protocols, the default first", protocols),
+        ("Splits, the default first", splits),
+        ("Published", published),
     )
-    page.sections.append(Section("Protocols, the default first", [(name, _protocol(name)) for name in task.protocols]))
-    if task.splits:
-        page.sections.append(Section("Splits, the default first", [(name, _split(task, name)) for name in task.splits]))
-    if task.published:
-        page.sections.append(Section("Published", [_published(one, task.unit) for one in task.published]))
-    return page
+    return [Section("", facts), recordings, *(Section(title, lines) for title, lines in others if lines)]
 
 
 MOST_PLACES = 8
 """That are named one by one."""
-
-
-def _where_there(kinds: Sequence[str]) -> str:
-    return f"; where a sensor has them {', '.join(kinds)}" if kinds else ""
 
 
 def _target(task: TaskSpec) -> str:
@@ -149,97 +153,49 @@ def _split(task: TaskSpec, name: str) -> str:
     ) + own
 
 
-def _published(one: Published, unit: str) -> Pair:
+def _published(one: Published, unit: str) -> tuple[str, str]:
     whose = "/".join(filter(None, (one.sensor or "any sensor", one.estimator or "their own model")))
     remark = f" ({one.remark})" if one.remark else ""
     return f"{one.score:g}{suffix(unit)}", f"{whose}, {one.protocol}: {one.reference}{remark}"
 
 
-def estimator_page(estimator: EstimatorDescriptor) -> Page:
-    """Return what an estimator answers, and what may be set."""
-    answers = {"features": "the features", "time": "the time index alone", "nothing": "nothing",
-               "reference": "the reference sensor: an oracle"}  # fmt: skip
-    grid = [f"{name}: {', '.join(f'{one:g}' for one in values)}" for name, values in estimator.grid.items()]
-    if estimator.window_grid != (0,):
-        grid.append(f"window: {', '.join(map(str, estimator.window_grid))} samples before the newest")
-    linear = {True: "linear", False: "not linear", None: "not said"}[estimator.linear]
-    facts = [
-        ("answers", " and ".join(estimator.kinds)),
-        ("looks at", answers[estimator.looks_at]),
-        ("model", linear + (", a trivial answer" if estimator.baseline else "")),
-        ("may be set", ", ".join(f"{name}={value}" for name, value in estimator.params.items()) or "nothing"),
-        ("chosen on validation data", "; ".join(grid) or "nothing"),
-        ("code", estimator.where),
-    ]
-    return Page(f"Estimator {estimator.name}: {estimator.title}", [Section("", facts)])
-
-
-def rig_page(rig: RigDescriptor) -> Page:
-    """Return what a rig is, and what it can do beside carrying out scenes."""
-    able = [name.replace("_", " ") for name in ("verification", "work_precision", "likeness") if getattr(rig, name)]
-    facts = [
-        ("scenes are", "simulated; rows are marked SIM" if rig.simulated else "carried out on hardware, or were"),
-        ("solvers", ", ".join(rig.rungs) or "none"),
-        ("also offers", ", ".join(able) or "nothing"),
-        ("code", rig.where),
-    ]
-    return Page(f"Rig {rig.name}: {rig.title}", [Section("", facts)])
-
-
-def effect_page(effect: EffectDescriptor) -> Page:
-    """Return what an effect makes of what, and when it is asked."""
-    facts = [
-        ("produces", ", ".join(effect.produces) or "nothing"),
-        ("consumes", ", ".join(effect.consumes) or "nothing"),
-        ("groups", ", ".join(effect.groups) or "none"),
-        ("code", effect.where),
-    ]
-    return Page(f"Effect {effect.name}: {effect.title}", [Section("", facts)])
-
-
-def indenter_page(indenter: IndenterDescriptor) -> Page:
-    """Return by which dimensions an indenter is given."""
-    return _given_by(f"Indenter {indenter.name}: {indenter.title}", "--indenter", indenter, indenter.dimensions)
-
-
-def profile_page(profile: ProfileDescriptor) -> Page:
-    """Return by which parameters a force profile is given."""
-    return _given_by(f"Profile {profile.name}: {profile.title}", "--profile", profile, profile.parameters)
-
-
-def _given_by(
-    title: str, option: str, descriptor: IndenterDescriptor | ProfileDescriptor, numbers: Mapping[str, Parameter]
-) -> Page:
-    asked = ",".join(f"{name}={one.default:g}" for name, one in numbers.items())
-    facts = [
-        ("asked for", f"tactbench record {option} {descriptor.name}{f':{asked}' if asked else ''}"),
-        ("code", descriptor.where),
-    ]
-    page = Page(title, [Section("", facts)])
-    if numbers:
-        lines = [(name, f"{one.default:g}", one.unit, one.range, one.text) for name, one in numbers.items()]
-        page.sections.append(Section("Given by", lines, ("name", "default", "unit", "may be", "what it is")))
-    return page
-
-
-def device_page(device: DeviceDescriptor) -> Page:
-    """Return what a device is for, and where its code is."""
-    facts = [("used for", device.kind), ("driver", device.driver), ("emulator", device.emulator or "none")]
-    return Page(f"Device {device.name}: {device.title}", [Section("", facts)])
-
-
-def page_of(descriptor: Any) -> Page:
-    """Return the page of a descriptor of any kind but a sensor."""
+def _facts(descriptor: Any) -> Iterator[tuple[str, str]]:
+    """Yield what there is to know beside name, title and code."""
     if isinstance(descriptor, EstimatorDescriptor):
-        return estimator_page(descriptor)
-    if isinstance(descriptor, RigDescriptor):
-        return rig_page(descriptor)
-    if isinstance(descriptor, EffectDescriptor):
-        return effect_page(descriptor)
-    if isinstance(descriptor, IndenterDescriptor):
-        return indenter_page(descriptor)
-    if isinstance(descriptor, ProfileDescriptor):
-        return profile_page(descriptor)
-    if isinstance(descriptor, DeviceDescriptor):
-        return device_page(descriptor)
-    return task_page(descriptor.spec)
+        answers = {"features": "the features", "time": "the time index alone", "nothing": "nothing",
+                   "reference": "the reference sensor: an oracle"}  # fmt: skip
+        grid = [f"{name}: {', '.join(f'{one:g}' for one in values)}" for name, values in descriptor.grid.items()]
+        if descriptor.window_grid != (0,):
+            grid.append(f"window: {', '.join(map(str, descriptor.window_grid))} samples before the newest")
+        linear = {True: "linear", False: "not linear", None: "not said"}[descriptor.linear]
+        yield "answers", " and ".join(descriptor.kinds)
+        yield "looks at", answers[descriptor.looks_at]
+        yield "model", linear + (", a trivial answer" if descriptor.baseline else "")
+        yield "may be set", ", ".join(f"{name}={value}" for name, value in descriptor.params.items()) or "nothing"
+        yield "chosen on validation data", "; ".join(grid) or "nothing"
+    elif isinstance(descriptor, RigDescriptor):
+        offered = ("verification", "work_precision", "likeness")
+        able = [name.replace("_", " ") for name in offered if getattr(descriptor, name)]
+        yield (
+            "scenes are",
+            "simulated; rows are marked SIM" if descriptor.simulated else "carried out on hardware, or were",
+        )
+        yield "solvers", ", ".join(descriptor.rungs) or "none"
+        yield "also offers", ", ".join(able) or "nothing"
+    elif isinstance(descriptor, EffectDescriptor):
+        for name in ("produces", "consumes", "groups"):
+            yield name, ", ".join(getattr(descriptor, name)) or "none"
+    elif isinstance(descriptor, DeviceDescriptor):
+        yield from (
+            ("used for", descriptor.kind),
+            ("driver", descriptor.driver),
+            ("emulator", descriptor.emulator or "none"),
+        )
+    else:
+        asked = ",".join(f"{name}={one.default:g}" for name, one in _numbers(descriptor).items())
+        option = "--indenter" if isinstance(descriptor, IndenterDescriptor) else "--profile"
+        yield "asked for", f"tactbench record {option} {descriptor.name}{f':{asked}' if asked else ''}"
+
+
+def _numbers(descriptor: IndenterDescriptor | ProfileDescriptor) -> Mapping[str, Parameter]:
+    return descriptor.dimensions if isinstance(descriptor, IndenterDescriptor) else descriptor.parameters

@@ -154,14 +154,14 @@ class _Bar(Display):
     @contextmanager
     def paused(self) -> Iterator[None]:
         """Take the bar off the screen meanwhile."""
-        if self._shown is None:
-            yield
-            return
-        self._shown.stop()
+        shown = self._shown
+        if shown is not None:
+            shown.stop()
         try:
             yield
         finally:
-            self._shown.start()
+            if shown is not None:
+                shown.start()
 
     def end(self) -> None:
         if self._shown is not None:

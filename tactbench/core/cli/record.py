@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 
 import click
 
-from tactbench.core.cli.options import FiniteRange, options
-from tactbench.core.cli.scenes import PRESS, indenter_of, profile_of, scene_of
+from tactbench.core.cli.options import YES, options
+from tactbench.core.cli.scenes import PROFILE, indenter_of, profile_of, scene_of
 from tactbench.core.cli.simulation import SIMULATION, simulation_of
 from tactbench.core.tables.text import command_line
 
@@ -19,48 +19,37 @@ if TYPE_CHECKING:
     from tactbench.core.plugins.interfaces import Operator, Rig
     from tactbench.core.plugins.registry import Registry
     from tactbench.core.samples import Block
-    from tactbench.core.spec.rig import SensorDescriptor
     from tactbench.core.spec.rig_file import RigFile
-    from tactbench.core.spec.scene import Scene
 
 
 @click.command(name="record")
-@click.option("--sensor", required=True, metavar="NAME", help="What is pressed on.")
-@click.option("--rig", metavar="NAME", help="What presses; default: the rig file's rig, or else twin.")
+@click.option("--sensor", required=True, metavar="NAME", help="Sensor.")
+@click.option("--rig", metavar="NAME", help="Rig. Default: the rig file's, else twin.")
 @click.option("--rig-file", metavar="FILE", help="Devices and links of a rig of real or emulated devices.")
-@options(*PRESS)
-@click.option("--slide-mm-s", type=FiniteRange(min=0, min_open=True), metavar="V",
-              help="Slide towards the tip at this speed, from the middle on; vibration is recorded too.")  # fmt: skip
+@click.option("--indenter", metavar="NAME[:D=X,...]",
+              help="Indenter with dimensions: cap:radius=10, cylinder:radius=4,angle=90. Default: flat.")  # fmt: skip
+@PROFILE
 @options(*SIMULATION)
-@click.option("--seed", type=click.IntRange(min=0), default=1, show_default=True, metavar="N")
-@click.option(
-    "--out", required=True, type=click.Path(path_type=Path), metavar="FILE", help="The recording, a .h5 file."
-)
-@click.option("--replace", is_flag=True, help="Replace the file if it is there already.")
-@click.option("--yes", is_flag=True, help="Ask nobody: what has to be done at the rig is done.")
-@click.option("--live", is_flag=True, help="Show taxels, force, rates and losses on stderr meanwhile.")
+@click.option("--seed", type=click.IntRange(min=0), default=1, show_default=True, metavar="N", help="Random seed.")
+@click.option("--out", required=True, type=click.Path(path_type=Path), metavar="FILE", help="Output file (.h5).")
+@click.option("--replace", is_flag=True, help="Overwrite the output file.")
+@YES
+@click.option("--live", is_flag=True, help="Show taxels, force, rates and losses while recording.")
 def command(
     sensor: str,
     rig: str | None,
     rig_file: str | None,
-    cap_mm: float | None,
     indenter: str | None,
     profile: str | None,
-    force_n: float | None,
-    seconds: float | None,
-    slide_mm_s: float | None,
+    effects: str | None,
+    settings: tuple[str, ...],
     seed: int,
     out: Path,
     replace: bool,
     yes: bool,
     live: bool,
-    effects: str | None,
-    rung: str | None,
-    tolerance: float | None,
-    scenario: str | None,
-    nuisances: tuple[str, ...],
 ) -> None:
-    """Carry out one scene into one recording."""
+    """Record one scene into one file; `tactbench list` names indenters and profiles."""
     import time
     from contextlib import ExitStack, nullcontext
 
@@ -75,16 +64,13 @@ def command(
 
     registry = load_registry()
     descriptor = registry.sensors[sensor]
-    shape, path = indenter_of(registry, indenter), profile_of(registry, profile)
     # The name of the scene decides its draws: the seed alone shall, and not the name of the file.
-    scene = scene_of("press", cap_mm, force_n, seconds, descriptor, shape, path)
-    if slide_mm_s is not None:
-        scene = _sliding(scene, slide_mm_s, descriptor)
+    scene = scene_of(
+        "press", descriptor, indenter=indenter_of(registry, indenter), profile=profile_of(registry, profile)
+    )
     devices = load_rig_file(Path(rig_file), registry) if rig_file else None
     rig = rig or (devices.rig if devices else "twin")
-    simulation = simulation_of(
-        registry, rig, [sensor], effects=effects, rung=rung, tolerance=tolerance, scenario=scenario, nuisances=nuisances
-    )
+    simulation = simulation_of(registry, rig, [sensor], effects=effects, settings=settings)
     if simulation is not None:
         scene = scene.simulated_as(simulation)
     if not replace:
@@ -97,9 +83,8 @@ def command(
             if live:
                 from tactbench.core.cli.live import LiveView
 
-                mark = (
-                    " (SIM)" if registry.rigs[rig].simulated else " (EMULATED)" if devices and devices.emulated else ""
-                )
+                emulated = devices is not None and devices.emulated
+                mark = " (SIM)" if registry.rigs[rig].simulated else " (EMULATED)" if emulated else ""
                 view = stack.enter_context(LiveView(scene, f"{sensor} on {rig}{mark}, {scene.indenter}"))
                 watch, paused = view.watch, view.paused
             built = _built(registry, rig, devices, TerminalOperator(yes=yes, paused=paused))
@@ -110,31 +95,18 @@ def command(
                 provenance=provenance, watch=watch, name=out.stem, replace=replace, complete_interrupted=True,
             )  # fmt: skip
     except (KeyboardInterrupt, TactbenchError) as error:
-        notes = getattr(error, "__notes__", ())
         if _interrupted(out):
             remark(f"What was recorded until then is in {out}, and is left out of every evaluation.")
         elif isinstance(error, KeyboardInterrupt):
-            remark("\n".join(notes) or "Nothing is kept.")
+            remark("\n".join(getattr(error, "__notes__", ())) or "Nothing is kept.")
         raise
     meta = made.meta
     spent = float(meta.provenance.get("sim_s", meta.provenance.get("acquisition_s", 0.0)))
     mark = " (EMULATED)" if meta.emulation else " (SIM)" if meta.simulated else ""
     click.echo(f"{out}: {meta.sensor.name} on {meta.rig}{mark}, {scene.indenter}, in {spent:.2f} s")
     for name, value in meta.assumptions.items():
-        click.echo(f"  assumed: {name} = {value}", err=True)
+        remark(f"  assumed: {name} = {value}")
     remark(f"See what is in it:  {command_line('tactbench', 'inspect', str(out))}")
-
-
-def _sliding(scene: Scene, speed_mm_s: float, sensor: SensorDescriptor) -> Scene:
-    """Return the scene with a slide from its middle on, and with the channel that hears it, if the sensor has one."""
-    from tactbench.core.spec.quantity import sourced
-    from tactbench.core.spec.scene import Slide
-
-    reference = "the command line"
-    middle = scene.profile.duration.to("s") / 2
-    slide = Slide(speed=sourced(speed_mm_s, "mm/s", reference), start=sourced(middle, "s", f"{reference}: the middle"))
-    hears = ("ac_pressure",) if sensor.spec.channels("ac_pressure") and "ac_pressure" not in scene.observe else ()
-    return scene.model_copy(update={"slide": slide, "observe": (*scene.observe, *hears)})
 
 
 def _interrupted(path: Path) -> bool:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -9,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from tactbench.core.cli.options import ENGINE, options
+from tactbench.core.cli.options import ENGINE, YES, options
 from tactbench.core.cli.selection import SELECTING, requested_matrix
 from tactbench.core.cli.tables import (
     DEFAULT_FOLDER,
@@ -32,7 +33,7 @@ _REASON_CHARACTERS = 200
 @options(*SELECTING, *ENGINE)
 @click.option("--out", type=click.Path(path_type=Path), default=DEFAULT_FOLDER, show_default=True,
               metavar="DIR", help="Where results lie; what is there already is reused.")  # fmt: skip
-@click.option("--yes", is_flag=True, help="Ask nobody: what has to be done at a rig of real devices is done.")
+@YES
 @click.option("--format", "shape", type=click.Choice(TABLE_FORMATS), default="table", show_default=True,
               help="How the leaderboard is printed.")  # fmt: skip
 @click.pass_context
@@ -42,11 +43,10 @@ def command(
     out: Path,
     yes: bool,
     shape: str,
-    engine: EngineName | None,
+    engine: EngineName,
     jobs: int | None,
     timeout: float | None,
     memory: int | None,
-    scheduler: str | None,
     **selection: Any,
 ) -> None:
     """Acquire, evaluate, rank.
@@ -55,8 +55,8 @@ def command(
     """
     check_destination(shape)
     keep_threads()
+    from tactbench.core.cli.listing import tell_failed
     from tactbench.core.cli.operator import TerminalOperator
-    from tactbench.core.cli.plugins import tell_failed
     from tactbench.core.cli.progress import progress
     from tactbench.core.cli.results import provenance_of
     from tactbench.core.leaderboard.formats import write_tables
@@ -76,7 +76,8 @@ def command(
         timeout_s=matrix.timeout_s if timeout is None else timeout,
         memory_mb=matrix.memory_mb if memory is None else memory,
     )
-    choice = EngineChoice(engine or "isolated", jobs, limits, scheduler)
+    scheduler = os.environ.get("DASK_SCHEDULER_ADDRESS") if engine == "dask" else None
+    choice = EngineChoice(engine, jobs, limits, scheduler)
     store = Store(out)
     with progress() as display:
         outcome = run_matrix(
@@ -129,7 +130,7 @@ def tell_stopped(rows: Sequence[Mapping[str, Any]], folder: Path) -> None:
         remark(f"  {row['status']:<13}  {row['cell']}: {one_line(row['reason'])}")
     which = str(rows[0]["cell"]), "--out", str(folder)
     remark(f"Look into one:  {command_line('tactbench', 'why', *which)}")
-    remark(f"Try it again:   {command_line('tactbench', 'rerun', *which)}")
+    remark(f"Try it again:   {command_line('tactbench', 'why', *which, '--again')}")
 
 
 def one_line(reason: str) -> str:

@@ -1,12 +1,11 @@
-"""The options that say what is pressed on a sensor, and the scene they describe."""
+"""Which scene the options of a verb describe: what is pressed on a sensor, and how."""
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING, Any
 
 import click
-
-from tactbench.core.cli.options import FiniteRange
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -20,63 +19,29 @@ if TYPE_CHECKING:
 
 _BY = "the command line"
 
-
-_ABOVE_0 = FiniteRange(min=0, min_open=True)
-
-PRESS = (
-    click.option("--indenter", "indenter", metavar="NAME[:D=X,...]",
-                 help="Another shape by name: cylinder:radius=4,angle=90, turned by 90 degrees about the press "
-                      "axis; see `tactbench list indenters`."),
-    click.option("--cap-mm", type=_ABOVE_0, metavar="R",
-                 help="Radius of a spherical cap; without it the indenter is flat."),
-    click.option("--force-n", type=_ABOVE_0, metavar="F", help="Force at the end; default 5."),
-    click.option("--seconds", type=_ABOVE_0, metavar="T",
-                 help="Duration; the ramp keeps its shape. Default 60."),
-    click.option("--profile", "profile", metavar="NAME[:P=X,...]",
-                 help="A force profile by name in place of the ramp: sine:mean=2,frequency=0.5; see "
-                      "`tactbench list profiles`."),
+PROFILE = click.option(
+    "--profile", metavar="NAME[:P=X,...]",
+    help="Force profile with its parameters: ramp:force=5,duration=60 (the default), sine:mean=2,frequency=0.5.",
 )  # fmt: skip
-"""Given to `indenter_of`, `profile_of` and `scene_of`."""
+"""Given to `profile_of`."""
 
 
 def scene_of(
-    name: str,
-    cap_mm: float | None,
-    force_n: float | None,
-    seconds: float | None,
-    sensor: SensorDescriptor | None,
-    shape: Indenter | None = None,
-    profile: ForceProfile | None = None,
+    name: str, sensor: SensorDescriptor | None, *, indenter: Indenter | None = None, profile: ForceProfile | None = None
 ) -> Scene:
-    """Return the scene the options describe; what they leave open is that of the paper. None: no sensor is pressed."""
-    from tactbench.core.errors import UsageError
+    """Return a press; what is left open is that of the paper. None: no sensor is pressed."""
     from tactbench.core.spec.profile import ForceRamp
-    from tactbench.core.spec.quantity import sourced
     from tactbench.core.spec.scene import Indenter, Scene
 
-    ramp = ForceRamp()
-    change: dict[str, Any] = {}
-    if force_n is not None:
-        change["end"] = sourced(force_n, "N", _BY)
-    if seconds is not None:
-        share = seconds / ramp.duration.to("s")
-        change["duration"] = sourced(seconds, "s", _BY)
-        change["hold"] = sourced(ramp.hold.to("s") * share, "s", f"{_BY}: the same share of the duration")
-        change["samples"] = max(1, round(ramp.samples * share))
-    if profile is not None and change:
-        raise UsageError("--force-n and --seconds are of the ramp.", hint="Give them as parameters of --profile.")
-    if shape is not None and cap_mm is not None:
-        raise UsageError("--cap-mm and --indenter both say what is pressed.", hint="Leave one of them out.")
-    indenter = shape or (Indenter() if cap_mm is None else Indenter(radius=sourced(cap_mm, "mm", _BY)))
-    kinds = tuple(dict.fromkeys(channel.kind for channel in sensor.spec.channels())) if sensor else ("taxel",)
+    indenter = indenter or Indenter()
     labels: dict[str, str | float | int] = {}
     if indenter.radius is not None:
         labels["cap_radius_mm"] = indenter.radius.to("mm")
     elif indenter.shape is not None:
         labels["indenter"] = indenter.shape
+    kinds = tuple(dict.fromkeys(channel.kind for channel in sensor.spec.channels())) if sensor else ("taxel",)
     observe = ("taxel",) if "taxel" in kinds else kinds
-    load = profile or ramp.model_copy(update=change)
-    return Scene(name=name, indenter=indenter, profile=load, observe=observe, labels=labels)
+    return Scene(name=name, indenter=indenter, profile=profile or ForceRamp(), observe=observe, labels=labels)
 
 
 def indenter_of(registry: Registry, text: str | None) -> Indenter | None:
@@ -106,14 +71,38 @@ def indenter_of(registry: Registry, text: str | None) -> Indenter | None:
 
 
 def profile_of(registry: Registry, text: str | None) -> ForceProfile | None:
-    """Return the force path that --profile describes; None: it was not given. Raises as `indenter_of`."""
+    """Return the force profile that --profile describes; None: it was not given. Raises as `indenter_of`."""
     from tactbench.core.plugins.force_profiles import force_path
 
     if text is None:
         return None
     name, given = _named(text)
+    if name == "ramp":
+        return _ramp(given)
     descriptor = registry.profiles[name]
     return force_path(descriptor, _in_units(given, descriptor.parameters), _BY)
+
+
+def _ramp(given: Mapping[str, float]) -> ForceProfile:
+    from tactbench.core.errors import UnknownNameError, UsageError
+    from tactbench.core.spec.profile import ForceRamp
+    from tactbench.core.spec.quantity import sourced
+
+    ramp = ForceRamp()
+    change: dict[str, Any] = {}
+    for name, value in given.items():
+        if name not in ("force", "duration"):
+            raise UnknownNameError("parameter of the ramp", name, ("force", "duration"))
+        if not 0 < value < math.inf:
+            raise UsageError(f"{name} of the ramp is {value:g}.", hint="Give a number above 0.")
+    if "force" in given:
+        change["end"] = sourced(given["force"], "N", _BY)
+    if "duration" in given:
+        share = given["duration"] / ramp.duration.to("s")
+        change["duration"] = sourced(given["duration"], "s", _BY)
+        change["hold"] = sourced(ramp.hold.to("s") * share, "s", f"{_BY}: the same share of the duration")
+        change["samples"] = max(1, round(ramp.samples * share))
+    return ramp.model_copy(update=change)
 
 
 def _named(text: str) -> tuple[str, dict[str, float]]:

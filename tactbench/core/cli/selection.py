@@ -1,8 +1,7 @@
-"""The options that say which cells a verb is about: those of ``run``."""
+"""The options that say which cells a run computes."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -16,26 +15,22 @@ if TYPE_CHECKING:
     from tactbench.core.spec.matrix import MatrixSpec
 
 SELECTING = (
-    click.option("--sensor", "sensors", multiple=True, metavar="NAME", help="Sensor to test; may be repeated."),
-    click.option("--task", "tasks", multiple=True, metavar="NAME", help="Question to ask; may be repeated."),
-    click.option("--rig", metavar="NAME", help="What carries out the scenes: twin (default), replay …"),
-    click.option("--recordings", type=click.Path(path_type=Path), metavar="DIR", help="Recordings for --rig replay."),
+    click.option("--sensor", "sensors", multiple=True, metavar="NAME", help="Sensor; repeatable."),
+    click.option("--task", "tasks", multiple=True, metavar="NAME", help="Task; repeatable."),
+    click.option("--rig", metavar="NAME", help="Rig: twin (default), replay, or one of a rig file."),
+    click.option("--recordings", type=click.Path(path_type=Path), metavar="DIR", help="Recordings to replay."),
     click.option("--rig-file", metavar="FILE", help="Devices and links of a rig of real or emulated devices."),
     click.option("--protocol", "protocols", multiple=True, metavar="NAME",
-                 help="How recordings become X and y; may be repeated. Default: the task's first."),
+                 help="Evaluation protocol; repeatable. Default: the task's first."),
     click.option("--split", "splits", multiple=True, metavar="NAME",
-                 help="What is kept apart: roles, session, placement, unit, few-shot, object …; may be repeated."),
+                 help="Train/test split: roles, session, placement, unit, few-shot, …; repeatable."),
     click.option("--estimator", "estimators", multiple=True, metavar="NAME",
-                 help="What answers; may be repeated. all: every one for this kind of question."),
-    click.option("--config", metavar="FILE", help="A matrix like benchmarks.yaml, or the name of a packaged one."),
+                 help="Estimator; repeatable; `all` for every one that fits."),
+    click.option("--config", metavar="FILE", help="Matrix file like benchmarks.yaml, or the name of a packaged one."),
     click.option("--repeats", type=click.IntRange(min=1, max=MOST_REPEATS), metavar="N",
-                 help="Replicates: record and answer everything N times, each with another seed. Default: 8 simulated "
-                 "ones; of recordings 1, whose sessions are the replicates."),
+                 help="Number of replicates, each with its own seed. Default: 8 if simulated, else 1."),
     click.option("--seed", type=click.IntRange(min=0), metavar="N", help="Seed of the first replicate."),
-    click.option("--probe", is_flag=True,
-                 help="Also ask what the recordings give away: first frame alone, shuffled rows."),
-    click.option("--latency/--no-latency", default=None,
-                 help="Measure how long one row takes, up to 0.3 s a cell. Default: yes."),
+    click.option("--probe", is_flag=True, help="Add leakage probes: first frame only, shuffled rows."),
     *SIMULATION,
 )  # fmt: skip
 """Given to `requested_matrix`."""
@@ -44,50 +39,10 @@ SELECTING = (
 def requested_matrix(
     registry: Registry,
     *,
-    probe: bool,
-    recordings: Path | None,
-    effects: str | None,
-    rung: str | None,
-    tolerance: float | None,
-    scenario: str | None,
-    nuisances: Sequence[str],
-    latency: bool | None,
-    **selection: Any,
-) -> tuple[MatrixSpec, Path | None]:
-    """Return the matrix that the options ask for, and the folder of the recordings to replay if there is one.
-
-    Raises
-    ------
-    UsageError
-        If a file, a name or a combination of options is wrong.
-    """
-    matrix = _matrix(**selection, replaying=recordings is not None)
-    chosen = {choice.name for choice in matrix.tasks}
-    tasks = []
-    for choice in matrix.tasks:
-        known = choice.name in registry.tasks
-        beside = registry.tasks[choice.name].spec.beside if known else ()  # an unknown name is refused with all others
-        more = [choice.model_copy(update={"name": name}) for name in beside if name not in chosen]
-        tasks += [choice, *more]  # those that are to be read beside it are answered in the same way
-    matrix = matrix.model_copy(update={"tasks": tuple(tasks)})
-    simulation = simulation_of(
-        registry, matrix.rig, matrix.sensors, effects=effects, rung=rung, tolerance=tolerance, scenario=scenario,
-        nuisances=nuisances, stated=matrix.simulation,
-    )  # fmt: skip
-    if probe:
-        matrix = matrix.model_copy(update={"probe": True})
-    if latency is not None:
-        matrix = matrix.model_copy(update={"latency": latency})
-    if simulation is not None:
-        matrix = matrix.model_copy(update={"simulation": simulation})
-    return matrix, recordings or (Path(matrix.recordings) if matrix.recordings else None)
-
-
-def _matrix(
-    *,
     sensors: tuple[str, ...],
     tasks: tuple[str, ...],
     rig: str | None,
+    recordings: Path | None,
     rig_file: str | None,
     protocols: tuple[str, ...],
     splits: tuple[str, ...],
@@ -95,44 +50,68 @@ def _matrix(
     config: str | None,
     repeats: int | None,
     seed: int | None,
-    replaying: bool,
-) -> MatrixSpec:
-    """Return the matrix file with the command line's choices laid over it."""
+    probe: bool,
+    effects: str | None,
+    settings: tuple[str, ...],
+) -> tuple[MatrixSpec, Path | None]:
+    """Return the matrix file with the command line's choices laid over it, and the folder of recordings if any.
+
+    Raises
+    ------
+    UsageError
+        If a file, a name or a combination of options is wrong.
+    """
     from tactbench.core.cli.config import default_matrix, matrix_called
     from tactbench.core.spec.matrix import EstimatorChoice, TaskChoice
 
     matrix = matrix_called(config) if config else default_matrix()
     change: dict[str, Any] = {}
-    if rig or replaying or rig_file:
-        change["rig"] = rig or (rig_of_file(rig_file) if rig_file else "replay")
-        change["rig_file"] = rig_file
-    if sensors:
-        change["sensors"] = tuple(dict.fromkeys(sensors))
-    elif change.get("rig", matrix.rig) != matrix.rig:
-        change["sensors"] = ()  # the file's sensors are those of its own rig
-    if repeats is not None:
-        change["repeats"] = repeats
-    if seed is not None:
-        change["seed"] = seed
-    chosen = list(matrix.tasks)
-    if tasks:
-        chosen = []
-        for name in dict.fromkeys(tasks):
-            chosen += [choice for choice in matrix.tasks if choice.name == name] or [TaskChoice(name=name)]
     over: dict[str, Any] = {}
-    if protocols:
-        over["protocol"] = tuple(dict.fromkeys(protocols))
-    elif change.get("rig", matrix.rig) != matrix.rig:
-        over["protocol"] = ("deployable",)  # the paper's protocol needs the paper's three roles
-    if splits:
-        over["split"] = tuple(dict.fromkeys(splits))
-    if estimators:
-        over["estimators"] = tuple(EstimatorChoice(name=name) for name in dict.fromkeys(estimators))
-    change["tasks"] = tuple(choice.model_copy(update=over) for choice in chosen)
-    return matrix.model_copy(update=change)
+    if rig or recordings or rig_file:
+        change["rig"] = rig or (_rig_of(rig_file) if rig_file else "replay")
+        change["rig_file"] = rig_file
+        if change["rig"] != matrix.rig:
+            change["sensors"] = ()  # the file's sensors are those of its own rig
+            over["protocol"] = ("deployable",)  # the paper's protocol needs the paper's three roles
+    stated = {
+        "sensors": tuple(dict.fromkeys(sensors)) or None,
+        "repeats": repeats,
+        "seed": seed,
+        "probe": probe or None,
+    }
+    change |= {name: value for name, value in stated.items() if value is not None}
+    chosen: list[TaskChoice] = []
+    for name in dict.fromkeys(tasks):
+        chosen += [choice for choice in matrix.tasks if choice.name == name] or [TaskChoice(name=name)]
+    several = {
+        "protocol": tuple(dict.fromkeys(protocols)),
+        "split": tuple(dict.fromkeys(splits)),
+        "estimators": tuple(EstimatorChoice(name=name) for name in dict.fromkeys(estimators)),
+    }
+    over |= {name: value for name, value in several.items() if value}
+    chosen = [choice.model_copy(update=over) for choice in chosen or matrix.tasks]
+    change["tasks"] = tuple(_with_those_beside(chosen, registry))
+    matrix = matrix.model_copy(update=change)
+    simulation = simulation_of(
+        registry, matrix.rig, matrix.sensors, effects=effects, settings=settings, stated=matrix.simulation
+    )
+    if simulation is not None:
+        matrix = matrix.model_copy(update={"simulation": simulation})
+    return matrix, recordings or (Path(matrix.recordings) if matrix.recordings else None)
 
 
-def rig_of_file(file: str) -> str:
+def _with_those_beside(choices: list[Any], registry: Registry) -> list[Any]:
+    """Return the tasks and those that are to be read beside them, answered in the same way."""
+    names = {choice.name for choice in choices}
+    found = []
+    for choice in choices:
+        known = choice.name in registry.tasks
+        beside = registry.tasks[choice.name].spec.beside if known else ()  # an unknown name is refused with all others
+        found += [choice, *(choice.model_copy(update={"name": name}) for name in beside if name not in names)]
+    return found
+
+
+def _rig_of(file: str) -> str:
     """Return the name of the rig that a rig file is for; raises ConfigError if it is none."""
     from tactbench.core.spec.rig_file import RigFile
     from tactbench.core.spec.yaml_file import load_yaml

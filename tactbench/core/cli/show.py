@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from tactbench.core.cli.options import format_option
 from tactbench.core.tables.text import json_text
 
 if TYPE_CHECKING:
@@ -15,15 +16,11 @@ if TYPE_CHECKING:
 
 @click.command(name="show")
 @click.argument("names", nargs=-1, required=True)
-@click.option(
-    "--all",
-    "everything",
-    is_flag=True,
-    help="Every parameter, and who states it; of a task in JSON every scene of its campaigns.",
-)
-@click.option("--format", "shape", type=click.Choice(("table", "json", "md")), default="table", show_default=True)
+@click.option("--all", "everything", is_flag=True,
+              help="Show every parameter and its source; of a task in JSON every scene of its campaigns.")  # fmt: skip
+@format_option("table", "json", "md")
 def command(names: tuple[str, ...], everything: bool, shape: str) -> None:
-    """Show sensors side by side (the paper's Table I and their data sheets), or anything else that is installed."""
+    """Show sensors side by side (Table I and data sheets), or details of anything else that is installed."""
     from tactbench.core.errors import UnknownNameError, UsageError
     from tactbench.core.plugins.registry import load_registry
 
@@ -59,15 +56,13 @@ def _count_campaigns(shown: dict[str, Any]) -> None:
 
 def _described(name: str, registry: Registry) -> list[dict[str, Any]]:
     """Return what is installed under `name`, one description for each kind of plugin that has it."""
-    owners = [family.owned(name) for family in registry.families().values() if name in family]
-    return [{"brought by": _owner(owned), **_dumped(owned.descriptor)} for owned in owners]
-
-
-def _dumped(descriptor: Any) -> dict[str, Any]:
-    dumped: dict[str, Any] = descriptor.model_dump(mode="json")
-    if hasattr(descriptor, "transducer"):
-        dumped["spec"] = _sensor(descriptor.spec)
-    return dumped
+    found = []
+    for owned in (family.owned(name) for family in registry.families().values() if name in family):
+        dumped: dict[str, Any] = owned.descriptor.model_dump(mode="json")
+        if hasattr(owned.descriptor, "transducer"):
+            dumped["spec"] = _sensor(owned.descriptor.spec)
+        found.append({"brought by": _owner(owned), **dumped})
+    return found
 
 
 def _sensor(spec: SensorSpec) -> dict[str, Any]:
@@ -88,19 +83,18 @@ def _pages(owners: list[Owned[Any]]) -> None:
 
     screen = console()
     for owned in owners:
-        page = page_of(owned.descriptor)
-        screen.print(Text(page.title, style="bold"))
+        title, sections = page_of(owned.descriptor)
+        screen.print(Text(title, style="bold"))
         screen.print(Text(f"brought by {_owner(owned)}", style="dim"))
-        for section in page.sections:
+        for section in sections:
             if section.title:
-                screen.print()
-                screen.print(Text(section.title, style="bold"))
+                screen.print(Text(f"\n{section.title}", style="bold"))
             grid = Table(box=box.SIMPLE_HEAD if section.head else None, show_header=bool(section.head),
                          pad_edge=False, padding=(0, 1))  # fmt: skip
             for place in range(max(map(len, section.lines))):
-                title = section.head[place] if section.head else ""
-                words = " ".join([title, *(line[place] for line in section.lines)]).split()
-                grid.add_column(Text(title), min_width=max(map(len, words), default=1) if section.head else None)
+                name = section.head[place] if section.head else ""
+                words = " ".join([name, *(line[place] for line in section.lines)]).split()
+                grid.add_column(Text(name), min_width=max(map(len, words), default=1) if section.head else None)
             for line in section.lines:
                 grid.add_row(*map(Text, line))
             screen.print(grid)

@@ -8,28 +8,26 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from tactbench.core.cli.options import FiniteRange
-
 if TYPE_CHECKING:
     from tactbench.core.plugins.registry import Registry
+    from tactbench.core.spec.rig import RigDescriptor
     from tactbench.core.spec.scene import Simulation
-    from tactbench.core.spec.sensor import SensorSpec
 
-
+EFFECTS = click.option(
+    "--effects", metavar="LIST",
+    help="Force effects in or out: +creep,-drift; groups and +all, -all too. A plain name enables an effect of another "
+    "package.",
+)  # fmt: skip
 SIMULATION = (
-    click.option("--scenario", metavar="NAME",
-                 help="A way of handling the sensor that its spec states by name; see `tactbench list scenarios`."),
-    click.option("--effects", metavar="LIST",
-                 help="Effects to include or leave out whatever the plan says: +creep,-drift. +all, -all. Without a "
-                 "sign the plan decides: an effect of another package takes part only where it is named."),
-    click.option("--rung", metavar="NAME", help="Rung of the ladder of contact solvers; see docs/twin.md."),
-    click.option("--tolerance", type=FiniteRange(min=0, min_open=True), metavar="X",
-                 help="Largest error of a simulated channel, in its unit: the cheapest rung that keeps it."),
-    click.option("--set", "nuisances", multiple=True, metavar="NAME=X",
-                 help="Another value of a nuisance, in the unit of its name: placement_scatter_mm=0.3; may be "
-                 "repeated."),
+    EFFECTS,
+    click.option(
+        "--set", "settings", multiple=True, metavar="NAME=VALUE",
+        help="Set a nuisance (placement_scatter_mm=0.3), or rung, tolerance or scenario of the simulation; repeatable.",
+    ),
 )  # fmt: skip
 """Given to `simulation_of`."""
+
+_NAMED = ("rung", "scenario")
 
 
 def simulation_of(
@@ -38,10 +36,7 @@ def simulation_of(
     sensors: Iterable[str],
     *,
     effects: str | None,
-    rung: str | None,
-    tolerance: float | None,
-    scenario: str | None,
-    nuisances: Sequence[str],
+    settings: Sequence[str] = (),
     stated: Simulation | None = None,
 ) -> Simulation | None:
     """Return what the options ask for, laid over what a file states; None when neither asks for anything.
@@ -49,79 +44,80 @@ def simulation_of(
     Raises
     ------
     UsageError
-        If a word of --effects is not one, the rig has no such rung, no sensor states such a scenario, nobody declares
-        such a nuisance, it cannot have its value, or the rig is not simulated at all.
+        If a word of --effects is not one, nobody declares what --set names, it cannot have its value, or the rig is not
+        simulated at all.
     """
     from tactbench.core.errors import UnknownNameError, UsageError
-    from tactbench.core.spec.scene import Simulation
+    from tactbench.core.spec.scene import NUISANCES, Simulation
 
-    change: dict[str, Any] = {}
+    change = _settings(settings)
     if effects is not None:
         change["effects"] = tuple(word.strip() for word in effects.split(",") if word.strip())
-    if rung is not None or tolerance is not None:
-        change |= {"rung": rung, "tolerance": tolerance}
-    if scenario is not None:
-        change["scenario"] = scenario
-    if nuisances:
-        change["nuisances"] = {**dict(stated.nuisances if stated else ()), **_values_of(nuisances)}
     if not change and (stated is None or not stated.nuisances):
         return stated
     descriptor = registry.rigs[rig]
     if not descriptor.simulated:
-        raise UsageError(
-            f"--effects, --rung, --tolerance, --scenario and --set are for simulated rigs; {rig} is not one.",
-            hint="Leave them out.",
-        )
-    scenarios = [name for sensor in registry.sensors for name in sensor.spec.scenarios]
-    if scenario is not None and scenario not in scenarios:
-        raise UnknownNameError("scenario", scenario, scenarios)
-    if rung is not None and rung not in descriptor.rungs:
-        raise UnknownNameError(f"rung of {rig}", rung, descriptor.rungs)
-    if rung is not None and tolerance is not None:
-        raise UsageError(
-            "--rung and --tolerance were both given.", hint="A tolerance picks the rung: give one of them."
-        )
-    known = {name for effect in registry.effects for name in (effect.name, *effect.groups)} | {"all"}
-    for word in change.get("effects", ()):
-        name = word.lstrip("+-")
+        raise UsageError(f"--effects and --set are for simulated rigs; {rig} is not one.", hint="Leave them out.")
+    _check(registry, descriptor, change)
+    if "rung" in change or "tolerance" in change:  # one takes the other's place
+        change = {"rung": None, "tolerance": None, **change}
+    given = change.pop("nuisances", {})
+    before = stated or Simulation()
+    simulation = Simulation.model_validate(
+        {**before.model_dump(), **change, "nuisances": {**dict(before.nuisances), **given}}
+    )
+    specs = [registry.sensors[name].spec for name in sensors]
+    known = dict.fromkeys([*NUISANCES, *(name for sensor in specs for name in sensor.settable())])
+    for name, _ in simulation.nuisances:
         if name not in known:
-            raise UnknownNameError("effect", name, sorted(known))
-        if word == name and (name not in registry.effects or registry.effects.owned(name).ours):
-            raise UsageError(f"--effects {word!r} lacks its sign.", hint=f"Write +{word} or -{word}.")
-    simulation = Simulation.model_validate({**(stated or Simulation()).model_dump(), **change})
-    _check_nuisances(simulation, [registry.sensors[name].spec for name in sensors])
+            raise UnknownNameError("nuisance", name, [*known, *(_NAMED if name in given else ())])
+    for sensor in specs:
+        sensor.with_nuisances(dict(simulation.nuisances))
     return simulation
 
 
-def _values_of(given: Sequence[str]) -> dict[str, float]:
-    """Return the values of ``name=number``; raises UsageError for what is none, or is given twice."""
+def _settings(given: Sequence[str]) -> dict[str, Any]:
+    """Return what --set changes; raises UsageError for what is no pair, or is given twice."""
     from tactbench.core.errors import UsageError
 
-    values: dict[str, float] = {}
+    named: dict[str, Any] = {}
+    numbers: dict[str, float] = {}
     for text in given:
-        name, equals, number = text.partition("=")
+        name, _, value = text.partition("=")
+        if name in named or name in numbers:
+            raise UsageError(f"--set gives {name} twice.", hint="Give it once.")
+        if name in _NAMED and value:
+            named[name] = value
+            continue
         try:
-            value = float(number)
+            numbers[name] = float(value)
         except ValueError:
-            value = math.nan
-        if not equals or not math.isfinite(value):
+            numbers[name] = math.nan
+        if not math.isfinite(numbers[name]):
             raise UsageError(
                 f"--set {text!r} is not a name and a number.", hint="Write --set placement_scatter_mm=0.3."
             )
-        if name in values:
-            raise UsageError(f"--set gives {name} twice: {values[name]:g} and {value:g}.", hint="Give it once.")
-        values[name] = value
-    return values
+    if "tolerance" in numbers:
+        named["tolerance"] = numbers.pop("tolerance")
+        if named["tolerance"] <= 0 or "rung" in named:
+            raise UsageError(
+                "--set tolerance is above 0, and picks the rung.", hint="Leave out --set rung, or the tolerance."
+            )
+    return {**named, "nuisances": numbers} if numbers else named
 
 
-def _check_nuisances(simulation: Simulation, sensors: Sequence[SensorSpec]) -> None:
-    """Refuse what neither scenes nor any of `sensors` declare, and values that a sensor cannot have."""
-    from tactbench.core.errors import UnknownNameError
-    from tactbench.core.spec.scene import NUISANCES
+def _check(registry: Registry, rig: RigDescriptor, change: dict[str, Any]) -> None:
+    """Refuse names of rungs, scenarios and effects that nobody declares."""
+    from tactbench.core.errors import UnknownNameError, UsageError
 
-    known = dict.fromkeys([*NUISANCES, *(name for sensor in sensors for name in sensor.settable())])
-    for name, _ in simulation.nuisances:
-        if name not in known:
-            raise UnknownNameError("nuisance", name, known)
-    for sensor in sensors:
-        sensor.with_nuisances(dict(simulation.nuisances))
+    scenarios = [name for sensor in registry.sensors for name in sensor.spec.scenarios]
+    for key, what, known in (("scenario", "scenario", scenarios), ("rung", f"rung of {rig.name}", rig.rungs)):
+        if key in change and change[key] not in known:
+            raise UnknownNameError(what, change[key], known)
+    effects = {name for effect in registry.effects for name in (effect.name, *effect.groups)} | {"all"}
+    for word in change.get("effects", ()):
+        name = word.lstrip("+-")
+        if name not in effects:
+            raise UnknownNameError("effect", name, sorted(effects))
+        if word == name and (name not in registry.effects or registry.effects.owned(name).ours):
+            raise UsageError(f"--effects {word!r} lacks its sign.", hint=f"Write +{word} or -{word}.")

@@ -12,7 +12,7 @@ from tactbench.core.samples import Block, Quality
 if TYPE_CHECKING:
     from tactbench.core.samples import FloatArray
     from tactbench.core.spec.scene import Scene
-    from tactbench.core.spec.sensor import ChannelSpec, StreamSpec
+    from tactbench.core.spec.sensor import StreamSpec
 
 LEVEL_S = 0.5
 """Seconds from a stream's first sample whose mean is its channels' level."""
@@ -26,42 +26,29 @@ class StreamState:
 
     One thread calls :meth:`take`; another may read the attributes meanwhile: each is replaced as a whole, none is
     changed in place.
-
-    Attributes
-    ----------
-    latest
-        (channels,) the last sample of each channel that was not MISSING; NaN where there was none. None: no sample yet.
-    quality
-        (channels,) of the last sample.
-    level
-        (channels,) mean over the first :data:`LEVEL_S` seconds.
-    largest
-        (channels,) largest distance from the level among the last samples of all blocks.
-    rate_hz
-        Over the last :data:`RATE_S` seconds, or over the last block if that is longer. None: not known.
-    first_ns, last_ns
-        Of the first and the last sample, as the blocks have them.
-    seen_s
-        When the last block came [s of `time.monotonic`].
-    counts
-        Rows with a sample that has the mark.
-    lost
-        Rows that never came, by the device's numbers.
     """
 
     def __init__(self, spec: StreamSpec) -> None:
         self.spec = spec
         self.rows = 0
         self.latest: FloatArray | None = None
+        """(channels,) the last sample of each that was not MISSING; NaN where there was none."""
         self.quality: Any = None
+        """(channels,) of the last sample."""
         self.level: FloatArray | None = None
+        """(channels,) mean over the first :data:`LEVEL_S` seconds."""
         self.largest: FloatArray | None = None
+        """(channels,) largest distance from the level among the last samples of all blocks."""
         self.rate_hz: float | None = None
+        """Over the last :data:`RATE_S` seconds, or over the last block if that is longer."""
         self.first_ns: int | None = None
         self.last_ns: int | None = None
         self.seen_s: float | None = None
+        """When the last block came [s of `time.monotonic`]."""
         self.counts = dict.fromkeys(COUNTED, 0)
+        """Rows with a sample that has the mark."""
         self.lost = 0
+        """Rows that never came, by the device's numbers."""
         self._first_number: int | None = None
         self._levelled = False
         self._sums: tuple[Any, Any] = (0.0, 0)
@@ -77,8 +64,7 @@ class StreamState:
         row = np.array(block.data[-1], dtype=float)
         if block.quality is not None:
             marks = np.bitwise_or.reduce(block.quality, axis=1)
-            found = {flag: int(np.count_nonzero(marks & flag)) for flag in COUNTED}
-            self.counts = {flag: self.counts[flag] + found[flag] for flag in COUNTED}
+            self.counts = {flag: self.counts[flag] + int(np.count_nonzero(marks & flag)) for flag in COUNTED}
             before = np.full(len(row), np.nan) if self.latest is None else self.latest
             row = np.where(block.quality[-1] & Quality.MISSING, before, row)
             self.quality = block.quality[-1].copy()
@@ -170,10 +156,5 @@ class Watched:
             for place, channel in enumerate(state.spec.channels)
             if channel.kind == "force"
         ]
-        named = [one for one in found if channel_of(*one).name in ("normal", "fz")]
+        named = [one for one in found if one[0].spec.channels[one[1]].name in ("normal", "fz")]
         return next(iter(named + found), None)
-
-
-def channel_of(state: StreamState, place: int) -> ChannelSpec:
-    """Return the channel at a place of a stream."""
-    return state.spec.channels[place]

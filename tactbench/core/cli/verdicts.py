@@ -29,7 +29,7 @@ def oracle_checks(registry: Registry, rig: str) -> list[Check]:
     """Return the rig's checks against its oracles; raises UsageError if it offers none."""
     where = registry.rigs[rig].verification
     if where is None:
-        raise UsageError(f"The rig {rig!r} brings no oracles.", hint="Choose another with --rig.")
+        raise UsageError(f"The rig {rig!r} brings no oracles.", hint="See `tactbench show` with its name.")
     return list(load_object(where)())
 
 
@@ -43,7 +43,9 @@ def likeness_checks(registry: Registry, rig: str, sensors: Sequence[str], record
     """
     where = registry.rigs[rig].likeness
     if where is None:
-        raise UsageError(f"The rig {rig!r} is not held against real sensors.", hint="Choose another with --rig.")
+        raise UsageError(
+            f"The rig {rig!r} is not held against real sensors.", hint="See `tactbench show` with its name."
+        )
     chosen_sensors = [registry.sensors[name] for name in sensors] or [
         sensor for sensor in registry.sensors if getattr(sensor.spec, "likeness", ())
     ]
@@ -93,19 +95,14 @@ def print_verdicts(found: Sequence[Found], shape: str, *, real: bool) -> None:
             rows = [one for one in found if one[0].group == group]
             kinds = ["" if verdict.met else "failed" for _, verdict, _ in rows]
             print_grid(group, _COLUMNS, _lines(rows), numeric=("found", "s"), kinds=kinds)
-        notes: dict[str, list[str]] = {}
+        notes: dict[str, dict[str, None]] = {}
         for check, verdict, _ in found:
             if not verdict.met and verdict.note:
-                notes.setdefault(verdict.note, []).append(_named(check, verdict))
+                notes.setdefault(verdict.note, {})[f"{check.name}, {verdict.name}"] = None
         for note, names in notes.items():
             remark(f"Missed: {'; '.join(names)}:\n  {note}")
     met = sum(verdict.met for _, verdict, _ in found)
-    what = "inside what real sensors show" if real else "within their bounds"
-    remark(f"{met} of {len(found)} {what}.")
-
-
-def _named(check: Check, verdict: Verdict) -> str:
-    return check.name if verdict.name in check.name else f"{check.name}, {verdict.name}"
+    remark(f"{met} of {len(found)} {'inside what real sensors show' if real else 'within their bounds'}.")
 
 
 def _lines(rows: Sequence[Found]) -> list[dict[str, str]]:
@@ -113,18 +110,10 @@ def _lines(rows: Sequence[Found]) -> list[dict[str, str]]:
     for check, verdict, spent in rows:
         first = check.name != before
         before = check.name
-        lines.append(
-            {
-                "": "ok" if verdict.met else "MISS",
-                "check": check.name if first else "",
-                "what": verdict.name,
-                "found": f"{verdict.found:.4g}",
-                "allowed": _allowed(verdict),
-                "unit": "" if verdict.unit == "1" else verdict.unit,
-                "s": f"{spent:.1f}" if first else "",
-                "source": verdict.source,
-            }
-        )
+        entries = ("ok" if verdict.met else "MISS", check.name if first else "", verdict.name, f"{verdict.found:.4g}",
+                   _allowed(verdict), "" if verdict.unit == "1" else verdict.unit, f"{spent:.1f}" if first else "",
+                   verdict.source)  # fmt: skip
+        lines.append(dict(zip(_COLUMNS, entries, strict=True)))
     return lines
 
 
@@ -138,19 +127,11 @@ def _allowed(verdict: Verdict) -> str:
 
 def _record(check: Check, verdict: Verdict, spent: float) -> dict[str, Any]:
     return {
-        "group": check.group,
-        "check": check.name,
-        "title": check.title,
-        "verdict": verdict.name,
-        "met": verdict.met,
-        "found": _finite(verdict.found),
-        "low": _finite(verdict.low),
-        "high": _finite(verdict.high),
-        "unit": verdict.unit,
-        "source": verdict.source,
-        "note": verdict.note,
-        "seconds": spent,
-    }
+        **{name: getattr(check, name) for name in ("group", "title")}, "check": check.name,
+        "verdict": verdict.name, "met": verdict.met,
+        **{name: _finite(getattr(verdict, name)) for name in ("found", "low", "high")},
+        "unit": verdict.unit, "source": verdict.source, "note": verdict.note, "seconds": spent,
+    }  # fmt: skip
 
 
 def _finite(number: float) -> float | None:

@@ -1,181 +1,211 @@
-"""``tactbench why``: whether a result would be reused, what changed, what it is made of, how it ended otherwise."""
+"""``tactbench why``: what a score rests on, whether it would be reused, how a cell ended, and the same once more."""
 
 from __future__ import annotations
 
+import sys
+from collections.abc import Iterator, Mapping
+from contextlib import redirect_stdout
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from tactbench.core.cli.options import options
-from tactbench.core.cli.selection import SELECTING
+from tactbench.core.cli.options import RESULTS, format_option
 from tactbench.core.cli.threads import keep_threads
-from tactbench.core.tables.text import json_text, visible
+from tactbench.core.tables.text import command_line, json_text, visible, visible_lines
 
 if TYPE_CHECKING:
     from tactbench.core.cli.cells import StoredCell
     from tactbench.core.matrix.store import Row
-    from tactbench.core.matrix.why import Explanation
 
+Field = tuple[str, str]
+"""A name, and a value with its unit."""
 _TAIL = 15
 """Lines of a traceback or log that are shown; the whole of it stands in ``--format json``."""
-_REASONS = 20
+_FIELDS = 12
+"""Fields of one kind (recordings, reasons, counts) that are shown; the others stand in ``--format json``."""
 
 
 @click.command(name="why")
 @click.argument("cell", metavar="CELL")
-@click.option("--out", type=click.Path(path_type=Path), default=Path("tactbench-results"), show_default=True,
-              metavar="DIR", help="The result folder.")  # fmt: skip
-@options(*SELECTING)
-@click.option("--format", "shape", type=click.Choice(("text", "json")), default="text", show_default=True)
-def command(cell: str, out: Path, shape: str, **options: Any) -> None:
-    """Say why a cell would be reused or computed, what its score rests on, and how it ended.
+@RESULTS
+@click.option("--again", is_flag=True, help="Compute the cell again and compare it, bit for bit; changes nothing.")
+@format_option("text", "json")
+@click.pass_context
+def command(ctx: click.Context, cell: str, out: Path, again: bool, shape: str) -> None:
+    """Show what a cell's score rests on, whether its result would be reused, and how it ended.
 
-    CELL is its name as tables show it, or a part that only one cell has; of the replicates of a
-    cell the first is meant. Without options the cell is asked for as it was; with `run`'s options, as they ask for it.
+    CELL is a name as tables show it, or a part of it that only one cell has; of its replicates the first is meant. With
+    --again, the exit code is 1 if something differs or it fails. What a simulation recorded is then recorded again,
+    into another place.
     """
     keep_threads()
     from tactbench.core.cli.cells import find_cell
 
-    found = find_cell(out, cell, options)
-    facts = _facts(found, found.explain())
-    click.echo(json_text(facts, indent=1) if shape == "json" else _text(facts))
+    found = find_cell(out, cell)
+    facts = _repeated(found) if again else _facts(found)
+    text = json_text(facts, indent=1) if shape == "json" else (_again_text if again else _text)(facts)
+    click.echo(text)
+    ctx.exit(1 if again and facts["answer"] != "identical" else 0)
 
 
-def _facts(found: StoredCell, why: Explanation) -> dict[str, Any]:
-    row = found.row or {}
-    folder = found.store.folder
-    key = str(row.get("key") or "")
-    done = row.get("status") == "done"
+def _facts(found: StoredCell) -> dict[str, Any]:
+    row, why = found.row, found.explain()
+    done = row["status"] == "done"
+    again = () if done and not why.hit else ("why", found.cell.name, "--again", "--out", str(found.store.folder))
     return {
         "cell": found.cell.name,
         "answer": "hit" if why.hit else "miss",
         "key": why.key,
         "reasons": list(why.reasons),
-        "status": row.get("status", "never run"),
-        "reason": row.get("reason", ""),
-        "signal": row.get("signal"),
-        "traceback": row.get("traceback", ""),
-        "log": row.get("log", ""),
-        "stored_key": key,
-        "file": str(folder / "cells" / f"{key}.h5") if done else None,
-        "recordings": list(row.get("recordings", [])) if done else [],
-        "simulation": row.get("simulation", {}),
-        "score": row.get("score"),
-        "made_by": row.get("made_by", ""),
-        "replicates": _replicates(found) if done else [],
-        "rests_on": _rests_on(row) if done else [],
+        **{name: row.get(name) for name in ("status", "reason", "signal", "traceback", "log", "score", "made_by")},
+        "stored_key": str(row["key"] or ""),
+        "file": str(found.store.folder / "cells" / f"{row['key']}.h5") if done else None,
+        "recordings": list(row["recordings"]) if done else [],
+        "simulation": row["simulation"],
+        "replicates": [*_replicates(found)] if done else [],
+        "scores": row["scores"] if done else {},
+        "recording_scores": _recording_scores(found) if done else {},
+        "rests_on": [*_rests_on(row)] if done else [],
         "provenance": _provenance(found) if done else [],
-        "try": _try(found, why),
+        "try": command_line("tactbench", *(again or ("run",))),
     }
 
 
-def _replicates(found: StoredCell) -> list[str]:
-    """Return what the cell came to over its replicates, and what each of them scored."""
-    from tactbench.core.leaderboard.names import metric_name
+def _replicates(found: StoredCell) -> Iterator[Field]:
+    """Yield what the cell came to over its replicates, and what each of them scored."""
     from tactbench.core.statistics.replicates import counted, over_replicates, percent
-    from tactbench.core.tables.numbers import ABSENT, interval, score
+    from tactbench.core.tables.numbers import ABSENT, interval, score_with_unit
 
     name = found.cell.name.removesuffix(f"/{found.cell.repeat}")
     (row,) = over_replicates([row for row in found.store.rows() if row["cell"].rpartition("/")[0] == name])
     unit, many = str(row["unit"]), row["n_replicates"]
-    ends = interval(row["ci_low"], row["ci_high"], unit)
     over = counted(many, str(row["replicate_unit"]))
-    text = f"{metric_name(row)} {score(row['score'], unit)}"
-    text += (
-        f", {percent(many, row['replicate_unit'])} over {over}: {ends}" if ends != ABSENT else f" ({over}: no interval)"
-    )
+    yield "score", f"{score_with_unit(row['score'], unit)} over {over}"
+    ends = interval(row["ci_low"], row["ci_high"], unit)
+    share = percent(many, row["replicate_unit"])
+    yield f"{share} interval", "none: fewer than five" if ends == ABSENT else f"{ends} ({row['ci_method']})"
     if row["score_beyond_floor"] is not None:
         ends = interval(row["beyond_floor_ci_low"], row["beyond_floor_ci_high"], unit)
-        text += f"; beyond the floor {score(row['score_beyond_floor'], unit)}" + (f", {ends}" if ends != ABSENT else "")
-    parts = [text]
+        beyond = score_with_unit(row["score_beyond_floor"], unit)
+        yield "score beyond the floor", beyond if ends == ABSENT else f"{beyond}, {ends}"
     if len(row["replicate_scores"]) > 1:
-        each = zip(row["seeds"], row["replicate_scores"], strict=True)
-        parts.append("each (seed: score): " + ", ".join(f"{seed}: {score(value, unit)}" for seed, value in each))
+        for seed, value in zip(row["seeds"], row["replicate_scores"], strict=True):
+            yield f"score, seed {seed}", score_with_unit(value, unit)
     if row["recordings_right"] is not None:
-        parts.append(f"recordings right: {row['recordings_right']:.3g} of {row['recordings_asked']:.3g} a replicate")
+        yield "recordings right", f"{row['recordings_right']:.3g} of {row['recordings_asked']:.3g} a replicate"
     if row["delay_parts_ms"] and row["answer_delay_ms"] is not None:
-        listed = ", ".join(f"{part} {value:.3g}" for part, value in row["delay_parts_ms"].items())
-        parts.append(f"answer delay {row['answer_delay_ms']:.3g} ms: {listed}")
-    return [visible(part) for part in parts]
+        yield "delay after touch", f"{row['answer_delay_ms']:.3g} ms"
+        yield from ((f"  {part}", f"{value:.3g} ms") for part, value in row["delay_parts_ms"].items())
 
 
-def _rests_on(row: Row) -> list[str]:
-    """Return what the score of a finished cell is made of and what it is to be held against."""
+def _recording_scores(found: StoredCell) -> dict[str, float]:
+    """Return the score of each test recording, of classes the accuracy; none of events."""
+    from tactbench.core.report.cells import recording_scores
+
+    scores = recording_scores(found.row, found.store.answers(str(found.row["key"])).get("test"))
+    return {name: value for name, _, value in map(dict.values, scores)}
+
+
+def _rests_on(row: Row) -> Iterator[Field]:
+    """Yield what the score of a finished cell is made of and what it is to be compared with."""
     from tactbench.core.leaderboard.names import metric_name
     from tactbench.core.leaderboard.notes import count_texts, picked
-    from tactbench.core.tables.numbers import score, score_with_unit
+    from tactbench.core.tables.numbers import score_with_unit
 
     unit = str(row["unit"])
-    texts = [f"{metric_name(row)} {score(row['score'], unit)}"]
+    yield "metric", metric_name(row)
+    yield "score", score_with_unit(row["score"], unit)
     if row.get("score_beyond_floor") is not None:
-        floor = f"floor of the reference {score_with_unit(row['reference_floor'], unit)}"
-        texts += [floor, f"beyond it {score(row['score_beyond_floor'], unit)}"]
+        yield "floor of the reference", score_with_unit(row["reference_floor"], unit)
+        yield "score beyond the floor", score_with_unit(row["score_beyond_floor"], unit)
     if row.get("published") is not None:
-        texts.append(f"published {score(row['published'], unit)} ({row['published_reference']})")
-    parts = [("score", "; ".join(texts))]
-    if row.get("scores"):
-        parts.append(("other scores", ", ".join(f"{name} {value:.3g}" for name, value in row["scores"].items())))
+        yield "published", f"{score_with_unit(row['published'], unit)} ({row['published_reference']})"
+    yield from ((name, f"{value:.3g}") for name, value in (row.get("scores") or {}).items())
     if row.get("events"):
-        parts.append(("events", ", ".join(f"{name} {value:.3g}" for name, value in row["events"].items())))
-        parts.append(("alarms", str(row["answer_from"])))
+        yield from ((name, f"{value:.3g}") for name, value in row["events"].items())
+        yield "alarms", str(row["answer_from"])
     if row.get("chosen"):
-        parts.append(("chosen on validation data", picked(row)))
-    parts.append(("samples", f"{row['n_train']} to train on, {row['n_test']} to test on, from {row['n_recordings']} "
-                             f"recordings of {row['n_sessions']} sessions"))  # fmt: skip
-    if row.get("assumptions"):
-        parts.append(("assumed", ", ".join(f"{name} {value}" for name, value in sorted(row["assumptions"].items()))))
-    counted = count_texts(row.get("counts") or {})
-    if counted:
-        parts.append(("left out", "; ".join(counted)))
-    parts += [("remark", str(remark)) for remark in (*row.get("remarks", ()), *row.get("stamps", ()))]
-    return [visible(f"{name}: {text}") for name, text in parts]
+        yield "chosen on validation data", picked(row)
+    yield "samples to train on", str(row["n_train"])
+    yield "samples to test on", str(row["n_test"])
+    yield "recordings", f"{row['n_recordings']} of {row['n_sessions']} sessions"
+    yield from (("assumed", f"{name} {value}") for name, value in sorted((row.get("assumptions") or {}).items()))
+    yield from (("left out", text) for text in count_texts(row.get("counts") or {}))
+    yield from (("remark", str(remark)) for remark in (*row.get("remarks", ()), *row.get("stamps", ())))
 
 
 def _provenance(found: StoredCell) -> list[str]:
     from tactbench.core.cli.results import provenance_of
     from tactbench.core.provenance.gather import foot
 
-    return list(foot(provenance_of(found.store, [found.row or {}])))
+    return list(foot(provenance_of(found.store, [found.row])))
 
 
-def _try(found: StoredCell, why: Explanation) -> str:
-    if found.row is None or (not why.hit and found.row["status"] == "done"):
-        return "tactbench run: computes it"
-    from tactbench.core.tables.text import command_line
-
-    return command_line("tactbench", "rerun", found.cell.name, "--out", str(found.store.folder))
-
-
-def _text(facts: dict[str, Any]) -> str:
-    lines = [facts["cell"]]
-    if facts["answer"] == "hit":
-        lines.append("hit: nothing that decides the result has changed; `tactbench run` uses it again.")
-    elif facts["status"] == "done":
-        lines.append("miss: `tactbench run` computes it again.")
-    else:
-        lines.append("miss: there is no result to use again; `tactbench run` computes it.")
-    lines += [f"  {reason}" for reason in facts["reasons"][:_REASONS]]
-    if len(facts["reasons"]) > _REASONS:
-        lines.append(f"  and {len(facts['reasons']) - _REASONS} more (--format json has all)")
-    lines += ["", *_ended(facts), "", f"Try: {facts['try']}"]
-    return "\n".join(lines)
-
-
-def _ended(facts: dict[str, Any]) -> list[str]:
-    if facts["status"] == "done":
-        where = ", ".join(facts["recordings"][:3])
-        more = len(facts["recordings"]) - 3
-        recordings = f"{where}{f' and {more} more' if more > 0 else ''}"
-        over = [f"over replicates: {facts['replicates'][0]}", *(f"  {part}" for part in facts["replicates"][1:])]
-        one = ["this replicate:", *(f"  {part}" for part in facts["rests_on"])]
-        return [*over, *one, f"done: {facts['file']}", f"recordings: {recordings}", *facts["provenance"]]
-    lines = [facts["status"] + (f": {facts['reason']}" if facts["reason"] else "")]
+def _text(facts: Mapping[str, Any]) -> str:
+    done = facts["status"] == "done"
+    fields: list[Field] = [("status", f"{facts['status']}{': ' if facts['reason'] else ''}{facts['reason']}")]
     if facts["signal"] is not None:
-        lines.append(f"signal {facts['signal']}")
+        fields.append(("signal", str(facts["signal"])))
+    will = "reuses" if facts["answer"] == "hit" else "computes it again, for what changed:" if done else "computes it"
+    fields.append(("tactbench run", f"{will} it" if will == "reuses" else will))
+    fields += _first([("", text) for text in facts["reasons"]])
+    if done:
+        per = _first([(f"  {name}", f"{value:.4g}") for name, value in facts["recording_scores"].items()])
+        fields += [("", ""), *facts["replicates"], ("", ""), ("this replicate", facts["cell"]), *facts["rests_on"]]
+        fields += [("score of recording", ""), *per] if per else []
+        fields += [("", ""), ("file", facts["file"])]
+        fields += _first([("recording", path) for path in facts["recordings"]])[:4]
+        fields += [("made by", text) for text in facts["provenance"]]
+    lines = [facts["cell"], *_aligned(fields)]
     for part in ("traceback", "log"):
-        shown = facts[part].splitlines()
+        shown = (facts[part] or "").splitlines()
         if shown:
             lines.append(f"{part}{', its end' if len(shown) > _TAIL else ''}:")
             lines += [f"  {line}" for line in shown[-_TAIL:]]
-    return lines
+    return visible_lines("\n".join([*lines, "", f"Try: {facts['try']}"]))
+
+
+def _first(fields: list[Field]) -> list[Field]:
+    more = len(fields) - _FIELDS
+    return fields if more <= 0 else [*fields[:_FIELDS], ("", f"and {more} more (--format json has all)")]
+
+
+def _aligned(fields: list[Field]) -> list[str]:
+    width = max(len(name) for name, _ in fields)
+    return [visible(f"{name:<{width}}  {value}".rstrip()) for name, value in fields]
+
+
+def _repeated(found: StoredCell) -> dict[str, Any]:
+    """Compute the cell again in this process, and return how it compares."""
+    from tactbench.core.cli.progress import progress
+    from tactbench.core.cli.screen import remark
+    from tactbench.core.matrix.rerun import compute_again
+
+    row = found.row
+    if row.get("signal") is not None:
+        remark(f"It was ended by signal {row['signal']} before; it is computed in this process now.")
+    paths = () if found.simulated else found.paths
+    with redirect_stdout(sys.stderr), progress() as display:  # what a plugin prints is no result
+        again = compute_again(found.cell, row, found.store, found.registry, paths, display)
+    return {
+        "cell": found.cell.name,
+        "answer": "identical" if again.identical else "different",
+        "recordings_made": again.recordings,
+        **{name: again.row[name] for name in ("status", "reason", "traceback", "score")},
+        "differences": list(again.differences),
+        "circumstances": list(found.explain().reasons),
+    }
+
+
+def _again_text(facts: Mapping[str, Any]) -> str:
+    lines = [facts["cell"]]
+    if facts["answer"] == "identical":
+        made = f"{facts['recordings_made']} recordings, " if facts["recordings_made"] else ""
+        lines.append(f"identical: {made}answers, scores and intervals, bit for bit.")
+    else:
+        lines.append("different:" if facts["differences"] else f"{facts['status']} again, as before: {facts['reason']}")
+        lines += [f"  {line}" for line in (*facts["differences"], *facts["traceback"].splitlines())]
+    if facts["circumstances"]:
+        lines += ["Since the cell was made, this has changed:", *(f"  {reason}" for reason in facts["circumstances"])]
+    return visible_lines("\n".join(lines))

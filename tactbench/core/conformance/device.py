@@ -1,7 +1,7 @@
 """Checks of force sensors and motors: on their emulators in virtual time, as a rig uses them.
 
 What they have in common with a sensor's driver is in ``driver.py``. How a motor is moved, each rig says for itself:
-a rig is checked with it by `--invasive`.
+a rig is checked with it by `--rig-file`.
 """
 
 from __future__ import annotations

@@ -169,7 +169,7 @@ def driver_opens(subject: Subject) -> None:
     if descriptor.driver is None:
         skip("it names no driver: it can be simulated or replayed, not read")
     if descriptor.emulator is None:
-        skip("it names no emulator: only `--invasive --rig-file FILE` tries its driver, on a real line")
+        skip("it names no emulator: only `--rig-file FILE` tries its driver, on a real line")
     if descriptor.emulated_link is None:
         fail("emulated_link", "it names an emulator, and does not say on which kind of link")
     with emulated(subject) as (driver, lines, _):

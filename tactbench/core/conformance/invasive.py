@@ -191,7 +191,7 @@ def _zero_n(acquisition: Any) -> float:
 def real_rig_presses(subject: Subject) -> None:
     """A rig of real devices shows only by a press whether it gives what tasks need.
 
-    Look at `tactbench rig check FILE` for limits, and at the message for what is missing.
+    Look at `tactbench doctor --rig-file FILE --seconds 0` for limits, and at the message for what is missing.
     """
     made = _pressed(subject)
     for name, rows in made.rows.items():

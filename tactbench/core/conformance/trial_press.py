@@ -128,7 +128,7 @@ def pressed(subject: Subject, seed: int = 1) -> TrialPress:
     else:
         descriptor, field = subject.descriptor, "where"
         if not descriptor.simulated:
-            skip("it moves something real: `--invasive --rig-file FILE` presses with it")
+            skip("it moves something real: `--rig-file FILE` presses with it")
         if not simulated_sensors(subject):
             skip("no sensor that can be simulated is installed")
         sensor = simulated_sensors(subject)[0]

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any, NamedTuple
 
 from tactbench.core.cost.ladder_rows import Record, by_score, mark_fronts, opening, stopped, timed
-from tactbench.core.cost.rounds import measure
+from tactbench.core.cost.rounds import BUDGET_S, measure
 from tactbench.core.cost.timed_estimators import TimedEstimator, timed_estimator
 from tactbench.core.errors import UsageError
 from tactbench.core.evaluation.dataset import load_dataset
@@ -35,8 +35,6 @@ def climb(
     store: Store,
     *,
     rounds: int,
-    budget_s: float,
-    threads: int,
     clock: Callable[[], float],
     progress: Progress,
     recordings: Path | None = None,
@@ -50,7 +48,7 @@ def climb(
         One sensor, one task. Scores are over its replicates, times of the first.
     store
         Cells that are in it are not scored again; timing is always done anew.
-    rounds, budget_s, threads, clock
+    rounds, clock
         As in `tactbench.core.cost.rounds.measure`.
     recordings
         Folder for rigs that replay.
@@ -90,40 +88,25 @@ def climb(
             continue
         try:
             timed_estimators[row["cell"]] = timed_estimator(
-                task, descriptor, row["params"], row["protocol"], row["split"], data, seed=matrix.seed, threads=threads
+                task, descriptor, row["params"], row["protocol"], row["split"], data, seed=matrix.seed, threads=1
             )
         except Exception as error:
             rows[row["cell"]] |= stopped(error)
-    times = measure(
-        timed_estimators,
-        rounds=rounds,
-        budget_s=budget_s,
-        threads=threads,
-        seed=matrix.seed,
-        clock=clock,
-        progress=progress,
-    )
+    times = measure(timed_estimators, rounds=rounds, seed=matrix.seed, clock=clock, progress=progress)
     load = os.getloadavg()[0] if hasattr(os, "getloadavg") else None
     scores = {row["cell"].removesuffix(f"/{row['repeat']}"): row["scores"] for row in done}
     for cell, one in timed_estimators.items():
-        rows[cell] |= timed(one, times[cell], scores[cell], rounds, budget_s)
+        rows[cell] |= timed(one, times[cell], scores[cell], rounds)
     better = metric_called(task.metric).higher_is_better
     found = by_score(list(rows.values()), higher_is_better=better)
     mark_fronts(found, higher_is_better=better)
     fold = next((one.fold for one in timed_estimators.values()), "")
     measured = {
-        "higher_is_better": better,
-        "fold": fold,
-        "remarks": _remarks(timed_estimators.values()),
-        "rounds": rounds,
-        "budget_s": budget_s,
-        "threads": threads,
-    }
-    return Ladder({**_about(outcome), **measured, "load": load, "cores": os.cpu_count()}, found)
-
-
-def _remarks(timed_estimators: Iterable[TimedEstimator]) -> list[str]:
-    return list(dict.fromkeys(remark for one in timed_estimators for remark in one.remarks))
+        "higher_is_better": better, "fold": fold,
+        "remarks": list(dict.fromkeys(remark for one in timed_estimators.values() for remark in one.remarks)),
+        "rounds": rounds, "budget_s": BUDGET_S, "threads": 1, "load": load, "cores": os.cpu_count(),
+    }  # fmt: skip
+    return Ladder(_about(outcome) | measured, found)
 
 
 def _about(outcome: Outcome) -> dict[str, Any]:

@@ -10,8 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from tactbench.core.cost.front import front
-from tactbench.core.cost.rounds import Timing
+from tactbench.core.cost.precision import front
+from tactbench.core.cost.rounds import BUDGET_S, Timing
 from tactbench.core.cost.timed_estimators import TimedEstimator
 from tactbench.core.errors import NotApplicable, TactbenchError
 from tactbench.core.evaluation.delay import answer_delay_ms, tail_ms
@@ -62,20 +62,20 @@ def stopped(error: Exception) -> Record:
     return {"status": "skipped" if isinstance(error, NotApplicable) else "failed", "reason": reason}
 
 
-def timed(one: TimedEstimator, timing: Timing, scores: Mapping[str, float], rounds: int, budget_s: float) -> Record:
+def timed(one: TimedEstimator, timing: Timing, scores: Mapping[str, float], rounds: int) -> Record:
     """Return what changes in a row by having been timed; `scores` are those of the cell, by fold among others."""
     if timing.trouble is not None:
         return stopped(timing.trouble)
-    fit_q1, fit, fit_q3 = _quartiles(timing.fit_s)
-    batch_q1, batch, batch_q3 = (value / len(one.X_test) for value in _quartiles(timing.batch_s))
-    latency_q1, latency, latency_q3 = _quartiles([1e3 * spent for spent in timing.latency_s])
     p95, largest = tail_ms(np.array(timing.latency_s))
-    parts = {**one.delay_parts_ms, "prediction": latency}
-    spread = latency_q1 - latency, latency_q3 - latency
-    later = (largest if p95 is None else p95) - latency
+    latency = _quartiles("latency_ms", [1e3 * spent for spent in timing.latency_s], middle="latency_ms_p50")
+    parts = {**one.delay_parts_ms, "prediction": latency["latency_ms_p50"]}
+    spread = [latency[f"latency_ms_{end}"] - parts["prediction"] for end in ("q1", "q3")]
+    later = (largest if p95 is None else p95) - parts["prediction"]
     if timing.features_s:
-        features_q1, parts["features"], features_q3 = _quartiles([1e3 * spent for spent in timing.features_s])
-        spread = spread[0] + features_q1 - parts["features"], spread[1] + features_q3 - parts["features"]
+        features = _quartiles("features", [1e3 * spent for spent in timing.features_s])
+        parts["features"] = features["features"]
+        spread = [so_far + features[f"features_{end}"] - parts["features"]
+                  for so_far, end in zip(spread, ("q1", "q3"), strict=True)]  # fmt: skip
         p95_features, largest = tail_ms(np.array(timing.features_s))
         later += (largest if p95_features is None else p95_features) - parts["features"]
     delay = answer_delay_ms(parts, one.looks_at)
@@ -84,19 +84,13 @@ def timed(one: TimedEstimator, timing: Timing, scores: Mapping[str, float], roun
         "n_train": len(one.X_train),
         "n_test": len(one.X_test),
         "n_features": one.X_train.shape[1],
-        "fit_s": fit,
-        "fit_s_q1": fit_q1,
-        "fit_s_q3": fit_q3,
+        **_quartiles("fit_s", timing.fit_s),
         "fits": len(timing.fit_s),
-        "batch_s_per_row": batch,
-        "batch_s_per_row_q1": batch_q1,
-        "batch_s_per_row_q3": batch_q3,
+        **_quartiles("batch_s_per_row", [took / len(one.X_test) for took in timing.batch_s]),
         "batches": len(timing.batch_s),
-        "latency_ms_p50": latency,
+        **latency,
         "latency_ms_p95": p95,
         "latency_ms_max": 1e3 * max(timing.latency_s),
-        "latency_ms_q1": latency_q1,
-        "latency_ms_q3": latency_q3,
         "latency_n": len(timing.latency_s),
         "answer_delay_ms": delay,
         "answer_delay_ms_q1": None if delay is None else delay + spread[0],
@@ -105,13 +99,13 @@ def timed(one: TimedEstimator, timing: Timing, scores: Mapping[str, float], roun
         "data_s": spent,
         "data_kind": kind,
         **{f"loop_{rate}_hz": None if delay is None else delay + later < 1e3 / rate for rate in LOOPS_HZ},
-        "notes": [*_cut_short(timing, rounds, budget_s), *_other_answers(one, timing, scores)],
+        "notes": [*_cut_short(timing, rounds), *_other_answers(one, timing, scores)],
     }
 
 
-def _cut_short(timing: Timing, rounds: int, budget_s: float) -> list[str]:
+def _cut_short(timing: Timing, rounds: int) -> list[str]:
     return [
-        f"{what} in {len(times)} of {rounds} rounds: one took more than {budget_s:g} s"
+        f"{what} in {len(times)} of {rounds} rounds: one took more than {BUDGET_S:g} s"
         for what, times in (("fitted", timing.fit_s), ("all test rows answered", timing.batch_s))
         if len(times) < rounds
     ]
@@ -128,9 +122,9 @@ def _other_answers(one: TimedEstimator, timing: Timing, scores: Mapping[str, flo
     return [f"the timed model scores {score:.6g} on fold {one.fold}, the cell's {stored:.6g}"]
 
 
-def _quartiles(times: Sequence[float]) -> tuple[float, float, float]:
-    low, middle, high = np.quantile(times, (0.25, 0.5, 0.75))
-    return float(low), float(middle), float(high)
+def _quartiles(name: str, times: Sequence[float], *, middle: str = "") -> dict[str, float]:
+    low, median, high = np.quantile(times, (0.25, 0.5, 0.75)).tolist()
+    return {middle or name: median, f"{name}_q1": low, f"{name}_q3": high}
 
 
 def _acquisition(metas: Sequence[RecordingMeta]) -> tuple[str | None, float | None]:

@@ -1,15 +1,39 @@
-"""Work-precision diagrams: their points by subject, the front of each, and the default's place in it."""
+"""Work-precision diagrams: their points by subject, the front of each, the default's place in it, and a figure."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from typing import NamedTuple
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import NamedTuple, TypeVar
 
-from tactbench.core.cost.front import front
 from tactbench.core.errors import TactbenchError
 from tactbench.core.matrix.progress import Progress
 from tactbench.core.plugins.cost import CostPoint, CostStudy
+
+P = TypeVar("P")
+SHARE = 1 / 3
+"""Of an observable's noise: an error below it changes no score much."""
+# Okabe and Ito's colours, told apart by people with any colour vision; shapes say the same again.
+MARKS = (("#0072B2", "o"), ("#D55E00", "s"), ("#009E73", "^"), ("#CC79A7", "D"), ("#E69F00", "v"), ("#56B4E9", "P"),
+         ("#000000", "X"), ("#F0E442", "h"))  # fmt: skip
+
+
+def front(points: Sequence[P], *, seconds: Callable[[P], float], error: Callable[[P], float]) -> list[P]:
+    """Return the points that no other one beats in both, the quickest first.
+
+    Parameters
+    ----------
+    seconds
+        What one takes; any unit, smaller is better.
+    error
+        How far off one is; smaller is better. A score to be maximised is given with its sign changed.
+    """
+    kept: list[P] = []
+    for point in sorted(points, key=lambda point: (seconds(point), error(point))):
+        if not kept or error(point) < error(kept[-1]):
+            kept.append(point)
+    return kept
 
 
 class Skipped(NamedTuple):
@@ -50,36 +74,60 @@ def precise(points: Sequence[CostPoint]) -> list[CostPoint]:
     return front(points, seconds=lambda point: point.seconds, error=lambda point: point.error)
 
 
-def cheapest_below(points: Sequence[CostPoint], share: float = 1 / 3) -> CostPoint | None:
-    """Return the quickest point of one diagram whose error is below `share` of the noise; None if none is."""
-    below = [point for point in points if math.isfinite(point.floor) and point.error < share * point.floor]
-    return min(below, key=lambda point: point.seconds, default=None)
-
-
-def verdict(points: Sequence[CostPoint], share: float = 1 / 3) -> str:
-    """Return one sentence on the default's place in one diagram: why it is the default, or what it misses."""
+def verdict(points: Sequence[CostPoint]) -> str:
+    """Return one sentence on the default of one diagram, and the quickest point below a third of the noise."""
     default = next((point for point in points if point.default), None)
     if default is None:
         return "No default is among the points."
-    subject = f"{default.subject}, {default.observable}"
-    at = f"the default ({default.label}) is off by {default.error:.2g} {default.unit} rms at {_time(default)}"
+    text = f"{default.subject}, {default.observable}: the default is {_point(default)}"
     if not math.isfinite(default.floor):
-        return f"{subject}: {at}; no noise is stated to hold it against."
-    limit = f"a third of the noise ({share * default.floor:.2g} {default.unit})"
-    best = cheapest_below(points, share)
-    if best is None:
-        closest = min(points, key=lambda point: point.error)
-        return (
-            f"{subject}: {at}; no point keeps {limit}: the nearest, {closest.label}, is off by {closest.error:.2g} "
-            f"at {_time(closest)}."
-        )
-    # Two times within a tenth of each other are one time on a machine that does other things as well.
-    if default.error < share * default.floor and default.seconds <= 1.1 * best.seconds:
-        return f"{subject}: {at}: the cheapest point below {limit}."
-    if default.error < share * default.floor:
-        return f"{subject}: {at}, below {limit}; {best.label} keeps it too, in {_time(best)}."
-    return f"{subject}: {at}, above {limit}; {best.label} keeps it, in {_time(best)}."
+        return f"{text}; no noise is stated to compare it with."
+    limit = SHARE * default.floor
+    below = [point for point in points if point.error < limit]
+    best = min(below, key=lambda point: point.seconds, default=None)
+    quickest = "none" if best is None else "the default" if best is default else _point(best)
+    return f"{text}; quickest below a third of the noise ({limit:.2g} {default.unit}): {quickest}."
 
 
-def _time(point: CostPoint) -> str:
-    return f"{1e3 * point.seconds:.0f} ms" if point.seconds < 1 else f"{point.seconds:.2g} s"
+def _point(point: CostPoint) -> str:
+    return f"{point.label}, {point.error:.2g} {point.unit} rms in {1e3 * point.seconds:.3g} ms"
+
+
+def draw(points: Sequence[CostPoint], title: str, paths: Sequence[Path]) -> None:
+    """Draw one panel for each subject and observable, and save it under every one of `paths`.
+
+    Points that share the setting ``family`` share a mark; the front is a line, the default a ring, and the dashed
+    line a third of the observable's noise.
+    """
+    from matplotlib.figure import Figure
+
+    panels = diagrams(points)
+    families = list(dict.fromkeys(str(point.settings.get("family", "")) for point in points))
+    across = min(2, len(panels))
+    down = math.ceil(len(panels) / across)
+    figure = Figure(figsize=(6.4 * across, 4.6 * down), layout="constrained")
+    axes = figure.subplots(down, across, squeeze=False)
+    for axis in axes.flat[len(panels) :]:
+        axis.set_visible(False)
+    for axis, ((subject, observable), group) in zip(axes.flat, panels.items(), strict=False):
+        for place, family in enumerate(families):
+            own = [point for point in group if str(point.settings.get("family", "")) == family]
+            if own:
+                colour, shape = MARKS[place % len(MARKS)]
+                axis.loglog([p.seconds for p in own], [max(p.error, 1e-12) for p in own], shape, color=colour, ms=6,
+                            label=family, ls="none")  # fmt: skip
+        best = precise(group)
+        axis.plot([p.seconds for p in best], [max(p.error, 1e-12) for p in best], color="#555555", lw=1, zorder=0)
+        for point in group:
+            if point.default:
+                axis.plot(point.seconds, point.error, "o", ms=15, mfc="none", mec="black", mew=1.6, label="default")
+        if math.isfinite(group[0].floor):
+            axis.axhline(SHARE * group[0].floor, color="black", ls="--", lw=0.9, label="a third of the noise")
+        axis.set_title(f"{subject}, {observable}")
+        axis.set_xlabel("seconds per recording")
+        axis.set_ylabel(f"error, rms [{group[0].unit}]")
+        axis.grid(True, which="major", alpha=0.3)
+        axis.legend(fontsize=8, frameon=False)
+    figure.suptitle(title)
+    for path in paths:
+        figure.savefig(path, dpi=150)

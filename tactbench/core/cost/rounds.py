@@ -23,6 +23,8 @@ from tactbench.core.plugins.interfaces import Estimator
 WARM_UP_ROWS = 300
 """Rows of the fit that nobody times: it imports what a library imports late, and starts its threads."""
 
+BUDGET_S = 20.0
+"""Of one fit, or of one answer to all test rows, unless a caller says otherwise."""
 REPEATS, REPEATS_S = 10, 0.05
 """What takes milliseconds is done up to ten times a round, within 0.05 s, and its median counts: one interruption by
 the machine would else be all that is measured."""
@@ -51,8 +53,8 @@ def measure(
     timed_estimators: Mapping[str, TimedEstimator],
     *,
     rounds: int,
-    budget_s: float,
-    threads: int,
+    budget_s: float = BUDGET_S,
+    threads: int = 1,
     seed: int,
     clock: Callable[[], float],
     progress: Progress,

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from tactbench.core.errors import UsageError
-from tactbench.core.evaluation.metrics import metric_called
 from tactbench.core.matrix.progress import Progress
 from tactbench.core.matrix.run import run_matrix
 from tactbench.core.matrix.store import Store
@@ -24,7 +23,6 @@ class TaskScore:
     estimator: str
     metric: str
     unit: str
-    higher_is_better: bool
     score: float | None
     """None: there is none, and `reason` says why."""
     sim_s: float | None
@@ -55,15 +53,7 @@ def quick_estimator(registry: Registry, task: str) -> str:
 
 
 def task_score(
-    registry: Registry,
-    rig: str,
-    sensor: str,
-    task: str,
-    simulation: Simulation,
-    *,
-    estimator: str,
-    seed: int,
-    progress: Progress,
+    registry: Registry, rig: str, sensor: str, task: str, simulation: Simulation, *, estimator: str, progress: Progress
 ) -> TaskScore:
     """Record every scene of `task` as `simulation` asks, and answer it; nothing is kept.
 
@@ -76,30 +66,11 @@ def task_score(
     """
     choice = TaskChoice(name=task, estimators=(EstimatorChoice(name=estimator),))
     matrix = MatrixSpec(
-        rig=rig, seed=seed, repeats=1, sensors=(sensor,), tasks=(choice,), simulation=simulation, latency=False
+        rig=rig, seed=1, repeats=1, sensors=(sensor,), tasks=(choice,), simulation=simulation, latency=False
     )
     with tempfile.TemporaryDirectory(prefix="tactbench-score-") as folder:
         outcome = run_matrix(matrix, Store(Path(folder)), progress=progress)
     row = next(row for row in outcome.rows if row["estimator"] == estimator)
     return TaskScore(
-        task=task,
-        estimator=estimator,
-        metric=row["metric"],
-        unit=row["unit"],
-        higher_is_better=metric_called(row["metric"]).higher_is_better,
-        score=row["score"],
-        sim_s=row["sim_s"],
-        recordings=len(row["recordings"]),
-        reason=row["reason"],
+        task, estimator, row["metric"], row["unit"], row["score"], row["sim_s"], len(row["recordings"]), row["reason"]
     )
-
-
-def with_all_effects(simulation: Simulation | None) -> Simulation:
-    """Return `simulation` with every installed effect asked for."""
-    chosen = simulation or Simulation()
-    return chosen.model_copy(update={"effects": (*chosen.effects, "+all")})
-
-
-def in_unit(score: float, unit: str) -> str:
-    """Return a score as text, its unit behind it where it has one."""
-    return f"{score:.4g}" if unit in ("", "1") else f"{score:.4g} {unit}"

@@ -75,7 +75,7 @@ class Dask(Engine):
             except (OSError, ValueError) as error:
                 raise UsageError(
                     f"No Dask scheduler with a worker answers at {self._scheduler}: {error}.",
-                    hint="Start `dask scheduler` and `dask worker ADDRESS`, or leave --scheduler out for workers here.",
+                    hint="Start `dask scheduler` and `dask worker ADDRESS`, or unset DASK_SCHEDULER_ADDRESS.",
                 ) from error
             for address, there in self._client.run(_prepared, threads).items():
                 if differ := differences(environment(), there):

@@ -51,4 +51,4 @@ def failing_as(what: str) -> Iterator[None]:
         raise
     except (Exception, SystemExit) as error:
         text = f"{what}: {type(error).__name__}: {error}".rstrip(": ")
-        raise RigError(text + ".", hint="See `tactbench plugins` for who brings it.") from error
+        raise RigError(text + ".", hint="See `tactbench list plugins` for who brings it.") from error

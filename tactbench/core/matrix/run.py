@@ -57,7 +57,7 @@ class EngineChoice:
                 hint="Leave out --jobs, or use --engine isolated.",
             )
         if self.scheduler is not None and self.name != "dask":
-            raise UsageError("--scheduler is for --engine dask.", hint="Add --engine dask, or leave it out.")
+            raise UsageError("A scheduler is for --engine dask.", hint="Add --engine dask, or leave it out.")
         if self.name == "dask" and importlib.util.find_spec("distributed") is None:
             raise UsageError(
                 "The Dask engine needs the library distributed, which is not installed.",

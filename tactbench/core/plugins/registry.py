@@ -341,5 +341,5 @@ def load_object(where: str) -> Any:
         return getattr(importlib.import_module(module), attribute)
     except (ImportError, AttributeError) as error:
         raise PluginError(
-            f"{where} cannot be loaded: {error}.", hint="Check the plugin's installation with `tactbench plugins`."
+            f"{where} cannot be loaded: {error}.", hint="Check the plugin's installation with `tactbench list plugins`."
         ) from error

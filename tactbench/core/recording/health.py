@@ -25,6 +25,10 @@ MOST_LISTED = 6
 """Channels that are named one by one."""
 RATE_TOLERANCE = 0.05
 """Relative difference between the stated and the measured rate that is remarked on."""
+WRONG_UNITS = (100.0, 1000.0)
+"""A rate that is off by about one of these factors looks like times in a wrong unit."""
+SLOWEST_HZ = 1.0
+"""No tactile sensor is known to be read more seldom: without a stated rate, a lower one looks like a wrong unit."""
 
 
 @dataclass(frozen=True)
@@ -252,5 +256,11 @@ def _clock(stream: str, data: _Stream) -> Iterator[Finding]:
         )
         yield Finding("irregular", "info", stream, (), 0, text)
     stated = data.spec.rate_hz
+    if stated is None and rate < SLOWEST_HZ:
+        yield Finding("rate", "warning", stream, (), 0, f"{stream} runs at {rate:.4g} Hz: ms read as s?")
     if stated is not None and abs(rate - stated) > RATE_TOLERANCE * stated:
-        yield Finding("rate", "warning", stream, (), 0, f"{stream} runs at {rate:.4g} Hz; {stated:g} Hz are stated")
+        text = f"{stream} runs at {rate:.4g} Hz; {stated:g} Hz are stated"
+        for off, looks in ((stated / rate, "ms read as s?"), (rate / stated, "s read as ms?")):
+            if any(abs(off / factor - 1) < 2 * RATE_TOLERANCE for factor in WRONG_UNITS):
+                text += f": {looks}"
+        yield Finding("rate", "warning", stream, (), 0, text)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import base64
 import hashlib
+import json
 from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -12,7 +13,6 @@ from importlib import resources
 from typing import TYPE_CHECKING
 
 import tactbench
-from tactbench.core.cost.ladder_file import read_ladders
 from tactbench.core.errors import TactbenchError
 from tactbench.core.leaderboard import AXES
 from tactbench.core.leaderboard.columns import DEFAULT
@@ -112,7 +112,7 @@ def compared_section(subject: ReportData) -> Section:
 def costs_section(subject: ReportData) -> Section:
     """Return the section of what `tactbench cost` has left in the folder."""
     folder = subject.results.store.folder
-    tables = tuple(map(ladder_table, read_ladders(folder)))
+    tables = tuple(ladder_table(json.loads(path.read_bytes())) for path in sorted((folder / "cost").glob("*.json")))
     pictures = tuple(
         Picture(path.stem, "As `tactbench cost` has drawn it.", path.read_bytes())
         for path in sorted((folder / "cost").glob("*.png"))

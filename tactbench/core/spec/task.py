@@ -72,7 +72,7 @@ class VectorTarget(Frozen):
     source: Literal["vector"] = "vector"
     kind: ChannelKind = "position"
     """Of every component."""
-    names: tuple[str, ...] = Field(min_length=2)
+    names: tuple[str, ...] = Field(min_length=1)
     """The channels, one a component."""
     unit: str
     """Of every component: the length of a difference is in it too."""

@@ -209,7 +209,7 @@ class ParallelManipulator:
     Raises
     ------
     UsageError
-        If the settings lack something, or contradict each other. What `rig check` refuses is :func:`build`'s business.
+        If the settings lack something, or contradict each other. What `doctor` refuses is :func:`build`'s business.
     """
 
     def __init__(self, file: RigFile, operator: Operator | None, physics: Rig | None) -> None:
@@ -514,12 +514,12 @@ def build(context: RigContext) -> ParallelManipulator:
     Raises
     ------
     UsageError
-        If there is no rig file, it lacks something, `rig check` refuses it, or it names a simulation that is none.
+        If there is no rig file, it lacks something, `doctor` refuses it, or it names a simulation that is none.
     """
     if context.rig_file is None:
         raise UsageError(
             "The rig 'parallel-manipulator' needs to know its devices and its limits.",
-            hint="Name a rig file with --rig-file FILE; `tactbench rig check FILE` says what it would do.",
+            hint="Name a rig file with --rig-file FILE; `tactbench doctor --rig-file FILE` says what it would do.",
         )
     refuse(context.rig_file)
     physics = physics_of(context.rig_file, load_registry())

@@ -90,7 +90,8 @@ def refuse(file: RigFile) -> None:
     problems = _found(file).problems
     if problems:
         raise UsageError(
-            f"The rig file is refused: {problems[0]}", hint="`tactbench rig check FILE` says all that it would do."
+            f"The rig file is refused: {problems[0]}",
+            hint="`tactbench doctor --rig-file FILE --seconds 0` says all that it would do.",
         )
 
 

@@ -370,7 +370,7 @@ def settings_of(file: RigFile) -> RigSettings:
         message = "is missing" if first["type"] == "missing" else first["msg"].removeprefix("Value error, ")
         raise UsageError(
             f"{name} in the rig file: {message}.",
-            hint="`tactbench rig check FILE` names the line; see docs/hardware.md.",
+            hint="`tactbench doctor --rig-file FILE --seconds 0` names the line; see docs/hardware.md.",
         ) from error
     required = (MOTOR,) if found.manipulator == "fixed" else (MOTOR, *JOINTS)
     missing = [name for name in required if name not in file.devices]

@@ -43,7 +43,7 @@ def states(choice, place=0):
 
 
 def test_all_wishes_met():
-    choice = only([answer()], Wish(max_delay_ms=2, range_n=5, rate_hz=10, max_error=0.6))
+    choice = only([answer()], Wish(max_delay_ms=2, range_n=5, rate_hz=10, score=0.6))
     assert states(choice) == dict.fromkeys(("answer delay", "force range", "rate", "score"), "met")
     assert choice.verdict == "a SIM / lasso meets all 4 wishes."
 
@@ -54,7 +54,7 @@ def test_all_wishes_met():
         (Wish(max_delay_ms=0.4), 0.6, "600 µs too slow"),
         (Wish(range_n=10.5), 0.5, "0.5 N short of range"),
         (Wish(rate_hz=130), 30, "30 Hz too low"),
-        (Wish(max_error=0.3), 0.2, "0.2000 N above the wished error"),
+        (Wish(score=0.3), 0.2, "0.2000 N above the wished error"),
     ],
 )
 def test_a_miss_says_by_how_much(wish, short_by, says):
@@ -65,7 +65,7 @@ def test_a_miss_says_by_how_much(wish, short_by, says):
     assert choice.verdict == f"None meets all: nearest is a SIM / lasso, {says}."
 
 
-@pytest.mark.parametrize("wish", [Wish(1.0), Wish(range_n=10), Wish(rate_hz=100), Wish(max_error=0.5)])
+@pytest.mark.parametrize("wish", [Wish(1.0), Wish(range_n=10), Wish(rate_hz=100), Wish(score=0.5)])
 def test_exactly_as_wished_is_met(wish):
     assert set(states(only([answer()], wish)).values()) == {"met"}
 
@@ -73,7 +73,7 @@ def test_exactly_as_wished_is_met(wish):
 def test_a_score_is_to_be_large_and_an_error_small():
     rows = [answer(score=0.7, baseline=0.2, metric="macro_f1", unit="1"),
             answer("b", score=0.9, baseline=0.2, metric="macro_f1", unit="1")]  # fmt: skip
-    choice = only(rows, Wish(min_score=0.8), sensor(), sensor("b"), task=F1)
+    choice = only(rows, Wish(score=0.8), sensor(), sensor("b"), task=F1)
     assert [one.row["sensor"] for one in choice.candidates] == ["b", "a"]
     assert [states(choice, place)["score"] for place in (0, 1)] == ["met", "missed"]
     assert choice.candidates[1].criteria[0].missed_by == "0.100 below the wished score"
@@ -115,14 +115,14 @@ def test_prediction_that_takes_longer_than_the_interval_limits_the_rate():
 
 
 def test_an_error_is_unknown_beyond_what_was_pressed_and_a_miss_within_it_stays_one():
-    assert states(only([answer()], Wish(range_n=8, max_error=0.6)))["score"] == "unknown"
-    assert states(only([answer()], Wish(range_n=8, max_error=0.4)))["score"] == "missed"
+    assert states(only([answer()], Wish(range_n=8, score=0.6)))["score"] == "unknown"
+    assert states(only([answer()], Wish(range_n=8, score=0.4)))["score"] == "missed"
     assert any("any error beyond 5 N" in one for one in only([answer()], Wish(range_n=8)).unknown)
 
 
 def test_errors_of_force_are_those_beyond_the_floor_if_all_have_one():
     floored = {"score_beyond_floor": 0.1, "beyond_floor_ci_low": 0.0, "beyond_floor_ci_high": 0.3}
-    choice = only([answer(**floored), answer("b", **(floored | {"score_beyond_floor": 0.05}))], Wish(max_error=0.2))
+    choice = only([answer(**floored), answer("b", **(floored | {"score_beyond_floor": 0.05}))], Wish(score=0.2))
     assert [(one.score, one.low, one.high) for one in choice.candidates] == [(0.05, 0.0, 0.3), (0.1, 0.0, 0.3)]
     assert "beyond" in choice.quantity
     plain = only([answer(**floored), answer("b")], Wish())
@@ -203,7 +203,6 @@ def test_what_to_do_about_what_is_unknown():
     assert "run `tactbench run --sensor a --task question --protocol deployable --estimator lasso`" in told
     assert "it has no interval" in told
     assert "the force range of a: not stated" in told
-    assert "length, mass, interface, power and availability of a" in told
     assert "how other scores: no result here; run `tactbench run --sensor other" in told
     assert "oracle" not in told
     assert choice.left_out == ("gone: there is no finished answer beside trivial ones.",)
@@ -221,8 +220,8 @@ sources = st.sampled_from([STATED, ASSUMED, None])
 
 def test_measured_rows_do_not_say_how_hard_was_pressed():
     measured = answer(simulated=False)
-    assert states(only([measured], Wish(range_n=1, max_error=0.6)))["score"] == "unknown"
-    assert states(only([measured], Wish(max_error=0.6)))["score"] == "met"
+    assert states(only([measured], Wish(range_n=1, score=0.6)))["score"] == "unknown"
+    assert states(only([measured], Wish(score=0.6)))["score"] == "met"
     assert any("do not say how hard" in one for one in only([measured], Wish(range_n=1)).unknown)
 
 
@@ -245,7 +244,7 @@ def test_met_means_known_and_good_enough(
         "answer delay": stated and link and delay is not None and delay <= (wish.max_delay_ms or 0),
         "rate": stated and rate >= (wish.rate_hz or 0),
         "force range": upper is not None and range_source is STATED and upper >= (wish.range_n or 0),
-        "score": wish.max_error is not None and score <= wish.max_error and (wish.range_n or 0) <= 5,
+        "score": wish.score is not None and score <= wish.score and (wish.range_n or 0) <= 5,
         "trivial answer": False,
     }
     for criterion in one.criteria:

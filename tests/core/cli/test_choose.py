@@ -83,8 +83,8 @@ def test_results_of_ones_own_come_first_and_say_what_they_lack(ran):
 
 
 def test_json_has_the_wish_the_criteria_and_what_is_unknown(verbs):
-    told = json.loads(verbs("choose", *WISH, "--max-error", "0.2", "--format", "json").stdout)
-    assert told["wish"] == {"max_delay_ms": 2, "range_n": 5, "rate_hz": 10, "max_error": 0.2, "min_score": None}
+    told = json.loads(verbs("choose", *WISH, "--score", "0.2", "--format", "json").stdout)
+    assert told["wish"] == {"max_delay_ms": 2, "range_n": 5, "rate_hz": 10, "score": 0.2}
     assert (told["protocol"], told["split"]) == ("deployable", "roles")
     (choice,) = told["choices"]
     assert {one["sensor"] for one in choice["candidates"]} == {"biotac", "icub"}
@@ -94,7 +94,7 @@ def test_json_has_the_wish_the_criteria_and_what_is_unknown(verbs):
 
 
 PAGES = (
-    ("choose", *WISH, "--max-error", "0.2"),
+    ("choose", *WISH, "--score", "0.2"),
     ("choose", "--task", "curvature", "--range-n", "40"),
     ("show", "force"),
     ("show", "curvature"),
@@ -118,9 +118,6 @@ def test_eighty_columns_break_no_word(tmp_path, monkeypatch, verbs, arguments):
         ((), "--task"),
         (("--task", "forse"), "Did you mean 'force'"),
         (("--task", "force", "--protocol", "karl"), "Did you mean 'karl2016'"),
-        (("--task", "force", "--split", "session"), "roles"),
-        (("--task", "curvature", "--max-error", "1"), "--min-score"),
-        (("--task", "force", "--min-score", "1"), "--max-error"),
         (("--task", "force", "--rate-hz", "-1"), "--rate-hz"),
         (("--task", "force", "--range-n", "nan"), "--range-n"),
         (("nowhere", "--task", "force"), "no results in nowhere"),

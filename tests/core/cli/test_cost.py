@@ -10,7 +10,7 @@ from tests.conftest import Verbs
 from tests.core.cli.test_screens import assert_one_clear_screen
 from tests.core.cost.test_ladder import presses
 
-ASKED = ("cost", "--sensor", "made", "--task", "force", "--recordings", "shelf", "--rounds", "2", "--split", "session")
+ASKED = ("cost", "--sensor", "made", "--task", "force", "--recordings", "shelf", "--rounds", "2")
 CLUMSY = tuple(word for name in ("breaks", "tires", "lacks", "wavers", "ols") for word in ("--estimator", name))
 
 
@@ -36,7 +36,7 @@ def test_whoever_breaks_costs_its_own_row_only(shell):
 def test_what_is_timed_adds_no_row_to_a_leaderboard_and_what_a_run_has_finished_is_not_done_again(tmp_path):
     verbs = Verbs(tmp_path, here=True)
     presses(verbs.folder / "shelf")
-    asked = ("--sensor", "made", "--task", "force", "--recordings", "shelf", "--split", "session", "--out", "out")
+    asked = ("--sensor", "made", "--task", "force", "--recordings", "shelf", "--out", "out")
     verbs("run", *asked, "--estimator", "ols")
     before = verbs("leaderboard", "out", "--format", "json").stdout
     cells = {path: path.read_bytes() for path in (verbs.folder / "out" / "cells").iterdir()}
@@ -79,14 +79,8 @@ def test_the_table_states_what_its_times_mean(tmp_path):
         (("cost", "--sensor", "icub", "--task", "force", "--estimator", "laso"), "Did you mean 'lasso'"),
         (("cost", "--sensor", "icub", "--task", "force", "--estimator", "logistic"), "classification"),
         (("cost", "--sensor", "icub", "--task", "force", "--protocol", "karl2015"), "Did you mean 'karl2016'"),
-        (
-            ("cost", "--sensor", "icub", "--task", "curvature", "--protocol", "deployable", "--split", "few-shot"),
-            "one split, not",
-        ),
         (("cost", "--twin", "--task", "forse"), "Did you mean 'force'"),
-        (("cost", "--twin", "--rung", "defaut"), "Did you mean 'default'"),
-        (("cost", "--twin", "--estimator", "ols", "--estimator", "lasso"), "once"),
-        (("cost", "--sensor", "icub", "--task", "force", "--rung", "fine"), "add --twin"),
+        (("cost", "--twin", "--estimator", "ols"), "Leave the others out"),
     ],
 )
 def test_wrong_words_are_answered_with_the_next_step(verbs, arguments, says):

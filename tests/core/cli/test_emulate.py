@@ -7,7 +7,7 @@ from importlib.metadata import EntryPoint
 
 import pytest
 
-from tactbench.core.cli import VERBS, main
+from tactbench.core.cli import main
 from tactbench.core.plugins.registry import load_registry
 from tactbench.core.spec.yaml_file import load_yaml
 from tactbench.plugin.devices import RigFile, drivers_of
@@ -36,7 +36,7 @@ def emulate(monkeypatch, tmp_path, capsys):
     return call
 
 
-SHORT = ("--seconds", "0.5", "--presses", "2")
+SHORT = ("--profile", "ramp:duration=0.5", "--presses", "2")
 
 
 def test_the_rig_file_printed_is_the_one_written_and_opens_the_devices(emulate, tmp_path):
@@ -71,7 +71,7 @@ def test_the_rig_file_printed_is_the_one_written_and_opens_the_devices(emulate, 
 
 
 def test_a_force_sensor_alone_feels_the_force_alone(emulate):
-    code, out, err = emulate("scale", "--seconds", "0.1", "--presses", "1")
+    code, out, err = emulate("scale", "--profile", "ramp:duration=0.1", "--presses", "1")
     assert code == 0
     assert out.startswith("force: udp://127.0.0.1:")
     assert "A rig file needs a sensor" in err
@@ -79,10 +79,10 @@ def test_a_force_sensor_alone_feels_the_force_alone(emulate):
 
 def test_a_rig_file_is_started_and_keeps_what_is_real(emulate, tmp_path):
     (tmp_path / "mine.yaml").write_text(
-        "rig: bench\ntitle: here\nsensors: {pad: {link: emulated, faults: [late]}}\n"
+        "rig: bench\ntitle: here\nsensors: {pad: {link: emulated, faults: [late, 'unplug:start_s=0.2']}}\n"
         "force: {device: scale, link: 'udp://127.0.0.1:9', channel: fx, sign: -1}\nsettings: {colour: red}\n"
     )
-    code, out, err = emulate("--rig-file", "mine.yaml", *SHORT, "--fault", "pad:unplug:start_s=0.2")
+    code, out, err = emulate("--rig-file", "mine.yaml", *SHORT)
     assert code == 0
     (tmp_path / "out.yaml").write_text(out)
     file = load_yaml(tmp_path / "out.yaml", RigFile)
@@ -102,15 +102,18 @@ def test_a_rig_file_is_started_and_keeps_what_is_real(emulate, tmp_path):
         (("scale", "bare-scale"), "A rig has one force"),
         (("bare-scale",), "bare-scale has no emulator"),
         (("mute",), "mute has no emulator"),
-        (("pad", "--fault", "scale:late"), "no emulated device called 'scale'"),
-        (("pad", "--fault", "pad:late:delay=1"), "'delay_s'"),
-        (("pad", "--fault", "pad:parity"), "no fault 'parity'"),
-        (("pad", "--physics", "twni"), "Did you mean 'twin'"),
+        (("--rig-file", "late.yaml"), "'delay_s'"),
+        (("--rig-file", "parity.yaml"), "no fault 'parity'"),
+        (("--rig-file", "twni.yaml"), "Did you mean 'twin'"),
         (("pad", "--write-rig-file", "mine.yaml"), "mine.yaml is there already"),
     ],
 )
 def test_what_cannot_be_is_said_with_the_next_step(emulate, tmp_path, words, said):
     (tmp_path / "mine.yaml").write_text("rig: bench\n")
+    wrong = {"late": ", faults: ['late:delay=1']}}", "parity": ", faults: [parity]}}",
+             "twni": "}}\nemulation: {physics: twni}"}  # fmt: skip
+    for name, more in wrong.items():
+        (tmp_path / f"{name}.yaml").write_text(f"rig: bench\nsensors: {{pad: {{link: emulated{more}\n")
     code, out, err = emulate(*words)
     assert (code, out) == (2, "")
     assert said in err
@@ -128,7 +131,3 @@ def test_ctrl_c_ends_it_with_130(emulate, monkeypatch):
     assert code == 130
     assert "The emulated devices and their links are gone" in err
     assert threading.active_count() == before
-
-
-def test_it_is_among_the_verbs():
-    assert "emulate" in VERBS

@@ -1,5 +1,6 @@
 """What is shown of a recording while it is made, on real terminals."""
 
+import io
 import os
 import re
 import select
@@ -8,9 +9,10 @@ from contextlib import contextmanager
 
 import numpy as np
 import pytest
+from rich.console import Console
 
 from tactbench.core.cli.live import LiveView, one_line
-from tactbench.core.cli.live_frame import frame
+from tactbench.core.cli.live_frame import Frame
 from tactbench.core.cli.stream_state import StreamState, Watched
 from tactbench.core.samples import Block, Quality
 from tactbench.core.spec.sensor import ChannelSpec, StreamSpec
@@ -29,9 +31,9 @@ from tests.core.cli.terminals import (
 from tests.links.ends import pty
 
 COLOUR = re.compile(r"\x1b\[[0-9;]*[34][0-7][0-9;]*m")
-TWO_AND_A_HALF = ("╶─╮ ╭─╴╭─╮", "╭─╯ ╰─╮│ │", "╰─╴.╶─╯╰─╯ N")
+TWO_AND_A_HALF = "force 2.50 N, wanted 1.11 N"
 WIRED = ROOT / "tests" / "third_party" / "wired"
-RECORD = ("-m", "tactbench", "record", "--sensor", "icub", "--cap-mm", "10", "--out", "press.h5", "--live")
+RECORD = ("-m", "tactbench", "record", "--sensor", "icub", "--indenter", "cap:radius=10", "--out", "press.h5", "--live")
 
 
 @contextmanager
@@ -59,16 +61,13 @@ def test_the_screen_has_force_taxels_rates_and_losses(tmp_path):
         tell("gap")
         for _ in range(24):
             tell("force 2.5")
-        lines = terminal.read_screen_with(TWO_AND_A_HALF[0], "3.0 of 10.0 s")
+        lines = terminal.read_screen_with(TWO_AND_A_HALF, "3.0 of 10.0 s")  # two seconds of a rise of 5 N in 9 s
         assert len(lines) == 24
         assert max(map(len, lines)) <= 80
         assert lines[0].startswith("pad on a test")
-        for drawn, line in zip(TWO_AND_A_HALF, lines[1:4], strict=True):
-            assert drawn in line
-        assert "wanted 1.11 N" in lines[2], "two seconds of a rise of 5 N in 9 s"
         text = "\n".join(lines)
-        assert "+250 " in text, "a channel that falls under load rises here"
-        assert "t3█+500" in text
+        assert re.search(r"t2 +\+250 ━", text), "a channel that falls under load rises here"
+        assert re.search(r"t3 +\+500 ━", text)
         assert "warmth 31.25 degC" in text
         (pad,) = [line.split() for line in lines if line.startswith("pad  ")]
         (scale,) = [line.split() for line in lines if line.startswith("scale")]
@@ -131,7 +130,7 @@ def test_whoever_is_asked_has_the_terminal(tmp_path):
         assert terminal.process.stdout.readline() == b"ask\n"
         tell("force 2.5")
         terminal.read_until(SECOND_SCREEN)
-        terminal.read_screen_with(TWO_AND_A_HALF[1])
+        terminal.read_screen_with("force 2.50 N")
         tell("end", wait=False)
         terminal.last_words()
 
@@ -161,14 +160,24 @@ def test_a_recording_of_the_twin_leaves_its_last_state(tmp_path):
     assert "icub on twin (SIM), cap R 10 mm" in said
     assert "60.0 of 60.0 s" in said
     assert "wanted 5.00 N" in said
-    assert re.search(r"taxels +5000 +83.33/83.33 +0 +0 +0 +0 +0\n", said)
+    assert re.search(r"taxels +5000 +83.33/83.33 +0 +0 +0 +0 +0 *\n", said)
     assert (tmp_path / "press.h5").exists()
 
 
 @contextmanager
 def wired(tmp_path, seconds):
     """Record a pad on a line that the test speaks for; give the terminal and the far end of the line."""
-    command = ["-m", "tactbench", "record", "--sensor", "wired-pad", "--rig", "wired-rig", "--seconds", seconds]
+    command = [
+        "-m",
+        "tactbench",
+        "record",
+        "--sensor",
+        "wired-pad",
+        "--rig",
+        "wired-rig",
+        "--profile",
+        f"ramp:duration={seconds}",
+    ]
     with pty() as line:
         address = f"serial://{line.name}?baud=115200"
         options = {"cwd": tmp_path, "path": [WIRED], "WIRED_LINK": address}
@@ -276,43 +285,43 @@ def watched(sensor=(PAD,), reference=(SCALE,)):
     return Watched("title", SCENE, tuple(map(StreamState, sensor)), tuple(map(StreamState, reference)))
 
 
-@pytest.mark.parametrize("width", [20, 40, 80, 200])
-@pytest.mark.parametrize("height", [5, 12, 24, 70])
+def drawn(view, width, height):
+    console = Console(width=width, height=height, file=io.StringIO(), force_terminal=False)
+    return ["".join(one.text for one in line).rstrip() for line in
+            console.render_lines(Frame(view), console.options.update(height=height))]  # fmt: skip
+
+
+@pytest.mark.parametrize("width", [20, 80, 200])
+@pytest.mark.parametrize("height", [5, 24, 70])
 @pytest.mark.parametrize("taxels", [0, 1, 64, 500])
-@pytest.mark.parametrize("placed", [True, False])
-def test_a_picture_fits_whatever_there_is(width, height, taxels, placed):
+def test_a_picture_fits_whatever_there_is(width, height, taxels):
     rng = np.random.default_rng(1)
-    channels = [
-        ChannelSpec(name=f"a-long-name{n}", kind="taxel", position_m=(n % 8, n // 8, 0) if placed else None)
-        for n in range(taxels)
-    ]
+    channels = [ChannelSpec(name=f"a-long-name{n}", kind="taxel") for n in range(taxels)]
     other = ChannelSpec(name="other", kind="joint", unit="rad")
     view = watched(sensor=[StreamSpec(name="s", channels=(*channels, other))])
     for state in view.streams:
-        frame(view, width, height)
+        drawn(view, width, height)
         for last in range(1, 100, 10):
             state.take(Block("s", np.arange(last, last + 10), rng.normal(size=(10, len(state.spec.channels)))))
-    lines = [line.plain for line in frame(view, width, height)]
+    lines = drawn(view, width, height)
     assert len(lines) <= height
     assert max(map(len, lines)) <= width
 
 
-def test_taxels_without_a_place_are_bars_and_those_without_room_are_counted():
+def test_taxels_without_room_are_counted():
     names = [f"t{n}" for n in range(1, 101)]
     stream = StreamSpec(name="s", channels=tuple(ChannelSpec(name=name, kind="taxel") for name in names))
     view = watched(sensor=[stream])
     view.sensor[0].take(Block("s", np.array([0, 10**9]), np.array([np.zeros(100), np.arange(100) - 50])))
-    text = "\n".join(line.plain for line in frame(view, 80, 24))
-    assert "t1   -50 ▒" in text
-    assert "t95  +44 █" in text
-    assert re.search(r"… \d+ more", text)
+    text = "\n".join(drawn(view, 80, 24))
+    assert re.search(r"t1 +-50 ━", text)
     shown = sum(bool(re.search(rf"\b{name} ", text)) for name in names)
     assert shown + int(re.search(r"… (\d+) more", text)[1]) == 100
 
 
 def test_nothing_from_a_stream_is_said_and_no_force_is_no_error():
     view = watched(reference=())
-    text = "\n".join(line.plain for line in frame(view, 80, 24))
+    text = "\n".join(drawn(view, 80, 24))
     assert "no reference force" in text
     assert "waiting for samples" in text
     assert one_line(view) == "title: no times yet; pad -/100 Hz"
@@ -323,7 +332,7 @@ def test_a_saturated_force_is_said():
     view.reference[0].take(
         Block("scale", np.arange(1), np.full((1, 1), 5.0), np.full((1, 1), Quality.SATURATED, np.uint8))
     )
-    assert "SATURATED" in "\n".join(line.plain for line in frame(view, 80, 24)[1:4])
+    assert "SATURATED" in drawn(view, 80, 24)[1]
     assert "SATURATED" in one_line(view)
 
 

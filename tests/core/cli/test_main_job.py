@@ -99,7 +99,7 @@ def test_recordings_of_a_run_can_be_replayed_with_the_same_scores(ran):
     verbs, rows, _ = ran
     replayed = json.loads(
         verbs("run", "--rig", "replay", "--recordings", "tactbench-results/recordings", "--task", "force",
-              "--protocol", "karl2016", "--format", "json", "--out", "replayed", "--no-latency").stdout
+              "--protocol", "karl2016", "--format", "json", "--out", "replayed").stdout
     )  # fmt: skip
     assert [row["score"] for row in replayed] == [row["score"] for row in rows]
     assert all(row["simulated"] for row in replayed)
@@ -113,7 +113,7 @@ def test_a_cell_that_fails_is_a_row_and_stops_nobody(ran):
         path.unlink()
         path.write_bytes(damaged)
     asked = ("--sensor", "icub", "--sensor", "ideal", "--task", "force", "--estimator", "ols")
-    done = Verbs(verbs.folder)("run", "--repeats", "1", *asked, "--no-latency", "--format", "json", code=1)
+    done = Verbs(verbs.folder)("run", "--repeats", "1", *asked, "--format", "json", code=1)
     rows = json.loads(done.stdout)
     assert {row["status"] for row in rows if row["sensor"] == "icub"} == {"failed"}
     assert {row["status"] for row in rows if row["sensor"] == "ideal"} == {"done"}
@@ -182,10 +182,8 @@ def test_ctrl_c_leaves_nothing_half_written_and_the_next_run_continues(tmp_path,
 def test_a_row_over_several_places_states_all_of_them(tmp_path):
     verbs = Verbs(tmp_path, here=True)
     asked = ("--sensor", "icub", "--task", "force", "--split", "placement", "--protocol", "deployable")
-    asked += ("--rung", "closed-form")  # the cheapest
-    rows = json.loads(
-        verbs("run", "--repeats", "1", *asked, "--estimator", "ols", "--no-latency", "--format", "json").stdout
-    )
+    asked += ("--set", "rung=closed-form")  # the cheapest
+    rows = json.loads(verbs("run", "--repeats", "1", *asked, "--estimator", "ols", "--format", "json").stdout)
     (row,) = [row for row in rows if row["estimator"] == "ols"]
     # Nominal at (-0.3, 0), and 1.5 mm either way along and across.
     assert row["assumptions"]["contact_x_mm"] == "-1.8 to 1.2"

@@ -97,7 +97,7 @@ def test_every_kind_passes_its_checks(made):
 
 def scores(folder, *arguments, made):
     verbs = Verbs(folder, here=True)
-    done = verbs("run", "--repeats", "1", "--no-latency", "--format", "json", *arguments, plugins=folders(made))
+    done = verbs("run", "--repeats", "1", "--format", "json", *arguments, plugins=folders(made))
     rows = json.loads(done.stdout)
     assert {row["status"] for row in rows} == {"done"}
     return {row["estimator"]: row["score"] for row in rows}

@@ -22,7 +22,7 @@ COMMAND = [
 ]
 FORCE = [
     *(sys.executable, "-m", "tactbench", "run", "--repeats", "1", "--sensor", "ideal", "--task", "force"),
-    *("--estimator", "ols", "--no-latency"),
+    *("--estimator", "ols"),
 ]
 
 

@@ -54,7 +54,7 @@ def test_rows_say_what_an_answer_is_made_of_and_the_report_shows_them(asked, tmp
 
 
 def test_a_vote_goes_with_the_papers_protocol_and_summaries_do_not(asked):
-    run = ("run", "--recordings", "in-roles", "--task", "shaken-by-vote", "--protocol", "karl2016", "--no-latency")
+    run = ("run", "--recordings", "in-roles", "--task", "shaken-by-vote", "--protocol", "karl2016")
     (row, _) = json.loads(asked(*run, "--format", "json").stdout)
     assert (row["protocol"], row["split"], row["n_test"]) == ("karl2016", "roles", 4)
     assert row["answer_from"] == "the commonest answer of its frames"

@@ -71,7 +71,7 @@ def test_the_end_names_every_stopped_cell_and_how_to_look_into_it(capsys, tmp_pa
     assert "Stopped: 1 failed, 1 timeout." in said.err
     assert "a/b/c: RuntimeError: two lines\n" in said.err
     assert f"tactbench why a/b/c --out {tmp_path}" in said.err
-    assert f"tactbench rerun a/b/c --out {tmp_path}" in said.err
+    assert f"tactbench why a/b/c --out {tmp_path} --again" in said.err
     assert max(len(line) for line in said.err.splitlines() if "a/b/d e" in line) < 260
 
 

@@ -39,7 +39,7 @@ def tables(verbs):
 def test_import_then_inspect(tables):
     done = tables("import", "mapping.yaml", "--out", "recordings")
     assert "2 recordings of pad, 100 rows, from 2 files" in done.stdout
-    assert "one: fz has no sample in 25 of 50 rows" in done.stdout
+    assert "rows without a sample, marked and left out of every evaluation: fz 50" in done.stdout
     assert "warning: taxel b constant (in 2 of 2 recordings)" in done.stdout
     assert "importing" in done.stderr
     shown = tables("inspect", "recordings/one.h5").stdout
@@ -88,7 +88,7 @@ def test_without_what_only_posix_has(tables):
     )
     for words in (
         ("import", "mapping.yaml", "--out", "recordings"),
-        ("record", "--sensor", "ideal", "--seconds", "3", "--out", "press.h5"),
+        ("record", "--sensor", "ideal", "--profile", "ramp:duration=3", "--out", "press.h5"),
         ("inspect", "recordings/one.h5", "press.h5"),
     ):
         done = subprocess.run(
@@ -109,7 +109,15 @@ def test_a_damaged_recording(tables):
 
 def test_record_then_inspect(verbs):
     done = verbs(
-        "record", "--sensor", "icub", "--cap-mm", "10", "--force-n", "2", "--seconds", "3", "--out", "press.h5"
+        "record",
+        "--sensor",
+        "icub",
+        "--indenter",
+        "cap:radius=10",
+        "--profile",
+        "ramp:force=2,duration=3",
+        "--out",
+        "press.h5",
     )
     assert "icub on twin (SIM), cap R 10 mm" in done.stdout
     (about,) = json.loads(verbs("inspect", "press.h5", "--format", "json").stdout)
@@ -118,17 +126,20 @@ def test_record_then_inspect(verbs):
     assert about["meta"]["scene"]["profile"]["end"]["value"] == 2.0
     assert {stream["of"] for stream in about["streams"]} == {"sensor", "reference"}
     assert "exists already" in verbs("record", "--sensor", "icub", "--out", "press.h5", code=2).stderr
-    again = ("record", "--sensor", "icub", "--cap-mm", "10", "--force-n", "2", "--seconds", "3", "--out", "other.h5")
+    again = (
+        "record",
+        "--sensor",
+        "icub",
+        "--indenter",
+        "cap:radius=10",
+        "--profile",
+        "ramp:force=2,duration=3",
+        "--out",
+        "other.h5",
+    )
     verbs(*again)  # the seed alone decides, and not the name of the file
     (other,) = json.loads(verbs("inspect", "other.h5", "--format", "json").stdout)
     assert (other["meta"]["name"], other["content_sha256"]) == ("other", about["content_sha256"])
-
-
-def test_record_a_slide(verbs):
-    verbs("record", "--sensor", "biotac", "--seconds", "3", "--slide-mm-s", "40", "--force-n", "1", "--out", "slide.h5")
-    about = json.loads(verbs("inspect", "slide.h5", "--format", "json").stdout)
-    assert "vibration" in json.dumps(about)
-    assert "stick_ratio" in json.dumps(about)
 
 
 def test_record_a_shape_and_a_profile_by_name(verbs):
@@ -143,8 +154,8 @@ def test_record_a_shape_and_a_profile_by_name(verbs):
     for wrong, says in (
         (("--indenter", "knob"), "Known: cap, cylinder, edge, flat, pin."),
         (("--indenter", "pin:radius=wide"), "radius of 'pin' is given as 'wide', and a number is expected"),
-        (("--indenter", "pin", "--cap-mm", "5"), "both say what is pressed"),
-        (("--profile", "sine", "--force-n", "5"), "are of the ramp"),
+        (("--profile", "ramp:end=5"), "no parameter of the ramp called 'end'"),
+        (("--profile", "ramp:force=0"), "force of the ramp is 0"),
     ):
         assert says in verbs("record", "--sensor", "ideal", *wrong, "--out", "no.h5", code=2).stderr
 
@@ -206,7 +217,7 @@ def logged(verbs):
 
 
 def test_a_log_of_a_sensor_becomes_a_recording(logged):
-    told = ("--option", "triangle=3", "--session", "a", "--role", "test", "--label", "cap_radius_mm=4")
+    told = ("--option", "triangle=3", "--label", "session=a", "--label", "role=test", "--label", "cap_radius_mm=4")
     done = logged("import", "bus.asc", "--sensor", "icub", *told, "--out", "recordings/press.h5")
     assert "recordings/press.h5: icub from bus.asc, 50 rows of taxels; clock host" in done.stdout
     assert "  frames of others: 100" in done.stdout
@@ -235,7 +246,8 @@ def test_a_log_that_cannot_be_read_is_one_clear_screen(logged):
         (("bus.asc", "--sensor", "ideal"), "has no reader for logs"),
         (("other.txt", "--sensor", "icub"), "other.txt is not a log"),
         (("nowhere.asc", "--sensor", "icub"), "There is no log nowhere.asc"),
-        (("bus.asc", "--session", "a"), "name the --sensor"),
+        (("bus.asc", "--label", "session=a"), "name the --sensor"),
+        (("bus.asc", "--sensor", "icub", "--label", "role=tset"), "train, validation, test is expected"),
     ):
         done = logged("import", *given, code=2)
         assert said in done.stderr

@@ -1,4 +1,4 @@
-"""``tactbench rerun``: every cell comes out the same bit for bit, and what was changed by hand is found."""
+"""``tactbench why --again``: every cell comes out the same bit for bit, and what was changed by hand is found."""
 
 import json
 import shutil
@@ -13,7 +13,7 @@ from tests.core.matrix.plugin_packages import write_acme
 
 RUN = (
     "run", "--repeats", "1", "--sensor", "ideal", "--task", "force", "--estimator", "acme", "--estimator", "ols",
-    "--estimator", "acme-raises", "--effects", "-drift", "--seed", "3", "--no-latency",
+    "--estimator", "acme-raises", "--effects", "-drift", "--seed", "3",
 )  # fmt: skip
 CELLS = [f"ideal/force/twin/karl2016/{name}/1" for name in ("acme", "ols", "mean", "time-index")]
 
@@ -39,7 +39,7 @@ def here(made, tmp_path):
         return ask(*words, "--out", "results", plugins=(str(folder / "site"),), code=code).stdout
 
     def rerun(cell, *words, **options):
-        return json.loads(ask("rerun", cell, *words, "--format", "json", **options))
+        return json.loads(ask("why", cell, "--again", *words, "--format", "json", **options))
 
     rerun.folder, rerun.ask = folder, ask
     return rerun
@@ -61,7 +61,9 @@ def test_every_cell_comes_out_the_same_and_nothing_in_the_folder_changes(here, c
 def test_a_replayed_cell_is_answered_from_the_same_recordings(here):
     (row,) = [row for row in json.loads((here.folder / "replayed" / "leaderboard.json").read_text())
               if row["estimator"] == "ols"]  # fmt: skip
-    found = json.loads(Verbs(here.folder)("rerun", row["cell"], "--out", "replayed", "--format", "json").stdout)
+    found = json.loads(
+        Verbs(here.folder)("why", row["cell"], "--again", "--out", "replayed", "--format", "json").stdout
+    )
     assert (found["answer"], found["recordings_made"]) == ("identical", 0)
 
 
@@ -94,7 +96,7 @@ def test_changed_code_is_named_beside_what_came_out(here):
     assert any(difference.startswith("score ") for difference in found["differences"])
     (changed,) = found["circumstances"]
     assert changed.startswith("source: acme ")
-    said = here.ask("rerun", CELLS[0], code=1)
+    said = here.ask("why", CELLS[0], "--again", code=1)
     assert f"Since the cell was made, this has changed:\n  {changed}" in said
 
 
@@ -105,4 +107,4 @@ def test_a_cell_that_fails_fails_again_and_shows_where(here):
 
 
 def test_an_unknown_cell_is_refused(here):
-    here.ask("rerun", "nobody", code=2)
+    here.ask("why", "nobody", "--again", code=2)

@@ -74,12 +74,12 @@ def test_the_best_score_comes_first_and_no_score_last():
 )
 def test_a_loop_is_kept_by_its_95th_percentile(usual_ms, rare_ms, rare, hundred, thousand):
     latency = [usual_ms / 1e3] * (200 - rare) + [rare_ms / 1e3] * rare
-    found = timed(at_once("a"), Timing([1.0], [1.0], latency, [0.0] * 200), {}, 1, 20.0)
+    found = timed(at_once("a"), Timing([1.0], [1.0], latency, [0.0] * 200), {}, 1)
     assert (found["loop_100_hz"], found["loop_1000_hz"]) == (hundred, thousand)
 
 
 def test_too_few_calls_for_a_95th_percentile_are_judged_by_the_largest():
-    found = timed(at_once("a"), Timing([1.0], [1.0], [0.0001] * 198 + [0.05], [0.0] * 199), {}, 1, 20.0)
+    found = timed(at_once("a"), Timing([1.0], [1.0], [0.0001] * 198 + [0.05], [0.0] * 199), {}, 1)
     assert (found["latency_ms_p95"], found["latency_ms_max"]) == (None, 50.0)
     assert not found["loop_100_hz"]
 
@@ -87,17 +87,17 @@ def test_too_few_calls_for_a_95th_percentile_are_judged_by_the_largest():
 def test_a_loop_waits_for_every_part_of_the_delay_and_is_told_of_the_longest():
     parts = {"sampling": 4.0, "link": 0.5, "window": 5.0}
     times = Timing([1.0], [1.0], [0.0001] * 200, [0.0003] * 200)
-    found = timed(at_once("a", **parts), times, {}, 1, 20.0)
+    found = timed(at_once("a", **parts), times, {}, 1)
     assert found["answer_delay_ms"] == pytest.approx(4.0 + 0.5 + 5.0 + 0.3 + 0.1)
     assert found["loop_100_hz"]
-    later = timed(at_once("a", **parts | {"window": 5.2}), times, {}, 1, 20.0)
+    later = timed(at_once("a", **parts | {"window": 5.2}), times, {}, 1)
     assert not later["loop_100_hz"]
     shown = line({**row("a", None, None, None), "reason": "", **later}, "N")
     assert shown["100 Hz loop"] == "no (window)"
 
 
 def test_a_delay_that_is_not_known_is_no_verdict_and_on_no_front():
-    found = timed(timed_estimator(Hours(), "a"), Timing([1.0], [1.0], [0.001] * 200, [0.0] * 200), {}, 1, 20.0)
+    found = timed(timed_estimator(Hours(), "a"), Timing([1.0], [1.0], [0.001] * 200, [0.0] * 200), {}, 1)
     assert (found["answer_delay_ms"], found["loop_100_hz"], found["loop_1000_hz"]) == (None, None, None)
     rows = [row("a", 0.9, 1.0, None), row("b", 0.5, 2.0, 3.0)]
     mark_fronts(rows, higher_is_better=True)
@@ -105,7 +105,7 @@ def test_a_delay_that_is_not_known_is_no_verdict_and_on_no_front():
 
 
 def test_quartiles_and_rows_are_those_of_the_times():
-    found = timed(timed_estimator(Hours(), "a"), Timing([5.0, 1.0, 3.0, 2.0, 4.0], [2.0], [0.004]), {}, 5, 20.0)
+    found = timed(timed_estimator(Hours(), "a"), Timing([5.0, 1.0, 3.0, 2.0, 4.0], [2.0], [0.004]), {}, 5)
     assert (found["fit_s_q1"], found["fit_s"], found["fit_s_q3"]) == (2.0, 3.0, 4.0)
     assert found["batch_s_per_row"] == 2.0 / 1000
     assert found["latency_ms_p50"] == 4.0

@@ -4,12 +4,10 @@ from __future__ import annotations
 
 import math
 
-import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tactbench.core.cost.precision import cheapest_below, diagrams, precise, verdict
-from tactbench.core.cost.precision_figure import draw
+from tactbench.core.cost.precision import diagrams, draw, front, precise, verdict
 from tactbench.plugin.simulation import CostPoint
 
 
@@ -35,15 +33,16 @@ def test_the_front_is_beaten_by_nobody_and_beats_everybody_else(pairs):
     assert [p.error for p in best] == sorted((p.error for p in best), reverse=True)
 
 
-def test_a_default_is_defended_or_its_miss_is_said():
+def test_a_score_to_be_maximised_is_given_with_its_sign_changed():
+    scores = [(1.0, 0.5), (2.0, 0.4), (3.0, 0.9)]
+    assert front(scores, seconds=lambda p: p[0], error=lambda p: -p[1]) == [(1.0, 0.5), (3.0, 0.9)]
+
+
+def test_the_default_stands_beside_the_quickest_point_that_will_do():
     quick, default, slow = _point(0.1, 0.5), _point(0.2, 0.05, default=True), _point(1.0, 0.01)
-    assert "the cheapest point below a third of the noise" in verdict([quick, default, slow])
-    assert cheapest_below([quick, default, slow]) == default
-    cheaper = _point(0.1, 0.09, label="cheaper")
-    assert "cheaper keeps it too" in verdict([cheaper, default])
-    poor = _point(0.2, 0.2, default=True)
-    assert "no point keeps" in verdict([quick, poor])
-    assert "above" in verdict([poor, _point(0.9, 0.01, label="finer")])
+    assert verdict([quick, default, slow]).endswith("quickest below a third of the noise (0.1 count): the default.")
+    assert "cheaper, 0.09 count rms in 100 ms." in verdict([_point(0.1, 0.09, label="cheaper"), default])
+    assert verdict([quick, _point(0.2, 0.2, default=True)]).endswith(": none.")
     assert "no noise is stated" in verdict([_point(1, 1, default=True, floor=math.inf)])
     assert "No default" in verdict([quick])
 
@@ -61,10 +60,3 @@ def test_a_figure_has_a_panel_for_every_observable(tmp_path):
 def test_points_without_noise_are_drawn_too(tmp_path):
     draw([_point(0.1, 0.5, floor=math.inf, default=True)], "t", [tmp_path / "a.png"])
     assert (tmp_path / "a.png").exists()
-
-
-@pytest.mark.parametrize("share", [0.1, 1.0])
-def test_the_share_of_the_noise_decides(share):
-    found = cheapest_below([_point(0.1, 0.2), _point(0.2, 0.02)], share)
-    assert found is not None
-    assert found.error < share * 0.3

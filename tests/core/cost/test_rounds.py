@@ -61,9 +61,9 @@ def timed_estimator(clock, name, *, fit_s=512 * BINARY, batch_s=256 * BINARY, ro
     )  # fmt: skip
 
 
-def run(clock, *timed_estimators, rounds=5, budget_s=20.0, threads=1):
+def run(clock, *timed_estimators, rounds=5, threads=1):
     named = {one.name: one for one in timed_estimators}
-    return measure(named, rounds=rounds, budget_s=budget_s, threads=threads, seed=3, clock=clock, progress=Progress())
+    return measure(named, rounds=rounds, threads=threads, seed=3, clock=clock, progress=Progress())
 
 
 def test_what_took_so_long_is_said_to_have_taken_so_long():
@@ -115,7 +115,7 @@ def test_a_fit_beyond_the_budget_is_done_once_and_its_row_says_so():
     assert found["slow"].fit_s == [21.0]
     assert found["slow"].batch_s == [22.0]
     assert len(found["slow"].latency_s) == 5 * 200
-    notes = timed(slow, found["slow"], {}, 5, 20.0)["notes"]
+    notes = timed(slow, found["slow"], {}, 5)["notes"]
     assert notes == [
         "fitted in 1 of 5 rounds: one took more than 20 s",
         "all test rows answered in 1 of 5 rounds: one took more than 20 s",
@@ -176,7 +176,7 @@ def test_a_model_that_is_not_the_scored_one_is_told_of():
     one = timed_estimator(clock, "a")
     times = run(clock, one, rounds=1)["a"]
     # Noughts against ones: an rmse of exactly 1.
-    assert timed(one, times, {"fold roles": 1.0}, 1, 20.0)["notes"] == []
-    assert timed(one, times, {"fold roles": 0.9}, 1, 20.0)["notes"] == [
+    assert timed(one, times, {"fold roles": 1.0}, 1)["notes"] == []
+    assert timed(one, times, {"fold roles": 0.9}, 1)["notes"] == [
         "the timed model scores 1 on fold roles, the cell's 0.9"
     ]

@@ -12,8 +12,8 @@ from tests.core.matrix.plugin_packages import write_metadata
     ("settings", "code", "said"),
     [
         ("{force_ceiling: 5}", 2, r"rig\.yaml:4.*force_ceiling_n"),
-        ("{force_ceiling_n: 5}", 0, "5 N.*Nothing is refused"),
-        ("{force_ceiling_n: 12}", 1, "12 N.*The frame bears 10 N"),
+        ("{force_ceiling_n: 5}", 0, "5 N.*Nothing was opened"),
+        ("{force_ceiling_n: 12}", 1, "refused: The frame bears 10 N.*12 N"),
     ],
 )
 def test_its_file_is_checked_and_its_check_is_printed(shell, settings, code, said):
@@ -23,5 +23,5 @@ def test_its_file_is_checked_and_its_check_is_printed(shell, settings, code, sai
     write_metadata(shell.folder, "acme-rig", "1.0", points="acme-rig = acme_rig")
     lines = ("version: 1", "rig: acme-press", "sensors: {icub: {link: emulated}}", f"settings: {settings}")
     (shell.folder / "rig.yaml").write_text("\n".join(lines), encoding="utf-8")
-    done = shell("rig", "check", "rig.yaml", code=code)
+    done = shell("doctor", "--seconds", "0", "--rig-file", "rig.yaml", code=code)
     assert re.search(said, done.stdout + done.stderr, re.DOTALL), done.stdout

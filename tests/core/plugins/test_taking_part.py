@@ -7,7 +7,7 @@ import numpy as np
 def recordings(shell, out, *more, plugins=("patching",)):
     """Return the readings of a run's recordings, by the names of the files, which hold the keys."""
     shell(
-        "run", "--sensor", "icub", "--task", "force", "--estimator", "mean", "--repeats", "1", "--no-latency",
+        "run", "--sensor", "icub", "--task", "force", "--estimator", "mean", "--repeats", "1",
         "--out", out, *more, plugins=plugins,
     )  # fmt: skip
     found = {}

@@ -13,7 +13,7 @@ SLOWER = "  options: {rate_hz: 250.0, counts_per_newton: 1.0e+6, counts_per_newt
 
 def test_rows_of_emulated_devices_are_ranked_with_nobody_else(shell, verbs):
     asked = ("--sensor", "icub", "--task", "force", "--protocol", "deployable", "--estimator", "ols", "--repeats", "1")
-    asked += ("--engine", "in-process", "--no-latency")
+    asked += ("--engine", "in-process")
     text = EXAMPLE.read_text(encoding="utf-8")
     assert NET_FT in text
     (shell.folder / "rig.yaml").write_text(text.replace(NET_FT, NET_FT + SLOWER), encoding="utf-8")
@@ -43,7 +43,9 @@ def test_a_rig_file_for_another_rig_or_none_at_all_is_refused(verbs):
 
 
 def test_one_scene_is_recorded_and_a_terminal_is_asked_for_where_somebody_has_to_press(shell):
-    made = shell("record", "--rig-file", str(EXAMPLE), "--sensor", "icub", "--seconds", "2", "--out", "press.h5")
+    made = shell(
+        "record", "--rig-file", str(EXAMPLE), "--sensor", "icub", "--profile", "ramp:duration=2", "--out", "press.h5"
+    )
     assert "icub on bench (EMULATED)" in made.stdout
     text = EXAMPLE.read_text().replace("link: emulated", "link: udp://127.0.0.1:9", 1)
     (shell.folder / "rig.yaml").write_text(text)

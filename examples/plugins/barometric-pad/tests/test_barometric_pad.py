@@ -36,7 +36,7 @@ def test_from_tables_to_a_score(tmp_path):
                    comments="")  # fmt: skip
     said = tactbench(tmp_path, "import", str(MAPPING), "--root", ".", "--out", "pad")
     assert "3 recordings of barometric-pad, 1500 rows" in said
-    answer = ("--rig", "replay", "--recordings", "pad", "--task", "force", "--protocol", "deployable", "--no-latency")
+    answer = ("--rig", "replay", "--recordings", "pad", "--task", "force", "--protocol", "deployable")
     rows = json.loads(tactbench(tmp_path, "run", *answer, "--estimator", "ols", "--format", "json"))
     scores = {row["estimator"]: row["score"] for row in rows}
     # Of one barometer, 0.1 hPa of noise at 2 to 6 hPa/N is 0.02 to 0.05 N; eight are better.

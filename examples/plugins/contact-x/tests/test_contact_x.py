@@ -15,7 +15,7 @@ def test_conforms(check):
 
 def test_a_grid_of_taxels_knows_the_place(tmp_path):
     command = [sys.executable, "-m", "tactbench", "run", "--sensor", "ideal", "--task", "contact-x", "--estimator", "ridge",
-               "--repeats", "1", "--no-latency", "--format", "json"]  # fmt: skip
+               "--repeats", "1", "--format", "json"]  # fmt: skip
     done = subprocess.run(command, cwd=tmp_path, check=True, capture_output=True, text=True, timeout=100)
     scores = {row["estimator"]: row["score"] for row in json.loads(done.stdout)}
     # An answer linear in readings that grow with the force too: it halves the error of knowing nothing, and no more is said.

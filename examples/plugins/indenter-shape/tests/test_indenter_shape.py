@@ -14,8 +14,7 @@ def test_conforms(check):
 
 
 def test_a_grid_of_taxels_tells_shapes_apart(tmp_path):
-    command = [sys.executable, "-m", "tactbench", "run", "--sensor", "ideal", "--task", "indenter-shape", "--repeats", "1",
-               "--no-latency", "--format", "json"]  # fmt: skip
+    command = [sys.executable, "-m", "tactbench", "run", "--sensor", "ideal", "--task", "indenter-shape", "--repeats", "1", "--format", "json"]  # fmt: skip
     done = subprocess.run(command, cwd=tmp_path, check=True, capture_output=True, text=True, timeout=200)
     scores = {row["estimator"]: row["score"] for row in json.loads(done.stdout)}
     # Of places and angles that it was not trained on; one answer of five is right by chance.

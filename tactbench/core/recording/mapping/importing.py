@@ -13,16 +13,18 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import cast, get_args
 
+import numpy as np
+
 from tactbench.core.errors import MappingError, RecordingError, UnwritableError
 from tactbench.core.recording.health import Finding, examine
 from tactbench.core.recording.mapping.channels import MappedStream, device, fill, sensor_of
 from tactbench.core.recording.mapping.files import FileSet, RawRecording, find, read
-from tactbench.core.recording.mapping.model import Mapping, Word
+from tactbench.core.recording.mapping.model import MUST_NAME_SENTINELS, Mapping, Word
 from tactbench.core.recording.mapping.samples import labels, samples, times
 from tactbench.core.recording.mapping.tasks import check_tasks, place_tasks, require_answerable, tasks_text
 from tactbench.core.recording.reader import content_digest, open_recording
 from tactbench.core.recording.writer import RecordingWriter
-from tactbench.core.samples import Block
+from tactbench.core.samples import Block, FloatArray
 from tactbench.core.spec.recording import RecordingMeta, Scalar
 from tactbench.core.spec.scene import Role
 from tactbench.core.spec.sensor import SensorSpec, StreamSpec
@@ -32,6 +34,8 @@ RIG = "import"
 """What an imported recording says about its rig: somebody else's, made known by a mapping."""
 
 ENDING = ".h5"
+SAME = 1e-8
+"""1 - |correlation| of two columns that hold the same, rounded to the digits of a table."""
 _FILE_NAME = re.compile(r"^[A-Za-z0-9][A-Za-z0-9._-]*$")
 
 Progress = Callable[[int, int, str], None]
@@ -175,10 +179,18 @@ def _write(
         for name, table in raw.tables.items()
         if (time := mapping.tables[name].time) is not None
     }
+    sensed: dict[str, FloatArray] = {}
+    reference: dict[str, FloatArray] = {}
     with RecordingWriter(path, meta, keep=False) as writer:
         for name, stream in streams.items():
             table = raw.tables[stream.source.table]
             read_in = samples(stream, table)
+            columns = zip(stream.spec.channels, np.where(read_in.quality, np.nan, read_in.data).T, strict=True)
+            for channel, column in columns:
+                if stream.source.of == "sensor":
+                    sensed[channel.name] = column
+                elif channel.kind in MUST_NAME_SENTINELS:
+                    reference[channel.name] = column
             writer.append(Block(name, clocks.get(stream.source.table), read_in.data, read_in.quality))
             for label, annotation in stream.source.annotations.items():
                 writer.annotate(name, label, labels(label, annotation, table))
@@ -187,9 +199,21 @@ def _write(
         counts |= {f"{channel} without a sample": number for channel, number in missing.items()}
         writer.revise(counts=counts)
     with open_recording(path) as written:
-        findings = tuple(examine(written))
+        findings = (*examine(written), *_given_away(sensed, reference))
     rows = max(len(table) for table in raw.tables.values())
     return Imported(path, meta.name, rows, meta.sensor.name, missing, meta.excluded, meta.origin, findings)
+
+
+def _given_away(sensed: dict[str, FloatArray], reference: dict[str, FloatArray]) -> Iterator[Finding]:
+    """Yield what stands among the sensor's channels and is a force of the reference but for scale and offset."""
+    for force, wanted in reference.items():
+        for name, column in sensed.items():
+            there = np.isfinite(column) & np.isfinite(wanted) if len(column) == len(wanted) else np.zeros(0, bool)
+            if there.sum() < 3 or not np.ptp(column[there]) or not np.ptp(wanted[there]):
+                continue
+            if 1.0 - abs(np.corrcoef(column[there], wanted[there])[0, 1]) < SAME:
+                text = f"{name}, a channel of the sensor, is the reference {force} but for scale and offset"
+                yield Finding("target-among-features", "warning", "", (name,), 1, text)
 
 
 def _meta(mapping: Mapping, raw: RawRecording, sensor: SensorSpec, reference: tuple[StreamSpec, ...]) -> RecordingMeta:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import io
+import json
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
@@ -11,6 +12,7 @@ from tactbench.core.errors import MappingError
 from tactbench.core.recording.mapping.model import Csv, Records, Text, Xlsx
 from tactbench.core.recording.mapping.table import TextTable
 
+_DELIMITERS = {"\t": "tab", ";": "semicolon"}
 Line = tuple[int, list[str]]
 """Number of a line, and its cells."""
 
@@ -56,6 +58,12 @@ def _cells(text: str, shown: str, how: Csv | Text) -> Iterator[Line]:
             if line.strip():
                 yield number, line.split()
         return
+    for mark, name in _DELIMITERS.items():
+        if lines and mark in lines[0] and how.delimiter not in lines[0]:
+            raise MappingError(
+                f"{shown} is separated by {name}s, and not by {how.delimiter!r}.",
+                hint=f"Write delimiter: {json.dumps(mark)} under `read`.",
+            )
     reader = csv.reader(lines, delimiter=how.delimiter, strict=True)
     try:
         for cells in reader:

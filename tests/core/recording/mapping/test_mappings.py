@@ -14,6 +14,7 @@ from tactbench.core.errors import MappingError, TactbenchError
 from tactbench.core.recording.mapping import import_tables
 from tactbench.core.recording.reader import open_recording
 from tactbench.core.samples import Quality
+from tests.conftest import ROOT
 
 BASE = yaml.safe_load("""
 version: 1
@@ -41,7 +42,7 @@ class Tables:
         self.data.mkdir()
 
     def put(self, name, text):
-        (self.data / name).parent.mkdir(exist_ok=True)
+        (self.data / name).parent.mkdir(parents=True, exist_ok=True)
         (self.data / name).write_bytes(text.encode())
 
     def run(self, replace=False, **change):
@@ -272,6 +273,7 @@ def test_a_sentinel_that_nobody_named_is_refused(tables):
         ("", {}, "press.csv"),
         ("0,nan,2,3,4\n1,nan,2,3,5\n", {}, "column 1 (channel t1)"),
         ("0,1,2,3\n1,1,2,3\n", {}, "no column 4"),
+        ("0\t1\t2\t3\t4\n1\t1\t2\t3\t4\n", {}, "press.csv is separated by tabs"),
         (rows(), {"tables__table__read__header": True}, "'0.00' in column 0"),
         (rows(), {"streams__force__channels": [{**FORCE, "given_in": "mm"}]}, "'mm'"),
         (rows(), {"clock": "none"}, "mapping.yaml:"),
@@ -284,6 +286,7 @@ def test_a_sentinel_that_nobody_named_is_refused(tables):
         (rows(), {"streams__taxels__dtype": "uint8", "streams__taxels__channels": [{**TAXELS, "columns": "0..2"}]},
          "0.01 is no uint8"),
         (rows(), {"tables__table__time__epoch": "unix"}, "the year 1970"),
+        (rows(), {"tables__table__time": {"column": 1, "unit": "s", "epoch": "unix"}}, "the year 1970"),
     ],
 )  # fmt: skip
 def test_what_does_not_fit_is_refused_with_its_place(tables, text, change, says):
@@ -309,3 +312,37 @@ def test_the_same_import_changes_nothing_and_another_one_is_refused_or_replaces_
 def test_what_is_no_file_in_place_of_a_table_is_named(tables, make):
     make(tables.data / "press.csv")
     tables.refused("press.csv")
+
+
+@pytest.mark.parametrize("columns", ["1..3", "1..4"])
+def test_a_force_among_the_sensors_columns_is_warned_of(tables, columns):
+    tables.put("press.csv", rows(force=lambda row: (row - 15) ** 2))
+    (made,) = tables.run(streams__taxels__channels=[{**TAXELS, "columns": columns}]).recordings
+    warned = [(one.severity, one.channels) for one in made.findings if one.check == "target-among-features"]
+    assert warned == ([] if columns == "1..3" else [("warning", ("t4",))])
+
+
+@pytest.mark.parametrize(
+    ("rate_hz", "says"), [(None, "ms read as s?"), (100.0, "ms read as s?"), (1e-4, "s read as ms?")]
+)
+def test_times_in_a_wrong_unit_are_warned_of(tables, rate_hz, says):
+    tables.put("press.csv", "".join(f"{10 * row},{row},2,3,{row}\n" for row in range(40)))
+    source = BASE["sensor"]["principle_source"]
+    stated = {} if rate_hz is None else {"streams__taxels__rate_hz": rate_hz, "streams__taxels__rate_source": source}
+    (made,) = tables.run(**stated).recordings
+    assert any(one.check == "rate" and one.message.endswith(says) for one in made.findings)
+
+
+def test_the_shipped_mapping_of_slip_directions_reads_a_misspelt_object(tables):
+    header = ",".join(f"ff_e{number}" for number in range(1, 25))
+    tables.put("csvs/n/strippes305.csv", f"{header}\n" + "".join(f"{','.join([str(row)] * 24)}\n" for row in range(9)))
+    mapping = ROOT / "examples" / "mappings" / "biotacsp-slip-direction.yaml"
+    (made,) = import_tables(mapping, root=tables.data, out=tables.out).recordings
+    with open_recording(made.path) as recording:
+        assert recording.meta.name == "n-strippes-305"
+        assert recording.meta.labels == {
+            "direction": "north",
+            "slip": "slipped",
+            "object": "striped",
+            "set": "textures",
+        }

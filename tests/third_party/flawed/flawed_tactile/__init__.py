@@ -1,6 +1,6 @@
 """Plugins with one flaw each, named after it; ``sound-…`` have none.
 
-`CAUGHT_BY`: the check that is meant for each. `rig_file`: those with one are checked with ``--invasive`` as well.
+`CAUGHT_BY`: the check that is meant for each. `rig_file`: those with one are checked with ``--rig-file`` as well.
 """
 
 
