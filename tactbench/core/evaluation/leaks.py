@@ -9,6 +9,7 @@ import numpy.typing as npt
 
 from tactbench.core.evaluation.dataset import Dataset, Table
 from tactbench.core.evaluation.splits import Assignment
+from tactbench.core.recording.health import is_copy
 
 BLOCK = 16
 """Consecutive rows that must be equal; a recording of fewer rows counts as a whole."""
@@ -16,9 +17,6 @@ CHANGES = 0.5
 """Share of the rows of a block that must differ from the row before: sensors at rest repeat themselves."""
 MOST_SHARED = 0.05
 """Share of the test rows of a fold that is put up with. Two presses on a sensor with noise share none."""
-COPY = 1.0 - 1e-9
-"""Correlation from which a channel is the target: rounding to float32 leaves 1e-14, noise of 90 dB 1e-9."""
-
 _Hashes = npt.NDArray[np.uint64]
 
 
@@ -26,12 +24,12 @@ def copied_channels(data: Dataset) -> tuple[str, ...]:
     """Return a stamp if a channel is the target of a regression but for scale and offset, else nothing."""
     if data.classes:
         return ()
+    targets = np.concatenate([table.y[table.labelled] for table in data.tables])
+    parts = targets.reshape(len(targets), -1).T
     found = []
-    y = np.concatenate([table.y[table.labelled] for table in data.tables]).reshape(-1, data.tables[0].y[:1].size).T
     for place, name in enumerate(data.features):
-        x = np.concatenate([table.X[table.labelled, place] for table in data.tables])
-        with np.errstate(invalid="ignore", divide="ignore"):  # of what never changes there is no correlation
-            found += [name] * bool((np.abs(np.corrcoef(x, y)[0, 1:]) > COPY).any())
+        column = np.concatenate([table.X[table.labelled, place] for table in data.tables])
+        found += [name] * any(is_copy(column, part) for part in parts)
     return (f"leaks: {', '.join(found)} is the target but for scale and offset.",) if found else ()
 
 

@@ -9,6 +9,7 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from dataclasses import replace as replaced
+from itertools import product
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import cast, get_args
@@ -16,7 +17,7 @@ from typing import cast, get_args
 import numpy as np
 
 from tactbench.core.errors import MappingError, RecordingError, UnwritableError
-from tactbench.core.recording.health import Finding, examine
+from tactbench.core.recording.health import Finding, examine, is_copy
 from tactbench.core.recording.mapping.channels import MappedStream, device, fill, sensor_of
 from tactbench.core.recording.mapping.files import FileSet, RawRecording, find, read
 from tactbench.core.recording.mapping.model import MUST_NAME_SENTINELS, Mapping, Word
@@ -34,8 +35,6 @@ RIG = "import"
 """What an imported recording says about its rig: somebody else's, made known by a mapping."""
 
 ENDING = ".h5"
-SAME = 1e-8
-"""1 - |correlation| of two columns that hold the same, rounded to the digits of a table."""
 _FILE_NAME = re.compile(r"^[A-Za-z0-9][A-Za-z0-9._-]*$")
 
 Progress = Callable[[int, int, str], None]
@@ -206,14 +205,10 @@ def _write(
 
 def _given_away(sensed: dict[str, FloatArray], reference: dict[str, FloatArray]) -> Iterator[Finding]:
     """Yield what stands among the sensor's channels and is a force of the reference but for scale and offset."""
-    for force, wanted in reference.items():
-        for name, column in sensed.items():
-            there = np.isfinite(column) & np.isfinite(wanted) if len(column) == len(wanted) else np.zeros(0, bool)
-            if there.sum() < 3 or not np.ptp(column[there]) or not np.ptp(wanted[there]):
-                continue
-            if 1.0 - abs(np.corrcoef(column[there], wanted[there])[0, 1]) < SAME:
-                text = f"{name}, a channel of the sensor, is the reference {force} but for scale and offset"
-                yield Finding("target-among-features", "warning", "", (name,), 1, text)
+    for (force, wanted), (name, column) in product(reference.items(), sensed.items()):
+        if len(column) == len(wanted) and is_copy(column, wanted):
+            text = f"{name}, a channel of the sensor, is the reference {force} but for scale and offset"
+            yield Finding("target-among-features", "warning", "", (name,), 1, text)
 
 
 def _meta(mapping: Mapping, raw: RawRecording, sensor: SensorSpec, reference: tuple[StreamSpec, ...]) -> RecordingMeta:
