@@ -231,7 +231,7 @@ def _carried_out(
     """Yield each name with what `work` made of it, all in one child process, or in this one."""
     if not isolated:
         return InProcess().each(work, names)
-    return Pool(1, Limits(timeout_s=timeout_s)).each(work, names, together=True)
+    return Pool(1, Limits(timeout_s=timeout_s)).each(work, names)
 
 
 class _Carrier:

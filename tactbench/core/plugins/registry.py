@@ -246,7 +246,7 @@ def _described_in_children(points: Sequence[tuple[str, str]], timeout_s: float) 
         return {}
     from tactbench.core.pool import Limits, Pool
 
-    return dict(Pool(1, Limits(timeout_s=timeout_s)).each(_describe, points, together=True))
+    return dict(Pool(1, Limits(timeout_s=timeout_s)).each(_describe, points))
 
 
 def _describe(point: tuple[str, str]) -> dict[str, Any]:

@@ -58,14 +58,10 @@ class Engine:
         """Yield every submitted item with its result or the error that stopped it, in the order in which they end."""
         raise NotImplementedError
 
-    def each(
-        self, work: Callable[[T], R], items: Iterable[T], *, together: bool = False
-    ) -> Iterator[tuple[T, R | BaseException]]:
-        """Carry out `work` for every item, each as a piece of its own or all `together`, and yield outcomes."""
+    def each(self, work: Callable[[T], R], items: Iterable[T]) -> Iterator[tuple[T, R | BaseException]]:
+        """Carry out `work` for every item, as one piece, and yield outcomes."""
         with self:
-            every = list(items)
-            for piece in [every] if together else [[item] for item in every]:
-                self.submit(work, piece)
+            self.submit(work, list(items))
             yield from self.outcomes()
 
 

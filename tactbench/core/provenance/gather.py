@@ -90,28 +90,14 @@ def _commit(folder: Path) -> str:
 
 
 def foot(several: Sequence[Mapping[str, Any]]) -> tuple[str, ...]:
-    """Return what stands under a table: which software made it on which machine, each said once.
-
-    Parameters
-    ----------
-    several
-        What `gather` returned for each of the runs that the rows come from; keys may be missing.
-    """
-    texts = [text for one in several for text in _sentences(one)]
-    hosts = {str(one["host"]) for one in several if one.get("host")}
-    if len(hosts) > 1:
-        texts.append(f"{len(hosts)} hosts: times of one are not to be compared with times of another.")
-    return tuple(dict.fromkeys(texts))
+    """Return which software made some rows on which machines, each said once; `several` are from `gather`."""
+    return tuple(dict.fromkeys(text for one in several for text in _sentences(one)))
 
 
 def _sentences(one: Mapping[str, Any]) -> Iterator[str]:
-    if "tactbench" in one:
-        commit = f" ({one['commit']})" if one.get("commit") else ""
-        libraries = ", ".join(f"{name} {version}" for name, version in one.get("distributions", {}).items())
-        threads = f"BLAS threads: {one.get('threads', '?')}"
-        yield f"tactbench {one['tactbench']}{commit}, Python {one.get('python', '?')}, {libraries}, {threads}."
-    for plugin in one.get("plugins", ()):
+    commit = f" ({one['commit']})" if one["commit"] else ""
+    libraries = ", ".join(f"{name} {version}" for name, version in one["distributions"].items())
+    yield f"tactbench {one['tactbench']}{commit}, Python {one['python']}, {libraries}, BLAS threads: {one['threads']}."
+    for plugin in one["plugins"]:
         yield f"Plugin {plugin['distribution']} {plugin['version']} (source {plugin['source'][:12]})."
-    if one.get("host"):
-        memory = f", {one['memory_mb'] / 1024:.0f} GiB" if one.get("memory_mb") else ""
-        yield f"Host {one['host']}: {one.get('cpu', 'unknown processor')}, {one.get('cores')} cores{memory}."
+    yield f"Host {one['host']}: {one['cpu']}, {one['cores']} cores, {one['memory_mb'] / 1024:.0f} GiB."

@@ -35,9 +35,17 @@ def nobody_is_left():
     assert descriptors() <= opened
 
 
+def apart(pool, items):
+    """Yield outcomes of items that are a piece of work each."""
+    with pool:
+        for item in items:
+            pool.submit(work, [item])
+        yield from pool.outcomes()
+
+
 def together(*whats, limits=PATIENT):
     """Return outcomes of items of one piece of work, in order."""
-    found = list(Pool(1, limits).each(work, whats, together=True))
+    found = list(Pool(1, limits).each(work, whats))
     assert [what for what, _ in found] == list(whats)
     return [outcome for _, outcome in found]
 
@@ -95,12 +103,12 @@ def test_what_an_item_prints_is_kept_of_it_alone_and_cut_to_its_end(capfd):
 
 def test_items_of_a_piece_share_a_process_and_pieces_do_not():
     assert len({*together("whoami 1", "whoami 2", "whoami 3")}) == 1
-    apart = [pid for _, pid in Pool(2).each(work, ["whoami 1", "whoami 2", "whoami 3"])]
-    assert len({*apart, os.getpid()}) == 4
+    pids = [pid for _, pid in apart(Pool(2), ["whoami 1", "whoami 2", "whoami 3"])]
+    assert len({*pids, os.getpid()}) == 4
 
 
 def test_pieces_begin_in_order_and_no_more_than_jobs_are_at_work(tmp_path):
-    found = dict(Pool(2).each(work, [f"neighbours {tmp_path} {number}" for number in range(6)]))
+    found = dict(apart(Pool(2), [f"neighbours {tmp_path} {number}" for number in range(6)]))
     assert len(found) == 6
     assert max(found.values()) <= 2
     begun = sorted(tmp_path.glob("begun-*"), key=lambda path: path.stat().st_mtime_ns)
@@ -114,7 +122,7 @@ def test_who_forks_is_heard_once_and_what_is_left_in_its_group_ends_with_it():
 
 
 def test_an_item_or_piece_that_cannot_be_sent_has_its_error():
-    found = dict(Pool(1).each(work, ["fine", sys]))
+    found = dict(apart(Pool(1), ["fine", sys]))
     assert found["fine"] == "fine"
     assert "cannot pickle" in str(found[sys])
 
@@ -139,7 +147,7 @@ def test_a_device_has_time_to_be_closed(tmp_path):
 
 
 def test_an_iteration_given_up_ends_everybody(tmp_path):
-    running = Pool(2, Limits(grace_s=20.0)).each(work, [f"holds {tmp_path / 'device'}", "fine", "leaves", "hangs"])
+    running = apart(Pool(2, Limits(grace_s=20.0)), [f"holds {tmp_path / 'device'}", "fine", "leaves", "hangs"])
     assert next(running) == ("fine", "fine")
     next(running)
     running.close()
@@ -151,8 +159,11 @@ from tactbench.core.pool import Pool
 from tests.core.pool.works import work
 if sys.argv[1] != "default":
     multiprocessing.set_start_method(sys.argv[1])
-for item, outcome in Pool(2).each(work, sys.argv[2:]):
-    print(item, "->", type(outcome).__name__, flush=True)
+with Pool(2) as pool:
+    for item in sys.argv[2:]:
+        pool.submit(work, [item])
+    for item, outcome in pool.outcomes():
+        print(item, "->", type(outcome).__name__, flush=True)
 """
 """A script that guards nothing by ``if __name__ == "__main__"``."""
 
