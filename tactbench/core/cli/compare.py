@@ -1,4 +1,4 @@
-"""``tactbench compare A B``: two sensors, two estimators or two result folders."""
+"""``tactbench compare A B``: two sensors, estimators, protocols, splits or result folders."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ COMPARISON_FORMATS = ("table", "json", "md", "latex", "csv")
 @click.argument("first", metavar="A")
 @click.argument("second", metavar="B")
 @click.option("--out", "folder", type=click.Path(path_type=Path), default=Path("tactbench-results"), show_default=True,
-              help="Result folder that sensors or estimators are compared in.")  # fmt: skip
+              help="Result folder, unless A and B are folders.")  # fmt: skip
 @click.option("--task", help="This task only.")
 @click.option("--config", metavar="FILE", help="Matrix whose declared comparisons p-values are corrected for.")
 @click.option("--format", "shape", type=click.Choice(COMPARISON_FORMATS), default="table", show_default=True)
 def command(first: str, second: str, folder: Path, task: str | None, config: str | None, shape: str) -> None:
-    """Compare A and B replicate by replicate: two sensors, two estimators, or two result folders.
+    """Compare A and B replicate by replicate: two sensors, estimators, protocols, splits, or result folders.
 
     Of two folders the same cells are compared: before and after a change, or two laboratories.
     """

@@ -1,27 +1,30 @@
-"""Two sensors, two estimators or two result folders, cell by cell: what may be compared, and what it shows.
-
-Comparisons become one table a question, and records, with the same digits in every format.
-"""
+"""Two sensors, estimators, protocols, splits or result folders, compared cell by cell."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any, Literal
 
 from tactbench.core.errors import UnknownNameError
 from tactbench.core.leaderboard.names import Row, answer_name, grouped, hardware_name, metric_name
 from tactbench.core.spec.matrix import ComparisonChoice
-from tactbench.core.statistics.aggregate import aggregate
 from tactbench.core.statistics.paired import Difference, FoldDifference, difference, holm, over_folds
-from tactbench.core.tables.numbers import ABSENT, interval, score, signed, suffix
-from tactbench.core.tables.text_table import TextTable
+from tactbench.core.tables.numbers import ABSENT, score, signed, suffix
+from tactbench.core.tables.text_table import Entry, TextTable, finite
 
-Kind = Literal["sensors", "estimators", "folders"]
+Kind = Literal["sensors", "estimators", "protocols", "splits", "folders"]
 Key = tuple[Any, ...]
 COLUMNS = (
     "of", "A", "B", "A − B", "95 % interval", "p", "p folds", "p Holm", "effect", "P(A better)", "n", "verdict",
 )  # fmt: skip
+_NAMES: dict[Kind, Callable[[Row], str]] = {
+    "sensors": lambda row: str(row["sensor"]),
+    "estimators": answer_name,
+    "protocols": lambda row: str(row["protocol"]),
+    "splits": lambda row: str(row["split"]),
+}
 
 
 @dataclass(frozen=True)
@@ -30,10 +33,10 @@ class PairwiseComparison:
 
     kind: Kind
     first: str
-    """name of the first sensor, estimator or folder"""
+    """name of the first sensor, estimator, protocol, split or folder"""
     second: str
     of: str
-    """what both have: the estimator of two sensors, the sensor of two estimators, both of two folders"""
+    """what both have: the estimator of two sensors, the sensor of two estimators, else both"""
     first_row: Row | None
     second_row: Row | None
     difference: Difference | None
@@ -53,24 +56,25 @@ class PairwiseComparison:
 
 
 def comparisons(rows: Sequence[Row], first: str, second: str, task: str | None = None) -> list[PairwiseComparison]:
-    """Compare two sensors or two estimators of one leaderboard, wherever both have answered the same question.
+    """Compare two sensors, estimators, protocols or splits of one leaderboard, wherever the rest of the cells is equal.
 
     Raises
     ------
     UnknownNameError
-        If these rows have no such task, no sensor and no estimator of such a name, or not both names are of one kind.
+        If these rows have no such task, nothing of such a name, or not both names are of one kind.
     """
     rows = _in_task(rows, task)
-    sensors = grouped(_answers(rows), lambda row: str(row["sensor"]))
-    estimators = grouped(rows, answer_name)
-    kinds: dict[Kind, Mapping[str, Sequence[Row]]] = {"sensors": sensors, "estimators": estimators}
-    for kind, named in kinds.items():
+    known = {
+        kind: grouped(rows if kind == "estimators" else _answers(rows), name_of) for kind, name_of in _NAMES.items()
+    }
+    for kind, named in known.items():
         if first in named and second in named:
             return _compared(kind, first, second, named[first], named[second])
-    for kind, named in kinds.items():
+    for kind, named in known.items():
         if first in named:
             raise UnknownNameError(f"{kind[:-1]} in these results", second, named)
-    raise UnknownNameError("sensor or estimator in these results", first, [*sensors, *estimators])
+    every = [name for named in known.values() for name in named]
+    raise UnknownNameError("sensor, estimator, protocol or split in these results", first, every)
 
 
 def folder_comparisons(
@@ -78,6 +82,17 @@ def folder_comparisons(
 ) -> list[PairwiseComparison]:
     """Compare the same cells of two result folders; raises UnknownNameError for a task that one has not."""
     return _compared("folders", first, second, *(_answers(_in_task(rows, task)) for rows in (first_rows, second_rows)))
+
+
+def asked_in_several_ways(rows: Sequence[Row]) -> Iterator[PairwiseComparison]:
+    """Compare finished answers under each further protocol, and each further split, with that under the first."""
+    finished = [row for row in _answers(rows) if row["status"] == "done"]
+    kinds: tuple[Kind, ...] = ("protocols", "splits")
+    for kind in kinds:
+        name_of = _NAMES[kind]
+        for key, (first, *others) in grouped(finished, partial(_key, kind)).items():
+            for other in others:
+                yield _pair(kind, name_of(first), name_of(other), key[-1], first, other)
 
 
 def _answers(rows: Sequence[Row]) -> list[Row]:
@@ -130,26 +145,33 @@ def _cells(pair: PairwiseComparison) -> frozenset[str]:
 def _compared(
     kind: Kind, first: str, second: str, first_rows: Sequence[Row], second_rows: Sequence[Row]
 ) -> list[PairwiseComparison]:
-    keys = [{_key(kind, row): row for row in rows} for rows in (first_rows, second_rows)]
+    ones, others = ({_key(kind, row): row for row in rows} for rows in (first_rows, second_rows))
     found = []
-    for key in dict.fromkeys([*keys[0], *keys[1]]):
-        one, other = keys[0].get(key), keys[1].get(key)
-        result, folds = None, None
-        if one is None:
-            refused = _why_alone(key, first, keys[0])
-        elif other is None:
-            refused = _why_alone(key, second, keys[1])
-        elif not (refused := _why_not(one, other, first, second)):
-            result, folds = difference(one, other), over_folds(one, other)
-        found.append(PairwiseComparison(kind, first, second, key[-1], one, other, result, folds, refused))
+    for key in dict.fromkeys([*ones, *others]):
+        one, other = ones.get(key), others.get(key)
+        if one is None or other is None:
+            refused = _why_alone(key, first, ones) if one is None else _why_alone(key, second, others)
+            found.append(PairwiseComparison(kind, first, second, key[-1], one, other, None, None, refused))
+        else:
+            found.append(_pair(kind, first, second, key[-1], one, other))
     return found
+
+
+def _pair(kind: Kind, first: str, second: str, of: str, one: Row, other: Row) -> PairwiseComparison:
+    if refused := _why_not(one, other, first, second):
+        return PairwiseComparison(kind, first, second, of, one, other, None, None, refused)
+    return PairwiseComparison(
+        kind, first, second, of, one, other, difference(one, other), over_folds(one, other), refused
+    )
 
 
 def _key(kind: Kind, row: Row) -> Key:
     """Return what two rows must have in common: hardware first, then protocol, then all else."""
     sensor, answer = str(row["sensor"]), answer_name(row)
-    of = {"sensors": answer, "estimators": sensor, "folders": f"{sensor}, {answer}"}[kind]
-    return (hardware_name(row), row["protocol"], row["split"], row["task"], row["repeat"], of)
+    of = {"sensors": answer, "estimators": sensor}.get(kind, f"{sensor}, {answer}")
+    protocol = "" if kind == "protocols" else row["protocol"]
+    split = "" if kind == "splits" else row["split"]
+    return (hardware_name(row), protocol, split, row["task"], row["repeat"], of)
 
 
 def _why_alone(alone: Key, missing: str, others: Iterable[Key]) -> str:
@@ -184,15 +206,18 @@ def tables_of(comparisons: Sequence[PairwiseComparison]) -> list[TextTable]:
 
 def _title(pair: PairwiseComparison) -> str:
     row = pair.row
+    protocol = [f"{row['protocol']}{' †' if row['dagger'] else ''}"] if pair.kind != "protocols" else []
+    split = [f"split {row['split']}"] if row["split"] and pair.kind != "splits" else []
     names = f"A = {pair.first}, B = {pair.second}"
-    protocol = f"{row['protocol']}{' †' if row['dagger'] else ''}"
-    split = [f"split {row['split']}"] if row["split"] else []
-    return " · ".join([names, row["task"], metric_name(row), protocol, *split, hardware_name(row)])
+    return " · ".join([names, row["task"], metric_name(row), *protocol, *split, hardware_name(row)])
 
 
 def _line(pair: PairwiseComparison) -> tuple[str, ...]:
     unit = pair.row["unit"]
-    scores = [score(row["score"] if row else None, unit) for row in (pair.first_row, pair.second_row)]
+    scores = [
+        Entry(score(row["score"], unit), finite(row["score"]), cell=row["cell"]) if row else ABSENT
+        for row in (pair.first_row, pair.second_row)
+    ]
     found = pair.difference
     if found is None:
         return (pair.of, *scores, *(ABSENT for _ in COLUMNS[4:]), f"not compared: {pair.refused}")
@@ -257,29 +282,7 @@ def notes_of(comparisons: Sequence[PairwiseComparison]) -> list[str]:
         notes.append("None of these was declared in the matrix: exploratory, p is not corrected for being one of many.")
     if any(pair.row["simulated"] for pair, _ in found):
         notes.append("SIM, EMULATED: simulated by the twin; says nothing of hardware.")
-    return list(dict.fromkeys([*notes, *_averages([pair for pair, _ in found])]))
-
-
-def _averages(found: Sequence[PairwiseComparison]) -> list[str]:
-    """Return the interquartile mean over tasks of either, where two tasks or more were compared under one protocol."""
-    notes = []
-    for (_, protocol), pairs in grouped(found, lambda pair: (hardware_name(pair.row), pair.row["protocol"])).items():
-        one, other = (
-            aggregate([row for row in rows if row is not None])
-            for rows in zip(*((pair.first_row, pair.second_row) for pair in pairs), strict=True)
-        )
-        if len({pair.row["task"] for pair in pairs}) < 2 or one is None or other is None:
-            continue
-        left_out = "".join(f" Left out: {reason}." for reason in dict.fromkeys(one.left_out + other.left_out))
-        means = ", ".join(
-            f"{name} {side.value:.3f} ({interval(side.low, side.high, '1')})"
-            for name, side in ((pairs[0].first, one), (pairs[0].second, other))
-        )
-        notes.append(
-            f"Interquartile mean over {one.tasks} tasks under {protocol} ({one.entries} scores; 0 is the trivial "
-            f"baseline, 1 the reference): {means}.{left_out}"
-        )
-    return notes
+    return list(dict.fromkeys(notes))
 
 
 def record_of(pair: PairwiseComparison) -> dict[str, Any]:
