@@ -18,10 +18,6 @@ _TEX = {
 }  # fmt: skip
 """Brackets and the star are options of ``\\\\`` where they follow it: in braces they are text."""
 
-_ACCENTS = {
-    "\u0300": r"\`", "\u0301": r"\'", "\u0302": r"\^", "\u0303": r"\~", "\u0304": r"\=", "\u0306": r"\u",
-    "\u0307": r"\.", "\u0308": r"\"", "\u030b": r"\H", "\u030c": r"\v", "\u0327": r"\c",
-}  # fmt: skip
 _LIGATURE = re.compile(r"-(?=-)|`(?=`)|'(?=')|[!?](?=`)|,(?=,)")
 """The first of two characters that TeX draws as one."""
 
@@ -96,10 +92,6 @@ def _character(character: str) -> str:
         return _TEX[character]
     if character.isascii():
         return character
-    parts = unicodedata.normalize("NFD", character)
-    letter, marks = parts[0], parts[1:]
-    if letter.isascii() and letter.isalpha() and marks in _ACCENTS:
-        # An accent above i or j takes the place of the dot.
-        dotless = rf"\{letter}" if letter in "ij" and marks != "\u0327" else letter
-        return f"{_ACCENTS[marks]}{{{dotless}}}"
+    if "À" <= character <= "ÿ" and unicodedata.decomposition(character):
+        return character  # an ASCII letter with an accent
     return f"U+{ord(character):04X}"

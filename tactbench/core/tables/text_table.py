@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import re
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
@@ -12,8 +11,6 @@ from tactbench.core.tables.numbers import ABSENT as ABSENT
 
 WORDY = 60
 """Letters from which a field wraps as prose."""
-_DIGITS = r"[-+−]?[\d\u202f]+(?:\.\d+)?(?:[eE][-+]?\d+)?"
-_NUMBER = re.compile(rf"({_DIGITS})(?: … {_DIGITS})?(?: %)?(?: ?[†‡*])*")
 
 
 class Entry(str):
@@ -99,15 +96,13 @@ class TextTable:
 
 
 def sort_value(text: str) -> float | None:
-    """Return what a text is sorted by in a column of numbers.
-
-    That of an `Entry`; else the number that the text is, thin spaces and marks aside, of an interval its lower end.
-    Text with a unit has none, since two lines may have two units.
-    """
+    """Return what a text is sorted by in a column of numbers: the value of an `Entry`, else the number that it is."""
     if isinstance(text, Entry):
         return text.value
-    found = _NUMBER.fullmatch(text.strip())
-    return float(found[1].replace("\u202f", "").replace("−", "-")) if found and any(map(str.isdigit, text)) else None
+    try:
+        return finite(float(text.replace("\u202f", "").replace("−", "-")))
+    except ValueError:
+        return None
 
 
 def finite(value: object) -> float | None:
