@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
+from itertools import chain
 from typing import Any, Literal
 
 from tactbench.core.errors import UnknownNameError
@@ -35,15 +36,13 @@ class PairwiseComparison:
     first: str
     """name of the first sensor, estimator, protocol, split or folder"""
     second: str
-    of: str
-    """what both have: the estimator of two sensors, the sensor of two estimators, else both"""
     first_row: Row | None
     second_row: Row | None
-    difference: Difference | None
-    folds: FoldDifference | None
-    """the same over folds whose training data overlap, where there are several"""
     refused: str
     """why there is no difference; empty if there is one"""
+    difference: Difference | None = None
+    folds: FoldDifference | None = None
+    """the same over folds whose training data overlap, where there are several"""
     declared: bool = False
     """the matrix says that it is run to compare these"""
     p_corrected: float | None = None
@@ -51,8 +50,18 @@ class PairwiseComparison:
 
     @property
     def row(self) -> Row:
-        """Return one of the rows, for what both have."""
+        """One of the rows, for what both have."""
         return next(row for row in (self.first_row, self.second_row) if row is not None)
+
+    @property
+    def of(self) -> str:
+        """What both have: the estimator of two sensors, the sensor of two estimators, else both."""
+        return str(_key(self.kind, self.row)[-1])
+
+    @property
+    def cells(self) -> frozenset[str]:
+        """The names of both cells."""
+        return frozenset(str(row["cell"]) for row in (self.first_row, self.second_row) if row is not None)
 
 
 def comparisons(rows: Sequence[Row], first: str, second: str, task: str | None = None) -> list[PairwiseComparison]:
@@ -64,17 +73,14 @@ def comparisons(rows: Sequence[Row], first: str, second: str, task: str | None =
         If these rows have no such task, nothing of such a name, or not both names are of one kind.
     """
     rows = _in_task(rows, task)
-    known = {
-        kind: grouped(rows if kind == "estimators" else _answers(rows), name_of) for kind, name_of in _NAMES.items()
-    }
+    known = {kind: grouped(rows if kind == "estimators" else _answers(rows), name) for kind, name in _NAMES.items()}
     for kind, named in known.items():
         if first in named and second in named:
             return _compared(kind, first, second, named[first], named[second])
     for kind, named in known.items():
         if first in named:
             raise UnknownNameError(f"{kind[:-1]} in these results", second, named)
-    every = [name for named in known.values() for name in named]
-    raise UnknownNameError("sensor, estimator, protocol or split in these results", first, every)
+    raise UnknownNameError("sensor, estimator, protocol or split in these results", first, chain(*known.values()))
 
 
 def folder_comparisons(
@@ -89,10 +95,8 @@ def asked_in_several_ways(rows: Sequence[Row]) -> Iterator[PairwiseComparison]:
     finished = [row for row in _answers(rows) if row["status"] == "done"]
     kinds: tuple[Kind, ...] = ("protocols", "splits")
     for kind in kinds:
-        name_of = _NAMES[kind]
-        for key, (first, *others) in grouped(finished, partial(_key, kind)).items():
-            for other in others:
-                yield _pair(kind, name_of(first), name_of(other), key[-1], first, other)
+        for first, *others in grouped(finished, partial(_key, kind)).values():
+            yield from (_pair(kind, _NAMES[kind](first), _NAMES[kind](other), first, other) for other in others)
 
 
 def _answers(rows: Sequence[Row]) -> list[Row]:
@@ -115,17 +119,10 @@ def with_declared(
 
     The family of tests is every declared pair of cells in `rows`, the whole leaderboard.
     """
-    family: dict[frozenset[str], float | None] = {}
-    for pair in (pair for choice in declared for pair in _declared(rows, choice)):
-        if pair.difference is not None:
-            family.setdefault(_cells(pair), pair.difference.p)
+    every = [pair for choice in declared for pair in _declared(rows, choice)]
+    family = {pair.cells: pair.difference.p for pair in reversed(every) if pair.difference is not None}
     corrected = dict(zip(family, holm(list(family.values())), strict=True))
-    return [
-        replace(pair, declared=_cells(pair) in corrected, p_corrected=corrected.get(_cells(pair)))
-        if pair.difference is not None
-        else pair
-        for pair in found
-    ]
+    return [replace(pair, declared=pair.cells in corrected, p_corrected=corrected.get(pair.cells)) for pair in found]
 
 
 def _declared(rows: Sequence[Row], choice: ComparisonChoice) -> list[PairwiseComparison]:
@@ -138,31 +135,27 @@ def _declared(rows: Sequence[Row], choice: ComparisonChoice) -> list[PairwiseCom
     return [pair for pair in found if pair.kind == ("sensors" if choice.sensors else "estimators")]
 
 
-def _cells(pair: PairwiseComparison) -> frozenset[str]:
-    return frozenset(str(row["cell"]) for row in (pair.first_row, pair.second_row) if row is not None)
-
-
 def _compared(
     kind: Kind, first: str, second: str, first_rows: Sequence[Row], second_rows: Sequence[Row]
 ) -> list[PairwiseComparison]:
     ones, others = ({_key(kind, row): row for row in rows} for rows in (first_rows, second_rows))
     found = []
     for key in dict.fromkeys([*ones, *others]):
-        one, other = ones.get(key), others.get(key)
-        if one is None or other is None:
-            refused = _why_alone(key, first, ones) if one is None else _why_alone(key, second, others)
-            found.append(PairwiseComparison(kind, first, second, key[-1], one, other, None, None, refused))
-        else:
-            found.append(_pair(kind, first, second, key[-1], one, other))
+        alone = (
+            ""
+            if key in ones and key in others
+            else _why_alone(key, *((second, others) if key in ones else (first, ones)))
+        )
+        found.append(_pair(kind, first, second, ones.get(key), others.get(key), alone))
     return found
 
 
-def _pair(kind: Kind, first: str, second: str, of: str, one: Row, other: Row) -> PairwiseComparison:
-    if refused := _why_not(one, other, first, second):
-        return PairwiseComparison(kind, first, second, of, one, other, None, None, refused)
-    return PairwiseComparison(
-        kind, first, second, of, one, other, difference(one, other), over_folds(one, other), refused
-    )
+def _pair(
+    kind: Kind, first: str, second: str, one: Row | None, other: Row | None, refused: str = ""
+) -> PairwiseComparison:
+    if one is None or other is None or (refused := _why_not(one, other, first, second)):
+        return PairwiseComparison(kind, first, second, one, other, refused)
+    return PairwiseComparison(kind, first, second, one, other, "", difference(one, other), over_folds(one, other))
 
 
 def _key(kind: Kind, row: Row) -> Key:
@@ -226,30 +219,28 @@ def _line(pair: PairwiseComparison) -> tuple[str, ...]:
         *scores,
         signed(found.value, unit),
         " … ".join(signed(end, unit) for end in (found.low, found.high) if end is not None) or ABSENT,
-        probability(found.p),
-        probability(pair.folds.p) if pair.folds else ABSENT,
-        probability(pair.p_corrected) if pair.declared else "exploratory",
+        _probability(found.p),
+        _probability(pair.folds.p) if pair.folds else ABSENT,
+        _probability(pair.p_corrected) if pair.declared else "exploratory",
         ABSENT if found.effect is None else signed(found.effect, "1"),
         ABSENT if found.improved is None else f"{found.improved:.2f}",
         f"{found.replicates}" + ("" if found.paired else " unpaired"),
-        verdict(pair),
+        _verdict(pair),
     )
 
 
-def verdict(pair: PairwiseComparison) -> str:
+def _verdict(pair: PairwiseComparison) -> str:
     """Return who is better, or that it cannot be told."""
     found = pair.difference
-    if found is None:
-        return "not compared"
-    if found.verdict in ("equivalent", "undecided"):
-        return found.verdict
+    if found is None or found.verdict in ("equivalent", "undecided"):
+        return found.verdict if found else ""
     winner = pair.first if found.verdict == "better" else pair.second
     region = pair.row.get("equivalence")
     beyond = f" by more than {region:g}{suffix(pair.row['unit'])}" if region and found.beyond else ""
     return f"{winner} better{beyond}"
 
 
-def probability(p: float | None) -> str:
+def _probability(p: float | None) -> str:
     """Return a p-value, two digits."""
     if p is None:
         return ABSENT
