@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from tactbench.core.errors import UsageError
 from tactbench.core.files import replace_file
@@ -23,9 +22,6 @@ from tactbench.core.tables.numbers import whole
 from tactbench.core.tables.text import visible
 from tactbench.core.tables.text_table import TextTable
 
-if TYPE_CHECKING:
-    from rich.console import Console
-
 SUFFIXES = {
     ".json": "json", ".csv": "csv", ".md": "md", ".tex": "latex", ".parquet": "parquet", ".xlsx": "xlsx",
     ".txt": "table",
@@ -36,11 +32,6 @@ IN_FOLDER = ("md", "csv", "json")
 _IN_A_PAPER = ("sensor", "estimator", "score", "interval", "published")
 _COLUMNS = {"sensor": "l", "estimator": r"p{0.24\columnwidth}", "notes": "l"}
 """How LaTeX sets columns that are no numbers: long names of estimators go on in a further line."""
-
-
-def show(table: Table, console: Console, view: View = DEFAULT_VIEW) -> None:
-    """Print a leaderboard on a terminal."""
-    terminal.show(document(table, view), console)
 
 
 def plain_text(table: Table, width: int = 240, view: View = DEFAULT_VIEW) -> str:
