@@ -51,7 +51,7 @@ def latex(table: Table, view: View = DEFAULT_VIEW) -> str:
     names = view.columns or _IN_A_PAPER
     blocks = zip(table.blocks, grids(table, replace(view, wide=False, columns=())), strict=True)
     parts = [_in_a_paper(block, grid, names, number) for number, (block, grid) in enumerate(blocks, 1)]
-    parts += [latex_table(one, one.notes, number=number) for number, one in enumerate(table.sections, len(parts) + 1)]
+    parts += [latex_table(one, number=number) for number, one in enumerate(table.sections, len(parts) + 1)]
     return "\n".join(parts)
 
 
@@ -68,11 +68,11 @@ def _in_a_paper(block: Block, grid: TextTable, names: Sequence[str], number: int
         columns=(*names, "notes"),
         headings=(*("\n".join(heads[name].rsplit(" ", 1)) for name in names), ""),
         lines=tuple((*line, mark) for line, mark in zip(shown, marked, strict=True)),
+        notes=tuple(f"{note.text.rstrip('.')}." for note in block.notes if note.printed),
     ).compact()
-    notes = [f"{note.text.rstrip('.')}." for note in block.notes if note.printed]
     rule = grid.kinds.index("baseline") if "baseline" in grid.kinds[1:] else None
     columns = "".join(_COLUMNS.get(name, "r") for name in table.columns)
-    return latex_table(table, notes, number=number, columns=f"@{{}}{columns}@{{}}", rule=rule)
+    return latex_table(table, number=number, columns=f"@{{}}{columns}@{{}}", rule=rule)
 
 
 def _caption(block: Block) -> str:

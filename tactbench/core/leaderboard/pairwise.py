@@ -190,11 +190,13 @@ def _why_not(one: Row, other: Row, first: str, second: str) -> str:
 
 
 def tables_of(comparisons: Sequence[PairwiseComparison]) -> list[TextTable]:
-    """Return a table for each question: task, metric, protocol, split and hardware."""
+    """Return a table for each question: task, metric, protocol, split and hardware; notes stand below the last."""
     groups = grouped(comparisons, _title)
-    return [
-        TextTable(title, COLUMNS, tuple(map(_line, pairs)), frozenset(COLUMNS[1:-1])) for title, pairs in groups.items()
+    tables = [
+        TextTable(title, COLUMNS, tuple(map(_line, pairs)), frozenset(COLUMNS[1:-1])).compact()
+        for title, pairs in groups.items()
     ]
+    return [*tables[:-1], *(replace(one, notes=notes_of(comparisons)) for one in tables[-1:])]
 
 
 def _title(pair: PairwiseComparison) -> str:
@@ -247,11 +249,11 @@ def _probability(p: float | None) -> str:
     return "< 0.001" if p < 0.001 else f"{p:.2g}"
 
 
-def notes_of(comparisons: Sequence[PairwiseComparison]) -> list[str]:
+def notes_of(comparisons: Sequence[PairwiseComparison]) -> tuple[str, ...]:
     """Return what must be known to read the tables."""
     found = [(pair, pair.difference) for pair in comparisons if pair.difference is not None]
     if not found:
-        return []
+        return ()
     notes = [
         "A − B is in the metric's unit; p is of no difference at all, by exchanging A and B within replicates; effect "
         "is the difference over the standard deviation of the replicates' differences; n counts replicates."
@@ -273,7 +275,7 @@ def notes_of(comparisons: Sequence[PairwiseComparison]) -> list[str]:
         notes.append("None of these was declared in the matrix: exploratory, p is not corrected for being one of many.")
     if any(pair.row["simulated"] for pair, _ in found):
         notes.append("SIM, EMULATED: simulated by the twin; says nothing of hardware.")
-    return list(dict.fromkeys(notes))
+    return tuple(dict.fromkeys(notes))
 
 
 def record_of(pair: PairwiseComparison) -> dict[str, Any]:

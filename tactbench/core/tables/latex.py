@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import unicodedata
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 
 from tactbench.core.tables.text_table import TextTable
 
@@ -22,20 +22,12 @@ _LIGATURE = re.compile(r"-(?=-)|`(?=`)|'(?=')|[!?](?=`)|,(?=,)")
 """The first of two characters that TeX draws as one."""
 
 
-def latex(tables: Iterable[TextTable | Sequence[str]]) -> str:
-    """Return tables as LaTeX over both columns of a paper, notes below the table that they follow."""
-    found: list[tuple[TextTable, list[str]]] = []
-    for part in tables:
-        if isinstance(part, TextTable):
-            found.append((part, [*part.notes]))
-        elif found:
-            found[-1][1].extend(part)
-    return "\n".join(latex_table(one, notes, number=place) for place, (one, notes) in enumerate(found, 1))
+def latex(tables: Iterable[TextTable]) -> str:
+    """Return tables as LaTeX over both columns of a paper."""
+    return "\n".join(latex_table(one, number=number) for number, one in enumerate(tables, 1))
 
 
-def latex_table(
-    table: TextTable, notes: Iterable[str] = (), *, number: int = 1, columns: str = "", rule: int | None = None
-) -> str:
+def latex_table(table: TextTable, *, number: int = 1, columns: str = "", rule: int | None = None) -> str:
     """Return a table as LaTeX, its title as the caption; text between backticks is code elsewhere.
 
     A heading may have two lines.
@@ -68,7 +60,7 @@ def latex_table(
         *lines,
         r"\bottomrule",
         r"\end{tabular}",
-        *(rf"\par\smallskip\raggedright {tex(note.replace('`', ''))}" for note in notes),
+        *(rf"\par\smallskip\raggedright {tex(note.replace('`', ''))}" for note in table.notes),
         rf"\end{{{environment}}}",
         "",
     ])  # fmt: skip
