@@ -1,4 +1,4 @@
-"""``tactbench compare A B``: two sensors, two estimators or two result folders."""
+"""``tactbench compare A B``: two sensors, estimators, protocols, splits or result folders."""
 
 from __future__ import annotations
 
@@ -14,19 +14,26 @@ COMPARISON_FORMATS = ("table", "json", "md", "latex", "csv")
 @click.argument("first", metavar="A")
 @click.argument("second", metavar="B")
 @click.option("--out", "folder", type=click.Path(path_type=Path), default=Path("tactbench-results"), show_default=True,
-              help="Result folder that sensors or estimators are compared in.")  # fmt: skip
+              help="Result folder, unless A and B are folders.")  # fmt: skip
 @click.option("--task", help="This task only.")
 @click.option("--config", metavar="FILE", help="Matrix whose declared comparisons p-values are corrected for.")
 @click.option("--format", "shape", type=click.Choice(COMPARISON_FORMATS), default="table", show_default=True)
 def command(first: str, second: str, folder: Path, task: str | None, config: str | None, shape: str) -> None:
-    """Compare A and B replicate by replicate: two sensors, two estimators, or two result folders.
+    """Compare A and B replicate by replicate: two sensors, estimators, protocols, splits, or result folders.
 
     Of two folders the same cells are compared: before and after a change, or two laboratories.
     """
     from tactbench.core.cli.config import default_matrix, matrix_called
+    from tactbench.core.cli.grid import print_records, print_tables
     from tactbench.core.cli.results import is_results
     from tactbench.core.errors import UsageError
-    from tactbench.core.leaderboard.pairwise import comparisons, folder_comparisons, with_declared
+    from tactbench.core.leaderboard.pairwise import (
+        comparisons,
+        folder_comparisons,
+        record_of,
+        tables_of,
+        with_declared,
+    )
 
     if all(is_results(Path(one)) for one in (first, second)):
         found = folder_comparisons(kept_rows(Path(first)), kept_rows(Path(second)), first, second, task)
@@ -39,7 +46,10 @@ def command(first: str, second: str, folder: Path, task: str | None, config: str
             f"{first} and {second} have no cell to compare" + (f" in task {task!r}." if task else "."),
             hint="See what there is with `tactbench leaderboard`.",
         )
-    _print(found, shape)
+    if shape in ("json", "csv"):
+        print_records(list(map(record_of, found)), shape)
+    else:
+        print_tables(tables_of(found), shape)
 
 
 def kept_rows(folder: Path) -> list[dict[str, Any]]:
@@ -47,18 +57,3 @@ def kept_rows(folder: Path) -> list[dict[str, Any]]:
     from tactbench.core.cli.results import opened, shown_rows
 
     return shown_rows(opened(folder))
-
-
-def _print(found: Any, shape: str) -> None:
-    from tactbench.core.cli.grid import print_records, print_tables
-    from tactbench.core.cli.screen import remark
-    from tactbench.core.leaderboard.pairwise import notes_of, record_of, tables_of
-
-    if shape in ("json", "csv"):
-        print_records([record_of(pair) for pair in found], shape)
-    elif shape == "table":
-        print_tables([table.compact() for table in tables_of(found)])
-        for note in notes_of(found):
-            remark(note)
-    else:
-        print_tables([*tables_of(found), notes_of(found)], shape)

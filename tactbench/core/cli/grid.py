@@ -10,7 +10,7 @@ import click
 from tactbench.core.tables.text import json_text
 
 if TYPE_CHECKING:
-    from tactbench.core.tables.terminal import Part
+    from tactbench.core.tables.text_table import TextTable
 
 GRID_FORMATS = ("table", "json", "csv")
 
@@ -40,17 +40,17 @@ def print_grid(
     print_tables([text_table(title, columns, lines, numeric=numeric, kinds=kinds)])
 
 
-def print_tables(parts: Sequence[Part], shape: str = "table") -> None:
-    """Print tables and notes on stdout as ``table``, ``md`` or ``latex``."""
+def print_tables(tables: Sequence[TextTable], shape: str = "table") -> None:
+    """Print tables on stdout as ``table``, ``md`` or ``latex``."""
     from tactbench.core.cli.screen import console
     from tactbench.core.tables.latex import latex
     from tactbench.core.tables.markdown import markdown
     from tactbench.core.tables.terminal import show
 
     if shape == "table":
-        show(parts, console())
+        show(tables, console())
     else:
-        click.echo((markdown if shape == "md" else latex)(parts), nl=False)
+        click.echo((markdown if shape == "md" else latex)(tables), nl=False)
 
 
 def print_records(records: Sequence[Mapping[str, Any]], shape: str) -> None:

@@ -5,18 +5,12 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 
-from tactbench.core.cli.comparisons import COMPARISON_FORMATS, print_comparisons
 from tactbench.core.cli.results import opened, provenance_of, shown_rows
 from tactbench.core.cli.tables import DEFAULT_FOLDER, TABLE_FORMATS, format_of, print_table, questions_of, view_of
-from tactbench.core.leaderboard import AXES
-
-if TYPE_CHECKING:
-    from tactbench.core.leaderboard.view import View
-    from tactbench.core.matrix.store import Store
 
 _FILTERS = ("sensor", "task", "protocol", "split", "estimator")
 
@@ -39,51 +33,26 @@ def _filters(command: Any) -> Any:
               help="How it is shown; default: table, or what the name of the file given with --to says.")  # fmt: skip
 @click.option("--to", "-o", "to", type=click.Path(path_type=Path, dir_okay=False), metavar="FILE",
               help="Write a file: .txt, .md, .csv, .json, .tex, .parquet, .xlsx.")  # fmt: skip
-@click.option("--compare", "by", type=click.Choice(AXES), help="Show these side by side instead.")
 @click.option("--no-times", "times", flag_value=False, default=True, type=bool,
               help="Only what a seed decides, no times and hosts: the same bytes on every machine.")  # fmt: skip
 def command(
-    folder: Path, shape: str | None, to: Path | None, by: str | None, times: bool, best: int | None,
-    columns: str | None, wide: bool, **filters: tuple[str, ...],
+    folder: Path, shape: str | None, to: Path | None, times: bool, best: int | None, columns: str | None, wide: bool,
+    **filters: tuple[str, ...],
 ) -> None:  # fmt: skip
     """Show the table of all results in a folder, in any format. FOLDER is what `run --out` wrote."""
     from tactbench.core.cli.tables import check_destination
+    from tactbench.core.leaderboard.table import build_table
+    from tactbench.core.leaderboard.view import best as best_of
 
     shape = format_of(shape, to)
     check_destination(shape, to)
     view = view_of(folder, wide=wide, columns=columns, shape=shape)
-    _show(opened(folder), shape, to, by, times, best, view, filters)
-
-
-def _show(
-    store: Store, shape: str, to: Path | None, by: str | None, times: bool, count: int | None, view: View,
-    filters: Mapping[str, Sequence[str]],
-) -> None:  # fmt: skip
-    from tactbench.core.errors import UsageError
-    from tactbench.core.leaderboard.side_by_side import compare
-    from tactbench.core.leaderboard.table import build_table
-    from tactbench.core.leaderboard.view import best
-
+    store = opened(folder)
     every = shown_rows(store)
     rows = _only(every, filters)
+    table = build_table(rows, provenance_of(store, rows), times=times, questions=questions_of(rows))
     view = replace(view, all_rows=len(rows) == len(every))
-    if by is None:
-        table = build_table(rows, provenance_of(store, rows), times=times, questions=questions_of(rows))
-        print_table(best(table, count) if count else table, shape, view, to=to)
-    elif to is not None or not times or count:
-        raise UsageError("A comparison is printed whole, and has no times.", hint="Leave out --to, --best, --no-times.")
-    elif shape not in COMPARISON_FORMATS:
-        raise UsageError(
-            f"A comparison cannot be printed as {shape}.", hint=f"Formats: {', '.join(COMPARISON_FORMATS)}."
-        )
-    else:
-        tables = compare(rows, by)
-        if not tables:
-            raise UsageError(
-                f"These rows hold no question that was asked with more than one {by}.",
-                hint="Ask so first, for example `tactbench run --config protocols` or `tactbench run --config beyond`.",
-            )
-        print_comparisons(tables, shape)
+    print_table(best_of(table, best) if best else table, shape, view, to=to)
 
 
 def _only(rows: list[dict[str, Any]], filters: Mapping[str, Sequence[str]]) -> list[dict[str, Any]]:

@@ -31,7 +31,7 @@ def opened(folder: Path) -> Store:
 
 
 def shown_rows(store: Store) -> list[dict[str, Any]]:
-    """Return a row for each cell of a folder that a table can be made of, baselines beside each; tell of the others.
+    """Return a row for each cell of a folder; tell of files that cannot be read.
 
     Raises
     ------
@@ -40,13 +40,12 @@ def shown_rows(store: Store) -> list[dict[str, Any]]:
     """
     from tactbench.core.cli.screen import remark
     from tactbench.core.errors import UsageError
-    from tactbench.core.leaderboard.checked import checked
     from tactbench.core.leaderboard.levels import with_levels
     from tactbench.core.statistics.replicates import over_replicates
     from tactbench.core.tables.text import cut, visible
 
-    rows, wrong = checked(store.rows())
-    messages = [cut(visible(one), 300) for one in (*store.troubles, *wrong)]
+    rows = store.rows()
+    messages = [cut(visible(one), 300) for one in store.troubles]
     if not rows:
         raise UsageError(
             f"{store.folder} has no row that can be shown" + (f": {messages[0]}." if messages else "."),

@@ -114,10 +114,12 @@ def print_table(table: Table, shape: str, view: View, *, to: Path | None = None)
     """
     from tactbench.core.errors import UsageError
     from tactbench.core.files import replace_file
-    from tactbench.core.leaderboard.formats import rendered, show
+    from tactbench.core.leaderboard.formats import rendered
+    from tactbench.core.leaderboard.view import document
+    from tactbench.core.tables.terminal import show
 
     if shape == "table" and to is None and sys.stdout.isatty():
-        show(table, console(), view)
+        show(document(table, view), console())
         return
     content = rendered(table, shape, view, width_without_terminal())
     if to is None:

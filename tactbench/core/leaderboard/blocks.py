@@ -23,8 +23,6 @@ from tactbench.core.statistics.replicates import FEWEST
 from tactbench.core.tables.text import visible
 
 _Key = tuple[str, str, str, str]
-MOST_RANKED = 20_000
-"""Answers of one block beyond which comparing all pairs takes too long."""
 PLACED_OVER = ("replicate", "session", None)
 """What places may rest on: what is recorded anew. None: a row that does not say."""
 
@@ -140,26 +138,16 @@ def places(results: Sequence[Row]) -> tuple[dict[str, Rank], str]:
     """
     if not all(_may_be_placed(row) for row in results):
         return {row["cell"]: Rank(1, None, None, len(results) > 1) for row in results}, "few"
-    if not results:
-        return {}, ""
-    if not any(row.get("replicates") for row in results):
-        unranked = "these rows keep no replicates"
-    elif len(results) > MOST_RANKED:
-        unranked = f"there are more than {MOST_RANKED} answers"
-    elif not all(math.isfinite(row["score"]) for row in results):
-        unranked = "a score is no finite number"
-    else:
+    if any(row.get("replicates") for row in results):
         from tactbench.core.statistics.ranking import ranks  # numerics
 
-        try:
-            return ranks(results), ""
-        except (ArithmeticError, LookupError, TypeError, ValueError) as error:
-            # Rows of a stranger's folder: their replicates may be anything.
-            unranked = f"their replicates cannot be used ({type(error).__name__})"
+        return ranks(results), ""
     ordered = errors(results)
     spans = [(bisect_left(ordered, error), bisect_right(ordered, error)) for error in ordered]
     by_score = [Rank(first + 1, None, None, after - first > 1) for first, after in spans]
-    return dict(zip((row["cell"] for row in results), by_score, strict=True)), unranked
+    return dict(
+        zip((row["cell"] for row in results), by_score, strict=True)
+    ), "these rows keep no replicates" if results else ""
 
 
 def _may_be_placed(row: Row) -> bool:

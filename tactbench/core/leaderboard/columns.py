@@ -117,11 +117,6 @@ class Line:
     placing: Rank | None = None
     """Where it stands in its block; answers better than the trivial one of their sensor only."""
 
-    @property
-    def cells(self) -> tuple[str, ...]:
-        """Its texts, one a column."""
-        return tuple(self.texts.values())
-
     def value(self, column: str) -> float | None:
         """Return what a line is sorted by in a column of numbers; None: last."""
         if column == "place":

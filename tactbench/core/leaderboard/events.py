@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from tactbench.core.leaderboard.names import Row, answer_name, distinct
+from tactbench.core.leaderboard.names import Row, answer_name
 from tactbench.core.tables.numbers import ABSENT
 from tactbench.core.tables.text import visible
 from tactbench.core.tables.text_table import TextTable
@@ -38,24 +38,12 @@ def events_table(rows: Sequence[Row]) -> TextTable | None:
         if "misses" in figures:
             texts["misses"] += f" of {figures['events']:g}"
         lines.append((visible(row["task"]), visible(row["sensor"]), answer_name(row), *texts.values()))
-    policies = distinct((str(row["answer_from"]), str(row["task"])) for row in finished)
-    oracles = dict.fromkeys(answer_name(row) for row in finished if row.get("looks_at") == "reference")
-    return (
-        TextTable(
-            "Events, at the threshold that validation recordings chose",
-            ("task", "sensor", "estimator", *_FIGURES),
-            tuple(lines),
-            frozenset(_FIGURES),
-            kinds=tuple("baseline" if row["is_baseline"] else "result" for row in finished),
-            notes=(
-                _NOTE,
-                *(visible(f"{', '.join(tasks)}: {policy}.") for policy, tasks in policies.items() if policy),
-                *(f"{name} reads the reference sensor: an oracle, and no bar." for name in oracles),
-            ),
-        )
-        if lines
-        else None
-    )
+    if not lines:
+        return None
+    title = "Events, at the threshold that validation recordings chose"
+    kinds = tuple("baseline" if row["is_baseline"] else "result" for row in finished)
+    columns = ("task", "sensor", "estimator", *_FIGURES)
+    return TextTable(title, columns, tuple(lines), frozenset(_FIGURES), kinds=kinds, notes=(_NOTE,))
 
 
 def _figure(figures: Mapping[str, float | None], key: str, form: str) -> str:

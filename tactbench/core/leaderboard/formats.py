@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from tactbench.core.errors import UsageError
 from tactbench.core.files import replace_file
@@ -23,9 +22,6 @@ from tactbench.core.tables.numbers import whole
 from tactbench.core.tables.text import visible
 from tactbench.core.tables.text_table import TextTable
 
-if TYPE_CHECKING:
-    from rich.console import Console
-
 SUFFIXES = {
     ".json": "json", ".csv": "csv", ".md": "md", ".tex": "latex", ".parquet": "parquet", ".xlsx": "xlsx",
     ".txt": "table",
@@ -36,11 +32,6 @@ IN_FOLDER = ("md", "csv", "json")
 _IN_A_PAPER = ("sensor", "estimator", "score", "interval", "published")
 _COLUMNS = {"sensor": "l", "estimator": r"p{0.24\columnwidth}", "notes": "l"}
 """How LaTeX sets columns that are no numbers: long names of estimators go on in a further line."""
-
-
-def show(table: Table, console: Console, view: View = DEFAULT_VIEW) -> None:
-    """Print a leaderboard on a terminal."""
-    terminal.show(document(table, view), console)
 
 
 def plain_text(table: Table, width: int = 240, view: View = DEFAULT_VIEW) -> str:
@@ -60,7 +51,7 @@ def latex(table: Table, view: View = DEFAULT_VIEW) -> str:
     names = view.columns or _IN_A_PAPER
     blocks = zip(table.blocks, grids(table, replace(view, wide=False, columns=())), strict=True)
     parts = [_in_a_paper(block, grid, names, number) for number, (block, grid) in enumerate(blocks, 1)]
-    parts += [latex_table(one, one.notes, number=number) for number, one in enumerate(table.sections, len(parts) + 1)]
+    parts += [latex_table(one, number=number) for number, one in enumerate(table.sections, len(parts) + 1)]
     return "\n".join(parts)
 
 
@@ -77,11 +68,11 @@ def _in_a_paper(block: Block, grid: TextTable, names: Sequence[str], number: int
         columns=(*names, "notes"),
         headings=(*("\n".join(heads[name].rsplit(" ", 1)) for name in names), ""),
         lines=tuple((*line, mark) for line, mark in zip(shown, marked, strict=True)),
+        notes=tuple(f"{note.text.rstrip('.')}." for note in block.notes if note.printed),
     ).compact()
-    notes = [f"{note.text.rstrip('.')}." for note in block.notes if note.printed]
     rule = grid.kinds.index("baseline") if "baseline" in grid.kinds[1:] else None
     columns = "".join(_COLUMNS.get(name, "r") for name in table.columns)
-    return latex_table(table, notes, number=number, columns=f"@{{}}{columns}@{{}}", rule=rule)
+    return latex_table(table, number=number, columns=f"@{{}}{columns}@{{}}", rule=rule)
 
 
 def _caption(block: Block) -> str:

@@ -27,9 +27,8 @@ def identity_of(package: str, provenance: Mapping[str, Any]) -> dict[str, str]:
     """Return what tells one state of a plugin's package from another, of `gather`'s provenance; empty: not known."""
     if package == PACKAGE:
         return {name: str(provenance[name]) for name in ("tactbench", "commit") if name in provenance}
-    plugins = provenance.get("plugins")
-    for one in plugins if isinstance(plugins, list) else ():
-        if isinstance(one, dict) and one.get("package") == package:
+    for one in provenance.get("plugins", ()):
+        if one["package"] == package:
             return {name: str(one.get(name)) for name in ("distribution", "version", "source")}
     return {}
 
@@ -43,29 +42,19 @@ def write_level(folder: Path, sensor: str, facts: Mapping[str, Any]) -> Path:
 
 
 def read_levels(folder: Path) -> dict[str, dict[str, Any]]:
-    """Return what was checked, by sensor; what cannot be read or makes no sense is left out."""
-    found = {}
-    for path in sorted((folder / FOLDER).glob("*.json")):
-        try:
-            facts = json.loads(path.read_bytes())
-        except (OSError, ValueError, RecursionError):
-            continue
-        if isinstance(facts, dict) and facts.get("level") in _LEVELS and facts.get("sensor") == path.stem:
-            found[path.stem] = facts
-    return found
+    """Return what was checked, by sensor."""
+    return {path.stem: json.loads(path.read_bytes()) for path in sorted((folder / FOLDER).glob("*.json"))}
 
 
 def merge_levels(folders: Sequence[Path], into: Path) -> None:
     """Write what was checked in any of `folders` into another one; of two levels of one sensor the lower one."""
-    found: dict[str, dict[str, Any]] = {}
-    for sensor, facts in chain.from_iterable(read_levels(folder).items() for folder in folders):
-        found[sensor] = min(found.get(sensor, facts), facts, key=_how_high)
-    for sensor, facts in found.items():
+    found = sorted(
+        chain.from_iterable(read_levels(folder).items() for folder in folders),
+        key=lambda one: (_LEVELS.index(one[1]["level"]), json.dumps(one[1], sort_keys=True)),
+        reverse=True,
+    )
+    for sensor, facts in dict(found).items():
         write_level(into, sensor, facts)
-
-
-def _how_high(facts: Mapping[str, Any]) -> tuple[int, str]:
-    return _LEVELS.index(facts["level"]), json.dumps(facts, sort_keys=True)
 
 
 def with_levels(rows: Sequence[Row], folder: Path, provenance: Callable[[str], Mapping[str, Any]]) -> list[Row]:
@@ -77,9 +66,7 @@ def with_levels(rows: Sequence[Row], folder: Path, provenance: Callable[[str], M
         By a row's ``made_by``.
     """
     levels = read_levels(folder)
-    # A level is never declared.
-    rows = [{name: row[name] for name in row if name != KEY} if KEY in row else row for row in rows]
-    return [{**row, KEY: _level(row, levels, provenance)} for row in rows] if levels else rows
+    return [{**row, KEY: _level(row, levels, provenance)} for row in rows] if levels else list(rows)
 
 
 def _level(row: Row, levels: Mapping[str, Mapping[str, Any]], provenance: Callable[[str], Mapping[str, Any]]) -> str:

@@ -1,27 +1,31 @@
-"""Two sensors, two estimators or two result folders, cell by cell: what may be compared, and what it shows.
-
-Comparisons become one table a question, and records, with the same digits in every format.
-"""
+"""Two sensors, estimators, protocols, splits or result folders, compared cell by cell."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
+from itertools import chain
 from typing import Any, Literal
 
 from tactbench.core.errors import UnknownNameError
 from tactbench.core.leaderboard.names import Row, answer_name, grouped, hardware_name, metric_name
 from tactbench.core.spec.matrix import ComparisonChoice
-from tactbench.core.statistics.aggregate import aggregate
 from tactbench.core.statistics.paired import Difference, FoldDifference, difference, holm, over_folds
-from tactbench.core.tables.numbers import ABSENT, interval, score, signed, suffix
-from tactbench.core.tables.text_table import TextTable
+from tactbench.core.tables.numbers import ABSENT, score, signed, suffix
+from tactbench.core.tables.text_table import Entry, TextTable, finite
 
-Kind = Literal["sensors", "estimators", "folders"]
+Kind = Literal["sensors", "estimators", "protocols", "splits", "folders"]
 Key = tuple[Any, ...]
 COLUMNS = (
     "of", "A", "B", "A − B", "95 % interval", "p", "p folds", "p Holm", "effect", "P(A better)", "n", "verdict",
 )  # fmt: skip
+_NAMES: dict[Kind, Callable[[Row], str]] = {
+    "sensors": lambda row: str(row["sensor"]),
+    "estimators": answer_name,
+    "protocols": lambda row: str(row["protocol"]),
+    "splits": lambda row: str(row["split"]),
+}
 
 
 @dataclass(frozen=True)
@@ -30,17 +34,15 @@ class PairwiseComparison:
 
     kind: Kind
     first: str
-    """name of the first sensor, estimator or folder"""
+    """name of the first sensor, estimator, protocol, split or folder"""
     second: str
-    of: str
-    """what both have: the estimator of two sensors, the sensor of two estimators, both of two folders"""
     first_row: Row | None
     second_row: Row | None
-    difference: Difference | None
-    folds: FoldDifference | None
-    """the same over folds whose training data overlap, where there are several"""
     refused: str
     """why there is no difference; empty if there is one"""
+    difference: Difference | None = None
+    folds: FoldDifference | None = None
+    """the same over folds whose training data overlap, where there are several"""
     declared: bool = False
     """the matrix says that it is run to compare these"""
     p_corrected: float | None = None
@@ -48,29 +50,37 @@ class PairwiseComparison:
 
     @property
     def row(self) -> Row:
-        """Return one of the rows, for what both have."""
+        """One of the rows, for what both have."""
         return next(row for row in (self.first_row, self.second_row) if row is not None)
+
+    @property
+    def of(self) -> str:
+        """What both have: the estimator of two sensors, the sensor of two estimators, else both."""
+        return str(_key(self.kind, self.row)[-1])
+
+    @property
+    def cells(self) -> frozenset[str]:
+        """The names of both cells."""
+        return frozenset(str(row["cell"]) for row in (self.first_row, self.second_row) if row is not None)
 
 
 def comparisons(rows: Sequence[Row], first: str, second: str, task: str | None = None) -> list[PairwiseComparison]:
-    """Compare two sensors or two estimators of one leaderboard, wherever both have answered the same question.
+    """Compare two sensors, estimators, protocols or splits of one leaderboard, wherever the rest of the cells is equal.
 
     Raises
     ------
     UnknownNameError
-        If these rows have no such task, no sensor and no estimator of such a name, or not both names are of one kind.
+        If these rows have no such task, nothing of such a name, or not both names are of one kind.
     """
     rows = _in_task(rows, task)
-    sensors = grouped(_answers(rows), lambda row: str(row["sensor"]))
-    estimators = grouped(rows, answer_name)
-    kinds: dict[Kind, Mapping[str, Sequence[Row]]] = {"sensors": sensors, "estimators": estimators}
-    for kind, named in kinds.items():
+    known = {kind: grouped(rows if kind == "estimators" else _answers(rows), name) for kind, name in _NAMES.items()}
+    for kind, named in known.items():
         if first in named and second in named:
             return _compared(kind, first, second, named[first], named[second])
-    for kind, named in kinds.items():
+    for kind, named in known.items():
         if first in named:
             raise UnknownNameError(f"{kind[:-1]} in these results", second, named)
-    raise UnknownNameError("sensor or estimator in these results", first, [*sensors, *estimators])
+    raise UnknownNameError("sensor, estimator, protocol or split in these results", first, chain(*known.values()))
 
 
 def folder_comparisons(
@@ -78,6 +88,15 @@ def folder_comparisons(
 ) -> list[PairwiseComparison]:
     """Compare the same cells of two result folders; raises UnknownNameError for a task that one has not."""
     return _compared("folders", first, second, *(_answers(_in_task(rows, task)) for rows in (first_rows, second_rows)))
+
+
+def asked_in_several_ways(rows: Sequence[Row]) -> Iterator[PairwiseComparison]:
+    """Compare finished answers under each further protocol, and each further split, with that under the first."""
+    finished = [row for row in _answers(rows) if row["status"] == "done"]
+    kinds: tuple[Kind, ...] = ("protocols", "splits")
+    for kind in kinds:
+        for first, *others in grouped(finished, partial(_key, kind)).values():
+            yield from (_pair(kind, _NAMES[kind](first), _NAMES[kind](other), first, other) for other in others)
 
 
 def _answers(rows: Sequence[Row]) -> list[Row]:
@@ -100,17 +119,10 @@ def with_declared(
 
     The family of tests is every declared pair of cells in `rows`, the whole leaderboard.
     """
-    family: dict[frozenset[str], float | None] = {}
-    for pair in (pair for choice in declared for pair in _declared(rows, choice)):
-        if pair.difference is not None:
-            family.setdefault(_cells(pair), pair.difference.p)
+    every = [pair for choice in declared for pair in _declared(rows, choice)]
+    family = {pair.cells: pair.difference.p for pair in reversed(every) if pair.difference is not None}
     corrected = dict(zip(family, holm(list(family.values())), strict=True))
-    return [
-        replace(pair, declared=_cells(pair) in corrected, p_corrected=corrected.get(_cells(pair)))
-        if pair.difference is not None
-        else pair
-        for pair in found
-    ]
+    return [replace(pair, declared=pair.cells in corrected, p_corrected=corrected.get(pair.cells)) for pair in found]
 
 
 def _declared(rows: Sequence[Row], choice: ComparisonChoice) -> list[PairwiseComparison]:
@@ -123,33 +135,36 @@ def _declared(rows: Sequence[Row], choice: ComparisonChoice) -> list[PairwiseCom
     return [pair for pair in found if pair.kind == ("sensors" if choice.sensors else "estimators")]
 
 
-def _cells(pair: PairwiseComparison) -> frozenset[str]:
-    return frozenset(str(row["cell"]) for row in (pair.first_row, pair.second_row) if row is not None)
-
-
 def _compared(
     kind: Kind, first: str, second: str, first_rows: Sequence[Row], second_rows: Sequence[Row]
 ) -> list[PairwiseComparison]:
-    keys = [{_key(kind, row): row for row in rows} for rows in (first_rows, second_rows)]
+    ones, others = ({_key(kind, row): row for row in rows} for rows in (first_rows, second_rows))
     found = []
-    for key in dict.fromkeys([*keys[0], *keys[1]]):
-        one, other = keys[0].get(key), keys[1].get(key)
-        result, folds = None, None
-        if one is None:
-            refused = _why_alone(key, first, keys[0])
-        elif other is None:
-            refused = _why_alone(key, second, keys[1])
-        elif not (refused := _why_not(one, other, first, second)):
-            result, folds = difference(one, other), over_folds(one, other)
-        found.append(PairwiseComparison(kind, first, second, key[-1], one, other, result, folds, refused))
+    for key in dict.fromkeys([*ones, *others]):
+        alone = (
+            ""
+            if key in ones and key in others
+            else _why_alone(key, *((second, others) if key in ones else (first, ones)))
+        )
+        found.append(_pair(kind, first, second, ones.get(key), others.get(key), alone))
     return found
+
+
+def _pair(
+    kind: Kind, first: str, second: str, one: Row | None, other: Row | None, refused: str = ""
+) -> PairwiseComparison:
+    if one is None or other is None or (refused := _why_not(one, other, first, second)):
+        return PairwiseComparison(kind, first, second, one, other, refused)
+    return PairwiseComparison(kind, first, second, one, other, "", difference(one, other), over_folds(one, other))
 
 
 def _key(kind: Kind, row: Row) -> Key:
     """Return what two rows must have in common: hardware first, then protocol, then all else."""
     sensor, answer = str(row["sensor"]), answer_name(row)
-    of = {"sensors": answer, "estimators": sensor, "folders": f"{sensor}, {answer}"}[kind]
-    return (hardware_name(row), row["protocol"], row["split"], row["task"], row["repeat"], of)
+    of = {"sensors": answer, "estimators": sensor}.get(kind, f"{sensor}, {answer}")
+    protocol = "" if kind == "protocols" else row["protocol"]
+    split = "" if kind == "splits" else row["split"]
+    return (hardware_name(row), protocol, split, row["task"], row["repeat"], of)
 
 
 def _why_alone(alone: Key, missing: str, others: Iterable[Key]) -> str:
@@ -175,24 +190,29 @@ def _why_not(one: Row, other: Row, first: str, second: str) -> str:
 
 
 def tables_of(comparisons: Sequence[PairwiseComparison]) -> list[TextTable]:
-    """Return a table for each question: task, metric, protocol, split and hardware."""
+    """Return a table for each question: task, metric, protocol, split and hardware; notes stand below the last."""
     groups = grouped(comparisons, _title)
-    return [
-        TextTable(title, COLUMNS, tuple(map(_line, pairs)), frozenset(COLUMNS[1:-1])) for title, pairs in groups.items()
+    tables = [
+        TextTable(title, COLUMNS, tuple(map(_line, pairs)), frozenset(COLUMNS[1:-1])).compact()
+        for title, pairs in groups.items()
     ]
+    return [*tables[:-1], *(replace(one, notes=notes_of(comparisons)) for one in tables[-1:])]
 
 
 def _title(pair: PairwiseComparison) -> str:
     row = pair.row
+    protocol = [f"{row['protocol']}{' †' if row['dagger'] else ''}"] if pair.kind != "protocols" else []
+    split = [f"split {row['split']}"] if row["split"] and pair.kind != "splits" else []
     names = f"A = {pair.first}, B = {pair.second}"
-    protocol = f"{row['protocol']}{' †' if row['dagger'] else ''}"
-    split = [f"split {row['split']}"] if row["split"] else []
-    return " · ".join([names, row["task"], metric_name(row), protocol, *split, hardware_name(row)])
+    return " · ".join([names, row["task"], metric_name(row), *protocol, *split, hardware_name(row)])
 
 
 def _line(pair: PairwiseComparison) -> tuple[str, ...]:
     unit = pair.row["unit"]
-    scores = [score(row["score"] if row else None, unit) for row in (pair.first_row, pair.second_row)]
+    scores = [
+        Entry(score(row["score"], unit), finite(row["score"]), cell=row["cell"]) if row else ABSENT
+        for row in (pair.first_row, pair.second_row)
+    ]
     found = pair.difference
     if found is None:
         return (pair.of, *scores, *(ABSENT for _ in COLUMNS[4:]), f"not compared: {pair.refused}")
@@ -201,41 +221,39 @@ def _line(pair: PairwiseComparison) -> tuple[str, ...]:
         *scores,
         signed(found.value, unit),
         " … ".join(signed(end, unit) for end in (found.low, found.high) if end is not None) or ABSENT,
-        probability(found.p),
-        probability(pair.folds.p) if pair.folds else ABSENT,
-        probability(pair.p_corrected) if pair.declared else "exploratory",
+        _probability(found.p),
+        _probability(pair.folds.p) if pair.folds else ABSENT,
+        _probability(pair.p_corrected) if pair.declared else "exploratory",
         ABSENT if found.effect is None else signed(found.effect, "1"),
         ABSENT if found.improved is None else f"{found.improved:.2f}",
         f"{found.replicates}" + ("" if found.paired else " unpaired"),
-        verdict(pair),
+        _verdict(pair),
     )
 
 
-def verdict(pair: PairwiseComparison) -> str:
+def _verdict(pair: PairwiseComparison) -> str:
     """Return who is better, or that it cannot be told."""
     found = pair.difference
-    if found is None:
-        return "not compared"
-    if found.verdict in ("equivalent", "undecided"):
-        return found.verdict
+    if found is None or found.verdict in ("equivalent", "undecided"):
+        return found.verdict if found else ""
     winner = pair.first if found.verdict == "better" else pair.second
     region = pair.row.get("equivalence")
     beyond = f" by more than {region:g}{suffix(pair.row['unit'])}" if region and found.beyond else ""
     return f"{winner} better{beyond}"
 
 
-def probability(p: float | None) -> str:
+def _probability(p: float | None) -> str:
     """Return a p-value, two digits."""
     if p is None:
         return ABSENT
     return "< 0.001" if p < 0.001 else f"{p:.2g}"
 
 
-def notes_of(comparisons: Sequence[PairwiseComparison]) -> list[str]:
+def notes_of(comparisons: Sequence[PairwiseComparison]) -> tuple[str, ...]:
     """Return what must be known to read the tables."""
     found = [(pair, pair.difference) for pair in comparisons if pair.difference is not None]
     if not found:
-        return []
+        return ()
     notes = [
         "A − B is in the metric's unit; p is of no difference at all, by exchanging A and B within replicates; effect "
         "is the difference over the standard deviation of the replicates' differences; n counts replicates."
@@ -257,29 +275,7 @@ def notes_of(comparisons: Sequence[PairwiseComparison]) -> list[str]:
         notes.append("None of these was declared in the matrix: exploratory, p is not corrected for being one of many.")
     if any(pair.row["simulated"] for pair, _ in found):
         notes.append("SIM, EMULATED: simulated by the twin; says nothing of hardware.")
-    return list(dict.fromkeys([*notes, *_averages([pair for pair, _ in found])]))
-
-
-def _averages(found: Sequence[PairwiseComparison]) -> list[str]:
-    """Return the interquartile mean over tasks of either, where two tasks or more were compared under one protocol."""
-    notes = []
-    for (_, protocol), pairs in grouped(found, lambda pair: (hardware_name(pair.row), pair.row["protocol"])).items():
-        one, other = (
-            aggregate([row for row in rows if row is not None])
-            for rows in zip(*((pair.first_row, pair.second_row) for pair in pairs), strict=True)
-        )
-        if len({pair.row["task"] for pair in pairs}) < 2 or one is None or other is None:
-            continue
-        left_out = "".join(f" Left out: {reason}." for reason in dict.fromkeys(one.left_out + other.left_out))
-        means = ", ".join(
-            f"{name} {side.value:.3f} ({interval(side.low, side.high, '1')})"
-            for name, side in ((pairs[0].first, one), (pairs[0].second, other))
-        )
-        notes.append(
-            f"Interquartile mean over {one.tasks} tasks under {protocol} ({one.entries} scores; 0 is the trivial "
-            f"baseline, 1 the reference): {means}.{left_out}"
-        )
-    return notes
+    return tuple(dict.fromkeys(notes))
 
 
 def record_of(pair: PairwiseComparison) -> dict[str, Any]:

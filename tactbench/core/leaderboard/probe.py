@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 import importlib
-import json
-from collections.abc import Iterator, Mapping, Sequence
-from typing import Any
+from collections.abc import Iterator, Sequence
 
 from tactbench.core.evaluation.protocols import DEPLOYABLE, FIRST_FRAME
 from tactbench.core.leaderboard.names import Row, answer_name, grouped, sensor_name, sign_of
-from tactbench.core.leaderboard.trivial import Bars
+from tactbench.core.leaderboard.trivial import WORSE_END, Bars
 from tactbench.core.tables.numbers import ABSENT, interval, score, score_with_unit, suffix
 from tactbench.core.tables.text import visible
-from tactbench.core.tables.text_table import Entry, TextTable, sort_value
+from tactbench.core.tables.text_table import Entry, TextTable
 
 LEAK_SHARE = 0.5
 """Share of the skill (score beyond the trivial answer's) from which on the first frame's is called a leak: what came
@@ -26,13 +24,16 @@ COLUMNS = (
     "sensor", "task", "estimator", "split", "score", "95 % interval", "shuffled", "first frame alone",
     "trivial", "verdict",
 )  # fmt: skip
-NUMERIC = frozenset(COLUMNS[4:9])
+_NOTE = (
+    f"LEAK: the first frame alone has {LEAK_SHARE:.0%} or more of the skill (score beyond the trivial answer). "
+    "Optimistic: shuffled rows score beyond the interval of the split. TRIVIAL: an answer that reads no sensor "
+    "scores as well. See docs/real-recordings.md."
+)
 
 
 def build_probe(rows: Sequence[Row]) -> TextTable | None:
     """Put each finished answer under `deployable` beside its probes; None if nothing was probed."""
-    asked = (row for row in rows if row["protocol"] == FIRST_FRAME.name or row["split"] in ("shuffled", None))
-    probes = grouped(asked, lambda row: _key(row, row["protocol"]))
+    alike = grouped(rows, _answer)
     bars = Bars(rows)
     lines: list[tuple[str, ...]] = []
     skipped: dict[str, None] = {}
@@ -41,59 +42,50 @@ def build_probe(rows: Sequence[Row]) -> TextTable | None:
             continue
         if row["split"] in ("shuffled", "in-session"):
             continue  # neither keeps recordings or groups apart: there is nothing to compare with
-        first = _probe_of(row, probes, FIRST_FRAME.name, row["split"])
-        shuffled = _probe_of(row, probes, DEPLOYABLE.name, "shuffled")
-        if first is None and shuffled is None:
-            continue
-        lines.append(_line(row, shuffled, first, bars))
+        first = _probe_of(alike[_answer(row)], FIRST_FRAME.name, row["split"])
+        shuffled = _probe_of(alike[_answer(row)], DEPLOYABLE.name, "shuffled")
+        if first is not None or shuffled is not None:
+            lines.append(_line(row, shuffled, first, bars))
         if first is not None and first["status"] == "skipped":
             skipped[visible(f"{row['sensor']}/{row['task']}: {first['reason']}")] = None
     if not lines:
         return None
-    note = (
-        f"LEAK: the first frame alone has {LEAK_SHARE:.0%} or more of the skill (score beyond the trivial answer). "
-        "Optimistic: shuffled rows score beyond the interval of the split. TRIVIAL: an answer that reads no sensor "
-        "scores as well. See docs/real-recordings.md."
-    )
     kinds = tuple("alarm" if line[-1].startswith(("LEAK", "TRIVIAL")) else "plain" for line in lines)
     title = "Probe · does the score come from the contact?"
-    return TextTable(title, COLUMNS, tuple(lines), NUMERIC, notes=(note, *skipped), kinds=kinds)
+    return TextTable(title, COLUMNS, tuple(lines), frozenset(COLUMNS[4:9]), notes=(_NOTE, *skipped), kinds=kinds)
 
 
-def _key(row: Row, protocol: str) -> tuple[Any, ...]:
-    """Return what an answer and its probe under a protocol share."""
-    same = (row[key] for key in ("sensor", "task", "rig", "estimator"))
-    return (protocol, *same, json.dumps(row["params"], sort_keys=True))
+def _answer(row: Row) -> tuple[str, ...]:
+    return row["sensor"], row["task"], row["rig"], answer_name(row)
 
 
-def _probe_of(row: Row, probes: Mapping[tuple[Any, ...], list[Row]], protocol: str, split: str) -> Row | None:
+def _probe_of(alike: Sequence[Row], protocol: str, split: str) -> Row | None:
     """Return the same answer under a protocol and split. A cell that was never begun may not know its split."""
-    for other in probes.get(_key(row, protocol), ()):
-        if other["split"] == split or (other["split"] is None and other["status"] != "done"):
-            return other
+    for one in alike:
+        if one["protocol"] == protocol and (
+            one["split"] == split or (one["split"] is None and one["status"] != "done")
+        ):
+            return one
     return None
 
 
 def _line(row: Row, shuffled: Row | None, first: Row | None, bars: Bars) -> tuple[str, ...]:
-    unit, trivial = row["unit"], bars.trivial(row)
+    unit = row["unit"]
     found = [*_about_trivial(row, bars), *_about_first(row, first), *_about_shuffled(row, shuffled)]
-    bar = score(row["baseline"], unit) if trivial is None else f"{score(trivial['score'], unit)} {answer_name(trivial)}"
-    shown = {"shuffled": shuffled, "first frame alone": first}
-    between = interval(row["ci_low"], row["ci_high"], unit)
-    texts = (score(row["score"], unit), between, _shown(shuffled), _shown(first), bar)
-    words = (sensor_name(row), row["task"], answer_name(row), row["split"], "; ".join(found) or "no leak shown")
-    numbers = [
-        Entry(visible(text), sort_value(text), cell=(shown.get(name) or row)["cell"])
-        for name, text in zip(COLUMNS[4:9], texts, strict=True)
-    ]
-    *about, says = map(visible, words)
-    return (*about, *numbers, says)
+    bar = score(bars.score(row), unit) + (f" {bars.name(row)}" if bars.trivial(row) else "")
+    return (
+        sensor_name(row), visible(row["task"]), answer_name(row), visible(row["split"]),
+        _shown(row), Entry(interval(row["ci_low"], row["ci_high"], unit), row["ci_low"], cell=row["cell"]),
+        _shown(shuffled), _shown(first), Entry(bar, bars.score(row), cell=row["cell"]),
+        visible("; ".join(found) or "no leak shown"),
+    )  # fmt: skip
 
 
 def _shown(row: Row | None) -> str:
-    if row is None or row["status"] == "done":
-        return ABSENT if row is None else score(row["score"], row["unit"])
-    return str(row["status"])
+    if row is None:
+        return ABSENT
+    return Entry(score(row["score"], row["unit"]) if row["status"] == "done" else row["status"], row["score"],
+                 cell=row["cell"])  # fmt: skip
 
 
 def _about_trivial(row: Row, bars: Bars) -> Iterator[str]:
@@ -136,7 +128,7 @@ def _beyond_guessing(first: Row, trivial: float) -> bool | None:
         if guess == 1.0 or right == 0:
             return False
         return float(importlib.import_module("scipy.special").bdtrc(right - 1, n, guess)) <= TAIL
-    worst = first["ci_high" if sign_of(first) > 0 else "ci_low"]
+    worst = first[WORSE_END[sign_of(first)]]
     if first["n_test"] < FEWEST or worst is None:
         return None
     return _skill(worst, trivial, first) > 0
@@ -146,7 +138,7 @@ def _about_shuffled(row: Row, shuffled: Row | None) -> Iterator[str]:
     """Yield by how much shuffled rows flatter the score, if by more than its interval."""
     if shuffled is None or shuffled["status"] != "done":
         return
-    best = row["ci_low" if sign_of(row) > 0 else "ci_high"]
+    best = row[WORSE_END[-sign_of(row)]]
     if best is None:
         yield "no interval to hold the shuffled score against"
     elif _skill(shuffled["score"], best, row) > 0:

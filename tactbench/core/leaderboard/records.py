@@ -1,7 +1,4 @@
-"""A table as records for programs: JSON, CSV, Parquet and an Excel file, with the texts that people see.
-
-The keys of rows, in order and in groups.
-"""
+"""A table as records for programs: JSON, CSV, Parquet and an Excel file, with the texts that people see."""
 
 from __future__ import annotations
 
@@ -21,39 +18,12 @@ from tactbench.core.tables.text import json_text, visible
 RANK_KEYS = ("rank", "rank_low", "rank_high", "rank_tied")
 """Where a row stands in its block; they follow the keys of the row."""
 
-_STARTS = {"Configuration": "cell", "Answer": "status", "Times and memory": "sim_s", "What it rests on": "simulated"}
-_PLACES = [*map(list(RowModel.model_fields).index, _STARTS.values()), len(RowModel.model_fields)]
-_BETWEEN = {
-    title: list(RowModel.model_fields)[first:after]
-    for title, first, after in zip(_STARTS, _PLACES, _PLACES[1:], strict=False)
-}
-GROUPS = {title: tuple(key for key in keys if key not in NESTED) for title, keys in _BETWEEN.items()}
-"""Single values; a key that is in no group comes last, so that none is ever left out."""
-
-OF_THE_MACHINE = {*_BETWEEN["Times and memory"], "search", "recordings", "key", "events", "operating_points"}
+_FIELDS = list(RowModel.model_fields)
+OF_THE_MACHINE = {
+    *_FIELDS[_FIELDS.index("sim_s") : _FIELDS.index("simulated")],
+    "search", "recordings", "key", "events", "operating_points",
+}  # fmt: skip
 """Keys that machine, place or hour decide, not the seed alone."""
-
-TITLES = {
-    "params": "Parameters other than the defaults",
-    "chosen": "Chosen on validation data",
-    "search": "Every candidate that was compared",
-    "scores": "Other scores: by class, by fold, by other metrics",
-    "events": "Events: at the threshold that validation recordings chose",
-    "operating_points": "Events at thresholds for other bounds of false alarms",
-    "delay_parts_ms": "Parts of the answer delay [ms]",
-    "counts": "What was counted",
-    "assumptions": "Assumed by the simulation",
-    "plan": "Effects of the first recording: included and left out, with reasons",
-    "confusion": "Confusion: true class down, answer across [rows]",
-    "recordings": "Recordings",
-    "remarks": "Remarks of the recordings",
-    "stamps": "Stamps",
-    "replicates": "What the interval is over",
-}
-"""Lists and tables."""
-
-APART = ("traceback", "classes")
-"""Shown in places of their own."""
 
 FORMAT_VERSION = "1"
 _RANKS = {"rank": int, "rank_low": int, "rank_high": int, "rank_tied": bool}

@@ -55,10 +55,7 @@ class Table:
         """The provenance in sentences, for the files."""
         from tactbench.core.provenance.gather import foot
 
-        try:
-            made_by = foot(self.provenance) if self.provenance else ()
-        except (AttributeError, ArithmeticError, LookupError, TypeError, ValueError):
-            made_by = ("The provenance of these rows cannot be read.",)  # a stranger's folder may say anything
+        made_by = foot(self.provenance) if self.provenance else ()
         return tuple(cut(visible(sentence), LONGEST) for sentence in made_by)
 
 

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from operator import itemgetter
-from typing import Any
 
 from tactbench.core.leaderboard.names import Row, answer_name, grouped, sign_of
 
@@ -20,19 +19,14 @@ def error_of(row: Row) -> float:
     return sign_of(row) * row["score"] if math.isfinite(row["score"]) else math.inf
 
 
-def best_trivials(rows: Iterable[Row]) -> dict[tuple[Any, ...], Row]:
-    """Return the best of all finished trivial answers by their `comparison_key`; an oracle is none."""
-    finished = (row for row in rows if row["is_baseline"] and row["status"] == "done")
-    groups = grouped((row for row in finished if row.get("looks_at") != "reference"), comparison_key)
-    return {key: min(alike, key=error_of) for key, alike in groups.items()}
-
-
 class Bars:
     """The score that each answer is held against: the best trivial one of its own sensor, whatever it looks at."""
 
     def __init__(self, rows: Iterable[Row]) -> None:
-        """Take the trivial answers from `rows`."""
-        self._best: Mapping[tuple[Any, ...], Row] = best_trivials(rows)
+        """Take the finished trivial answers from `rows`; an oracle is none."""
+        trivial = (row for row in rows if row["is_baseline"] and row["status"] == "done")
+        groups = grouped((row for row in trivial if row.get("looks_at") != "reference"), comparison_key)
+        self._best = {key: min(alike, key=error_of) for key, alike in groups.items()}
 
     def trivial(self, row: Row) -> Row | None:
         """Return the trivial answer; None where it is not among the rows, and only its score may be known."""

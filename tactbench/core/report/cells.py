@@ -10,12 +10,32 @@ import numpy as np
 
 from tactbench.core.evaluation.metrics import METRICS
 from tactbench.core.leaderboard.names import METRIC_NAMES
-from tactbench.core.leaderboard.records import GROUPS, TITLES
 from tactbench.core.report.results import Results
 from tactbench.core.report.section import Details, Row
 from tactbench.core.samples import Answers
+from tactbench.core.spec.row import RowModel
 from tactbench.core.tables.text_table import ABSENT, Entry, TextTable, finite, text_table
 
+_GROUPS = {"cell": "Configuration", "status": "Answer", "sim_s": "Times and memory", "simulated": "What it rests on"}
+"""Titles of groups of single values, by the key of a row that begins each."""
+_TITLES = {
+    "params": "Parameters other than the defaults",
+    "chosen": "Chosen on validation data",
+    "search": "Every candidate that was compared",
+    "scores": "Other scores: by class, by fold, by other metrics",
+    "events": "Events: at the threshold that validation recordings chose",
+    "operating_points": "Events at thresholds for other bounds of false alarms",
+    "delay_parts_ms": "Parts of the answer delay [ms]",
+    "counts": "What was counted",
+    "assumptions": "Assumed by the simulation",
+    "plan": "Effects of the first recording: included and left out, with reasons",
+    "confusion": "Confusion: true class down, answer across [rows]",
+    "recordings": "Recordings",
+    "remarks": "Remarks of the recordings",
+    "stamps": "Stamps",
+    "replicates": "What the interval is over",
+}
+"""Lists and tables."""
 _TEXTS = ("traceback", "log")
 _APART = ("classes", "confusion", "fold_sizes")
 """Keys of a row that have places of their own."""
@@ -28,7 +48,12 @@ def details(row: Row, results: Results | None) -> Details:
     """
     said = {name: value for name, value in row.items() if value not in (None, "", [], {}, ())}
     single = {name: _text(value) for name, value in said.items() if not isinstance(value, Mapping | list | tuple)}
-    pairs = {title: {name: single.pop(name) for name in names if name in single} for title, names in GROUPS.items()}
+    pairs: dict[str, dict[str, str]] = {}
+    title = ""
+    for name in RowModel.model_fields:
+        title = _GROUPS.get(name, title)
+        if name in single and name not in _TEXTS:
+            pairs.setdefault(title, {})[name] = single.pop(name)
     pairs["Also"] = {name: text for name, text in single.items() if name not in _TEXTS}
     of = f", replicate {row['repeat']} of {row['repeats']}" if row["repeats"] > 1 else ""
     tested = results.answers(row).get("test") if results and row["status"] == "done" else None
@@ -37,10 +62,12 @@ def details(row: Row, results: Results | None) -> Details:
     records: dict[str, Sequence[Mapping[str, Any]]] = {
         "Score of each fold": _folds(row),
         f"Score of each recording{of}": recording_scores(row, tested),
-        TITLES["confusion"]: [{"true": true} | dict(zip(classes, answered, strict=False)) for true, answered in counts],
+        _TITLES["confusion"]: [
+            {"true": true} | dict(zip(classes, answered, strict=False)) for true, answered in counts
+        ],
     }
-    for name in (*TITLES, *sorted(said.keys() - TITLES.keys())):
-        value, title = said.get(name), TITLES.get(name, name)
+    for name in (*_TITLES, *sorted(said.keys() - _TITLES.keys())):
+        value, title = said.get(name), _TITLES.get(name, name)
         if name in _APART:
             continue
         if isinstance(value, Mapping):

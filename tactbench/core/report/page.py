@@ -14,10 +14,9 @@ from typing import TYPE_CHECKING
 
 import tactbench
 from tactbench.core.errors import TactbenchError
-from tactbench.core.leaderboard import AXES
 from tactbench.core.leaderboard.columns import DEFAULT
 from tactbench.core.leaderboard.levels import KEY as LEVEL
-from tactbench.core.leaderboard.side_by_side import compare
+from tactbench.core.leaderboard.pairwise import asked_in_several_ways, tables_of
 from tactbench.core.leaderboard.view import full_grid
 from tactbench.core.recording.reader import read_meta
 from tactbench.core.report.cells import details
@@ -98,7 +97,7 @@ def _picture(one: SavedFigure) -> Picture:
 
 def compared_section(subject: ReportData) -> Section:
     """Return the tables below the leaderboard: events, means over tasks, probes, comparisons."""
-    tables = (*subject.leaderboard.sections, *(table for by in AXES for table in compare(subject.rows, by)))
+    tables = (*subject.leaderboard.sections, *tables_of(list(asked_in_several_ways(subject.rows))))
     lacks = (
         "No question was asked in two ways: `tactbench run --probe` adds shuffled rows and the first frame alone, "
         "`--protocol` and `--split` ask otherwise."

@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from tactbench.core.errors import DataError
-from tactbench.core.leaderboard.checked import checked, with_added
 from tactbench.core.leaderboard.levels import with_levels
 from tactbench.core.matrix.store import Row, Store
 from tactbench.core.plugins.declared import with_declared_of
@@ -71,13 +70,10 @@ class Results:
 
 
 def open_results(store: Store, registry: Registry) -> Results:
-    """Return what `store` holds: a row a cell, baselines beside it, and rows of other versions as they are."""
-    rows = [with_added(row) for row in store.rows()]
-    good = checked(rows)[0]
-    known = {id(row) for row in good}
-    over = with_levels(over_replicates(good), store.folder, store.provenance)
-    shown = (*over, *(row for row in rows if id(row) not in known))
-    return Results(store, with_declared_of(registry, shown), shown, {str(row.get("key", "")): row for row in good})
+    """Return what `store` holds: a row a cell."""
+    rows = store.rows()
+    shown = tuple(with_levels(over_replicates(rows), store.folder, store.provenance))
+    return Results(store, with_declared_of(registry, shown), shown, {str(row["key"]): row for row in rows})
 
 
 @dataclass(frozen=True)

@@ -1,7 +1,7 @@
 """Records as CSV, for programs and for spreadsheets.
 
 A spreadsheet runs a cell that begins like a formula. Names and reasons come from plugins and from strangers' folders:
-text that begins so is written with an apostrophe before it, numbers never are. `unguarded` takes it off again.
+text that begins so is written with an apostrophe before it, numbers never are.
 """
 
 from __future__ import annotations
@@ -35,11 +35,6 @@ def csv_of_records(records: Sequence[Mapping[str, Any]]) -> str:
 def guarded(text: str) -> str:
     """Return text that no spreadsheet takes for a formula."""
     return f"'{text}" if _FORMULA.match(text) and not _NUMBER.fullmatch(text) else text
-
-
-def unguarded(text: str) -> str:
-    """Return what was written before `guarded` was applied."""
-    return text[1:] if text.startswith("'") and _FORMULA.match(text) else text
 
 
 def _cell(value: Any) -> Any:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import unicodedata
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 
 from tactbench.core.tables.text_table import TextTable
 
@@ -18,28 +18,16 @@ _TEX = {
 }  # fmt: skip
 """Brackets and the star are options of ``\\\\`` where they follow it: in braces they are text."""
 
-_ACCENTS = {
-    "\u0300": r"\`", "\u0301": r"\'", "\u0302": r"\^", "\u0303": r"\~", "\u0304": r"\=", "\u0306": r"\u",
-    "\u0307": r"\.", "\u0308": r"\"", "\u030b": r"\H", "\u030c": r"\v", "\u0327": r"\c",
-}  # fmt: skip
 _LIGATURE = re.compile(r"-(?=-)|`(?=`)|'(?=')|[!?](?=`)|,(?=,)")
 """The first of two characters that TeX draws as one."""
 
 
-def latex(tables: Iterable[TextTable | Sequence[str]]) -> str:
-    """Return tables as LaTeX over both columns of a paper, notes below the table that they follow."""
-    found: list[tuple[TextTable, list[str]]] = []
-    for part in tables:
-        if isinstance(part, TextTable):
-            found.append((part, [*part.notes]))
-        elif found:
-            found[-1][1].extend(part)
-    return "\n".join(latex_table(one, notes, number=place) for place, (one, notes) in enumerate(found, 1))
+def latex(tables: Iterable[TextTable]) -> str:
+    """Return tables as LaTeX over both columns of a paper."""
+    return "\n".join(latex_table(one, number=number) for number, one in enumerate(tables, 1))
 
 
-def latex_table(
-    table: TextTable, notes: Iterable[str] = (), *, number: int = 1, columns: str = "", rule: int | None = None
-) -> str:
+def latex_table(table: TextTable, *, number: int = 1, columns: str = "", rule: int | None = None) -> str:
     """Return a table as LaTeX, its title as the caption; text between backticks is code elsewhere.
 
     A heading may have two lines.
@@ -72,7 +60,7 @@ def latex_table(
         *lines,
         r"\bottomrule",
         r"\end{tabular}",
-        *(rf"\par\smallskip\raggedright {tex(note.replace('`', ''))}" for note in notes),
+        *(rf"\par\smallskip\raggedright {tex(note.replace('`', ''))}" for note in table.notes),
         rf"\end{{{environment}}}",
         "",
     ])  # fmt: skip
@@ -96,10 +84,6 @@ def _character(character: str) -> str:
         return _TEX[character]
     if character.isascii():
         return character
-    parts = unicodedata.normalize("NFD", character)
-    letter, marks = parts[0], parts[1:]
-    if letter.isascii() and letter.isalpha() and marks in _ACCENTS:
-        # An accent above i or j takes the place of the dot.
-        dotless = rf"\{letter}" if letter in "ij" and marks != "\u0327" else letter
-        return f"{_ACCENTS[marks]}{{{dotless}}}"
+    if "À" <= character <= "ÿ" and unicodedata.decomposition(character):
+        return character  # an ASCII letter with an accent
     return f"U+{ord(character):04X}"

@@ -59,18 +59,15 @@ def _print_notes(notes: Sequence[str], console: Console) -> None:
 def _print_table(table: TextTable, console: Console) -> list[str]:
     """Print a table without its notes and return the columns that there was no room for."""
     from rich.cells import cell_len
+    from rich.padding import Padding
     from rich.table import Table
     from rich.text import Text
 
     widths = _widths(table, console.width - _MARGIN)
     taken = sum(widths.values()) + _GAP * (len(widths) - 1) + _MARGIN
     blank = taken - cell_len(table.title) - cell_len(table.origin)
-    if not table.origin:
-        console.print(Text(table.title, "bold"), highlight=False)
-    elif blank > 1:
-        console.print(Text(f"{table.title}{' ' * blank}{table.origin}", "bold"), highlight=False)
-    else:
-        console.print(Text(f"{table.title}\n{table.origin}", "bold"), highlight=False)
+    origin = (" " * blank if blank > 1 else "\n") + table.origin if table.origin else ""
+    console.print(Text(table.title + origin, "bold"), highlight=False)
     for sentence in table.summary:
         console.print(Text(sentence), highlight=False)
     console.print()
@@ -85,8 +82,6 @@ def _print_table(table: TextTable, console: Console) -> list[str]:
         )
     for line, kind in zip(table.lines, table.kinds or [""] * len(table.lines), strict=True):
         grid.add_row(*(Text(line[place]) for place in widths), style=_STYLE.get(kind, ""))
-    from rich.padding import Padding
-
     console.print(Padding(grid, (0, 0, 0, _MARGIN)), width=max(taken, console.width), crop=False)
     if table.notes:
         console.print()

@@ -3,34 +3,28 @@
 from __future__ import annotations
 
 import math
-import re
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 from tactbench.core.tables.numbers import ABSENT as ABSENT
 
 WORDY = 60
 """Letters from which a field wraps as prose."""
-_DIGITS = r"[-+−]?[\d\u202f]+(?:\.\d+)?(?:[eE][-+]?\d+)?"
-_NUMBER = re.compile(rf"({_DIGITS})(?: … {_DIGITS})?(?: %)?(?: ?[†‡*])*")
 
 
 class Entry(str):
     """A text of a table with the number behind it and a link."""
 
-    __slots__ = ("anchor", "cell", "value")
+    __slots__ = ("cell", "value")
     value: float | None
     """What a column of numbers is sorted by, in one unit for the whole column; None sorts last."""
-    anchor: str
-    """Where a page tells more; empty: nowhere."""
     cell: str
     """The cell that it is from, by name; a page that has a place for each cell makes a link of it."""
 
-    def __new__(cls, text: str, value: float | None = None, anchor: str = "", cell: str = "") -> Entry:
+    def __new__(cls, text: str, value: float | None = None, *, cell: str = "") -> Entry:
         """Return the text with what is known besides."""
         entry = super().__new__(cls, text)
-        entry.value, entry.anchor, entry.cell = value, anchor, cell
+        entry.value, entry.cell = value, cell
         return entry
 
 
@@ -55,10 +49,6 @@ class TextTable:
     """Sentences below the title."""
     notes: tuple[str, ...] = ()
     """Sentences below the lines."""
-    records: tuple[Mapping[str, Any], ...] = ()
-    """The same as numbers; all have the same keys."""
-    anchor: str = ""
-    """Where links to the whole table lead; empty: nowhere."""
     first_to_go: tuple[str, ...] = ()
     """Columns that a terminal leaves out, in this order, where it is too narrow even with texts broken at spaces."""
     unbroken: frozenset[str] = frozenset()
@@ -99,15 +89,13 @@ class TextTable:
 
 
 def sort_value(text: str) -> float | None:
-    """Return what a text is sorted by in a column of numbers.
-
-    That of an `Entry`; else the number that the text is, thin spaces and marks aside, of an interval its lower end.
-    Text with a unit has none, since two lines may have two units.
-    """
+    """Return what a text is sorted by in a column of numbers: the value of an `Entry`, else the number that it is."""
     if isinstance(text, Entry):
         return text.value
-    found = _NUMBER.fullmatch(text.strip())
-    return float(found[1].replace("\u202f", "").replace("−", "-")) if found and any(map(str.isdigit, text)) else None
+    try:
+        return finite(float(text.replace("\u202f", "").replace("−", "-")))
+    except ValueError:
+        return None
 
 
 def finite(value: object) -> float | None:

@@ -164,7 +164,3 @@ def test_what_is_no_result_folder_is_told_in_a_sentence(verbs, content):
     assert "Traceback" not in refused.stderr
     assert "tactbench run" in refused.stderr
     assert not (verbs.folder / "there" / "recordings").exists()
-
-
-def test_a_comparison_is_not_written_to_files(ran):
-    assert "--to" in ran("leaderboard", "out", "--compare", "split", "--to", "x.md", code=2).stderr

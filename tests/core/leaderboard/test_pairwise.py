@@ -4,6 +4,7 @@ import pytest
 
 from tactbench.core.errors import UnknownNameError
 from tactbench.core.leaderboard.pairwise import (
+    asked_in_several_ways,
     comparisons,
     folder_comparisons,
     notes_of,
@@ -106,11 +107,18 @@ def test_two_folders_are_compared_cell_by_cell():
     assert tables_of(found)[0].lines[0][-1] == "old better"
 
 
-def test_several_tasks_are_averaged():
-    rows = [
-        answered(sensor, means, task=task) for task in ("x", "y") for sensor, means in (("a", (1.0,) * 6), ("b", WORSE))
-    ]
-    (note,) = [note for note in notes_of(comparisons(rows, "a", "b")) if note.startswith("Interquartile")]
-    assert "over 2 tasks" in note
-    assert "a 0.667" in note
-    assert not any(note.startswith("Interquartile") for note in notes_of(comparisons(rows, "a", "b", "x")))
+def test_protocols_and_splits_are_compared_answer_by_answer():
+    rows = [answered(protocol=protocol, split=split, means=means)
+            for protocol, means in (("karl2016", WORSE), ("deployable", (1.0, 1.1, 1.2, 1.3, 1.4, 1.5)))
+            for split in ("session", "unit")]  # fmt: skip
+    found = comparisons(rows, "karl2016", "deployable")
+    assert [(one.kind, one.of, one.row["split"]) for one in found] == [
+        ("protocols", "a, lasso", "session"), ("protocols", "a, lasso", "unit"),
+    ]  # fmt: skip
+    assert all(one.difference.verdict == "worse" for one in found)
+    assert (
+        tables_of(found)[0].title == "A = karl2016, B = deployable · question · RMSE [N] · split session · SIM (twin)"
+    )
+    assert [one.kind for one in asked_in_several_ways(rows)] == ["protocols"] * 2 + ["splits"] * 2
+    apart = [row | {"simulated": False, "rig": "replay"} if row["protocol"] == "karl2016" else row for row in rows]
+    assert [one.kind for one in asked_in_several_ways(apart)] == ["splits"] * 2

@@ -1,15 +1,10 @@
 """Verdicts of the probe, each seen to go both ways."""
 
-import io
-
 import numpy as np
 import pytest
-from rich.console import Console
 
-from tactbench.core.leaderboard.formats import show
 from tactbench.core.leaderboard.probe import build_probe
-from tactbench.core.leaderboard.table import build_table
-from tests.core.leaderboard.rendering import to_latex, to_markdown
+from tests.core.leaderboard.rendering import to_markdown
 from tests.core.leaderboard.rows import row
 
 
@@ -72,6 +67,10 @@ def test_the_first_frame_of_numbers(first, more, says):
 @pytest.mark.parametrize(
     ("rows", "says"),
     [
+        (
+            [classed(0.88), classed(0.86, "first-frame"), classed(0.99, split="shuffled")],
+            "LEAK: the first frame alone scores 0.860 of 0.880; optimistic by 0.110 when shuffled",
+        ),
         ([classed(0.88), classed(0.94, split="shuffled")], "optimistic by 0.060 when shuffled"),
         ([classed(0.88), classed(0.90, split="shuffled")], "no leak shown"),
         ([classed(0.88), classed(0.70, split="shuffled")], "no leak shown"),
@@ -86,11 +85,6 @@ def test_the_first_frame_of_numbers(first, more, says):
 )
 def test_shuffled_rows_against_the_interval(rows, says):
     assert verdict(*rows) == says
-
-
-def test_both_verdicts_stand_side_by_side():
-    said = verdict(classed(0.88), classed(0.86, "first-frame"), classed(0.99, split="shuffled"))
-    assert said == "LEAK: the first frame alone scores 0.860 of 0.880; optimistic by 0.110 when shuffled"
 
 
 def test_each_split_has_the_first_frame_of_its_own():
@@ -142,17 +136,6 @@ def test_the_best_of_all_trivial_answers_is_looked_at(scores, says):
     assert table.kinds == ("alarm" if says.startswith("TRIVIAL") else "plain",)
     best = min(scores, key=scores.get)
     assert line[table.columns.index("trivial")] == f"{scores[best]:.4f} {best}"
-
-
-def test_simulated_rows_say_so_and_every_text_format_has_the_table():
-    rows = [classed(0.95), classed(0.90, "first-frame")]
-    out = io.StringIO()
-    show(build_table(rows), Console(file=out, width=200))
-    for text in (out.getvalue(), to_markdown(rows), to_latex(rows)):
-        assert "does the score come from the contact?" in text
-        assert "LEAK: the first frame alone scores 0.900 of 0.950" in text
-        assert "a SIM" in text
-    assert "50\\% or more" in to_latex(rows)
 
 
 def test_without_an_interval_nothing_holds_the_shuffled_score():

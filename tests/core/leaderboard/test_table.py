@@ -93,17 +93,6 @@ def test_shuffled_rows_and_probes_come_after_what_is_kept_apart():
     ] * 3
 
 
-@pytest.mark.parametrize("status", ["failed", "crashed", "timeout", "out-of-memory"])
-def test_a_stopped_cell_is_a_line_with_its_reason_and_the_command_to_look_into_it(status):
-    rows = [row(), *(row(name, status=status, score=None, reason="the plug was pulled.") for name in "bcdefg")]
-    said = f"b/lasso, c/lasso, d/lasso, e/lasso and 2 more {status}: the plug was pulled. `tactbench why CELL`"
-    for text in (to_markdown(rows).replace("\\", ""), plain_text(build_table(rows))):
-        assert status.upper() in text
-        assert said in text
-    assert "the plug was pulled" in to_csv(rows)
-    assert "why" not in to_latex(rows)
-
-
 def test_a_trivial_answer_stands_once_where_all_sensors_agree_on_its_digits():
     rows = [row(name, estimator, score) for name in "ab" for estimator, score in (("lasso", 0.5), ("mean", 1.4))]
     (grid,) = grids(build_table(rows))
@@ -152,7 +141,7 @@ def test_the_best_of_each_sensor_keep_the_places_they_have_among_all():
         ("a", "lasso", 0.5), ("a", "ols", 0.6), ("b", "lasso", 0.7), ("b", "mean", 1.4),
     )]  # fmt: skip
     (block,) = best(build_table(rows), 1).blocks
-    assert [line.cells[:3] for line in block.lines] == [("1", "a", ""), ("3", "b", "")]
+    assert [(line.texts["place"], line.texts["sensor"]) for line in block.lines] == [("1", "a"), ("3", "b")]
     assert "places among all" in block.setting
 
 

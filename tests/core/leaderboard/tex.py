@@ -12,15 +12,10 @@ _SIGNS = {
     r"\,": "\u202f",
     "-{}": "-", "`{}": "`", "'{}": "'", "?{}": "?", "!{}": "!", ",{}": ",",
 }  # fmt: skip
-_ACCENTS = {
-    r"\`": "\u0300", r"\'": "\u0301", r"\^": "\u0302", r"\~": "\u0303", r"\=": "\u0304", r"\u": "\u0306",
-    r"\.": "\u0307", r"\"": "\u0308", r"\H": "\u030b", r"\v": "\u030c", r"\c": "\u0327",
-}  # fmt: skip
 _TOKEN = re.compile(
     "|".join(re.escape(sign) for sign in sorted(_SIGNS, key=len, reverse=True))
-    + r"|(?P<accent>\\(?:[`'^~=.\"]|[uHvc](?=\{)))\{(?P<letter>[A-Za-z]|\\[ij])\}"
     # What a line of text may hold as it is; two of these that TeX draws as one have been taken apart.
-    + r"|(?P<plain>(?!--|``|''|\?`|!`|,,)[A-Za-z0-9 .:;()/=+@,'`?!-])"
+    + r"|(?P<plain>(?!--|``|''|\?`|!`|,,)[A-Za-z0-9À-ÖØ-öø-ÿ .:;()/=+@,'`?!-])"
 )
 
 
@@ -30,10 +25,7 @@ def untex(text):
     while place < len(text):
         token = _TOKEN.match(text, place)
         assert token, f"would act or not compile: {text[place:]!r}"
-        if token["accent"]:
-            read.append(unicodedata.normalize("NFC", token["letter"][-1] + _ACCENTS[token["accent"]]))
-        else:
-            read.append(token["plain"] or _SIGNS[token[0]])
+        read.append(token["plain"] or _SIGNS[token[0]])
         place = token.end()
     return "".join(read)
 
@@ -46,6 +38,5 @@ def as_set(text):
 def _letter(one):
     if one.isascii() or one in _SIGNS.values():
         return one
-    parts = unicodedata.normalize("NFD", one)
-    known = len(parts) == 2 and parts[0].isascii() and parts[0].isalpha() and parts[1] in _ACCENTS.values()
-    return one if known else f"U+{ord(one):04X}"
+    accented = "À" <= one <= "ÿ" and unicodedata.decomposition(one)
+    return one if accented else f"U+{ord(one):04X}"

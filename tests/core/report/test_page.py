@@ -177,7 +177,7 @@ def test_scores_of_folds_and_recordings(material):
 def test_a_comparison_s_numbers_lead_each_to_their_cell(material):
     rows = [made_row("a", cell=f"a-{name}", protocol=name) for name in ("karl2016", "deployable")]
     subject = with_rows(material, *rows)
-    (table,) = (one for one in compared_section(subject).tables if "karl2016" in one.columns)
+    (table,) = (one for one in compared_section(subject).tables if "A = karl2016" in one.title)
     cells = [getattr(text, "cell", "") for text in table.lines[0]]
     assert [cell for cell in cells if cell] == ["a-karl2016", "a-deployable"]
     html = make_page(subject).html

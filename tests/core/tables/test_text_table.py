@@ -1,24 +1,12 @@
 import math
 
 from tactbench.core.tables.markdown import markdown
-from tactbench.core.tables.text_table import finite, sort_value, text_table
+from tactbench.core.tables.text_table import Entry, finite, sort_value, text_table
 
 
-def test_a_bare_number_is_read_with_its_marks():
-    read = {
-        "0.6795 †": 0.6795,
-        "4\u202f395": 4395,
-        "−3": -3,
-        "-1e-3": -1e-3,
-        "62 %": 62,
-        "0.5 † ‡": 0.5,
-        "0.4 … 0.6": 0.4,
-    }
-    assert {text: sort_value(text) for text in read} == read
-
-
-def test_text_with_a_unit_is_no_number_since_another_line_may_have_another_unit():
-    assert [sort_value(text) for text in ("10.2 ms", "4 s", "–", "", "1 ms … 2 s", "base", "\u202f")] == [None] * 7
+def test_only_a_bare_number_is_sorted_as_one_since_lines_may_have_several_units():
+    texts = ("4\u202f395", "−3", "-1e-3", "10.2 ms", "–", "", "base", Entry("10.2 ms", 0.0102))
+    assert [sort_value(text) for text in texts] == [4395, -3, -1e-3, None, None, None, None, 0.0102]
 
 
 def test_what_is_not_finite_cannot_be_sorted():
