@@ -90,14 +90,18 @@ def _commit(folder: Path) -> str:
 
 
 def foot(several: Sequence[Mapping[str, Any]]) -> tuple[str, ...]:
-    """Return which software made some rows on which machines, each said once; `several` are from `gather`."""
+    """Return which software made some rows on which machines, each said once; keys of `gather` may be missing."""
     return tuple(dict.fromkeys(text for one in several for text in _sentences(one)))
 
 
 def _sentences(one: Mapping[str, Any]) -> Iterator[str]:
-    commit = f" ({one['commit']})" if one["commit"] else ""
-    libraries = ", ".join(f"{name} {version}" for name, version in one["distributions"].items())
-    yield f"tactbench {one['tactbench']}{commit}, Python {one['python']}, {libraries}, BLAS threads: {one['threads']}."
-    for plugin in one["plugins"]:
+    if "tactbench" in one:
+        commit = f" ({one['commit']})" if one.get("commit") else ""
+        libraries = ", ".join(f"{name} {version}" for name, version in one.get("distributions", {}).items())
+        threads = f"BLAS threads: {one.get('threads', '?')}"
+        yield f"tactbench {one['tactbench']}{commit}, Python {one.get('python', '?')}, {libraries}, {threads}."
+    for plugin in one.get("plugins", ()):
         yield f"Plugin {plugin['distribution']} {plugin['version']} (source {plugin['source'][:12]})."
-    yield f"Host {one['host']}: {one['cpu']}, {one['cores']} cores, {one['memory_mb'] / 1024:.0f} GiB."
+    if one.get("host"):
+        memory = f", {one['memory_mb'] / 1024:.0f} GiB" if one.get("memory_mb") else ""
+        yield f"Host {one['host']}: {one.get('cpu', 'unknown processor')}, {one.get('cores')} cores{memory}."

