@@ -23,8 +23,8 @@ from tactbench.core.choosing.criteria import (
     newtons,
     pressed_n,
 )
-from tactbench.core.leaderboard.blocks import no_better
 from tactbench.core.leaderboard.names import LOWER_IS_BETTER, answer_name, hardware_name, metric_name, sensor_name
+from tactbench.core.leaderboard.trivial import no_better
 from tactbench.core.spec.sensor import SensorSpec
 from tactbench.core.spec.task import TaskSpec
 from tactbench.core.tables.text import command_line, visible

@@ -17,7 +17,6 @@ from tactbench.core.leaderboard.columns import Line, line_of
 from tactbench.core.leaderboard.names import Row, distinct, grouped, hardware_name, metric_name, sign_of
 from tactbench.core.leaderboard.sentences import NO_BETTER, Board, Note, above, below
 from tactbench.core.leaderboard.trivial import Bars, error_of
-from tactbench.core.leaderboard.trivial import no_better as no_better
 from tactbench.core.statistics.rank import Rank, beyond_floor, excess_of
 from tactbench.core.statistics.replicates import FEWEST
 from tactbench.core.tables.text import visible

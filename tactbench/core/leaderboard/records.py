@@ -27,8 +27,6 @@ OF_THE_MACHINE = {
 
 FORMAT_VERSION = "1"
 _RANKS = {"rank": int, "rank_low": int, "rank_high": int, "rank_tied": bool}
-_LONGEST_TEXT = 32_767
-"""Characters that Excel takes in a cell."""
 
 
 def keys(table: Table) -> tuple[str, ...]:
@@ -150,4 +148,4 @@ def xlsx(table: Table) -> bytes:
 def _value(value: Any) -> Any:
     if isinstance(value, float):
         return value if math.isfinite(value) else None
-    return value if isinstance(value, int | None) else visible(str(value))[:_LONGEST_TEXT]
+    return value if isinstance(value, int | None) else visible(str(value))

@@ -161,16 +161,17 @@ def test_a_workbook_has_numbers_as_numbers_and_no_formula(monkeypatch):
         xlsx(build_table([row()]))
 
 
-@pytest.mark.parametrize(
-    ("seconds", "text"),
-    [(None, "–"), (12.34, "12.3 s"), (0.01234, "12.3 ms"), (2e-5, "20.0 µs"), (100.4, "100 s"), (0, "0 s"),
-     (0.9999, "1.00 s")],
-)  # fmt: skip
-def test_durations_have_three_digits_and_a_unit(seconds, text):
-    assert duration(seconds) == text
-
-
-def test_scores_with_a_unit_have_four_decimals():
+def test_durations_have_three_digits_and_a_unit_and_scores_with_a_unit_four_decimals():
+    texts = {
+        None: "–",
+        12.34: "12.3 s",
+        0.01234: "12.3 ms",
+        2e-5: "20.0 µs",
+        100.4: "100 s",
+        0: "0 s",
+        0.9999: "1.00 s",
+    }
+    assert {seconds: duration(seconds) for seconds in texts} == texts
     assert (score(0.68754, "N"), score(0.60488, "1"), score(None, "1")) == ("0.6875", "0.605", "–")
 
 

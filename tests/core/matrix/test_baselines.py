@@ -45,7 +45,7 @@ def test_nobody_who_is_no_better_has_a_place(metric, good, bad):
         one["cell"] = f"{one['sensor']}-{one['estimator']}"
     table = build_table(rows)
     (block,) = table.blocks
-    places = {line.row["cell"]: line.cells[0] for line in block.lines}
+    places = {line.row["cell"]: line.texts["place"] for line in block.lines}
     assert places.pop("a-lasso") == "1"
     assert places.pop("b-lasso") == "–"
     assert set(places.values()) == {""}
