@@ -31,14 +31,12 @@ STATUS_S = 5.0
 @click.option("--rig-file", type=click.Path(path_type=Path), metavar="FILE",
               help="Start every device of this file whose link is `emulated`, with its faults.")  # fmt: skip
 @PROFILE
-@click.option("--presses", type=click.IntRange(min=1), metavar="N", help="Number of presses. Default: until Ctrl-C.")
 def command(
     names: tuple[str, ...],
     rig_file: Path | None,
     profile: str | None,
-    presses: int | None,
 ) -> None:
-    """Start emulated sensors and devices on links of this machine, pressed by a simulated rig.
+    """Start emulated sensors and devices on links of this machine, pressed by a simulated rig, until Ctrl-C.
 
     DEVICE is a sensor or device by name, for example: tactbench emulate biotac net-ft. The rig file that
     opens them is printed: > rig.yaml.
@@ -77,10 +75,10 @@ def command(
     presser.draw(1)
     with EmulatedDevices(devices, time="real") as emulated:
         _say_where(emulated, entries, file)
-        for number in count(1) if presses is None else range(1, presses + 1):
+        for number in count(1):
             if number > 1:
                 presser.draw(number)
-            _press(emulated, presser, number, presses)
+            _press(emulated, presser, number)
 
 
 @dataclass
@@ -208,11 +206,10 @@ def _say_where(emulated: EmulatedDevices, entries: Mapping[str, DeviceEntry], fi
     remark(f"  {command_line('tactbench', 'record', *words)}")
 
 
-def _press(emulated: EmulatedDevices, presser: Presser, number: int, presses: int | None) -> None:
+def _press(emulated: EmulatedDevices, presser: Presser, number: int) -> None:
     """Press once, and say how it goes."""
     profile, over_s = presser.alone.profile, presser.start(emulated.clock() * 1e-9)
-    of = "" if presses is None else f" of {presses}"
-    remark(f"Press {number}{of}: {profile.largest_n:g} N after {profile.duration.to('s'):g} s")
+    remark(f"Press {number}: {profile.largest_n:g} N after {profile.duration.to('s'):g} s")
     while (now_s := emulated.clock() * 1e-9) < over_s:
         emulated.advance(round(1e9 * min(now_s + STATUS_S, over_s)))
         passed = (f"{name} {here} bytes in, {there} out" for name, (here, there) in emulated.passed_bytes.items())
