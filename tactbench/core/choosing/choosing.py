@@ -29,14 +29,6 @@ from tactbench.core.spec.sensor import SensorSpec
 from tactbench.core.spec.task import TaskSpec
 from tactbench.core.tables.text import command_line, visible
 
-_STEPS = {
-    "answer delay": "run `{run}`; or ask its maker, or measure it",
-    "force range": "ask its maker, or load it and measure",
-    "rate": "ask its maker, or measure it on your set-up",
-    "trivial answer": "run `{run}`",
-}
-"""What to do about a wish of which is not known whether it is met."""
-
 
 @dataclass(frozen=True)
 class Candidate:
@@ -196,8 +188,8 @@ class _Choosing:
         sensor = visible(one.row["sensor"])
         again = self.run(one.row["sensor"], "--estimator", one.row["estimator"])
         for criterion in one.named("unknown"):
-            step = _STEPS.get(criterion.wish, "").format(run=again)
-            yield f"the {criterion.wish} of {sensor}: {criterion.text}{f'; {step}' if step else ''}."
+            step = f"; run `{again}`" if criterion.wish in ("answer delay", "trivial answer") else ""
+            yield f"the {criterion.wish} of {sensor}: {criterion.text}{step}."
         if one.low is None or one.high is None:
             yield f"how sure the score of {sensor} is: it has no interval; run `{again} --repeats 8`."
 

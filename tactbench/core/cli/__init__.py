@@ -75,10 +75,6 @@ def main(arguments: list[str] | None = None) -> None:
     # A short-lived process that imports thousands of objects to keep: looking through them for garbage every 700 new
     # ones takes a sixth of the time of an import.
     gc.set_threshold(100_000, 50, 100)
-    too_few = _too_few_files()
-    if too_few:
-        click.echo(too_few, err=True)
-        sys.exit(2)
     if sys.stdout is None:
         # The next file that is opened would take its number, and whatever writes to that would write into the file.
         click.echo("Error: Standard output is closed.\n  Redirect it instead: > FILE, or > /dev/null.", err=True)
@@ -99,25 +95,6 @@ def main(arguments: list[str] | None = None) -> None:
     except Exception as error:
         code = _tell(error)
     sys.exit(code if isinstance(code, int) else 0)
-
-
-FILES = 32
-"""Open at once: HDF5, a child process's pipes, logs and modules; a run of one job gets by with eight."""
-
-
-def _too_few_files() -> str:
-    """Return in words that too few files may be open at once; empty if enough, or if the limit could be raised."""
-    try:
-        import resource
-    except ImportError:
-        return ""
-    soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
-    if soft == resource.RLIM_INFINITY or soft >= FILES:
-        return ""
-    if hard == resource.RLIM_INFINITY or hard >= FILES:
-        resource.setrlimit(resource.RLIMIT_NOFILE, (FILES, hard))
-        return ""
-    return f"Error: {soft} files may be open at once here, and {FILES} are needed.\n  Raise it: ulimit -n 1024"
 
 
 def _interrupted(arguments: list[str] | None) -> int:

@@ -23,16 +23,15 @@ if TYPE_CHECKING:
 @click.argument("name")
 @click.option("--recording", type=click.Path(path_type=Path, exists=True, dir_okay=False), metavar="FILE",
               help="Check this recording of the sensor, importing no code of the plugin.")  # fmt: skip
-@click.option("--passive", is_flag=True, help="With --recording: add the checks that run without it.")
 @click.option("--rig-file", type=click.Path(path_type=Path, exists=True, dir_okay=False), metavar="FILE",
               help="Also open the device's line, or press with the rig, as this file says; prompts first.")  # fmt: skip
 @YES
 @click.option("--out", type=click.Path(path_type=Path, exists=True, file_okay=False), metavar="DIR",
-              help="Store a sensor's level in this result folder; its tables show it.")  # fmt: skip
+              help="Store a sensor's level in this result folder: its tables show it. Runs all checks.")  # fmt: skip
 @format_option("table", "json")
 @click.pass_context
 def command(
-    ctx: click.Context, name: str, recording: Path | None, passive: bool, rig_file: Path | None, yes: bool,
+    ctx: click.Context, name: str, recording: Path | None, rig_file: Path | None, yes: bool,
     out: Path | None, shape: str,
 ) -> None:  # fmt: skip
     """Check whether a plugin conforms: a sensor, rig, device, task, estimator, effect, indenter or profile.
@@ -65,9 +64,7 @@ def command(
     sensors = [one for one in subjects if one.kind == "sensor"]
     if (recording or out) and not sensors and not wrong:
         raise UsageError(f"{name} is no sensor.", hint="--recording and --out are for sensors: leave them out.")
-    modes: list[Mode] = ["passive"] if passive or recording is None else []
-    if out is not None and not modes:
-        raise UsageError("--out stores a level, which a recording alone has not.", hint="Add --passive.")
+    modes: list[Mode] = ["passive"] if out is not None or recording is None else []
     if recording is not None:
         modes.append("recording")
         subjects = sensors

@@ -123,7 +123,6 @@ def _store(out: Path, sensor: str, task: str) -> Store:
 def _print(ladder: Ladder) -> None:
     from tactbench.core.cli.grid import print_grid
     from tactbench.core.cli.screen import remark
-    from tactbench.core.cost.ladder_file import DEFINITIONS
     from tactbench.core.report.costs import COLUMNS, RIGHT, line, title
 
     about = ladder.about
@@ -137,5 +136,4 @@ def _print(ladder: Ladder) -> None:
         )
     for text in about["remarks"]:
         remark(f"{text[0].upper()}{text[1:]}.")
-    for key, text in DEFINITIONS.items():
-        remark(f"{key}: {text}.")
+    remark("docs/glossary.md says what each column is.")

@@ -78,29 +78,24 @@ def show_twin(sensors: tuple[str, ...], out: Path, shape: str, *, rounds: int, t
 
 
 def _show(points: Sequence[CostPoint], skipped: Sequence[Skipped], scores: Scores, study: CostStudy) -> None:
-    from tactbench.core.cost.precision import diagrams, precise, verdict
+    from tactbench.core.cost.precision import diagrams, precise, quickest_enough
 
     for (subject, observable), group in diagrams(points).items():
-        best = precise(group)
+        best, enough = precise(group), quickest_enough(group)
         lines = []
         for point in group:
-            marks = ("default",) * point.default + ("front",) * (point in best)
+            marks = ("default",) * point.default + ("front",) * (point in best) + ("enough",) * (point is enough)
             texts = {key: _text(value) for key, value in _record(point, scores).items() if key not in point.settings}
             lines.append({"": ", ".join(marks), **texts})
         columns = [key for key in lines[0] if key not in ("sensor", "observable", "default", "reason")]
-        numeric = (
-            "seconds",
-            "error_rms",
-            "error_worst",
-            "noise",
-            *(key for key in columns if key.startswith("score_")),
-        )
+        scored = (key for key in columns if key.startswith("score_"))
+        numeric = ("seconds", "error_rms", "error_worst", "noise", *scored)
         kinds = ["result" if point.default else "" for point in group]
         print_grid(f"{subject}, {observable}: {study.title}", columns, lines, kinds=kinds, numeric=numeric)
-        click.echo(verdict(group))
     for one in skipped:
         click.echo(f"{one.subject}, {one.label}: {one.reason}")
     remark(study.reference)
+    remark("enough: the quickest whose error is below a third of the noise.")
     for estimator in dict.fromkeys(one.estimator for one in scores.values()):
         remark(f"Scores are by {estimator}, of one replicate recorded at that rung with the same draws (SIM).")
 

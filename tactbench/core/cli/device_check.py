@@ -285,14 +285,6 @@ def _noise(spec: StreamSpec, values: FloatArray) -> tuple[Noise, ...]:
     return tuple(found)
 
 
-_MEANING = {
-    "GAP": "come after rows that were lost: is the host or the bus too busy?",
-    "MISSING": "have a channel without a sample: is every part of the device connected?",
-    "SUSPECT": "have a sample that failed its check: look at the cable, its shield and its ground.",
-    "SATURATED": "have a channel at its converter's end, with nothing touching it: is something touching it?",
-}
-
-
 def _problems(found: StreamCheck) -> list[str]:
     name, sentences = found.stream, []
     if found.rate_hz is not None and found.nominal_hz is not None:
@@ -302,13 +294,15 @@ def _problems(found: StreamCheck) -> list[str]:
                 f"Stream {name} came at {found.rate_hz:.4g} Hz, stated are {found.nominal_hz:.4g} Hz. "
                 "Is the device set up for another rate, or the link too slow for it?"
             )
-    if found.lost:
-        sentences.append(
-            f"Of stream {name}, {found.lost} rows are lost by its numbers: is the host or the bus too busy?"
-        )
-    if found.unordered:
-        sentences.append(f"Of stream {name}, {found.unordered} rows came twice or late: what lies between?")
-    marks = {mark: number for mark, number in found.marks.items() if number and not (mark == "GAP" and found.lost)}
-    return sentences + [
-        f"Of stream {name}, {number} of {found.rows} rows {_MEANING[mark]}" for mark, number in marks.items()
-    ]
+    wrong = {"lost (host or bus too busy?)": found.lost, "twice or late": found.unordered} | {
+        f"{mark} ({_CAUSES[mark]})": 0 if mark == "GAP" and found.lost else number
+        for mark, number in found.marks.items()
+    }
+    if any(wrong.values()):
+        counts = ", ".join(f"{number} {what}" for what, number in wrong.items() if number)
+        sentences.append(f"Stream {name}, of {found.rows} rows: {counts}.")
+    return sentences
+
+
+_CAUSES = {"GAP": "host or bus too busy?", "MISSING": "a part not connected?", "SUSPECT": "cable, shield, ground?",
+           "SATURATED": "is something touching it?"}  # fmt: skip

@@ -107,7 +107,8 @@ def _print(
     host: Sequence[HostItem], registry: Registry, would: RigCheck | None, checks: Sequence[DeviceCheck],
     problems: Sequence[str],
 ) -> None:  # fmt: skip
-    from tactbench.core.cli.screen import print_table
+    from tactbench.core.cli.grid import print_tables
+    from tactbench.core.tables.text_table import TextTable
 
     for text in problems:
         click.secho("Wrong: ", fg="red", bold=True, nl=False)
@@ -117,11 +118,10 @@ def _print(
             click.secho("Missing: ", fg="yellow", nl=False)
             name = f"extra {one.name}" if one.kind == "extra" else one.name
             click.echo(visible(f"{name}: {'. '.join(filter(None, (one.text, one.hint)))}"))
-    for table in would.tables if would else ():
-        print_table(table.title, table.head, table.rows)
+    tables = [(table.title, table.head, table.rows) for table in (would.tables if would else ())]
     streams = [row for check in checks for stream in check.streams for row in _stream(check, stream)]
-    if streams:
-        print_table("untouched", _STREAMS, streams)
+    print_tables([TextTable(title, tuple(head), tuple(map(tuple, rows)))
+                  for title, head, rows in (*tables, ("untouched", _STREAMS, streams)) if rows])  # fmt: skip
     for check in checks:
         said = ", ".join(f"{name} {value}" for name, value in check.identity.items())
         remarks = [*check.remarks, *(f"{number} {name}" for name, number in check.counts.items())]

@@ -31,20 +31,15 @@ STATUS_S = 5.0
 @click.option("--rig-file", type=click.Path(path_type=Path), metavar="FILE",
               help="Start every device of this file whose link is `emulated`, with its faults.")  # fmt: skip
 @PROFILE
-@click.option("--presses", type=click.IntRange(min=1), metavar="N", help="Number of presses. Default: until Ctrl-C.")
-@click.option("--write-rig-file", "out", type=click.Path(path_type=Path), metavar="FILE",
-              help="Also write the printed rig file, with the devices' links, to FILE.")  # fmt: skip
 def command(
     names: tuple[str, ...],
     rig_file: Path | None,
     profile: str | None,
-    presses: int | None,
-    out: Path | None,
 ) -> None:
-    """Start emulated sensors and devices on links of this machine, pressed by a simulated rig.
+    """Start emulated sensors and devices on links of this machine, pressed by a simulated rig, until Ctrl-C.
 
-    DEVICE is a sensor or device by name, for example: tactbench emulate biotac net-ft. What another program needs to
-    open them is printed as a rig file.
+    DEVICE is a sensor or device by name, for example: tactbench emulate biotac net-ft. The rig file that
+    opens them is printed: > rig.yaml.
     """
     from itertools import count
 
@@ -60,8 +55,6 @@ def command(
             "Either devices or a rig file say what to emulate.",
             hint="For example: tactbench emulate biotac net-ft; `tactbench list devices` names more.",
         )
-    if out is not None and out.exists() and not out.read_text(encoding="utf-8", errors="replace").startswith(HEAD):
-        raise UsageError(f"{out} is there already, and not from `tactbench emulate`.", hint="Give another name.")
     registry = load_registry()
     file = load_rig_file(rig_file, registry) if rig_file is not None else None
     entries = _named(registry, names) if file is None else file.entries()
@@ -81,11 +74,11 @@ def command(
         raise UsageError("No device in the rig file is emulated.", hint="Write `link: emulated` for one.")
     presser.draw(1)
     with EmulatedDevices(devices, time="real") as emulated:
-        _say_where(emulated, entries, file, out)
-        for number in count(1) if presses is None else range(1, presses + 1):
+        _say_where(emulated, entries, file)
+        for number in count(1):
             if number > 1:
                 presser.draw(number)
-            _press(emulated, presser, number, presses)
+            _press(emulated, presser, number)
 
 
 @dataclass
@@ -185,9 +178,7 @@ def _named(registry: Registry, names: Sequence[str]) -> dict[str, DeviceEntry]:
     return entries
 
 
-def _say_where(
-    emulated: EmulatedDevices, entries: Mapping[str, DeviceEntry], file: RigFile | None, out: Path | None
-) -> None:
+def _say_where(emulated: EmulatedDevices, entries: Mapping[str, DeviceEntry], file: RigFile | None) -> None:
     import yaml
 
     from tactbench.core.spec.rig_file import FORCE, RigFile
@@ -209,23 +200,16 @@ def _say_where(
     parts = {"sensors": sensors, "force": found.get(FORCE), "devices": others}
     rig = RigFile(rig="bench", **parts) if file is None else file.model_copy(update=parts)
     plain = rig.model_dump(mode="json", exclude_defaults=True, exclude={"emulation", "version"})
-    written = f"{HEAD}\n{yaml.safe_dump({'version': 1, **plain}, sort_keys=False)}"
-    click.echo(written, nl=False)
-    if out is not None:
-        out.write_text(written, encoding="utf-8")
-    else:
-        remark("Save the above as rig.yaml, or have it written with --write-rig-file.")
-    name = "rig.yaml" if out is None else str(out)
-    words = ("--rig", rig.rig, "--rig-file", name, "--sensor", next(iter(sensors)), "--live", "--out", "press.h5")
-    remark(f"Record in another terminal:  {command_line('tactbench', 'record', *words)}")
-    remark("Ctrl-C ends the devices.")
+    click.echo(f"{HEAD}\n{yaml.safe_dump({'version': 1, **plain}, sort_keys=False)}", nl=False)
+    words = ("--rig-file", "rig.yaml", "--sensor", next(iter(sensors)), "--live", "--out", "press.h5")
+    remark("Ctrl-C ends the devices. With the above in rig.yaml (> rig.yaml), record in another terminal:")
+    remark(f"  {command_line('tactbench', 'record', *words)}")
 
 
-def _press(emulated: EmulatedDevices, presser: Presser, number: int, presses: int | None) -> None:
+def _press(emulated: EmulatedDevices, presser: Presser, number: int) -> None:
     """Press once, and say how it goes."""
     profile, over_s = presser.alone.profile, presser.start(emulated.clock() * 1e-9)
-    of = "" if presses is None else f" of {presses}"
-    remark(f"Press {number}{of}: {profile.largest_n:g} N after {profile.duration.to('s'):g} s")
+    remark(f"Press {number}: {profile.largest_n:g} N after {profile.duration.to('s'):g} s")
     while (now_s := emulated.clock() * 1e-9) < over_s:
         emulated.advance(round(1e9 * min(now_s + STATUS_S, over_s)))
         passed = (f"{name} {here} bytes in, {there} out" for name, (here, there) in emulated.passed_bytes.items())

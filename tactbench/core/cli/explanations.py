@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-import click
-
 from tactbench.core.cli.grid import print_grid, print_records
 from tactbench.core.cli.progress import progress
 from tactbench.core.cli.screen import remark
@@ -27,9 +25,6 @@ if TYPE_CHECKING:
 _COLUMNS = ("", "effect", "cost", "if left out", "reason")
 LONGEST_S = 60.0
 """Seconds that recordings may take for the score."""
-_SMALLEST_DIFFERENCE = 0.1
-"""Share by which two times of one run each differ on a machine that does other things as well."""
-_SCORE_COLUMNS = ("effects", "score", "simulated in")
 
 
 def print_explanations(
@@ -63,7 +58,7 @@ def print_explanations(
     if simulation:
         scenes = [scene.simulated_as(simulation) for scene in scenes]
     records: list[dict[str, Any]] = []
-    expected_s = left_out_s = 0.0
+    expected_s = 0.0
     for group in _alike(rig, sensor, scenes):
         rows = rig.explain(sensor, group[0], rounds=rounds)
         if shape == "table":
@@ -71,20 +66,19 @@ def print_explanations(
         about = {"sensor": sensor_name, "task": task_name, "scene": group[0].name, "scenes": len(group)}
         records += [{**about, **_record(row)} for row in rows]
         expected_s += 2 * len(group) * sum(row.cost_s or 0.0 for row in rows if row.entry.included)
-        left_out_s += len(group) * sum(row.cost_s or 0.0 for row in rows if not row.entry.included)
     if rounds and expected_s > LONGEST_S:
         remark(f"No score: recording the task with the effects chosen and with all would take about {expected_s:.0f} "
                "s. `tactbench run`, without and with --effects +all, does it.")  # fmt: skip
     elif rounds:
         answerer = quick_estimator(registry, task_name)
         with progress() as display:
+            asked = simulation or Simulation()
             chosen, every = (
                 task_score(registry, rig_name, sensor_name, task_name, variant, estimator=answerer, progress=display)
-                for variant in (simulation or Simulation(), _with_all_effects(simulation or Simulation()))
+                for variant in (asked, asked.model_copy(update={"effects": (*asked.effects, "+all")}))
             )
         if shape == "table":
             _print_scores(sensor_name, chosen, every)
-            click.echo(f"Effect by effect, by the costs above, those left out take {1e3 * left_out_s:.1f} ms.")
         scores = {
             "score": chosen.score, "score_all_effects": every.score, "score_metric": chosen.metric,
             "score_estimator": chosen.estimator, "score_reason": chosen.reason or every.reason, "sim_s": chosen.sim_s,
@@ -95,12 +89,8 @@ def print_explanations(
         print_records(records, shape)
 
 
-def _with_all_effects(simulation: Simulation) -> Simulation:
-    return simulation.model_copy(update={"effects": (*simulation.effects, "+all")})
-
-
 def _print_scores(sensor: str, chosen: TaskScore, every: TaskScore) -> None:
-    """Print the score with the effects chosen beside that with all, and what leaving the others out saved."""
+    """Print the score with the effects chosen beside that with all."""
     lines = [
         {
             "effects": name,
@@ -110,21 +100,7 @@ def _print_scores(sensor: str, chosen: TaskScore, every: TaskScore) -> None:
         for name, one in (("chosen", chosen), ("all", every))
     ]
     title = f"{sensor}, {chosen.task}: {METRIC_NAMES.get(chosen.metric, chosen.metric)} by {chosen.estimator} (SIM)"
-    print_grid(title, _SCORE_COLUMNS, lines, numeric=("score", "simulated in"))
-    if chosen.score is None or every.score is None:
-        return
-    moved = every.score - chosen.score
-    same = "All effects instead of those chosen: the very same score."
-    click.echo(f"All effects instead of those chosen move the score by {moved:+.2g}." if moved else same)
-    if chosen.sim_s is not None and every.sim_s:
-        saved = every.sim_s - chosen.sim_s
-        share = f", {100 * saved / every.sim_s:.0f} %"
-        if abs(saved) < _SMALLEST_DIFFERENCE * every.sim_s:
-            share = ": no more than one run each tells apart"
-        click.echo(
-            f"Leaving out the others saved {saved:.2f} of {every.sim_s:.2f} s of the processor for {every.recordings} "
-            f"recordings{share}."
-        )
+    print_grid(title, tuple(lines[0]), lines, numeric=("score", "simulated in"))
 
 
 def _alike(rig: Explaining, sensor: SensorDescriptor, scenes: list[Scene]) -> list[list[Scene]]:
@@ -152,11 +128,8 @@ def _print(sensor: str, task: str, group: list[Scene], rows: Any, rounds: int) -
     kinds = ["" if row.entry.included else "skipped" for row in rows]
     others = f", and {len(group) - 1} scenes with the same effects" if len(group) > 1 else ""
     print_grid(f"{sensor}, {task}: {group[0].name}{others}", _COLUMNS, lines, numeric=("cost",), kinds=kinds)
-    included = [row.cost_s for row in rows if row.entry.included and row.cost_s is not None]
-    if rounds:
-        remark(f"{1e3 * sum(included):.1f} ms for one recording on this machine, medians of {rounds}; behind a minus "
-               "stands what asking for the effect would add.")  # fmt: skip
-    remark("= 0: exactly nothing; <= x: at most; ~ x: about (a standard deviation, a step); ?: not known.")
+    timed = f"Costs: medians of {rounds} recordings; of an effect left out, what it would add. " if rounds else ""
+    remark(f"{timed}= 0: exactly nothing; <= at most; ~ about (a standard deviation, a step); ? not known.")
 
 
 def _change(row: Explained) -> str:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Iterator
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 from rich.progress_bar import ProgressBar  # noqa: TID253  (imported for the live view alone)
 from rich.segment import Segment  # noqa: TID253  (imported for the live view alone)
@@ -107,17 +107,10 @@ def _wrong(state: StreamState, place: int) -> str:
     return ", ".join(str(flag.name) for flag in _MARKS if state.quality[place] & flag)
 
 
-class _Taxel(NamedTuple):
-    name: str
-    response: float
-    """Change from the level, rising under load where the channel's sign is known."""
-    wrong: str
-
-
 def _taxels(watched: Watched, width: int, height: int) -> Table:
     """Return the taxels as bars, with a title, in at most `height` lines and it; what has no room is counted."""
     taxels = [
-        _taxel(state, place)
+        (state, place)
         for state in watched.sensor
         for place, channel in enumerate(state.spec.channels)
         if channel.kind == "taxel"
@@ -134,7 +127,7 @@ def _taxels(watched: Watched, width: int, height: int) -> Table:
         table.add_column(no_wrap=True, style="dim")
         table.add_column(no_wrap=True, justify="right")
         table.add_column(ratio=1)
-    cells = [_cells(one, full) for one in shown]
+    cells = [_cells(*one, full) for one in shown]
     if len(shown) < len(taxels):
         cells.append((f"… {len(taxels) - len(shown)} more", "", ""))
     for row in range(rows if taxels else 0):
@@ -142,20 +135,16 @@ def _taxels(watched: Watched, width: int, height: int) -> Table:
     return table
 
 
-def _taxel(state: StreamState, place: int) -> _Taxel:
-    channel = state.spec.channels[place]
-    response = math.nan
+def _cells(state: StreamState, place: int, full: float) -> tuple[RenderableType, RenderableType, RenderableType]:
+    """Return name, change and bar of a taxel; the change rises under load where the channel's sign is known."""
+    channel, wrong, change = state.spec.channels[place], _wrong(state, place), math.nan
     if state.latest is not None and state.level is not None:
-        response = float(state.latest[place] - state.level[place]) * (channel.sign or 1)
-    return _Taxel(channel.name[:8], response, _wrong(state, place))
-
-
-def _cells(taxel: _Taxel, full: float) -> tuple[RenderableType, RenderableType, RenderableType]:
-    style = BAD if taxel.wrong else "cyan" if taxel.response >= 0 else "yellow"
-    if not math.isfinite(taxel.response):
-        return taxel.name, Text(taxel.wrong[:9] or "-", style), ""
-    number = f"{taxel.response + 0.0:+.4g}{f' {taxel.wrong[:3]}' if taxel.wrong else ''}"
-    return taxel.name, Text(number, style), ProgressBar(full, abs(taxel.response), complete_style=style)
+        change = float(state.latest[place] - state.level[place]) * (channel.sign or 1)
+    style = BAD if wrong else "cyan" if change >= 0 else "yellow"
+    if not math.isfinite(change):
+        return channel.name[:8], Text(wrong[:9] or "-", style), ""
+    number = f"{change + 0.0:+.4g}{f' {wrong[:3]}' if wrong else ''}"
+    return channel.name[:8], Text(number, style), ProgressBar(full, abs(change), complete_style=style)
 
 
 def _full_bar(watched: Watched) -> float:

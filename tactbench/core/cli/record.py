@@ -32,7 +32,6 @@ if TYPE_CHECKING:
 @options(*SIMULATION)
 @click.option("--seed", type=click.IntRange(min=0), default=1, show_default=True, metavar="N", help="Random seed.")
 @click.option("--out", required=True, type=click.Path(path_type=Path), metavar="FILE", help="Output file (.h5).")
-@click.option("--replace", is_flag=True, help="Overwrite the output file.")
 @YES
 @click.option("--live", is_flag=True, help="Show taxels, force, rates and losses while recording.")
 def command(
@@ -45,7 +44,6 @@ def command(
     settings: tuple[str, ...],
     seed: int,
     out: Path,
-    replace: bool,
     yes: bool,
     live: bool,
 ) -> None:
@@ -73,8 +71,7 @@ def command(
     simulation = simulation_of(registry, rig, [sensor], effects=effects, settings=settings)
     if simulation is not None:
         scene = scene.simulated_as(simulation)
-    if not replace:
-        require_free(out)
+    require_free(out)
     provenance = gather(registry)
     try:
         with ExitStack() as stack:
@@ -92,7 +89,7 @@ def command(
                 built = view.beside(built)
             made = acquire(
                 built, descriptor, registry.rigs[rig], scene, role=None, seed=seed, path=out, clock=time.perf_counter,
-                provenance=provenance, watch=watch, name=out.stem, replace=replace, complete_interrupted=True,
+                provenance=provenance, watch=watch, name=out.stem, complete_interrupted=True,
             )  # fmt: skip
     except (KeyboardInterrupt, TactbenchError) as error:
         if _interrupted(out):

@@ -21,11 +21,10 @@ if TYPE_CHECKING:
     metavar="DIR",
     help="Where page and figures are put; default: FOLDER/report.",
 )
-@click.option("--open", "shown", is_flag=True, help="Show the page in the browser.")
 @click.option("--format", "shape", type=click.Choice(("table", "md", "json", "csv")), default="table",
               show_default=True, help="How the published numbers and ours are printed.")  # fmt: skip
 @click.pass_context
-def command(ctx: click.Context, folder: Path, out: Path | None, shown: bool, shape: str) -> None:
+def command(ctx: click.Context, folder: Path, out: Path | None, shape: str) -> None:
     """Make one page of all results in FOLDER, which is what `run --out` wrote.
 
     The published numbers are printed beside ours.
@@ -50,8 +49,6 @@ def command(ctx: click.Context, folder: Path, out: Path | None, shown: bool, sha
     for sentence in made.broken:
         remark(f"Failed: {sentence}")
     remark(f"Page: {made.page}")
-    if shown:
-        click.launch(str(made.page))
     ctx.exit(1 if made.broken else 0)
 
 

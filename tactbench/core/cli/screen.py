@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import click
@@ -36,18 +35,3 @@ def remark(text: str) -> None:
     from tactbench.core.tables.text import visible_lines
 
     click.echo(visible_lines(text), err=True)
-
-
-def print_table(title: str, head: Sequence[str], rows: Sequence[Sequence[str]], *, whole: str = "") -> None:
-    """Print a table under a title to stdout; without rows it says that there are none.
-
-    The column `whole` is not broken: it holds commands to copy.
-    """
-    from tactbench.core.tables.terminal import show
-    from tactbench.core.tables.text_table import TextTable
-
-    if not rows:
-        click.echo(f"{title}\n  none\n")
-        return
-    table = TextTable(title, tuple(head), tuple(map(tuple, rows)), unbroken=frozenset({whole}))
-    show([table], console())

@@ -8,10 +8,10 @@
 
 The JSON file has ``version`` 2, what was asked (``sensor``, ``task``, ``rig``, ``protocol``, ``split``, ``seed``), the
 score's ``metric``, ``unit``, ``higher_is_better``, ``simulated`` and ``dagger`` as in a leaderboard's row, how it was
-timed (``fold``, ``rounds``, ``budget_s``, ``threads``, ``load``, ``cores``, ``remarks``), ``definitions`` of times and
-verdicts, ``provenance``, and ``rows``: one for each estimator, the best score first, what nobody could measure null.
-Times of different hosts are never compared. docs/glossary.md says what each time of a row is; ``_q1`` and ``_q3`` are
-quartiles, ``delay_parts_ms`` what a delay is the sum of, ``data_s`` the seconds that the training recordings took.
+timed (``fold``, ``rounds``, ``budget_s``, ``threads``, ``load``, ``cores``, ``remarks``), ``provenance``, and ``rows``:
+one for each estimator, the best score first, what nobody could measure null. Times of different hosts are never
+compared. docs/glossary.md says what each time of a row is; ``_q1`` and ``_q3`` are quartiles, ``delay_parts_ms`` what a
+delay is the sum of, ``data_s`` the seconds that the training recordings took.
 """
 
 from __future__ import annotations
@@ -25,25 +25,6 @@ from tactbench.core.files import replace_file
 from tactbench.core.tables.csv_text import csv_of_records
 
 VERSION = 2
-
-DEFINITIONS = {
-    "fit_s": "seconds of one fit on the training rows of one fold, with parameters chosen and features ready; median "
-    "of the rounds",
-    "batch_s_per_row": "seconds of one predict over all test rows of the fold, divided by their number; median of the "
-    "rounds",
-    "latency_ms": "milliseconds of predict on a single row whose features are ready, after warm-up; quantiles of the "
-    "calls of all rounds",
-    "data_s": "seconds that it took to record the training recordings: the processor's for simulated ones, else the "
-    "wall's",
-    "answer_delay_ms": "milliseconds from a change at the skin to the answer that knows of it: one sampling interval "
-    "of the sensor, its link, the group delay of the window, features and prediction of one row (medians)",
-    "loop": "an answer keeps up with a loop on this machine if its delay is below the loop's period (10 ms at 100 Hz, "
-    "1 ms at 1 kHz), features and prediction taken at their p95 or, of fewer than 200 calls, the largest; the part in "
-    "brackets is the longest",
-    "front": "nobody else is both better by the score itself and quicker; trivial answers do not compete, nor what is "
-    "no better than the best of them that looks at nothing; scores whose "
-    "intervals overlap may be told apart by luck",
-}
 
 
 def write_ladder(ladder: Ladder, folder: Path, metric: str = "") -> list[Path]:
@@ -59,7 +40,7 @@ def write_ladder(ladder: Ladder, folder: Path, metric: str = "") -> list[Path]:
     from tactbench.core.cost.ladder_figure import draw_ladder
 
     place = folder / "cost" / f"{ladder.about['sensor']}-{ladder.about['task']}"
-    whole = {"version": VERSION, **ladder.about, "definitions": DEFINITIONS, "rows": ladder.rows}
+    whole = {"version": VERSION, **ladder.about, "rows": ladder.rows}
     paths = [place.with_name(f"{place.name}.{ending}") for ending in ("json", "csv", "png", "pdf")]
     try:
         place.parent.mkdir(parents=True, exist_ok=True)

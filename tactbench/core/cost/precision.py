@@ -1,4 +1,4 @@
-"""Work-precision diagrams: their points by subject, the front of each, the default's place in it, and a figure."""
+"""Work-precision diagrams: their points by subject, the front of each, and a figure."""
 
 from __future__ import annotations
 
@@ -74,23 +74,10 @@ def precise(points: Sequence[CostPoint]) -> list[CostPoint]:
     return front(points, seconds=lambda point: point.seconds, error=lambda point: point.error)
 
 
-def verdict(points: Sequence[CostPoint]) -> str:
-    """Return one sentence on the default of one diagram, and the quickest point below a third of the noise."""
-    default = next((point for point in points if point.default), None)
-    if default is None:
-        return "No default is among the points."
-    text = f"{default.subject}, {default.observable}: the default is {_point(default)}"
-    if not math.isfinite(default.floor):
-        return f"{text}; no noise is stated to compare it with."
-    limit = SHARE * default.floor
-    below = [point for point in points if point.error < limit]
-    best = min(below, key=lambda point: point.seconds, default=None)
-    quickest = "none" if best is None else "the default" if best is default else _point(best)
-    return f"{text}; quickest below a third of the noise ({limit:.2g} {default.unit}): {quickest}."
-
-
-def _point(point: CostPoint) -> str:
-    return f"{point.label}, {point.error:.2g} {point.unit} rms in {1e3 * point.seconds:.3g} ms"
+def quickest_enough(points: Sequence[CostPoint]) -> CostPoint | None:
+    """Return the quickest point of one diagram below a third of its noise; None: none, or no noise is stated."""
+    enough = [point for point in points if math.isfinite(point.floor) and point.error < SHARE * point.floor]
+    return min(enough, key=lambda point: point.seconds, default=None)
 
 
 def draw(points: Sequence[CostPoint], title: str, paths: Sequence[Path]) -> None:

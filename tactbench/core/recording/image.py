@@ -80,9 +80,7 @@ def store(
 def require_free(path: Path) -> None:
     """Raise UnwritableError if there is a recording already."""
     if path.exists():
-        raise UnwritableError(
-            f"{path} exists already.", hint="Give another name with --out, or replace it with --replace."
-        )
+        raise UnwritableError(f"{path} exists already.", hint="Give another name with --out, or delete that one.")
 
 
 def cannot_write(path: Path, error: OSError) -> UnwritableError:

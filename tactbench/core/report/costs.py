@@ -73,6 +73,5 @@ def ladder_table(about: Mapping[str, Any]) -> TextTable:
         lines.append([Entry(texts.get(name, ""), finite(row.get(key))) for name, key in _SORTED_BY.items()])
     kinds = ["baseline" if row["is_baseline"] else "result" if row["status"] == "done" else "failed"
              for row in about["rows"]]  # fmt: skip
-    words = [f"{text}." for text in about["remarks"]]
-    words += [f"{name}: {text}." for name, text in about["definitions"].items()]
+    words = [*(f"{text}." for text in about["remarks"]), "docs/glossary.md says what each column is."]
     return text_table(title(about), COLUMNS, lines, numeric=RIGHT, notes=words, kinds=kinds)

@@ -7,6 +7,7 @@ import hashlib
 import json
 from collections import Counter
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from importlib import resources
@@ -111,7 +112,10 @@ def compared_section(subject: ReportData) -> Section:
 def costs_section(subject: ReportData) -> Section:
     """Return the section of what `tactbench cost` has left in the folder."""
     folder = subject.results.store.folder
-    tables = tuple(ladder_table(json.loads(path.read_bytes())) for path in sorted((folder / "cost").glob("*.json")))
+    tables = []
+    for path in sorted((folder / "cost").glob("*.json")):
+        with suppress(KeyError, TypeError, ValueError):  # twin.json has no such table, nor has a damaged file
+            tables.append(ladder_table(json.loads(path.read_bytes())))
     pictures = tuple(
         Picture(path.stem, "As `tactbench cost` has drawn it.", path.read_bytes())
         for path in sorted((folder / "cost").glob("*.png"))
@@ -120,7 +124,7 @@ def costs_section(subject: ReportData) -> Section:
     some = next(timed, None)
     command = command_line("tactbench", "cost", *(("--sensor", some["sensor"], "--task", some["task"]) if some else ()))
     lacks = f"What an answer costs in time beside its score: `{command}`; of the simulation: `tactbench cost --twin`."
-    return Section(tables=tables, pictures=pictures,
+    return Section(tables=tuple(tables), pictures=pictures,
                    missing=() if tables or pictures else (lacks,))  # fmt: skip
 
 

@@ -215,8 +215,7 @@ def build(context: RigContext) -> Bench:
     if context.rig_file is None:
         raise UsageError(
             "The rig 'bench' needs to know its devices.",
-            hint="Name a rig file with --rig-file FILE; `tactbench emulate biotac net-ft --write-rig-file FILE` makes "
-            "one.",
+            hint="Name a rig file with --rig-file FILE; `tactbench emulate biotac net-ft > FILE` makes one.",
         )
     physics = physics_of(context.rig_file, load_registry())
     return Bench(context.rig_file, context.operator, physics)

@@ -63,8 +63,3 @@ def test_what_is_printed_is_json(there, verb):
     with unrendered():
         found = json.loads(there(*verb.split(), *VERBS[verb], "--format", "json").stdout)
     assert found, "and it says something"
-
-
-def test_likeness_is_json_as_well(verbs):
-    found = json.loads(verbs("twin", "verify", "--real", "--only", "icub", "--format", "json").stdout)
-    assert {type(verdict["met"]) for verdict in found} == {bool}

@@ -30,7 +30,6 @@ from tests.core.cli.terminals import (
 )
 from tests.links.ends import pty
 
-COLOUR = re.compile(r"\x1b\[[0-9;]*[34][0-7][0-9;]*m")
 TWO_AND_A_HALF = "force 2.50 N, wanted 1.11 N"
 WIRED = ROOT / "tests" / "third_party" / "wired"
 RECORD = ("-m", "tactbench", "record", "--sensor", "icub", "--indenter", "cap:radius=10", "--out", "press.h5", "--live")
@@ -135,15 +134,6 @@ def test_whoever_is_asked_has_the_terminal(tmp_path):
         terminal.last_words()
 
 
-def test_no_colour_where_none_is_wanted(tmp_path):
-    with fed(tmp_path, NO_COLOR="1") as (terminal, tell):
-        tell("gap")
-        terminal.read_screen_with("taxels")
-        tell("end", wait=False)
-        terminal.last_words()
-    assert not COLOUR.search(terminal.seen)
-
-
 def test_a_terminal_without_a_cursor_gets_lines(tmp_path):
     with fed(tmp_path, TERM="dumb") as (terminal, tell):
         tell("force 2.5")
@@ -167,17 +157,8 @@ def test_a_recording_of_the_twin_leaves_its_last_state(tmp_path):
 @contextmanager
 def wired(tmp_path, seconds):
     """Record a pad on a line that the test speaks for; give the terminal and the far end of the line."""
-    command = [
-        "-m",
-        "tactbench",
-        "record",
-        "--sensor",
-        "wired-pad",
-        "--rig",
-        "wired-rig",
-        "--profile",
-        f"ramp:duration={seconds}",
-    ]
+    command = ["-m", "tactbench", "record", "--sensor", "wired-pad", "--rig", "wired-rig"]
+    command += ["--profile", f"ramp:duration={seconds}"]
     with pty() as line:
         address = f"serial://{line.name}?baud=115200"
         options = {"cwd": tmp_path, "path": [WIRED], "WIRED_LINK": address}
@@ -220,13 +201,6 @@ def test_ctrl_c_leaves_the_terminal_as_it_was(tmp_path):
     assert (tmp_path / "press.h5").exists()
 
 
-def test_without_a_terminal_a_line_says_it(verbs):
-    done = verbs(*RECORD[2:])
-    assert "icub on twin (SIM), cap R 10 mm: 60.0 of 60.0 s; force " in done.stderr
-    assert "taxels 83.33/83.33 Hz" in done.stderr
-    assert "\x1b" not in done.stderr
-
-
 def state_of(*blocks, rate_hz=100.0, channels=2):
     spec = StreamSpec(
         name="s", rate_hz=rate_hz, channels=tuple(ChannelSpec(name=f"c{n}", kind="taxel") for n in range(channels))
@@ -245,19 +219,12 @@ def test_a_rate_is_that_of_the_last_two_seconds():
     assert state_of(*slow).rate_hz == pytest.approx(50)
     assert state_of(*slow, *quick).rate_hz == pytest.approx(100, rel=0.01), "the first of the two ends before"
     assert state_of(slow[0]).rate_hz == pytest.approx(50)
-
-
-def test_rows_that_come_together_do_not_count_twice():
     bursts = [Block("s", np.full(10, n * 100_000_000), np.zeros((10, 2))) for n in range(30)]
-    assert state_of(bursts[0]).rate_hz is None
-    assert state_of(*bursts[:2]).rate_hz == pytest.approx(100)
-    assert state_of(*bursts).rate_hz == pytest.approx(100)
-
-
-def test_without_a_clock_there_is_no_rate():
-    state = state_of(Block("s", None, np.ones((10, 2))), Block("s", None, np.zeros((10, 2))))
-    assert (state.rows, state.rate_hz, state.last_ns) == (20, None, None)
-    assert state.level.tolist() == [1, 1], "the first block's"
+    assert state_of(bursts[0]).rate_hz is None, "rows that come together do not count twice"
+    assert state_of(*bursts[:2]).rate_hz == state_of(*bursts).rate_hz == pytest.approx(100)
+    timeless = state_of(Block("s", None, np.ones((10, 2))), Block("s", None, np.zeros((10, 2))))
+    assert (timeless.rows, timeless.rate_hz, timeless.last_ns) == (20, None, None)
+    assert timeless.level.tolist() == [1, 1], "the first block's"
 
 
 def test_the_level_is_the_mean_of_the_first_half_second_and_missing_samples_are_in_none():
@@ -308,32 +275,12 @@ def test_a_picture_fits_whatever_there_is(width, height, taxels):
     assert max(map(len, lines)) <= width
 
 
-def test_taxels_without_room_are_counted():
-    names = [f"t{n}" for n in range(1, 101)]
-    stream = StreamSpec(name="s", channels=tuple(ChannelSpec(name=name, kind="taxel") for name in names))
-    view = watched(sensor=[stream])
-    view.sensor[0].take(Block("s", np.array([0, 10**9]), np.array([np.zeros(100), np.arange(100) - 50])))
-    text = "\n".join(drawn(view, 80, 24))
-    assert re.search(r"t1 +-50 ━", text)
-    shown = sum(bool(re.search(rf"\b{name} ", text)) for name in names)
-    assert shown + int(re.search(r"… (\d+) more", text)[1]) == 100
-
-
 def test_nothing_from_a_stream_is_said_and_no_force_is_no_error():
     view = watched(reference=())
     text = "\n".join(drawn(view, 80, 24))
     assert "no reference force" in text
     assert "waiting for samples" in text
     assert one_line(view) == "title: no times yet; pad -/100 Hz"
-
-
-def test_a_saturated_force_is_said():
-    view = watched()
-    view.reference[0].take(
-        Block("scale", np.arange(1), np.full((1, 1), 5.0), np.full((1, 1), Quality.SATURATED, np.uint8))
-    )
-    assert "SATURATED" in drawn(view, 80, 24)[1]
-    assert "SATURATED" in one_line(view)
 
 
 def test_blocks_of_streams_that_nobody_announced_are_passed_over(capsys):

@@ -121,20 +121,8 @@ def test_a_cell_that_fails_is_a_row_and_stops_nobody(ran):
 
 
 def test_a_strangers_sensor_runs(shell):
-    done = shell(
-        "run",
-        "--repeats",
-        "1",
-        "--sensor",
-        "acme-pad",
-        "--task",
-        "force",
-        "--estimator",
-        "lasso",
-        "--format",
-        "json",
-        plugins=("good", "broken"),
-    )
+    asked = ("--sensor", "acme-pad", "--task", "force", "--estimator", "lasso", "--format", "json")
+    done = shell("run", "--repeats", "1", *asked, plugins=("good", "broken"))
     rows = json.loads(done.stdout)
     assert {row["status"] for row in rows} == {"done"}
     (lasso,) = [row for row in rows if row["estimator"] == "lasso" and not row["params"]]

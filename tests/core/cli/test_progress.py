@@ -31,28 +31,6 @@ def test_a_line_a_tenth_says_how_far_how_many_stopped_and_how_long_still(capsys)
     assert shown[-1] == "evaluating: 40/40 cell 39 (2 stopped)"
 
 
-def test_of_few_steps_each_has_a_line_and_none_tells_how_long_others_take(capsys):
-    lines = Lines(Clock())
-    lines.begin("evaluating", 4)
-    for number in range(4):
-        lines.advance(f"cell {number}", stopped=number == 1)
-    shown = capsys.readouterr().err.splitlines()
-    assert shown[1:] == [
-        "evaluating: 1/4 cell 0",
-        "evaluating: 2/4 cell 1 (1 stopped)",
-        "evaluating: 3/4 cell 2 (1 stopped)",
-        "evaluating: 4/4 cell 3 (1 stopped)",
-    ]
-
-
-def test_ten_thousand_cells_are_ten_lines(capsys):
-    lines = Lines(Clock())
-    lines.begin("evaluating", 10_000)
-    for number in range(10_000):
-        lines.advance(str(number))
-    assert len(capsys.readouterr().err.splitlines()) == 11
-
-
 @pytest.mark.parametrize(
     ("seconds", "shown"), [(0.2, "1 s"), (40, "40 s"), (120, "2 min"), (5400, "1 h 30 min"), (90_000, "25 h 0 min")]
 )
@@ -73,11 +51,6 @@ def test_the_end_names_every_stopped_cell_and_how_to_look_into_it(capsys, tmp_pa
     assert f"tactbench why a/b/c --out {tmp_path}" in said.err
     assert f"tactbench why a/b/c --out {tmp_path} --again" in said.err
     assert max(len(line) for line in said.err.splitlines() if "a/b/d e" in line) < 260
-
-
-def test_all_well_says_nothing(capsys, tmp_path):
-    tell_stopped([], tmp_path)
-    assert capsys.readouterr() == ("", "")
 
 
 def test_a_reason_moves_no_cursor():

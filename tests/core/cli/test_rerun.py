@@ -104,7 +104,3 @@ def test_a_cell_that_fails_fails_again_and_shows_where(here):
     found = here("acme-raises", code=1)
     assert (found["status"], found["differences"]) == ("failed", [])
     assert "the pad came off" in found["traceback"]
-
-
-def test_an_unknown_cell_is_refused(here):
-    here.ask("why", "nobody", "--again", code=2)

@@ -122,13 +122,3 @@ def test_standard_output_that_cannot_be_written_is_one_error(tmp_path, where, sa
     done = subprocess.run(["bash", "-c", command], cwd=tmp_path, capture_output=True, text=True, timeout=60)
     assert done.returncode == 1
     assert_one_clear_screen(done, says)
-
-
-@pytest.mark.parametrize("files", [6, 8])
-def test_a_low_limit_of_open_files_is_met_with_words(tmp_path, files):
-    command = f"ulimit -n {files}; exec {shlex.quote(sys.executable)} -m tactbench list"
-    done = subprocess.run(["bash", "-c", command], cwd=tmp_path, capture_output=True, text=True, timeout=60)
-    assert done.returncode == 2
-    assert done.stderr == (
-        f"Error: {files} files may be open at once here, and 32 are needed.\n  Raise it: ulimit -n 1024\n"
-    )

@@ -25,6 +25,8 @@ def test_a_plan_is_explained_with_reasons_costs_and_bounds(verbs):
     assert rows["core"]["change"] == 0
     assert all(row["reason"] for row in rows.values())
     assert rows["creep"]["scenes"] == 3
+    # Nothing that the plan leaves out touches these scenes: not a digit of the score.
+    assert rows["contact"]["score"] == rows["contact"]["score_all_effects"]
 
 
 @pytest.mark.parametrize(("task", "slides"), [("slip", True), ("force", False)])
@@ -37,17 +39,6 @@ def test_friction_and_vibration_are_explained_where_a_task_slides_alone(verbs, t
     ):
         assert rows[effect]["included"] == slides
         assert rows[effect]["reason"].startswith(why if slides else "no tangential motion: the scene does not slide")
-
-
-def test_it_ends_with_the_score_with_all_effects_beside_that_with_those_chosen(verbs):
-    done = verbs("twin", "explain", "--sensor", "icub", "--task", "force", "--rounds", "1")
-    said = done.stdout[done.stdout.index("RMSE by ols (SIM)") :]
-    assert "chosen" in said
-    assert "all" in said
-    # Nothing that the plan leaves out touches these scenes: not a digit of the score.
-    assert "the very same score" in said
-    assert "Leaving out the others saved" in said
-    assert "recording and evaluating: " in done.stderr
 
 
 def test_what_an_effect_that_is_left_out_does_to_the_score_shows(verbs):
@@ -85,18 +76,8 @@ def test_what_was_asked_for_shows(verbs):
 
 
 def test_asked_effects_and_rungs_are_kept_with_the_recording(verbs):
-    verbs(
-        "record",
-        "--sensor",
-        "icub",
-        "--out",
-        "a.h5",
-        "--profile",
-        "ramp:duration=2",
-        "--effects=-noise",
-        "--set",
-        "rung=closed-form",
-    )
+    words = ("--profile", "ramp:duration=2", "--effects=-noise", "--set", "rung=closed-form")
+    verbs("record", "--sensor", "icub", "--out", "a.h5", *words)
     shown = verbs("inspect", "a.h5").stdout
     left_out = next(line for line in shown.splitlines() if "left out:" in line)
     assert "white-noise (asked)" in left_out
@@ -109,17 +90,8 @@ def test_a_scenario_is_listed_and_kept_with_the_recording(verbs):
     listed = verbs("list", "scenarios").stdout
     assert "hard-handled" in listed
     assert "biotac: pressed hard" in listed
-    verbs(
-        "record",
-        "--sensor",
-        "biotac",
-        "--out",
-        "a.h5",
-        "--profile",
-        "ramp:duration=1",
-        "--set",
-        "scenario=hard-handled",
-    )
+    words = ("--profile", "ramp:duration=1", "--set", "scenario=hard-handled")
+    verbs("record", "--sensor", "biotac", "--out", "a.h5", *words)
     assert "scenario = hard-handled" in verbs("inspect", "a.h5").stdout
 
 

@@ -11,19 +11,8 @@ import pytest
 from tests.conftest import ROOT, Verbs
 from tests.core.matrix.plugin_packages import write_acme
 
-RUN = (
-    "run",
-    "--repeats",
-    "1",
-    "--sensor",
-    "ideal",
-    "--task",
-    "force",
-    "--estimator",
-    "acme",
-    "--estimator",
-    "acme-raises",
-)
+RUN = ("run", "--repeats", "1", "--sensor", "ideal", "--task", "force", "--estimator", "acme", "--estimator",
+       "acme-raises")  # fmt: skip
 ACME = "ideal/force/twin/karl2016/acme/1"
 
 
@@ -83,14 +72,6 @@ def test_the_words_and_the_run_agree(here):
     # Back as it was: the first result is still there.
     filters.write_text(original)
     assert why(here)["answer"] == "hit"
-
-
-def test_what_changed_is_said_in_words(here):
-    (here.acme / "table.csv").write_text("1")
-    found = why(here)
-    assert found["answer"] == "miss"
-    assert any(said.startswith("source: acme ") for said in found["reasons"])
-    assert " source: acme " in here("why", "acme/1").stdout
 
 
 def test_a_recording_that_was_removed_or_replaced_is_named(here):

@@ -7,7 +7,7 @@ import math
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tactbench.core.cost.precision import diagrams, draw, front, precise, verdict
+from tactbench.core.cost.precision import diagrams, draw, front, precise, quickest_enough
 from tactbench.plugin.simulation import CostPoint
 
 
@@ -38,13 +38,11 @@ def test_a_score_to_be_maximised_is_given_with_its_sign_changed():
     assert front(scores, seconds=lambda p: p[0], error=lambda p: -p[1]) == [(1.0, 0.5), (3.0, 0.9)]
 
 
-def test_the_default_stands_beside_the_quickest_point_that_will_do():
+def test_the_quickest_point_that_will_do():
     quick, default, slow = _point(0.1, 0.5), _point(0.2, 0.05, default=True), _point(1.0, 0.01)
-    assert verdict([quick, default, slow]).endswith("quickest below a third of the noise (0.1 count): the default.")
-    assert "cheaper, 0.09 count rms in 100 ms." in verdict([_point(0.1, 0.09, label="cheaper"), default])
-    assert verdict([quick, _point(0.2, 0.2, default=True)]).endswith(": none.")
-    assert "no noise is stated" in verdict([_point(1, 1, default=True, floor=math.inf)])
-    assert "No default" in verdict([quick])
+    assert quickest_enough([quick, default, slow]) is default
+    assert quickest_enough([quick, _point(0.2, 0.2)]) is None
+    assert quickest_enough([_point(1, 1, floor=math.inf)]) is None, "no noise is stated"
 
 
 def test_a_figure_has_a_panel_for_every_observable(tmp_path):
