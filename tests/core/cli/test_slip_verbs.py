@@ -43,7 +43,6 @@ def test_tables_and_pages_tell_of_events(answered):
     verbs, _ = answered
     table = verbs("leaderboard", "--wide").stdout
     assert "Events, at the threshold that validation recordings chose" in table
-    assert "force-ratio reads the reference sensor" in table
     assert " oracle  " in table
     why = verbs("why", "made/slip/replay/deployable/pac-band").stdout
     assert re.search(r"false alarms per minute +0\n", why)
