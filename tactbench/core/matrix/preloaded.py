@@ -10,6 +10,11 @@ if hasattr(os, "setsid"):
     with suppress(OSError):
         os.setsid()  # Ctrl-C in a terminal reaches the run alone, which ends its workers
 
+# A pipe that the run writes to ends with the run: workers print to logs of their own.
+nowhere = os.open(os.devnull, os.O_WRONLY)
+for stream in (1, 2):
+    os.dup2(nowhere, stream)
+
 for library in ("h5py", "scipy.linalg", "scipy.signal", "tactbench.core.acquisition"):
     import_module(library)
 
