@@ -14,7 +14,7 @@ from pathlib import Path
 import pytest
 from hypothesis import settings
 
-from tactbench.core.pool import start_server
+from tactbench.core.pool import preload
 
 # A shared machine is slow at times: a deadline would test the machine. Continuous integration draws the same examples
 # every time, so that a red run means a change; people's own runs keep exploring.
@@ -42,7 +42,7 @@ os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 # There is one fork server for each process, and it keeps what it was started with. Without scikit-learn every cell of
 # every test would import that again, which takes five times as long as the cell: so it is started before any test
 # module is imported.
-start_server("tactbench.core.matrix.preloaded")
+preload("tactbench.core.matrix.preloaded")
 
 # A shell's background jobs are deaf to Ctrl-C, and so is all that they start: tests that send one would wait for ever.
 if signal.getsignal(signal.SIGINT) == signal.SIG_IGN:

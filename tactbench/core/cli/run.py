@@ -65,11 +65,9 @@ def command(
     from tactbench.core.matrix.run import EngineChoice, run_matrix
     from tactbench.core.matrix.store import Store
     from tactbench.core.plugins.registry import installed
-    from tactbench.core.pool import Limits, start_server
+    from tactbench.core.pool import Limits
     from tactbench.core.statistics.replicates import over_replicates
 
-    if engine != "in-process":
-        start_server("tactbench.core.matrix.preloaded")  # imports libraries while this process plans
     tell_failed(installed())
     matrix, folder = requested_matrix(installed(), **selection)
     limits = Limits(  # what the options leave open, the matrix file says

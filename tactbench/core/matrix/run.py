@@ -22,7 +22,7 @@ from tactbench.core.matrix.summary import fill_baselines
 from tactbench.core.plugins.declared import declared_in, with_declared
 from tactbench.core.plugins.interfaces import Operator
 from tactbench.core.plugins.registry import Registry, installed
-from tactbench.core.pool import UNLIMITED, Engine, InProcess, Limits, Pool, start_server
+from tactbench.core.pool import UNLIMITED, Engine, InProcess, Limits, Pool, preload
 from tactbench.core.pool.limits import can_refuse_memory
 from tactbench.core.provenance.gather import gather, usable_cores
 from tactbench.core.spec.matrix import MatrixSpec
@@ -131,8 +131,7 @@ def run_matrix(
     if choice.name == "dask":
         matrix = matrix.model_copy(update={"latency": False})  # a cluster's cells are never alone on their machine
     with store.hold():
-        if choice.name != "in-process":
-            start_server("tactbench.core.matrix.preloaded")
+        preload("tactbench.core.matrix.preloaded")
         registry = with_declared(installed(), declared_in(recordings))
         keys = Keys(registry)
         cells, plan = plan_run(matrix, registry, keys, store, recordings, choice.limits)

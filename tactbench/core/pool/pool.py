@@ -275,13 +275,9 @@ def _context() -> Any:
 _preload = ["tactbench.core.pool.child"]
 
 
-def start_server(*modules: str) -> None:
-    """Have the fork server import `modules`, and start it now, so that it imports them while this process goes on."""
+def preload(*modules: str) -> None:
+    """Have the fork server import `modules` when it starts, which is when the first process is needed."""
     _preload.extend(name for name in modules if name not in _preload)
-    if _context().get_start_method() == "forkserver":
-        from multiprocessing import forkserver
-
-        _start(forkserver.ensure_running)
 
 
 def _start(start: Callable[[], None]) -> None:
