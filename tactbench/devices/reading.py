@@ -34,13 +34,17 @@ UNRATED_ROWS = 4096
 class _Stream:
     """One stream on its way from driver to caller."""
 
-    def __init__(self, spec: StreamSpec, queue_s: float, block_s: float) -> None:
+    def __init__(self, device: str, spec: StreamSpec, queue_s: float, block_s: float) -> None:
+        self.device = device
+        self.rated = spec.rate_hz is not None
+        self.came_ns = 0
         self.check = SequenceCheck()
         self.queue = BlockQueue(spec, queue_s)
         self.written = 0
         self.most_rows = UNRATED_ROWS if spec.rate_hz is None else math.ceil(2 * block_s * spec.rate_hz)
 
-    def put(self, block: Block) -> None:
+    def put(self, block: Block, now_ns: int) -> None:
+        self.came_ns = now_ns
         kept = self.check(block)
         if kept is not None:
             self.queue.put(kept)
@@ -77,6 +81,8 @@ class Reading:
         Seconds of data that a caller may be behind.
     block_s
         Seconds of data in a block, about: never more than twice as much.
+    silent_s
+        A stream with a rate of which nothing came for longer ends the reading.
     """
 
     def __init__(
@@ -87,6 +93,7 @@ class Reading:
         advance: Callable[[int], None] | None = None,
         queue_s: float = 5.0,
         block_s: float = 0.05,
+        silent_s: float = math.inf,
     ) -> None:
         if not (0 < block_s < queue_s < math.inf):
             raise UsageError(
@@ -98,6 +105,7 @@ class Reading:
         self._advance = advance
         self._queue_s = queue_s
         self._block_s = block_s
+        self._silent_ns = 1e9 * silent_s
         self._streams: dict[str, _Stream] = {}
         self._counts: dict[str, Mapping[str, int]] = {name: {} for name in self._drivers}
         self._to_stop: list[str] = []
@@ -118,7 +126,7 @@ class Reading:
                             f"The stream {spec.name!r} of {name} is there already, of another device.",
                             hint="Streams of one recording have different names.",
                         )
-                    self._streams[spec.name] = _Stream(spec, self._queue_s, self._block_s)
+                    self._streams[spec.name] = _Stream(name, spec, self._queue_s, self._block_s)
                 if self._advance is None:
                     # It is read at once: the next device may take longer to start than the link's buffers last.
                     threading.Thread(
@@ -190,7 +198,7 @@ class Reading:
         is_over
             Asked at every block's time, whether or not a device has sent anything: true ends the reading too.
         """
-        now_ns = self._clock()
+        now_ns = began_ns = self._clock()
         end_ns = now_ns + (math.inf if duration_s == math.inf else round(1e9 * duration_s))
         while not (self._over.is_set() or is_over()) and now_ns < end_ns:
             until_ns = int(min(now_ns + round(1e9 * self._block_s), end_ns))
@@ -200,8 +208,16 @@ class Reading:
             else:
                 now_ns = self._carry(self._advance, now_ns, until_ns)
             yield from self._waiting()
+            self._listen(now_ns, began_ns)
         self._finish()
         yield from self._waiting()
+
+    def _listen(self, now_ns: int, began_ns: int) -> None:
+        """End the reading if a stream has been silent for too long."""
+        for name, stream in self._streams.items():
+            silent_ns = now_ns - max(began_ns, stream.came_ns)
+            if stream.rated and silent_ns > self._silent_ns:
+                self._fail(stream.device, RigError(f"Nothing came of {name} for {1e-9 * silent_ns:.3g} s."))
 
     def _waiting(self) -> Iterator[Block]:
         for stream in self._streams.values():
@@ -216,7 +232,7 @@ class Reading:
                     f"A block of stream {block.stream!r} came, which {name} did not announce.",
                     hint="Correct the driver: its streams are fixed once it is started.",
                 )
-            self._streams[block.stream].put(block)
+            self._streams[block.stream].put(block, self._clock())
         return bool(blocks)
 
     def _carry(self, advance: Callable[[int], None], now_ns: int, until_ns: int) -> int:

@@ -31,6 +31,8 @@ SELECTING = (
                  help="Number of replicates, each with its own seed. Default: 8 if simulated, else 1."),
     click.option("--seed", type=click.IntRange(min=0), metavar="N", help="Seed of the first replicate."),
     click.option("--probe", is_flag=True, help="Add leakage probes: first frame only, shuffled rows."),
+    click.option("--include-incomplete", is_flag=True,
+                 help="Let recordings take part that lack more than their rig file allows."),
     *SIMULATION,
 )  # fmt: skip
 """Given to `requested_matrix`."""
@@ -51,6 +53,7 @@ def requested_matrix(
     repeats: int | None,
     seed: int | None,
     probe: bool,
+    include_incomplete: bool,
     effects: str | None,
     settings: tuple[str, ...],
 ) -> tuple[MatrixSpec, Path | None]:
@@ -78,6 +81,7 @@ def requested_matrix(
         "repeats": repeats,
         "seed": seed,
         "probe": probe or None,
+        "include_incomplete": include_incomplete or None,
     }
     change |= {name: value for name, value in stated.items() if value is not None}
     chosen: list[TaskChoice] = []

@@ -65,6 +65,7 @@ from tactbench.core.evaluation.splits import (
 )
 from tactbench.core.evaluation.summaries import summarised, without_windows
 from tactbench.core.plugins.interfaces import Estimator
+from tactbench.core.recording.completeness import INCOMPLETE
 from tactbench.core.samples import Answers, FloatArray, Fold, IntArray, Part
 from tactbench.core.spec.recording import RecordingMeta
 from tactbench.core.spec.rig import EstimatorDescriptor
@@ -496,7 +497,7 @@ def _result(
     held_s = tare_s(data.recorded) if data.rules.tare else 0.0
     if data.rules.tare and not held_s:
         remarks.append("not tared: no recording states an unloaded hold")
-    remarks += [_untrained(answered), *delay_remarks]
+    remarks += [_untrained(answered), *delay_remarks, _incomplete(data.recorded)]
     took_part, left_out, stamps = _part_taken(data)
     return Result(
         metric=metric.name,
@@ -581,6 +582,20 @@ def _of_answers(data: TaskData, descriptor: EstimatorDescriptor, answered: Seque
             "raises an alarm"
         )
     return remarks
+
+
+def _incomplete(recorded: Dataset) -> str:
+    """Return how many incomplete recordings were left out or taken, and why they are incomplete."""
+    out = {name: n for name, n in recorded.counts.items() if name.startswith(f"recordings left out ({INCOMPLETE}")}
+    taken = [meta.excluded for meta in recorded.metas if meta.excluded]
+    every = sum(out.values()) + len(recorded.metas)
+    texts = (
+        [f"{sum(out.values())} of {every} recordings left out: {'; '.join(sorted(name[21:-1] for name in out))}"]
+        if out
+        else []
+    )
+    texts += [f"{len(taken)} of {every} recordings take part although {'; '.join(sorted(set(taken)))}"] if taken else []
+    return "; ".join(texts)
 
 
 def _untrained(answered: Sequence[AnsweredFold]) -> str:

@@ -67,18 +67,19 @@ _prepared: set[tuple[int, str, str]] = set()
 """By process: after a fork, memory pages are copied at first use, which a clock would count."""
 
 
-def dataset(task: TaskSpec, recordings: tuple[Path, ...]) -> Dataset:
+def dataset(task: TaskSpec, recordings: tuple[Path, ...], include_incomplete: bool = False) -> Dataset:
     """Return `recordings` as a task needs them; cells in a row that need the same share what is read."""
     from tactbench.core.evaluation.dataset import load_dataset
 
-    if _last[:2] != [task, recordings]:
-        _last[:] = [task, recordings, load_dataset(task, recordings)]
-    found: Dataset = _last[2]
+    if _last[:3] != [task, recordings, include_incomplete]:
+        read = load_dataset(task, recordings, include_incomplete=include_incomplete)
+        _last[:] = [task, recordings, include_incomplete, read]
+    found: Dataset = _last[3]
     return found
 
 
 _last: list[Any] = []
-"""Task and recordings that were read last, and what came of them."""
+"""Task, recordings and whether incomplete ones take part, that were read last, and what came of them."""
 
 
 Solved = tuple[Row, "dict[str, Answers]"]
@@ -108,7 +109,7 @@ def solve(job: Job, concurrency: int = 1) -> Solved:
     # The global generators get the cell's seed: what is drawn from them does not depend on the cells before.
     random.seed(cell.seed)
     np.random.seed(cell.seed % 2**32)  # noqa: NPY002  (it is this old generator that libraries draw from)
-    data = dataset(task, recordings)
+    data = dataset(task, recordings, cell.include_incomplete)
     context = CellContext(
         task, estimator, dict(cell.params), cell.protocol, cell.split, seed=cell.seed, clock=time.perf_counter,
         latency=cell.timed,
@@ -147,7 +148,10 @@ def check_content(job: Job) -> None:
 def opening(cell: Cell, task: TaskSpec, *, simulated: bool = False) -> Row:
     """Return a row with what is known before anything is computed; every key of the format is there."""
     unknown = {name: field.get_default(call_default_factory=True) for name, field in RowModel.model_fields.items()}
-    alike = ("sensor", "task", "rig", "protocol", "split", "estimator", "repeat", "repeats", "seed", "declared_task")
+    alike = (
+        "sensor", "task", "rig", "protocol", "split", "estimator", "repeat", "repeats", "seed", "declared_task",
+        "include_incomplete",
+    )  # fmt: skip
     asked = ("answer_per", "answer_from", "metric", "unit", "equivalence", "reference_score")
     return {
         **unknown,

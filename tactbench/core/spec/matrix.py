@@ -89,6 +89,8 @@ class MatrixSpec(Frozen):
     """Also run the cells that show what recordings give away; see docs/real-recordings.md."""
     latency: bool = True
     """Measure how long one row takes, up to 0.3 s a cell; False: rows say nothing about it."""
+    include_incomplete: bool = False
+    """Let recordings of which more is missing than their rig file allows take part."""
     simulation: Simulation = Simulation()
     """How a simulated rig is asked to carry out every scene."""
     sensors: tuple[str, ...] = ()

@@ -53,6 +53,17 @@ class ForceEntry(DeviceEntry):
     """Seconds without load before each scene whose mean becomes zero on every channel; 0: the device keeps its own."""
 
 
+class Allowed(Frozen):
+    """What a recording may lack; one that lacks more is incomplete, and takes no part in a score unless asked for."""
+
+    silent_s: float = Field(default=2.0, gt=0)
+    """Longest time without a row of a stream that has a rate. A longer one ends the scene."""
+    lost_percent: float = Field(default=2.0, ge=0, le=100)
+    """Rows of a stream that never came, or were dropped since writing was behind."""
+    frozen_s: float = Field(default=2.0, gt=0)
+    """Longest time in which no channel of the force sensor changes; or of a sensor's stream, while the force does."""
+
+
 class NamedDevice(DeviceEntry):
     """A further device, such as a motor."""
 
@@ -85,6 +96,7 @@ class RigFile(Frozen):
     devices: dict[str, NamedDevice] = Field(default_factory=dict)
     """Further devices by their part in the rig, such as `motor`."""
     emulation: EmulationSettings = EmulationSettings()
+    allowed: Allowed = Allowed()
     settings: dict[str, Any] = Field(default_factory=dict)
     """The rig's own, which it checks itself."""
 

@@ -33,7 +33,6 @@ from tactbench.plugin.devices import (
     DeviceAcquisition,
     Driver,
     EmulatedDevices,
-    Emulation,
     Operator,
     PressingForce,
     Reading,
@@ -43,7 +42,6 @@ from tactbench.plugin.devices import (
     StreamCounts,
     ask_operator,
     drivers_of,
-    emulation_of,
     emulators_of,
     physics_of,
     with_sensor,
@@ -66,7 +64,6 @@ class BenchAcquisition:
     assumptions: Mapping[str, Scalar]
     drawn: Mapping[str, Scalar]
     clocks: Mapping[str, StreamClock]
-    emulation: Emulation | None
     reading: Reading = field(repr=False)
     duration_s: float
     force: PressingForce | None
@@ -75,12 +72,8 @@ class BenchAcquisition:
 
     def __iter__(self) -> Iterator[Block]:
         """Yield blocks until the scene is over, or a device is gone."""
-        began_s = time.perf_counter()
         for block in self.reading.blocks(self.duration_s):
             yield block if self.force is None else self.force.turned(block, self.zero)
-        spent_s = time.perf_counter() - began_s
-        if self.emulation is not None and spent_s > 0:
-            self.emulation = self.emulation.model_copy(update={"factor": self.duration_s / spent_s})
 
     @property
     def stream_counts(self) -> Mapping[str, StreamCounts]:
@@ -147,7 +140,9 @@ class Bench:
             self._prompt(file, sensor, scene)
             advance = emulated.advance if emulated is not None and file.emulation.time == "virtual" else None
             zero = _zero_of(drivers[FORCE], file.force.zero_s, clock) if file.force is not None else {}
-            reading = stack.enter_context(Reading(drivers, clock=clock, advance=advance))
+            reading = stack.enter_context(
+                Reading(drivers, clock=clock, advance=advance, silent_s=file.allowed.silent_s)
+            )
             own = drivers[sensor.name].streams
             force = None if file.force is None else PressingForce(file.force, drivers[FORCE].streams)
             if senses is not None:
@@ -163,7 +158,6 @@ class Bench:
                     **({} if force is None else force.about(zero)),
                 },
                 clocks={},
-                emulation=emulation_of(file, identity),
                 reading=reading,
                 duration_s=duration_s,
                 force=force,

@@ -6,17 +6,19 @@ import numpy as np
 import pytest
 
 from tactbench.core.acquisition import acquire
-from tactbench.core.errors import RigError, UsageError
+from tactbench.core.errors import DataError, RigError, UsageError
+from tactbench.core.evaluation.dataset import load_dataset
 from tactbench.core.recording.health import examine
 from tactbench.core.recording.reader import open_recording
 from tactbench.core.spec.quantity import assumed
-from tactbench.core.spec.rig_file import EmulationSettings
+from tactbench.core.spec.rig_file import Allowed, EmulationSettings
 from tactbench.plugin import ForceRamp, Quality, RigContext, Scene, load_object, load_registry
 from tactbench.plugin.devices import DeviceEntry, ForceEntry, RigFile
 from tactbench.sensors.icub.emulator import Bus
 
 REGISTRY = load_registry()
 SECONDS = 2.0
+TASK = REGISTRY.tasks["force"].spec
 SCENE = Scene(
     name="press",
     profile=ForceRamp(
@@ -45,7 +47,7 @@ def press(path, file, sensor="icub", scene=SCENE, operator=None):
     try:
         acquire(
             bench(file, operator), REGISTRY.sensors[sensor], REGISTRY.rigs["bench"], scene, role=None, seed=7,
-            path=path, clock=lambda: 0.0, provenance={}, complete_interrupted=True,
+            path=path, clock=lambda: 0.0, provenance={}, complete_interrupted=True, rig_file=file,
         )  # fmt: skip
     except RigError as raised:
         error = raised
@@ -178,12 +180,35 @@ def test_a_saturated_force_sensor_marks_every_channel(tmp_path):
 @pytest.mark.parametrize("part", ["sensor", "force"])
 def test_a_pulled_cable_ends_the_scene_and_keeps_what_there_is(tmp_path, part):
     faults = {"faults" if part == "sensor" else "force_faults": ("unplug:start_s=2.0",)}
-    error = press(tmp_path / "p.h5", rig_file(**faults))
-    assert error is not None
-    assert "is gone" in error.message
+    assert press(tmp_path / "p.h5", rig_file(**faults)) is None
     meta, streams = read(tmp_path / "p.h5")
-    assert meta.excluded.startswith("interrupted: ")
+    assert meta.excluded.startswith("incomplete: ended before its time: ")
+    assert "is gone" in meta.excluded
     assert 10 < len(streams["taxels"].data) < 50 * SECONDS
+
+
+@pytest.mark.parametrize(
+    ("part", "fault", "stream"),
+    [("force", "dropped:start_s=1.2", "force_torque"), ("sensor", "dropped-frame:start_s=1.2", "taxels")],
+)
+def test_a_device_that_falls_silent_ends_the_scene_and_the_recording_is_incomplete(tmp_path, part, fault, stream):
+    """Of the force sensor that is no small matter: what lacks it was evaluated as a whole recording."""
+    file = rig_file(**{"faults" if part == "sensor" else "force_faults": (fault,)})
+    file = file.model_copy(update={"allowed": Allowed(silent_s=0.3)})
+    assert press(tmp_path / "p.h5", file) is None
+    meta, streams = read(tmp_path / "p.h5")
+    assert meta.excluded.startswith("incomplete: ended before its time: ")
+    assert f"Nothing came of {stream} for 0.3" in meta.excluded
+    assert len(streams["taxels"].data) < 40 * SECONDS  # the scene ended
+    with pytest.raises(DataError, match=f"1 recordings left out.*{stream}"):
+        load_dataset(TASK, [tmp_path / "p.h5"])
+    assert load_dataset(TASK, [tmp_path / "p.h5"], include_incomplete=True).metas == (meta,)
+
+
+def test_losses_beyond_what_is_allowed_make_it_incomplete(tmp_path):
+    assert press(tmp_path / "p.h5", rig_file(force_faults=("dropped:every=20",))) is None
+    meta, _ = read(tmp_path / "p.h5")
+    assert meta.excluded.startswith("incomplete: force_torque: ")
 
 
 def test_a_sensor_that_sends_nothing_is_told_and_the_recording_left_out_of_every_evaluation(tmp_path, monkeypatch):
