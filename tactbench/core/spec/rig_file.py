@@ -51,6 +51,13 @@ class ForceEntry(DeviceEntry):
     """-1: pressing makes that channel fall."""
     zero_s: float = Field(default=2.0, ge=0)
     """Seconds without load before each scene whose mean becomes zero on every channel; 0: the device keeps its own."""
+    range_n: float = Field(default=25.0, gt=0)
+    """Rated range of its forces; by default that of a Nano17 SI-25-0.25. A zero of more than a tenth of it is refused,
+    and while it is taken a spread of more than a twentieth and a drift of more than a hundredth."""
+    noise_n: float | None = Field(default=None, gt=0)
+    """Standard deviation of its forces without load; a spread of twice that is refused. None: not known."""
+    largest_zero_n: float | None = Field(default=None, gt=0)
+    """In place of a tenth of the range: for a heavy indenter, or a sensor that was never biased."""
 
 
 class Allowed(Frozen):

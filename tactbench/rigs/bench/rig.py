@@ -11,9 +11,7 @@ from collections.abc import Iterator, Mapping
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field
 from functools import partial
-from typing import TYPE_CHECKING, Any
-
-import numpy as np
+from typing import TYPE_CHECKING
 
 from tactbench.plugin import (
     Acquisition,
@@ -48,8 +46,6 @@ from tactbench.plugin.devices import (
 )
 
 if TYPE_CHECKING:
-    import numpy.typing as npt
-
     from tactbench.plugin import FloatArray
     from tactbench.plugin.devices import Clock
 
@@ -137,14 +133,14 @@ class Bench:
             for driver in drivers.values():
                 stack.callback(driver.close)
             identity = {name: driver.identify() for name, driver in drivers.items()}
-            self._prompt(file, sensor, scene)
+            force = None if file.force is None else PressingForce(file.force, drivers[FORCE].streams)
+            zero = {} if force is None else self._zero(force, file, drivers[FORCE], clock)
+            self._prompt(force, zero, file, sensor, scene)
             advance = emulated.advance if emulated is not None and file.emulation.time == "virtual" else None
-            zero = _zero_of(drivers[FORCE], file.force.zero_s, clock) if file.force is not None else {}
             reading = stack.enter_context(
                 Reading(drivers, clock=clock, advance=advance, silent_s=file.allowed.silent_s)
             )
             own = drivers[sensor.name].streams
-            force = None if file.force is None else PressingForce(file.force, drivers[FORCE].streams)
             if senses is not None:
                 senses.start(clock() * 1e-9)
             yield BenchAcquisition(
@@ -175,27 +171,37 @@ class Bench:
         with self._physics.open(sensor, scene, seed=seed) as acquisition:
             yield acquisition
 
-    def _prompt(self, file: RigFile, sensor: SensorDescriptor, scene: Scene) -> None:
+    def _zero(self, force: PressingForce, file: RigFile, driver: Driver, clock: Clock) -> dict[str, FloatArray]:
+        """Return what the force sensor reads without load, by stream; raises RigError if it is not at rest."""
+        assert file.force is not None
+        seconds = file.force.zero_s
+        blocks: list[Block] = []
+        if seconds > 0:
+            text = f"Take your hands off: nothing may touch the sensor while the force is zeroed, {seconds:g} s."
+            ask_operator(file, self._operator, "take the hands off", text)
+            driver.start()
+            until_ns = clock() + round(1e9 * seconds)
+            while clock() < until_ns:
+                blocks += driver.read(min(0.1, max(0.0, (until_ns - clock()) * 1e-9)))
+            driver.stop()
+        return force.zero(blocks)
+
+    def _prompt(
+        self,
+        force: PressingForce | None,
+        zero: Mapping[str, FloatArray],
+        file: RigFile,
+        sensor: SensorDescriptor,
+        scene: Scene,
+    ) -> None:
         profile = scene.profile
+        taken = "" if force is None else f"Zero of the force: {zero[force.stream][force.column]:.3g} N. "
         text = (
-            f"{scene.name}: {sensor.spec.title}, {scene.indenter}. Touch nothing for {profile.hold_s:.0f} s, then "
-            f"press slowly to {profile.largest_n:g} N and back, within {profile.duration.to('s'):.0f} s in all."
+            f"{scene.name}: {sensor.spec.title}, {scene.indenter}. {taken}Press now: touch nothing for the first "
+            f"{profile.hold_s:.0f} s, then press slowly to {profile.largest_n:g} N and back, within "
+            f"{profile.duration.to('s'):.0f} s in all."
         )
         ask_operator(file, self._operator, "press", text)
-
-
-def _zero_of(driver: Driver, seconds: float, clock: Clock) -> dict[str, FloatArray]:
-    """Return the mean of every channel of an unloaded force sensor over so many seconds, by stream; 0 without any."""
-    rows: dict[str, list[npt.NDArray[Any]]] = {}
-    if seconds > 0:
-        driver.start()
-        until_ns = clock() + round(1e9 * seconds)
-        while clock() < until_ns:
-            for block in driver.read(min(0.1, max(0.0, (until_ns - clock()) * 1e-9))):
-                rows.setdefault(block.stream, []).append(block.data)
-        driver.stop()
-    found = {stream.name: np.zeros(len(stream.channels)) for stream in driver.streams}
-    return found | {name: np.concatenate(blocks).mean(axis=0) for name, blocks in rows.items()}
 
 
 def build(context: RigContext) -> Bench:

@@ -407,8 +407,7 @@ class ParallelManipulator:
         force = PressingForce(file.force, (stream,))
         guard.force_blocks()  # of before
         guard.advance(clock() + round(1e9 * file.force.zero_s))
-        rows = [block.data for block in guard.force_blocks()]
-        zero = np.concatenate(rows).mean(axis=0) if rows else np.zeros(len(stream.channels))
+        zero = force.zero(guard.force_blocks())[stream.name]
         options = read_options(FaulhaberOptions, file.devices[MOTOR].options, "faulhaber")
         assert options.retreat_m is not None
         assert options.retreat_speed_m_s is not None

@@ -128,7 +128,6 @@ def test_an_incomplete_recording_takes_no_part_unless_asked_for_and_the_row_says
     assert f"1 of 4 recordings take part although {why}" in taken.remarks
 
 
-
 @pytest.mark.parametrize(
     ("spoil", "error", "says"),
     [

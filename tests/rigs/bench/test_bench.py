@@ -13,7 +13,7 @@ from tactbench.core.recording.reader import open_recording
 from tactbench.core.spec.quantity import assumed
 from tactbench.core.spec.rig_file import Allowed, EmulationSettings
 from tactbench.plugin import ForceRamp, Quality, RigContext, Scene, load_object, load_registry
-from tactbench.plugin.devices import DeviceEntry, ForceEntry, RigFile
+from tactbench.plugin.devices import DeviceEntry, EmulatedDevices, ForceEntry, RigFile, emulators_of
 from tactbench.sensors.icub.emulator import Bus
 
 REGISTRY = load_registry()
@@ -239,6 +239,41 @@ def test_the_zero_of_the_force_sensor_is_taken_off_and_said(tmp_path):
     assert len(meta.drawn["zero of force_torque"].split(", ")) == 6
     held = streams["force_torque"].data[:400, 2]
     assert abs(held.mean()) < 0.5  # .7 N of noise, held for a hundredth of a second: some 50 samples
+
+
+class Somebody:
+    """An operator who does as told, and notes what that was."""
+
+    def __init__(self):
+        self.told = []
+
+    def prompt(self, text):
+        self.told.append(text)
+
+
+def test_the_steps_are_prompted_in_order_and_a_loaded_force_sensor_gets_no_zero(tmp_path):
+    """Hands off, the zero, press now: the zero was taken after the word to press, from a hand that pressed already."""
+    somebody = Somebody()
+    file = rig_file()
+    with EmulatedDevices(emulators_of(file, REGISTRY, "icub", lambda t_s: {"fz": 4.09}), time="real") as loaded:
+        counts = {"counts_per_newton": 1e6, "counts_per_newton_metre": 1e6}
+        entries = {name: {"link": address, "emulator": True} for name, address in loaded.addresses.items()}
+        entries["force"]["options"] = counts
+        there = file.model_copy(
+            update={
+                "sensors": {"icub": file.sensors["icub"].model_copy(update=entries["icub"])},
+                "force": file.force.model_copy(update=entries["force"]),
+            }
+        )
+        error = press(tmp_path / "p.h5", there, operator=somebody)
+        assert error is not None
+        assert "fz has a mean of 4.09 N, allowed are 2.5 N" in error.message
+        assert [text[:19] for text in somebody.told] == ["Take your hands off"]
+        low = there.model_copy(update={"force": there.force.model_copy(update={"largest_zero_n": 5.0})})
+        assert press(tmp_path / "p.h5", low, operator=somebody) is None
+    assert [("hands off" in text, "Press now" in text) for text in somebody.told[1:]] == [(True, False), (False, True)]
+    assert "Zero of the force: 4.09 N" in somebody.told[-1]
+    assert read(tmp_path / "p.h5")[0].emulation.devices == ("icub", "force")
 
 
 def test_what_cannot_be_is_refused_with_the_next_step(tmp_path):
