@@ -17,6 +17,9 @@ _PARITY = {"none": "N", "even": "E", "odd": "O"}
 class ByteLink(Link):
     """A byte stream in both directions: a :class:`SerialLink`, or an emulated device's."""
 
+    def _take(self, timeout_s: float) -> Received:
+        return self.read(timeout_s)
+
     @abstractmethod
     def read(self, timeout_s: float, *, size: int = 65536) -> Received:
         """Return what has come, as soon as that is at least one byte.

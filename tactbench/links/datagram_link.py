@@ -16,6 +16,9 @@ LARGEST_DATAGRAM = 65507
 class DatagramLink(Link):
     """Datagrams to and from one peer: a :class:`UdpLink`, or an emulated device's."""
 
+    def _take(self, timeout_s: float) -> Received:
+        return self.receive(timeout_s)
+
     @abstractmethod
     def receive(self, timeout_s: float) -> Received:
         """Return the next datagram, whole.

@@ -37,8 +37,7 @@ if TYPE_CHECKING:
     from tactbench.links.address import open_link
     from tactbench.links.bridge_frame import Frame, FrameDecoder, encode_frame
     from tactbench.links.byte_link import ByteLink
-    from tactbench.links.can_link import CanFrame, CanLink
-    from tactbench.links.can_log import CanLog
+    from tactbench.links.can_link import CanFrame, CanLink, CanLog
     from tactbench.links.datagram_link import DatagramLink
     from tactbench.links.link import Clock, Link, Received
     from tactbench.links.spi_bridge import SpiBridge

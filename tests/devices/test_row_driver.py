@@ -34,7 +34,7 @@ STREAM = StreamSpec(
 class ByteDriver(RowDriver[ByteLink]):
     stream, link_kind, defaults = STREAM, ByteLink, {"unit": 1}
 
-    def start(self):
+    def begin(self):
         self.link.write(b"+")
 
     def quiet(self):

@@ -6,6 +6,7 @@ import os
 import socket
 import subprocess
 import sys
+import time
 
 import can
 import pytest
@@ -51,6 +52,20 @@ def test_what_is_no_frame_is_refused(frame):
         link.send(frame)
 
 
+def test_a_frame_has_the_time_at_which_the_kernel_had_it_on_the_links_clock():
+    """A process that is late reads frames later than they came."""
+    clock = lambda: time.monotonic_ns() - 7_000_000_000  # noqa: E731
+    with (
+        open_link("can://virtual/e", clock) as link,
+        can.Bus("e", "virtual", preserve_timestamps=True, ignore_config=True) as far,
+    ):
+        far.send(can.Message(arbitration_id=1, is_extended_id=False, timestamp=time.time() - 0.5))
+        came_ns = clock() - 500_000_000
+        assert abs(link.receive(1.0).t_ns - came_ns) < 100_000_000  # the two calls, on a busy machine
+        far.send(can.Message(arbitration_id=1, is_extended_id=False, timestamp=12.5))  # an adapter's own seconds
+        assert abs(link.receive(1.0).t_ns - clock()) < 100_000_000
+
+
 def test_settings_of_the_user_are_not_read(monkeypatch):
     """python-can takes settings from the environment unless told otherwise."""
     monkeypatch.setenv("CAN_CONFIG", '{"receive_own_messages": true}')
@@ -66,7 +81,7 @@ needs_pty = pytest.mark.skipif(os.name != "posix", reason="pseudo-terminals are 
 @needs_pty
 def test_slcan_says_what_an_adapter_expects():
     """Lawicel's commands: close, 1 Mbit/s is S8, open, frame."""
-    with pty() as far, open_link(f"can://slcan/{far.name}?bitrate=1000000&settle_s=0") as link:
+    with pty() as far, open_link(f"can://slcan/{far.name}?bitrate=1000000&sleep_after_open=0") as link:
         link.send(FRAMES[0])
         link.send(FRAMES[3])
         sent = far.read_until(b"T1FFFFFFF8FFFFFFFFFFFFFFFF\r").split(b"\r")
@@ -83,7 +98,7 @@ def test_slcan_says_what_an_adapter_expects():
     ids=["not-ascii", "short", "no-number", "few-bytes", "no-hex", "cut"],
 )
 def test_noise_on_slcan_costs_what_it_hit(noise):
-    with pty() as far, open_link(f"can://slcan/{far.name}?bitrate=1000000&settle_s=0") as link:
+    with pty() as far, open_link(f"can://slcan/{far.name}?bitrate=1000000&sleep_after_open=0") as link:
         far.write(noise + b"\rt4E024001\r")
         assert content(link.receive(2.0)) == (0x4E0, b"\x40\x01", False)
         assert link.damaged == 1

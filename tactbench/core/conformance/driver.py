@@ -25,6 +25,8 @@ if TYPE_CHECKING:
 READ_S = 1.0
 """How long a driver is read: hundreds of samples of a fast sensor, some of a slow one."""
 WAIT_S = 0.1
+WAITED_S = 0.5
+"""How long a device that samples by itself is left alone before it is started."""
 UNPLUGGED_S = 5.0
 """How long a driver may go on reading once its line is gone: no device is waited for longer."""
 GONE_AT_S = 2.0
@@ -311,6 +313,25 @@ def driver_keeps_its_rate(subject: Subject) -> None:
 
 
 @check("sensor", "device", needs=("driver-reads",), level="silver")
+def driver_starts_afresh(subject: Subject) -> None:
+    """What a device sent before the start would be recorded as if it had come then.
+
+    Discard in start() what waits in the link (`Link.discard()`), and forget the beginning of a frame.
+    """
+    with emulated(subject) as (driver, _, clock):
+        for _ in range(2):
+            clock.advance(clock() + round(WAITED_S * 1e9))
+            began_ns = clock()
+            with code_of("driver.start", subject.package):
+                driver.start()
+            for block in blocks_of(driver, clock):
+                if block.t_ns is not None and len(block.t_ns) and block.t_ns[0] < began_ns:
+                    early = (began_ns - int(block.t_ns[0])) * 1e-9
+                    fail("driver.start", f"a row of {block.stream} is from {early:.2g} s before it was started")
+            driver.stop()
+
+
+@check("sensor", "device", needs=("driver-reads",), level="silver")
 def driver_does_not_wait_when_told_so(subject: Subject) -> None:
     """`read(0)` asks without waiting: a rig with several devices reads them in turn.
 
@@ -383,6 +404,6 @@ def driver_refuses_unknown_options(subject: Subject) -> None:
 
 CHECKS = (
     driver_opens, driver_says_who_it_is, driver_streams_are_the_specs, driver_reads,
-    driver_reads_what_is_sensed, driver_keeps_its_rate,
+    driver_reads_what_is_sensed, driver_keeps_its_rate, driver_starts_afresh,
     driver_does_not_wait_when_told_so, driver_closes_its_line, driver_reports_unplug, driver_refuses_unknown_options,
 )  # fmt: skip

@@ -19,7 +19,7 @@ from tactbench.core.conformance.driver import Lines, look_at
 from tactbench.core.conformance.press import FORCE_SHARE, pressing_channel
 from tactbench.core.conformance.subject import Subject
 from tactbench.core.conformance.trial_press import tiny_scene
-from tactbench.core.errors import TactbenchError
+from tactbench.core.errors import RigError, TactbenchError
 from tactbench.core.plugins.rig_files import load_rig_file
 from tactbench.core.plugins.taking_part import rig_context
 from tactbench.core.spec.profile import ForceRamp
@@ -163,10 +163,12 @@ def _pressed(subject: Subject) -> RealPress:
     with TemporaryDirectory() as folder:
         path = Path(folder) / "check.h5"
         with code_of("where", subject.package):
-            acquire(
+            made = acquire(
                 rig, sensor, subject.descriptor, real_scene(), role=None, seed=1, path=path,
                 clock=time.perf_counter, provenance={},
             )  # fmt: skip
+            if made.meta.excluded:
+                raise RigError(f"Its recording is {made.meta.excluded}.")
         with open_recording(path) as recording:
             wrong = [f"streams[{one.stream}]: {one.message}" for one in examine(recording) if one.severity == "error"]
             read = {name: recording.read(name) for name in recording.stream_names}

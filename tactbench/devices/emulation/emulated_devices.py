@@ -211,5 +211,5 @@ def _end_of(device: EmulatedDevice, can: CanTransport) -> End:
             return UdpEnd()
     if can == "slcan":
         # The bit rate is a statement; nothing here starts anew when its port is opened.
-        return PseudoTerminal("can://slcan/{}?bitrate=1000000&settle_s=0")
+        return PseudoTerminal("can://slcan/{}?bitrate=1000000&sleep_after_open=0")
     return BusEnd(can)

@@ -6,8 +6,6 @@ beside it.
 
 from __future__ import annotations
 
-from pathlib import Path
-
 from tactbench.plugin import RigDescriptor, hookimpl
 from tactbench.plugin.devices import DeviceDescriptor
 
@@ -28,15 +26,6 @@ def tactbench_devices() -> list[DeviceDescriptor]:
             emulated_link="datagram",
             # Usual counts (sourced: netft/pyNetFT).
             emulated_options={"counts_per_newton": 1e6, "counts_per_newton_metre": 1e6},
-        ),
-        DeviceDescriptor(
-            name="nano17",
-            title="ATI Nano17 by its gauge voltages, from a microcontroller of one's own",
-            kind="force",
-            driver=f"{here}.force_torque.nano17.driver:build",
-            emulator=f"{here}.force_torque.nano17.emulator:build",
-            emulated_link="bytes",
-            emulated_options={"calibration": str(Path(__file__).parent / "force_torque" / "nano17" / "FT8577.cal")},
         ),
         DeviceDescriptor(
             name="faulhaber",

@@ -33,9 +33,9 @@ MOST_FRAMES = 4096
 class FingertipDriver(Driver):
     """One fingertip: one triangle of one board.
 
-    Times are the host's at receipt: the board sends no number and no time. A head whose tail does not come within half
-    a period is a sample by itself. Frames of other triangles, boards and hosts are counted and left out; its own
-    commands, which some buses give back, are left out.
+    Times are the frames': the board sends no number and no time. A head without a tail is a sample by itself once the
+    next head has come, or nothing comes for a period. Frames of other triangles, boards and hosts are counted and left
+    out; its own commands, which some buses give back, are left out.
 
     Parameters
     ----------
@@ -150,7 +150,7 @@ class FingertipDriver(Driver):
             try:
                 frame = self._link.receive(left_s)
             except LinkTimeout:
-                samples += self._decoder.flush(self._clock() - round(5e8 * self._options.period_s))
+                samples += self._decoder.flush(self._clock() - round(1e9 * self._options.period_s))
                 break
             except LinkUnplugged:
                 samples += self._decoder.flush()

@@ -33,7 +33,7 @@ def test_a_sound_plugin_ends_with_0_and_says_how_many_checks_ran(verbs):
     assert last.startswith("sensor acme-pad: ran ")
     assert "failed 0" in last
     assert last.endswith("Level: silver.")
-    assert "skipped   10 checks: it names no driver" in done.stdout
+    assert "skipped   11 checks: it names no driver" in done.stdout
 
 
 def test_by_the_name_of_its_plugin_all_that_it_brings_is_checked(verbs):

@@ -70,6 +70,7 @@ CAUGHT_BY = {
         "driver-goes-back-in-time": "driver-reads",
         "driver-swaps-taxels": "driver-reads-what-is-sensed",
         "driver-doubles-samples": "driver-keeps-its-rate",
+        "driver-keeps-what-waited": "driver-starts-afresh",
         "driver-waits-anyhow": "driver-does-not-wait-when-told-so",
         "driver-leaves-its-line-open": "driver-closes-its-line",
         "driver-hides-the-unplugging": "driver-reports-unplug",

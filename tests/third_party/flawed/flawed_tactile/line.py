@@ -131,6 +131,17 @@ class doubles_samples(PadDriver):
         return super().blocks(rows * 2, t_ns)
 
 
+class keeps_what_waited(PadDriver):
+    """It lets the device send from its opening on."""
+
+    def __init__(self, settings):
+        super().__init__(settings)
+        self._link.write(b"go\n")
+
+    def start(self):
+        pass
+
+
 class waits_anyhow(PadDriver):
     def read(self, timeout_s):
         until_ns, found = self._clock() + 200_000_000, []

@@ -110,7 +110,7 @@ TRANSDUCERS = (
 READS_SHEAR = ("reads-shear", "folds-shear", "forgets-shear")
 DRIVERS = (
     "opens-two-lines", "is-a-number", "has-a-stream-of-its-own", "goes-back-in-time", "swaps-taxels", "doubles-samples",
-    "waits-anyhow", "leaves-its-line-open", "hides-the-unplugging", "takes-any-option",
+    "keeps-what-waited", "waits-anyhow", "leaves-its-line-open", "hides-the-unplugging", "takes-any-option",
 )  # fmt: skip
 
 

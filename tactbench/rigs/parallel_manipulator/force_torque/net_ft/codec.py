@@ -7,7 +7,7 @@ core/src/detail/protocol.cpp, sequence.cpp and status.cpp).
 from __future__ import annotations
 
 import struct
-from enum import Enum, IntEnum, IntFlag
+from enum import IntEnum, IntFlag
 from functools import cached_property
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -16,7 +16,7 @@ import numpy.typing as npt
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from tactbench.plugin import Quality, RigError
-from tactbench.rigs.parallel_manipulator.force_torque.ati_xml import (
+from tactbench.rigs.parallel_manipulator.force_torque.ati import (
     FORCE_UNITS,
     TORQUE_UNITS,
     AtiFileError,
@@ -38,9 +38,6 @@ _HEADER = 0x1234
 RECORD_BYTES = _RECORD.size
 RECORDS = np.dtype([("rdt_sequence", ">u4"), ("ft_sequence", ">u4"), ("status", ">u4"), ("counts", ">i4", (6,))])
 """The same as `_RECORD`, for many at once."""
-MOST_BUFFERED = 40
-"""Records in one datagram of buffered transfer, at most (sourced: ATI manual 9620-05-NET FT, section 7.4, as quoted in
-a public client)."""
 SEQUENCE_MODULUS = 1 << 32
 LEAST_COUNT, GREATEST_COUNT = -(2**31), 2**31 - 1
 """Of the signed 32 bits of a record."""
@@ -61,8 +58,6 @@ class NetFtOptions(Options):
     is a file that holds the box's ``netftapi2.xml``."""
     bias: bool = False
     """Whether starting takes the present reading as zero: the sensor must be unloaded then."""
-    buffered: bool = False
-    """Whether several records come in a datagram: less work at high rates, and later."""
 
     @model_validator(mode="after")
     def _one_scale(self) -> NetFtOptions:
@@ -148,32 +143,16 @@ def encode_record(record: Record) -> bytes:
         raise ValueError(f"{record} does not fit its 32-bit fields: {error}") from error
 
 
-def decode_record(data: bytes) -> Record:
-    """Return the record in a datagram; raises DatagramError if its length is not 36."""
-    if len(data) != RECORD_BYTES:
-        raise DatagramError(f"A record has {RECORD_BYTES} bytes, not {len(data)}.")
-    rdt, ft, status, *counts = _RECORD.unpack(data)
-    return Record(rdt, ft, status, tuple(counts))
-
-
-def decode_records(data: bytes, *, most: int = 1) -> npt.NDArray[np.void]:
-    """Return the records of a datagram, an array of :data:`RECORDS`.
-
-    Parameters
-    ----------
-    data
-        A datagram, or several whole ones joined.
-    most
-        Records it may hold: 1, :data:`MOST_BUFFERED` for buffered transfer.
+def decode_records(data: bytes) -> npt.NDArray[np.void]:
+    """Return the records of a datagram, or of several joined, an array of :data:`RECORDS`.
 
     Raises
     ------
     DatagramError
-        If it is no such datagram.
+        If it is not one or more whole records.
     """
-    n, rest = divmod(len(data), RECORD_BYTES)
-    if rest or not 1 <= n <= most:
-        raise DatagramError(f"A datagram has 1 to {most} records of {RECORD_BYTES} bytes, not {len(data)} bytes.")
+    if not data or len(data) % RECORD_BYTES:
+        raise DatagramError(f"Records of {RECORD_BYTES} bytes were expected, not {len(data)} bytes.")
     return np.frombuffer(data, RECORDS)
 
 
@@ -212,21 +191,8 @@ class Status(IntFlag):
     HTTP = 0x00000002
 
 
-class Health(Enum):
-    """What a status word means for the values beside it."""
-
-    HEALTHY = "healthy"
-    WARNING = "warning"
-    """A threshold set in the sensor was passed; the values are good."""
-    ERROR = "error"
-    """The values must not be used."""
-
-
-def health(status: int) -> Health:
-    """Return what a status word means: 0, exactly 80010000, or anything else (sourced: pyNetFT, status.cpp)."""
-    if status == 0:
-        return Health.HEALTHY
-    return Health.WARNING if status == Status.ERROR_SUMMARY | Status.CONDITION_LATCHED else Health.ERROR
+WARNING = Status.ERROR_SUMMARY | Status.CONDITION_LATCHED
+"""A threshold set in the sensor was passed: exactly this; its values are good (sourced: pyNetFT, status.cpp)."""
 
 
 def quality(status: int) -> Quality:
@@ -235,9 +201,9 @@ def quality(status: int) -> Quality:
     Errors are SUSPECT, not MISSING: the box forbids the use of the values, yet many of its bits (of the network, of
     other buses) do not touch them, and a mark keeps both facts.
     """
-    if health(status) is not Health.ERROR:
+    if status in (0, WARNING):
         return Quality.GOOD
-    known = Status.ERROR_SUMMARY | Status.CONDITION_LATCHED | Status.SATURATION_OR_CONVERTER
+    known = WARNING | Status.SATURATION_OR_CONVERTER
     marks = Quality.SATURATED if status & Status.SATURATION_OR_CONVERTER else Quality.GOOD
     return marks | Quality.SUSPECT if status & ~int(known) or not marks else marks
 
@@ -287,10 +253,10 @@ def read_configuration(data: bytes) -> CountScale:
     texts: dict[str, str] = {}
     needed = ("prodname", "cfgcpf", "cfgcpt", "scfgfu", "scfgtu")
     for element in elements(data):
-        if element.name in needed:
-            if element.name in texts:
-                raise AtiFileError(f"The tag {element.name} stands twice in the sensor's configuration.")
-            texts[element.name] = element.text.strip()
+        if element.tag in needed:
+            if element.tag in texts:
+                raise AtiFileError(f"The tag {element.tag} stands twice in the sensor's configuration.")
+            texts[element.tag] = (element.text or "").strip()
     missing = [name for name in needed if name not in texts]
     if missing:
         raise AtiFileError(f"The sensor's configuration has no {', '.join(missing)}.")

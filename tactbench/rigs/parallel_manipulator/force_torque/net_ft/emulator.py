@@ -17,7 +17,6 @@ from tactbench.plugin.devices import CanFrame, DeviceEmulator, EmulatorSettings,
 from tactbench.rigs.parallel_manipulator.force_torque.net_ft.codec import (
     GREATEST_COUNT,
     LEAST_COUNT,
-    MOST_BUFFERED,
     SENSOR_RATE_HZ,
     SEQUENCE_MODULUS,
     Command,
@@ -62,8 +61,6 @@ class RdtEmulator(DeviceEmulator):
         FT8577, quoted in a public script).
     threshold_n
         A force on one axis that sets the monitor condition, which stays until it is reset; None: no condition.
-    buffer_records
-        Records in a datagram of buffered transfer.
     first_sequence
         Of records and samples, to begin near the wrap of the counters.
     faults
@@ -78,14 +75,11 @@ class RdtEmulator(DeviceEmulator):
         rate_hz: float = 1000.0,
         largest: Sequence[float] = (25.0, 25.0, 35.0, 0.25, 0.25, 0.25),
         threshold_n: float | None = None,
-        buffer_records: int = MOST_BUFFERED,
         first_sequence: int = 1,
         faults: Iterable[DatagramFault] = (),
     ) -> None:
         if not 0.0 < rate_hz <= SENSOR_RATE_HZ:
             raise UsageError(f"A Net F/T box sends up to {SENSOR_RATE_HZ} records a second, not {rate_hz:g}.")
-        if not 1 <= buffer_records <= MOST_BUFFERED:
-            raise UsageError(f"A buffer holds 1 to {MOST_BUFFERED} records, not {buffer_records}.")
         self.scale = scale or CountScale(per_newton=1e6, per_newton_metre=1e6, product="EMULATED Net F/T")
         self.every = max(1, int(SENSOR_RATE_HZ // rate_hz))
         """Samples of the sensor from one record to the next."""
@@ -94,7 +88,6 @@ class RdtEmulator(DeviceEmulator):
         self._wrench = wrench
         self._largest = tuple(largest)
         self._threshold_n = threshold_n
-        self._buffer_records = buffer_records
         self._first_sequence = first_sequence
         self.faults = list(faults)
         self._seen: Counter[Fault] = Counter()
@@ -104,8 +97,6 @@ class RdtEmulator(DeviceEmulator):
         self._next: int | None = None
         self._left: int | None = None
         self._sequence = first_sequence
-        self._buffered = False
-        self._buffer: list[bytes] = []
         self._held: bytes | None = None
 
     @property
@@ -150,10 +141,9 @@ class RdtEmulator(DeviceEmulator):
 
     def _carry_out(self, request: Request) -> list[Sent]:
         match request.command:
-            case Command.START_REALTIME | Command.START_BUFFERED:
+            case Command.START_REALTIME:
                 ended = self._ended(self._now_s)
                 self._left = request.records or None
-                self._buffered = request.command is Command.START_BUFFERED
                 self._sequence = self._first_sequence
                 # The first sample after the request: a sample is not older than what asks for it.
                 self._next = math.floor(self._now_s * SENSOR_RATE_HZ) + 1
@@ -195,32 +185,18 @@ class RdtEmulator(DeviceEmulator):
         )
         self._sequence = (self._sequence + 1) % SEQUENCE_MODULUS
         self._next = sample + self.every
-        sent: list[Sent] = []
-        if self._buffered:
-            self._buffer.append(encode_record(record))
-            if len(self._buffer) == self._buffer_records:
-                sent += self._on_the_way(self._flushed(), at_s)
-        else:
-            sent += self._on_the_way(encode_record(record), at_s)
+        sent = self._on_the_way(encode_record(record), at_s)
         if self._left is not None:
             self._left -= 1
             if self._left == 0:
                 sent += self._ended(at_s)
         return sent
 
-    def _flushed(self) -> bytes:
-        datagram = b"".join(self._buffer)
-        self._buffer.clear()
-        return datagram
-
     def _ended(self, at_s: float) -> list[Sent]:
-        """Stop sending; return what is still under way (assumed: a started buffer is sent)."""
+        """Stop sending; return what is still under way."""
         self._next = None
-        sent = self._on_the_way(self._flushed(), at_s) if self._buffer else []
-        if self._held is not None:
-            sent.append((at_s, self._held))
-            self._held = None
-        return sent
+        held, self._held = self._held, None
+        return [] if held is None else [(at_s, held)]
 
     def _on_the_way(self, datagram: bytes, at_s: float) -> list[Sent]:
         """Return what arrives of a datagram sent at a time, in the order of arrival."""

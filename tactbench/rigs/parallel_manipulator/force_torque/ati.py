@@ -1,4 +1,4 @@
-"""An ATI Nano17 by its six gauge voltages: the calibration file, the matrix and its marks.
+"""ATI's files: units, and the calibration file (``.cal``) of a sensor that is read by its six gauge voltages.
 
 ``F = U (V - V_bias)``, V six gauge voltages, V_bias those of the unloaded sensor. Newer files state U ready-made
 (``UserAxis``); for older ones it is rebuilt from ``Axis`` rows, their scales and the ``BasicTransform`` to the tool's
@@ -10,24 +10,72 @@ from __future__ import annotations
 
 import math
 from typing import TYPE_CHECKING
+from xml.etree.ElementTree import Element, ParseError, fromstring
 
 import numpy as np
 import numpy.typing as npt
 from pydantic import BaseModel, ConfigDict
 
-from tactbench.plugin import Quality
-from tactbench.rigs.parallel_manipulator.force_torque.ati_xml import (
-    DISTANCE_UNITS,
-    FORCE_UNITS,
-    TORQUE_UNITS,
-    AtiFileError,
-    Element,
-    elements,
-    unit,
-)
+from tactbench.plugin import UsageError
 
 if TYPE_CHECKING:
     from tactbench.plugin import FloatArray
+
+_POUND_N = 4.4482216152605
+"""One pound-force: 0.45359237 kg by 9.80665 m/s^2 (sourced: international yard and pound agreement 1959, CGPM 1901)."""
+_INCH_M = 0.0254
+_KGF_N = 9.80665
+
+FORCE_UNITS = {
+    "N": 1.0,
+    "kN": 1e3,
+    "lb": _POUND_N,
+    "lbf": _POUND_N,
+    "klb": 1e3 * _POUND_N,
+    "klbf": 1e3 * _POUND_N,
+    "kg": _KGF_N,
+    "kgf": _KGF_N,
+    "g": 1e-3 * _KGF_N,
+    "gf": 1e-3 * _KGF_N,
+}
+"""Name -> newtons (names sourced: ATI manual 9620-05-NET FT, table 7.3, as quoted in public clients; those without the
+final f assumed)."""
+TORQUE_UNITS = {
+    "Nm": 1.0,
+    "Nmm": 1e-3,
+    "kNm": 1e3,
+    "lbin": _POUND_N * _INCH_M,
+    "lbfin": _POUND_N * _INCH_M,
+    "lbft": _POUND_N * 12 * _INCH_M,
+    "lbfft": _POUND_N * 12 * _INCH_M,
+    "kgcm": _KGF_N * 1e-2,
+    "kgfcm": _KGF_N * 1e-2,
+}
+"""Name without hyphens -> newton metres (sourced and assumed as above)."""
+DISTANCE_UNITS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "in": _INCH_M, "ft": 12 * _INCH_M}
+"""Name -> metres (sourced as above)."""
+
+
+class AtiFileError(UsageError):
+    """A file is not the ATI file that was expected."""
+
+
+def elements(data: bytes) -> list[Element]:
+    """Return the elements of an XML file in the order of their start tags; raises AtiFileError if `data` is no XML."""
+    try:
+        return list(fromstring(data).iter())
+    except (ParseError, LookupError, ValueError) as error:  # the last two: encodings that Python lacks
+        raise AtiFileError(f"This is not an XML file: {error}.") from error
+
+
+def unit(table: dict[str, float], name: str, what: str) -> float:
+    """Return the SI value of a unit as ATI spells it; raises AtiFileError for one that is not in `table`."""
+    plain = name.strip()
+    for spelling in (plain, plain.replace("-", "").replace(".", "")):
+        if spelling in table:
+            return table[spelling]
+    raise AtiFileError(f"The {what} unit {name!r} is not known; known: {', '.join(table)}.")
+
 
 AXES = ("Fx", "Fy", "Fz", "Tx", "Ty", "Tz")
 GAUGES = 6
@@ -70,38 +118,6 @@ class GaugeCalibration(BaseModel):
         wrench: FloatArray = (loaded[..., None, :] * np.array(self.matrix)).sum(axis=-1)
         return wrench
 
-    def volts(self, wrench: npt.ArrayLike, bias: npt.ArrayLike = 0.0) -> FloatArray:
-        """Return the (…, 6) gauge voltages [V] that mean `wrench` (…, 6) [N, N*m]: the inverse of `wrench`."""
-        volts: FloatArray = np.linalg.solve(np.array(self.matrix), np.asarray(wrench, dtype=float)[..., None])[..., 0]
-        volts += np.asarray(bias, dtype=float)
-        return volts
-
-    def quality(self, volts: npt.ArrayLike, *, step_v: float) -> npt.NDArray[np.uint8]:
-        """Return the (…, 6) marks of the six axes.
-
-        Every axis depends on every gauge: one gauge within a step of the end of its range marks all six as saturated,
-        and one that is not a number marks all six as missing.
-
-        Parameters
-        ----------
-        volts
-            (…, 6) gauge voltages, bias included.
-        step_v
-            Step of the converter [V]: the highest code of a bipolar one is a step below the end.
-        """
-        given = np.asarray(volts, dtype=float)
-        low, high = self.voltages
-        # A thousandth of a step of room for the rounding of count times step.
-        at_end = (given <= low + 1e-3 * step_v) | (given >= high - 1.001 * step_v)
-        marks = np.where(at_end.any(axis=-1), int(Quality.SATURATED), int(Quality.GOOD))
-        marks = np.where(np.isfinite(given).all(axis=-1), marks, int(Quality.MISSING))
-        return np.repeat(marks[..., None], len(AXES), axis=-1).astype(np.uint8)
-
-    def beyond_range(self, wrench: npt.ArrayLike) -> npt.NDArray[np.bool_]:
-        """Return (…, 6): whether an axis reads more than its rated range, where the calibration is not stated."""
-        beyond: npt.NDArray[np.bool_] = np.abs(np.asarray(wrench, dtype=float)) > np.array(self.largest)
-        return beyond
-
 
 def read_calibration(data: bytes) -> GaugeCalibration:
     """Return what the bytes of a ``.cal`` file say.
@@ -109,10 +125,10 @@ def read_calibration(data: bytes) -> GaugeCalibration:
     Raises
     ------
     AtiFileError
-        If they are no calibration file of six gauges, or not safe to read (document types and entities are refused).
+        If they are no calibration file of six gauges.
     """
     found = elements(data)
-    sensor, calibration = _only(found, "FTSensor").attributes, _only(found, "Calibration").attributes
+    sensor, calibration = _only(found, "FTSensor").attrib, _only(found, "Calibration").attrib
     if sensor.get("NumGages", "6") != str(GAUGES):
         raise AtiFileError(f"The file is for {sensor.get('NumGages')} gauges; sensors of {GAUGES} are read.")
     force_n = unit(FORCE_UNITS, _need(calibration, "ForceUnits"), "force")
@@ -146,7 +162,7 @@ _Rows = tuple[tuple[tuple[float, ...], ...], tuple[float, ...]]
 
 def _rows(found: list[Element], name: str) -> _Rows | None:
     """Return the rows of six elements `name`; None: there is none."""
-    rows = [element.attributes for element in found if element.name == name]
+    rows = [element.attrib for element in found if element.tag == name]
     if not rows:
         return None
     by_axis = {_need(row, "Name"): row for row in rows}
@@ -161,13 +177,13 @@ def _rows(found: list[Element], name: str) -> _Rows | None:
 def _rebuilt(found: list[Element], calibration: dict[str, str], force_n: float, torque_nm: float) -> _Rows | None:
     """Return the matrix from Axis rows, scales and transform, in the file's units; None: it is not to be had."""
     axes = _rows(found, "Axis")
-    transforms = [element.attributes for element in found if element.name == "BasicTransform"]
+    transforms = [element.attrib for element in found if element.tag == "BasicTransform"]
     if axes is None or len(transforms) != 1:
         return None
     move = {key: _number(transforms[0].get(key, "0")) for key in ("Dx", "Dy", "Dz", "Rx", "Ry", "Rz")}
     if any(move[key] != 0.0 for key in ("Rx", "Ry", "Rz")):
         return None  # In which order the angles turn is in no source.
-    scales = {e.attributes.get("Name"): _number(_need(e.attributes, "scale")) for e in found if e.name == "Axis"}
+    scales = {e.attrib.get("Name"): _number(_need(e.attrib, "scale")) for e in found if e.tag == "Axis"}
     if 0.0 in scales.values():
         raise AtiFileError("An Axis row has the scale 0.")
     matrix = np.array(axes[0]) / np.array([scales[axis] for axis in AXES])[:, None]
@@ -180,7 +196,7 @@ def _rebuilt(found: list[Element], calibration: dict[str, str], force_n: float, 
 
 
 def _only(found: list[Element], name: str) -> Element:
-    those = [element for element in found if element.name == name]
+    those = [element for element in found if element.tag == name]
     if len(those) != 1:
         raise AtiFileError(f"One element {name} was expected, {len(those)} were found.", hint="Is it an ATI .cal file?")
     return those[0]
