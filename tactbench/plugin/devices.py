@@ -15,6 +15,7 @@ from tactbench.core.spec.rig_file import FORCE, DeviceEntry, ForceEntry, NamedDe
 from tactbench.plugin.on_demand import on_demand
 
 if TYPE_CHECKING:
+    from tactbench.core.plugins.emulators import RigEmulators
     from tactbench.core.plugins.rig_devices import (
         PressingForce,
         ask_operator,
@@ -35,7 +36,6 @@ if TYPE_CHECKING:
     from tactbench.devices.row_emulator import RowEmulator
     from tactbench.devices.sequence import SequenceCheck, Unwrap
     from tactbench.links.address import open_link
-    from tactbench.links.bridge_frame import Frame, FrameDecoder, encode_frame
     from tactbench.links.byte_link import ByteLink
     from tactbench.links.can_link import CanFrame, CanLink, CanLog
     from tactbench.links.datagram_link import DatagramLink
@@ -65,8 +65,6 @@ __all__ = [
     "EmulatorSettings",
     "Fault",
     "ForceEntry",
-    "Frame",
-    "FrameDecoder",
     "Link",
     "LinkClosed",
     "LinkEnded",
@@ -79,6 +77,7 @@ __all__ = [
     "Reading",
     "Received",
     "RigCheck",
+    "RigEmulators",
     "RigFile",
     "RowDriver",
     "RowEmulator",
@@ -99,7 +98,6 @@ __all__ = [
     "drivers_of",
     "emulation_of",
     "emulators_of",
-    "encode_frame",
     "fault_concerns",
     "open_link",
     "physics_of",

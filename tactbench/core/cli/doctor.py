@@ -84,15 +84,20 @@ def _check_names(rig: RigFile, registry: Registry) -> None:
 
 
 def _at_rest(rig: RigFile, registry: Registry) -> Callable[[str], Senses]:
-    """Return by name what the rig's emulated devices sense at rest: a scene that never begins."""
-    from tactbench.core.cli.emulate import Presser
+    """Return by name what the rig's emulated devices sense at rest: a scene that never begins, of a sensor its own."""
     from tactbench.core.cli.scenes import scene_of
+    from tactbench.core.plugins.rig_devices import physics_of
+    from tactbench.devices.emulation.scene_samples import SceneSamples
 
-    scenes = {name: scene_of("rest", registry.sensors[name]) for name, one in rig.sensors.items() if one.emulated}
-    how = rig.emulation
-    presser = Presser(registry, how.physics, scenes, scene_of("rest", None), how.seed)
-    presser.draw(1)
-    return presser.senses
+    physics = physics_of(rig, registry)
+    found: dict[str, Senses] = {}
+    for name, entry in rig.sensors.items():
+        if physics is not None and entry.emulated:
+            scene = scene_of("rest", registry.sensors[name])
+            with physics.open(registry.sensors[name], scene, seed=rig.emulation.seed) as simulated:
+                found[name] = SceneSamples(simulated, scene.profile.duration.to("s"), rest_s=scene.profile.hold_s)
+    other: Senses = next(iter(found.values()), lambda t_s: {})
+    return lambda name: found.get(name, other)
 
 
 def _drivers(registry: Registry) -> Iterator[dict[str, str]]:

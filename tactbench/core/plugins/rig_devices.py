@@ -167,14 +167,15 @@ def physics_of(file: RigFile, registry: Registry) -> Rig | None:
 
 
 def ask_operator(file: RigFile, operator: Operator | None, doing: str, text: str) -> None:
-    """Let somebody do at the rig what `text` says, in a word `doing`; emulated devices need nobody.
+    """Let somebody do at the rig what `text` says, in a word `doing`; devices that are all emulated need nobody.
 
     Raises
     ------
     RigError
         If nobody is there.
     """
-    if all(entry.emulated for entry in file.entries().values()):
+    told = bool(file.emulation.control)
+    if all(entry.emulated or (entry.emulator and told) for entry in file.entries().values()):
         return
     if operator is None:
         raise RigError(

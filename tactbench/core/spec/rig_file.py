@@ -87,6 +87,8 @@ class EmulationSettings(Frozen):
     """The simulated rig whose samples the emulated devices read."""
     seed: int = Field(default=1, ge=0)
     """Of what is drawn in emulators; the scene's own seed is the run's."""
+    control: str = ""
+    """``host:port`` of emulators that run already (`tactbench emulate` writes it): a recording tells them its scene."""
 
 
 class RigFile(Frozen):

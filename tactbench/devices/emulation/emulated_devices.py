@@ -13,7 +13,7 @@ from typing import Any, Literal, Self
 from tactbench.core.errors import UnknownNameError
 from tactbench.core.spec.rig import EmulatedLink
 from tactbench.devices.emulation.lawicel_adapter import LawicelAdapter
-from tactbench.devices.emulation.line import Line, LinkFault, Passed
+from tactbench.devices.emulation.line import BITS_PER_BYTE, Line, LinkFault, Passed
 from tactbench.devices.emulation.real_time import BusEnd, CanTransport, End, PseudoTerminal, RealTimeServer, UdpEnd
 from tactbench.devices.emulation.virtual_links import VirtualByteLink, VirtualCanLink, VirtualDatagramLink
 from tactbench.devices.emulation.virtual_time import VirtualTime
@@ -26,8 +26,8 @@ from tactbench.links.spi_bridge import SpiBridge
 SPI_HZ = 4_400_000
 """Clock of an emulated SPI bus: what the BioTac's maker's tools use [sourced: docs/links.md]; the bus takes any up to
 10 MHz."""
-ANY_BAUD = 115200
-"""Stands in an address where the line has no pace of its own."""
+BAUDS = (115200, 230400, 460800, 921600, 1_000_000, 2_000_000, 3_000_000)
+"""Usual rates of serial lines [bit/s]."""
 
 
 @dataclass(frozen=True)
@@ -201,10 +201,16 @@ def _on_its_line(device: EmulatedDevice, serial_can: bool) -> DeviceEmulator:
     return emulator  # type: ignore[no-any-return]
 
 
+def _baud_for(emulator: Any) -> int:
+    """Return the least usual baud rate that carries what a device sends, and a quarter more."""
+    needed = 1.25 * BITS_PER_BYTE * getattr(emulator, "bytes_per_s", 0.0)
+    return next((baud for baud in BAUDS if baud >= needed), BAUDS[-1])
+
+
 def _end_of(device: EmulatedDevice, can: CanTransport) -> End:
     match device.link:
         case "bytes":
-            return PseudoTerminal(f"serial://{{}}?baud={device.baud or ANY_BAUD}")
+            return PseudoTerminal(f"serial://{{}}?baud={device.baud or _baud_for(device.emulator)}")
         case "spi":
             return PseudoTerminal(f"spi://bridge/{{}}?speed_hz={SPI_HZ}")
         case "datagram":

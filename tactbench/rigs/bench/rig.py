@@ -1,7 +1,8 @@
 """The bench as a rig: a sensor and a reference force sensor are read while somebody presses, and nothing moves.
 
 Devices that the rig file calls emulated are moved by a simulated rig, which carries out the same scene; whatever they
-sense then comes through their links and drivers as from real ones.
+sense then comes through their links and drivers as from real ones. Those of real time run in a process of their own,
+and are real ones here.
 """
 
 from __future__ import annotations
@@ -126,7 +127,7 @@ class Bench:
             duration_s = profile.duration.to("s")
             senses = None if simulated is None else SceneSamples(simulated, duration_s, rest_s=profile.hold_s)
             emulators = {} if senses is None else emulators_of(file, self._registry, sensor.name, senses)
-            emulated = stack.enter_context(EmulatedDevices(emulators, time=file.emulation.time)) if emulators else None
+            emulated = stack.enter_context(EmulatedDevices(emulators)) if emulators else None
             clock = time.monotonic_ns if emulated is None else emulated.clock
             links = {} if emulated is None else {name: partial(emulated.open_link, name) for name in emulators}
             drivers = drivers_of(file, self._registry, sensor.name, links, clock)
@@ -136,7 +137,7 @@ class Bench:
             force = None if file.force is None else PressingForce(file.force, drivers[FORCE].streams)
             zero = {} if force is None else self._zero(force, file, drivers[FORCE], clock)
             self._prompt(force, zero, file, sensor, scene)
-            advance = emulated.advance if emulated is not None and file.emulation.time == "virtual" else None
+            advance = None if emulated is None else emulated.advance
             reading = stack.enter_context(
                 Reading(drivers, clock=clock, advance=advance, silent_s=file.allowed.silent_s)
             )
@@ -165,7 +166,7 @@ class Bench:
         self, file: RigFile, sensor: SensorDescriptor, scene: Scene, seed: int
     ) -> Iterator[Acquisition | None]:
         """Give the scene as the simulated rig carries it out; None where no device is emulated."""
-        if self._physics is None or not file.emulated:
+        if self._physics is None or not file.emulated or file.emulation.time == "real":
             yield None
             return
         with self._physics.open(sensor, scene, seed=seed) as acquisition:
@@ -210,12 +211,17 @@ def build(context: RigContext) -> Bench:
     Raises
     ------
     UsageError
-        If there is no rig file, or it names a simulation that is none.
+        If there is no rig file, or it names a simulation that is none, or devices that nobody would open.
     """
     if context.rig_file is None:
         raise UsageError(
             "The rig 'bench' needs to know its devices.",
             hint="Name a rig file with --rig-file FILE; `tactbench emulate biotac net-ft > FILE` makes one.",
+        )
+    if context.rig_file.devices:
+        raise UsageError(
+            f"The bench opens no {', '.join(context.rig_file.devices)}: a hand presses, and nothing moves.",
+            hint="Leave it out under `devices:`, or use the rig parallel-manipulator.",
         )
     physics = physics_of(context.rig_file, load_registry())
     return Bench(context.rig_file, context.operator, physics)

@@ -49,5 +49,6 @@ def tactbench_rigs() -> list[RigDescriptor]:
             where=f"{here}.rig:build",
             file=f"{here}.settings:ManipulatorFile",
             check=f"{here}.rig_check:check",
+            emulators=f"{here}.emulation:PressEmulators",
         )
     ]

@@ -340,7 +340,11 @@ class ParallelManipulator:
         """Return the scene as the simulated rig carries it out, and what emulated devices sense of it."""
         if self._physics is None or not file.emulated:
             return None
-        simulated: Any = stack.enter_context(self._physics.open(sensor, scene, seed=seed))
+        simulated = stack.enter_context(self._physics.open(sensor, scene, seed=seed))
+        return simulated, self.emulated_press(simulated, file, scene, seed)
+
+    def emulated_press(self, simulated: Any, file: RigFile, scene: Scene, seed: int) -> EmulatedPress:
+        """Return a scene that a simulated rig has carried out as emulated devices sense it."""
         if not hasattr(simulated, "press_curve"):
             raise PluginContractError(
                 f"The simulated rig {file.emulation.physics!r} has no press curves.",
@@ -352,20 +356,27 @@ class ParallelManipulator:
         skin_m = self.settings.surface_m + 1e-3 * float(
             np.clip(off_mm, -heights.stand_off_mm / 2, heights.depth_mm / 2)
         )
-        press = EmulatedPress(simulated, scene, skin_m=skin_m, largest_n=1.5 * limits.force_ceiling_n, rng=rng)
-        return simulated, press
+        return EmulatedPress(simulated, scene, skin_m=skin_m, largest_n=1.5 * limits.force_ceiling_n, rng=rng)
 
     def _emulators(self, file: RigFile, sensor: SensorDescriptor, senses: EmulatedPress) -> dict[str, EmulatedDevice]:
         found = emulators_of(file, self._registry, sensor.name, senses)
+        self.pressed_by(senses, found)
+        self.free_joints(found)
+        return found
+
+    def pressed_by(self, senses: EmulatedPress, found: Mapping[str, EmulatedDevice]) -> None:
+        """Let the emulated motor, if there is one, press what `senses`."""
         if MOTOR in found:
             emulator = found[MOTOR].emulator
             if not isinstance(emulator, MotorEmulator):
                 raise UsageError(f"The emulated {MOTOR} is no faulhaber device.", hint="This rig moves one.")
             senses.pressed_by(emulator.drive)
+
+    def free_joints(self, found: Mapping[str, EmulatedDevice]) -> None:
+        """Let the emulated joints move without load: the platform's weight is not modelled."""
         for name in JOINTS:
             if name in found and isinstance(joint := found[name].emulator, MotorEmulator):
-                joint.drive.servo.load = None  # the platform's weight is not modelled
-        return found
+                joint.drive.servo.load = None
 
     def _guard(
         self, stack: ExitStack, file: RigFile, opened: Any, clock: Clock, emulated: EmulatedDevices | None
@@ -427,7 +438,9 @@ class ParallelManipulator:
                 retreat_m=options.retreat_m,
                 retreat_speed_m_s=options.retreat_speed_m_s,
                 heartbeat_s=1e-3 * limits.heartbeat_ms,
-                force_age_s=FORCE_AGE_S + 3 / (stream.rate_hz or 1000.0),
+                force_age_s=FORCE_AGE_S + 3 / (stream.rate_hz or 1000.0)
+                if limits.force_age_ms is None
+                else 1e-3 * limits.force_age_ms,
                 channel=force.column,
                 sign=force.sign,
                 zero=tuple(zero.tolist()),

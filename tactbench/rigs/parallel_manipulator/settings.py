@@ -52,6 +52,8 @@ class SafetyLimits(_Part):
     """Norm of the raw torque; None: torque is not looked at."""
     rated_force_n: Positive
     """What the weakest part bears: skin, sensor, force sensor, cap. By its data sheet."""
+    force_age_ms: Positive | None = None
+    """How old a sample of the force may be; None: three sampling periods and 10 ms."""
     travel_mm: Range
     """Least and greatest position of the motor; 0 lies between them, where the drive keeps them."""
     homing_force_n: Positive = 0.2

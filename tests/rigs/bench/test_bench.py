@@ -8,12 +8,13 @@ import pytest
 from tactbench.core.acquisition import acquire
 from tactbench.core.errors import DataError, RigError, UsageError
 from tactbench.core.evaluation.dataset import load_dataset
+from tactbench.core.plugins.emulators import running
 from tactbench.core.recording.health import examine
 from tactbench.core.recording.reader import open_recording
 from tactbench.core.spec.quantity import assumed
 from tactbench.core.spec.rig_file import Allowed, EmulationSettings
 from tactbench.plugin import ForceRamp, Quality, RigContext, Scene, load_object, load_registry
-from tactbench.plugin.devices import DeviceEntry, EmulatedDevices, ForceEntry, RigFile, emulators_of
+from tactbench.plugin.devices import DeviceEntry, EmulatedDevices, ForceEntry, NamedDevice, RigFile, emulators_of
 from tactbench.sensors.icub.emulator import Bus
 
 REGISTRY = load_registry()
@@ -37,6 +38,7 @@ def rig_file(sensor="icub", faults=(), force_faults=(), time="virtual", seed=1, 
 
 
 def bench(file, operator=None):
+    file = None if file is None else running(file)
     context = RigContext(effects=tuple(REGISTRY.effects), rig_file=file, operator=operator)
     return load_object(REGISTRY.rigs["bench"].where)(context)
 
@@ -283,6 +285,9 @@ def test_what_cannot_be_is_refused_with_the_next_step(tmp_path):
         press(tmp_path / "p.h5", rig_file("icub"), "biotac")
     with pytest.raises(UsageError, match="no channel 'fq'"):
         press(tmp_path / "p.h5", rig_file(channel="fq"))
+    motor = NamedDevice(device="faulhaber", link="emulated")
+    with pytest.raises(UsageError, match="opens no motor"):
+        bench(rig_file().model_copy(update={"devices": {"motor": motor}}))
     with pytest.raises(UsageError, match="no simulated rig"):
         bench(rig_file().model_copy(update={"emulation": EmulationSettings(physics="replay")}))
     mixed = rig_file()
