@@ -14,7 +14,7 @@ from tactbench.core.samples import Block
 from tactbench.core.spec.recording import StreamCounts
 from tactbench.core.spec.sensor import StreamSpec
 from tactbench.devices.driver import Driver
-from tactbench.devices.queue import BlockQueue, Loss
+from tactbench.devices.queue import BlockQueue
 from tactbench.devices.sequence import SequenceCheck
 from tactbench.links.link import Clock
 
@@ -44,9 +44,9 @@ class _Stream:
         self.most_rows = UNRATED_ROWS if spec.rate_hz is None else math.ceil(2 * block_s * spec.rate_hz)
 
     def put(self, block: Block, now_ns: int) -> None:
-        self.came_ns = now_ns
         kept = self.check(block)
         if kept is not None:
+            self.came_ns = now_ns
             self.queue.put(kept)
 
     def take(self) -> Iterator[Block]:
@@ -165,7 +165,7 @@ class Reading:
             name: StreamCounts(
                 received=stream.check.received,
                 written=stream.written,
-                dropped=stream.queue.loss.rows,
+                dropped=stream.queue.dropped,
                 duplicates=stream.check.duplicates,
                 late=stream.check.late,
                 gaps=stream.check.gaps,
@@ -177,16 +177,6 @@ class Reading:
     def counts(self) -> Mapping[str, int]:
         """What the drivers counted, as ``device: name``; at most 0.25 s old, and whole once the reading is over."""
         return {f"{name}: {what}": n for name, counts in self._counts.items() for what, n in counts.items()}
-
-    @property
-    def high_water(self) -> Mapping[str, int]:
-        """By stream: the most rows that waited to be taken."""
-        return {name: stream.queue.high_water for name, stream in self._streams.items()}
-
-    @property
-    def losses(self) -> Mapping[str, Loss]:
-        """By stream: what was dropped because the caller was behind."""
-        return {name: stream.queue.loss for name, stream in self._streams.items()}
 
     def blocks(self, duration_s: float, is_over: Callable[[], bool] = lambda: False) -> Iterator[Block]:
         """Yield blocks of all streams until the time is over or a device has ended the reading; then stop the devices.

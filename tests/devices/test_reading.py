@@ -100,7 +100,6 @@ def test_the_same_rows_in_virtual_and_in_real_time(read, clock):
     assert counts == StreamCounts(received=1052, written=1051, duplicates=1, gaps=2)
     assert reading.counts == {"device: datagrams": 6}
     assert reading.ended == ""
-    assert 0 < reading.high_water["wide"] <= 25_000
     assert max(len(block.data) for block in blocks) <= 500, "at most twice 50 ms of data"
 
 
@@ -153,9 +152,6 @@ def test_a_caller_that_stops_for_ten_seconds_loses_what_is_counted(clock):
     assert joined(came, "force") == ([*range(51 * 100), *range(101 * 100, 102 * 100)], [101 * 100])
     assert reading.stream_counts["wide"] == StreamCounts(received=51_000, written=26_000, dropped=25_000)
     assert reading.stream_counts["force"].dropped == 5000
-    assert reading.losses["wide"].first_sequence == 51 * 500
-    assert reading.losses["wide"].last_sequence == 101 * 500 - 1
-    assert reading.high_water == {"wide": 25_000, "force": 5000}
 
 
 def test_a_device_that_is_gone_ends_the_reading(clock):

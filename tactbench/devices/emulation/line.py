@@ -84,8 +84,6 @@ class Line:
         that open, and it is dropped.
     gone
         Whether the link was unplugged by a fault.
-    bytes_from_host, bytes_to_host
-        How many passed; of a CAN frame its data.
     log
         What passed in both directions, in order.
     """
@@ -100,7 +98,6 @@ class Line:
     ) -> None:
         self.deliver: Callable[[float, Piece], None] | None = None
         self.gone = False
-        self.bytes_from_host = self.bytes_to_host = 0
         self.log: list[Passed] = []
         self._emulator = emulator
         self._faults = tuple(faults)
@@ -123,7 +120,6 @@ class Line:
         self.poll(now_s)
         if self.gone:
             return
-        self.bytes_from_host += _size(piece)
         if self._keep_log:
             self.log.append(Passed(now_s, "host", piece))
         self._in_free_s = self._paced(self._in, piece, now_s, self._in_free_s)
@@ -141,7 +137,6 @@ class Line:
             self._send(self._emulator.poll(until_s))
         while self._out and self._out[0][0] <= now_s and self._out[0][0] < self._unplugged_s:
             t_s, piece = self._out.popleft()
-            self.bytes_to_host += _size(piece)
             if self._keep_log:
                 self.log.append(Passed(t_s, "device", piece))
             if self.deliver is not None:
@@ -181,7 +176,3 @@ class Line:
         for number in range(len(piece)):
             queue.append((t_s + number * self._byte_s, piece[number : number + 1]))
         return t_s + len(piece) * self._byte_s
-
-
-def _size(piece: Piece) -> int:
-    return len(piece if isinstance(piece, bytes) else piece.data)
