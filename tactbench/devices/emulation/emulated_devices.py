@@ -12,7 +12,7 @@ from typing import Any, Literal, Self
 
 from tactbench.core.errors import UnknownNameError
 from tactbench.core.spec.rig import EmulatedLink
-from tactbench.devices.emulation.line import BITS_PER_BYTE, Line, LinkFault, Passed
+from tactbench.devices.emulation.line import Line, LinkFault, Passed
 from tactbench.devices.emulation.real_time import End, PseudoTerminal, RealTimeServer, SlcanAdapter, UdpEnd
 from tactbench.devices.emulation.virtual_time import (
     VirtualByteLink,
@@ -43,7 +43,7 @@ class EmulatedDevice:
     faults: tuple[LinkFault, ...] = ()
     """Of the link; the device's own are in its emulator."""
     baud: int | None = None
-    """Of a serial line that has a pace, bits per second; None: what is sent is there at once."""
+    """Of a serial line, bits per second, for its address; None: derived from what the device sends."""
 
 
 class EmulatedDevices:
@@ -86,7 +86,6 @@ class EmulatedDevices:
             name: Line(
                 _on_its_line(device, real=self._virtual is None),
                 faults=device.faults,
-                baud=None if getattr(device.emulator, "keeps_pace", False) else device.baud,
                 keep_log=keep_log,
             )
             for name, device in self._devices.items()
@@ -197,7 +196,7 @@ def _on_its_line(device: EmulatedDevice, *, real: bool) -> DeviceEmulator:
 
 def _baud_for(emulator: Any) -> int:
     """Return the least usual baud rate that carries what a device sends, and a quarter more."""
-    needed = 1.25 * BITS_PER_BYTE * getattr(emulator, "bytes_per_s", 0.0)
+    needed = 1.25 * 10 * getattr(emulator, "bytes_per_s", 0.0)
     return next((baud for baud in BAUDS if baud >= needed), BAUDS[-1])
 
 

@@ -210,10 +210,12 @@ class RealTimeServer:
             self._unplug(name)
         self._ends.close()
 
-    def serve(self, now_s: float) -> float:
-        """Carry what has come and what is due at `now_s`; return when something is due next, infinite if nothing is."""
+    def serve(self, at_s: float | None = None) -> float:
+        """Carry what has come and what is due at `at_s` or now; return when something is due next, or infinity."""
         for name, (line, end) in list(self._open.items()):
-            for piece in end.received():
+            pieces = end.received()
+            now_s = self._clock() * 1e-9 if at_s is None else at_s  # after what it is the time of
+            for piece in pieces:
                 line.feed(piece, now_s)
             line.poll(now_s)
             if line.gone:
@@ -229,8 +231,7 @@ class RealTimeServer:
     def _run(self) -> None:
         try:
             while not self._stop:
-                due_s = self.serve(self._clock() * 1e-9)
-                wait_s = max(0.0, due_s - self._clock() * 1e-9)
+                wait_s = max(0.0, self.serve() - self._clock() * 1e-9)
                 self._selector.select(None if wait_s == math.inf else wait_s)
         except BaseException as error:  # shown to whoever waits for the device
             self.error = error

@@ -126,14 +126,13 @@ class _VirtualLink(Link):
 class VirtualByteLink(_VirtualLink, ByteLink):
     """A byte stream.
 
-    A read returns what came at one moment, so that every piece keeps its time; on a line with a pace, whose bytes come
-    one at a time, all that has come.
+    A read returns what came at one moment, so that every piece keeps its time.
     """
 
     def read(self, timeout_s: float, *, size: int = 65536) -> Received:  # noqa: D102  (inherited)
         self._wait(timeout_s)
         t_ns, data = self._arrived[0][0], bytearray()
-        while self._arrived and len(data) < size and (self._line.paced or self._arrived[0][0] == t_ns):
+        while self._arrived and len(data) < size and self._arrived[0][0] == t_ns:
             came_ns, piece = self._arrived.popleft()
             assert isinstance(piece, bytes)
             left = size - len(data)

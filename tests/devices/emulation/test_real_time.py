@@ -15,52 +15,51 @@ from tactbench.core.errors import LinkError, LinkTimeout, LinkUnplugged
 from tactbench.devices.emulation.emulated_devices import EmulatedDevice, EmulatedDevices
 from tactbench.devices.emulation.line import Line, LinkFault
 from tactbench.devices.emulation.real_time import PseudoTerminal, RealTimeServer, SlcanAdapter, UdpEnd
-from tactbench.plugin.devices import CanFrame, open_link
+from tactbench.plugin import ChannelSpec, StreamSpec
+from tactbench.plugin.devices import CanFrame, EmulatorSettings, RowEmulator, open_link
 from tests.core.pool.patience import until
 from tests.devices.emulation.models import Answerer, Complement, Recorder
 
 needs_pty = pytest.mark.skipif(os.name != "posix", reason="pseudo-terminals are POSIX")
 
 
-def on(kind, emulator, *faults, baud=None):
-    return EmulatedDevice(kind, emulator, tuple(LinkFault.parse(fault) for fault in faults), baud)
+def on(kind, emulator, *faults):
+    return EmulatedDevice(kind, emulator, tuple(LinkFault.parse(fault) for fault in faults))
 
 
 @needs_pty
-def test_bytes_are_released_when_they_are_due_and_not_before():
-    """Served at chosen moments: a byte takes 10/9600 s, and what is overdue is sent at once, not spread anew."""
+def test_what_is_due_is_sent_and_nothing_before():
+    """Served at chosen moments: what is overdue is sent at once."""
     end = PseudoTerminal("serial://{}?baud=9600")
-    line = Line(Recorder(period_s=0.01), baud=9600)
-    server = RealTimeServer({"a": (line, end)}, lambda: 0)
+    server = RealTimeServer({"a": (Line(Recorder(period_s=0.01)), end)}, lambda: 0)
     try:
         with open_link(end.address) as link:
             assert server.serve(0.0099) == pytest.approx(0.01)
             with pytest.raises(LinkTimeout):
                 link.read(0.0)
-            assert server.serve(0.01) == pytest.approx(0.01 + 10 / 9600)
-            assert link.read(1.0).data == b"\0"
-            assert server.serve(0.0115) == pytest.approx(0.01 + 20 / 9600)
-            assert link.read(1.0).data == b"\0"
+            assert server.serve(0.01) == pytest.approx(0.02)
+            assert link.read(1.0).data == bytes([0, 0, 0])
             server.serve(0.0303)
-            assert link.read(1.0).data == bytes([0, 1, 0, 0, 2])
+            assert link.read(1.0).data == bytes([1, 0, 0, 2, 0, 0])
     finally:
         server.close()
 
 
-@needs_pty
-def test_the_host_is_heard_at_the_pace_of_the_line():
-    end = PseudoTerminal("serial://{}?baud=9600")
-    device = Answerer()
-    server = RealTimeServer({"a": (Line(device, baud=9600), end)}, lambda: 0)
-    try:
-        with open_link(end.address) as link:
-            link.write(b"abc")
-            server.serve(1.0)
-            assert device.told == [(1.0, b"a")]
-            server.serve(2.0)
-            assert [t_s for t_s, _ in device.told] == pytest.approx([1.0, 1.0 + 10 / 9600, 1.0 + 20 / 9600])
-    finally:
-        server.close()
+@pytest.mark.parametrize(("rate_hz", "baud"), [(100.0, 115200), (1000.0, 921_600)])
+def test_the_address_states_a_baud_rate_that_carries_what_is_sent(rate_hz, baud):
+    """64 bytes a row at 1 kHz were written down with 115200 baud, 11.5 kB/s."""
+    row = StreamSpec(name="row", channels=tuple(ChannelSpec(name=f"c{n}", kind="taxel") for n in range(64)))
+
+    class Sends(RowEmulator):
+        stream = row
+
+        def sent(self, values):
+            return [bytes(len(values))]
+
+    model = Sends(EmulatorSettings(lambda t_s: {}, None))
+    model.rate_hz = rate_hz
+    with EmulatedDevices({"a": on("bytes", model)}, time="real") as devices:
+        assert devices.addresses["a"].endswith(f"?baud={baud}")
 
 
 @needs_pty

@@ -163,15 +163,6 @@ def test_a_read_takes_no_more_than_it_was_asked_for():
         assert [link.read(1.0, size=2).data for _ in range(4)] == [b"\0\0", b"\0", b"\1\0", b"\0"]
 
 
-def test_bytes_of_a_line_with_a_pace_are_read_together_once_they_have_come():
-    device = EmulatedDevice("bytes", Recorder(0.01), baud=9600)
-    with EmulatedDevices({"a": device}) as devices, devices.open_link("a") as link:
-        assert (link.read(1.0).data, devices.clock()) == (b"\0", 10 * MS)
-        devices.advance(30 * MS)
-        came = link.read(0.0)
-        assert (came.data, came.t_ns) == (bytes([0, 0, 1, 0, 0, 2]), 10 * MS + round(1e10 / 9600))
-
-
 def test_what_was_sent_before_the_link_was_opened_is_not_seen():
     with EmulatedDevices({"a": on("datagram", Recorder(0.01))}) as devices:
         devices.advance(95 * MS)
@@ -208,7 +199,7 @@ def run(seed):
 
     rngs = [np.random.default_rng([seed, number]) for number in range(4)]
     models = {
-        "stream": EmulatedDevice("bytes", Recorder(0.02, sensing, rngs[0]), baud=9600),
+        "stream": EmulatedDevice("bytes", Recorder(0.02, sensing, rngs[0])),
         "bus": on("can", Recorder(0.005, sensing, rngs[1], can=True), "late:every=7,delay_s=0.02"),
         "datagrams": on("datagram", Recorder(0.001, sensing, rngs[2]), "unplug:start_s=2.5"),
         "spi": on("spi", Complement()),
