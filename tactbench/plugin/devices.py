@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     from tactbench.devices.emulator import DeviceEmulator, EmulatorSettings, Senses, Sent, SpiDeviceEmulator
     from tactbench.devices.fault import Fault, fault_concerns
     from tactbench.devices.log import DeviceLog
+    from tactbench.devices.options import Options, open_for, read_file, read_options
     from tactbench.devices.reading import Reading
     from tactbench.devices.row_driver import RowDriver, Sample
     from tactbench.devices.row_emulator import RowEmulator
@@ -73,6 +74,7 @@ __all__ = [
     "LinkUnplugged",
     "NamedDevice",
     "Operator",
+    "Options",
     "PressingForce",
     "Reading",
     "Received",
@@ -99,8 +101,11 @@ __all__ = [
     "emulation_of",
     "emulators_of",
     "fault_concerns",
+    "open_for",
     "open_link",
     "physics_of",
+    "read_file",
+    "read_options",
     "with_sensor",
 ]
 

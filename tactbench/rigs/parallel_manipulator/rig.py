@@ -53,6 +53,7 @@ from tactbench.plugin.devices import (
     emulation_of,
     emulators_of,
     physics_of,
+    read_options,
     with_sensor,
 )
 from tactbench.rigs.parallel_manipulator.control import STOP_S, Control, WatchedDriver
@@ -65,7 +66,6 @@ from tactbench.rigs.parallel_manipulator.joints import Joints
 from tactbench.rigs.parallel_manipulator.motor.driver import FaulhaberDriver
 from tactbench.rigs.parallel_manipulator.motor.emulator import MotorEmulator
 from tactbench.rigs.parallel_manipulator.motor.profile import FaulhaberOptions
-from tactbench.rigs.parallel_manipulator.options import read_options
 from tactbench.rigs.parallel_manipulator.press import Course, Press
 from tactbench.rigs.parallel_manipulator.rig_check import refuse
 from tactbench.rigs.parallel_manipulator.settings import JOINTS, MOTOR, settings_of, with_limits

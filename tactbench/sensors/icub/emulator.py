@@ -16,7 +16,7 @@ from itertools import count
 from typing import ClassVar, Literal, TypeAlias
 
 from tactbench.plugin import UsageError
-from tactbench.plugin.devices import CanFrame, DeviceEmulator, EmulatorSettings, Fault, fault_concerns
+from tactbench.plugin.devices import CanFrame, DeviceEmulator, EmulatorSettings, Fault, fault_concerns, read_options
 from tactbench.sensors.icub.channels import STREAMS
 from tactbench.sensors.icub.codec import (
     BIT_RATE,
@@ -39,7 +39,7 @@ from tactbench.sensors.icub.codec import (
     skin_frames,
     version_frame,
 )
-from tactbench.sensors.icub.options import FingertipOptions, checked
+from tactbench.sensors.icub.options import FingertipOptions
 
 Sense: TypeAlias = Callable[[int, float], Sequence[int] | None]
 """(triangle, seconds) -> 12 results of its AD7147, 0 to 65535, rising under pressure; None: no chip there."""
@@ -459,7 +459,7 @@ def build_emulator(settings: EmulatorSettings) -> Bus:
     UsageError
         If an option or a fault is not known.
     """
-    options = checked(FingertipOptions, settings.options)
+    options = read_options(FingertipOptions, settings.options, "icub")
     rest = {channel.name: channel.rest.to("count") for channel in STREAMS[0].channels if channel.rest is not None}
 
     def sense(triangle: int, now_s: float) -> Sequence[int] | None:

@@ -382,13 +382,12 @@ def test_an_unplugged_link_ends_the_reading_and_closes():
 @pytest.mark.parametrize(
     ("options", "said"),
     [
-        ({"selct": 1}, "selct.*Options are select, frame"),
-        ({"select": 0}, "select: 0 was given"),
-        ({"select": True}, "select: True"),
+        ({"selct": 1}, "selct.*Did you mean 'select'"),
+        ({"select": 0}, "'select'.*greater than or equal to 1"),
         ({"frame": "E1 E20"}, "names of channels"),
         ({"frame": ""}, "names of channels"),
-        ({"resends": 1.5}, "resends: 1.5"),
-        ({"batches_ahead": 1}, "batches_ahead: 1"),
+        ({"resends": 1.5}, "'resends'"),
+        ({"batches_ahead": 1}, "'batches_ahead'"),
     ],
 )
 def test_options_that_are_none_are_refused(options, said):

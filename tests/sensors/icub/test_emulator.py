@@ -283,7 +283,7 @@ def test_a_late_answer():
 
 
 def test_a_late_tail_is_of_no_sample():
-    samples, _ = with_fault(BoardFault("late-answer", half="tail", start_s=0.1, end_s=0.13, delay_s=0.046))
+    samples, _ = with_fault(BoardFault("late-answer", half="tail", start_s=0.1, end_s=0.13, delay_s=0.038))
     assert [sample.quality for sample in samples[2:4]] == [
         (SUSPECT,) * 7 + (MISSING,) * 5,
         (MISSING,) * 7 + (GOOD,) * 5,
