@@ -5,6 +5,7 @@ from __future__ import annotations
 import shutil
 import subprocess
 from contextlib import contextmanager
+from itertools import pairwise
 
 import pytest
 
@@ -88,7 +89,7 @@ def test_the_link_reads_through_it(program):
         assert [one.number for one in found] == numbers
         assert [one.data for one in found] == [(bytes([255 - n, 255]), b"", b"\xff") for n in range(4)]
         begun = [one.device_us for one in found]
-        assert all((b - a) % 2**32 >= 350 for a, b in zip(begun, begun[1:], strict=False))  # the pauses are waited for
+        assert all((b - a) % 2**32 >= 350 for a, b in pairwise(begun))  # the pauses are waited for
         frame = [SpiStep(bytes([n % 256] * 2), 1, 20) for n in range(280)]  # zero bytes, stretches without one
         bridge.send(frame)
         assert bridge.receive(5.0).data == tuple(bytes([255 - n % 256] * 2) for n in range(280))

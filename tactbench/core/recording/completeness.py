@@ -33,9 +33,15 @@ class _Track:
     """Length and begin of the longest time without one."""
     row: npt.NDArray[Any] | None = None
     """The last row."""
-    same_ns: tuple[int, int] = (0, 0)
-    """From the first to the last row that is the same as the last."""
-    still: list[tuple[int, int]] = field(default_factory=list)
+
+
+@dataclass
+class _Stillness:
+    """Since when nothing changes in a stream of the force sensor, or in all streams of the sensor together."""
+
+    same_ns: tuple[int, int] | None = None
+    """From the last change to the last row."""
+    long: list[tuple[int, int]] = field(default_factory=list)
     """Former ones, longer than is allowed."""
 
 
@@ -55,6 +61,8 @@ class Completeness:
         self._reference = {stream.name: [one.name for one in stream.channels] for stream in reference}
         self._rated = {stream.name for stream in (*sensor, *reference) if stream.rate_hz is not None}
         self._tracks = {stream.name: _Track() for stream in (*sensor, *reference)}
+        of_sensor = _Stillness()  # a microphone may have nothing to say of a slow press
+        self._still = {stream.name: of_sensor for stream in sensor} | {one.name: _Stillness() for one in reference}
         self._begin_ns: int | None = None
         self._end_ns = 0
         self._force: list[tuple[int, float]] = []
@@ -73,7 +81,7 @@ class Completeness:
         good = ~missing.all(axis=1)
         if good.any():
             self._silence(track, block.t_ns[good])
-            self._stillness(track, block.t_ns[good], block.data[good])
+            self._stillness(track, self._still[block.stream], block.t_ns[good], block.data[good])
         names = self._reference.get(block.stream, [])
         pressing = next((place for place, name in enumerate(names) if name in ("fz", "normal")), None)
         if pressing is not None and (~missing[:, pressing]).any():
@@ -87,15 +95,15 @@ class Completeness:
         track.silence = max(track.silence, (int(steps[longest]), int(times[longest])))
         track.last_ns = int(t_ns[-1])
 
-    def _stillness(self, track: _Track, t_ns: npt.NDArray[np.int64], data: npt.NDArray[Any]) -> None:
-        if track.row is None:
-            track.row, track.same_ns = data[0], (int(t_ns[0]), int(t_ns[0]))
-        changed = (data != np.concatenate((track.row[None], data[:-1]))).any(axis=1)
-        begins = np.concatenate(([track.same_ns[0]], t_ns[changed]))
-        ends = np.concatenate((np.concatenate(([track.same_ns[1]], t_ns[:-1]))[changed], t_ns[-1:]))
+    def _stillness(self, track: _Track, still: _Stillness, t_ns: npt.NDArray[np.int64], data: npt.NDArray[Any]) -> None:
+        row = data[0] if track.row is None else track.row
+        since_ns, seen_ns = still.same_ns or (int(t_ns[0]), int(t_ns[0]))
+        changed = (data != np.concatenate((row[None], data[:-1]))).any(axis=1)
+        begins = np.concatenate(([since_ns], t_ns[changed]))
+        ends = np.concatenate((np.concatenate(([seen_ns], t_ns[:-1]))[changed], t_ns[-1:]))
         for place in np.flatnonzero(ends[:-1] - begins[:-1] > 1e9 * self._allowed.frozen_s).tolist():
-            track.still.append((int(begins[place]), int(ends[place])))
-        track.row, track.same_ns = data[-1].copy(), (int(begins[-1]), int(ends[-1]))
+            still.long.append((int(begins[place]), int(ends[place])))
+        track.row, still.same_ns = data[-1].copy(), (int(begins.max()), int(max(ends[-1], seen_ns)))
 
     @property
     def seconds(self) -> float:
@@ -112,7 +120,8 @@ class Completeness:
         silent_ns, from_ns = max(track.silence, (self._end_ns - last_ns, last_ns))
         if name in self._rated and silent_ns > 1e9 * self._allowed.silent_s:
             yield f"{name}: nothing for {1e-9 * silent_ns:.3g} s from {1e-9 * (from_ns - begin_ns):.3g} s on"
-        for from_ns, to_ns in (*track.still, track.same_ns):
+        still = self._still[name]
+        for from_ns, to_ns in (*still.long, *([still.same_ns] if still.same_ns else [])):
             if to_ns - from_ns <= 1e9 * self._allowed.frozen_s:
                 continue
             if name in self._reference or self._pressed(from_ns, to_ns):

@@ -65,6 +65,15 @@ def test_a_force_that_stands_still_is_frozen_and_a_sensor_if_the_force_moves_mea
     still = lambda t_s: np.full((len(t_s), 2), 7.0)  # noqa: E731
     assert lacking(taxels=still) == ["taxels: frozen for 9.99 s from 0 s on"]
     at_rest = lambda t_s: 1e-3 * np.sin(50 * t_s)[:, None] + np.where(t_s > 9.8, t_s - 9.8, 0.0)[:, None]  # noqa: E731
+    # A second stream of the sensor that changes shows that the sensor lives, whatever the first one does.
+    sound = StreamSpec(name="sound", rate_hz=100.0, channels=(ChannelSpec(name="pac", kind="ac_pressure"),))
+    found = Completeness(Allowed(), (TAXELS, sound), (FORCE,))
+    for second in range(10):
+        t_ns = np.array([second, second + 0.5]) * 10**9
+        found.add(Block("taxels", t_ns.astype(np.int64), np.array([[second, 0], [second, 1]])))
+        found.add(Block("sound", t_ns.astype(np.int64), np.zeros((2, 1))))
+        found.add(Block("force", t_ns.astype(np.int64), np.array([[second], [second + 0.5]])))
+    assert found.lacking({}) == []
     pressed_last = lambda t_s: np.where(t_s > 9.8, t_s, 7.0)[:, None].repeat(2, 1)  # noqa: E731
     assert lacking(taxels=pressed_last, force=at_rest) == []
 
