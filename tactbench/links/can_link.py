@@ -58,37 +58,11 @@ class CanLink(Link):
 
     @abstractmethod
     def receive(self, timeout_s: float) -> CanFrame:
-        """Return the next data frame.
-
-        Parameters
-        ----------
-        timeout_s
-            Seconds to wait; 0 asks without waiting.
-
-        Raises
-        ------
-        LinkTimeout
-            If none came.
-        LinkUnplugged
-            If the adapter or the network is gone.
-        LinkClosed
-            If the link was closed; :class:`LinkEnded` if a log is over.
-        """
+        """Return the next data frame; raises as every :class:`Link`, LinkEnded if a log is over."""
 
     @abstractmethod
     def send(self, frame: CanFrame) -> None:
-        """Send a data frame.
-
-        Raises
-        ------
-        LinkError
-            If it is not a CAN frame, or a log would have to take it.
-        LinkTimeout
-            If the adapter does not take it within :data:`~tactbench.links.link.WRITE_TIMEOUT_S`, or the queue is full
-            since no node acknowledges.
-        LinkUnplugged, LinkClosed
-            As of :meth:`receive`.
-        """
+        """Send a data frame; raises as every :class:`Link`, LinkTimeout also where no node acknowledges."""
 
     def _sendable(self, frame: CanFrame) -> None:
         """Raise what `send` raises of a link that is closed or unplugged, and of what is no CAN frame."""
@@ -165,8 +139,7 @@ class CanBus(CanLink):
                 # Bytes that are no frame. python-can's slcan would try those that are not ASCII again and again; its
                 # own flush() would drop the frames behind them as well.
                 self.damaged += 1
-                if hasattr(self._bus, "_buffer"):
-                    self._bus._buffer.clear()
+                getattr(self._bus, "_buffer", bytearray()).clear()
                 message = frame = None
             if frame is not None:
                 return frame
@@ -263,17 +236,7 @@ class CanLog(CanLink):
         self._messages: Iterator[Any] = iter(self._reader)
 
     def receive(self, timeout_s: float) -> CanFrame:
-        """Return the next data frame at once.
-
-        Raises
-        ------
-        LinkEnded
-            If the log is over.
-        LinkError
-            If the log is damaged from here on.
-        LinkClosed
-            If the link was closed.
-        """
+        """Return the next data frame at once; raises LinkEnded if the log is over, LinkError if it is damaged."""
         from can.io.blf import BLFParseError
 
         self._usable(timeout_s)
@@ -296,13 +259,7 @@ class CanLog(CanLink):
                 return frame
 
     def send(self, frame: CanFrame) -> None:
-        """Refuse: a log takes nothing.
-
-        Raises
-        ------
-        LinkError
-            Always.
-        """
+        """Raise LinkError: a log takes nothing."""
         self._usable()
         raise LinkError(f"{self.address} is a log: nothing can be sent to it.", hint="Read it, or open a bus.")
 

@@ -35,7 +35,10 @@ class Received:
 class Link(ABC):
     """A connection to a device: open when it is made, until :meth:`close` or the end of its ``with`` block.
 
-    One thread uses a link. Time-outs are waits by :meth:`timer`, whatever the clock.
+    One thread uses a link. Time-outs are waits by :meth:`timer`, whatever the clock; 0 asks without waiting. Every read
+    and write raises LinkTimeout if nothing came or the other end took nothing in time (:data:`WRITE_TIMEOUT_S` for what
+    is sent), LinkUnplugged if device or other end is gone, LinkClosed once it was closed, and LinkError for what is not
+    possible.
 
     Parameters
     ----------

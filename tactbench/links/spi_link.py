@@ -72,12 +72,7 @@ class SpiLink(Link):
     def send(self, steps: Sequence[SpiStep]) -> int:
         """Hand over a batch and return its number: 0, 1, 2, …, after 65535 again 0.
 
-        Raises
-        ------
-        LinkError
-            If it is empty, a step is not possible, or the adapter cannot hold one more: receive first.
-        LinkTimeout, LinkUnplugged, LinkClosed
-            As of every link.
+        Raises as every :class:`Link`, LinkError if it is empty, a step is not possible, or the adapter holds no more.
         """
         self._usable()
         if not steps:
@@ -90,35 +85,14 @@ class SpiLink(Link):
         return self._number
 
     def receive(self, timeout_s: float) -> SpiReply:
-        """Return the next reply. Where one was lost on its way, its number is left out.
-
-        Parameters
-        ----------
-        timeout_s
-            Seconds to wait; 0 asks without waiting.
-
-        Raises
-        ------
-        LinkTimeout
-            If none came.
-        LinkError
-            If the adapter refuses the batch.
-        LinkUnplugged, LinkClosed
-            As of every link.
-        """
+        """Return the next reply, raising as every :class:`Link`; where one was lost, its number is left out."""
         return self._collect(timeout_s, self._usable(timeout_s))
 
     def abandon(self) -> None:
         """Wait no longer for replies to what was sent; those that come late are dropped. Raises nothing."""
 
     def transfer(self, data: bytes, *, select: int = 1, pause_us: int = 0, timeout_s: float = 1.0) -> bytes:
-        """Exchange `data` at once and return what came in; replies to earlier batches are dropped.
-
-        Raises
-        ------
-        LinkTimeout, LinkError, LinkUnplugged, LinkClosed
-            As of :meth:`receive`.
-        """
+        """Exchange `data` at once and return what came in; replies to earlier batches are dropped."""
         number = self.send([SpiStep(data, select, pause_us)])
         deadline = self.timer() + timeout_s
         while True:

@@ -246,21 +246,6 @@ def test_counts_end_by_themselves_and_stop_ends_the_rest():
     assert emulator.rejected == 1
 
 
-def test_bias_and_latch():
-    emulator = box(lambda t: (0, 0, -3.0 if t < 0.5 else -4.0, 0, 0, 0), threshold_n=3.5)
-    emulator.feed(encode_request(Request(Command.SET_SOFTWARE_BIAS)), 0.1)
-    start(emulator, 0.1)
-    before = records_in(emulator.poll(0.2))[-1]
-    assert (before.status, before.counts[2]) == (0, 0)
-    after = records_in(emulator.poll(0.6))[-1]
-    assert (after.status, after.counts[2]) == (0x80010000, -1_000_000)
-    low = box(lambda t: (0, 0, -4.0 if t < 0.5 else 0.0, 0, 0, 0), threshold_n=3.5)
-    start(low)
-    assert records_in(low.poll(0.7))[-1].status == 0x80010000  # It stays, after the load is gone,
-    low.feed(encode_request(Request(Command.RESET_CONDITION_LATCH)), 0.7)
-    assert records_in(low.poll(0.8))[-1].status == 0  # until it is reset.
-
-
 def test_a_sensor_at_its_end_says_so():
     emulator = box(lambda t: (0, 0, -40.0, 0, 0, 0))
     start(emulator)
@@ -362,15 +347,6 @@ def test_a_saturated_sensor_is_marked_and_counted():
     assert (block.quality[saturated] == Quality.SATURATED).all()
     assert (block.quality[~saturated] == Quality.GOOD).all()
     assert driver.counts == {"errors": saturated.sum(), "saturated": saturated.sum()}
-
-
-def test_a_threshold_is_a_warning():
-    driver, link = driver_on(box(lambda t: (0, 0, -4.0, 0, 0, 0), threshold_n=3.5))
-    assert driver.identify()["status"] == "error summary, condition latched"
-    driver.start()
-    block = read_for(driver, link, 0.1)
-    assert not block.quality.any()
-    assert driver.counts["warnings"] == len(block.data)
 
 
 def test_the_bias_makes_the_present_reading_zero():

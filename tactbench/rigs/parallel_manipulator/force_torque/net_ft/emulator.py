@@ -67,8 +67,6 @@ class RdtEmulator(DeviceEmulator):
     largest
         (6,) where the sensor saturates [N, N*m]; the default is that of a Nano17 SI-25-0.25 (sourced: calibration file
         FT8577, quoted in a public script).
-    threshold_n
-        A force on one axis that sets the monitor condition, which stays until it is reset; None: no condition.
     first_sequence
         Of records and samples, to begin near the wrap of the counters.
     faults
@@ -82,7 +80,6 @@ class RdtEmulator(DeviceEmulator):
         scale: CountScale | None = None,
         rate_hz: float = 1000.0,
         largest: Sequence[float] = (25.0, 25.0, 35.0, 0.25, 0.25, 0.25),
-        threshold_n: float | None = None,
         first_sequence: int = 1,
         faults: Iterable[DatagramFault] = (),
     ) -> None:
@@ -95,12 +92,10 @@ class RdtEmulator(DeviceEmulator):
         """Datagrams that were no request."""
         self._wrench = wrench
         self._largest = tuple(largest)
-        self._threshold_n = threshold_n
         self._first_sequence = first_sequence
         self.faults = list(faults)
         self._seen: Counter[Fault] = Counter()
         self._bias = [0] * len(AXES)
-        self._latched = False
         self._now_s = 0.0
         self._next: int | None = None
         self._left: int | None = None
@@ -160,8 +155,6 @@ class RdtEmulator(DeviceEmulator):
                 return self._ended(self._now_s)
             case Command.SET_SOFTWARE_BIAS:
                 self._bias = self.scale.counts(self._sensed(self._now_s)[0]).tolist()
-            case Command.RESET_CONDITION_LATCH:
-                self._latched = False
         return []
 
     def _sensed(self, at_s: float) -> tuple[list[float], bool]:
@@ -176,11 +169,6 @@ class RdtEmulator(DeviceEmulator):
     def _one(self, sample: int) -> list[Sent]:
         at_s = sample / SENSOR_RATE_HZ
         wrench, saturated = self._sensed(at_s)
-        if self._threshold_n is not None and max(map(abs, wrench[:3])) > self._threshold_n:
-            self._latched = True
-        status = (Status.SATURATION_OR_CONVERTER if saturated else 0) | (
-            Status.CONDITION_LATCHED if self._latched else 0
-        )
         fx, fy, fz, tx, ty, tz = (
             min(max(count - zero, LEAST_COUNT), GREATEST_COUNT)
             for count, zero in zip(self.scale.counts(wrench).tolist(), self._bias, strict=True)
@@ -188,7 +176,7 @@ class RdtEmulator(DeviceEmulator):
         record = Record(
             self._sequence,
             (sample + self._first_sequence) % SEQUENCE_MODULUS,
-            int(status | Status.ERROR_SUMMARY if status else 0),
+            int(Status.SATURATION_OR_CONVERTER | Status.ERROR_SUMMARY) if saturated else 0,
             (fx, fy, fz, tx, ty, tz),
         )
         self._sequence = (self._sequence + 1) % SEQUENCE_MODULUS
@@ -203,6 +191,9 @@ class RdtEmulator(DeviceEmulator):
     def _ended(self, at_s: float) -> list[Sent]:
         """Stop sending; return what is still under way."""
         self._next = None
+        return self._released(at_s)
+
+    def _released(self, at_s: float) -> list[Sent]:
         held, self._held = self._held, None
         return [] if held is None else [(at_s, held)]
 
@@ -213,13 +204,10 @@ class RdtEmulator(DeviceEmulator):
         )
         if dropped:
             return []
-        arriving = [datagram, datagram] if doubled else [datagram]
-        if self._held is not None:
-            arriving.append(self._held)
-            self._held = None
-        elif late:
-            self._held = arriving.pop()
-        return [(at_s, piece) for piece in arriving]
+        if late and self._held is None:
+            self._held = datagram
+            return [(at_s, datagram)] * doubled
+        return [(at_s, datagram)] * (1 + doubled) + self._released(at_s)
 
 
 def build(settings: EmulatorSettings) -> RdtEmulator:
