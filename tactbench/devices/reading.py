@@ -25,8 +25,6 @@ STEP_S = 0.02
 datagrams of a UDP socket are 37 ms at 7 kHz, the fastest stream of a Net F/T)."""
 STOP_S = 5.0
 """How long readers are waited for (assumed: a read, a stop and what they send, each within a link's time-outs)."""
-COUNTS_S = 0.25
-"""How old `counts` may be while devices are read."""
 UNRATED_ROWS = 4096
 """The most rows of a block of a stream whose rate nobody states."""
 
@@ -175,7 +173,7 @@ class Reading:
 
     @property
     def counts(self) -> Mapping[str, int]:
-        """What the drivers counted, as ``device: name``; at most 0.25 s old, and whole once the reading is over."""
+        """What the drivers counted, as ``device: name``, once the reading is over."""
         return {f"{name}: {what}": n for name, counts in self._counts.items() for what, n in counts.items()}
 
     def blocks(self, duration_s: float, is_over: Callable[[], bool] = lambda: False) -> Iterator[Block]:
@@ -250,13 +248,9 @@ class Reading:
                 return
             self._to_stop.remove(name)
             self._readers[name] = threading.current_thread()
-        counted_ns = self._clock()
         try:
             while not self._over.is_set():
                 self._take_over(name, driver, READ_S)
-                if self._clock() - counted_ns > 1e9 * COUNTS_S:
-                    counted_ns = self._clock()
-                    self._counts[name] = dict(driver.counts)
             self._exhaust(name, driver, self._clock() + round(1e9 * READ_S))
         except Exception as error:
             self._fail(name, error)

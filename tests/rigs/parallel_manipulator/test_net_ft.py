@@ -177,8 +177,8 @@ def test_counts_per_unit_of_the_box_become_si():
         (configuration(cfgcpf="many"), "many"),
         (configuration(cfgcpf="0"), "positive"),
         (configuration(cfgcpt="inf"), "positive"),
-        (configuration().replace(b"<cfgcpf>1000000</cfgcpf>", b""), "no cfgcpf"),
-        (configuration().replace(b"</netft>", b"<cfgcpf>1</cfgcpf></netft>"), "twice"),
+        (configuration().replace(b"<cfgcpf>1000000</cfgcpf>", b""), "once each"),
+        (configuration().replace(b"</netft>", b"<cfgcpf>1</cfgcpf></netft>"), "once each"),
         (b"<netft>", "not an XML file"),
     ],
 )

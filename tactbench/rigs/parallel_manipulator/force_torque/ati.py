@@ -8,7 +8,6 @@ and builds both matrices so; it agrees with the UserAxis rows of FT8577 to the d
 
 from __future__ import annotations
 
-import math
 from typing import TYPE_CHECKING
 from xml.etree.ElementTree import Element, ParseError, fromstring
 
@@ -84,7 +83,7 @@ GAUGES = 6
 class GaugeCalibration(BaseModel):
     """What a calibration file says, in SI units."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
     serial: str
     body_style: str
@@ -128,91 +127,77 @@ def read_calibration(data: bytes) -> GaugeCalibration:
         If they are no calibration file of six gauges.
     """
     found = elements(data)
-    sensor, calibration = _only(found, "FTSensor").attrib, _only(found, "Calibration").attrib
+    try:
+        return _calibration(found)
+    except KeyError as error:
+        raise AtiFileError(f"The file has no {error.args[0]}.", hint="Is it an ATI .cal file?") from error
+    except ValueError as error:  # of a number, a shape, or pydantic's
+        raise AtiFileError(f"The file is no calibration of six gauges: {error}.") from error
+
+
+def _calibration(found: list[Element]) -> GaugeCalibration:
+    sensor, calibration = (_one(found, name) for name in ("FTSensor", "Calibration"))
     if sensor.get("NumGages", "6") != str(GAUGES):
-        raise AtiFileError(f"The file is for {sensor.get('NumGages')} gauges; sensors of {GAUGES} are read.")
-    force_n = unit(FORCE_UNITS, _need(calibration, "ForceUnits"), "force")
-    torque_nm = unit(TORQUE_UNITS, _need(calibration, "TorqueUnits"), "torque")
+        raise ValueError(f"it is for {sensor['NumGages']} gauges")
+    force_n = unit(FORCE_UNITS, calibration["ForceUnits"], "force")
+    torque_nm = unit(TORQUE_UNITS, calibration["TorqueUnits"], "torque")
     si = np.array([force_n] * 3 + [torque_nm] * 3)
-    stated, rebuilt = _rows(found, "UserAxis"), _rebuilt(found, calibration, force_n, torque_nm)
-    if stated is None and rebuilt is None:
-        raise AtiFileError("The file has neither six UserAxis rows nor six Axis rows with their transform.")
-    matrix, largest = stated or rebuilt or ((), ())
-    rows = np.array(matrix) * si[:, None]
+    stated = _rows(found, "UserAxis")
+    # The file's torque per force, in its own units: mm with N and N-mm.
+    lever = unit(DISTANCE_UNITS, calibration.get("DistUnits", "mm"), "distance") * force_n / torque_nm
+    rebuilt = _rebuilt(found, lever)
+    either = stated or rebuilt
+    if either is None:
+        raise ValueError("it has neither six UserAxis rows nor six Axis rows with their transform")
+    matrix, largest = either
+    rows = matrix * si[:, None]
     if np.linalg.matrix_rank(rows / np.abs(rows).max(axis=1, keepdims=True).clip(min=1e-300)) < len(AXES):
-        raise AtiFileError("The file's matrix is singular: six gauges must tell six axes apart.")
-    span = _number(calibration.get("OutputRange", "20"))
+        raise ValueError("its matrix is singular")
+    span = float(calibration.get("OutputRange", "20"))
     bipolar = calibration.get("OutputBipolar", "True").strip().lower() == "true"
     return GaugeCalibration(
-        serial=_need(sensor, "Serial"),
+        serial=sensor["Serial"],
         body_style=sensor.get("BodyStyle", ""),
         part_number=calibration.get("PartNumber", ""),
-        matrix=tuple(tuple(float(value) for value in row) for row in rows),
-        largest=tuple(float(value) for value in np.array(largest) * si),
+        matrix=tuple(map(tuple, rows.tolist())),
+        largest=tuple((largest * si).tolist()),
         voltages=(-span / 2, span / 2) if bipolar else (0.0, span),
-        rebuilt_difference=None
-        if stated is None or rebuilt is None
-        else float(np.abs(np.array(stated[0]) - np.array(rebuilt[0])).max()),
+        rebuilt_difference=None if stated is None or rebuilt is None else float(np.abs(stated[0] - rebuilt[0]).max()),
     )
 
 
-_Rows = tuple[tuple[tuple[float, ...], ...], tuple[float, ...]]
-"""Six rows of six values, and six rated ranges."""
+def _one(found: list[Element], name: str) -> dict[str, str]:
+    """Return the attributes of the one element of a name."""
+    those = [element.attrib for element in found if element.tag == name]
+    if len(those) != 1:
+        raise KeyError(f"element {name}, or several")
+    return those[0]
 
 
-def _rows(found: list[Element], name: str) -> _Rows | None:
-    """Return the rows of six elements `name`; None: there is none."""
-    rows = [element.attrib for element in found if element.tag == name]
-    if not rows:
+def _rows(found: list[Element], name: str) -> tuple[FloatArray, FloatArray] | None:
+    """Return the (6, 6) values and (6,) ranges of the six elements of a name; None: there is none."""
+    by_axis = {element.attrib["Name"]: element.attrib for element in found if element.tag == name}
+    if not by_axis:
         return None
-    by_axis = {_need(row, "Name"): row for row in rows}
-    if len(rows) != len(AXES) or set(by_axis) != set(AXES):
-        raise AtiFileError(f"Six {name} rows {', '.join(AXES)} were expected, not {', '.join(by_axis)}.")
-    values = tuple(tuple(_number(value) for value in _need(by_axis[axis], "values").split()) for axis in AXES)
-    if {len(row) for row in values} != {GAUGES}:
-        raise AtiFileError(f"Every {name} row needs {GAUGES} values.")
-    return values, tuple(_number(_need(by_axis[axis], "max")) for axis in AXES)
+    values = [[float(value) for value in by_axis[axis]["values"].split()] for axis in AXES]
+    if {len(row) for row in values} != {GAUGES} or not np.isfinite(values).all():
+        raise ValueError(f"each {name} row needs {GAUGES} numbers")
+    return np.array(values), np.array([float(by_axis[axis]["max"]) for axis in AXES])
 
 
-def _rebuilt(found: list[Element], calibration: dict[str, str], force_n: float, torque_nm: float) -> _Rows | None:
+def _rebuilt(found: list[Element], lever: float) -> tuple[FloatArray, FloatArray] | None:
     """Return the matrix from Axis rows, scales and transform, in the file's units; None: it is not to be had."""
     axes = _rows(found, "Axis")
     transforms = [element.attrib for element in found if element.tag == "BasicTransform"]
     if axes is None or len(transforms) != 1:
         return None
-    move = {key: _number(transforms[0].get(key, "0")) for key in ("Dx", "Dy", "Dz", "Rx", "Ry", "Rz")}
+    move = {key: float(transforms[0].get(key, "0")) for key in ("Dx", "Dy", "Dz", "Rx", "Ry", "Rz")}
     if any(move[key] != 0.0 for key in ("Rx", "Ry", "Rz")):
         return None  # In which order the angles turn is in no source.
-    scales = {e.attrib.get("Name"): _number(_need(e.attrib, "scale")) for e in found if e.tag == "Axis"}
+    scales = {element.attrib["Name"]: float(element.attrib["scale"]) for element in found if element.tag == "Axis"}
     if 0.0 in scales.values():
-        raise AtiFileError("An Axis row has the scale 0.")
-    matrix = np.array(axes[0]) / np.array([scales[axis] for axis in AXES])[:, None]
-    # The file's torque per force, in its own units: mm with N and N-mm.
-    lever = unit(DISTANCE_UNITS, calibration.get("DistUnits", "mm"), "distance") * force_n / torque_nm
+        raise ValueError("an Axis row has the scale 0")
+    matrix = axes[0] / np.array([scales[axis] for axis in AXES])[:, None]
     dx, dy, dz = (move[key] * lever for key in ("Dx", "Dy", "Dz"))
-    cross = np.array([[0.0, -dz, dy], [dz, 0.0, -dx], [-dy, dx, 0.0]])
-    matrix[3:] -= cross @ matrix[:3]
-    return tuple(tuple(float(value) for value in row) for row in matrix), axes[1]
-
-
-def _only(found: list[Element], name: str) -> Element:
-    those = [element for element in found if element.tag == name]
-    if len(those) != 1:
-        raise AtiFileError(f"One element {name} was expected, {len(those)} were found.", hint="Is it an ATI .cal file?")
-    return those[0]
-
-
-def _need(attributes: dict[str, str], name: str) -> str:
-    if name not in attributes:
-        raise AtiFileError(f"The attribute {name} is missing.")
-    return attributes[name]
-
-
-def _number(text: str) -> float:
-    try:
-        value = float(text)
-    except ValueError:
-        value = math.nan
-    if not math.isfinite(value):
-        raise AtiFileError(f"A number was expected, not {text!r}.")
-    return value
+    matrix[3:] -= np.array([[0.0, -dz, dy], [dz, 0.0, -dx], [-dy, dx, 0.0]]) @ matrix[:3]
+    return matrix, axes[1]

@@ -250,21 +250,17 @@ def read_configuration(data: bytes) -> CountScale:
     AtiFileError
         If `data` is no such file, if a tag that is needed is not there exactly once, or for an unknown unit.
     """
-    texts: dict[str, str] = {}
     needed = ("prodname", "cfgcpf", "cfgcpt", "scfgfu", "scfgtu")
-    for element in elements(data):
-        if element.tag in needed:
-            if element.tag in texts:
-                raise AtiFileError(f"The tag {element.tag} stands twice in the sensor's configuration.")
-            texts[element.tag] = (element.text or "").strip()
-    missing = [name for name in needed if name not in texts]
-    if missing:
-        raise AtiFileError(f"The sensor's configuration has no {', '.join(missing)}.")
+    found = [(element.tag, (element.text or "").strip()) for element in elements(data) if element.tag in needed]
+    if sorted(tag for tag, _ in found) != sorted(needed):
+        raise AtiFileError(f"The sensor's configuration needs {', '.join(needed)} once each.")
+    texts = dict(found)
     force_n, torque_nm = unit(FORCE_UNITS, texts["scfgfu"], "force"), unit(TORQUE_UNITS, texts["scfgtu"], "torque")
     try:
-        per_force, per_torque = float(texts["cfgcpf"]), float(texts["cfgcpt"])
         return CountScale(
-            per_newton=per_force / force_n, per_newton_metre=per_torque / torque_nm, product=texts["prodname"]
+            per_newton=float(texts["cfgcpf"]) / force_n,
+            per_newton_metre=float(texts["cfgcpt"]) / torque_nm,
+            product=texts["prodname"],
         )
     except ValueError as error:
         raise AtiFileError(
