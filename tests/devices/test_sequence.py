@@ -79,25 +79,6 @@ def test_counts_are_exact_over_wraps_gaps_duplicates_and_late_rows(case, cuts):
     assert all(np.array_equal(block.data[:, 0], block.sequence) for block in kept)
 
 
-@pytest.mark.parametrize(
-    ("previous", "current", "number"),
-    [
-        (1, 2, 2),
-        (2, 2, 2),
-        (2, 5, 5),
-        (5, 4, 4),
-        (0xFFFFFFFF, 0, 0x100000000),
-        (0xFFFFFFFF, 3, 0x100000003),
-        (0, 0xFFFFFFFF, -1),
-        (0, 0x7FFFFFFF, 0x7FFFFFFF),
-        (0, 0x80000000, -0x80000000),
-    ],
-)
-def test_one_step_of_a_32_bit_counter(previous, current, number):
-    """The steps of pyNetFT's tests."""
-    assert Unwrap(32)(np.array([previous, current], dtype=np.uint32)).tolist() == [previous, number]
-
-
 def test_marks_are_added_to_those_that_are_there():
     check = SequenceCheck()
     quality = np.array([[0, Quality.SUSPECT], [Quality.SATURATED, 0], [0, 0]], dtype=np.uint8)

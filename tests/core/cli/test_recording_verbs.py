@@ -205,7 +205,7 @@ def test_a_log_that_cannot_be_read_is_one_clear_screen(logged):
     (logged.folder / "other.txt").write_text("no log")
     for given, said in (
         (("bus.asc", "--sensor", "icub"), "Choose one by the options board and triangle"),
-        (("bus.asc", "--sensor", "icub", "--option", "bord=3"), "Options: board, triangle"),
+        (("bus.asc", "--sensor", "icub", "--option", "bord=3"), "Did you mean 'board'"),
         (("bus.asc", "--sensor", "icub", "--option", "board"), "KEY=VALUE is expected"),
         (("bus.asc", "--sensor", "icub", "--out", "recordings"), "a file that ends in .h5"),
         (("bus.asc", "--sensor", "icub", "--root", "."), "--root is for mappings"),
