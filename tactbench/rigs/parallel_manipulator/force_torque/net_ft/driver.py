@@ -40,6 +40,8 @@ from tactbench.rigs.parallel_manipulator.force_torque.net_ft.codec import (
 )
 from tactbench.rigs.parallel_manipulator.force_torque.wrench import AXES, STREAM, stream
 
+QUIET_S = 0.05
+"""After which a box that was stopped sends no more (assumed: a network of one cable, a busy host)."""
 ANSWER_S = 0.5
 """Within which a box answers, over the time its records take (assumed: a network of one cable)."""
 RESTARTED = 1000
@@ -117,7 +119,7 @@ class NetFtDriver(Driver):
         """
         if self._sampling:
             raise RigError("The box is sampling.", hint="Ask it before it is started, or stop it first.")
-        self._link.discard()
+        self._silence()
         self._send(Command.START_REALTIME, 2)
         first, second = (decode_records(self._next().data)[0] for _ in range(2))
         every = (int(second["ft_sequence"]) - int(first["ft_sequence"])) % SEQUENCE_MODULUS
@@ -143,7 +145,7 @@ class NetFtDriver(Driver):
         """
         if self._options.bias:
             self.tare()
-        self._link.discard()
+        self._silence()
         self._numbers, self._ticks, self._newest = Unwrap(32), Unwrap(32), 0
         self._send(Command.START_REALTIME)
         self._sampling = True
@@ -191,6 +193,13 @@ class NetFtDriver(Driver):
 
     def _send(self, command: Command, records: int = 0) -> None:
         self._link.send(encode_request(Request(command, records)))
+
+    def _silence(self) -> None:
+        """Stop the box, and drop what it sent before: records of an earlier start would seem to be of the next one."""
+        self._send(Command.STOP)
+        with suppress(LinkTimeout):
+            for _ in range(MOST_DATAGRAMS):
+                self._link.receive(QUIET_S + 2 * self._options.every / SENSOR_RATE_HZ)
 
     def _next(self) -> Received:
         return self._link.receive(ANSWER_S + 2 * self._options.every / SENSOR_RATE_HZ)
