@@ -20,6 +20,7 @@ from tactbench.core.conformance.press import FORCE_SHARE, pressing_channel
 from tactbench.core.conformance.subject import Subject
 from tactbench.core.conformance.trial_press import tiny_scene
 from tactbench.core.errors import RigError, TactbenchError
+from tactbench.core.plugins.emulators import running
 from tactbench.core.plugins.rig_files import load_rig_file
 from tactbench.core.plugins.taking_part import rig_context
 from tactbench.core.spec.profile import ForceRamp
@@ -119,7 +120,7 @@ def _built(subject: Subject) -> tuple[_Kept, SensorDescriptor]:
     if file.rig != subject.name:
         skip(f"the rig file is for the rig {file.rig}")
     sensor = subject.registry.sensors[next(iter(file.sensors))]
-    context = rig_context(subject.registry, rig_file=file, operator=subject.operator)
+    context = rig_context(subject.registry, rig_file=running(file), operator=subject.operator)
     with code_of("where", subject.package):
         return _Kept(subject.code("where")(context)), sensor
 
@@ -165,7 +166,7 @@ def _pressed(subject: Subject) -> RealPress:
         with code_of("where", subject.package):
             made = acquire(
                 rig, sensor, subject.descriptor, real_scene(), role=None, seed=1, path=path,
-                clock=time.perf_counter, provenance={},
+                clock=time.perf_counter, provenance={}, rig_file=_file(subject),
             )  # fmt: skip
             if made.meta.excluded:
                 raise RigError(f"Its recording is {made.meta.excluded}.")

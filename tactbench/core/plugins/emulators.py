@@ -9,6 +9,7 @@ from __future__ import annotations
 import atexit
 import json
 import os
+import signal
 import socket
 import subprocess
 import sys
@@ -266,6 +267,7 @@ atexit.register(end_running)
 
 def main() -> None:
     """Serve the rig file of the first line of stdin; end when stdin does."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # of the whole terminal: who reads the devices has to end first
     over = threading.Event()
     file = RigFile.model_validate_json(sys.stdin.readline())
 
@@ -278,5 +280,3 @@ def main() -> None:
         serve(file, load_registry(), started=lambda live: print(live.model_dump_json(), flush=True), over=over.is_set)
     except TactbenchError as error:
         print(json.dumps({"error": error.message, "hint": error.hint}), flush=True)
-    except KeyboardInterrupt:  # of the terminal's whole group: the one who reads them ends first
-        pass

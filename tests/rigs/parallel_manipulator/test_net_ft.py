@@ -22,7 +22,6 @@ from tactbench.rigs.parallel_manipulator.force_torque.net_ft.codec import (
     DatagramError,
     Record,
     Request,
-    Status,
     decode_records,
     decode_request,
     encode_record,
@@ -150,7 +149,6 @@ def test_marks_of_a_status():
     assert quality(0x80020000) == quality(0x80030000) == Quality.SATURATED
     assert quality(0x80000004) == quality(0x80000000) == quality(1) == Quality.SUSPECT
     assert quality(0xFFFFFFFF) == Quality.SATURATED | Quality.SUSPECT
-    assert Status(0x80020000) == Status.ERROR_SUMMARY | Status.SATURATION_OR_CONVERTER
     assert status_text(0) == "healthy"
     assert status_text(0x80020004) == "error summary, saturation or converter, temperature"
     assert status_text(0x00008001) == "undefined bits 00008001"

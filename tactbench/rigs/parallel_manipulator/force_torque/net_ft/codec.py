@@ -7,7 +7,7 @@ core/src/detail/protocol.cpp, sequence.cpp and status.cpp).
 from __future__ import annotations
 
 import struct
-from enum import IntEnum, IntFlag
+from enum import IntEnum
 from functools import cached_property
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -156,42 +156,17 @@ def decode_records(data: bytes) -> npt.NDArray[np.void]:
     return np.frombuffer(data, RECORDS)
 
 
-class Status(IntFlag):
-    """Bits of a record's status word (sourced: pyNetFT, status.cpp); undefined ones are kept."""
-
-    ERROR_SUMMARY = 0x80000000
-    CPU_OR_RAM = 0x40000000
-    DIGITAL_BOARD = 0x20000000
-    ANALOG_BOARD = 0x10000000
-    SERIAL_LINK = 0x08000000
-    PROGRAM_MEMORY = 0x04000000
-    HALTED_CONFIGURATION = 0x02000000
-    SETTINGS_VALIDATION = 0x01000000
-    CONFIGURATION_DOES_NOT_FIT = 0x00800000
-    NETWORK = 0x00400000
-    CAN = 0x00200000
-    RDT = 0x00100000
-    ETHERNET_IP = 0x00080000
-    DEVICE_NET = 0x00040000
-    SATURATION_OR_CONVERTER = 0x00020000
-    CONDITION_LATCHED = 0x00010000
-    WATCHDOG_TIMEOUT = 0x00004000
-    STACK_CHECK = 0x00002000
-    SERIAL_EEPROM = 0x00001000
-    SERIAL_FLASH = 0x00000800
-    ANALOG_BOARD_WATCHDOG = 0x00000400
-    EXCITATION_TOO_HIGH = 0x00000200
-    EXCITATION_TOO_LOW = 0x00000100
-    ARTIFICIAL_GROUND = 0x00000080
-    ANALOG_SUPPLY_TOO_HIGH = 0x00000040
-    ANALOG_SUPPLY_TOO_LOW = 0x00000020
-    SERIAL_LINK_DATA_UNAVAILABLE = 0x00000010
-    REFERENCE_OR_POWER = 0x00000008
-    TEMPERATURE = 0x00000004
-    HTTP = 0x00000002
-
-
-WARNING = Status.ERROR_SUMMARY | Status.CONDITION_LATCHED
+STATUS_BITS = (
+    "error summary", "CPU or RAM", "digital board", "analog board", "serial link", "program memory",
+    "halted configuration", "settings validation", "configuration does not fit", "network", "CAN", "RDT", "EtherNet/IP",
+    "DeviceNet", "saturation or converter", "condition latched", "", "watchdog timeout", "stack check", "serial EEPROM",
+    "serial flash", "analog board watchdog", "excitation too high", "excitation too low", "artificial ground",
+    "analog supply too high", "analog supply too low", "serial link data unavailable", "reference or power",
+    "temperature", "HTTP", "",
+)  # fmt: skip
+"""Of a record's status word, from the highest bit down (sourced: pyNetFT, status.cpp); empty: undefined."""
+ERROR_SUMMARY, SATURATION, CONDITION_LATCHED = 0x80000000, 0x00020000, 0x00010000
+WARNING = ERROR_SUMMARY | CONDITION_LATCHED
 """A threshold set in the sensor was passed: exactly this; its values are good (sourced: pyNetFT, status.cpp)."""
 
 
@@ -203,18 +178,16 @@ def quality(status: int) -> Quality:
     """
     if status in (0, WARNING):
         return Quality.GOOD
-    known = WARNING | Status.SATURATION_OR_CONVERTER
-    marks = Quality.SATURATED if status & Status.SATURATION_OR_CONVERTER else Quality.GOOD
-    return marks | Quality.SUSPECT if status & ~int(known) or not marks else marks
+    marks = Quality.SATURATED if status & SATURATION else Quality.GOOD
+    return marks | Quality.SUSPECT if status & ~(WARNING | SATURATION) or not marks else marks
 
 
 def status_text(status: int) -> str:
     """Return what a status word says, in words."""
-    if status == 0:
-        return "healthy"
-    names = [bit.name.lower().replace("_", " ") for bit in Status if status & bit and bit.name]
-    left = status & ~sum(Status)
-    return ", ".join([*names, *([f"undefined bits {left:08X}"] if left else [])])
+    bits = [(name, 1 << (31 - place)) for place, name in enumerate(STATUS_BITS) if status >> (31 - place) & 1]
+    names = [name for name, _ in bits if name]
+    undefined = sum(bit for name, bit in bits if not name)
+    return ", ".join([*names, *([f"undefined bits {undefined:08X}"] if undefined else [])]) or "healthy"
 
 
 class CountScale(BaseModel):

@@ -24,8 +24,10 @@ from tactbench.plugin.devices import (
     read_options,
 )
 from tactbench.rigs.parallel_manipulator.force_torque.net_ft.codec import (
+    ERROR_SUMMARY,
     GREATEST_COUNT,
     LEAST_COUNT,
+    SATURATION,
     SENSOR_RATE_HZ,
     SEQUENCE_MODULUS,
     Command,
@@ -34,7 +36,6 @@ from tactbench.rigs.parallel_manipulator.force_torque.net_ft.codec import (
     NetFtOptions,
     Record,
     Request,
-    Status,
     decode_request,
     encode_record,
 )
@@ -176,7 +177,7 @@ class RdtEmulator(DeviceEmulator):
         record = Record(
             self._sequence,
             (sample + self._first_sequence) % SEQUENCE_MODULUS,
-            int(Status.SATURATION_OR_CONVERTER | Status.ERROR_SUMMARY) if saturated else 0,
+            SATURATION | ERROR_SUMMARY if saturated else 0,
             (fx, fy, fz, tx, ty, tz),
         )
         self._sequence = (self._sequence + 1) % SEQUENCE_MODULUS
