@@ -14,6 +14,7 @@ from tactbench.core.errors import (
     PluginContractError,
     RigError,
     TactbenchError,
+    UnknownNameError,
     UsageError,
 )
 from tactbench.core.plugins.hookspecs import API_VERSION, hookimpl
@@ -102,6 +103,7 @@ __all__ = [
     "TactbenchError",
     "TaskDescriptor",
     "TaskSpec",
+    "UnknownNameError",
     "UsageError",
     "VectorTarget",
     "assumed",

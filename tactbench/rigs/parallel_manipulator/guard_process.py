@@ -32,7 +32,7 @@ from pathlib import Path
 from typing import Any, NoReturn
 
 from tactbench.plugin import Block, RigError, StreamSpec, TactbenchError, UsageError
-from tactbench.plugin.devices import LinkError, LinkTimeout, LinkUnplugged, open_link, read_options
+from tactbench.plugin.devices import LinkError, LinkTimeout, LinkUnplugged, open_link
 from tactbench.rigs.parallel_manipulator.guard_interface import (
     Beat,
     Event,
@@ -54,6 +54,7 @@ from tactbench.rigs.parallel_manipulator.guard_messages import (
 from tactbench.rigs.parallel_manipulator.motor.commands import HOMING_S
 from tactbench.rigs.parallel_manipulator.motor.profile import FaulhaberOptions
 from tactbench.rigs.parallel_manipulator.motor.retreat import retreat_blind, stand_blind
+from tactbench.rigs.parallel_manipulator.options import read_options
 
 START_S = 60.0
 """Within which the process is there and both devices have answered (assumed: imports of a busy machine)."""

@@ -23,7 +23,7 @@ from pathlib import Path
 from typing import IO, Any
 
 from tactbench.plugin import TactbenchError, load_object
-from tactbench.plugin.devices import Clock, DriverSettings, open_link, read_options
+from tactbench.plugin.devices import Clock, DriverSettings, open_link
 from tactbench.rigs.parallel_manipulator.guard import LOOK_S, LocalGuard
 from tactbench.rigs.parallel_manipulator.guard_interface import (
     Beat,
@@ -44,6 +44,7 @@ from tactbench.rigs.parallel_manipulator.guard_messages import (
 )
 from tactbench.rigs.parallel_manipulator.motor.profile import FaulhaberOptions
 from tactbench.rigs.parallel_manipulator.motor.retreat import retreat_blind, stand_blind
+from tactbench.rigs.parallel_manipulator.options import read_options
 
 MOST_BYTES = 4 << 20
 """Of samples kept for a rig that does not take them: some 50 s of a force sensor at 1 kHz (derived: 78 bytes a row)."""

@@ -53,7 +53,6 @@ from tactbench.plugin.devices import (
     emulation_of,
     emulators_of,
     physics_of,
-    read_options,
     with_sensor,
 )
 from tactbench.rigs.parallel_manipulator.control import STOP_S, Control, WatchedDriver
@@ -66,6 +65,7 @@ from tactbench.rigs.parallel_manipulator.joints import Joints
 from tactbench.rigs.parallel_manipulator.motor.driver import FaulhaberDriver
 from tactbench.rigs.parallel_manipulator.motor.emulator import MotorEmulator
 from tactbench.rigs.parallel_manipulator.motor.profile import FaulhaberOptions
+from tactbench.rigs.parallel_manipulator.options import read_options
 from tactbench.rigs.parallel_manipulator.press import Course, Press
 from tactbench.rigs.parallel_manipulator.rig_check import refuse
 from tactbench.rigs.parallel_manipulator.settings import JOINTS, MOTOR, settings_of, with_limits
@@ -340,11 +340,7 @@ class ParallelManipulator:
         """Return the scene as the simulated rig carries it out, and what emulated devices sense of it."""
         if self._physics is None or not file.emulated:
             return None
-        simulated = stack.enter_context(self._physics.open(sensor, scene, seed=seed))
-        return simulated, self.emulated_press(simulated, file, scene, seed)
-
-    def emulated_press(self, simulated: Any, file: RigFile, scene: Scene, seed: int) -> EmulatedPress:
-        """Return a scene that a simulated rig has carried out as emulated devices sense it."""
+        simulated: Any = stack.enter_context(self._physics.open(sensor, scene, seed=seed))
         if not hasattr(simulated, "press_curve"):
             raise PluginContractError(
                 f"The simulated rig {file.emulation.physics!r} has no press curves.",
@@ -356,27 +352,20 @@ class ParallelManipulator:
         skin_m = self.settings.surface_m + 1e-3 * float(
             np.clip(off_mm, -heights.stand_off_mm / 2, heights.depth_mm / 2)
         )
-        return EmulatedPress(simulated, scene, skin_m=skin_m, largest_n=1.5 * limits.force_ceiling_n, rng=rng)
+        press = EmulatedPress(simulated, scene, skin_m=skin_m, largest_n=1.5 * limits.force_ceiling_n, rng=rng)
+        return simulated, press
 
     def _emulators(self, file: RigFile, sensor: SensorDescriptor, senses: EmulatedPress) -> dict[str, EmulatedDevice]:
         found = emulators_of(file, self._registry, sensor.name, senses)
-        self.pressed_by(senses, found)
-        self.free_joints(found)
-        return found
-
-    def pressed_by(self, senses: EmulatedPress, found: Mapping[str, EmulatedDevice]) -> None:
-        """Let the emulated motor, if there is one, press what `senses`."""
         if MOTOR in found:
             emulator = found[MOTOR].emulator
             if not isinstance(emulator, MotorEmulator):
                 raise UsageError(f"The emulated {MOTOR} is no faulhaber device.", hint="This rig moves one.")
             senses.pressed_by(emulator.drive)
-
-    def free_joints(self, found: Mapping[str, EmulatedDevice]) -> None:
-        """Let the emulated joints move without load: the platform's weight is not modelled."""
         for name in JOINTS:
             if name in found and isinstance(joint := found[name].emulator, MotorEmulator):
-                joint.drive.servo.load = None
+                joint.drive.servo.load = None  # the platform's weight is not modelled
+        return found
 
     def _guard(
         self, stack: ExitStack, file: RigFile, opened: Any, clock: Clock, emulated: EmulatedDevices | None

@@ -20,7 +20,6 @@ from tactbench.plugin.devices import (
     RigFile,
     drivers_of,
     emulators_of,
-    read_options,
 )
 from tactbench.rigs.parallel_manipulator.guard import LONGEST_COMMAND, MANDATORY, reaction
 from tactbench.rigs.parallel_manipulator.joints import check_places, workspace_of
@@ -32,6 +31,7 @@ from tactbench.rigs.parallel_manipulator.loop_stability import (
 )
 from tactbench.rigs.parallel_manipulator.motor.codec import line_time_s
 from tactbench.rigs.parallel_manipulator.motor.profile import FaulhaberOptions, MotorProfile
+from tactbench.rigs.parallel_manipulator.options import read_options
 from tactbench.rigs.parallel_manipulator.settings import JOINTS, MOTOR, RigSettings, settings_of, with_limits
 from tactbench.rigs.parallel_manipulator.worst_case import (
     check_largest_force,

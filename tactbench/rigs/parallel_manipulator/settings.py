@@ -12,11 +12,12 @@ from typing import Annotated, Literal, Self
 from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, ValidationError, field_validator, model_validator
 
 from tactbench.plugin import ForceLoop, Quantity, UsageError, sourced
-from tactbench.plugin.devices import NamedDevice, RigFile, read_options
+from tactbench.plugin.devices import NamedDevice, RigFile
 from tactbench.rigs.parallel_manipulator.force_law import ForceLaw
 from tactbench.rigs.parallel_manipulator.geometry import Geometry
 from tactbench.rigs.parallel_manipulator.motion_profile import MotionLimits
 from tactbench.rigs.parallel_manipulator.motor.profile import FaulhaberOptions
+from tactbench.rigs.parallel_manipulator.options import read_options
 from tactbench.rigs.parallel_manipulator.press_moves import PressHeights
 from tactbench.rigs.parallel_manipulator.singularity import PostureLimits
 

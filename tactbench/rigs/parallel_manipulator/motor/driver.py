@@ -16,7 +16,7 @@ from typing import Literal
 import numpy as np
 
 from tactbench.plugin import Block, ChannelSpec, Quality, StreamSpec
-from tactbench.plugin.devices import ByteLink, Driver, DriverSettings, open_for, read_options
+from tactbench.plugin.devices import ByteLink, Driver, DriverSettings
 from tactbench.rigs.parallel_manipulator.motor.codec import Configuration, Kind, OperationStatus, fault_status
 from tactbench.rigs.parallel_manipulator.motor.commands import FAULTS, Commands
 from tactbench.rigs.parallel_manipulator.motor.errors import (
@@ -29,6 +29,7 @@ from tactbench.rigs.parallel_manipulator.motor.errors import (
 )
 from tactbench.rigs.parallel_manipulator.motor.exchange import Answer, Exchange
 from tactbench.rigs.parallel_manipulator.motor.profile import FaulhaberOptions
+from tactbench.rigs.parallel_manipulator.options import open_for, read_options
 
 STREAM = "motor"
 SETTLE_S = 0.5

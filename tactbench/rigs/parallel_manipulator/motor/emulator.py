@@ -14,19 +14,12 @@ from typing import ClassVar
 import numpy as np
 
 from tactbench.plugin import sourced
-from tactbench.plugin.devices import (
-    CanFrame,
-    DeviceEmulator,
-    EmulatorSettings,
-    Fault,
-    Sent,
-    fault_concerns,
-    read_options,
-)
+from tactbench.plugin.devices import CanFrame, DeviceEmulator, EmulatorSettings, Fault, Sent, fault_concerns
 from tactbench.rigs.parallel_manipulator.motor.codec import OK, Command, CommandReader, line_time_s
 from tactbench.rigs.parallel_manipulator.motor.drive import Drive, Refused
 from tactbench.rigs.parallel_manipulator.motor.profile import FaulhaberOptions, MotorProfile
 from tactbench.rigs.parallel_manipulator.motor.servo import Load, MotorModel
+from tactbench.rigs.parallel_manipulator.options import read_options
 
 
 @dataclass(frozen=True)

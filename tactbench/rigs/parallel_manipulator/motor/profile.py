@@ -13,8 +13,8 @@ from typing import Literal
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from tactbench.plugin import Quantity, RigError, assumed, sourced
-from tactbench.plugin.devices import Options
 from tactbench.rigs.parallel_manipulator.motor.codec import BAUDS
+from tactbench.rigs.parallel_manipulator.options import Options
 
 _MANUAL = "Faulhaber manual MCBL 3564K024B CS, the rotary drive of the same generation"
 
