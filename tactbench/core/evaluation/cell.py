@@ -497,7 +497,7 @@ def _result(
     held_s = tare_s(data.recorded) if data.rules.tare else 0.0
     if data.rules.tare and not held_s:
         remarks.append("not tared: no recording states an unloaded hold")
-    remarks += [_untrained(answered), *delay_remarks, _incomplete(data.recorded)]
+    remarks += [_untrained(answered), *delay_remarks]
     took_part, left_out, stamps = _part_taken(data)
     return Result(
         metric=metric.name,
@@ -553,7 +553,7 @@ def _refuse(estimator: str, metric: Metric, tested: Answers) -> None:
 
 
 def _part_taken(data: TaskData) -> tuple[list[RecordingMeta], dict[str, int], tuple[str, ...]]:
-    """Return the recordings that some fold uses, what no fold uses, and stamps of folds that leak."""
+    """Return the recordings that some fold uses, what no fold uses, and stamps: of leaks, of incomplete ones."""
     recorded = data.recorded
     folds = [over_rows(one, recorded) for one in data.assignments]
     used = used_rows(folds)
@@ -562,7 +562,8 @@ def _part_taken(data: TaskData) -> tuple[list[RecordingMeta], dict[str, int], tu
         stamps = leak_stamps(recorded, folds)
     else:
         stamps = (SHUFFLED_WHOLE_STAMP if recorded.whole else SHUFFLED_STAMP,)
-    return took_part, without_part(recorded, data.split, used), (*copied_channels(recorded), *stamps)
+    stamps = (*copied_channels(recorded), *stamps, *_incomplete(recorded))
+    return took_part, without_part(recorded, data.split, used), stamps
 
 
 def _of_answers(data: TaskData, descriptor: EstimatorDescriptor, answered: Sequence[AnsweredFold]) -> list[str]:
@@ -584,7 +585,7 @@ def _of_answers(data: TaskData, descriptor: EstimatorDescriptor, answered: Seque
     return remarks
 
 
-def _incomplete(recorded: Dataset) -> str:
+def _incomplete(recorded: Dataset) -> list[str]:
     """Return how many incomplete recordings were left out or taken, and why they are incomplete."""
     out = {name: n for name, n in recorded.counts.items() if name.startswith(f"recordings left out ({INCOMPLETE}")}
     taken = [meta.excluded for meta in recorded.metas if meta.excluded]
@@ -595,7 +596,7 @@ def _incomplete(recorded: Dataset) -> str:
         else []
     )
     texts += [f"{len(taken)} of {every} recordings take part although {'; '.join(sorted(set(taken)))}"] if taken else []
-    return "; ".join(texts)
+    return texts
 
 
 def _untrained(answered: Sequence[AnsweredFold]) -> str:

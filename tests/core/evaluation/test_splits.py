@@ -122,10 +122,10 @@ def test_an_incomplete_recording_takes_no_part_unless_asked_for_and_the_row_says
     paths = [*sessions(tmp_path), record(tmp_path / "bad.h5", *ramp(7), session="d", excluded=why)]
     out = run(paths)
     assert out.sizes.n_recordings == 3
-    assert f"1 of 4 recordings left out: {why}" in out.remarks
+    assert f"1 of 4 recordings left out: {why}" in out.stamps
     taken = run(load_dataset(force_task(), paths, include_incomplete=True))
     assert taken.sizes.n_recordings == 4
-    assert f"1 of 4 recordings take part although {why}" in taken.remarks
+    assert f"1 of 4 recordings take part although {why}" in taken.stamps
 
 
 @pytest.mark.parametrize(
