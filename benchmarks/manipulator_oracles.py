@@ -1,4 +1,4 @@
-"""What the parallel manipulator's kinematics, moves and force loop must give, and what they give.
+"""What the parallel manipulator's kinematics and moves must give, and what they give.
 
 The twelve poses were computed elsewhere twice: in closed form, and by Newton's method with 60 digits on the chains with
 both radii apart. A Newton's method in extended precision stands here beside them. Everything is drawn from one seed.
@@ -16,22 +16,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tactbench.plugin import ForceLoop, Quantity, Source, UsageError, assumed
-from tactbench.rigs.parallel_manipulator.force_law import ForceLaw
+from tactbench.plugin import Source, assumed
 from tactbench.rigs.parallel_manipulator.geometry import Delta, LinearDelta, RotaryDelta
 from tactbench.rigs.parallel_manipulator.jacobian import joint_motion, links
 from tactbench.rigs.parallel_manipulator.kinematics import forward, inverse, mode_of, solve_forward, solve_inverse
-from tactbench.rigs.parallel_manipulator.loop_stability import (
-    LinearLoop,
-    largest_gain_factor,
-    pressed_spring,
-    ramp_error_n,
-)
 from tactbench.rigs.parallel_manipulator.motion_profile import MotionLimits, MotionProfile
 from tactbench.rigs.parallel_manipulator.singularity import PostureLimits, measures
 from tactbench.rigs.parallel_manipulator.trajectory import line_motion, straight_move
 from tactbench.rigs.parallel_manipulator.workspace import PlaceRefusedError, Workspace
-from tactbench.rigs.parallel_manipulator.worst_case import check_largest_force, first_touch_n
 
 FREE = Source(tag="assumed", reference="to compute with")
 DRIVES = {"joint_speed_mm_s": 20.0, "joint_acceleration_mm_s2": 60.0}
@@ -73,15 +65,6 @@ POSES: list[tuple[str, tuple[float, ...], tuple[float, ...], tuple[float, ...]]]
      (0.9181, 0.606563, 0.815686, 0.3875)),
 ]  # fmt: skip
 
-# Largest stable gain at 1 N/mm, lag 10 ms: K in mm/(N s) of increments, kp in mm/N with ki = kp/0.15 s.
-GAINS: dict[tuple[str, float | None], dict[float, float]] = {
-    ("I", None): {10: 10, 50: 50, 100: 100, 1000: 1000},
-    ("I", 5.0): {10: 10, 50: 46.4, 100: 73.1, 1000: 123},
-    ("I", 1.0): {10: 10, 50: 44, 100: 65.5, 1000: 101},
-    ("PI", None): {10: 0.721, 50: 1.08, 100: 1.52, 1000: 10.4},
-    ("PI", 5.0): {10: 0.747, 50: 2.08, 100: 3.98, 1000: 39.6},
-    ("PI", 1.0): {10: 1.33, 50: 7.47, 100: 15.4, 1000: 158},
-}
 # Distance in mm, duration in s, speed reached in mm/s, for 50 mm/s, 500 mm/s^2, 5000 mm/s^3.
 DURATIONS = [(100, 2.2, 50), (5, 0.317480210, 31.498026), (1, 0.185663553, 10.772173), (0.05, 0.068399038, 1.462009)]
 
@@ -393,127 +376,6 @@ def moves(rng: np.random.Generator, count: int) -> list[Row]:
     ]
 
 
-def _q(value: float, unit: str) -> Quantity:
-    return assumed(value, unit, "to compute with")
-
-
-def force_loop(kind: str, cutoff_hz: float | None, rate_hz: float, gain: float, **more: Quantity) -> ForceLoop:
-    """Return a loop: `gain` is K in mm/(N s), or kp in mm/N with ki = kp/0.15 s."""
-    stated = {"delay": _q(1.0 if rate_hz == 1000 else 10.0, "ms"), "motor_lag": _q(10.0, "ms"), **more}
-    return ForceLoop(
-        proportional=_q(gain if kind == "PI" else 0.0, "mm/N"),
-        integral=_q(gain / 0.15 if kind == "PI" else gain, "mm/N/s"),
-        cutoff=None if cutoff_hz is None else _q(cutoff_hz, "Hz"),
-        rate=_q(rate_hz, "Hz"),
-        **stated,
-    )
-
-
-def gains(_: np.random.Generator, __: int) -> list[Row]:
-    """Oracle 8: the largest stable gains."""
-    closed = table = scaled = 0.0
-    for d in range(6):
-        loop = force_loop("I", None, 100.0, 1.0, delay=_q(10.0 * d, "ms"), motor_lag=_q(0.0, "s"))
-        wanted = 2 * math.sin(math.pi / (2 * (2 * d + 1)))
-        found = LinearLoop.of(loop).largest_stiffness_n_m() * 1e-3 * 0.01
-        closed = max(closed, abs(found / wanted - 1))
-    for (kind, cutoff), wanted_at in GAINS.items():
-        for rate, wanted in wanted_at.items():
-            loop = force_loop(kind, cutoff, rate, 1.0)
-            at = [largest_gain_factor(loop, 1e3 * k) * k for k in (1.0, 5.0, 20.0, 80.0)]
-            table = max(table, abs(at[0] / wanted - 1))
-            scaled = max(scaled, np.ptp(at) / at[0])
-    return [
-        at_most("2 sin(pi/(2 (2 d + 1))), d = 0 ... 5", closed, 1e-3),
-        at_most("24 gains of the table", table, 1e-2),
-        at_most("the same at 5, 20 and 80 N/mm, times k", scaled, 1e-12),
-    ]
-
-
-def free_law(loop: ForceLoop) -> ForceLaw:
-    """Return a law whose limits do not act."""
-    return ForceLaw(loop=loop, speed=_q(1e60, "m/s"), travel=(_q(-1e60, "m"), _q(1e60, "m")))
-
-
-def swings(_: np.random.Generator, __: int) -> list[Row]:
-    """Oracle 9: the loop on a spring at 0.95 and 1.05 of its limit."""
-    ratios: dict[float, list[float]] = {0.95: [], 1.05: []}
-    rates = []
-    for (kind, cutoff), limits in GAINS.items():
-        for rate in limits:
-            loop = force_loop(kind, cutoff, rate, 1.0, resolution=_q(0.0, "N"))
-            limit = LinearLoop.of(loop).largest_stiffness_n_m()
-            for factor, found in ratios.items():
-                slow = math.log(float(LinearLoop.of(loop).growth(np.array(factor * limit))))
-                # Long enough for the other modes to be forgotten.
-                steps = min(20_000, int(40 / abs(slow)))
-                kick = np.zeros(steps)
-                kick[0] = 1.0
-                depth = np.abs(pressed_spring(free_law(loop), factor * limit, np.zeros(steps), kick))
-                part = steps // 4
-                found.append(float(depth[-part:].max() / depth[-2 * part : -part].max()))
-                if factor > 1:
-                    rates.append(abs(math.log(found[-1]) / part / slow - 1))
-    return [
-        Row(
-            "24 loops at 0.95 of the limit: last/third quarter of a swing",
-            "< 1",
-            max(ratios[0.95]),
-            max(ratios[0.95]) < 1,
-        ),
-        Row("at 1.05", "> 1", min(ratios[1.05]), min(ratios[1.05]) > 1),
-        at_most("its rate against the eigenvalue", max(rates), 0.05),
-    ]
-
-
-def ramps(rng: np.random.Generator, seeds: int) -> list[Row]:
-    """Oracle 10: a ramp of 5 N in 60 s."""
-    means, spreads, slope = [], [], 5 / 60
-    wanted = slope * 0.01 * np.arange(1, 6001)
-    for k in (1.0, 20.0, 80.0):
-        loop = force_loop("I", 5.0, 100.0, 10 / k, resolution=_q(0.02, "N"))
-        law = ForceLaw(loop=loop, speed=_q(5 * slope, "mm/s"), travel=(_q(-10.0, "mm"), _q(10.0, "mm")))
-        for _ in range(seeds):
-            depth = pressed_spring(law, 1e3 * k, wanted, rng.normal(0, 0.02, wanted.size))
-            error = 1e3 * (1e3 * k * depth - wanted)[500:]
-            means.append(error.mean())
-            spreads.append(error.std())
-    said = 1e3 * ramp_error_n(loop, slope, 80e3)
-    mean = float(np.mean(means))
-    return [
-        Row("closed form of the error [mN]", "-6.1 +- 0.05", said, abs(said + 6.1) <= 0.05),
-        Row(f"mean of {len(means)} ramps, 20 mN noise and steps [mN]", "-6.1 +- 0.5", mean, abs(mean + 6.1) <= 0.5),
-        at_most("largest rms about its mean [mN]", float(max(spreads)), 10.0),
-    ]
-
-
-def touched_n(threshold: float, k: float, v: float, acc: float, period: float, delay: float, phases: int) -> float:
-    """Return the largest force of a touch, over phases of the samples: a motor that goes on until it brakes."""
-    worst = 0.0
-    for phase in np.linspace(0, period, phases, endpoint=False):
-        first = math.floor((threshold / (k * v) - phase) / period) + 1
-        worst = max(worst, k * (v * (phase + first * period + delay) + v * v / (2 * acc)))
-    return worst
-
-
-def touches(_: np.random.Generator, __: int) -> list[Row]:
-    """Oracle 11: the first touch."""
-    soft = touched_n(0.1, 20e3, 0.5e-3, 1.0, 0.01, 0.01, 1000)
-    hard = touched_n(0.1, 80e3, 5e-3, 1.0, 0.01, 0.01, 1000)
-    said = [first_touch_n(0.1, k, v, 1.0, 0.01, 0.01) for k, v in ((20e3, 0.5e-3), (80e3, 5e-3))]
-    try:
-        check_largest_force(said[1], 5.0, "the skin")
-        refused = 0.0
-    except UsageError:
-        refused = 1.0
-    return [
-        at_most("20 N/mm, 0.5 mm/s: peak [N]", soft, 0.31),
-        Row("80 N/mm, 5 mm/s: peak [N]", "9.1 +- 2 %", hard, abs(hard / 9.1 - 1) <= 0.02),
-        at_most("closed form against both", max(abs(soft / said[0] - 1), abs(hard / said[1] - 1)), 0.02),
-        exactly("refused for a skin of 5 N", refused, 1),
-    ]
-
-
 ORACLES: list[tuple[Callable[[np.random.Generator, int], list[Row]], int, int]] = [
     (poses, 0, 0),
     (grid, 61, 13),
@@ -522,10 +384,6 @@ ORACLES: list[tuple[Callable[[np.random.Generator, int], list[Row]], int, int]] 
     (lines, 1000, 30),
     (refusals, 0, 0),
     (moves, 1000, 30),
-    (gains, 0, 0),
-    (swings, 0, 0),
-    (ramps, 10, 3),
-    (touches, 0, 0),
 ]
 """Each with its size, and a small one for tests."""
 

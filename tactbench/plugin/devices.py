@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     from tactbench.devices.emulation.scene_samples import SceneSamples
     from tactbench.devices.emulator import DeviceEmulator, EmulatorSettings, Senses, Sent, SpiDeviceEmulator
     from tactbench.devices.fault import Fault, fault_concerns
+    from tactbench.devices.force_loop import ForceController, ForceLaw, LoopModel
     from tactbench.devices.log import DeviceLog
     from tactbench.devices.reading import Reading
     from tactbench.devices.row_driver import RowDriver, Sample
@@ -65,7 +66,9 @@ __all__ = [
     "Emulation",
     "EmulatorSettings",
     "Fault",
+    "ForceController",
     "ForceEntry",
+    "ForceLaw",
     "Frame",
     "FrameDecoder",
     "Link",
@@ -74,6 +77,7 @@ __all__ = [
     "LinkError",
     "LinkTimeout",
     "LinkUnplugged",
+    "LoopModel",
     "NamedDevice",
     "Operator",
     "PressingForce",

@@ -21,7 +21,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 
-from tactbench.rigs.parallel_manipulator.force_law import ForceController, ForceLaw
+from tactbench.plugin.devices import ForceController, ForceLaw
 from tactbench.rigs.parallel_manipulator.guard_interface import CommandKind, GuardState, Report
 from tactbench.rigs.parallel_manipulator.settings import RigSettings
 
@@ -129,6 +129,7 @@ class Press:
         self._sum_n = 0.0
         self._force_n = math.nan
         self._controller: ForceController | None = None
+        self._stepped_s = 0.0
         self._goal: Command | None = None
         self._requested_s: float | None = None
         self._since_s = self._due_s = 0.0
@@ -309,7 +310,7 @@ class Press:
                     self.fail(f"{self.mean_n:.2f} N are left after unloading")
             case _:
                 self._enter(PressState.RAMP, now_s)
-                self._controller = ForceController(self._law, self._force_n, report.position_m, now_s)
+                self._begin_loop(report, now_s)
 
     def _duration_of_unloading(self) -> float:
         heights = self._settings.heights
@@ -320,9 +321,12 @@ class Press:
     def _close_loop(self, report: Report, now_s: float) -> None:
         """Begin to regulate after a touch: the small force, or where the ramp was when contact was lost."""
         self._enter(PressState.RAMP if self._lost else PressState.CONTACT, now_s)
-        self._controller = ForceController(self._law, self._force_n, report.position_m, now_s)
+        self._begin_loop(report, now_s)
         if self._lost:
             self._paused_s += now_s - self._waiting_s
+
+    def _begin_loop(self, report: Report, now_s: float) -> None:
+        self._controller, self._stepped_s = ForceController(self._law, self._force_n, report.position_m), now_s
 
     def _setpoint(self, now_s: float) -> tuple[float, float]:
         """Return the wanted force and its slope."""
@@ -338,11 +342,12 @@ class Press:
         controller = self._controller
         assert controller is not None
         self.setpoint_n, slope = self._setpoint(now_s)
-        controller.step(self._force_n, report.position_m, now_s, self.setpoint_n, slope)
+        controller.step(self._force_n, report.position_m, now_s - self._stepped_s, self.setpoint_n, slope)
+        self._stepped_s = now_s
         self.error_n = controller.filtered_n - self.setpoint_n
         if self.state is PressState.CONTACT:
             if now_s - self._since_s >= self._settings.touch.settle_s:
-                self.contact_m = controller.target_m
+                self.contact_m = controller.target
                 self._enter(PressState.LIFT, now_s)
                 lift = 1e-3 * self._settings.touch.lift_mm
                 self._move(self.contact_m - lift, self._settings.touch.touch_speed_mm_s)
@@ -353,7 +358,7 @@ class Press:
             return self._asking(report, now_s) if self.state is not PressState.RETREAT else Command(CommandKind.RETREAT)
         if report.moving:
             return Command()
-        way = controller.target_m - report.target_m
+        way = controller.target - report.target_m
         if abs(way) < 0.5 * self._increment_m:
             return Command()
         return Command(CommandKind.STEP, distance_m=min(max(way, -self._step_m), self._step_m))

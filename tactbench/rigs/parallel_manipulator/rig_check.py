@@ -15,6 +15,7 @@ from tactbench.plugin.devices import (
     CheckTable,
     DeviceEntry,
     EmulatedDevices,
+    LoopModel,
     PressingForce,
     RigCheck,
     RigFile,
@@ -23,12 +24,6 @@ from tactbench.plugin.devices import (
 )
 from tactbench.rigs.parallel_manipulator.guard import LONGEST_COMMAND, MANDATORY, reaction
 from tactbench.rigs.parallel_manipulator.joints import check_places, workspace_of
-from tactbench.rigs.parallel_manipulator.loop_stability import (
-    advised_integral_m_n_s,
-    check_gains,
-    largest_gain_factor,
-    ramp_error_n,
-)
 from tactbench.rigs.parallel_manipulator.motor.codec import line_time_s
 from tactbench.rigs.parallel_manipulator.motor.profile import FaulhaberOptions, MotorProfile
 from tactbench.rigs.parallel_manipulator.options import read_options
@@ -49,9 +44,6 @@ MOST_BYTES = 24
 """Bytes shown of each."""
 _STEP = ("LR-1234", "OK\n", "M", "OK\n", "TPOS", "-12345\n", "POS", "-12345\n", "GRC", "1234\n", "OST", "65536\n")
 """Commands of one increment and the look that confirms its end, and their answers, each with a carriage return."""
-_PAPER_RAMP_N_S = 5.0 / 52.8
-"""The default scene's ramp."""
-
 
 _Entry = TypeVar("_Entry", bound=DeviceEntry)
 
@@ -205,25 +197,14 @@ def _loop(found: _Findings, settings: RigSettings) -> None:
     if settings.force_loop.integral_mm_n_s == 0 and settings.force_loop.proportional_mm_n == 0:
         found.problems.append("The force loop has no gain. State integral_mm_n_s.")
         return
-    greatest, least = 1e3 * stiffness.greatest_n_mm, 1e3 * stiffness.least_n_mm
-    factor = largest_gain_factor(loop, greatest)
-    stated = settings.force_loop.integral_mm_n_s
-    advised = [1e3 * advised_integral_m_n_s(loop, k) for k in (greatest, least)]
-    rows = [
+    model, greatest = LoopModel.of(loop), 1e3 * stiffness.greatest_n_mm
+    found.table(
+        "force loop",
         ("declared stiffness", f"{stiffness.least_n_mm:g} to {stiffness.greatest_n_mm:g} N/mm, "
          f"{stiffness.at_touch_n_mm:g} at a touch, {stiffness.at_ceiling_n_mm:g} at the ceiling"),
-        ("largest stable gains at the stiffest", f"{factor:.2f} times those stated"),
-        ("share used", f"{1 / factor:.2f}, at most 0.50"),
-    ]  # fmt: skip
-    if settings.force_loop.proportional_mm_n == 0:
-        text = f"{advised[0]:.3g} mm/(N s) at the stiffest, {advised[1]:.3g} at the softest; stated {stated:g}"
-        rows.append(("gain that overshoots by 5 %", text))
-    if settings.force_loop.integral_mm_n_s > 0 and settings.force_loop.feed_forward_n_mm is None:
-        errors = [ramp_error_n(loop, _PAPER_RAMP_N_S, k) for k in (least, greatest)]
-        text = f"{1e3 * errors[0]:.0f} mN at the softest, {1e3 * errors[1]:.0f} at the stiffest"
-        rows.append(("force minus wanted on 5 N in 52.8 s", text))
-    found.table("force loop", *rows)
-    found.refusing(lambda: check_gains(loop, greatest))
+        ("share of the largest stable gains", f"{greatest / model.largest_stiffness():.2f}, at most 0.50"),
+    )  # fmt: skip
+    found.refusing(lambda: model.share_used(greatest))
 
 
 def _forces(found: _Findings, settings: RigSettings, react: Reaction) -> None:

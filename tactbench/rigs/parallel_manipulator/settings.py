@@ -12,8 +12,7 @@ from typing import Annotated, Literal, Self
 from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, ValidationError, field_validator, model_validator
 
 from tactbench.plugin import ForceLoop, Quantity, UsageError, sourced
-from tactbench.plugin.devices import NamedDevice, RigFile
-from tactbench.rigs.parallel_manipulator.force_law import ForceLaw
+from tactbench.plugin.devices import ForceLaw, NamedDevice, RigFile
 from tactbench.rigs.parallel_manipulator.geometry import Geometry
 from tactbench.rigs.parallel_manipulator.motion_profile import MotionLimits
 from tactbench.rigs.parallel_manipulator.motor.profile import FaulhaberOptions
@@ -137,12 +136,12 @@ class ForceControl(_Part):
 
     def law(self, travel_mm: Range) -> ForceLaw:
         """Return the law within a travel of the motor."""
-        return ForceLaw(
-            loop=self.loop(),
-            speed=_from_rig_file(self.speed_mm_s, "mm/s"),
-            windup_time=_from_rig_file(self.windup_ms, "ms"),
-            travel=(_from_rig_file(travel_mm[0], "mm"), _from_rig_file(travel_mm[1], "mm")),
-            feed_forward=None if self.feed_forward_n_mm is None else _from_rig_file(self.feed_forward_n_mm, "N/mm"),
+        return ForceLaw.of(
+            self.loop(),
+            speed=1e-3 * self.speed_mm_s,
+            windup_s=1e-3 * self.windup_ms,
+            travel=(1e-3 * travel_mm[0], 1e-3 * travel_mm[1]),
+            feed_forward=math.inf if self.feed_forward_n_mm is None else 1e3 * self.feed_forward_n_mm,
         )
 
 

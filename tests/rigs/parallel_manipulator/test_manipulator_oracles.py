@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 from tactbench.rigs.parallel_manipulator.kinematics import forward, inverse
-from tactbench.rigs.parallel_manipulator.loop_stability import largest_gain_factor
 from tactbench.rigs.parallel_manipulator.motion_profile import MotionProfile
 from tactbench.rigs.parallel_manipulator.singularity import measures
 
@@ -25,7 +24,7 @@ def _load():
 ORACLES = _load()
 
 
-@pytest.mark.parametrize("number", range(1, 12))
+@pytest.mark.parametrize("number", range(1, 8))
 def test_oracle(number):
     oracle, _, small = ORACLES.ORACLES[number - 1]
     rows = oracle(np.random.default_rng([1, number]), small)
@@ -54,14 +53,3 @@ def test_a_duration_computed_elsewhere(distance_mm, duration_s, speed_mm_s):
     found = MotionProfile(1e-3 * distance_mm, 0.05, 0.5, 5.0)
     assert found.duration_s == pytest.approx(duration_s, abs=1e-8)
     assert 1e3 * found.peak_m_s == pytest.approx(speed_mm_s, abs=1e-6)
-
-
-@pytest.mark.parametrize(
-    ("kind", "cutoff_hz", "rate_hz", "wanted"),
-    [(*loop, rate, gain) for loop, gains in ORACLES.GAINS.items() for rate, gain in gains.items()],
-)
-def test_a_largest_gain_computed_elsewhere(kind, cutoff_hz, rate_hz, wanted):
-    loop = ORACLES.force_loop(kind, cutoff_hz, rate_hz, 1.0)
-    # Stated with three digits.
-    assert largest_gain_factor(loop, 1e3) == pytest.approx(wanted, rel=0.005)
-    assert largest_gain_factor(loop, 80e3) == pytest.approx(wanted / 80, rel=0.005)

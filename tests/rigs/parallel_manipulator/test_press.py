@@ -11,7 +11,6 @@ from tactbench.plugin import NotApplicable, RigError, assumed, load_registry
 from tactbench.plugin.devices import RigFile
 from tactbench.plugin.simulation import Slide
 from tactbench.rigs.parallel_manipulator.guard_interface import GuardState, Trigger
-from tactbench.rigs.parallel_manipulator.loop_stability import ramp_error_n
 from tactbench.rigs.parallel_manipulator.motor.emulator import MotorEmulator
 from tactbench.rigs.parallel_manipulator.motor.errors import AnswerMissingError
 from tactbench.rigs.parallel_manipulator.press import PressState
@@ -51,8 +50,10 @@ def test_presses_to_the_profiles_end_and_back(five_newtons):
     wanted = np.interp(t_s, *ramp(5.0, 0.5, 5.0).profile.corners)
     on_ramp = t_s > 2
     slope = 5.0 / 4.5
-    settings = settings_of(file_of(**QUICK))
-    behind = ramp_error_n(settings.force_loop.loop(), slope, 5e3)
+    law = settings_of(file_of(**QUICK)).force_loop.law((-1.0, 1.0))
+    kept = law.kept(law.period_s)
+    # The filter lets the true force run ahead, the integral lets it lag: r T a/(1 - a) - r/(k ki) (derived).
+    behind = slope * (law.period_s * kept / (1 - kept) - 1 / (5e3 * law.integral))
     # The newest sample of a control period is up to 1 ms old, and the motor's increments are 5 mN.
     assert (force - wanted)[on_ramp].mean() == pytest.approx(behind, abs=0.01)
 

@@ -28,7 +28,15 @@ def written(tmp_path, said):
 def test_the_example_is_not_refused_and_nothing_moves(capsys):
     code, out, _ = run(["doctor", "--seconds", "0", "--rig-file", str(EXAMPLE)], capsys)
     assert code == 0
-    for text in ("force ceiling", "Nothing was opened", "share used", "reaction", "sent first", "VER", "ASSUMED"):
+    for text in (
+        "force ceiling",
+        "Nothing was opened",
+        "share of the largest",
+        "reaction",
+        "sent first",
+        "VER",
+        "ASSUMED",
+    ):
         assert text in out
     assert "EN" not in out.split("sent first")[1].split()
 
@@ -63,7 +71,7 @@ def problems(**changes):
 
 def test_gains_above_half_of_the_limit_are_refused(capsys):
     (problem,) = problems(settings__force_loop__integral_mm_n_s=1.2)
-    assert "0.67 of those that no longer settle at 25 N/mm" in problem
+    assert "0.67 of those that no longer settle" in problem
 
 
 def test_forces_above_the_rating_are_refused():
