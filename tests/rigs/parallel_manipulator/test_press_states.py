@@ -4,8 +4,9 @@ import math
 
 import pytest
 
-from tactbench.rigs.parallel_manipulator.guard_interface import CommandKind, GuardState, Report, Trigger
-from tactbench.rigs.parallel_manipulator.press import Course, Press, PressState
+from tactbench.devices.guard_messages import Trigger
+from tactbench.devices.press import PressState
+from tactbench.plugin.devices import CommandKind, Course, GuardState, Press, Report
 from tactbench.rigs.parallel_manipulator.settings import settings_of
 from tests.rigs.parallel_manipulator.spring import file_of
 
@@ -18,7 +19,7 @@ class Plant:
     """A motor that is where it was sent, at its speed, a guard that does what it is told, and a spring of 5 N/mm."""
 
     def __init__(self, settings=SETTINGS):
-        self.press = Press(settings, COURSE, 1e-6)
+        self.press = Press(settings.press_plan(1e-6), COURSE)
         self.settings = settings
         self.skin_m = settings.surface_m
         self.now_s, self.position_m = 0.0, 1e-3 * settings.limits.retreat_mm

@@ -7,19 +7,26 @@ from __future__ import annotations
 
 import math
 from collections import Counter, deque
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
 
 from tactbench.plugin import sourced
-from tactbench.plugin.devices import CanFrame, DeviceEmulator, EmulatorSettings, Fault, Sent, fault_concerns
+from tactbench.plugin.devices import (
+    CanFrame,
+    DeviceEmulator,
+    EmulatorSettings,
+    Fault,
+    Sent,
+    fault_concerns,
+    read_options,
+)
 from tactbench.rigs.parallel_manipulator.motor.codec import OK, Command, CommandReader, line_time_s
 from tactbench.rigs.parallel_manipulator.motor.drive import Drive, Refused
 from tactbench.rigs.parallel_manipulator.motor.profile import FaulhaberOptions, MotorProfile
 from tactbench.rigs.parallel_manipulator.motor.servo import Load, MotorModel
-from tactbench.rigs.parallel_manipulator.options import read_options
 
 
 @dataclass(frozen=True)
@@ -89,6 +96,16 @@ class MotorEmulator(DeviceEmulator):
         self._in: deque[tuple[float, bytes]] = deque()
         self._answers: deque[tuple[float, str]] = deque()
         self._out: deque[tuple[float, bytes]] = deque()
+
+    @property
+    def position_m(self) -> float:
+        """Where the motor is, as its drive counts [m]."""
+        return self.drive.servo.position_m - self.drive.origin_m
+
+    def press_against(self, force_n: Callable[[float], float] | None) -> None:
+        """Let a force [N] at a position, as the drive counts [m], act on the motor; None: none, ever."""
+        drive = self.drive
+        drive.servo.load = None if force_n is None else lambda at_m, _: force_n(at_m - drive.origin_m)
 
     def feed(self, piece: bytes | CanFrame, now_s: float) -> list[Sent]:
         """Take bytes that the host sends from `now_s` on, at the line's rate; return what `poll` returns.

@@ -11,15 +11,15 @@ from collections import deque
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
 from types import FrameType
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from tactbench.plugin import Block, StreamSpec, TactbenchError
-from tactbench.plugin.devices import Driver
-from tactbench.rigs.parallel_manipulator.guard_interface import Beat, Event, Guard, Limits, Report
-from tactbench.rigs.parallel_manipulator.press import Press
-
-if TYPE_CHECKING:
-    from tactbench.plugin.devices import Clock
+from tactbench.core.errors import TactbenchError
+from tactbench.core.samples import Block
+from tactbench.core.spec.sensor import StreamSpec
+from tactbench.devices.driver import Driver
+from tactbench.devices.guard_messages import Beat, Event, Guard, Limits, Report
+from tactbench.devices.press import Press
+from tactbench.links.link import Clock
 
 STOP_S = 10.0
 """The thread is waited for so long (assumed: a control period, and what a guard in another process takes to answer)."""
