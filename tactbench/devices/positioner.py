@@ -11,12 +11,16 @@ from typing import Any, ClassVar, Literal, Self
 import numpy as np
 from pydantic import Field, model_validator
 
-from tactbench.core.errors import LinkError, RigError
+from tactbench.core.errors import LinkError, LinkTimeout, RigError
 from tactbench.core.samples import Block, Quality
 from tactbench.core.spec.sensor import ChannelSpec, StreamSpec
 from tactbench.devices.driver import Driver, DriverSettings
-from tactbench.devices.options import Options, read_options
+from tactbench.devices.options import Options, open_for, read_options
+from tactbench.links.byte_link import ByteLink
+from tactbench.links.link import Link
 
+SILENT_S = 0.5
+"""After which a controller is said not to answer (assumed)."""
 SETTLE_S = 0.5
 """Added to the time that a move takes by its speed and acceleration, after which it has not ended (assumed)."""
 
@@ -147,8 +151,8 @@ class Positioner(Driver):
     What goes wrong raises in the call that notices it: PositionerSilentError, another PositionerError, or a LinkError.
 
     As a device of a rig an axis has one stream, `motor`: position, current and target, once per state that was read.
-    A subclass has the abstract methods and the class attributes, calls :meth:`note` with each state that it reads, and
-    :meth:`check_move` before it sends a move. A DeviceDescriptor's `driver` names the class itself.
+    A subclass has the abstract methods and the class attributes. It calls :meth:`check_move` before it sends a move,
+    :meth:`begin` after, and :meth:`see` with each answer. A DeviceDescriptor's `driver` names the class itself.
 
     Raises
     ------
@@ -158,6 +162,9 @@ class Positioner(Driver):
 
     device: ClassVar[str]
     """Name in messages."""
+    link_kind: ClassVar[type[Link]] = ByteLink  # type: ignore[type-abstract]
+    """Of the link that is opened; and an example of its address."""
+    address: ClassVar[str] = "serial:///dev/ttyUSB0?baud=9600"
     options_kind: ClassVar[type[PositionerOptions]] = PositionerOptions
     resolution_m: ClassVar[float] = math.nan
     """Least step."""
@@ -174,6 +181,10 @@ class Positioner(Driver):
         self.facts = self.facts_of(self.options)
         self._state: PositionerState | None = None
         self._unread: list[PositionerState] = []
+        self._moving = self._retreats = False
+        self._goal = math.nan
+        self._rest, self._asked_ns = b"", 0
+        self.link: Any = open_for(settings, self.device, self.link_kind, self.address)
         self.homed = False
         """Whether positions mean anything, and limits hold."""
         self.enabled = False
@@ -198,11 +209,6 @@ class Positioner(Driver):
 
     # What a subclass does ---------------------------------------------------------------------------------------------
 
-    @property
-    @abstractmethod
-    def moving(self) -> bool:
-        """Whether a move is under way, by what is known now."""
-
     @abstractmethod
     def home(self, stop: Callable[[], bool] = lambda: False) -> None:
         """Find the place that positions count from, and set the ends of travel; it has power afterwards.
@@ -213,9 +219,9 @@ class Positioner(Driver):
             Called repeatedly while it moves; true: stand at once and raise PositionerError.
         """
 
-    @abstractmethod
     def enable(self) -> None:
-        """Give it power; it holds its place."""
+        """Give it power; it holds its place. Nothing is sent, unless a subclass does."""
+        self.enabled = True
 
     @abstractmethod
     def disable(self) -> None:
@@ -234,10 +240,9 @@ class Positioner(Driver):
         """Carry on what is under way, waiting at most `timeout_s` for the controller; read the state."""
 
     def retreat(self) -> None:
-        """Begin to move to the place away from the skin, whatever is under way; without one it halts."""
+        """Halt, and once it stands move to the place away from the skin, if there is one; whatever is under way."""
         self.halt()
-        if math.isfinite(self.facts.retreat):
-            self.move_to(self.facts.retreat, self.facts.retreat_speed)
+        self._retreats = math.isfinite(self.facts.retreat)
 
     def find_home(self) -> bool:
         """Ask the controller whether it is homed already, and set :attr:`homed` then: after a restart of this program.
@@ -274,27 +279,52 @@ class Positioner(Driver):
                 return self.position
         raise PositionerSilentError(f"It is at {self.position:g} {within_s:.1f} s after it was sent away.")
 
-    # What they have in common -----------------------------------------------------------------------------------------
+    # What a subclass calls --------------------------------------------------------------------------------------------
 
-    @property
-    def state(self) -> PositionerState | None:
-        """What was last read; None: nothing yet."""
-        return self._state
+    def begin(self, target: float = math.nan) -> None:
+        """Note that a move to a target was sent; NaN: to where it will stand, infinity: not before :meth:`begin`."""
+        self._moving, self._goal, self._retreats = True, target, False
 
-    @property
-    def position(self) -> float:
-        """The last position; NaN: not read yet."""
-        return math.nan if self._state is None else self._state.position
+    def see(self, t_ns: int, position: float, *, idle: bool) -> None:
+        """Note an answer: when and where, and whether the controller says that it stands.
 
-    def move_by(self, distance: float) -> float:
-        """Begin to move from the last target by a distance, to the nearest step; return the new target."""
-        if self._state is None or math.isnan(self._state.target):
-            raise NotReadyError("The axis does not know its target.", hint="Read it once it is at rest.")
-        return self.move_to(self._state.target + distance)
+        A move has ended when the controller stands at its target; one that says so before it has begun is not believed.
+        """
+        there = math.isnan(self._goal) or abs(position - self._goal) <= self.facts.near
+        self.note(PositionerState(t_ns, position, position if math.isnan(self._goal) else self._goal))
+        if idle and there:
+            self._moving = False
+            if self._retreats:
+                self.move_to(self.facts.retreat, self.facts.retreat_speed)
 
-    def at(self, position: float) -> bool:
-        """Whether it was last read at a place."""
-        return abs(self.position - position) <= self.facts.near
+    def lines(self, question: bytes, timeout_s: float) -> list[bytes]:
+        """Ask a controller on a ByteLink, unless an answer is out; return the lines that have come.
+
+        The caller calls :meth:`answered` with the answer. Raises PositionerSilentError if that takes `SILENT_S`.
+        """
+        if not self._asked_ns:
+            self.link.write(question)
+            self._asked_ns = self.clock()
+        try:
+            self._rest += self.link.read(timeout_s).data
+        except LinkTimeout:
+            if self.clock() - self._asked_ns > 1e9 * SILENT_S:
+                self._asked_ns = 0
+                raise PositionerSilentError(f"{self.device} does not answer {question!r}.") from None
+        *lines, self._rest = self._rest.split(b"\n")
+        return lines
+
+    def answered(self) -> None:
+        """Note that the answer has come: the next call of :meth:`lines` asks again."""
+        self._asked_ns = 0
+
+    def finish(self, stop: Callable[[], bool]) -> None:
+        """Wait for the end of a move; halts and raises PositionerError if `stop` says so."""
+        while self.moving:
+            self.update(0.05)
+            if stop():
+                self.halt()
+                raise PositionerError("The axis was told to stand.")
 
     def note(self, state: PositionerState) -> None:
         """Keep a state that was read."""
@@ -318,6 +348,33 @@ class Positioner(Driver):
         ):
             if wrong:
                 raise NotReadyError(problem, hint=hint)
+
+    # What they have in common -----------------------------------------------------------------------------------------
+
+    @property
+    def moving(self) -> bool:
+        """Whether a move is under way, by what is known now."""
+        return self._moving
+
+    @property
+    def state(self) -> PositionerState | None:
+        """What was last read; None: nothing yet."""
+        return self._state
+
+    @property
+    def position(self) -> float:
+        """The last position; NaN: not read yet."""
+        return math.nan if self._state is None else self._state.position
+
+    def move_by(self, distance: float) -> float:
+        """Begin to move from the last target by a distance, to the nearest step; return the new target."""
+        if self._state is None or math.isnan(self._state.target):
+            raise NotReadyError("The axis does not know its target.", hint="Read it once it is at rest.")
+        return self.move_to(self._state.target + distance)
+
+    def at(self, position: float) -> bool:
+        """Whether it was last read at a place."""
+        return abs(self.position - position) <= self.facts.near
 
     @property
     def streams(self) -> tuple[StreamSpec, ...]:
@@ -365,6 +422,7 @@ class Positioner(Driver):
     def close(self) -> None:
         """Close the link. The axis ends the move it has, and holds."""
         self.stop()
+        self.link.close()
 
 
 def _or(value: float | None, otherwise: float) -> float:

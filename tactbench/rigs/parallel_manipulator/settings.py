@@ -391,8 +391,9 @@ def with_limits(file: RigFile, settings: RigSettings, registry: Any) -> RigFile:
         "acceleration_m_s2": 1e-3 * settings.touch.acceleration_mm_s2,
     }
     entry = file.devices[MOTOR]
-    if entry.options.get("homing", "here") == "here":  # it stands at the place to which it retreats
-        own["home_m"] = own["retreat_m"]
+    kind, options = positioner_of(registry, MOTOR, entry)
+    if "homing" in kind.options_kind.model_fields and options.get("homing", "here") == "here":
+        own["home_m"] = own["retreat_m"]  # it stands at the place to which it retreats
     for name, value in own.items():
         if name in entry.options and not math.isclose(float(entry.options[name]), value, rel_tol=1e-9):
             raise UsageError(
@@ -400,6 +401,5 @@ def with_limits(file: RigFile, settings: RigSettings, registry: Any) -> RigFile:
                 hint="State it once, under `settings: limits:` and `touch:`.",
             )
     motor = entry.model_copy(update={"options": {**entry.options, **own}})
-    kind, options = positioner_of(registry, MOTOR, motor)
-    read_options(kind.options_kind, options, entry.device)
+    read_options(kind.options_kind, {**options, **own}, entry.device)
     return file.model_copy(update={"devices": {**file.devices, MOTOR: motor}})

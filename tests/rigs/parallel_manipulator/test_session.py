@@ -12,6 +12,7 @@ from tactbench.rigs.parallel_manipulator.kinematics import forward, inverse
 from tactbench.rigs.parallel_manipulator.rig import ParallelManipulator
 from tactbench.rigs.parallel_manipulator.session import Session
 from tactbench.rigs.parallel_manipulator.settings import JOINTS, settings_of, with_limits
+from tests.rigs.parallel_manipulator.presses import load
 from tests.rigs.parallel_manipulator.spring import Pressed, SpringRig, ramp, with_joints
 from tests.rigs.parallel_manipulator.test_press import RARER
 
@@ -161,3 +162,10 @@ def test_no_rail_moves_unless_the_motor_is_retracted(session):
     refused = guard.beat(travel)
     assert not refused.accepted
     assert re.search("motor is not retracted", refused.reason)
+
+
+@pytest.mark.parametrize("seed", range(2))
+def test_random_faults_of_all_axes_keep_the_force_below_its_bound(seed):
+    """A few of the 200 of benchmarks/axes_faults.py."""
+    for outcome in load("axes_faults").schedules(3, 200 + seed):
+        assert outcome.wrong == (), outcome

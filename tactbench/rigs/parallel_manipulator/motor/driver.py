@@ -10,14 +10,12 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 from tactbench.plugin.devices import (
-    ByteLink,
     DriverSettings,
     LinkTimeout,
     NotReadyError,
     Positioner,
     PositionerFacts,
     PositionerState,
-    open_for,
 )
 from tactbench.rigs.parallel_manipulator.motor.codec import (
     QUERIES,
@@ -95,7 +93,7 @@ class FaulhaberDriver(Positioner):
         super().__init__(settings)
         options: FaulhaberOptions = self.options
         self._profile = profile = options.profile()
-        # Arguments that the drive does not have are refused here, before anything is sent.
+        # Arguments that the drive does not have are refused before anything is sent.
         self._settings = self._required_settings()
         self._limits = [
             ("LL", profile.increments(end), query)
@@ -104,8 +102,7 @@ class FaulhaberDriver(Positioner):
         ]
         self._home = profile.increments(options.home_m)
         self._version = ""
-        self._link = open_for(settings, "faulhaber", ByteLink, "serial:///dev/ttyUSB0?baud=9600")  # type: ignore[type-abstract]
-        self._exchange = Exchange(self._link, settings.clock, baud=options.baud, node=options.node)
+        self._exchange = Exchange(self.link, settings.clock, baud=options.baud, node=options.node)
         self._counts: Counter[str] = Counter()
         self._queue: deque[tuple[str, int | None]] = deque()
         self._watching = self._in_fault = self._noticed = False
@@ -178,11 +175,6 @@ class FaulhaberDriver(Positioner):
         """Watch no more. The motor ends the move it has, and holds."""
         self._watching = False
         super().stop()
-
-    def close(self) -> None:
-        """Close the link. The motor ends the move it has, and holds."""
-        super().close()
-        self._link.close()
 
     # Power and place --------------------------------------------------------------------------------------------------
 
@@ -414,18 +406,18 @@ class FaulhaberDriver(Positioner):
         """
         command, target_m = b"\r" + retreat_command(self.options), self.facts.retreat
         if within_s is None or math.isnan(target_m):
-            self._link.write(b"\r" + encode("V", 0, node=self.options.node))
+            self.link.write(b"\r" + encode("V", 0, node=self.options.node))
             return math.nan
-        self._link.write(command)
+        self.link.write(command)
         reader, there, place_m, nearest_m = LineReader(), 0, math.nan, math.inf
         sent_ns = self.clock()
         deadline = sent_ns + round(1e9 * within_s)
         while self.clock() < deadline:
-            self._link.write(encode("POS", node=self.options.node))
+            self.link.write(encode("POS", node=self.options.node))
             requested_ns, place_m = self.clock(), math.nan
             while math.isnan(place_m) and self.clock() - requested_ns < 1e9 * self._exchange.answer_s:
                 with suppress(LinkTimeout):
-                    for line in reader.feed(self._link.read(self._exchange.answer_s).data):
+                    for line in reader.feed(self.link.read(self._exchange.answer_s).data):
                         if line.kind is Kind.VALUE:
                             place_m = self._profile.position_m(line.value)
             away_m = abs(place_m - target_m)
@@ -435,7 +427,7 @@ class FaulhaberDriver(Positioner):
             if away_m < nearest_m:
                 nearest_m, sent_ns = away_m, self.clock()
             elif not there and self.clock() - sent_ns > 1e9 * AGAIN_S:
-                self._link.write(command)
+                self.link.write(command)
                 sent_ns = self.clock()
         where = "does not say where it is" if math.isnan(place_m) else f"is at {place_m:g} m"
         raise MotorError(
