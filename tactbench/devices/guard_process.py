@@ -21,7 +21,7 @@ import json
 import math
 import os
 import pickle
-import selectors
+import select
 import signal
 import socket
 import subprocess
@@ -61,7 +61,7 @@ ARM_S = 180.0
 """Within which the axes are homed and retracted."""
 OPEN_S = 1.0
 """For so long a port is tried that another process still holds (assumed; free 5 ms after that was killed, measured)."""
-MOST_ROWS = 50_000
+MOST_BLOCKS = 50_000
 """Of samples kept for a rig that does not take them: some 50 s of a force sensor at 1 kHz."""
 MOST_MESSAGES = 2000
 """Reports and events kept for it."""
@@ -168,22 +168,17 @@ class GuardProcess:
         self._waiting: list[tuple[str, Any]] = []
         self._held: dict[str, list[Block]] = {"force": [], "motor": []}
         self._events: list[Event] = []
-        self._control, child_control = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
-        self._data, child_data = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
-        with child_control, child_data, Path(settings.log).open("ab") as errors:
-            descriptors = (child_control.fileno(), child_data.fileno())
+        self._socket, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+        with theirs, Path(settings.log).open("ab") as errors:
             self._process = subprocess.Popen(
-                [sys.executable, "-P", "-m", __name__, *map(str, descriptors)],
-                pass_fds=descriptors,
+                [sys.executable, "-P", "-m", __name__, str(theirs.fileno())],
+                pass_fds=(theirs.fileno(),),
                 start_new_session=True,
                 stdin=subprocess.DEVNULL,
                 stdout=errors,
                 stderr=errors,
             )
-        self._selector = selectors.DefaultSelector()
-        for end in (self._control, self._data):
-            end.setblocking(False)
-            self._selector.register(end, selectors.EVENT_READ)
+        self._socket.setblocking(False)
 
     @property
     def pid(self) -> int:
@@ -266,7 +261,7 @@ class GuardProcess:
             return
         self._closed = True
         with suppress(OSError):
-            self._control.send(pickle.dumps(("close", None)))
+            self._socket.send(pickle.dumps(("close", None)))
         try:
             # What it still sends is not waited for: it drops it.
             self._process.wait(ARM_S)
@@ -274,9 +269,7 @@ class GuardProcess:
             self._process.kill()
             self._process.wait()
         finally:
-            self._selector.close()
-            self._control.close()
-            self._data.close()
+            self._socket.close()
 
     def _started(self) -> tuple[StreamSpec, StreamSpec]:
         if self._streams is None:
@@ -293,7 +286,7 @@ class GuardProcess:
         self._present()
         try:
             # A full socket means that nobody reads at the other end.
-            self._control.send(pickle.dumps((kind, body)))
+            self._socket.send(pickle.dumps((kind, body)))
         except OSError as error:
             self._fail(f"it does not take a message ({error})")
 
@@ -322,12 +315,13 @@ class GuardProcess:
 
     def _take(self, timeout_s: float) -> None:
         """Take what the process has sent, waiting for it at most so long; raises GuardLostError if it is gone."""
-        for key, _ in self._selector.select(timeout_s):
+        select.select([self._socket], [], [], timeout_s)
+        while True:
             data = b""
             try:
-                data = key.fileobj.recv(PACKET)  # type: ignore[union-attr]
+                data = self._socket.recv(PACKET)
             except BlockingIOError:
-                continue
+                return
             except ConnectionError:
                 pass
             if not data:
@@ -341,7 +335,7 @@ class GuardProcess:
                 self._waiting.append((kind, body))
 
     def _kept(self, kind: str) -> list[Block]:
-        while self._lost is None and not self._closed and self._selector.select(0.0):
+        if self._lost is None and not self._closed:
             self._take(0.0)
         found, self._held[kind] = self._held[kind], []
         return found
@@ -368,11 +362,11 @@ class GuardProcess:
 class _Server:
     """The process' loop, around a guard."""
 
-    def __init__(self, control: socket.socket, data: socket.socket) -> None:
-        self._control, self._data = control, data
-        control.setblocking(False)
-        data.setblocking(False)
-        self._out: dict[socket.socket, deque[bytes]] = {control: deque(), data: deque()}
+    def __init__(self, to_rig: socket.socket) -> None:
+        self._socket = to_rig
+        to_rig.setblocking(False)
+        self._messages: deque[bytes] = deque(maxlen=MOST_MESSAGES)
+        self._blocks: deque[bytes] = deque()
         self._guard: LocalGuard | None = None
         self._settings: ProcessSettings | None = None
         self._clock: Clock = time.monotonic_ns
@@ -438,16 +432,13 @@ class _Server:
         self._write({"leaving": self._clock(), "terminated": self.terminated, "rig_lost": self._alone})
 
     def _rest(self, seconds: float) -> None:
-        with selectors.DefaultSelector() as selector:
-            if not self._alone:
-                selector.register(self._control, selectors.EVENT_READ)
-            selector.select(max(0.0, seconds))
+        select.select([] if self._alone else [self._socket], [], [], max(0.0, seconds))
 
     def _interrupted(self) -> bool:
         """Return whether homing is to end: called between two answers of an axis."""
         with suppress(BlockingIOError):
             try:
-                self._alone |= self._control.recv(1, socket.MSG_PEEK) == b""
+                self._alone |= self._socket.recv(1, socket.MSG_PEEK) == b""
             except ConnectionError:
                 self._alone = True
         return self._left()
@@ -455,7 +446,7 @@ class _Server:
     def _hear(self) -> None:
         while not self._alone:
             try:
-                data = self._control.recv(PACKET)
+                data = self._socket.recv(PACKET)
             except BlockingIOError:
                 return
             except ConnectionError:
@@ -524,24 +515,23 @@ class _Server:
         self._write(asdict(event))
 
     def _answer(self, kind: str, body: Any) -> None:
-        if len(self._out[self._control]) < MOST_MESSAGES:
-            self._out[self._control].append(pickle.dumps((kind, body)))
+        self._messages.append(pickle.dumps((kind, body)))
         self._flush()
 
     def _forward(self, guard: LocalGuard) -> None:
         guard.events()
         for kind, blocks in (("force", guard.force_blocks()), ("motor", guard.motor_blocks())):
             for piece in (piece for block in blocks for piece in _pieces(block)):
-                if len(self._out[self._data]) < MOST_ROWS:
-                    self._out[self._data].append(pickle.dumps((kind, piece)))
+                if len(self._blocks) < MOST_BLOCKS:
+                    self._blocks.append(pickle.dumps((kind, piece)))
                 else:
                     self._dropped_rows += len(piece.data)
 
     def _flush(self) -> None:
-        for end, waiting in self._out.items():
-            with suppress(OSError):  # full, or nobody there
+        with suppress(OSError):  # full, or nobody there
+            for waiting in (self._messages, self._blocks):
                 while waiting and not self._alone:
-                    end.send(waiting[0])
+                    self._socket.send(waiting[0])
                     waiting.popleft()
 
     def _write(self, entry: Mapping[str, Any]) -> None:
@@ -562,11 +552,10 @@ def _pieces(block: Block) -> Iterator[Block]:
 
 
 def main() -> int:
-    """Run the process: ``python -m … CONTROL DATA``, numbers of two open sockets."""
+    """Run the process: ``python -m … SOCKET``, the number of an open socket."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGHUP, signal.SIG_IGN)
-    control, data = (socket.socket(fileno=int(number)) for number in sys.argv[1:3])
-    server = _Server(control, data)
+    server = _Server(socket.socket(fileno=int(sys.argv[1])))
 
     def terminate(_number: int, _frame: Any) -> None:
         server.terminated = True

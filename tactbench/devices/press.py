@@ -3,8 +3,6 @@
 ::
 
     standoff -> approach -> contact -> lift -> unloaded -> return -> ramp -> hold -> unload -> done
-                    ^                                                  |       |
-                    +------------- again, once: contact lost ----------+-------+
     any of them -> retreat -> failed
 
 The surface is found first: a quick way to where it cannot be yet, a slow one until the raw force says that it is
@@ -100,7 +98,8 @@ class PressPlan:
     band_n: float
     """Filtered forces below it count as no force."""
     lost_s: float
-    """Contact is lost if the force is in the band for so long while more than twice the band is wanted."""
+    """Contact is lost, which ends the press, if the force is in the band for so long while more than twice the band is
+    wanted."""
     hold_s: float = 0.0
     """How long the largest force is held after the course."""
 
@@ -137,8 +136,6 @@ class Press:
         Why it failed; empty: it has not.
     not_out
         What is to be done where the motor did not come out; empty: it did.
-    remarks
-        What happened on the way that did not end it.
     contact_m
         Position of the motor at which the small force was kept; NaN: not yet.
     touch_n
@@ -151,7 +148,6 @@ class Press:
         self.state = PressState.STANDOFF
         self.ended = ""
         self.not_out = ""
-        self.remarks: list[str] = []
         self.contact_m = math.nan
         self.touch_n = 0.0
         self.error_n = math.nan
@@ -166,11 +162,8 @@ class Press:
         self._requested_s: float | None = None
         self._since_s = self._due_s = 0.0
         self._began_s: float | None = None
-        self._paused_s = 0.0
-        self._waiting_s = math.nan
         self._band_since_s = self._error_since_s = math.nan
         self._swings, self._peak_n = 0, 0.0
-        self._lost = False
         self._go = False
 
     # What a rig says --------------------------------------------------------------------------------------------------
@@ -347,11 +340,9 @@ class Press:
     # Under force ------------------------------------------------------------------------------------------------------
 
     def _close_loop(self, report: Report, now_s: float) -> None:
-        """Begin to regulate after a touch: the small force, or where the ramp was when contact was lost."""
-        self._enter(PressState.RAMP if self._lost else PressState.CONTACT, now_s)
+        """Begin to regulate the small force after a touch."""
+        self._enter(PressState.CONTACT, now_s)
         self._begin_loop(report, now_s)
-        if self._lost:
-            self._paused_s += now_s - self._waiting_s
 
     def _begin_loop(self, report: Report, now_s: float) -> None:
         self._controller, self._stepped_s = ForceController(self._plan.law, self._force_n, report.position_m), now_s
@@ -361,7 +352,7 @@ class Press:
         least = self._plan.contact_n
         if self.state is PressState.CONTACT or self._began_s is None:
             return least, 0.0
-        scene_s = now_s - self._began_s - self._paused_s
+        scene_s = now_s - self._began_s
         setpoint = self._course.setpoint_n(scene_s)
         rising = self.state is PressState.RAMP and setpoint > least and scene_s < self._course.end_s
         return max(least, setpoint), self._course.slope_n_s if rising else 0.0
@@ -393,7 +384,7 @@ class Press:
     def _end_of(self, now_s: float) -> None:
         """Go over from ramp to hold, and from hold to unloading."""
         assert self._began_s is not None
-        scene_s = now_s - self._began_s - self._paused_s
+        scene_s = now_s - self._began_s
         if self.state is PressState.RAMP and scene_s >= self._course.end_s:
             self._enter(PressState.HOLD, now_s)
         if self.state is PressState.HOLD and scene_s >= self._course.end_s + self._plan.hold_s:
@@ -406,13 +397,7 @@ class Press:
         in_band = controller.filtered_n < rules.band_n and self.setpoint_n > 2 * rules.band_n
         self._band_since_s = _since(self._band_since_s, in_band, now_s)
         if now_s - self._band_since_s >= rules.lost_s:
-            if self._lost:
-                self.fail(f"contact lost a second time, at {self.setpoint_n:.2f} N")
-                return False
-            self._lost, self._waiting_s = True, self._band_since_s
-            self.remarks.append(f"contact lost at {self.setpoint_n:.2f} N, and approached again")
-            self._enter(PressState.APPROACH, now_s)
-            self._move(rules.deepest_m, rules.touch_speed_m_s)
+            self.fail(f"contact was lost, at {self.setpoint_n:.2f} N")
             return False
         self._error_since_s = _since(self._error_since_s, abs(self.error_n) > rules.error_band_n, now_s)
         if now_s - self._error_since_s >= 1.0:

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
         physics_of,
         with_sensor,
     )
-    from tactbench.devices.control import Control, WatchedDriver
+    from tactbench.devices.control import Control
     from tactbench.devices.driver import Driver, DriverSettings
     from tactbench.devices.emulation.emulated_devices import EmulatedDevice, EmulatedDevices
     from tactbench.devices.emulation.scene_samples import SceneSamples
@@ -145,7 +145,6 @@ __all__ = [
     "StreamClock",
     "StreamCounts",
     "Unwrap",
-    "WatchedDriver",
     "ask_operator",
     "drivers_of",
     "emulation_of",

@@ -47,7 +47,6 @@ from tactbench.plugin.devices import (
     RigFile,
     StreamClock,
     StreamCounts,
-    WatchedDriver,
     ask_operator,
     emulation_of,
     physics_of,
@@ -151,8 +150,6 @@ class PressAcquisition:
             found[f"event {number}"] = f"{at_s:.3f} s, {event.state}: {event.text}"
         if len(self.said) > MOST_EVENTS:
             found["events left out"] = len(self.said) - MOST_EVENTS
-        for remark in press.remarks:
-            found["remark press"] = remark
         return found
 
     @property
@@ -286,8 +283,7 @@ class ParallelManipulator:
         self._prompt(file, sensor, scene)
         (driver,) = session.opened(sensor.name, sensor.name)
         stack.callback(driver.close)
-        watched = WatchedDriver(driver, clock)
-        identity = {**session.identity, sensor.name: watched.identify()}
+        identity = {**session.identity, sensor.name: driver.identify()}
         force, zero, limits = session.measured_limits()
         press = Press(settings.press_plan(self._facts.resolution), self._course(scene))
         control: Control | None = None
@@ -297,11 +293,11 @@ class ParallelManipulator:
                 control.carry(until_ns)
 
         reading = stack.enter_context(
-            Reading({sensor.name: watched}, clock=clock, advance=carry if session.virtual else None)
+            Reading({sensor.name: driver}, clock=clock, advance=carry if session.virtual else None)
         )
         stack.callback(_disarmed, session)
         control = Control(
-            guard, limits, guard.arm(limits), press, watched, clock,
+            guard, limits, guard.arm(limits), press, lambda: _received(reading), clock,
             period_s=settings.force_loop.period_s, stale_s=1e-3 * settings.press.stale_ms,
         )  # fmt: skip
         stack.callback(control.stop)
@@ -316,7 +312,7 @@ class ParallelManipulator:
         press.begin(1e-9 * begin_ns)
         simulated = None if senses is None else senses[0]
         return PressAcquisition(
-            streams=watched.streams,
+            streams=driver.streams,
             reference=(*force.streams, guard.motor_stream),
             plan=() if simulated is None else simulated.plan,
             assumptions={} if simulated is None else simulated.assumptions,
@@ -436,6 +432,10 @@ def _rows(block: Block, rows: slice) -> Block:
             if (value := getattr(block, name)) is not None
         },
     )
+
+
+def _received(reading: Reading) -> int:
+    return sum(one.received for one in reading.stream_counts.values())
 
 
 def _disarmed(session: Session) -> None:

@@ -1,27 +1,18 @@
-"""What a rig file would let this rig do, and why it would be refused; nothing is opened and nothing moves.
-
-The first bytes are those that the drivers send to emulated devices in the process, in virtual time.
-"""
+"""What a rig file would let this rig do, and why it would be refused; nothing is opened and nothing moves."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from functools import partial
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import Any
 
 from tactbench.plugin import TactbenchError, UsageError, load_registry
 from tactbench.plugin.devices import (
-    CanFrame,
     CheckTable,
-    DeviceEntry,
-    EmulatedDevices,
     LoopModel,
     PositionerFacts,
-    PressingForce,
     RigCheck,
     RigFile,
-    drivers_of,
-    emulators_of,
     largest_force_n,
     read_options,
 )
@@ -38,20 +29,11 @@ from tactbench.rigs.parallel_manipulator.settings import (
     with_limits,
 )
 
-if TYPE_CHECKING:
-    from tactbench.plugin.devices import Link
-
-FIRST = 4
-"""Pieces shown of what is sent to a device."""
-MOST_BYTES = 24
-"""Bytes shown of each."""
 WATCH_S = 8e-3
 """Age of the force at 1 kHz, a look of the guard, and scheduling: what a reaction has beside the axis' own latency."""
 _STEP = ("LR-1234", "OK\n", "M", "OK\n", "TPOS", "-12345\n", "POS", "-12345\n", "GRC", "1234\n", "OST", "65536\n")
 """Commands of one increment and the look that confirms its end, and their answers, each with a carriage return."""
 _MANDATORY = ("lower_m", "upper_m", "speed_m_s", "acceleration_m_s2", "corridor_m")
-
-_Entry = TypeVar("_Entry", bound=DeviceEntry)
 
 
 class _Findings:
@@ -71,7 +53,7 @@ class _Findings:
 
 
 def check(file: RigFile) -> RigCheck:
-    """Return limits, units, times, forces and first bytes, and what is refused.
+    """Return what axes, loop, forces and places come to, and what is refused.
 
     Raises
     ------
@@ -79,7 +61,6 @@ def check(file: RigFile) -> RigCheck:
         If the file lacks something, or names what is not installed.
     """
     found = _found(file)
-    _first_bytes(found, with_limits(file, settings_of(file), load_registry()))
     return RigCheck(tuple(found.tables), tuple(found.problems))
 
 
@@ -104,7 +85,6 @@ def _found(file: RigFile) -> _Findings:
         facts[name] = kind.facts_of(options)
         _axis(found, settings, name, options)
     motor = facts[MOTOR]
-    _limits(found, settings)
     if motor.corridor > settings.force_loop.step_m:
         found.problems.append(
             f"The motor calls a move ended within {1e6 * motor.corridor:g} um, and the largest increment is "
@@ -190,27 +170,6 @@ def _has_speed(profile: MotorProfile, name: str, speed_mm_s: float) -> None:
         )
 
 
-def _limits(found: _Findings, settings: RigSettings) -> None:
-    limits, heights = settings.limits, settings.heights
-    low, high = limits.travel_mm
-    beats = 1e-3 * limits.heartbeat_ms * settings.force_loop.rate_hz
-    torque = "not looked at" if limits.torque_ceiling_nm is None else f"{limits.torque_ceiling_nm:g} N m"
-    age = "three samples and 10 ms" if limits.force_age_ms is None else f"{limits.force_age_ms:g} ms"
-    found.table(
-        "limits",
-        ("force ceiling, pressing", f"{limits.force_ceiling_n:g} N, of the norm of one raw sample"),
-        ("force ceiling, travelling and homing", f"{limits.travel_ceiling_n:g} N"),
-        ("torque ceiling", torque),
-        ("rated force of the weakest part", f"{limits.rated_force_n:g} N"),
-        ("age of the force, at most", age),
-        ("travel of the motor", f"{low:g} to {high:g} mm"),
-        ("retreats to", f"{limits.retreat_mm:g} mm at {limits.retreat_speed_mm_s:g} mm/s"),
-        ("heartbeat", f"{limits.heartbeat_ms:g} ms, {beats:.1f} control periods"),
-        ("skin expected at", f"{1e3 * settings.surface_m:g} mm, standard deviation {heights.surface_spread_mm:g} mm"),
-        ("goes no deeper than", f"{1e3 * settings.deepest_m:g} mm"),
-    )
-
-
 def _loop(found: _Findings, settings: RigSettings) -> None:
     """Say how far the gains are from swinging, and refuse more than half."""
     model, stiffness = LoopModel.of(settings.force_loop.loop()), settings.stiffness
@@ -262,7 +221,6 @@ def _places(found: _Findings, settings: RigSettings) -> None:
     """Say where the manipulator would go."""
     platform = Platform.of(settings)
     if platform is None:
-        found.table("places", ("manipulator", "fixed: somebody puts the sensor below the indenter"))
         return
     found.refusing(platform.check)
     heights = settings.heights
@@ -273,52 +231,3 @@ def _places(found: _Findings, settings: RigSettings) -> None:
         ("corners of what scenes may ask for", f"{corners} mm"),
         ("stand-off, clearance plane", f"{1e3 * heights.stand_off_m:g}, {1e3 * heights.clearance_m:g} mm"),
     )
-
-
-def _first_bytes(found: _Findings, file: RigFile) -> None:
-    """Say what each device would be sent first: who it is, and its settings; of motors nothing that moves."""
-    rows: list[tuple[str, ...]] = []
-    registry = load_registry()
-    for sensor in file.sensors:
-        entries = file.entries()
-        names = [sensor] if rows else [sensor, "force", MOTOR, *(name for name in JOINTS if name in entries)]
-        emulated = file.model_copy(
-            update={
-                "sensors": {sensor: _emulated(file.sensors[sensor])},
-                "force": None if file.force is None else _emulated(file.force),
-                "devices": {name: _emulated(entry) for name, entry in file.devices.items()},
-            }
-        )
-        for name in names:
-            try:
-                emulators = emulators_of(emulated, registry, sensor, lambda t_s: {})
-                with EmulatedDevices({name: emulators[name]}, keep_log=True) as devices:
-                    links: dict[str, Callable[[], Link]] = {name: devices.opener(name)}
-                    driver = drivers_of(emulated, registry, sensor, links, devices.clock, (name,))[name]
-                    with driver:
-                        driver.identify()
-                        driver.start()
-                        if name == "force" and file.force is not None:
-                            PressingForce(file.force, driver.streams)
-                    sent = [passed.piece for passed in devices.log_of(name) if passed.sender == "host"]
-            except TactbenchError as error:
-                found.problems.append(str(error))
-                continue
-            rows.append((name, entries[name].link, "  ".join(_shown(piece) for piece in sent[:FIRST])))
-    title = "sent first, by the drivers to emulated devices"
-    found.tables.append(CheckTable(title, ("device", "link", "bytes"), tuple(rows)))
-
-
-def _emulated(entry: _Entry) -> _Entry:
-    return entry.model_copy(update={"link": "emulated", "faults": ()})
-
-
-def _shown(piece: object) -> str:
-    """Return a piece as text where it is text, else its bytes; a CAN frame as number and bytes."""
-    if isinstance(piece, CanFrame):
-        return f"{piece.id:X}#{piece.data.hex(' ').upper()}"
-    assert isinstance(piece, bytes)
-    if piece.endswith(b"\r") and piece.isascii():
-        return repr(piece.decode("ascii")).strip("'")
-    text = piece[:MOST_BYTES].hex(" ").upper()
-    return f"{text} … ({len(piece)} bytes)" if len(piece) > MOST_BYTES else text

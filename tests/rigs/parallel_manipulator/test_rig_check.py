@@ -30,17 +30,8 @@ def written(tmp_path, said):
 def test_the_example_is_not_refused_and_nothing_moves(capsys):
     code, out, _ = run(["doctor", "--seconds", "0", "--rig-file", str(EXAMPLE)], capsys)
     assert code == 0
-    for text in (
-        "force ceiling",
-        "Nothing was opened",
-        "share of the largest",
-        "reaction",
-        "sent first",
-        "VER",
-        "ASSUMED",
-    ):
+    for text in ("24.7 N", "Nothing was opened", "share of the largest", "reaction", "holds without power", "ASSUMED"):
         assert text in out
-    assert "EN" not in out.split("sent first")[1].split()
 
 
 def test_a_file_without_a_ceiling_is_refused_with_its_line(tmp_path, capsys):
@@ -181,8 +172,6 @@ def test_places_within_it_are_told():
     assert found.problems == ()
     (places,) = (table for table in found.tables if table.title == "places")
     assert ("manipulator", "example of a linear delta") in places.rows
-    (first,) = (table for table in found.tables if table.title.startswith("sent first"))
-    assert {"joint-1", "joint-2", "joint-3", "motor", "force", "icub", "biotac"} == {row[0] for row in first.rows}
 
 
 def test_rigs_that_move_nothing_have_nothing_to_check(capsys):
