@@ -78,11 +78,10 @@ class Drive:
         self.profile = profile
         self.servo = Servo(model, load)
         self.standing = False
-        """Whether further ticks change nothing but the motor's heat, to the servo's resolution, before a command."""
+        """Whether further ticks change nothing, to the servo's resolution, before a command."""
         self.hot = False
         """Too hot: without power, and without any until it is switched on again."""
         self.flash_defect = False
-        self.temperature_c = 25.0
         self._reference_switch_m = reference_switch_m
         # Speeds and limits at power-on are assumed.
         travel = [profile.increments(stop.to("m")) for stop in model.travel]
@@ -165,8 +164,7 @@ class Drive:
         return self._place_m(settings.negative_limit), self._place_m(settings.positive_limit)
 
     def _limit_a(self) -> float:
-        peak = self.profile.current_a(self.settings.peak_current)
-        return self.servo.limit_a(peak, self.profile.current_a(self.settings.continuous_current))
+        return self.profile.current_a(self.settings.peak_current)
 
     def _place_m(self, increments: float) -> float:
         return self.origin_m + self.profile.position_m(increments)
@@ -369,7 +367,7 @@ class Drive:
             # Without sign (assumed).
             "GRC": lambda: str(round(abs(servo.current_a) / profile.current_a(1.0))),
             "GCL": lambda: str(round(self._limit_a() / profile.current_a(1.0))),
-            "TEM": lambda: str(round(self.temperature_c)),
+            "TEM": lambda: "25",
             "VER": lambda: "EMULATOR",
             "GTYP": lambda: profile.name,
             "GSER": lambda: "0",
