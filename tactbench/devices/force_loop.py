@@ -206,16 +206,24 @@ class LoopModel:
     @classmethod
     def of(cls, loop: ForceLoop, length: str = "m", *, period_s: float | None = None, **limits: Any) -> Self:
         """Return the model of a declared loop; parameters as those of :meth:`ForceLaw.of`."""
-        law = ForceLaw.of(loop, length, period_s=period_s, **limits)
-        lag = loop.motor_lag.to("s")
-        return cls(
-            law=law,
-            lag_kept=math.exp(-law.period_s / lag) if lag > 0 else 0.0,
-            # A delay of exactly so many steps must not become one more by rounding.
-            delay_steps=math.ceil(loop.delay.to("s") / law.period_s - 1e-9),
+        return cls.around(
+            ForceLaw.of(loop, length, period_s=period_s, **limits),
+            lag_s=loop.motor_lag.to("s"),
+            delay_s=loop.delay.to("s"),
             speed=loop.speed.to(f"{length}/s"),
             acceleration=loop.acceleration.to(f"{length}/s/s"),
             resolution_n=loop.resolution.to("N"),
+        )
+
+    @classmethod
+    def around(cls, law: ForceLaw, *, lag_s: float, delay_s: float, **motor: float) -> Self:
+        """Return the model of a law with the motor's lag and the delay of a command; `motor` as the fields."""
+        return cls(
+            law,
+            lag_kept=math.exp(-law.period_s / lag_s) if lag_s > 0 else 0.0,
+            # A delay of exactly so many steps must not become one more by rounding.
+            delay_steps=math.ceil(delay_s / law.period_s - 1e-9),
+            **motor,
         )
 
     def matrix(self, stiffness: float) -> FloatArray:

@@ -555,14 +555,8 @@ class LocalGuard:
             (not facts.corridor > 0, f"{self._name} does not state its corridor"),
             (not facts.limits[0] <= low < high <= facts.limits[1], "the travel is not within the axis' ends"),
             (not low <= facts.retreat < high, "the place to retreat to is not within the travel, away from its end"),
-            (facts.speed > limits.speed_m_s * (1 + 1e-9), "the axis' speed is above the limit"),
-            (self._steps(limits.step_m) == 0, "a step is shorter than half an increment of the axis"),
             (facts.corridor > limits.step_m, "the axis' corridor is longer than a step"),
             (len(limits.zero) != len(channels), f"the force has {len(channels)} channels and {len(limits.zero)} zeros"),
-            (
-                limits.torque_ceiling_nm is not None and not any(channel.kind == "torque" for channel in channels),
-                "there is a ceiling of torque and no torque",
-            ),
             (self._force_lost or self._lost, "a device is gone: close the guard and open a new one"),
         ):
             if wrong:

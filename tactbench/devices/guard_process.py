@@ -165,7 +165,7 @@ class GuardProcess:
         self._arming = self._closed = False
         self._lost: GuardLostError | None = None
         self._streams: tuple[StreamSpec, StreamSpec] | None = None
-        self._waiting: list[tuple[str, Any]] = []
+        self._answer: tuple[type[TactbenchError] | None, Any] | None = None
         self._held: dict[str, list[Block]] = {"force": [], "motor": []}
         self._events: list[Event] = []
         self._socket, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
@@ -197,27 +197,26 @@ class GuardProcess:
 
     def start(self) -> Mapping[str, Mapping[str, str]]:
         """Let the process open all devices."""
-        self._say("start", (self._settings, os.getpid()))
-        identity, self._streams = self._answer("started", START_S)
+        identity, self._streams = self._ask("start", START_S, self._settings, os.getpid())
         found: Mapping[str, Mapping[str, str]] = identity
         return found
 
     def arm(self, limits: Limits) -> Report:
         """Check, home, retract; see :class:`~.guard_messages.Guard`."""
         self._limits, self._arming = limits, True
-        self._say("arm", limits)
         try:
-            return self._report(0, ARM_S)
+            report: Report = self._ask("arm", ARM_S, limits)
         except GuardRefusesError:
             self._limits = None
             raise
         finally:
             self._arming = False
+        return report
 
     def beat(self, beat: Beat) -> Report:
         """Send a beat and wait for its report, some milliseconds."""
-        self._say("beat", beat)
-        return self._report(beat.sequence, ARM_S if self._limits is None else self._limits.heartbeat_s)
+        report: Report = self._ask("beat", ARM_S if self._limits is None else self._limits.heartbeat_s, beat)
+        return report
 
     def advance(self, until_ns: int) -> None:
         """Wait until the clock says so much."""
@@ -242,16 +241,14 @@ class GuardProcess:
 
     def counts(self) -> Mapping[str, Mapping[str, int]]:
         """Return the counts; of the guard also ``rows_dropped``: samples that this end did not take in time."""
-        self._say("counts")
-        found: Mapping[str, Mapping[str, int]] = self._answer(
+        found: Mapping[str, Mapping[str, int]] = self._ask(
             "counts", START_S if self._limits is None else self._limits.heartbeat_s
         )
         return found
 
     def disarm(self) -> Report:
         """Retreat if the pressing axis is not out, and expect no more beats."""
-        self._say("disarm")
-        report = self._report(0, ARM_S)
+        report: Report = self._ask("disarm", ARM_S)
         self._limits = None
         return report
 
@@ -261,7 +258,7 @@ class GuardProcess:
             return
         self._closed = True
         with suppress(OSError):
-            self._socket.send(pickle.dumps(("close", None)))
+            self._socket.send(pickle.dumps(("close", ())))
         try:
             # What it still sends is not waited for: it drops it.
             self._process.wait(ARM_S)
@@ -282,36 +279,26 @@ class GuardProcess:
         if self._closed:
             raise GuardRefusesError("The guard is closed.", hint="Open a new one.")
 
-    def _say(self, kind: str, body: Any = None) -> None:
+    def _ask(self, kind: str, within_s: float, *body: Any) -> Any:
+        """Send a message and return its answer; raises what the process says that it raised, or GuardLostError."""
         self._present()
+        self._answer = None
         try:
             # A full socket means that nobody reads at the other end.
             self._socket.send(pickle.dumps((kind, body)))
         except OSError as error:
             self._fail(f"it does not take a message ({error})")
-
-    def _report(self, sequence: int, within_s: float) -> Report:
         until_ns = self._clock() + round(1e9 * within_s)
-        while True:
-            report: Report = self._answer("report", max(0.0, 1e-9 * (until_ns - self._clock())))
-            if report.sequence == sequence:
-                return report
-
-    def _answer(self, kind: str, within_s: float) -> Any:
-        """Return the next message of a kind; raises what the process says that it raised, or GuardLostError."""
-        until_ns = self._clock() + round(1e9 * within_s)
-        while True:
-            for number, (one, body) in enumerate(self._waiting):
-                if one in (kind, "error"):
-                    del self._waiting[number]
-                    if one == "error":
-                        error, message, hint = body
-                        raise error(message, hint=hint)
-                    return body
+        while self._answer is None:
             left_s = 1e-9 * (until_ns - self._clock())
             if left_s <= 0.0:
                 self._fail(f"it has not answered within {within_s:.3f} s")
             self._take(left_s)
+        error_kind, found = self._answer
+        if error_kind is not None:
+            message, hint = found
+            raise error_kind(message, hint=hint)
+        return found
 
     def _take(self, timeout_s: float) -> None:
         """Take what the process has sent, waiting for it at most so long; raises GuardLostError if it is gone."""
@@ -332,7 +319,7 @@ class GuardProcess:
             elif kind == "event":
                 self._events.append(body)
             else:
-                self._waiting.append((kind, body))
+                self._answer = body
 
     def _kept(self, kind: str) -> list[Block]:
         if self._lost is None and not self._closed:
@@ -456,33 +443,27 @@ class _Server:
                 return
             self._carry_out(*pickle.loads(data))
 
-    def _carry_out(self, kind: str, body: Any) -> None:
-        guard = self._guard
+    def _carry_out(self, kind: str, body: tuple[Any, ...]) -> None:
+        if kind == "close":
+            self._over = True
+            return
+        self._arming = kind == "arm"
         try:
             if kind == "start":
-                self._start(*body)
-            elif kind == "close":
-                self._over = True
-            elif guard is None:
+                found: Any = self._start(*body)
+            elif self._guard is None:
                 raise GuardRefusesError("The guard was not started.", hint="Use start().")
-            elif kind == "beat":
-                self._answer("report", guard.beat(body))
-            elif kind == "arm":
-                self._arming = True
-                report = guard.arm(body)
-                self._arming = False
-                self._answer("report", report)
-            elif kind == "disarm":
-                self._answer("report", guard.disarm())
-            elif kind == "counts":
-                counts = {name: dict(values) for name, values in guard.counts().items()}
-                counts["guard"]["rows_dropped"] = self._dropped_rows
-                self._answer("counts", counts)
+            else:
+                found = getattr(self._guard, kind)(*body)
+            if kind == "counts":
+                found["guard"]["rows_dropped"] = self._dropped_rows
         except TactbenchError as error:
-            self._arming = False
-            self._answer("error", (type(error), error.message, error.hint))
+            self._say("answer", (type(error), (error.message, error.hint)))
+        else:
+            self._say("answer", (None, found))
+        self._arming = False
 
-    def _start(self, settings: ProcessSettings, parent: int) -> None:
+    def _start(self, settings: ProcessSettings, parent: int) -> Any:
         self._parent, self._settings, self._clock = parent, settings, settings.clock()
         self._log = Path(settings.log).open("a", encoding="utf-8", buffering=1)  # noqa: SIM115  (closed in `close`)
         self._write({"started": self._clock(), "unix_ns": time.time_ns(), "pid": os.getpid()})
@@ -505,16 +486,16 @@ class _Server:
                 driver.close()
             raise
         self._guard = guard
-        self._answer("started", (identity, (guard.force_stream, guard.motor_stream)))
         # What there is by now stays: collections have little to look at.
         gc.collect()
         gc.freeze()
+        return identity, (guard.force_stream, guard.motor_stream)
 
     def _event(self, event: Event) -> None:
-        self._answer("event", event)
+        self._say("event", event)
         self._write(asdict(event))
 
-    def _answer(self, kind: str, body: Any) -> None:
+    def _say(self, kind: str, body: Any) -> None:
         self._messages.append(pickle.dumps((kind, body)))
         self._flush()
 

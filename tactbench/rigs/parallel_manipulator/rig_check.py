@@ -9,7 +9,6 @@ from typing import Any
 from tactbench.plugin import TactbenchError, UsageError, load_registry
 from tactbench.plugin.devices import (
     CheckTable,
-    LoopModel,
     PositionerFacts,
     RigCheck,
     RigFile,
@@ -31,7 +30,7 @@ from tactbench.rigs.parallel_manipulator.settings import (
 
 WATCH_S = 8e-3
 """Age of the force at 1 kHz, a look of the guard, and scheduling: what a reaction has beside the axis' own latency."""
-_STEP = ("LR-1234", "OK\n", "M", "OK\n", "TPOS", "-12345\n", "POS", "-12345\n", "GRC", "1234\n", "OST", "65536\n")
+_STEP = ("LA-12345", "OK\n", "M", "OK\n", "TPOS", "-12345\n", "POS", "-12345\n", "GRC", "1234\n", "OST", "65536\n")
 """Commands of one increment and the look that confirms its end, and their answers, each with a carriage return."""
 _MANDATORY = ("lower_m", "upper_m", "speed_m_s", "acceleration_m_s2", "corridor_m")
 
@@ -172,7 +171,8 @@ def _has_speed(profile: MotorProfile, name: str, speed_mm_s: float) -> None:
 
 def _loop(found: _Findings, settings: RigSettings) -> None:
     """Say how far the gains are from swinging, and refuse more than half."""
-    model, stiffness = LoopModel.of(settings.force_loop.loop()), settings.stiffness
+    stiffness = settings.stiffness
+    model = settings.force_loop.model(settings.force_loop.law(settings.limits.travel_mm))
     greatest = 1e3 * stiffness.greatest_n_mm
     found.table(
         "force loop",

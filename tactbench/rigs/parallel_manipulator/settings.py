@@ -11,8 +11,8 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, field_validator, model_validator
 
-from tactbench.plugin import ForceLoop, Quantity, UsageError, load_object, sourced
-from tactbench.plugin.devices import ForceLaw, NamedDevice, Positioner, PressPlan, RigFile, read_options
+from tactbench.plugin import UsageError, load_object
+from tactbench.plugin.devices import ForceLaw, LoopModel, NamedDevice, Positioner, PressPlan, RigFile, read_options
 from tactbench.rigs.parallel_manipulator.kinematics import LinearDelta
 from tactbench.rigs.parallel_manipulator.workspace import Postures
 
@@ -34,10 +34,6 @@ Range = tuple[FiniteFloat, FiniteFloat]
 
 class _Part(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid")
-
-
-def _from_rig_file(value: float, unit: str) -> Quantity:
-    return sourced(value, unit, "the rig file")
 
 
 class SafetyLimits(_Part):
@@ -127,22 +123,17 @@ class ForceControl(_Part):
         """Largest increment in a control period [m]."""
         return 1e-3 * self.speed_mm_s / self.rate_hz
 
-    def loop(self) -> ForceLoop:
-        """Return the loop as scenes state it."""
-        return ForceLoop(
-            proportional=_from_rig_file(self.proportional_mm_n, "mm/N"),
-            integral=_from_rig_file(self.integral_mm_n_s, "mm/N/s"),
-            cutoff=None if self.cutoff_hz is None else _from_rig_file(self.cutoff_hz, "Hz"),
-            rate=_from_rig_file(self.rate_hz, "Hz"),
-            delay=_from_rig_file(self.delay_ms, "ms"),
-            motor_lag=_from_rig_file(self.motor_lag_ms, "ms"),
-            speed=_from_rig_file(self.speed_mm_s, "mm/s"),
-        )
+    def model(self, law: ForceLaw) -> LoopModel:
+        """Return the loop on a linear skin."""
+        return LoopModel.around(law, lag_s=1e-3 * self.motor_lag_ms, delay_s=1e-3 * self.delay_ms)
 
     def law(self, travel_mm: Range) -> ForceLaw:
         """Return the law within a travel of the motor."""
-        return ForceLaw.of(
-            self.loop(),
+        return ForceLaw(
+            period_s=self.period_s,
+            proportional=1e-3 * self.proportional_mm_n,
+            integral=1e-3 * self.integral_mm_n_s,
+            cutoff_hz=self.cutoff_hz,
             speed=1e-3 * self.speed_mm_s,
             windup_s=1e-3 * self.windup_ms,
             travel=(1e-3 * travel_mm[0], 1e-3 * travel_mm[1]),

@@ -178,7 +178,6 @@ class TestInEitherProcess:
         for wrong, message in (
             ({"travel_m": (-4e-3, 2e-3)}, "place to retreat to is not within the travel"),
             ({"travel_m": (-7e-3, 2e-3)}, "not within the axis' ends"),
-            ({"speed_m_s": 0.01}, "axis' speed is above the limit"),
             ({"step_m": 1e-6}, "corridor is longer than a step"),
             ({"zero": (0.0,) * 3}, "6 channels and 3 zeros"),
             ({"zero": (0.0, 0.0, 1.0, 0.0, 0.0, 0.0)}, "force while travelling"),

@@ -120,13 +120,6 @@ def test_answers(text, sent, answer, lines):
         assert answers(line, command.name) == (line.kind is not Kind.NOTICE)
 
 
-def test_one_bytes_at_a_time_says_the_same():
-    whole = b"".join(bytes.fromhex(row[2]) for row in ANSWERED)
-    reader = LineReader()
-    lines = [line for byte in whole for line in reader.feed(bytes([byte]))]
-    assert lines == [line for row in ANSWERED for line in row[3]]
-
-
 @pytest.mark.parametrize(
     ("pieces", "lines"),
     [
@@ -213,25 +206,6 @@ def test_a_line_without_end_is_given_up_in_bounded_memory():
 def test_what_no_drive_sends_is_garbled(raw):
     reader = LineReader()
     assert {line.kind for line in reader.feed(raw)} == {Kind.GARBLED}
-
-
-def test_an_unfinished_line_can_be_forgotten():
-    reader = LineReader()
-    reader.feed(b"98")
-    reader.clear()
-    assert reader.feed(b"7\r\n") == [Line(Kind.VALUE, "7")]
-
-
-@pytest.mark.parametrize("name", ["", "L A", "LA1", "LÄ", "LA\r"])
-def test_names_that_are_none(name):
-    with pytest.raises(ValueError, match="letters"):
-        encode(name)
-
-
-@pytest.mark.parametrize("node", [0, 256, -1])
-def test_nodes_that_are_none(node):
-    with pytest.raises(ValueError, match="1 to 255"):
-        encode("EN", node=node)
 
 
 @given(st.floats(-1.0, 1.0))

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tactbench.plugin import UsageError, assumed
+from tactbench.plugin import UsageError
 from tactbench.rigs.parallel_manipulator.motor.codec import (
     OVERTEMPERATURE,
     Kind,
@@ -172,23 +172,6 @@ def test_a_drive_that_stands_without_load_answers_as_if_each_tick_were_made(tick
     assert made[True][3] == made[False][3]
 
 
-def test_polls_cannot_be_quicker_than_the_line():
-    """87.3 questions for a position of five digits in a second at 9600, the drive's own time left out."""
-    model = MotorModel(answer_time=assumed(0.0, "ms", "test"))
-    host = Host(model=model)
-    host.do("HO98956")
-    start_s = now_s = host.now_s
-    answered = 0
-    while now_s < start_s + 1.0:
-        host.reader.feed(joined_bytes(host.emulator.feed(b"POS\r", now_s)))
-        lines = []
-        while not lines:
-            now_s = host.emulator.next_s()
-            lines = host.reader.feed(joined_bytes(host.emulator.poll(now_s)))
-        answered += 1
-    assert answered == math.ceil(87.3)
-
-
 def test_other_nodes_are_silent():
     host = Host()
     assert host.lines("7POS\r") == []
@@ -211,16 +194,6 @@ def test_a_move_ends_on_its_target_and_says_so():
         host.do("LR-7", "M")
     host.wait(0.3)
     assert host.ask("POS") == str(500 - 35)
-
-
-def test_what_was_put_in_comes_back_to_one_step():
-    rng = np.random.default_rng(3)
-    host = Host()
-    host.do("EN", "SP500", "AC5000", "DEC5000")
-    for target_m in rng.uniform(-9e-3, 9e-3, 8):
-        host.go(target_m, 0.8)
-        assert abs(int(host.ask("POS")) * STEP_M - target_m) <= STEP_M / 2 + 1e-12
-        assert abs(host.emulator.drive.servo.position_m - target_m) <= STEP_M / 2 + 1e-7  # The servo's own rest.
 
 
 def test_the_servo_goes_its_lag_and_is_stable_against_any_spring():
@@ -260,20 +233,6 @@ def test_the_current_limit_bounds_the_force_and_is_said():
     assert not status & OperationStatus.POSITION_ATTAINED
 
 
-def test_position_limits_hold_in_both_kinds_of_motion():
-    host = Host()
-    host.do("EN", "LL500", "LL-200", "APL1")
-    host.go(5e-3, 0.8)
-    assert host.ask("POS") == "500"
-    host.do("V-40")
-    host.wait(1.0)
-    assert host.ask("POS") == "-200"
-    host.do("APL0")
-    host.wait(1.0)
-    # Without limits it runs into the end stop of its travel.
-    assert host.emulator.drive.servo.position_m == pytest.approx(-10e-3)
-
-
 def test_homing_on_the_end_stop_by_current():
     host = Host()
     host.do("EN", "LPC200", "LCC200", "V-20")
@@ -296,26 +255,6 @@ def test_homing_on_a_switch():
     assert not host.status & OperationStatus.HOMING
     assert host.ask("POS") == "0"
     assert host.emulator.drive.servo.position_m == pytest.approx(-2.4e-3, abs=STEP_M)
-
-
-def test_notices_of_place_and_speed():
-    host = Host()
-    host.do("EN", "NP300", "NV30", "LA600")
-    lines = host.lines("M\r", 0.8)
-    assert sorted(line.text for line in lines) == ["OK", "p", "v"]
-    host.do("NP", "NPOFF", "LA0")
-    assert [line.text for line in host.lines("M\r", 0.8)] == ["OK"]
-
-
-def test_limits_can_be_read_back():
-    host = Host()
-    host.do("SP20", "AC300", "DEC200", "LL700", "LL-800", "LPC500", "LCC300", "CORRIDOR9", "DEV77")
-    asked = ("GSP", "GAC", "GDEC", "GPL", "GNL", "GPC", "GCC", "GCORRIDOR", "GDEV")
-    assert [host.ask(name) for name in asked] == ["20", "300", "200", "700", "-800", "500", "300", "9", "77"]
-    assert host.ask("SAVE") == "EEPROM writing done"
-    host.do("SP30")
-    host.lines("RESET\r")
-    assert host.ask("GSP") == "20"
 
 
 @pytest.mark.parametrize("text", ["LA", "SP-1", "AC0", "LL0", "LL", "ANSW9", "BAUD9601", "LA99999999999", "POS5"])
@@ -350,13 +289,6 @@ def test_late_answers_come_late_and_in_order():
     assert [line.text for line in host.lines("OST\r", 0.2)] == ["7", "65536"]
 
 
-def test_late_answers_do_not_hold_notices_back():
-    host = Host()
-    host.do("EN", "NP", "LA20")
-    host.emulator.faults = [MotorFault("late-answers", delay_s=5.0)]
-    assert host.lines("M\r", 1.0) == [Line(Kind.NOTICE, "p")]
-
-
 def test_garbled_lines_are_counted_or_pass_as_another_number():
     host = Host()
     host.do("HO98956")
@@ -370,18 +302,6 @@ def test_garbled_lines_are_counted_or_pass_as_another_number():
     host.emulator.faults.clear()
     host.lines("\r")
     assert host.ask("POS") == "98956"
-
-
-def test_every_third_line_is_garbled():
-    host = Host(faults=[MotorFault("garbled-line", every=3)])
-    right = [host.lines("POS\r", 0.05) == [Line(Kind.VALUE, "0")] for _ in range(9)]
-    assert [n for n, good in enumerate(right) if not good and n % 3 == 2] == [2, 5, 8]
-    # A garbled end of a line takes the next one with it, and no other.
-    assert all(good for n, good in enumerate(right) if n % 3 == 1)
-
-
-def test_a_flash_defect():
-    assert Host(faults=[MotorFault("flash-defect")]).ask("SAVE") == "Flash defect"  # FH-2.22
 
 
 def test_faults_that_are_none():

@@ -7,7 +7,6 @@ from collections import Counter, deque
 from collections.abc import Callable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, replace
-from typing import Literal
 
 from tactbench.plugin.devices import (
     DriverSettings,
@@ -253,7 +252,7 @@ class FaulhaberDriver(Positioner):
         if self.enabled and self._limits:
             # Position control again, from a target that is known, within the ends of travel.
             (_, upper, _), (_, lower, _) = self._limits
-            self._begin("LA", min(max(self._home, lower), upper), self._speed)
+            self._begin(min(max(self._home, lower), upper), self._speed)
             while self.moving:
                 self.update(self._exchange.answer_s)
 
@@ -328,7 +327,7 @@ class FaulhaberDriver(Positioner):
         """Begin to move to a position, to the nearest increment; the speed is rounded down."""
         self.check_move(position)
         return self._begin(
-            "LA", self._profile.increments(position), self._speed if speed is None else self._profile.speed(speed)
+            self._profile.increments(position), self._speed if speed is None else self._profile.speed(speed)
         )
 
     def move_by(self, distance: float) -> float:
@@ -337,7 +336,7 @@ class FaulhaberDriver(Positioner):
             raise NotReadyError("The motor's target is not known.", hint="Use locate() once it is at rest.")
         target = self._target + self._profile.increments(distance)
         self.check_move(self._profile.position_m(target))
-        return self._begin("LR", target, self._speed)
+        return self._begin(target, self._speed)
 
     def halt(self) -> None:
         """Begin to move to the position that was last read, whatever is under way: it brakes and holds there.
@@ -375,17 +374,15 @@ class FaulhaberDriver(Positioner):
         self._exchange.send("M", None, move)
         self._queue.append(("TPOS", None))
 
-    def _begin(self, command: Literal["LA", "LR"], target: int, speed: int) -> float:
+    def _begin(self, target: int, speed: int) -> float:
         position_m = self._profile.position_m(target)
-        distance = None if self._target is None else target - self._target
         low, high = self.facts.limits
-        way_m = high - low if distance is None else abs(self._profile.position_m(distance))
+        way_m = high - low if self._target is None else abs(self._profile.position_m(target - self._target))
         self._move = _Move(target, self._seconds(way_m, speed))
         if self._speed_now != speed:
             self._queue.append(("SP", speed))
             self._speed_now = speed
-        argument = target if command == "LA" or distance is None else distance
-        self._queue += [("LA" if distance is None else command, argument), ("M", None), ("TPOS", None)]
+        self._queue += [("LA", target), ("M", None), ("TPOS", None)]
         return position_m
 
     def _seconds(self, way_m: float, speed: int) -> float:

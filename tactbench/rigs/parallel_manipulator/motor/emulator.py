@@ -37,7 +37,6 @@ class MotorFault(Fault):
         "motor-fault": "too hot: without power until it is over and the drive is enabled again",
         "late-answers": "answers, not notices, come later by delay_s",
         "garbled-line": "one byte of a line is another one",
-        "flash-defect": "SAVE fails",
     }
     delay_s: float = 0.25
     """Seven times the longest answer at 9600 baud."""
@@ -192,7 +191,6 @@ class MotorEmulator(DeviceEmulator):
     def _carry_out(self, command: Command, at_s: float) -> None:
         if command.node not in (None, self.drive.settings.node):
             return
-        self.drive.flash_defect = self._active("flash-defect", at_s) is not None
         try:
             answer = self.drive.answer(command)
             refused = False
