@@ -20,7 +20,6 @@ from tactbench.plugin.simulation import SimulatedPress
 
 if TYPE_CHECKING:
     from tactbench.plugin import FloatArray
-    from tactbench.rigs.parallel_manipulator.motor.drive import Drive
 
 FORCE = "fz"
 """Name under which a simulated rig gives the pressing force, and emulated force sensors are given it."""
@@ -54,7 +53,7 @@ def quiet(scene: Scene) -> Scene:
 
 
 class EmulatedPress:
-    """A simulated scene under an emulated motor, as :data:`~tactbench.plugin.Senses`.
+    """A simulated scene under an emulated motor.
 
     Without load the sensor reads the unloaded hold of the recording, by the time since :meth:`start`, again and again.
 
@@ -77,7 +76,6 @@ class EmulatedPress:
     ) -> None:
         profile = scene.profile
         self.skin_m = skin_m
-        self._drive: Drive | None = None
         self._start_s = 0.0
         self._hold_ns = round(1e9 * profile.hold_s)
         self._duration_ns = round(1e9 * profile.duration.to("s"))
@@ -94,11 +92,6 @@ class EmulatedPress:
         self._noise_ns, self._noise_n = _force_noise(simulated, scene)
         self._floor_n: list[float] = (FLOOR_N * rng.standard_normal(_FLOOR_DRAWS)).tolist()
 
-    def pressed_by(self, drive: Drive) -> None:
-        """Let a drive's motor press, and feel the skin."""
-        self._drive = drive
-        drive.servo.load = lambda position_m, _: self.force_n(position_m - drive.origin_m)
-
     def start(self, at_s: float) -> None:
         """Let the scene's time begin, on the devices' clock."""
         self._start_s = at_s
@@ -112,10 +105,9 @@ class EmulatedPress:
         here, there = self._forces_n[before : before + 2]
         return here + (place - before) * (there - here)
 
-    def __call__(self, t_s: float) -> Mapping[str, float]:
-        """Return the value of every channel at a second of the devices' clock, in the channels' units."""
-        drive = self._drive
-        force_n = 0.0 if drive is None else self.force_n(drive.servo.position_m - drive.origin_m)
+    def sensed(self, t_s: float, position_m: float) -> Mapping[str, float]:
+        """Return the value of every channel, in its unit, at a second of the devices' clock and a motor's position."""
+        force_n = self.force_n(position_m)
         since_ns = round(1e9 * (t_s - self._start_s))
         if force_n > 0.0:
             at_ns = self._hold_ns + round(force_n * self._ns_per_n)

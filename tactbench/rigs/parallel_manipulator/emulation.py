@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from tactbench.plugin import Acquisition, Scene, SensorDescriptor
-from tactbench.plugin.devices import RigEmulators, RigFile, emulators_of, with_sensor
-from tactbench.rigs.parallel_manipulator.emulated_press import EmulatedPress, quiet
+from tactbench.plugin.devices import RigEmulators, RigFile
+from tactbench.rigs.parallel_manipulator.emulated_press import quiet
 from tactbench.rigs.parallel_manipulator.rig import ParallelManipulator
-from tactbench.rigs.parallel_manipulator.settings import JOINTS, MOTOR
-
-if TYPE_CHECKING:
-    from tactbench.plugin.devices import EmulatedDevice
+from tactbench.rigs.parallel_manipulator.session import Senses, coupled_emulators
+from tactbench.rigs.parallel_manipulator.settings import settings_of, with_limits
 
 
 class PressEmulators(RigEmulators):
@@ -21,33 +19,22 @@ class PressEmulators(RigEmulators):
 
     def __init__(self, file: RigFile, registry: Any) -> None:
         self._file = file
-        self._press: EmulatedPress | None = None
-        devices: dict[str, EmulatedDevice] = {}
-        for sensor in file.sensors:
-            devices = emulators_of(with_sensor(file, sensor), registry, sensor, self._sensed) | devices
-        for name in JOINTS:
-            if name in devices:
-                joint: Any = devices[name].emulator
-                joint.drive.servo.load = None  # the platform's weight is not modelled
-        self.devices = devices
-
-    def _sensed(self, t_s: float) -> Mapping[str, float]:
-        return {} if self._press is None else self._press(t_s)
+        self._senses = Senses()
+        settings = settings_of(file)
+        limited = with_limits(file, settings, registry)
+        self.devices = coupled_emulators(limited, settings, registry, list(file.sensors), self._senses)
 
     def prepare(self, simulated: Acquisition, sensor: SensorDescriptor, scene: Scene, seed: int) -> None:
         """Put the sensor of a scene before the motor."""
         rig = ParallelManipulator(self._file, None, _Carried(simulated))
         with ExitStack() as stack:
-            found = rig._senses(stack, self._file, sensor, quiet(scene), seed)
-        assert found is not None
-        motor: Any = self.devices[MOTOR].emulator
-        found[1].pressed_by(motor.drive)
-        self._press = found[1]
+            found = rig._senses(stack, sensor, quiet(scene), seed)
+        self._senses.press = None if found is None else found[1]
 
     def begin(self, at_s: float) -> None:
         """Let the scene's time begin."""
-        if self._press is not None:
-            self._press.start(at_s)
+        if self._senses.press is not None:
+            self._senses.press.start(at_s)
 
 
 class _Carried:

@@ -10,9 +10,9 @@ import pytest
 
 from tactbench.core.errors import LinkError, RigError, UnknownNameError, UsageError
 from tactbench.core.plugins.registry import load_registry
+from tactbench.core.spec.rig_file import DeviceEntry
 from tactbench.plugin import Block, ChannelSpec, Quality, StreamSpec
 from tactbench.plugin.devices import (
-    DeviceEntry,
     EmulatedDevices,
     ForceEntry,
     PressingForce,

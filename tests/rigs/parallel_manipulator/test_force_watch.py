@@ -2,11 +2,11 @@
 
 import numpy as np
 
+from tactbench.devices.force_watch import ForceWatch
+from tactbench.devices.guard_messages import Trigger
+from tactbench.devices.sequence import SequenceCheck
 from tactbench.plugin import Block
-from tactbench.plugin.devices import SequenceCheck
 from tactbench.rigs.parallel_manipulator.force_torque.wrench import stream
-from tactbench.rigs.parallel_manipulator.force_watch import ForceWatch
-from tactbench.rigs.parallel_manipulator.guard_interface import Trigger
 from tests.rigs.parallel_manipulator.presses import FAULTS
 
 LIMITS = FAULTS.Setting().limits

@@ -8,13 +8,13 @@ from __future__ import annotations
 
 import math
 from functools import cached_property
-from typing import Literal
+from typing import Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from tactbench.plugin import Quantity, RigError, assumed, sourced
+from tactbench.plugin.devices import PositionerOptions
 from tactbench.rigs.parallel_manipulator.motor.codec import BAUDS
-from tactbench.rigs.parallel_manipulator.options import Options
 
 _MANUAL = "Faulhaber manual MCBL 3564K024B CS, the rotary drive of the same generation"
 
@@ -131,8 +131,8 @@ class MotorProfile(BaseModel):
         return found
 
 
-class FaulhaberOptions(Options):
-    """What a rig file says of a motor and its drive."""
+class FaulhaberOptions(PositionerOptions):
+    """What a rig file says of a motor and its drive; what it leaves out is as the drive has it."""
 
     node: int | None = Field(default=None, ge=1, le=255)
     """Address on a line with several drives."""
@@ -144,45 +144,38 @@ class FaulhaberOptions(Options):
     acceleration_unit_m_s2: float | None = Field(default=None, gt=0.0)
     current_unit_a: float | None = Field(default=None, gt=0.0)
     lower_m: float | None = Field(default=None, lt=0.0)
-    """Ends of travel, kept by the drive and by the driver; without them the motor can be watched, not moved. The drive
-    takes a negative and a positive one."""
+    """The drive takes a negative and a positive end of travel."""
     upper_m: float | None = Field(default=None, gt=0.0)
-    speed_m_s: float | None = Field(default=None, gt=0.0)
-    """Of moves; this and the next four: None leaves what the drive has."""
-    acceleration_m_s2: float | None = Field(default=None, gt=0.0)
-    """Of starting and braking."""
-    corridor_m: float | None = Field(default=None, gt=0.0)
-    """Around a target, within which the drive says that it is reached: well below the shortest move."""
     peak_current_a: float | None = Field(default=None, gt=0.0)
     continuous_current_a: float | None = Field(default=None, gt=0.0)
+    force_constant_n_a: float | None = Field(default=None, gt=0.0)
+    """Force per current: times the peak current it is the largest force."""
     homing: Literal["here", "switch", "end-stop"] = "here"
     """Where positions count from: the place at which it stands, the drive's reference switch, or an end stop that is
     run against."""
-    home_m: float = 0.0
-    """What that place is called."""
     homing_speed_m_s: float = 0.005
     """Negative: towards negative positions; of a switch without sign."""
     homing_current_a: float = Field(default=0.2, gt=0.0)
     """With which it runs against an end stop."""
-    retreat_m: float | None = None
-    """Where it goes to be away from the sensor."""
-    retreat_speed_m_s: float | None = Field(default=None, gt=0.0)
 
     @model_validator(mode="after")
-    def _possible(self) -> FaulhaberOptions:
+    def _possible(self) -> Self:
         if self.baud not in BAUDS:
             raise ValueError(f"baud is one of {', '.join(map(str, BAUDS))}")
-        if (self.lower_m is None) != (self.upper_m is None):
-            raise ValueError("give both lower_m and upper_m, or none")
         if self.homing_speed_m_s == 0.0:
             raise ValueError("a homing speed is not 0")
-        if self.retreat_m is not None and not self.within(self.retreat_m):
-            raise ValueError("retreat_m is between lower_m and upper_m")
         return self
 
-    def within(self, position_m: float) -> bool:
-        """Return whether a position is within the ends of travel; False where there are none."""
-        return self.lower_m is not None and self.upper_m is not None and self.lower_m <= position_m <= self.upper_m
+    @property
+    def largest_force_n(self) -> float | None:
+        """Peak current times force constant [N]; None: one of them is not stated."""
+        if self.peak_current_a is None or self.force_constant_n_a is None:
+            return self.peak_force_n
+        return self.peak_current_a * self.force_constant_n_a
+
+    def homes_towards(self) -> int:
+        """Return the sign of the homing speed against an end stop; 0: it stands, or the drive's set-up decides."""
+        return int(math.copysign(1, self.homing_speed_m_s)) if self.homing == "end-stop" else 0
 
     def profile(self) -> MotorProfile:
         """Return the units."""

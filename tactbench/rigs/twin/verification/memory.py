@@ -8,9 +8,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from tactbench.plugin import FloatArray, ForceLoop, assumed
+from tactbench.plugin.devices import LoopModel
 from tactbench.plugin.simulation import Check, Verdict
 from tactbench.rigs.twin.effects.heated_core import HeatedCore
-from tactbench.rigs.twin.effects.loop_dynamics import Dynamics
 from tactbench.rigs.twin.effects.memory import lag, time_constant_s, wandering
 
 _ROUNDING = 1e-12
@@ -208,8 +208,8 @@ def _limit() -> list[Verdict]:
     unlimited = {"speed": assumed(1e20, "mm/s", "none"), "acceleration": assumed(1e30, "mm/s/s", "none")}
     for name, cutoff in (("filtered", assumed(1.0, "Hz", "check")), ("unfiltered", None)):
         drive = ForceLoop(cutoff=cutoff, resolution=assumed(0.0, "N", "none"), **unlimited)
-        loop = Dynamics.of(drive, 0.012)
-        limit = loop.limit_n_per_mm()
+        loop = LoopModel.of(drive, "mm", period_s=0.012)
+        limit = loop.largest_stiffness()
         low, high = 0.5 * limit, 2.0 * limit
         while high / low > 1.001:
             middle = math.sqrt(low * high)
@@ -226,9 +226,8 @@ def _limit() -> list[Verdict]:
     return verdicts
 
 
-def _swings(loop: Dynamics, stiffness: float) -> bool:
+def _swings(loop: LoopModel, stiffness: float) -> bool:
     noise = np.zeros(4000)
     noise[0] = 1e-6 * stiffness
-    free = (-math.inf, math.inf)
-    depths = np.abs(loop.carried(lambda depth: stiffness * depth, np.zeros(noise.size), noise, free))
+    depths = np.abs(loop.simulate(lambda depth: stiffness * depth, np.zeros(noise.size), noise))
     return bool(depths[-1000:].max() > depths[1000:2000].max())

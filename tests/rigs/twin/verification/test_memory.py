@@ -3,7 +3,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tactbench.rigs.twin.effects import heated_core, loop_dynamics
+from tactbench.plugin.devices import LoopModel
+from tactbench.rigs.twin.effects import heated_core
 from tactbench.rigs.twin.effects import memory as filters
 from tactbench.rigs.twin.verification import memory
 
@@ -47,7 +48,7 @@ def _euler(self, t_s, conductance, indenter_c, start_c):
         (memory, "lag", _late, {"lag-ramp", "lag-curve", "low-pass"}),
         (memory, "wandering", _explicit, {"drift-moments"}),
         (heated_core.HeatedCore, "carried", _euler, {"heat-step", "heat-order"}),
-        (loop_dynamics.Dynamics, "growth", lambda self, k: 0.15 * k, {"force-loop-limit"}),
+        (LoopModel, "growth", lambda self, k: 0.15 * k, {"force-loop-limit"}),
     ],
 )
 def test_and_would_not_if_it_were_broken(where, what, broken, caught, monkeypatch):
