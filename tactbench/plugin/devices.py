@@ -11,7 +11,7 @@ from tactbench.core.plugins.checks import CheckTable, RigCheck
 from tactbench.core.plugins.interfaces import DeviceAcquisition, Operator
 from tactbench.core.spec.recording import Emulation, StreamClock, StreamCounts
 from tactbench.core.spec.rig import DeviceDescriptor
-from tactbench.core.spec.rig_file import FORCE, DeviceEntry, ForceEntry, NamedDevice, RigFile
+from tactbench.core.spec.rig_file import FORCE, ForceEntry, NamedDevice, RigFile
 from tactbench.plugin.on_demand import on_demand
 
 if TYPE_CHECKING:
@@ -85,7 +85,6 @@ __all__ = [
     "DeviceAcquisition",
     "DeviceDescriptor",
     "DeviceEmulator",
-    "DeviceEntry",
     "DeviceLog",
     "DeviceSettings",
     "Driver",
