@@ -26,7 +26,7 @@ from tactbench.rigs.parallel_manipulator.motor.exchange import (
     MotorSilentError,
     WrongGenerationError,
 )
-from tactbench.rigs.parallel_manipulator.motor.profile import MotorProfile
+from tactbench.rigs.parallel_manipulator.motor.profile import FaulhaberOptions
 from tests.rigs.parallel_manipulator.pumps import VirtualLink
 
 STEP_M = 6e-6
@@ -396,7 +396,7 @@ def test_a_wall_is_a_move_that_does_not_end():
 def test_another_target_than_asked_for_is_noticed():
     driver, link = ready()
     driver.move_by(100 * STEP_M)
-    link.emulator.drive.profile = MotorProfile()
+    link.emulator.drive.profile = FaulhaberOptions()
     answer = link.emulator.drive.answer
 
     def damaged(command):
