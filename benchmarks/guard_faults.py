@@ -190,7 +190,7 @@ def build_profile() -> Any:
     """Return the units of the drive that the options state."""
     from tactbench.rigs.parallel_manipulator.motor.profile import FaulhaberOptions
 
-    return FaulhaberOptions(**STATED).profile()
+    return FaulhaberOptions(**STATED)
 
 
 @dataclass

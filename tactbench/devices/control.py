@@ -15,7 +15,8 @@ from typing import Any
 
 from tactbench.core.errors import TactbenchError
 from tactbench.core.samples import Block
-from tactbench.devices.guard_messages import Beat, Event, Guard, Limits, Report
+from tactbench.devices.guard_messages import Beat, Event, Limits, Report
+from tactbench.devices.guard_process import Guard
 from tactbench.devices.press import Press
 from tactbench.links.link import Clock
 

@@ -140,7 +140,7 @@ class LocalGuard:
         self._into_skin = self._touched = False
         self._began_ns = self._sent_ns = 0
 
-    # What a rig asks for; see Guard -----------------------------------------------------------------------------------
+    # What a rig asks for ----------------------------------------------------------------------------------------------
 
     @property
     def force_stream(self) -> StreamSpec:
@@ -168,7 +168,16 @@ class LocalGuard:
         return found
 
     def arm(self, limits: Limits) -> Report:
-        """Check, home what is not homed, retract, and begin to expect beats."""
+        """Check, home what is not homed, retract the pressing axis, and begin to expect beats.
+
+        The first beat is due within `heartbeat_s`, and its sequence is 1.
+
+        Raises
+        ------
+        GuardRefusesError
+            If something is not as it must be; nothing was moved, or what was begun has ended. The state is IDLE, or
+            FAULT if force or an axis went wrong while homing.
+        """
         again = self.state is GuardState.ARMED
         if not (again or self.state is GuardState.IDLE):
             raise GuardRefusesError(f"The guard is in state {self.state}.", hint="Disarm it first.")
@@ -193,7 +202,7 @@ class LocalGuard:
         return self._report(0, _Verdict(True))
 
     def beat(self, beat: Beat) -> Report:
-        """Take a beat."""
+        """Say that the rig is there, and what shall be done; return at once."""
         limits = self._limits
         if self.state is GuardState.ARMED and limits is not None:
             self._counts["beats"] += 1

@@ -9,11 +9,8 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
-from typing import Protocol
 
 from tactbench.core.errors import RigError, UsageError
-from tactbench.core.samples import Block
-from tactbench.core.spec.sensor import StreamSpec
 
 
 class GuardRefusesError(RigError):
@@ -209,54 +206,3 @@ class Event:
     force_n: float
     position_m: float
     text: str
-
-
-class Guard(Protocol):
-    """A guard; one thread uses it. A guard in another process may be lost: then all raise GuardLostError."""
-
-    @property
-    def force_stream(self) -> StreamSpec:
-        """The force sensor's stream, from :meth:`start` on."""
-
-    @property
-    def motor_stream(self) -> StreamSpec:
-        """The pressing axis' stream, from :meth:`start` on."""
-
-    def start(self) -> Mapping[str, Mapping[str, str]]:
-        """Ask all devices who they are and let them sample; return what ``force`` and the axes said."""
-
-    def arm(self, limits: Limits) -> Report:
-        """Check everything, home what is not homed, retract the pressing axis; beats count from then on.
-
-        The first beat is due within `heartbeat_s`, and its sequence is 1.
-
-        Raises
-        ------
-        GuardRefusesError
-            If something is not as it must be; nothing was moved, or what was begun has ended. The state is IDLE, or
-            FAULT if force or an axis went wrong while homing.
-        """
-
-    def beat(self, beat: Beat) -> Report:
-        """Say that the rig is there, and what shall be done; return at once."""
-
-    def advance(self, until_ns: int) -> None:
-        """Let time pass until the rig's clock says so much; the rig's only wait while the guard is armed."""
-
-    def force_blocks(self) -> list[Block]:
-        """Return all force samples since the last call: raw, unfiltered, zero not subtracted, each once, in order."""
-
-    def motor_blocks(self) -> list[Block]:
-        """Return all states of the pressing axis since the last call."""
-
-    def events(self) -> list[Event]:
-        """Return what has happened since the last call."""
-
-    def counts(self) -> Mapping[str, Mapping[str, int]]:
-        """Return what ``force``, the axes and ``guard`` have counted."""
-
-    def disarm(self) -> Report:
-        """End ARMED, RETREATED or FAULT: the pressing axis, if it is not there, retreats first, within its time."""
-
-    def close(self) -> None:
-        """Disarm, let all devices be and close their links; once closed, this does nothing."""

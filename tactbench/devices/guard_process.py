@@ -35,7 +35,7 @@ from dataclasses import asdict, dataclass, field, replace
 from functools import partial
 from importlib import import_module
 from pathlib import Path
-from typing import IO, Any, NoReturn
+from typing import IO, Any, NoReturn, TypeAlias
 
 from tactbench.core.errors import LinkClosed, LinkError, RigError, TactbenchError, UsageError
 from tactbench.core.samples import Block
@@ -143,7 +143,9 @@ def _opened(settings: DeviceSettings, clock: Clock) -> Any:
 
 
 class GuardProcess:
-    """A guard in a process of its own, as its rig sees it; a :class:`~.guard_messages.Guard`.
+    """A guard in a process of its own, as its rig sees it: the same methods as :class:`~.guard.LocalGuard`.
+
+    Once it is lost, all raise GuardLostError.
 
     Parameters
     ----------
@@ -202,7 +204,7 @@ class GuardProcess:
         return found
 
     def arm(self, limits: Limits) -> Report:
-        """Check, home, retract; see :class:`~.guard_messages.Guard`."""
+        """Check, home, retract."""
         self._limits, self._arming = limits, True
         try:
             report: Report = self._ask("arm", ARM_S, limits)
@@ -344,6 +346,9 @@ class GuardProcess:
         self._events.append(Event(self._clock(), GuardState.FAULT, trigger, math.nan, math.nan, text))
         self._lost = GuardLostError(text, hint=f"Its last events are in {self._settings.log}.")
         raise self._lost
+
+
+Guard: TypeAlias = LocalGuard | GuardProcess
 
 
 class _Server:

@@ -37,13 +37,12 @@ if TYPE_CHECKING:
         Beat,
         CommandKind,
         Event,
-        Guard,
         GuardLostError,
         GuardState,
         Limits,
         Report,
     )
-    from tactbench.devices.guard_process import DeviceSettings, GuardProcess, ProcessSettings
+    from tactbench.devices.guard_process import DeviceSettings, Guard, GuardProcess, ProcessSettings
     from tactbench.devices.log import DeviceLog
     from tactbench.devices.options import Options, open_for, read_file, read_options
     from tactbench.devices.positioner import (

@@ -16,7 +16,7 @@ from tactbench.plugin.devices import (
     read_options,
 )
 from tactbench.rigs.parallel_manipulator.motor.codec import line_time_s
-from tactbench.rigs.parallel_manipulator.motor.profile import FaulhaberOptions, MotorProfile
+from tactbench.rigs.parallel_manipulator.motor.profile import FaulhaberOptions
 from tactbench.rigs.parallel_manipulator.platform import Platform
 from tactbench.rigs.parallel_manipulator.settings import (
     JOINTS,
@@ -129,16 +129,14 @@ def _axis(found: _Findings, settings: RigSettings, name: str, options: Any) -> N
 
 def _units(found: _Findings, settings: RigSettings | None, options: FaulhaberOptions) -> list[tuple[str, str]]:
     """Return what the drive's integers mean; refuse speeds of a press that it does not have."""
-    profile = options.profile()
-    units = (
-        ("increment", "position_unit", "um"), ("unit of speed", "speed_unit", "mm/s"),
-        ("unit of acceleration", "acceleration_unit", "mm/s/s"), ("unit of current", "current_unit", "mA"),
-    )  # fmt: skip
     rows = []
-    for what, name, shown in units:
-        quantity = getattr(profile, name)
-        by = "the rig file" if name in profile.model_fields_set else f"ASSUMED: {quantity.source.reference}"
-        rows.append((what, f"{quantity.to(shown):g} {shown} ({by})"))
+    for what, name, factor, unit in (
+        ("increment", "increment_m", 1e6, "um"), ("unit of speed", "speed_unit_m_s", 1e3, "mm/s"),
+        ("unit of acceleration", "acceleration_unit_m_s2", 1e3, "mm/s^2"),
+        ("unit of current", "current_unit_a", 1e3, "mA"),
+    ):  # fmt: skip
+        by = "" if name in options.model_fields_set else " (ASSUMED)"
+        rows.append((what, f"{factor * getattr(options, name):g} {unit}{by}"))
     if settings is not None:
         touch = settings.touch
         for name, speed_mm_s in (
@@ -146,7 +144,7 @@ def _units(found: _Findings, settings: RigSettings | None, options: FaulhaberOpt
             ("press unload_speed_mm_s", settings.press.unload_speed_mm_s),
             ("limits retreat_speed_mm_s", settings.limits.retreat_speed_mm_s),
         ):  # fmt: skip
-            found.refusing(partial(_has_speed, profile, name, speed_mm_s))
+            found.refusing(partial(_has_speed, options, name, speed_mm_s))
         # Of each line one end is in the text already, or is a carriage return.
         exchange_s = sum(line_time_s(len(text) + 1, options.baud) for text in _STEP)
         loop = settings.force_loop
@@ -159,12 +157,12 @@ def _units(found: _Findings, settings: RigSettings | None, options: FaulhaberOpt
     return rows
 
 
-def _has_speed(profile: MotorProfile, name: str, speed_mm_s: float) -> None:
-    got_mm_s = 1e3 * profile.speed_m_s(profile.speed(1e-3 * speed_mm_s))
+def _has_speed(options: FaulhaberOptions, name: str, speed_mm_s: float) -> None:
+    unit_mm_s = 1e3 * options.speed_unit_m_s
+    got_mm_s = unit_mm_s * options.speed(1e-3 * speed_mm_s)
     if got_mm_s < 0.9 * speed_mm_s:
         raise UsageError(
-            f"{name} of {speed_mm_s:g} mm/s would be {got_mm_s:g} mm/s: the drive's unit is "
-            f"{profile.speed_unit.to('mm/s'):g} mm/s.",
+            f"{name} of {speed_mm_s:g} mm/s would be {got_mm_s:g} mm/s: the drive's unit is {unit_mm_s:g} mm/s.",
             hint="State another speed, or the drive's own unit under `options: speed_unit_m_s`.",
         )
 

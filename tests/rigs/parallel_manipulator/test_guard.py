@@ -353,32 +353,11 @@ def test_a_force_that_does_not_change_lets_no_step_pass(tmp_path):
         assert sum(report.accepted for report in asked) <= 1
 
 
-def test_one_late_sample_alone_is_no_fault(tmp_path):
-    from tactbench.devices.emulation.line import LinkFault
-
-    # Held up by 5 ms, and those behind it with it: late, and not too old.
-    with rig("local", tmp_path, force_link=[LinkFault.parse("late:start_s=1.5,every=400,delay_s=0.005")]) as made:
-        assert made.press().phase == "over"
-
-
 def test_a_drive_that_has_forgotten_its_limits_is_not_armed(made):
     made.press()
     made.guard.disarm()
     made.world.motor.drive.settings.positive_limit = 9999
     with pytest.raises(GuardRefusesError, match="GPL 9999 where LL3000 was set"):
-        made.guard.arm(made.setting.limits)
-
-
-@pytest.mark.parametrize("name", ["lower_m", "retreat_m", "acceleration_m_s2", "corridor_m"])
-def test_a_rig_file_without_a_limit_is_not_armed(name, tmp_path, monkeypatch):
-    left_out = {name, "upper_m"} if name == "lower_m" else {name}
-    if name == "lower_m":
-        left_out |= {"retreat_m"}
-    monkeypatch.setattr(FAULTS, "STATED", {key: value for key, value in FAULTS.STATED.items() if key not in left_out})
-    with (
-        rig("local", tmp_path) as made,
-        pytest.raises(GuardRefusesError, match="stated? .*" + {"lower_m": "motor"}.get(name, name.split("_")[0])),
-    ):
         made.guard.arm(made.setting.limits)
 
 
@@ -427,14 +406,6 @@ def test_force_while_homing_stops_the_motor(tmp_path, monkeypatch):
         here_m = made.world.position_m
         made.guard.advance(made.clock() + 10**9)
         assert made.world.position_m == pytest.approx(here_m, abs=1e-5)
-
-
-def test_another_zero_is_taken_while_the_motor_is_out(made):
-    made.press()
-    limits = replace(made.setting.limits, zero=(0.0, 0.0, 0.05, 0.0, 0.0, 0.0))
-    report = made.guard.arm(limits)
-    assert report.state is GuardState.ARMED
-    assert made.guard.beat(Beat(1, made.clock())).force_n == pytest.approx(-0.05, abs=0.03)
 
 
 # Schedules ------------------------------------------------------------------------------------------------------------

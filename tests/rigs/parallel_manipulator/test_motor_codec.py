@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tactbench.plugin import RigError, assumed
+from tactbench.plugin import RigError
 from tactbench.rigs.parallel_manipulator.motor.codec import (
     LONGEST_LINE,
     Command,
@@ -19,7 +19,7 @@ from tactbench.rigs.parallel_manipulator.motor.codec import (
     line_time_s,
     newer_generation,
 )
-from tactbench.rigs.parallel_manipulator.motor.profile import MotorProfile
+from tactbench.rigs.parallel_manipulator.motor.profile import FaulhaberOptions
 
 # FH-1: command, bytes, what the drive reads. All are answered OK.
 ANSWERED_OK = [
@@ -211,14 +211,14 @@ def test_what_no_drive_sends_is_garbled(raw):
 @given(st.floats(-1.0, 1.0))
 @settings(max_examples=60)
 def test_a_position_comes_back_to_half_an_increment(position_m):
-    profile = MotorProfile()
+    profile = FaulhaberOptions()
     back = profile.position_m(profile.increments(position_m))
     # Half of 6 um, and the rounding of a metre.
     assert abs(back - position_m) <= 3e-6 + 1e-15
 
 
 def test_limits_are_rounded_down_and_never_to_nothing():
-    profile = MotorProfile()
+    profile = FaulhaberOptions()
     assert [profile.speed(v) for v in (0.05, 0.0519, -0.0519, 0.0)] == [50, 51, -51, 0]
     assert [profile.current(i) for i in (0.8, 0.7999)] == [800, 799]
     assert profile.acceleration(1.5) == 1500
@@ -231,5 +231,5 @@ def test_limits_are_rounded_down_and_never_to_nothing():
         profile.increments(float("nan"))
     with pytest.raises(RigError, match="at most"):
         profile.increments(1e9)
-    fine = MotorProfile(speed_unit=assumed(1.0, "um/s", "test"))
+    fine = FaulhaberOptions(speed_unit_m_s=1e-6)
     assert fine.speed(0.0004) == 400

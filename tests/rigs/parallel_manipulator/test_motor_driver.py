@@ -14,7 +14,6 @@ from tactbench.plugin.devices import (
     EmulatorSettings,
     LinkUnplugged,
     NotReadyError,
-    open_link,
 )
 from tactbench.rigs.parallel_manipulator.motor.driver import FaulhaberDriver
 from tactbench.rigs.parallel_manipulator.motor.emulator import MotorEmulator, MotorFault
@@ -27,8 +26,8 @@ from tactbench.rigs.parallel_manipulator.motor.exchange import (
     MotorSilentError,
     WrongGenerationError,
 )
-from tactbench.rigs.parallel_manipulator.motor.profile import MotorProfile
-from tests.rigs.parallel_manipulator.pumps import VirtualLink, on_pty
+from tactbench.rigs.parallel_manipulator.motor.profile import FaulhaberOptions
+from tests.rigs.parallel_manipulator.pumps import VirtualLink
 
 STEP_M = 6e-6
 LIMITS = {"lower_m": -9e-3, "upper_m": 9e-3, "speed_m_s": 0.05, "acceleration_m_s2": 1.0, "corridor_m": 12e-6}
@@ -147,20 +146,6 @@ def test_increments_add_up_and_there_is_one_at_a_time():
     assert driver.locate() == pytest.approx(-140 * STEP_M)
 
 
-@pytest.mark.parametrize(("baud", "longest_s"), [(9600, 0.065), (115200, 0.03)])
-def test_an_increment_under_force_control_takes_so_long(baud, longest_s):
-    """From the call to the knowledge of its end: a question that is out, LR, M, TPOS, OST, and the motor's move."""
-    driver, link = ready(baud=baud)
-    times = []
-    for _ in range(10):
-        begin_s = link.now_s
-        driver.move_by(12 * STEP_M)
-        while driver.moving:
-            driver.update(0.002)
-        times.append(link.now_s - begin_s)
-    assert max(times) < longest_s
-
-
 @pytest.mark.parametrize(
     ("options", "before", "message"),
     [
@@ -179,14 +164,6 @@ def test_moves_that_are_not_allowed(options, before, message):
         driver.move_to(9.1e-3)
     assert place(link) == 0.0
     assert not driver.moving
-
-
-def test_limits_and_currents_are_set_and_read_back():
-    _, link = ready(peak_current_a=0.8, continuous_current_a=0.4)
-    kept = link.emulator.drive.settings
-    assert (kept.speed, kept.acceleration, kept.braking) == (50, 1000, 1000)
-    assert (kept.peak_current, kept.continuous_current) == (800, 400)
-    assert (kept.positive_limit, kept.negative_limit, kept.limits_on) == (1500, -1500, True)
 
 
 def test_a_setting_that_the_drive_does_not_keep_is_told():
@@ -239,18 +216,6 @@ def test_homing_on_the_end_stop_with_little_current():
     driver.move_to(0.0)
     finish(driver, link)
     assert place(link) == pytest.approx(0.0, abs=2 * STEP_M)
-
-
-def test_no_switch_and_no_stop():
-    driver, link = driver_on(motor(), **LIMITS, homing="switch")
-    driver.start()
-    with pytest.raises(MotorRefusalError):
-        driver.home()
-    endless, link = driver_on(motor(), **LIMITS, homing="end-stop", homing_speed_m_s=0.001)
-    endless.start()
-    link.emulator.drive.servo.stops = (-1.0, 1.0)
-    with pytest.raises(MotorError, match="an end stop within 60 s"):
-        endless.home()
 
 
 # Retreats -------------------------------------------------------------------------------------------------------------
@@ -346,31 +311,6 @@ def test_a_drive_that_lost_something_is_homed_anew(change):
 # What goes wrong ------------------------------------------------------------------------------------------------------
 
 
-def test_notices_do_not_answer():
-    driver, link = ready()
-    # Place and speed reached, at once and often.
-    for text in (b"NP\r", b"NV1\r", b"NP10\r"):
-        link.send(text)
-        link.go(0.05)
-        link.arrived.clear()
-    driver.move_to(1e-3)
-    finish(driver, link)
-    assert place(link) == pytest.approx(1e-3, abs=STEP_M)
-    assert driver.counts == {}
-
-
-def test_answers_that_stay_late_are_silence():
-    driver, link = ready(retreat_m=-2e-3)
-    link.emulator.faults = [MotorFault("late-answers", delay_s=0.25)]
-    with pytest.raises(MotorSilentError, match="3 answers in a row"):
-        read_on(driver)
-    link.emulator.faults = []
-    link.go(1.0)
-    assert driver.read(1.0)
-    driver.retreat()
-    finish(driver, link)
-
-
 def test_an_increment_that_is_not_answered():
     driver, link = ready()
     driver.update(0.1)
@@ -456,7 +396,7 @@ def test_a_wall_is_a_move_that_does_not_end():
 def test_another_target_than_asked_for_is_noticed():
     driver, link = ready()
     driver.move_by(100 * STEP_M)
-    link.emulator.drive.profile = MotorProfile()
+    link.emulator.drive.profile = FaulhaberOptions()
     answer = link.emulator.drive.answer
 
     def damaged(command):
@@ -575,30 +515,3 @@ def test_any_bytes_from_the_drive_raise_named_errors_only(pieces, seed):
 def test_options_that_are_refused(options, message):
     with pytest.raises(UsageError, match=message):
         driver_on(motor(), **options)
-
-
-def test_on_a_pseudo_terminal():
-    """In real time."""
-    options = LIMITS | {"baud": 115200, "retreat_m": -1e-3}
-    emulator = build_emulator(EmulatorSettings(senses=lambda t: {}, rng=np.random.default_rng(1), options=options))
-    with on_pty(emulator) as end:
-        address = f"serial://{end.name}?baud=115200"
-        with FaulhaberDriver(DriverSettings(open_link=lambda: open_link(address), options=options)) as driver:
-            end.opened()
-            assert driver.identify()["firmware"] == "EMULATOR"
-            driver.start()
-            driver.home()
-            driver.enable()
-            for target_m in (0.5e-3, 0.2e-3):
-                driver.move_to(target_m)
-                while driver.moving:
-                    driver.update(0.1)
-            driver.retreat()
-            while driver.moving:
-                driver.update(0.1)
-            assert driver.locate() == pytest.approx(-1e-3, abs=2 * STEP_M)
-            (block,) = driver.read(1.0)
-            assert len(block.data) > 5
-            end.unplug()
-            with pytest.raises(LinkUnplugged):
-                read_on(driver)

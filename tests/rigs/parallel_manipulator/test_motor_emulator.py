@@ -172,15 +172,6 @@ def test_a_drive_that_stands_without_load_answers_as_if_each_tick_were_made(tick
     assert made[True][3] == made[False][3]
 
 
-def test_other_nodes_are_silent():
-    host = Host()
-    assert host.lines("7POS\r") == []
-    host.do("NODEADR7")
-    assert host.ask("7POS") == "0"
-    assert host.lines("8POS\r") == []
-    assert host.ask("POS") == "0"
-
-
 def test_a_move_ends_on_its_target_and_says_so():
     host = Host()
     host.do("EN")
@@ -233,30 +224,6 @@ def test_the_current_limit_bounds_the_force_and_is_said():
     assert not status & OperationStatus.POSITION_ATTAINED
 
 
-def test_homing_on_the_end_stop_by_current():
-    host = Host()
-    host.do("EN", "LPC200", "LCC200", "V-20")
-    for _ in range(40):
-        if host.status & OperationStatus.CURRENT_LIMITATION and host.ask("GN") == "0":
-            break
-    else:
-        pytest.fail("the end stop was not noticed")
-    host.do("HO")
-    assert host.ask("POS") == "0"
-    assert host.emulator.drive.servo.position_m == pytest.approx(-10e-3)
-
-
-def test_homing_on_a_switch():
-    host = Host(reference_switch_m=-2.4e-3)
-    assert host.ask("GOHOSEQ") == "Command not available"  # Without power.
-    host.do("EN", "HO1000", "HOSP5", "GOHOSEQ")
-    assert host.status & OperationStatus.HOMING
-    host.wait(1.0)
-    assert not host.status & OperationStatus.HOMING
-    assert host.ask("POS") == "0"
-    assert host.emulator.drive.servo.position_m == pytest.approx(-2.4e-3, abs=STEP_M)
-
-
 @pytest.mark.parametrize("text", ["LA", "SP-1", "AC0", "LL0", "LL", "ANSW9", "BAUD9601", "LA99999999999", "POS5"])
 def test_arguments_that_are_refused(text):
     assert Host().ask(text) == "Invalid parameter"
@@ -278,15 +245,6 @@ def test_a_motor_fault_takes_the_power_and_says_so():
     assert host.ask("GN") == "0"  # Without power it has run out.
     assert host.ask("GST")[3] == "0"  # The end of the fault alone does not move it.
     host.do("EN")
-
-
-def test_late_answers_come_late_and_in_order():
-    host = Host()
-    host.do("HO7")
-    host.emulator.faults = [MotorFault("late-answers", end_s=host.now_s + 0.1, delay_s=0.25)]
-    assert host.lines("POS\r", 0.2) == []
-    # The answer of the next question waits behind the late one.
-    assert [line.text for line in host.lines("OST\r", 0.2)] == ["7", "65536"]
 
 
 def test_garbled_lines_are_counted_or_pass_as_another_number():

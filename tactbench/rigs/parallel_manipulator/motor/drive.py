@@ -22,7 +22,13 @@ from tactbench.rigs.parallel_manipulator.motor.codec import (
     Configuration,
     OperationStatus,
 )
-from tactbench.rigs.parallel_manipulator.motor.profile import MotorProfile
+from tactbench.rigs.parallel_manipulator.motor.profile import (
+    LARGEST_ACCELERATION,
+    LARGEST_CURRENT,
+    LARGEST_POSITION,
+    LARGEST_SPEED,
+    FaulhaberOptions,
+)
 from tactbench.rigs.parallel_manipulator.motor.servo import Load, MotorModel, Profile, Servo
 
 _REFUSED = "POR I PP PD SR CI NV NVOFF CAHOSEQ HA HL HN HP SHA SHL SHN GOIX LOADHO"
@@ -31,18 +37,18 @@ _NOT_MODELLED = QUERIES.union(_REFUSED.split())
 
 
 _SETTINGS = {
-    "SP": ("speed", "largest_speed", 0),
-    "AC": ("acceleration", "largest_acceleration", 1),
-    "DEC": ("braking", "largest_acceleration", 1),
-    "CORRIDOR": ("corridor", "32767", 0),
-    "DEV": ("deviation", "32767", 0),
-    "LPC": ("peak_current", "largest_current", 0),
-    "LCC": ("continuous_current", "largest_current", 0),
-    "HOSP": ("homing_speed", "largest_speed", 0),
-    "NODEADR": ("node", "255", 0),
-    "ANSW": ("answer_mode", "2", 0),
+    "SP": ("speed", LARGEST_SPEED, 0),
+    "AC": ("acceleration", LARGEST_ACCELERATION, 1),
+    "DEC": ("braking", LARGEST_ACCELERATION, 1),
+    "CORRIDOR": ("corridor", 32767, 0),
+    "DEV": ("deviation", 32767, 0),
+    "LPC": ("peak_current", LARGEST_CURRENT, 0),
+    "LCC": ("continuous_current", LARGEST_CURRENT, 0),
+    "HOSP": ("homing_speed", LARGEST_SPEED, 0),
+    "NODEADR": ("node", 255, 0),
+    "ANSW": ("answer_mode", 2, 0),
 }
-"""Commands that set a number: its field, its largest value or where the profile has it, and its least."""
+"""Commands that set a number: its field, its largest value, and its least."""
 _READ_BACK = {
     "GSP": "SP", "GAC": "AC", "GDEC": "DEC", "GPC": "LPC", "GCC": "LCC", "GCORRIDOR": "CORRIDOR", "GDEV": "DEV",
 }  # fmt: skip
@@ -90,7 +96,7 @@ class Drive:
     """
 
     def __init__(
-        self, load: Load | None, profile: MotorProfile, model: MotorModel, reference_switch_m: float | None
+        self, load: Load | None, profile: FaulhaberOptions, model: MotorModel, reference_switch_m: float | None
     ) -> None:
         self.profile = profile
         self.servo = Servo(model, load)
@@ -140,15 +146,15 @@ class Drive:
             self.servo.step(at_s, None, 0.0)
             reference.stop_at(self.servo.position_m)
         else:
-            speed = profile.speed_m_s(settings.speed)
-            acceleration = profile.acceleration_m_s2(settings.acceleration)
-            braking = profile.acceleration_m_s2(settings.braking)
+            speed = settings.speed * profile.speed_unit_m_s
+            acceleration = settings.acceleration * profile.acceleration_unit_m_s2
+            braking = settings.braking * profile.acceleration_unit_m_s2
             if self._velocity is not None:
-                commanded = min(max(profile.speed_m_s(self._velocity), -speed), speed)
+                commanded = min(max(self._velocity * profile.speed_unit_m_s, -speed), speed)
                 reference.to_speed(self._at_limits(commanded, braking), self.servo.tick_s, acceleration, braking)
             else:
                 if self._homing:
-                    speed = profile.speed_m_s(settings.homing_speed)
+                    speed = settings.homing_speed * profile.speed_unit_m_s
                 reference.to_position(self._target_m, self.servo.tick_s, speed, acceleration, braking)
             self.servo.step(at_s, reference, self._limit_a())
         notices = self._notify()
@@ -177,13 +183,13 @@ class Drive:
         return self._place_m(settings.negative_limit), self._place_m(settings.positive_limit)
 
     def _limit_a(self) -> float:
-        return self.profile.current_a(self.settings.peak_current)
+        return self.settings.peak_current * self.profile.current_unit_a
 
     def _place_m(self, increments: float) -> float:
         return self.origin_m + self.profile.position_m(increments)
 
     def _increments(self, position_m: float) -> int:
-        return round((position_m - self.origin_m) / self.profile.position_m(1.0))
+        return round((position_m - self.origin_m) / self.profile.increment_m)
 
     def _notify(self) -> list[str]:
         notices = []
@@ -220,9 +226,7 @@ class Drive:
         settings = self.settings
         if name in _SETTINGS:
             field, most, least = _SETTINGS[name]
-            setattr(
-                settings, field, self._number(argument, getattr(self.profile, most, None) or int(most), least=least)
-            )
+            setattr(settings, field, self._number(argument, most, least=least))
             return OK
         match name:
             case "EN":
@@ -236,22 +240,20 @@ class Drive:
             case "DI":
                 self._enabled = self._homing = False
             case "LA":
-                self._loaded_m = self._place_m(self._number(argument, self.profile.largest_position, signed=True))
+                self._loaded_m = self._place_m(self._number(argument, LARGEST_POSITION, signed=True))
             case "LR":
                 # Relative to the target before (assumed), so that steps do not add up errors of control.
-                steps = self._number(argument, self.profile.largest_position, signed=True)
+                steps = self._number(argument, LARGEST_POSITION, signed=True)
                 base_m = self._target_m if self._velocity is None else self.servo.position_m
                 self._loaded_m = base_m + self.profile.position_m(steps)
             case "M":
                 self._move()
             case "V":
                 self._need_power()
-                self._velocity = self._number(argument, self.profile.largest_speed, signed=True)
+                self._velocity = self._number(argument, LARGEST_SPEED, signed=True)
                 self._attained = self._homing = False
             case "HO":
-                commanded = (
-                    0 if argument is None else self._number(argument, self.profile.largest_position, signed=True)
-                )
+                commanded = 0 if argument is None else self._number(argument, LARGEST_POSITION, signed=True)
                 self.origin_m = self.servo.position_m - self.profile.position_m(commanded)
             case "GOHOSEQ":
                 if self._reference_switch_m is None:
@@ -264,7 +266,7 @@ class Drive:
             case "NPOFF":
                 self._notify_end = False
             case "LL":
-                limit = self._number(argument, self.profile.largest_position, signed=True)
+                limit = self._number(argument, LARGEST_POSITION, signed=True)
                 if limit > 0:
                     settings.positive_limit = limit
                 elif limit < 0:
@@ -339,13 +341,13 @@ class Drive:
             "POS": lambda: str(self._increments(servo.position_m)),
             "TPOS": lambda: str(self._increments(self._target_m)),
             "GV": lambda: str(self._velocity or 0),
-            "GN": lambda: str(round(servo.speed_m_s / profile.speed_m_s(1.0))),
+            "GN": lambda: str(round(servo.speed_m_s / profile.speed_unit_m_s)),
             # Without sign (assumed).
-            "GRC": lambda: str(round(abs(servo.current_a) / profile.current_a(1.0))),
-            "GCL": lambda: str(round(self._limit_a() / profile.current_a(1.0))),
+            "GRC": lambda: str(round(abs(servo.current_a) / profile.current_unit_a)),
+            "GCL": lambda: str(round(self._limit_a() / profile.current_unit_a)),
             "TEM": lambda: "25",
             "VER": lambda: "EMULATOR",
-            "GTYP": lambda: profile.name,
+            "GTYP": lambda: "linear motor, Faulhaber ASCII",
             "GSER": lambda: "0",
             "OST": ost,
             "CST": cst,

@@ -64,10 +64,10 @@ def retreat_command(options: FaulhaberOptions) -> bytes:
 
     Raises PositionerError if the drive does not have the speed.
     """
-    profile, node = options.profile(), options.node
+    node = options.node
     if options.retreat_m is None or options.retreat_speed_m_s is None:
         return encode("V", 0, node=node)
-    speed, place = profile.speed(options.retreat_speed_m_s), profile.increments(options.retreat_m)
+    speed, place = options.speed(options.retreat_speed_m_s), options.increments(options.retreat_m)
     return encode("SP", speed, node=node) + encode("LA", place, node=node) + encode("M", node=node)
 
 
@@ -91,7 +91,7 @@ class FaulhaberDriver(Positioner):
     def __init__(self, settings: DriverSettings) -> None:
         super().__init__(settings)
         options: FaulhaberOptions = self.options
-        self._profile = profile = options.profile()
+        self._profile = profile = options
         # Arguments that the drive does not have are refused before anything is sent.
         self._settings = self._required_settings()
         self._limits = [
@@ -115,13 +115,11 @@ class FaulhaberDriver(Positioner):
     @classmethod
     def facts_of(cls, options: FaulhaberOptions) -> PositionerFacts:
         """Return the facts, with the drive's increment, and the line's and the motor's latency."""
-        return replace(
-            super().facts_of(options), resolution=options.profile().position_m(1), stop_latency_s=_latency_s(options)
-        )
+        return replace(super().facts_of(options), resolution=options.increment_m, stop_latency_s=_latency_s(options))
 
     def _required_settings(self) -> list[tuple[str, int, str]]:
         """Return command, argument and the query that reads it back, of what the options state."""
-        options, profile = self.options, self._profile
+        options = profile = self._profile
         found: list[tuple[str, int, str]] = []
         if options.speed_m_s is not None:
             found.append(("SP", profile.speed(options.speed_m_s), "GSP"))
@@ -386,7 +384,7 @@ class FaulhaberDriver(Positioner):
         return position_m
 
     def _seconds(self, way_m: float, speed: int) -> float:
-        return self.facts.seconds(way_m, self._profile.speed_m_s(max(1, speed))) + 4.0 * self._exchange.answer_s
+        return self.facts.seconds(way_m, max(1, speed) * self._profile.speed_unit_m_s) + 4.0 * self._exchange.answer_s
 
     def _abort(self) -> None:
         """Send no more of what is under way."""
@@ -552,7 +550,7 @@ class FaulhaberDriver(Positioner):
                 t_ns=position.t_ns,
                 position=self._profile.position_m(position.value),
                 target=math.nan if self._target is None else self._profile.position_m(self._target),
-                current_a=self._profile.current_a(current.value) if _says_number(current.line) else math.nan,
+                current_a=current.value * self._profile.current_unit_a if _says_number(current.line) else math.nan,
                 problem=", ".join(_name(bit) for bit in _PROBLEMS if status & bit),
             )
         )

@@ -25,7 +25,7 @@ from tactbench.plugin.devices import (
 )
 from tactbench.rigs.parallel_manipulator.motor.codec import OK, Command, CommandReader, line_time_s
 from tactbench.rigs.parallel_manipulator.motor.drive import Drive, Refused
-from tactbench.rigs.parallel_manipulator.motor.profile import FaulhaberOptions, MotorProfile
+from tactbench.rigs.parallel_manipulator.motor.profile import FaulhaberOptions
 from tactbench.rigs.parallel_manipulator.motor.servo import Load, MotorModel
 
 
@@ -75,14 +75,14 @@ class MotorEmulator(DeviceEmulator):
         load: Load | None,
         rng: np.random.Generator,
         *,
-        profile: MotorProfile | None = None,
+        profile: FaulhaberOptions | None = None,
         model: MotorModel | None = None,
         reference_switch_m: float | None = None,
         baud: int = 9600,
         faults: Iterable[MotorFault] = (),
     ) -> None:
         model = model or MotorModel()
-        self.drive = Drive(load, profile or MotorProfile(), model, reference_switch_m)
+        self.drive = Drive(load, profile or FaulhaberOptions(), model, reference_switch_m)
         self.faults = list(faults)
         self.begins_m = 0.0
         """Where the motor stands at power-on, as its driver counts once it has homed it."""
@@ -239,7 +239,7 @@ def build(settings: EmulatorSettings) -> MotorEmulator:
     found = MotorEmulator(
         lambda _position_m, at_s: settings.senses(at_s).get("load", 0.0),
         settings.rng,
-        profile=options.profile(),
+        profile=options,
         model=model,
         reference_switch_m=SWITCH_M if options.homing == "switch" else None,
         baud=options.baud,
