@@ -11,11 +11,15 @@ from functools import lru_cache
 import numpy as np
 
 from tactbench.plugin import FloatArray, RigError, SensorSpec
-from tactbench.plugin.simulation import SkinGrid, SkinState
-from tactbench.sensors.biotac.discs import discs_on, dome_mm, outer_radius_mm, shell_of
+from tactbench.plugin.simulation import FluidBackedShell, SkinGrid, SkinState
 from tactbench.sensors.biotac.electrodes import NAMES
 from tactbench.sensors.biotac.film import REFINEMENT, edges, mid_film_mm, refined, spectral_interpolation
+from tactbench.sensors.biotac.meshes import sheet_x
+from tactbench.sensors.biotac.rims import Disc, RimmedDiscs
 from tactbench.sensors.biotac.sheet import FilmSheet, faces_between
+
+_STEP_MM = 0.1
+"""Over which the film's stretch under a disc is taken: an eighth of the disc or less."""
 
 
 class Preparation:
@@ -151,3 +155,65 @@ class _Key:
 @lru_cache(maxsize=8)
 def _prepared(key: _Key) -> Preparation:
     return Preparation(key.sensor, key.grid, key.refinement)
+
+
+def discs_on(sensor: SensorSpec, grid: SkinGrid) -> RimmedDiscs:
+    """Return electrodes and excitation on the cells of `grid`, round in the metric of the film's middle.
+
+    Raises
+    ------
+    RigError
+        If an electrode has no position, or lies outside the sheet.
+    """
+    par = sensor.parameters
+    electrode_radius, excitation_radius = par["electrode_radius"].to("mm"), par["excitation_radius"].to("mm")
+    outer, dome = outer_radius_mm(sensor), dome_mm(sensor)
+    electrodes = []
+    for channel in sensor.channels("taxel"):
+        if channel.position_m is None:
+            raise RigError(f"{channel.name} of {sensor.name} has no position.", hint="Give ChannelSpec.position_m.")
+        x, y, z = (1e3 * component for component in channel.position_m)
+        place = sheet_x(x, float(np.hypot(y, z)), outer, dome)
+        electrodes.append(disc_at(sensor, place, float(np.arctan2(y, -z)), electrode_radius))
+    excitation = []
+    for pair in ("front", "back"):
+        x = par[f"excitation_x_{pair}"].to("mm")
+        angle = par[f"excitation_arc_{pair}"].to("mm") / par["core_radius"].to("mm")
+        excitation += [disc_at(sensor, x, side, excitation_radius) for side in (-angle, angle)]
+    return RimmedDiscs(grid.x_mm, grid.s_mm, electrodes, excitation)
+
+
+def disc_at(sensor: SensorSpec, x_mm: float, angle_rad: float, radius_mm: float) -> Disc:
+    """Return a disc at a place of the sheet, with the stretch of the film's middle there."""
+    outer = outer_radius_mm(sensor)
+    x, angle = x_mm + _STEP_MM * np.array([-1.0, 1.0]), angle_rad + _STEP_MM / outer * np.array([-1.0, 1.0])
+    corners = mid_film_mm(x, angle, shell_of(sensor).film.at(x, angle), outer, dome_mm(sensor))
+    along, across = corners[1] - corners[0], corners[:, 1] - corners[:, 0]
+    stretch = tuple(float(np.linalg.norm(way.mean(axis=0))) / (2 * _STEP_MM) for way in (along, across))
+    return Disc(x_mm, angle_rad * outer, radius_mm, (stretch[0], stretch[1]))
+
+
+def shell_of(sensor: SensorSpec) -> FluidBackedShell:
+    """Return the sensor's fluid-backed shell; raises RigError if its skin is another."""
+    if not isinstance(sensor.skin, FluidBackedShell):
+        raise RigError(
+            f"{sensor.name} has no fluid-backed shell, which this transduction needs.",
+            hint="Declare the skin as FluidBackedShell, or name another transducer.",
+        )
+    return sensor.skin
+
+
+def outer_radius_mm(sensor: SensorSpec) -> float:
+    """Return the finger's outer radius; raises RigError if the sheet states none."""
+    radius = shell_of(sensor).sheet.outer_radius
+    if radius is None:
+        raise RigError(f"The skin of {sensor.name} states no outer radius.", hint="Give SkinSheet.outer_radius.")
+    return radius.to("mm")
+
+
+def dome_mm(sensor: SensorSpec) -> float:
+    """Return where the finger's dome begins; raises RigError if the sheet states none."""
+    dome = shell_of(sensor).sheet.dome
+    if dome is None:
+        raise RigError(f"The skin of {sensor.name} states no dome.", hint="Give SkinSheet.dome.")
+    return dome.start.to("mm")
