@@ -26,8 +26,7 @@ class Preparation:
     """What does not depend on the load: geometry and interpolation."""
 
     def __init__(self, sensor: SensorSpec, grid: SkinGrid, refinement: int) -> None:
-        self.skin = shell_of(sensor)
-        outer, dome = outer_radius_mm(sensor), dome_mm(sensor)
+        self.skin, outer, dome = finger_of(sensor)
         self.coarse_film = self.skin.film.at(grid.x_mm, grid.s_mm / outer)
         fine = refined(grid, refinement)
         self.film = self.skin.film.at(fine.x_mm, fine.s_mm / outer)
@@ -135,26 +134,15 @@ def build(
 
 def prepared(sensor: SensorSpec, grid: SkinGrid, refinement: int = REFINEMENT) -> Preparation:
     """Return the preparation for `sensor` and `grid`, made once and kept."""
-    return _prepared(_Key(sensor, grid, refinement))
-
-
-class _Key:
-    """Specs hold dictionaries and grids arrays: neither can be hashed, their contents can."""
-
-    def __init__(self, sensor: SensorSpec, grid: SkinGrid, refinement: int) -> None:
-        self.sensor, self.grid, self.refinement = sensor, grid, refinement
-        self._text = (sensor.model_dump_json(), grid.x_mm.tobytes(), grid.s_mm.tobytes(), refinement)
-
-    def __hash__(self) -> int:
-        return hash(self._text)
-
-    def __eq__(self, other: object) -> bool:
-        return isinstance(other, _Key) and self._text == other._text
+    return _prepared(sensor.model_dump_json(), grid.x_mm.tobytes(), grid.s_mm.tobytes(), refinement)
 
 
 @lru_cache(maxsize=8)
-def _prepared(key: _Key) -> Preparation:
-    return Preparation(key.sensor, key.grid, key.refinement)
+def _prepared(sensor: str, x_mm: bytes, s_mm: bytes, refinement: int) -> Preparation:
+    """Specs hold dictionaries and grids arrays: neither can be hashed, their contents can."""
+    return Preparation(
+        SensorSpec.model_validate_json(sensor), SkinGrid(np.frombuffer(x_mm), np.frombuffer(s_mm)), refinement
+    )
 
 
 def discs_on(sensor: SensorSpec, grid: SkinGrid) -> RimmedDiscs:
@@ -167,7 +155,7 @@ def discs_on(sensor: SensorSpec, grid: SkinGrid) -> RimmedDiscs:
     """
     par = sensor.parameters
     electrode_radius, excitation_radius = par["electrode_radius"].to("mm"), par["excitation_radius"].to("mm")
-    outer, dome = outer_radius_mm(sensor), dome_mm(sensor)
+    _, outer, dome = finger_of(sensor)
     electrodes = []
     for channel in sensor.channels("taxel"):
         if channel.position_m is None:
@@ -185,35 +173,20 @@ def discs_on(sensor: SensorSpec, grid: SkinGrid) -> RimmedDiscs:
 
 def disc_at(sensor: SensorSpec, x_mm: float, angle_rad: float, radius_mm: float) -> Disc:
     """Return a disc at a place of the sheet, with the stretch of the film's middle there."""
-    outer = outer_radius_mm(sensor)
+    skin, outer, dome = finger_of(sensor)
     x, angle = x_mm + _STEP_MM * np.array([-1.0, 1.0]), angle_rad + _STEP_MM / outer * np.array([-1.0, 1.0])
-    corners = mid_film_mm(x, angle, shell_of(sensor).film.at(x, angle), outer, dome_mm(sensor))
+    corners = mid_film_mm(x, angle, skin.film.at(x, angle), outer, dome)
     along, across = corners[1] - corners[0], corners[:, 1] - corners[:, 0]
     stretch = tuple(float(np.linalg.norm(way.mean(axis=0))) / (2 * _STEP_MM) for way in (along, across))
     return Disc(x_mm, angle_rad * outer, radius_mm, (stretch[0], stretch[1]))
 
 
-def shell_of(sensor: SensorSpec) -> FluidBackedShell:
-    """Return the sensor's fluid-backed shell; raises RigError if its skin is another."""
-    if not isinstance(sensor.skin, FluidBackedShell):
+def finger_of(sensor: SensorSpec) -> tuple[FluidBackedShell, float, float]:
+    """Return the shell, its outer radius and where its dome begins [mm]; raises RigError for another skin."""
+    skin = sensor.skin
+    if not isinstance(skin, FluidBackedShell) or skin.sheet.outer_radius is None or skin.sheet.dome is None:
         raise RigError(
-            f"{sensor.name} has no fluid-backed shell, which this transduction needs.",
-            hint="Declare the skin as FluidBackedShell, or name another transducer.",
+            f"{sensor.name} has no fluid-backed shell with an outer radius and a dome, which this transduction needs.",
+            hint="Declare the skin as FluidBackedShell with both, or name another transducer.",
         )
-    return sensor.skin
-
-
-def outer_radius_mm(sensor: SensorSpec) -> float:
-    """Return the finger's outer radius; raises RigError if the sheet states none."""
-    radius = shell_of(sensor).sheet.outer_radius
-    if radius is None:
-        raise RigError(f"The skin of {sensor.name} states no outer radius.", hint="Give SkinSheet.outer_radius.")
-    return radius.to("mm")
-
-
-def dome_mm(sensor: SensorSpec) -> float:
-    """Return where the finger's dome begins; raises RigError if the sheet states none."""
-    dome = shell_of(sensor).sheet.dome
-    if dome is None:
-        raise RigError(f"The skin of {sensor.name} states no dome.", hint="Give SkinSheet.dome.")
-    return dome.start.to("mm")
+    return skin, skin.sheet.outer_radius.to("mm"), skin.sheet.dome.start.to("mm")
