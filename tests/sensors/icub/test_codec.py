@@ -264,6 +264,16 @@ def test_a_tail_without_its_head_makes_a_sample():
     assert decoder.counts[14, 3].missing_heads == 1
 
 
+def test_halves_of_different_samples_are_never_joined():
+    # The tail of the first and the head of the second are lost; values would join without a trace.
+    decoder = SkinDecoder(PERIOD_S)
+    first, second = fed(decoder, pair(0, 240)[0], pair(PERIOD_NS, 100)[1])
+    assert first.taxels[:7] == bytes([240] * 7)
+    assert first.quality[7:] == (MISSING,) * 5
+    assert second.taxels[7:] == bytes([100] * 5)
+    assert second.quality[:7] == (MISSING,) * 7
+
+
 def test_equal_samples_in_a_burst_are_not_doubled():
     # A host that was late reads several equal samples at one time.
     decoder = SkinDecoder(PERIOD_S)
