@@ -71,7 +71,7 @@ class NetFtDriver(Driver):
         self._clock = settings.clock
         self._counts: Tally[str] = Tally()
         self._kept: list[Received] = []
-        self._sampling = False
+        self._sampling = self._silent = False
         self._numbers, self._ticks, self._newest = Unwrap(32), Unwrap(32), 0
         self._link = open_for(settings, "net-ft", DatagramLink, "udp://192.168.1.1:49152")  # type: ignore[type-abstract]
         try:
@@ -145,7 +145,10 @@ class NetFtDriver(Driver):
         """
         if self._options.bias:
             self.tare()
-        self._silence()
+        if not self._silent:
+            self._silence()
+        self._silent = False
+        self._link.discard()
         self._numbers, self._ticks, self._newest = Unwrap(32), Unwrap(32), 0
         self._send(Command.START_REALTIME)
         self._sampling = True
@@ -174,12 +177,12 @@ class NetFtDriver(Driver):
         return [self._block(good)] if good else []
 
     def stop(self) -> None:
-        """Let the box send no more."""
+        """Let the box send no more, and wait until nothing comes."""
         if self._sampling:
             self._sampling = False
             self._kept = []
             with suppress(LinkError):
-                self._send(Command.STOP)
+                self._silence()
 
     def tare(self) -> bool:
         """Let the box take its present reading as zero; records already under way are still of the old zero."""
@@ -200,6 +203,7 @@ class NetFtDriver(Driver):
         with suppress(LinkTimeout):
             for _ in range(MOST_DATAGRAMS):
                 self._link.receive(QUIET_S + 2 * self._options.every / SENSOR_RATE_HZ)
+        self._silent = True
 
     def _next(self) -> Received:
         return self._link.receive(ANSWER_S + 2 * self._options.every / SENSOR_RATE_HZ)
