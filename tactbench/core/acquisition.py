@@ -100,6 +100,7 @@ def acquire(
         spent = clock() - began
         allowed = Allowed() if rig_file is None else rig_file.allowed
         whole = Completeness(allowed, acquisition.streams, acquisition.reference)
+        has_devices = hasattr(acquisition, "stream_counts")
         began_s = time.perf_counter()
 
         def of_devices(rows: Mapping[str, int], *, cut_short: bool) -> dict[str, Any]:
@@ -119,7 +120,8 @@ def acquire(
                     if block is None:
                         break
                     writer.append(block)
-                    whole.add(block)
+                    if has_devices:
+                        whole.add(block)
                     if watch is not None:
                         watch(block)
                 _check_not_silent(acquisition, writer.rows)
