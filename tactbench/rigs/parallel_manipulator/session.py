@@ -170,10 +170,11 @@ class Session:
         assert self._file.force is not None
         guard, settings, stream = self.guard, self._settings, self.guard.force_stream
         force = PressingForce(self._file.force, (stream,))
-        guard.force_blocks()  # of before
-        guard.advance(self.clock() + round(1e9 * self._file.force.zero_s))
-        rows = [block.data for block in guard.force_blocks()]
-        zero = np.concatenate(rows).mean(axis=0) if rows else np.zeros(len(stream.channels))
+        since_ns = self.clock()
+        guard.advance(since_ns + round(1e9 * self._file.force.zero_s))
+        # Not what has waited since nobody took it.
+        fresh = [block.data[times >= since_ns] for block in guard.force_blocks() if (times := block.t_ns) is not None]
+        zero = np.concatenate(fresh).mean(axis=0) if any(map(len, fresh)) else np.zeros(len(stream.channels))
         limits, touch, loop = settings.limits, settings.touch, settings.force_loop
         low, high = limits.travel_mm
         kept = Limits(

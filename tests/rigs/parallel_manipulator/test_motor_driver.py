@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tactbench.plugin import Quality, RigError, UsageError
+from tactbench.plugin import Quality, UsageError
 from tactbench.plugin.devices import (
     DriverSettings,
     EmulatorSettings,
@@ -20,7 +20,6 @@ from tactbench.rigs.parallel_manipulator.motor.emulator import MotorEmulator, Mo
 from tactbench.rigs.parallel_manipulator.motor.emulator import build as build_emulator
 from tactbench.rigs.parallel_manipulator.motor.exchange import (
     IN_A_ROW,
-    Exchange,
     MotorError,
     MotorRefusalError,
     MotorSilentError,
@@ -166,28 +165,7 @@ def test_moves_that_are_not_allowed(options, before, message):
     assert not driver.moving
 
 
-def test_a_setting_that_the_drive_does_not_keep_is_told():
-    emulator = motor()
-    driver, _ = driver_on(emulator, **LIMITS)
-    emulator.drive._number, kept = lambda argument, largest, **more: min(argument, 40), emulator.drive._number
-    with pytest.raises(MotorError, match=r"has GSP 40 where SP50 was set"):
-        driver.start()
-    emulator.drive._number = kept
-    with pytest.raises(RigError, match="is 20000 units; the drive takes at most 10000"):
-        driver_on(motor(), speed_m_s=20.0)
-
-
 # Homing ---------------------------------------------------------------------------------------------------------------
-
-
-def test_homing_where_it_stands_does_not_move_it():
-    driver, link = driver_on(motor(), **LIMITS, home_m=1e-3)
-    driver.start()
-    assert not driver.homed
-    driver.home()
-    driver.enable()
-    assert (driver.homed, place(link)) == (True, 0.0)
-    assert driver.locate() == pytest.approx(1e-3, abs=STEP_M / 2)
 
 
 def test_homing_on_the_switch():
@@ -406,28 +384,6 @@ def test_another_target_than_asked_for_is_noticed():
     link.emulator.drive.answer = damaged
     with pytest.raises(MotorError, match=r"target is 0\.0054 m, and 0\.0006 m was asked for"):
         finish(driver, link)
-
-
-@pytest.mark.parametrize(
-    ("text", "refusal"),
-    [
-        ("XYZ", "Unknown command"),
-        ("LPC", "Invalid parameter"),
-        ("GOHOSEQ", "Command not available"),
-    ],
-)
-def test_refusals_say_which(text, refusal):
-    link = VirtualLink(motor())
-    exchange = Exchange(link, link.clock, baud=9600)
-    assert exchange.greet() == "EMULATOR"
-    exchange.send(text)
-    answers = []
-    while not answers:
-        answers = exchange.pump(1.0)
-    with pytest.raises(MotorRefusalError, match=text) as found:
-        answers[0].checked()
-    assert found.value.text == refusal
-    assert found.value.hint
 
 
 def to_and_fro(driver, link):

@@ -201,17 +201,6 @@ def test_the_servo_goes_its_lag_and_is_stable_against_any_spring():
     assert (stiff.limited, stiff.current_a) == (True, 1.6)
 
 
-def test_force_is_current():
-    """Pressing 5 N takes 5 N / 6.5 N/A; the drive says it in whole mA."""
-    host = Host(wall(0.0, 10e3))
-    host.do("EN")
-    host.go(0.5e-3, 1.0)
-    position_m = host.emulator.drive.servo.position_m
-    assert position_m == pytest.approx(0.5e-3, abs=STEP_M)
-    assert int(host.ask("GRC")) == round(1e3 * 10e3 * position_m / 6.5)
-    assert not host.status & OperationStatus.CURRENT_LIMITATION
-
-
 def test_the_current_limit_bounds_the_force_and_is_said():
     host = Host(wall(0.0, 80e3))
     host.do("EN", "LPC400", "LCC400")
@@ -267,25 +256,6 @@ def test_faults_that_are_none():
         MotorFault("coffee")
     with pytest.raises(UsageError, match="1 or more"):
         MotorFault("garbled-line", every=0)
-
-
-def test_when_it_is_asked_changes_nothing():
-    """Bytes in and out, and their times, are the same polled every 0.3 ms and every 40 ms."""
-    sent = [(0.0, "EN\r"), (0.02, "LA500\rNP\rM\r"), (0.3, "POS\rOST\r"), (0.5, "V-20\r"), (0.8, "GRC\rPOS\r")]
-    streams = []
-    for period_s in (3e-4, 4e-2):
-        faults = [MotorFault("garbled-line", every=2), MotorFault("motor-fault", 0.71, 0.75)]
-        emulator, out, now_s = MotorEmulator(wall(1e-3, 5e3), np.random.default_rng(1), faults=faults), [], 0.0
-        left = list(sent)
-        while now_s < 1.0:
-            due_s = min(now_s + period_s, left[0][0] if left else math.inf)
-            if left and left[0][0] <= due_s:
-                out += emulator.feed(left.pop(0)[1].encode(), due_s)
-            else:
-                out += emulator.poll(due_s)
-            now_s = due_s
-        streams.append(out)
-    assert streams[0] == streams[1]
 
 
 @given(st.lists(st.binary(max_size=30), max_size=8))
