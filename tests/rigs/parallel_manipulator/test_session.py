@@ -115,7 +115,8 @@ def test_the_zero_is_of_its_own_seconds_and_not_of_what_waited(session):
     session.emulated.advance(session.clock() + 200_000_000)
     session.senses.press = pressed
     _, zero, _ = session.measured_limits()
-    assert abs(zero["force_torque"][2]) < 1e-3
+    # Of 300 samples a few were on their way; with the 200 that waited it would be 2 N.
+    assert abs(zero["force_torque"][2]) < 0.1
 
 
 def test_force_while_the_platform_moves_stops_every_rail(session):
