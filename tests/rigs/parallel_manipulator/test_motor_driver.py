@@ -90,12 +90,6 @@ def place(link):
 # As a device of a rig -------------------------------------------------------------------------------------------------
 
 
-def test_it_says_what_it_is():
-    driver, _ = driver_on(motor())
-    assert driver.identify() == {"firmware": "EMULATOR", "model": "linear motor, Faulhaber ASCII", "serial": "0"}
-    assert driver.counts == {}
-
-
 def test_it_is_watched_without_being_moved():
     driver, link = driver_on(motor())
     driver.start()
@@ -133,16 +127,6 @@ def test_a_move_ends_at_its_target_while_it_is_watched():
     assert len(positions) > 3
     assert (np.diff(positions) >= 0).all()
     assert driver.state.target == pytest.approx(3e-3)
-
-
-def test_increments_add_up_and_there_is_one_at_a_time():
-    driver, link = ready()
-    for n in range(20):
-        assert driver.move_by(-7 * STEP_M) == pytest.approx(-7 * (n + 1) * STEP_M)
-        with pytest.raises(NotReadyError, match="is moving"):
-            driver.move_by(STEP_M)
-        finish(driver, link)
-    assert driver.locate() == pytest.approx(-140 * STEP_M)
 
 
 @pytest.mark.parametrize(
@@ -228,18 +212,6 @@ def test_a_retreat_at_any_moment_of_an_increment(bytes_on_the_way):
     finish(driver, link)
     assert place(link) == pytest.approx(-2e-3, abs=STEP_M)
     assert driver.counts == {}
-
-
-def test_a_retreat_whose_answers_are_lost_is_repeated():
-    driver, link = ready(retreat_m=-2e-3)
-    link.emulator.faults = [MotorFault("late-answers", end_s=link.now_s + 0.1, delay_s=0.4)]
-    driver.retreat()
-    with pytest.raises(MotorSilentError, match=r"did not answer (SP|LA|M)"):
-        finish(driver, link)
-    driver.retreat()
-    finish(driver, link)
-    assert place(link) == pytest.approx(-2e-3, abs=STEP_M)
-    assert driver.counts["time_outs"] == 2
 
 
 def test_without_a_place_to_retreat_to_it_halts():

@@ -7,14 +7,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tactbench.plugin import UsageError
 from tactbench.rigs.parallel_manipulator.motor.codec import (
     OVERTEMPERATURE,
     Kind,
     Line,
     LineReader,
     OperationStatus,
-    answers,
     encode,
     line_time_s,
 )
@@ -137,19 +135,6 @@ def test_silence_and_changed_rate():
     assert host.emulator.poll(due_s + 25e-6) == [(pytest.approx(due_s), b"\r\n")]
 
 
-def test_lines_leave_at_the_pace_of_the_line():
-    host = Host()
-    host.do("HO98956")
-    start_s = host.now_s
-    assert host.emulator.feed(b"POS\r", start_s) == []
-    began_s = start_s + line_time_s(4, 9600) + 1e-3
-    left_s = began_s + line_time_s(7, 9600)
-    assert host.emulator.poll(left_s + 1e-9) == [
-        (pytest.approx(began_s + line_time_s(1, 9600)), b"9"),
-        (pytest.approx(left_s), b"8956\r\n"),
-    ]
-
-
 @pytest.mark.parametrize("ticks", [1, 7, 1000])
 def test_a_drive_that_stands_without_load_answers_as_if_each_tick_were_made(ticks):
     """Ticks are left out where nothing moves: whether it is looked at between them changes nothing."""
@@ -213,11 +198,6 @@ def test_the_current_limit_bounds_the_force_and_is_said():
     assert not status & OperationStatus.POSITION_ATTAINED
 
 
-@pytest.mark.parametrize("text", ["LA", "SP-1", "AC0", "LL0", "LL", "ANSW9", "BAUD9601", "LA99999999999", "POS5"])
-def test_arguments_that_are_refused(text):
-    assert Host().ask(text) == "Invalid parameter"
-
-
 @pytest.mark.parametrize("text", ["POR8", "GU", "SWS", "SOR1"])
 def test_what_is_not_modelled_is_not_pretended(text):
     assert Host().ask(text) == "Command not available"
@@ -234,28 +214,6 @@ def test_a_motor_fault_takes_the_power_and_says_so():
     assert host.ask("GN") == "0"  # Without power it has run out.
     assert host.ask("GST")[3] == "0"  # The end of the fault alone does not move it.
     host.do("EN")
-
-
-def test_garbled_lines_are_counted_or_pass_as_another_number():
-    host = Host()
-    host.do("HO98956")
-    host.emulator.faults = [MotorFault("garbled-line")]
-    lines = [line for _ in range(200) for line in host.lines("POS\r", 0.05)]
-    assert Line(Kind.VALUE, "98956") not in lines
-    assert any(line.kind is Kind.GARBLED for line in lines)
-    # Five of seven bytes are digits: 9 of 255 replacements each are another digit, which no host can notice. Of 200
-    # lines 5 are expected so, with a standard deviation of 2.2.
-    assert 0 < sum(answers(line, "POS") for line in lines) < 16
-    host.emulator.faults.clear()
-    host.lines("\r")
-    assert host.ask("POS") == "98956"
-
-
-def test_faults_that_are_none():
-    with pytest.raises(UsageError, match=r"no fault called .coffee.*late-answers, motor-fault"):
-        MotorFault("coffee")
-    with pytest.raises(UsageError, match="1 or more"):
-        MotorFault("garbled-line", every=0)
 
 
 @given(st.lists(st.binary(max_size=30), max_size=8))
