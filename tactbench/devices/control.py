@@ -10,12 +10,12 @@ import threading
 from collections import deque
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
+from dataclasses import replace
 from types import FrameType
-from typing import Any
 
 from tactbench.core.errors import TactbenchError
 from tactbench.core.samples import Block
-from tactbench.devices.guard_messages import Beat, Event, Limits, Report
+from tactbench.devices.guard_messages import Event, Limits, Report
 from tactbench.devices.guard_process import Guard
 from tactbench.devices.press import Press
 from tactbench.links.link import Clock
@@ -177,20 +177,14 @@ class Control:
         if now_ns - self._rows_ns > self._stale_ns:
             press.fail(f"the sensor has sent nothing for {1e-6 * (now_ns - self._rows_ns):.0f} ms")
         try:
-            command = press.step(self._report, raw, 1e-9 * now_ns)
+            beat = press.step(self._report, raw, 1e-9 * now_ns)
         except TactbenchError as error:
             press.fail(_error_text(error))
-            command = press.step(self._report, (), 1e-9 * now_ns)
+            beat = press.step(self._report, (), 1e-9 * now_ns)
         self._beats += 1
-        request: dict[str, Any] = {
-            "command": command.kind,
-            "distance_m": command.distance_m,
-            "position_m": command.position_m,
-            "speed_m_s": command.speed_m_s,
-        }
-        self._report = self._guard.beat(
-            Beat(self._beats, now_ns, str(press.state), force_sequence=self._report.force_sequence, **request)
-        )
+        number = self._report.force_sequence
+        beat = replace(beat, sequence=self._beats, t_ns=now_ns, state=str(press.state), force_sequence=number)
+        self._report = self._guard.beat(beat)
 
 
 @contextmanager

@@ -453,6 +453,8 @@ class _Server:
             self._over = True
             return
         self._arming = kind == "arm"
+        if self._arming:
+            self._dropped_rows = 0  # of the time between two scenes
         try:
             if kind == "start":
                 found: Any = self._start(*body)

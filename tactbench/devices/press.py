@@ -20,7 +20,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 
 from tactbench.devices.force_loop import ForceController, ForceLaw
-from tactbench.devices.guard_messages import CommandKind, GuardState, Report
+from tactbench.devices.guard_messages import Beat, CommandKind, GuardState, Report
 
 SWINGS = 6
 """Half swings of the error in a row, each above the band of errors, after which the loop is said to swing (assumed:
@@ -55,14 +55,9 @@ class PressState(StrEnum):
 _REGULATED = (PressState.CONTACT, PressState.RAMP, PressState.HOLD)
 
 
-@dataclass(frozen=True)
-class Command:
-    """What the guard is asked for in the next beat."""
-
-    kind: CommandKind = CommandKind.NONE
-    distance_m: float = 0.0
-    position_m: float = math.nan
-    speed_m_s: float = math.nan
+def _command(kind: CommandKind = CommandKind.NONE, **more: float) -> Beat:
+    """Return a beat that lacks its number, time and state."""
+    return Beat(0, 0, command=kind, **more)  # type: ignore[arg-type]
 
 
 @dataclass(frozen=True)
@@ -158,7 +153,7 @@ class Press:
         self._force_n = math.nan
         self._controller: ForceController | None = None
         self._stepped_s = 0.0
-        self._goal: Command | None = None
+        self._goal: Beat | None = None
         self._requested_s: float | None = None
         self._since_s = self._due_s = 0.0
         self._began_s: float | None = None
@@ -199,7 +194,7 @@ class Press:
 
     # Stepping ---------------------------------------------------------------------------------------------------------
 
-    def step(self, report: Report, raw: Sequence[tuple[float, float]], now_s: float) -> Command:
+    def step(self, report: Report, raw: Sequence[tuple[float, float]], now_s: float) -> Beat:
         """Go on by one control period.
 
         Parameters
@@ -230,7 +225,7 @@ class Press:
             case PressState.CONTACT | PressState.RAMP | PressState.HOLD:
                 return self._regulated(report, now_s)
             case PressState.RETREAT:
-                return Command(CommandKind.RETREAT)
+                return _command(CommandKind.RETREAT)
         return self._asking(report, now_s)
 
     def _take(self, raw: Sequence[tuple[float, float]], now_s: float) -> None:
@@ -250,7 +245,7 @@ class Press:
         """Mean of the raw forces of the last `mean_ms` [N]; NaN: there are none."""
         return self._sum_n / len(self._raw) if self._raw else math.nan
 
-    def _guarded(self, report: Report, now_s: float) -> Command:
+    def _guarded(self, report: Report, now_s: float) -> Beat:
         """Note that the guard retreats, or has retreated."""
         if self.state is not PressState.RETREAT and not self.over:
             self.ended = f"in {self.state}: {report.trigger or report.state}"
@@ -258,7 +253,7 @@ class Press:
         if report.state is not GuardState.RETREATING and not self.over:
             self.not_out = report.not_out
             self._enter(PressState.FAILED, now_s)
-        return Command()
+        return _command()
 
     def _enter(self, state: PressState, now_s: float) -> None:
         self.state, self._since_s = state, now_s
@@ -269,17 +264,17 @@ class Press:
     # Moves ------------------------------------------------------------------------------------------------------------
 
     def _move(self, position_m: float, speed_m_s: float) -> None:
-        self._goal = Command(CommandKind.MOVE_TO, position_m=position_m, speed_m_s=speed_m_s)
+        self._goal = _command(CommandKind.MOVE_TO, position_m=position_m, speed_m_s=speed_m_s)
         self._requested_s = None
 
-    def _asking(self, report: Report, now_s: float) -> Command:
+    def _asking(self, report: Report, now_s: float) -> Beat:
         """Return the move that is to be begun, until the guard has accepted it; a stop at once."""
         if self._goal is None or self._requested_s is not None:
-            return Command()
-        if report.moving and self._goal.kind is not CommandKind.STOP:
-            return Command()
+            return _command()
+        if report.moving and self._goal.command is not CommandKind.STOP:
+            return _command()
         self._requested_s = now_s
-        if self._goal.kind is CommandKind.MOVE_TO:
+        if self._goal.command is CommandKind.MOVE_TO:
             way_m = abs(self._goal.position_m - report.position_m)
             self._due_s = now_s + SLOW * way_m / self._goal.speed_m_s + SLACK_S
         return self._goal
@@ -306,10 +301,10 @@ class Press:
         slowly = self._goal.position_m == plan.deepest_m
         if slowly and self._requested_s is not None and (report.touched or self.mean_n > plan.mean_n):
             # The guard has stopped it at a single touch; a mean that is reached is stopped here.
-            self._goal = None if report.touched else Command(CommandKind.STOP)
+            self._goal = None if report.touched else _command(CommandKind.STOP)
             self._requested_s = None
             return
-        if self._goal.kind is CommandKind.STOP:
+        if self._goal.command is CommandKind.STOP:
             if self._requested_s is not None and not report.moving:
                 self._goal = None
             return
@@ -357,7 +352,7 @@ class Press:
         rising = self.state is PressState.RAMP and setpoint > least and scene_s < self._course.end_s
         return max(least, setpoint), self._course.slope_n_s if rising else 0.0
 
-    def _regulated(self, report: Report, now_s: float) -> Command:
+    def _regulated(self, report: Report, now_s: float) -> Beat:
         controller = self._controller
         assert controller is not None
         self.setpoint_n, slope = self._setpoint(now_s)
@@ -373,13 +368,15 @@ class Press:
         elif self._kept(controller, now_s):
             self._end_of(now_s)
         if self.state not in _REGULATED:
-            return self._asking(report, now_s) if self.state is not PressState.RETREAT else Command(CommandKind.RETREAT)
+            return (
+                self._asking(report, now_s) if self.state is not PressState.RETREAT else _command(CommandKind.RETREAT)
+            )
         if report.moving:
-            return Command()
+            return _command()
         way = controller.target - report.target_m
         if abs(way) < 0.5 * self._plan.resolution_m:
-            return Command()
-        return Command(CommandKind.STEP, distance_m=min(max(way, -self._plan.step_m), self._plan.step_m))
+            return _command()
+        return _command(CommandKind.STEP, distance_m=min(max(way, -self._plan.step_m), self._plan.step_m))
 
     def _end_of(self, now_s: float) -> None:
         """Go over from ramp to hold, and from hold to unloading."""

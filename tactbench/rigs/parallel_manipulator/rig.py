@@ -253,17 +253,15 @@ class ParallelManipulator:
         scene = quiet(scene)
         with_sensor(self._file, sensor.name)
         place = self._place(scene, seed)
-        with ExitStack() as stack:
-            senses = self._senses(stack, sensor, scene, seed)
-            try:
+        try:
+            with ExitStack() as stack:
+                senses = self._senses(stack, sensor, scene, seed)
                 yield self._opened(stack, self._current_session(sensor.name), sensor, scene, senses, place)
-            except BaseException:
-                stack.callback(self._end_session)
-                stack.callback(stack.pop_all().close)  # of this scene first
-                raise
-            if not self._kept:
-                stack.callback(self._end_session)
-                stack.callback(stack.pop_all().close)
+        except BaseException:
+            self._end_session()
+            raise
+        if not self._kept:
+            self._end_session()
 
     def _opened(
         self,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from functools import partial
 from typing import Any
 
@@ -90,7 +90,7 @@ def _found(file: RigFile) -> _Findings:
             f"{1e6 * settings.force_loop.step_m:g} um. Lower corridor_m, or raise the loop's speed."
         )
     _loop(found, settings)
-    _forces(found, settings, motor)
+    _forces(found, settings, facts)
     _places(found, settings)
     return found
 
@@ -181,9 +181,9 @@ def _loop(found: _Findings, settings: RigSettings) -> None:
     found.refusing(lambda: model.share_used(greatest))
 
 
-def _forces(found: _Findings, settings: RigSettings, motor: PositionerFacts) -> None:
+def _forces(found: _Findings, settings: RigSettings, facts: Mapping[str, PositionerFacts]) -> None:
     """Say how large the force may become, and refuse more than what is rated or allowed."""
-    limits, touch, stiffness = settings.limits, settings.touch, settings.stiffness
+    limits, touch, stiffness, motor = settings.limits, settings.touch, settings.stiffness, facts[MOTOR]
     react_s = WATCH_S + motor.stop_latency_s
     slow, acceleration = 1e-3 * touch.touch_speed_mm_s, 1e-3 * touch.acceleration_mm_s2
     k, soft = 1e3 * stiffness.at_ceiling_n_mm, 1e3 * stiffness.at_touch_n_mm
@@ -202,7 +202,14 @@ def _forces(found: _Findings, settings: RigSettings, motor: PositionerFacts) -> 
         ("in an approach that misses the touch", f"{by_approach:.2f} N: ceiling and reaction"),
         ("first touch", f"{first:.2f} N, {touch.allowed_n:g} N are allowed"),
     )
-    largest = max(by_step, by_approach)
+    rails = [
+        largest_force_n(limits.travel_ceiling_n, k, one.speed, one.acceleration, WATCH_S + one.stop_latency_s)
+        for name, one in facts.items()
+        if name != MOTOR
+    ]
+    if rails:
+        found.table("largest forces of the rails", ("of a rail that runs down on something", f"{max(rails):.2f} N"))
+    largest = max(by_step, by_approach, *rails)
     if not largest <= limits.rated_force_n:  # also refuses what is not a number
         found.problems.append(
             f"The force may come to {largest:.2f} N; the weakest part is rated for {limits.rated_force_n:.2f} N. Lower "

@@ -174,9 +174,11 @@ class Session:
         assert self._file.force is not None
         guard, settings, stream = self.guard, self._settings, self.guard.force_stream
         force = PressingForce(self._file.force, (stream,))
-        guard.force_blocks()  # of before
-        guard.advance(self.clock() + round(1e9 * self._file.force.zero_s))
-        zero = force.zero(guard.force_blocks())[stream.name]
+        since_ns = self.clock()
+        guard.advance(since_ns + round(1e9 * self._file.force.zero_s))
+        # Not what has waited since nobody took it.
+        fresh = (block.rows(block.t_ns >= since_ns) for block in guard.force_blocks() if block.t_ns is not None)
+        zero = force.zero(fresh)[stream.name]
         limits, touch, loop = settings.limits, settings.touch, settings.force_loop
         low, high = limits.travel_mm
         kept = Limits(

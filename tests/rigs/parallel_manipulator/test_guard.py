@@ -11,9 +11,8 @@ import pytest
 
 from tactbench.devices.guard import reaction_s
 from tactbench.devices.guard_messages import GuardRefusesError, Trigger
-from tactbench.plugin import TactbenchError, UsageError
+from tactbench.plugin import UsageError
 from tactbench.plugin.devices import Beat, CommandKind, GuardState, largest_force_n
-from tests.conftest import ROOT
 from tests.rigs.parallel_manipulator.presses import FAULTS, rig
 
 
@@ -71,16 +70,6 @@ def test_a_press_goes_in_holds_and_comes_out(kind, tmp_path):
         assert made.guard.counts()["guard"]["beats"] == press.sequence
         assert made.guard.disarm().state is GuardState.IDLE
         assert made.out
-
-
-@pytest.mark.parametrize("kind", ["local", "process"])
-def test_a_device_that_does_not_answer_at_the_start_is_what_is_told(kind, tmp_path, monkeypatch):
-    monkeypatch.setenv("PYTHONPATH", str(ROOT))
-    with (
-        pytest.raises(TactbenchError, match="The force sensor did not answer"),
-        rig(kind, tmp_path, force_driver="tests.rigs.parallel_manipulator.broken_force:build_silent"),
-    ):
-        pass
 
 
 # In this process, and in one that is started once ---------------------------------------------------------------------
@@ -229,17 +218,6 @@ def test_a_force_that_is_not_a_number(tmp_path):
         assert (report.state, report.trigger) == (GuardState.FAULT, Trigger.FORCE_NOT_A_NUMBER)
         assert made.out
         assert made.world.largest_n < 2.0
-
-
-def test_samples_that_come_twice_or_late_are_kept_out_and_counted(tmp_path):
-    texts = ("doubled:every=2", "out-of-order:every=5")
-    with rig("local", tmp_path, force=[FAULTS.DatagramFault.parse(text) for text in texts]) as made:
-        assert made.press().phase == "over"
-        numbers = np.concatenate([block.sequence for block in made.guard.force_blocks()])
-        assert (np.diff(numbers) > 0).all()
-        counts = made.guard.counts()["force"]
-        assert counts["duplicates"] == pytest.approx(numbers.size / 2, rel=0.3)
-        assert counts["late"] > numbers.size / 10
 
 
 @pytest.mark.parametrize("baud", [9600, 115200])

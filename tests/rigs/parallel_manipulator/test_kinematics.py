@@ -87,13 +87,6 @@ def test_whatever_is_asked_nothing_is_nan_and_links_keep_their_length(a, b, c, d
         assert np.abs(away - delta.link_m).max() <= 2e-14
 
 
-@given(st.floats(-0.03, 0.03), st.floats(-0.03, 0.03), st.floats(1e-3, 0.02))
-@settings(max_examples=30)
-def test_vertical_rails_rise_with_the_platform(x, y, rise):
-    low, high = inverse(LV, np.array([[x, y, -0.15], [x, y, -0.15 + rise]]))
-    assert high - low == pytest.approx([rise] * 3, abs=1e-15)
-
-
 def test_a_place_out_of_reach_names_leg_and_shortfall():
     with pytest.raises(UnreachableError, match=r"Leg 2 of .* misses the place \(200\.000, 0\.000, -150\.000\) mm"):
         inverse(LV, np.array([0.2, 0.0, -0.15]))

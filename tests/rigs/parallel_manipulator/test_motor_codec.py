@@ -177,14 +177,6 @@ def test_any_bytes_are_survived_and_the_next_line_is_read(pieces):
     assert drive.feed(b"\rLA1000\r")[-1] == Command("LA", 1000)
 
 
-@given(st.binary(min_size=1, max_size=300), st.data())
-@settings(max_examples=60)
-def test_cuts_do_not_matter(data, draw):
-    cut = draw.draw(st.integers(0, len(data)))
-    whole, halves = LineReader(), LineReader()
-    assert whole.feed(data) == halves.feed(data[:cut]) + halves.feed(data[cut:])
-
-
 @given(st.integers(-(10**18), 10**18), st.sampled_from([None, 1, 255]), st.sampled_from(["LA", "V", "CORRIDOR"]))
 @settings(max_examples=40)
 def test_a_command_comes_back(argument, node, name):
@@ -200,12 +192,6 @@ def test_a_line_without_end_is_given_up_in_bounded_memory():
     assert reader.feed(b"1\r\n") == [Line(Kind.VALUE, "1")]
     drive = CommandReader()
     assert drive.feed(b"L" * 100_000 + b"\r") == [Command("")]
-
-
-@pytest.mark.parametrize("raw", [b"98\xb956\r\n", b"98956\n", b"\r\n", b"OK\r\r\n", b"z\r\n", b"98\r56\r\n"])
-def test_what_no_drive_sends_is_garbled(raw):
-    reader = LineReader()
-    assert {line.kind for line in reader.feed(raw)} == {Kind.GARBLED}
 
 
 @given(st.floats(-1.0, 1.0))

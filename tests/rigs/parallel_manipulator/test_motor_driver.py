@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tactbench.plugin import Quality, RigError, UsageError
+from tactbench.plugin import Quality, UsageError
 from tactbench.plugin.devices import (
     DriverSettings,
     EmulatorSettings,
@@ -20,7 +20,6 @@ from tactbench.rigs.parallel_manipulator.motor.emulator import MotorEmulator, Mo
 from tactbench.rigs.parallel_manipulator.motor.emulator import build as build_emulator
 from tactbench.rigs.parallel_manipulator.motor.exchange import (
     IN_A_ROW,
-    Exchange,
     MotorError,
     MotorRefusalError,
     MotorSilentError,
@@ -91,12 +90,6 @@ def place(link):
 # As a device of a rig -------------------------------------------------------------------------------------------------
 
 
-def test_it_says_what_it_is():
-    driver, _ = driver_on(motor())
-    assert driver.identify() == {"firmware": "EMULATOR", "model": "linear motor, Faulhaber ASCII", "serial": "0"}
-    assert driver.counts == {}
-
-
 def test_it_is_watched_without_being_moved():
     driver, link = driver_on(motor())
     driver.start()
@@ -136,16 +129,6 @@ def test_a_move_ends_at_its_target_while_it_is_watched():
     assert driver.state.target == pytest.approx(3e-3)
 
 
-def test_increments_add_up_and_there_is_one_at_a_time():
-    driver, link = ready()
-    for n in range(20):
-        assert driver.move_by(-7 * STEP_M) == pytest.approx(-7 * (n + 1) * STEP_M)
-        with pytest.raises(NotReadyError, match="is moving"):
-            driver.move_by(STEP_M)
-        finish(driver, link)
-    assert driver.locate() == pytest.approx(-140 * STEP_M)
-
-
 @pytest.mark.parametrize(
     ("options", "before", "message"),
     [
@@ -166,28 +149,7 @@ def test_moves_that_are_not_allowed(options, before, message):
     assert not driver.moving
 
 
-def test_a_setting_that_the_drive_does_not_keep_is_told():
-    emulator = motor()
-    driver, _ = driver_on(emulator, **LIMITS)
-    emulator.drive._number, kept = lambda argument, largest, **more: min(argument, 40), emulator.drive._number
-    with pytest.raises(MotorError, match=r"has GSP 40 where SP50 was set"):
-        driver.start()
-    emulator.drive._number = kept
-    with pytest.raises(RigError, match="is 20000 units; the drive takes at most 10000"):
-        driver_on(motor(), speed_m_s=20.0)
-
-
 # Homing ---------------------------------------------------------------------------------------------------------------
-
-
-def test_homing_where_it_stands_does_not_move_it():
-    driver, link = driver_on(motor(), **LIMITS, home_m=1e-3)
-    driver.start()
-    assert not driver.homed
-    driver.home()
-    driver.enable()
-    assert (driver.homed, place(link)) == (True, 0.0)
-    assert driver.locate() == pytest.approx(1e-3, abs=STEP_M / 2)
 
 
 def test_homing_on_the_switch():
@@ -250,18 +212,6 @@ def test_a_retreat_at_any_moment_of_an_increment(bytes_on_the_way):
     finish(driver, link)
     assert place(link) == pytest.approx(-2e-3, abs=STEP_M)
     assert driver.counts == {}
-
-
-def test_a_retreat_whose_answers_are_lost_is_repeated():
-    driver, link = ready(retreat_m=-2e-3)
-    link.emulator.faults = [MotorFault("late-answers", end_s=link.now_s + 0.1, delay_s=0.4)]
-    driver.retreat()
-    with pytest.raises(MotorSilentError, match=r"did not answer (SP|LA|M)"):
-        finish(driver, link)
-    driver.retreat()
-    finish(driver, link)
-    assert place(link) == pytest.approx(-2e-3, abs=STEP_M)
-    assert driver.counts["time_outs"] == 2
 
 
 def test_without_a_place_to_retreat_to_it_halts():
@@ -406,28 +356,6 @@ def test_another_target_than_asked_for_is_noticed():
     link.emulator.drive.answer = damaged
     with pytest.raises(MotorError, match=r"target is 0\.0054 m, and 0\.0006 m was asked for"):
         finish(driver, link)
-
-
-@pytest.mark.parametrize(
-    ("text", "refusal"),
-    [
-        ("XYZ", "Unknown command"),
-        ("LPC", "Invalid parameter"),
-        ("GOHOSEQ", "Command not available"),
-    ],
-)
-def test_refusals_say_which(text, refusal):
-    link = VirtualLink(motor())
-    exchange = Exchange(link, link.clock, baud=9600)
-    assert exchange.greet() == "EMULATOR"
-    exchange.send(text)
-    answers = []
-    while not answers:
-        answers = exchange.pump(1.0)
-    with pytest.raises(MotorRefusalError, match=text) as found:
-        answers[0].checked()
-    assert found.value.text == refusal
-    assert found.value.hint
 
 
 def to_and_fro(driver, link):

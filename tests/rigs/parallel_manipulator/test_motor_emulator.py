@@ -7,14 +7,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tactbench.plugin import UsageError
 from tactbench.rigs.parallel_manipulator.motor.codec import (
     OVERTEMPERATURE,
     Kind,
     Line,
     LineReader,
     OperationStatus,
-    answers,
     encode,
     line_time_s,
 )
@@ -137,19 +135,6 @@ def test_silence_and_changed_rate():
     assert host.emulator.poll(due_s + 25e-6) == [(pytest.approx(due_s), b"\r\n")]
 
 
-def test_lines_leave_at_the_pace_of_the_line():
-    host = Host()
-    host.do("HO98956")
-    start_s = host.now_s
-    assert host.emulator.feed(b"POS\r", start_s) == []
-    began_s = start_s + line_time_s(4, 9600) + 1e-3
-    left_s = began_s + line_time_s(7, 9600)
-    assert host.emulator.poll(left_s + 1e-9) == [
-        (pytest.approx(began_s + line_time_s(1, 9600)), b"9"),
-        (pytest.approx(left_s), b"8956\r\n"),
-    ]
-
-
 @pytest.mark.parametrize("ticks", [1, 7, 1000])
 def test_a_drive_that_stands_without_load_answers_as_if_each_tick_were_made(ticks):
     """Ticks are left out where nothing moves: whether it is looked at between them changes nothing."""
@@ -201,17 +186,6 @@ def test_the_servo_goes_its_lag_and_is_stable_against_any_spring():
     assert (stiff.limited, stiff.current_a) == (True, 1.6)
 
 
-def test_force_is_current():
-    """Pressing 5 N takes 5 N / 6.5 N/A; the drive says it in whole mA."""
-    host = Host(wall(0.0, 10e3))
-    host.do("EN")
-    host.go(0.5e-3, 1.0)
-    position_m = host.emulator.drive.servo.position_m
-    assert position_m == pytest.approx(0.5e-3, abs=STEP_M)
-    assert int(host.ask("GRC")) == round(1e3 * 10e3 * position_m / 6.5)
-    assert not host.status & OperationStatus.CURRENT_LIMITATION
-
-
 def test_the_current_limit_bounds_the_force_and_is_said():
     host = Host(wall(0.0, 80e3))
     host.do("EN", "LPC400", "LCC400")
@@ -222,11 +196,6 @@ def test_the_current_limit_bounds_the_force_and_is_said():
     status = host.status
     assert status & OperationStatus.CURRENT_LIMITATION
     assert not status & OperationStatus.POSITION_ATTAINED
-
-
-@pytest.mark.parametrize("text", ["LA", "SP-1", "AC0", "LL0", "LL", "ANSW9", "BAUD9601", "LA99999999999", "POS5"])
-def test_arguments_that_are_refused(text):
-    assert Host().ask(text) == "Invalid parameter"
 
 
 @pytest.mark.parametrize("text", ["POR8", "GU", "SWS", "SOR1"])
@@ -245,47 +214,6 @@ def test_a_motor_fault_takes_the_power_and_says_so():
     assert host.ask("GN") == "0"  # Without power it has run out.
     assert host.ask("GST")[3] == "0"  # The end of the fault alone does not move it.
     host.do("EN")
-
-
-def test_garbled_lines_are_counted_or_pass_as_another_number():
-    host = Host()
-    host.do("HO98956")
-    host.emulator.faults = [MotorFault("garbled-line")]
-    lines = [line for _ in range(200) for line in host.lines("POS\r", 0.05)]
-    assert Line(Kind.VALUE, "98956") not in lines
-    assert any(line.kind is Kind.GARBLED for line in lines)
-    # Five of seven bytes are digits: 9 of 255 replacements each are another digit, which no host can notice. Of 200
-    # lines 5 are expected so, with a standard deviation of 2.2.
-    assert 0 < sum(answers(line, "POS") for line in lines) < 16
-    host.emulator.faults.clear()
-    host.lines("\r")
-    assert host.ask("POS") == "98956"
-
-
-def test_faults_that_are_none():
-    with pytest.raises(UsageError, match=r"no fault called .coffee.*late-answers, motor-fault"):
-        MotorFault("coffee")
-    with pytest.raises(UsageError, match="1 or more"):
-        MotorFault("garbled-line", every=0)
-
-
-def test_when_it_is_asked_changes_nothing():
-    """Bytes in and out, and their times, are the same polled every 0.3 ms and every 40 ms."""
-    sent = [(0.0, "EN\r"), (0.02, "LA500\rNP\rM\r"), (0.3, "POS\rOST\r"), (0.5, "V-20\r"), (0.8, "GRC\rPOS\r")]
-    streams = []
-    for period_s in (3e-4, 4e-2):
-        faults = [MotorFault("garbled-line", every=2), MotorFault("motor-fault", 0.71, 0.75)]
-        emulator, out, now_s = MotorEmulator(wall(1e-3, 5e3), np.random.default_rng(1), faults=faults), [], 0.0
-        left = list(sent)
-        while now_s < 1.0:
-            due_s = min(now_s + period_s, left[0][0] if left else math.inf)
-            if left and left[0][0] <= due_s:
-                out += emulator.feed(left.pop(0)[1].encode(), due_s)
-            else:
-                out += emulator.poll(due_s)
-            now_s = due_s
-        streams.append(out)
-    assert streams[0] == streams[1]
 
 
 @given(st.lists(st.binary(max_size=30), max_size=8))

@@ -189,13 +189,6 @@ def test_a_sensor_that_falls_silent_ends_the_press_and_the_motor_is_out(monkeypa
     assert 0.1 < last_s["force_torque"] < 2.0
 
 
-def test_the_same_seed_gives_the_same_bytes():
-    first, second = (on_spring(5.0, ramp(1.0, 0.3, 1.0), **RARER) for _ in range(2))
-    for name in first.data:
-        assert np.array_equal(first.data[name], second.data[name])
-        assert np.array_equal(first.t_s[name], second.t_s[name])
-
-
 def test_the_manipulator_goes_to_the_scenes_place_before_it_presses():
     said = with_joints(settings__places__reach_x_mm=[-15.0, 15.0], settings__places__scatter_mm=0.5, **RARER)
     rig = ParallelManipulator(RigFile.model_validate(said), None, SpringRig(5.0))

@@ -43,7 +43,7 @@ class Plant:
     def go(self):
         """Go on by one control period."""
         command = self.press.step(self.report(), [(self.now_s, self.force_n)], self.now_s)
-        match command.kind:
+        match command.command:
             case CommandKind.MOVE_TO:
                 self.target_m, self.speed_m_s, self.touched = command.position_m, command.speed_m_s, False
             case CommandKind.STEP:
@@ -55,7 +55,7 @@ class Plant:
                 self.state = GuardState.RETREATED
         way = self.target_m - self.position_m
         self.position_m += math.copysign(min(abs(way), self.speed_m_s * PERIOD_S), way)
-        if way > 0 and self.force_n > self.settings.touch.single_n and command.kind is not CommandKind.STEP:
+        if way > 0 and self.force_n > self.settings.touch.single_n and command.command is not CommandKind.STEP:
             self.target_m, self.touched = self.position_m, True
         self.now_s += PERIOD_S
         self.largest_n = max(self.largest_n, self.force_n)
@@ -141,21 +141,3 @@ def test_a_guard_that_retreats_ends_the_press(state):
     plant.go()
     assert plant.press.state is PressState.FAILED
     assert plant.press.ended == f"in {state}: force ceiling"
-
-
-def test_the_first_reason_stands():
-    plant = Plant().until(PressState.CONTACT)
-    plant.press.fail("the sensor has sent nothing")
-    plant.press.fail("something else")
-    plant.until(PressState.FAILED)
-    assert plant.press.ended == "the sensor has sent nothing"
-
-
-def test_a_move_that_is_not_accepted_is_asked_for_again():
-    plant = Plant()
-    plant.go()
-    plant.accepted = False
-    plant.target_m = plant.position_m
-    plant.go()
-    plant.accepted = True
-    plant.until(PressState.CONTACT)

@@ -108,6 +108,17 @@ def test_a_scene_is_the_same_in_its_own_session_each_time():
     assert rig._session is None
 
 
+def test_the_zero_is_of_its_own_seconds_and_not_of_what_waited(session):
+    pressed = session.senses.press
+    session.senses.press = type("Hand", (), {"sensed": lambda self, at_s, x: {"fz": 5 + np.sin(1e4 * at_s)},
+                                             "force_n": lambda self, x: 0.0})()  # fmt: skip
+    session.emulated.advance(session.clock() + 200_000_000)
+    session.senses.press = pressed
+    _, zero, _ = session.measured_limits()
+    # Of 300 samples a few were on their way; with the 200 that waited it would be 2 N.
+    assert abs(zero["force_torque"][2]) < 0.1
+
+
 def test_force_while_the_platform_moves_stops_every_rail(session):
     session.travel((0.0, 0.0))
     session.senses.press.obstacle(session, 1e-3)

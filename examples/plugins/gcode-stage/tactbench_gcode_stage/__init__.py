@@ -1,6 +1,7 @@
 """One axis of a stage with GRBL 1.1, in machine coordinates: it presses under force as any Positioner does.
 
-Sourced: gnea/grbl, doc/markdown (interface, jogging). Soft limits ($20=1) and homing ($22=1) must be switched on.
+Sourced: gnea/grbl, doc/markdown (interface, jogging). Soft limits ($20=1) and homing ($22=1) must be switched on. A board
+that resets when its port is opened stops then, and forgets its place: it cannot retreat after its guard has died.
 """
 
 from tactbench.plugin import hookimpl

@@ -90,16 +90,16 @@ class FaulhaberDriver(Positioner):
 
     def __init__(self, settings: DriverSettings) -> None:
         super().__init__(settings)
-        options: FaulhaberOptions = self.options
-        self._profile = profile = options
+        self._options: FaulhaberOptions = self.options
+        options = self._options
         # Arguments that the drive does not have are refused before anything is sent.
         self._settings = self._required_settings()
         self._limits = [
-            ("LL", profile.increments(end), query)
+            ("LL", options.increments(end), query)
             for end, query in ((options.upper_m, "GPL"), (options.lower_m, "GNL"))
             if end is not None
         ]
-        self._home = profile.increments(options.home_m)
+        self._home = options.increments(options.home_m)
         self._version = ""
         self._exchange = Exchange(self.link, settings.clock, baud=options.baud, node=options.node)
         self._counts: Counter[str] = Counter()
@@ -119,19 +119,19 @@ class FaulhaberDriver(Positioner):
 
     def _required_settings(self) -> list[tuple[str, int, str]]:
         """Return command, argument and the query that reads it back, of what the options state."""
-        options = profile = self._profile
+        options = self._options
         found: list[tuple[str, int, str]] = []
         if options.speed_m_s is not None:
-            found.append(("SP", profile.speed(options.speed_m_s), "GSP"))
+            found.append(("SP", options.speed(options.speed_m_s), "GSP"))
         if options.acceleration_m_s2 is not None:
-            argument = profile.acceleration(options.acceleration_m_s2)
+            argument = options.acceleration(options.acceleration_m_s2)
             found += [("AC", argument, "GAC"), ("DEC", argument, "GDEC")]
         if options.corridor_m is not None:
-            found.append(("CORRIDOR", max(1, profile.increments(options.corridor_m)), "GCORRIDOR"))
+            found.append(("CORRIDOR", max(1, options.increments(options.corridor_m)), "GCORRIDOR"))
         if options.peak_current_a is not None:
-            found.append(("LPC", profile.current(options.peak_current_a), "GPC"))
+            found.append(("LPC", options.current(options.peak_current_a), "GPC"))
         if options.continuous_current_a is not None:
-            found.append(("LCC", profile.current(options.continuous_current_a), "GCC"))
+            found.append(("LCC", options.current(options.continuous_current_a), "GCC"))
         return found
 
     # The life of a device ---------------------------------------------------------------------------------------------
@@ -183,11 +183,11 @@ class FaulhaberDriver(Positioner):
         if not self.enabled:
             raise MotorError("The motor's drive was enabled and has no power.", hint="Check its supply.")
         place, target = self._sure("POS"), self._sure("TPOS")
-        if abs(self._profile.position_m(place - target)) > CORRIDOR_M:
+        if abs(self._options.position_m(place - target)) > CORRIDOR_M:
             self.disable()
             raise MotorError(
-                f"The motor was to hold its place at {self._profile.position_m(place):g} m, and its target is "
-                f"{self._profile.position_m(target):g} m; it is without power again.",
+                f"The motor was to hold its place at {self._options.position_m(place):g} m, and its target is "
+                f"{self._options.position_m(target):g} m; it is without power again.",
                 hint="Home it anew.",
             )
         self._target = target
@@ -201,7 +201,7 @@ class FaulhaberDriver(Positioner):
     def locate(self) -> float:
         """Ask for place and target, each until two answers are the same; return the place [m]."""
         self._target = self._sure("TPOS")
-        return self._profile.position_m(self._sure("POS"))
+        return self._options.position_m(self._sure("POS"))
 
     def find_home(self) -> bool:
         """Whether the drive has kept power and the ends of travel that homing set: it counts from the same place then.
@@ -228,17 +228,17 @@ class FaulhaberDriver(Positioner):
         self._ask("APL", 0)
         if self.options.homing != "here":
             self.enable()
-            speed = self._profile.speed(self.options.homing_speed_m_s)
+            speed = self._options.speed(self.options.homing_speed_m_s)
             if self.options.homing == "switch":
                 self._to_switch(abs(speed), stop)
             else:
-                self._against_stop(speed, self._profile.current(self.options.homing_current_a), stop)
+                self._against_stop(speed, self._options.current(self.options.homing_current_a), stop)
         self._ask("HO", self._home)
         place = self._sure("POS")
-        if abs(self._profile.position_m(place - self._home)) > CORRIDOR_M:
+        if abs(self._options.position_m(place - self._home)) > CORRIDOR_M:
             raise MotorError(
                 f"The motor's place was to be called {self.options.home_m:g} m, and is "
-                f"{self._profile.position_m(place):g} m."
+                f"{self._options.position_m(place):g} m."
             )
         for setting in self._limits:
             self._keep(*setting)
@@ -325,15 +325,15 @@ class FaulhaberDriver(Positioner):
         """Begin to move to a position, to the nearest increment; the speed is rounded down."""
         self.check_move(position)
         return self._begin(
-            self._profile.increments(position), self._speed if speed is None else self._profile.speed(speed)
+            self._options.increments(position), self._speed if speed is None else self._options.speed(speed)
         )
 
     def move_by(self, distance: float) -> float:
         """Begin to move from the last target by a distance, to the nearest increment; return the new target."""
         if self._target is None:
             raise NotReadyError("The motor's target is not known.", hint="Use locate() once it is at rest.")
-        target = self._target + self._profile.increments(distance)
-        self.check_move(self._profile.position_m(target))
+        target = self._target + self._options.increments(distance)
+        self.check_move(self._options.position_m(target))
         return self._begin(target, self._speed)
 
     def halt(self) -> None:
@@ -343,7 +343,7 @@ class FaulhaberDriver(Positioner):
         """
         if self.state is None or not self.homed:
             raise NotReadyError("The motor's position is not known.", hint="Home it, and read it.")
-        self._at_once(self._profile.increments(self.position), None)
+        self._at_once(self._options.increments(self.position), None)
 
     def retreat(self) -> None:
         """Begin to move to the place away from the sensor, whatever is under way; without one it halts.
@@ -358,7 +358,7 @@ class FaulhaberDriver(Positioner):
             raise NotReadyError("The motor has no place to retreat to.", hint="Home it.")
         speed = self.options.retreat_speed_m_s
         self._at_once(
-            self._profile.increments(self.facts.retreat), None if speed is None else self._profile.speed(speed)
+            self._options.increments(self.facts.retreat), None if speed is None else self._options.speed(speed)
         )
 
     def _at_once(self, target: int, speed: int | None) -> None:
@@ -373,9 +373,9 @@ class FaulhaberDriver(Positioner):
         self._queue.append(("TPOS", None))
 
     def _begin(self, target: int, speed: int) -> float:
-        position_m = self._profile.position_m(target)
+        position_m = self._options.position_m(target)
         low, high = self.facts.limits
-        way_m = high - low if self._target is None else abs(self._profile.position_m(target - self._target))
+        way_m = high - low if self._target is None else abs(self._options.position_m(target - self._target))
         self._move = _Move(target, self._seconds(way_m, speed))
         if self._speed_now != speed:
             self._queue.append(("SP", speed))
@@ -384,7 +384,7 @@ class FaulhaberDriver(Positioner):
         return position_m
 
     def _seconds(self, way_m: float, speed: int) -> float:
-        return self.facts.seconds(way_m, max(1, speed) * self._profile.speed_unit_m_s) + 4.0 * self._exchange.answer_s
+        return self.facts.seconds(way_m, max(1, speed) * self._options.speed_unit_m_s) + 4.0 * self._exchange.answer_s
 
     def _abort(self) -> None:
         """Send no more of what is under way."""
@@ -414,7 +414,7 @@ class FaulhaberDriver(Positioner):
                 with suppress(LinkTimeout):
                     for line in reader.feed(self.link.read(self._exchange.answer_s).data):
                         if line.kind is Kind.VALUE:
-                            place_m = self._profile.position_m(line.value)
+                            place_m = self._options.position_m(line.value)
             away_m = abs(place_m - target_m)
             there = there + 1 if away_m <= self.facts.near else 0
             if there == 2:  # One could be the late answer to another question.
@@ -523,7 +523,7 @@ class FaulhaberDriver(Positioner):
         if answer.line is None:
             self._queue.appendleft(("TPOS", None))
         elif self._target is not None and answer.value != self._target:
-            expected, found = (self._profile.position_m(steps) for steps in (self._target, answer.value))
+            expected, found = (self._options.position_m(steps) for steps in (self._target, answer.value))
             self._abort()
             raise MotorError(
                 f"The motor's target is {found:g} m, and {expected:g} m was asked for.",
@@ -548,9 +548,9 @@ class FaulhaberDriver(Positioner):
         self.note(
             PositionerState(
                 t_ns=position.t_ns,
-                position=self._profile.position_m(position.value),
-                target=math.nan if self._target is None else self._profile.position_m(self._target),
-                current_a=current.value * self._profile.current_unit_a if _says_number(current.line) else math.nan,
+                position=self._options.position_m(position.value),
+                target=math.nan if self._target is None else self._options.position_m(self._target),
+                current_a=current.value * self._options.current_unit_a if _says_number(current.line) else math.nan,
                 problem=", ".join(_name(bit) for bit in _PROBLEMS if status & bit),
             )
         )
@@ -569,7 +569,7 @@ class FaulhaberDriver(Positioner):
             limited = " at its current limit" if status & OperationStatus.CURRENT_LIMITATION else ""
             raise MotorError(
                 f"The motor stands at {self.position:g} m{limited} and has not reached "
-                f"{self._profile.position_m(move.target):g} m within {move.seconds:.2f} s.",
+                f"{self._options.position_m(move.target):g} m within {move.seconds:.2f} s.",
                 hint="Let it retreat, and see what is in its way.",
             )
 
