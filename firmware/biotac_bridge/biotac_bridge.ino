@@ -8,8 +8,8 @@
 #include <SPI.h>
 #include <string.h>
 
-const uint8_t VERSION = 1, HOLDS = 4;            // of the format; batches held, the running one included
-const uint16_t FIRMWARE = 1, LARGEST = 2048;     // bytes of payload
+const uint8_t VERSION = 1, HOLDS = 8;            // of the format; batches held, the running one included
+const uint16_t FIRMWARE = 1, LARGEST = 1024;     // bytes of payload
 const uint32_t FASTEST_HZ = 10000000;            // what a BioTac takes
 const uint8_t LINES[] = {10, 9, 8};              // pins of the select lines, low is active; line i is bit i of a mask
 const char NAME[] = "biotac_bridge";

@@ -80,7 +80,7 @@ def test_it_is_short():
 def test_the_link_reads_through_it(program):
     with running(program) as link:
         bridge = SpiBridge(link, speed_hz=20_000_000)
-        assert (bridge.name, bridge.firmware, bridge.holds, bridge.select_lines) == ("biotac_bridge", 1, 4, 7)
+        assert (bridge.name, bridge.firmware, bridge.holds, bridge.select_lines) == ("biotac_bridge", 1, 8, 7)
         assert bridge.speed_hz == 10_000_000
         numbers = [
             bridge.send([SpiStep(bytes([n, 0]), 1, 50), SpiStep(b"", 0, 300), SpiStep(b"\0", 2)]) for n in range(4)
@@ -90,9 +90,9 @@ def test_the_link_reads_through_it(program):
         assert [one.data for one in found] == [(bytes([255 - n, 255]), b"", b"\xff") for n in range(4)]
         begun = [one.device_us for one in found]
         assert all((b - a) % 2**32 >= 350 for a, b in pairwise(begun))  # the pauses are waited for
-        frame = [SpiStep(bytes([n % 256] * 2), 1, 20) for n in range(280)]  # zero bytes, stretches without one
+        frame = [SpiStep(bytes([n % 256] * 2), 1, 20) for n in range(140)]  # zero bytes, stretches without one
         bridge.send(frame)
-        assert bridge.receive(5.0).data == tuple(bytes([255 - n % 256] * 2) for n in range(280))
+        assert bridge.receive(5.0).data == tuple(bytes([255 - n % 256] * 2) for n in range(140))
 
 
 def test_it_refuses_what_it_cannot_do_and_is_in_step_again_after_noise(program):
@@ -116,9 +116,9 @@ def test_it_refuses_what_it_cannot_do_and_is_in_step_again_after_noise(program):
             assert reply.number == frame.number
             assert (reply.kind, reply.payload) == (Kind.ERROR.reply, why) if why else reply.kind == Kind.SETUP.reply
         busy = b"\0\xff\xff\0\0"  # 65 ms
-        for number in range(5):
+        for number in range(9):
             link.write(encode_frame(Frame(Kind.BATCH, number, busy)))
-        assert replies(link, 1) == [Frame(Kind.ERROR.reply, 4, b"full")]
+        assert replies(link, 1) == [Frame(Kind.ERROR.reply, 8, b"full")]
         with pytest.raises(LinkTimeout):
             link.read(0.0)
         link.write(encode_frame(Frame(Kind.HELLO, 77)))  # answered while a batch runs

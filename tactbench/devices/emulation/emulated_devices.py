@@ -29,6 +29,8 @@ from tactbench.links.spi_bridge import SpiBridge
 SPI_HZ = 4_400_000
 """Clock of an emulated SPI bus: what the BioTac's maker's tools use [sourced: docs/links.md]; the bus takes any up to
 10 MHz."""
+HELD = 8
+"""Batches that an emulated bridge holds, as the firmware of docs/links.md does."""
 BAUDS = (115200, 230400, 460800, 921600, 1_000_000, 2_000_000, 3_000_000)
 """Usual rates of serial lines [bit/s]."""
 
@@ -188,7 +190,7 @@ def _on_its_line(device: EmulatedDevice, *, real: bool) -> DeviceEmulator:
     """Return the device as its line sees it: an SPI bus behind a bridge, in real time a CAN bus behind an adapter."""
     emulator: Any = device.emulator  # which of the two protocols it has, the kind of link says
     if device.link == "spi":
-        emulator = BridgeEmulator(emulator.exchange)
+        emulator = BridgeEmulator(emulator.exchange, holds=HELD)
     elif device.link == "can" and real:
         emulator = SlcanAdapter(emulator)
     return emulator  # type: ignore[no-any-return]

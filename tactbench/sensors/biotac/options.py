@@ -31,7 +31,7 @@ class BioTacOptions(Options):
     """How often every word is asked for again, so that words of bad parity can be replaced."""
     batch_words: int | None = Field(default=None, ge=1, le=1000)
     """Words in a batch; None: a frame. Fewer where a bridge takes only short batches: a word is 14 bytes of payload."""
-    batches_ahead: int = Field(default=4, ge=2, le=16)
+    batches_ahead: int = Field(default=8, ge=2, le=16)
     """Batches under way at once, as far as the adapter holds them: so long may the host be late without a gap."""
 
 
