@@ -349,6 +349,7 @@ class GuardProcess:
 
 
 Guard: TypeAlias = LocalGuard | GuardProcess
+"""A guard in this process or in one of its own; one thread uses it."""
 
 
 class _Server:

@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 from functools import partial
 from typing import Any
 
-from tactbench.plugin import TactbenchError, UsageError, load_registry
+from tactbench.plugin import RigError, TactbenchError, UsageError, load_registry
 from tactbench.plugin.devices import (
     CheckTable,
     PositionerFacts,
@@ -81,7 +81,10 @@ def _found(file: RigFile) -> _Findings:
     for name in axes_of(settings):
         kind, given = positioner_of(registry, name, file.devices[name])
         options = read_options(kind.options_kind, given, name)
-        facts[name] = kind.facts_of(options)
+        try:
+            facts[name] = kind.facts_of(options)
+        except RigError as error:
+            raise UsageError(f"{name}: {error.message}", hint=error.hint) from error
         _axis(found, settings, name, options)
     motor = facts[MOTOR]
     if motor.corridor > settings.force_loop.step_m:

@@ -102,7 +102,9 @@ def test_an_error_within_the_guard_lets_the_motor_retreat(tmp_path, monkeypatch)
         found = entries(made.log)
         (error,) = [entry["internal_error"] for entry in found if "internal_error" in entry]
         assert "a driver's own error" in error
-        assert [entry for entry in found if "motor has retreated to -0.005" in entry.get("rescued", "")]
+        (rescued,) = [entry["rescued"] for entry in found if "rescued" in entry]
+        where = float(re.search(r"motor has retreated to (\S+) m", rescued)[1])
+        assert where == pytest.approx(FAULTS.RETREAT_M, abs=1.01 * FAULTS.STATED["corridor_m"])
 
 
 def homed_to_a_switch_behind_the_skin(made):

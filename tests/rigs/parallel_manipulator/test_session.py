@@ -1,5 +1,6 @@
 """Axes that outlive a scene, are watched whenever they move, and keep their home."""
 
+import gc
 import re
 
 import numpy as np
@@ -13,7 +14,7 @@ from tactbench.rigs.parallel_manipulator.rig import ParallelManipulator
 from tactbench.rigs.parallel_manipulator.session import Session
 from tactbench.rigs.parallel_manipulator.settings import JOINTS, settings_of, with_limits
 from tests.rigs.parallel_manipulator.presses import load
-from tests.rigs.parallel_manipulator.spring import Pressed, SpringRig, ramp, with_joints
+from tests.rigs.parallel_manipulator.spring import Pressed, SpringRig, file_of, ramp, with_joints
 from tests.rigs.parallel_manipulator.test_press import RARER
 
 FILE = RigFile.model_validate(
@@ -96,6 +97,30 @@ def test_a_whole_session_of_scenes_keeps_its_home():
     events = [text for name, text in found.acquisition.drawn.items() if name.startswith("event")]
     assert not any("homing" in text for text in events)
     assert rig._session is None
+
+
+def test_by_the_clock_guard_and_home_are_kept_until_the_rig_is_forgotten(tmp_path):
+    # Emulators, rig and perhaps other programs share the machine: forces and beats may be late.
+    patient = {"force_age_ms": 1500.0, "heartbeat_ms": 1500.0}
+    rig = ParallelManipulator(
+        file_of(
+            emulation__time="real", force__options__rate_hz=250.0, settings__guard_log=str(tmp_path / "guard.log"),
+            settings__press__stale_ms=3000.0, **{f"settings__limits__{name}": value for name, value in patient.items()},
+        ), None, SpringRig(5.0),
+    )  # fmt: skip
+    for _ in range(2):
+        with rig.open(load_registry().sensors["icub"], ramp(1.0, 0.2, 1.5), seed=1) as acquisition:
+            found = Pressed(acquisition)
+        assert found.acquisition.ended == ""
+        # 1 N less the 0.3 N that a ramp of 0.77 N/s is behind at k K = 2.5/s, and late periods.
+        assert 0.4 < found.force_n[-10:].mean() < 1.1
+    guard = rig._session.guard
+    assert guard._process.poll() is None
+    del rig, acquisition, found
+    gc.collect()
+    assert guard._process.poll() == 0
+    said = (tmp_path / "guard.log").read_text(encoding="utf-8")
+    assert (said.count('"homing motor"'), said.count('"armed"}')) == (1, 4)
 
 
 def test_a_scene_is_the_same_in_its_own_session_each_time():

@@ -76,6 +76,29 @@ def _latency_s(options: FaulhaberOptions) -> float:
     return line_time_s(LONGEST_COMMAND + len(retreat_command(options)), options.baud) + LAG_S
 
 
+def _required_settings(options: FaulhaberOptions) -> list[tuple[str, int, str]]:
+    """Return command, argument and the query that reads it back, of what the options state."""
+    found: list[tuple[str, int, str]] = []
+    if options.speed_m_s is not None:
+        found.append(("SP", options.speed(options.speed_m_s), "GSP"))
+    if options.acceleration_m_s2 is not None:
+        argument = options.acceleration(options.acceleration_m_s2)
+        found += [("AC", argument, "GAC"), ("DEC", argument, "GDEC")]
+    if options.corridor_m is not None:
+        found.append(("CORRIDOR", max(1, options.increments(options.corridor_m)), "GCORRIDOR"))
+    if options.peak_current_a is not None:
+        found.append(("LPC", options.current(options.peak_current_a), "GPC"))
+    if options.continuous_current_a is not None:
+        found.append(("LCC", options.current(options.continuous_current_a), "GCC"))
+    return found
+
+
+def _required_limits(options: FaulhaberOptions) -> list[tuple[str, int, str]]:
+    """Return the same of the ends of travel."""
+    ends = ((options.upper_m, "GPL"), (options.lower_m, "GNL"))
+    return [("LL", options.increments(end), query) for end, query in ends if end is not None]
+
+
 class FaulhaberDriver(Positioner):
     """A linear motor on a Faulhaber drive of the 300x RS generation.
 
@@ -92,14 +115,8 @@ class FaulhaberDriver(Positioner):
         super().__init__(settings)
         self._options: FaulhaberOptions = self.options
         options = self._options
-        # Arguments that the drive does not have are refused before anything is sent.
-        self._settings = self._required_settings()
-        self._limits = [
-            ("LL", options.increments(end), query)
-            for end, query in ((options.upper_m, "GPL"), (options.lower_m, "GNL"))
-            if end is not None
-        ]
         self._home = options.increments(options.home_m)
+        self._settings, self._limits = _required_settings(options), _required_limits(options)
         self._version = ""
         self._exchange = Exchange(self.link, settings.clock, baud=options.baud, node=options.node)
         self._counts: Counter[str] = Counter()
@@ -114,25 +131,16 @@ class FaulhaberDriver(Positioner):
 
     @classmethod
     def facts_of(cls, options: FaulhaberOptions) -> PositionerFacts:
-        """Return the facts, with the drive's increment, and the line's and the motor's latency."""
-        return replace(super().facts_of(options), resolution=options.increment_m, stop_latency_s=_latency_s(options))
+        """Return the facts, with the drive's increment, and the line's and the motor's latency.
 
-    def _required_settings(self) -> list[tuple[str, int, str]]:
-        """Return command, argument and the query that reads it back, of what the options state."""
-        options = self._options
-        found: list[tuple[str, int, str]] = []
-        if options.speed_m_s is not None:
-            found.append(("SP", options.speed(options.speed_m_s), "GSP"))
-        if options.acceleration_m_s2 is not None:
-            argument = options.acceleration(options.acceleration_m_s2)
-            found += [("AC", argument, "GAC"), ("DEC", argument, "GDEC")]
-        if options.corridor_m is not None:
-            found.append(("CORRIDOR", max(1, options.increments(options.corridor_m)), "GCORRIDOR"))
-        if options.peak_current_a is not None:
-            found.append(("LPC", options.current(options.peak_current_a), "GPC"))
-        if options.continuous_current_a is not None:
-            found.append(("LCC", options.current(options.continuous_current_a), "GCC"))
-        return found
+        Raises
+        ------
+        RigError
+            For a setting that the drive does not have.
+        """
+        _required_settings(options)
+        _required_limits(options)
+        return replace(super().facts_of(options), resolution=options.increment_m, stop_latency_s=_latency_s(options))
 
     # The life of a device ---------------------------------------------------------------------------------------------
 
