@@ -148,7 +148,7 @@ def opening(cell: Cell, task: TaskSpec, *, simulated: bool = False) -> Row:
     """Return a row with what is known before anything is computed; every key of the format is there."""
     unknown = {name: field.get_default(call_default_factory=True) for name, field in RowModel.model_fields.items()}
     alike = ("sensor", "task", "rig", "protocol", "split", "estimator", "repeat", "repeats", "seed", "declared_task")
-    asked = ("answer_per", "answer_from", "metric", "unit", "equivalence", "reference_score")
+    asked = ("answer_per", "answer_from", "metric", "unit", "equivalence")
     return {
         **unknown,
         **{name: getattr(cell, name) for name in alike},
