@@ -84,10 +84,10 @@ def command(
     if shape == "json":
         click.echo(json_text({"failed_plugins": wrong, "checked": [_plain(one) for one in reports]}, indent=1))
     else:
-        lines = [("could not be loaded", text) for text in wrong]
+        print_fields([("could not be loaded", text) for text in wrong])
         for report in reports:
-            lines += [*_lines(report), ("summary", report.summary)]
-        print_fields(lines)
+            print_fields(list(_lines(report)))
+            click.secho(report.summary, bold=True)
     ctx.exit(1 if wrong or not all(one.ok for one in reports) or not reports else 0)
 
 
@@ -153,4 +153,5 @@ def _lines(report: CheckReport) -> Iterator[tuple[str, str]]:
     reasons: dict[str, list[str]] = {}
     for one in report.skipped:
         reasons.setdefault(one.text, []).append(one.check)
-    yield from (("skipped", f"{', '.join(names)}: {text}") for text, names in reasons.items())
+    for text, names in reasons.items():
+        yield "skipped", f"{f'{len(names)} checks' if len(names) > 1 else names[0]}: {text}"

@@ -12,7 +12,6 @@ from tactbench.core.cli.threads import keep_threads
 
 if TYPE_CHECKING:
     from tactbench.core.cost.ladder import Ladder
-    from tactbench.core.plugins.registry import Registry
     from tactbench.core.spec.matrix import MatrixSpec
 
 
@@ -66,7 +65,7 @@ def command(
     from tactbench.core.plugins.registry import load_registry
 
     registry = with_declared(load_registry(), declared_in(recordings))
-    matrix = _matrix(registry, sensors[0], task, recordings, protocol, estimators)
+    matrix = _matrix(sensors[0], task, recordings, protocol, estimators)
     with progress() as display:
         ladder = climb(
             matrix, registry, Store(out / "cost"), rounds=rounds, clock=time.perf_counter, progress=display,
@@ -81,13 +80,12 @@ def command(
 
 
 def _matrix(
-    registry: Registry, sensor: str, task: str, recordings: Path | None, protocol: str | None,
-    estimators: tuple[str, ...],
-) -> MatrixSpec:  # fmt: skip
+    sensor: str, task: str, recordings: Path | None, protocol: str | None, estimators: tuple[str, ...]
+) -> MatrixSpec:
     from tactbench.core.spec.matrix import EstimatorChoice, MatrixSpec, TaskChoice
 
     rig = "twin" if recordings is None else "replay"
-    if protocol is None and not registry.rigs[rig].simulated:
+    if protocol is None and recordings is not None:
         protocol = "deployable"  # as `run` has it: the paper's protocol needs the paper's three roles
     answerers = tuple(EstimatorChoice(name=name) for name in estimators or ("all",))
     choice = TaskChoice(name=task, protocol=protocol, estimators=answerers)

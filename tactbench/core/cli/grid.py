@@ -58,10 +58,10 @@ def print_fields(fields: Sequence[tuple[str, str]]) -> None:
     """Print names and values on stdout, a field a line; long values are broken at spaces of the terminal's width."""
     from tactbench.core.cli.screen import console
 
-    left = max((len(name) for name, _ in fields), default=0) + 2
+    left, width = max((len(name) for name, _ in fields), default=0) + 2, console().width
     for name, value in fields:
         lines = textwrap.wrap(
-            f"{visible(name):<{left}}{visible(value)}", console().width, subsequent_indent=" " * left,
+            f"{visible(name):<{left}}{visible(value)}", width, subsequent_indent=" " * left,
             break_long_words=False, break_on_hyphens=False,
         )  # fmt: skip
         click.echo("\n".join(lines))

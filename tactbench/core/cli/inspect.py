@@ -124,9 +124,8 @@ def _clock(clock: dict[str, Any]) -> dict[str, Any]:
     lines = clock["segments"]
     drift = max((line["drift"] * 1e6 for line in lines), key=abs, default=None)
     error_us = max((line["bound_ns"] * 1e-3 for line in lines if line["bound_ns"] is not None), default=None)
-    delay_ms = [edge * 1e-6 for edge in clock["delay_ns"]]
     return {"source": clock["source"], "method": clock["method"], "drift ppm": drift, "error us": error_us,
-            "least delay ms": delay_ms, "breaks": clock["breaks"]}  # fmt: skip
+            "breaks": clock["breaks"]}  # fmt: skip
 
 
 def _ends(names: list[str]) -> str:

@@ -29,8 +29,7 @@ def command(ctx: click.Context, folders: tuple[Path, ...], out: Path) -> None:
     from tactbench.core.matrix.merge import merge
 
     merged = merge(folders, out, also=partial(_write_tables, folders))
-    hosts = len({row.get("host", "") for row in merged.rows})
-    remark(f"{len(merged.rows)} cells of {hosts} hosts, {merged.recordings} recordings.")
+    remark(f"{len(merged.rows)} cells, {merged.recordings} recordings.")
     for sentence in merged.left_out:
         remark(f"Left out: {sentence}")
     click.echo(out)

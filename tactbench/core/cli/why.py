@@ -133,7 +133,7 @@ def _replicates(found: _Stored) -> Iterator[Field]:
     for name in ("score_beyond_floor", "reference_floor", "published"):
         if row[name] is not None:
             yield name.replace("_", " "), score_with_unit(row[name], unit)
-    for seed, value in zip(row["seeds"], row["replicate_scores"], strict=False):
+    for seed, value in zip(row["seeds"], row["replicate_scores"], strict=True):
         yield f"score, seed {seed}", score_with_unit(value, unit)
     if row["delay_parts_ms"] and row["answer_delay_ms"] is not None:
         yield "delay after touch", f"{row['answer_delay_ms']:.3g} ms"
@@ -182,7 +182,7 @@ def _print(facts: Mapping[str, Any]) -> None:
     for part in ("traceback", "log"):
         lines = (facts[part] or "").splitlines()
         if lines:
-            click.echo(visible_lines("\n  ".join([f"{part}, its end:", *lines[-_TAIL:]])))
+            click.echo(visible_lines("\n  ".join([f"{part}, last lines:", *lines[-_TAIL:]])))
     click.echo(visible_lines(f"\nTry: {facts['try']}"))
 
 

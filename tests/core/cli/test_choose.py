@@ -6,9 +6,6 @@ from pathlib import Path
 import pytest
 
 from tactbench.core.cli.config import shipped_results
-from tactbench.core.report.datasheet import OF_DEVICES
-from tactbench.core.spec.sensor import SensorSpec
-from tactbench.plugin import DataSheet, PhysicalRange, Source, load_registry, sourced
 from tests.conftest import Verbs
 from tests.core.cli.terminals import on_terminal, plain
 
@@ -68,20 +65,3 @@ def test_json_of_show_holds_everything_that_is_stated(verbs):
     assert (len(task["spec"]["scenes"]), len(task["spec"]["campaigns"]["placement"])) == (3, 5)
     assert biotac["spec"]["data_sheet"]["force_range"]["upper"] == 30
     assert "Wettels" in verbs("show", "biotac", "--all").stdout
-
-
-def test_every_fact_of_a_data_sheet_has_a_source_and_no_sample_depends_on_it():
-    for descriptor in load_registry().sensors:
-        spec: SensorSpec = descriptor.spec
-        assert "data_sheet" not in spec.model_dump()
-        for name in OF_DEVICES:
-            fact = getattr(spec.data_sheet, name)
-            assert fact is None or (fact.source.tag in ("sourced", "derived", "measured") and fact.source.reference)
-
-
-def test_a_data_sheet_refuses_what_cannot_be():
-    with pytest.raises(ValueError, match="measure different things"):
-        DataSheet(mass=sourced(3.0, "mm", "a test"))
-    source = Source(tag="sourced", reference="a test")
-    with pytest.raises(ValueError, match="larger force"):
-        DataSheet(force_range=PhysicalRange(lower=5.0, upper=1.0, unit="N", source=source))

@@ -24,16 +24,13 @@ def recording(tmp_path):
     )  # fmt: skip
 
 
-def test_inspect_shows_them_and_json_holds_them_escaped(recording, verbs):
+def test_inspect_and_errors_show_them_and_json_holds_them_escaped(recording, verbs):
     shown = verbs("inspect", str(recording))
     assert acting(shown.stdout) == acting(shown.stderr) == []
     assert all(f"{letter}\\x1b]0;owned\\x07" in shown.stdout for letter in "abcef")
     text = verbs("inspect", str(recording), "--format", "json").stdout
     assert acting(text) == []
     assert json.loads(text)[0]["meta"]["session"] == f"a{TITLE}"
-
-
-def test_an_error_shows_them(verbs):
     shown = verbs("inspect", f"none{TITLE}.h5", code=2).stderr
     assert acting(shown) == []
     assert "none\\x1b]0;owned\\x07.h5" in shown

@@ -6,6 +6,7 @@ import pytest
 
 from tactbench.core.cli.progress import progress
 from tactbench.core.cli.run import tell_stopped
+from tests.conftest import Verbs
 from tests.core.cli.terminals import on_terminal
 
 RUN = ("-m", "tactbench", "run", "--sensor", "ideal")
@@ -14,14 +15,14 @@ FORCE = (*RUN, "--task", "force", "--estimator", "ols", "--repeats")
 
 
 def interrupted(folder, command, at):
-    """Press Ctrl-C once `at` is on the screen; return the exit code, the screen and the files that were left aside."""
+    """Press Ctrl-C once `at` is on the screen; return the exit code and the screen."""
     folder.mkdir()
     with on_terminal(command, cwd=folder, columns=140, lines=40) as terminal:
         assert at in terminal.read_until(at)
         os.write(terminal.ours, b"\x03")
         terminal.read_until(None)
         code = terminal.process.wait(60)
-    return code, terminal.seen, [path for path in folder.rglob("*") if path.suffix in (".partial", ".completing")]
+    return code, terminal.seen
 
 
 @pytest.mark.parametrize(
@@ -29,16 +30,20 @@ def interrupted(folder, command, at):
     [(CURVATURE, " 0/18"), (CURVATURE, " 4/18"), ((*FORCE, "1", "--estimator", "forest"), "/1")],
     ids=["the first recording", "a later one", "evaluating"],
 )
-def test_ctrl_c_ends_it_with_one_sentence(tmp_path, command, at):
+def test_ctrl_c_ends_it_with_one_sentence_and_the_next_run_continues(tmp_path, command, at):
     for attempt in range(3):  # Python drops an interrupt that comes while it is inside a destructor: rare
-        code, seen, left = interrupted(tmp_path / str(attempt), command, at)
+        code, seen = interrupted(tmp_path / str(attempt), command, at)
         if code == 130 and "Traceback" not in seen:
             break
     assert code == 130
     assert "goes on from there" in seen
     assert "Traceback" not in seen
     assert "KeyboardInterrupt" not in seen
-    assert left == []
+    folder = tmp_path / str(attempt)
+    assert not [path for path in folder.rglob("*") if path.suffix in (".partial", ".completing")]
+    finished = {path: path.read_bytes() for path in folder.rglob("*.h5")}
+    Verbs(folder, here=True)(*command[2:])
+    assert {path: path.read_bytes() for path in finished} == finished, "what was finished is reused, not made again"
 
 
 def test_the_table_so_far_comes_with_each_replicate_and_stays_off_the_end(tmp_path):

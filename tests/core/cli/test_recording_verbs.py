@@ -166,12 +166,10 @@ def test_a_log_of_a_sensor_becomes_a_recording_and_is_not_replaced_unasked(logge
         (("bus.asc", "--sensor", "icub", "--option", "bord=3"), "board, triangle"),
         (("bus.asc", "--sensor", "icub", "--out", "recordings"), ".h5"),
         (("bus.asc", "--sensor", "ideal"), "no reader for logs"),
-        (("other.txt", "--sensor", "icub"), "other.txt"),
         (("bus.asc", "--label", "session=a"), "--sensor"),
         (("bus.asc", "--sensor", "icub", "--label", "role=tset"), "train, validation, test"),
     ],
 )
 def test_a_log_that_cannot_be_read_is_one_clear_screen(logged, given, said):
-    (logged.folder / "other.txt").write_text("no log")
     assert_one_clear_screen(logged("import", *given, code=2), said)
     assert not (logged.folder / "recordings").exists()
