@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+from tactbench.core.cli.options import format_option
 from tactbench.core.cli.threads import keep_threads
 
 if TYPE_CHECKING:
@@ -21,8 +22,7 @@ if TYPE_CHECKING:
     metavar="DIR",
     help="Where page and figures are put; default: FOLDER/report.",
 )
-@click.option("--format", "shape", type=click.Choice(("table", "md", "json", "csv")), default="table",
-              show_default=True, help="How the published numbers and ours are printed.")  # fmt: skip
+@format_option("table", "md", "json", "csv")
 @click.pass_context
 def command(ctx: click.Context, folder: Path, out: Path | None, shape: str) -> None:
     """Make one page of all results in FOLDER, which is what `run --out` wrote.

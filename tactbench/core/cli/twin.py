@@ -30,8 +30,7 @@ def command() -> None:
 def explain(sensor: str, task: str, rounds: int, effects: str | None, shape: str) -> None:
     """Show which effects a task's scenes get, which they do not, why, and what each costs or would cost.
 
-    It ends with the task's score with the effects chosen beside that with all of them, unless that takes more than a
-    minute.
+    It ends with the task's score with the effects chosen beside that with all of them.
     """
     keep_threads()
     from tactbench.core.cli.explanations import print_explanations
