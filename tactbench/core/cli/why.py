@@ -171,13 +171,15 @@ def _print(facts: Mapping[str, Any]) -> None:
 
     kept = "reuses it" if facts["answer"] == "hit" else "computes it again"
     scores = [f"{value:.4g} of {name}" for name, value in facts["recording_scores"].items()]
-    several = {"changed": facts["reasons"], "test recording": scores, "recording": facts["recordings"]}
+    several = {"changed": facts["reasons"], "test recordings": scores, "recordings": facts["recordings"]}
     fields = [("cell", facts["cell"]), ("status", str(facts["status"])), ("reason", str(facts["reason"] or ""))]
     fields += [("signal", str(facts["signal"] or "")), ("tactbench run", kept), *facts["replicates"]]
     if facts["rests_on"]:
         fields += [("this replicate", facts["file"]), *((f"  {name}", value) for name, value in facts["rests_on"])]
     for name, texts in several.items():
-        fields += [(f"{name} of {len(texts)}", text) for text in texts[:_FIELDS]]
+        more = [f"… {len(texts) - _FIELDS} more"] if len(texts) > _FIELDS else []
+        labels = [f"{name} ({len(texts)})", *[""] * _FIELDS]
+        fields += zip(labels, [*texts[:_FIELDS], *more], strict=False)
     print_fields([(name, value) for name, value in fields if value])
     for part in ("traceback", "log"):
         lines = (facts[part] or "").splitlines()
