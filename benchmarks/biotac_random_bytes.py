@@ -9,15 +9,17 @@ Usage: python benchmarks/biotac_random_bytes.py [BYTES] [SEED]
 from __future__ import annotations
 
 import sys
+import tempfile
 import time
+from pathlib import Path
 
 import numpy as np
 
 from tactbench.plugin import DataError
-from tactbench.sensors.biotac.codec import PROPERTIES, decoded, encoded, property_text
+from tactbench.sensors.biotac.codec import decoded, encoded, property_text
 from tactbench.sensors.biotac.emulator import Emulator
 from tactbench.sensors.biotac.frames import FrameBatches
-from tactbench.sensors.biotac.text_log import read_text_log
+from tactbench.sensors.biotac.text_log import read_log
 
 
 def chunks(data: bytes, rng: np.random.Generator) -> list[bytes]:
@@ -65,15 +67,18 @@ def main(count: int, seed: int) -> None:
     assert sensor.exchange(1, b"\x00\x00", now_s + 1.001) == encoded(2043)
     print(f"emulator: {len(parts)} periods of the select; the next exchange is whole")
 
-    names = [name for name in PROPERTIES if name != "sampling frequency"]
+    names = ("flex version", "software version", "serial number")
     shown = sum(property_text(name, data[n : n + 100]) is not None for n in range(0, count, 100) for name in names)
     print(f"properties: {len(names) * -(-count // 100)} read, {shown} of them texts")
 
-    try:
-        log = read_text_log(data.decode("latin-1").splitlines())
-        print(f"text log: {log.left_out.total()} lines left out, {len(log.blocks)} blocks")
-    except DataError as error:
-        print(f"text log: {error}")
+    with tempfile.NamedTemporaryFile() as file:
+        file.write(data)
+        file.flush()
+        try:
+            log = read_log(Path(file.name), {})
+            print(f"text log: {dict(log.counts)}, {len(log.blocks)} blocks")
+        except DataError as error:
+            print(f"text log: {error}")
 
     sensor, batches = Emulator(), FrameBatches(speed_hz=4_400_000)
     for name, alone in (("emulator and frames", False), ("frames alone", True)):

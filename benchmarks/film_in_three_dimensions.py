@@ -20,12 +20,12 @@ from scipy.sparse import diags
 from scipy.sparse.linalg import cg
 from skfem.models import poisson  # noqa: F401
 
-from tactbench.sensors.biotac.discs import disc_at
 from tactbench.sensors.biotac.film import mid_film_mm
 from tactbench.sensors.biotac.meshes import sheet_x
 from tactbench.sensors.biotac.rims import Disc, RimmedDiscs
-from tactbench.sensors.biotac.sheet import FilmSheet, faces_between, flat_faces
+from tactbench.sensors.biotac.sheet import Faces, FilmSheet, faces_between
 from tactbench.sensors.biotac.spec import SKIN, SPEC
+from tactbench.sensors.biotac.transduction import disc_at
 
 OUTER, DOME, END = (SKIN.sheet.outer_radius.to("mm"), SKIN.sheet.dome.start.to("mm"), SKIN.sheet.x_max.to("mm"))
 
@@ -78,7 +78,7 @@ def in_two_dimensions(thickness: Callable[[np.ndarray], np.ndarray], cells: int)
     """Return the same by the twin's own film."""
     x = (np.arange(cells) + 0.5) * 2.2 * REACH / cells - 1.1 * REACH
     film = thickness(np.hypot(x[:, None], x[None, :]))
-    sheet = FilmSheet(flat_faces(film.shape, (x[1] - x[0], x[1] - x[0])), _Grounded(x))
+    sheet = FilmSheet(Faces(np.ones((cells - 1, cells)), np.ones((cells, cells - 1))), _Grounded(x))
     return float(sheet.resistances(film)[0, 0])
 
 

@@ -27,7 +27,7 @@ from tactbench.sensors.icub.codec import (
     read_version,
     skin_frames,
 )
-from tactbench.sensors.icub.emulator import REST_RESULT, Board, Bus
+from tactbench.sensors.icub.emulator import Bus
 
 PERIOD_S = 0.02
 COMMANDS = (0x4D, 0x50, 0x07, 0x4C, 0x4E, 0x1C)
@@ -52,8 +52,8 @@ def main() -> int:
     given = parser.parse_args()
     generator = random.Random(given.seed)
     decoder = SkinDecoder(PERIOD_S, old_ids=True)
-    bus = Bus([Board(14, lambda triangle, now_s: [generator.choice((0, REST_RESULT, 0xFFFF))] * 12)])
-    calm = Bus([Board(14, lambda triangle, now_s: [REST_RESULT] * 12)])
+    bus = Bus(lambda now_s: {"T1": generator.choice((-1e9, 0.0, 243.0, 1e9))}, triangle=3)
+    calm = Bus(lambda now_s: {f"T{number}": 77.0 for number in range(1, 13)}, triangle=3)
     t_ns, began = 0, time.perf_counter()
     for number in range(1, given.count + 1):
         t_ns += generator.randrange(1_000_000)
@@ -74,7 +74,7 @@ def main() -> int:
             calm.feed(command_frame(14, command), 1e-9 * t_ns)
         calm.poll(1e-9 * t_ns + 0.03)
         back = [sent.data for _, sent in calm.poll(1e-9 * t_ns + 0.05)]
-        usual = [half.data for half in skin_frames(14, 3, [240] * 12)]
+        usual = [half.data for half in skin_frames(14, 3, [77] * 12)]
         if sample.taxels != bytes([77] * 12) or back[-2:] != usual:
             print(f"Not recovered after frame {number} of seed {given.seed}: {sample}, {back}", file=sys.stderr)
             return 1

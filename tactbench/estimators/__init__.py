@@ -78,21 +78,21 @@ def _curved() -> list[EstimatorDescriptor]:
     return [
         EstimatorDescriptor(
             name="knn", title="k nearest neighbours", kinds=BOTH, linear=False, params={"n_neighbors": 15},
-            where="tactbench.estimators.neighbours:neighbours", rehearsal={},
+            where="tactbench.estimators.nonlinear:neighbours", rehearsal={},
         ),
         EstimatorDescriptor(
             name="svm", title="Support vectors, Gaussian kernel, on every n-th row from 30 000 rows up", kinds=BOTH,
             linear=False, params={"C": 1.0, "gamma": "scale", "rows": 30_000},
-            where="tactbench.estimators.kernel:support_vectors", rehearsal={},
+            where="tactbench.estimators.nonlinear:support_vectors", rehearsal={},
         ),
         EstimatorDescriptor(
             name="boosting", title="Gradient boosting on histograms", kinds=BOTH, linear=False,
             params={"max_iter": 100, "learning_rate": 0.1, "max_leaf_nodes": 31},
-            where="tactbench.estimators.boosting:boosting", rehearsal={"max_iter": 2},
+            where="tactbench.estimators.nonlinear:boosting", rehearsal={"max_iter": 2},
         ),
         EstimatorDescriptor(
             name="mlp", title="Neural network with one hidden layer", kinds=BOTH, linear=False,
-            params={"hidden": 64, "alpha": 1e-4, "max_iter": 200}, where="tactbench.estimators.neural:perceptron",
+            params={"hidden": 64, "alpha": 1e-4, "max_iter": 200}, where="tactbench.estimators.nonlinear:perceptron",
             rehearsal={"max_iter": 2},
         ),
     ]  # fmt: skip
@@ -106,11 +106,11 @@ def _forests() -> list[EstimatorDescriptor]:
         found += [
             EstimatorDescriptor(
                 name=f"forest{number}", title=f"Random forest of {trees} trees", kinds=BOTH, linear=False,
-                params=params, where="tactbench.estimators.forest:forest", rehearsal={"n_estimators": 2},
+                params=params, where="tactbench.estimators.nonlinear:forest", rehearsal={"n_estimators": 2},
             ),
             EstimatorDescriptor(
                 name=f"forest-fast{number}", title=f"Random forest of {trees} trees by oneDAL (extra: fast)",
-                kinds=BOTH, linear=False, params=params, where="tactbench.estimators.fast_forest:fast_forest",
+                kinds=BOTH, linear=False, params=params, where="tactbench.estimators.nonlinear:fast_forest",
                 distributions=("scikit-learn-intelex", "daal"),
             ),
         ]  # fmt: skip

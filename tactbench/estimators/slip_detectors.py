@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from tactbench.estimators.nonlinear import EveryNth
 from tactbench.plugin import NotApplicable, StreamReadings
 
 if TYPE_CHECKING:
@@ -20,29 +21,18 @@ BANDS = 16
 """Of the spectrum."""
 
 
-class ConstantDetector:
-    """The same score for every frame."""
-
-    def __init__(self, score: float) -> None:
-        self.score = score
-
-    def fit(self, X: FloatArray, y: npt.NDArray[Any]) -> ConstantDetector:
-        """Learn nothing."""
-        return self
-
-    def predict(self, X: FloatArray) -> FloatArray:
-        """Return (n,) times the score."""
-        return np.full(len(X), self.score)
-
-
-def always(*, kind: str, seed: int, threads: int) -> ConstantDetector:
+def always(*, kind: str, seed: int, threads: int) -> Any:
     """Return what says slip in every frame."""
-    return ConstantDetector(1.0)
+    from sklearn.dummy import DummyRegressor
+
+    return DummyRegressor(strategy="constant", constant=1.0)
 
 
-def never(*, kind: str, seed: int, threads: int) -> ConstantDetector:
+def never(*, kind: str, seed: int, threads: int) -> Any:
     """Return what says slip in no frame."""
-    return ConstantDetector(0.0)
+    from sklearn.dummy import DummyRegressor
+
+    return DummyRegressor(strategy="constant", constant=0.0)
 
 
 class MeanFeature:
@@ -62,17 +52,8 @@ def mean_feature(*, kind: str, seed: int, threads: int) -> MeanFeature:
     return MeanFeature()
 
 
-class ClassifierDetector:
+class ClassifierDetector(EveryNth):
     """A classifier's confidence that a frame slips, learned from every n-th frame."""
-
-    def __init__(self, model: Any, rows: int) -> None:
-        self.model, self.rows = model, rows
-
-    def fit(self, X: FloatArray, y: npt.NDArray[Any]) -> ClassifierDetector:
-        """Learn from X (n, p) and whether frames slip, (n,) of 0 and 1."""
-        step = -(-len(X) // self.rows)
-        self.model.fit(X[::step], y[::step])
-        return self
 
     def predict(self, X: FloatArray) -> FloatArray:
         """Return (n,) confidences."""

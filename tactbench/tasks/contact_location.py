@@ -1,11 +1,79 @@
-"""Where on the skin something touches, from taxels."""
+"""Where on the skin something touches, from taxels.
+
+Its recordings are of a ball pressed at places scattered over the skin, each with the place as a reference.
+"""
 
 from __future__ import annotations
 
-from tactbench.plugin import TaskDescriptor, TaskSpec, VectorTarget, hookimpl
-from tactbench.tasks.contact_scenes import LOCATION_SCENES
+from collections.abc import Iterator
+
+from tactbench.plugin import (
+    ForceRamp,
+    Indenter,
+    Placement,
+    PlannedScene,
+    Quantity,
+    Role,
+    Scene,
+    TaskDescriptor,
+    TaskSpec,
+    VectorTarget,
+    assumed,
+    hookimpl,
+    sourced,
+)
 
 TACTBENCH_API = 1
+
+REACH_MM = 5.0
+"""Furthest commanded offset from the nominal contact point, along the finger and along its arc (assumed): a square of
+10 mm, on which the caps of 5 mm touch both sensors' active skin throughout."""
+SESSIONS: tuple[tuple[Role, int, int], ...] = (("train", 6, 10), ("validation", 2, 10), ("test", 5, 6))
+"""Role, sessions and places a session: five test sessions are the least that an interval over sessions is made of."""
+_SLOT_S = 30.0
+"""From the beginning of one recording to that of the next (assumed): a press, and the way to the next place."""
+_PRESS = ForceRamp(
+    hold=assumed(2.0, "s", "unloaded, to tare on"),
+    duration=assumed(12.0, "s", "2 s unloaded, then 0.5 N/s: slower than the skin creeps does not matter for a place"),
+    samples=240,
+)
+_RADIUS = sourced(5.0, "mm", "Karl et al. 2016: the smallest of its caps")
+_STEPS = (0.7548776662466927, 0.5698402909980532)
+"""1/g and 1/g² of the root g of g³ = g + 1: multiples of them, modulo 1, cover a square evenly (Roberts 2018, R2)."""
+
+
+def _places_mm() -> Iterator[tuple[float, float]]:
+    """Yield places without end, each set of consecutive ones spread evenly over the square."""
+    number = 0
+    while True:
+        number += 1
+        x, s = ((0.5 + number * step) % 1.0 for step in _STEPS)
+        yield REACH_MM * (2 * x - 1), REACH_MM * (2 * s - 1)
+
+
+def _scenes() -> Iterator[PlannedScene]:
+    places = _places_mm()
+    for role, sessions, each in SESSIONS:
+        for session in range(1, sessions + 1):
+            for number in range(1, each + 1):
+                x, s = next(places)
+                scene = Scene(
+                    name=f"place-{role}-{session}-{number}",
+                    indenter=Indenter(radius=_RADIUS),
+                    placement=Placement(x=_commanded(x), s=_commanded(s)),
+                    profile=_PRESS,
+                    session=f"{role}-{session}",
+                    starts_after_s=_SLOT_S * (number - 1),
+                    observe=("taxel", "position"),
+                )
+                yield PlannedScene(role=role, scene=scene)
+
+
+def _commanded(offset_mm: float) -> Quantity:
+    return assumed(round(offset_mm, 3), "mm", "one of the places scattered over the skin")
+
+
+LOCATION_SCENES = tuple(_scenes())
 
 SPEC = TaskSpec(
     name="contact-location",

@@ -18,7 +18,7 @@ from tactbench.plugin.simulation import Slide
 from tactbench.rigs.twin import tactbench_effects
 from tactbench.rigs.twin.rig import build
 from tactbench.tasks import contact_location, three_axis_force
-from tactbench.tasks.contact_scenes import LOCATION_SCENES, REACH_MM
+from tactbench.tasks.contact_location import LOCATION_SCENES, REACH_MM
 
 SENSORS = ["biotac", "icub"]
 

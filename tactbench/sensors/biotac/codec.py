@@ -1,4 +1,4 @@
-"""The BioTac's words on SPI: commands, replies and properties to bytes and back, and counts to units.
+"""The BioTac's words on SPI: commands, replies and properties to bytes and back.
 
 Nothing here reads, writes or waits. Two public sources state the protocol and agree where not said otherwise: [driver]
 kth-ros-pkg/biotac_driver, ``biotac.h`` and ``biotac.c`` (SynTouch's own library for the Cheetah adapter), and [manual]
@@ -13,18 +13,10 @@ an odd parity.
 from __future__ import annotations
 
 from enum import StrEnum
-from typing import TYPE_CHECKING, NamedTuple
-
-import numpy as np
+from typing import NamedTuple
 
 from tactbench.plugin import Quantity, sourced
-from tactbench.sensors.biotac.channels import CONVERTER_TOP, STREAMS
-from tactbench.sensors.biotac.spec import PARAMETERS
-
-if TYPE_CHECKING:
-    import numpy.typing as npt
-
-    from tactbench.plugin import FloatArray
+from tactbench.sensors.biotac.channels import STREAMS
 
 _DRIVER = "kth-ros-pkg/biotac_driver biotac.h"
 
@@ -41,6 +33,9 @@ INDEX: dict[str, int] = {
     "PAC": 0, "PDC": 1, "TAC": 2, "TDC": 3, "Hall": 15, **{f"E{n}": 16 + n for n in range(1, 25)},
 }  # fmt: skip
 """Number of each channel in a sampling command [sourced: driver; Hall on some models, E20 to E24 on the SP: manual]."""
+
+NAMES: dict[int, str] = {index: name for name, index in INDEX.items()}
+"""The same turned round."""
 
 STREAMING_INDEX = 16
 """Switches a sensor to the streaming of protocol 1.1, left only after 5 s without a clock [sourced]: never sent."""
@@ -84,13 +79,8 @@ PROPERTIES: dict[str, Property] = {
     "serial number": Property(0x15, 16),
     "cpu speed": Property(0x61, 2),
     "sampling frequency": Property(0x70, 2),
-    "sampling pattern": Property(0x73, 88),
 }
-"""All are read-only and sent without parity [sourced: manual, table 10; driver].
-
-The pattern is two bytes for each of 44 commands [derived from the manual's two bytes per command; the driver states
-a length of 44 and never reads it].
-"""
+"""All are read-only and sent without parity [sourced: manual, table 10; driver]."""
 
 
 class Fault(StrEnum):
@@ -112,8 +102,6 @@ class Reply(NamedTuple):
     value: int | None
     """0 to 4095 as received, wrong by a bit under PARITY and RESERVED; None where no datum came."""
     fault: Fault | None = None
-    error: int | None = None
-    """Second byte of an error reply, a key of :data:`ERRORS`."""
 
 
 def with_parity(payload: int) -> int:
@@ -167,7 +155,7 @@ def decoded(word: bytes) -> Reply:
         return Reply(None, Fault.NO_REPLY)
     first, second = word
     if first == ERROR and second in ERRORS:
-        return Reply(None, Fault.ERROR, second)
+        return Reply(None, Fault.ERROR)
     if word in (b"\x00\x00", b"\xff\xff"):
         return Reply(None, Fault.NOT_CONNECTED)
     value = (first >> 1) * 32 + (second >> 3)
@@ -182,28 +170,14 @@ def property_text(name: str, raw: bytes) -> str | None:
     Parameters
     ----------
     name
-        A key of :data:`PROPERTIES` other than the sampling frequency, whose byte order no source states.
+        Flex version, software version or serial number.
     raw
         The bytes that were clocked out; what follows the property's length is not looked at.
-
-    Raises
-    ------
-    KeyError
-        For an unknown name.
-    ValueError
-        For the sampling frequency.
     """
     length = PROPERTIES[name].length
-    if name == "sampling frequency":
-        raise ValueError("no source states the byte order of the sampling frequency")
     raw = raw[:length]
-    if name == "sampling pattern":
-        return _pattern_text(raw)
     if len(raw) < length:
         return None
-    if name == "cpu speed":
-        # Big-endian kHz, shown as MIPS [sourced: driver].
-        return None if raw in (b"\x00\x00", b"\xff\xff") else f"{int.from_bytes(raw, 'big') / 1000:.1f} MIPS"
     if not all(0x21 <= byte <= 0x7E for byte in raw):
         return None
     text = raw.decode("ascii")
@@ -214,76 +188,3 @@ def property_text(name: str, raw: bytes) -> str | None:
     # Serial number, grouped 2-2-2.1.1-1-2-1-4; a sensor is there if it begins with BT [sourced: driver].
     groups = f"{text[0:2]}-{text[2:4]}-{text[4:6]}.{text[6]}.{text[7]}-{text[8]}-{text[9:11]}-{text[11]}-{text[12:]}"
     return groups if text.startswith("BT") else None
-
-
-def _pattern_text(raw: bytes) -> str | None:
-    """Return the channels' names: ``1SSSSSSP 01`` for each command, the last ``1SSSSSSP FE`` [sourced: manual]."""
-    names = {with_parity(0x40 | index): name for name, index in INDEX.items()}
-    found = []
-    for place in range(0, len(raw) - 1, 2):
-        if raw[place] not in names or raw[place + 1] not in (0x01, 0xFE):
-            return None
-        found.append(names[raw[place]])
-        if raw[place + 1] == 0xFE:
-            return " ".join(found)
-    return None
-
-
-def electrode_ohm(count: npt.ArrayLike) -> FloatArray:
-    """Return the impedance of an electrode, ``(4095/E - 1) 10 kOhm`` [sourced: manual, section 5]; inf at 0 counts."""
-    reading = np.asarray(count, dtype=np.float64)
-    ratio = np.divide(CONVERTER_TOP, reading, out=np.full(reading.shape, np.inf), where=reading > 0.0)
-    return np.asarray((ratio - 1.0) * PARAMETERS["reference_resistor"].to("ohm"))
-
-
-def pressure_pa(channel: str, count: npt.ArrayLike, offset_count: float) -> FloatArray:
-    """Return PDC or PAC as pressure over that at `offset_count`, the reading untouched; the spec's scale per count.
-
-    Raises
-    ------
-    KeyError
-        For a channel without such a scale.
-    """
-    return np.asarray(_PA_PER_COUNT[channel] * (np.asarray(count, dtype=np.float64) - offset_count))
-
-
-def tdc_degc(count: npt.ArrayLike) -> FloatArray:
-    """Return TDC as temperature, ``b / ln((p - q x)/x) - 273.15`` with x = TDC/4095 [sourced: manual]; nan at 0.
-
-    q = 30 kOhm/0.6444 and p = 10/3 q assume a full scale of 3.0 V beside the stated 3.3 V, with which 2000 counts would
-    be about 3 degC more [derived]: keep the counts, too.
-    """
-    return np.asarray(PARAMETERS["thermistor_b"].to("K") / _thermistor_log(count) - 273.15)
-
-
-def tac_as_printed(count: npt.ArrayLike) -> FloatArray:
-    """Return the manual's formula for TAC, ``-41.07 / ln((p - q x)/x)``; nan at 0. It is no rate of temperature.
-
-    At mid-scale it gives about -3.3 where the manual states 0 to 1 degC/s, so the spec has no unit for TAC but counts
-    [derived]. For comparison with tables made by the maker's formula only.
-    """
-    return np.asarray(-41.07 / _thermistor_log(count))
-
-
-def _thermistor_log(count: npt.ArrayLike) -> FloatArray:
-    x = np.asarray(count, dtype=np.float64) / CONVERTER_TOP
-    x = np.where(x > 0.0, x, np.nan)
-    return np.asarray(np.log((PARAMETERS["thermistor_p"].value - PARAMETERS["thermistor_q"].value * x) / x))
-
-
-_PA_PER_COUNT = {
-    channel.name: channel.scale.to("Pa/count")
-    for stream in STREAMS
-    for channel in stream.channels
-    if channel.scale is not None and channel.kind in ("dc_pressure", "ac_pressure")
-}
-
-
-def exchange_s(n_sensors: int = 1, *, clock_hz: float | None = None, word_pause_s: float = 0.0) -> float:
-    """Return the seconds from a sampling command's first bit to the last reply's last.
-
-    One command to all sensors at once, the pause, then a word and `word_pause_s` for each [sourced: driver]. It must
-    stay below the spacing of commands, 227.3 us.
-    """
-    word_s = 16.0 / (CLOCK.to("Hz") if clock_hz is None else clock_hz)
-    return word_s + SAMPLING_PAUSE.to("s") + n_sensors * (word_s + word_pause_s)

@@ -11,7 +11,7 @@ import math
 from collections import Counter
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, ClassVar, Literal
+from typing import TYPE_CHECKING, ClassVar
 
 from tactbench.plugin import UsageError
 from tactbench.plugin.devices import Fault, SpiDeviceEmulator, fault_concerns
@@ -21,15 +21,14 @@ from tactbench.sensors.biotac.codec import (
     ERROR,
     FASTEST_CLOCK,
     INDEX,
+    NAMES,
     PROPERTIES,
     READ,
     SAMPLING_PAUSE,
     WRITE,
     encoded,
     parity_holds,
-    with_parity,
 )
-from tactbench.sensors.biotac.frames import DEFAULT_FRAME
 from tactbench.sensors.biotac.options import Options
 
 if TYPE_CHECKING:
@@ -38,7 +37,8 @@ if TYPE_CHECKING:
 _ROUNDING_S = 1e-9
 """Seconds as float64 are 0.1 ns apart after eleven days, and a host's sum of pauses rounds more than once."""
 
-_NAMES = {index: name for name, index in INDEX.items()}
+_IDLE = b"\xff"
+"""What is on the line while the sensor does not drive it [assumed: high]."""
 
 _FILLERS = (0x00, 0x01)
 """First byte that a host sends while it reads: 00 00, 00 01 and 01 00 are in use [sourced: driver, manual, and a public
@@ -103,15 +103,8 @@ DEFAULT_PROPERTIES: Mapping[str, bytes] = {
     "flex version": b"BD",
     "software version": b"0238",
     "serial number": b"BT2P0220B11E0004",
-    "cpu speed": (16000).to_bytes(2, "big"),
-    "sampling frequency": (4400).to_bytes(2, "big"),
-    "sampling pattern": b"".join(
-        bytes([with_parity(0x40 | INDEX[name]), 0xFE if place == len(DEFAULT_FRAME) - 1 else 0x01])
-        for place, name in enumerate(DEFAULT_FRAME)
-    ),
 }
-"""Serial and versions as in the maker's examples [sourced: QuickStart Guide]; speed [assumed]; big-endian frequency
-[assumed]; the default frame as pattern [derived]."""
+"""As in the maker's examples [sourced: QuickStart Guide]."""
 
 
 class Emulator(SpiDeviceEmulator):
@@ -133,11 +126,6 @@ class Emulator(SpiDeviceEmulator):
         Mask of its select lines: it hears what is sent with all of them active.
     clock_hz
         Of the bus: how long bytes take.
-    idle
-        What is on the line when the sensor does not drive it: 00 or FF.
-    early_resend
-        The answer to a resend before any word: ``error`` is A5 5F [sourced: driver], ``ignored`` is none [sourced:
-        manual].
     """
 
     def __init__(
@@ -148,16 +136,12 @@ class Emulator(SpiDeviceEmulator):
         faults: Iterable[BioTacFault] = (),
         select: int = 1,
         clock_hz: float | None = None,
-        idle: int = 0xFF,
-        early_resend: Literal["error", "ignored"] = "error",
     ) -> None:
         self._senses = senses or (lambda _: {})
         self._properties = {PROPERTIES[name].code: data for name, data in properties.items()}
         self.faults = list(faults)
         self._select = select
         self._byte_s = 8.0 / (CLOCK.to("Hz") if clock_hz is None else clock_hz)
-        self._idle = bytes([idle])
-        self._early_resend = early_resend
         self._answer: _Answer | None = None
         self._last: _Answer | None = None
         self._seen: Counter[Fault] = Counter()
@@ -184,16 +168,16 @@ class Emulator(SpiDeviceEmulator):
         """
         if any(fault.name == "not-connected" and fault.active(now_s) for fault in self.faults):
             self._answer, self._last = None, None
-            return self._idle * len(data)
+            return _IDLE * len(data)
         if select & self._select != self._select:
-            return self._idle * len(data)
+            return _IDLE * len(data)
         if self._answer is not None and data[:1] and data[0] in _FILLERS:
             return self._read(len(data), now_s)
         if len(data) < 2:
-            return self._idle * len(data)
+            return _IDLE * len(data)
         end_s = now_s + 2 * self._byte_s
         self._answer = self._command(data[0], data[1], end_s)
-        return self._idle * 2 + self._read(len(data) - 2, end_s)
+        return _IDLE * 2 + self._read(len(data) - 2, end_s)
 
     def _shown(self, name: str, channel: str, now_s: float) -> list[BioTacFault]:
         """Return the faults called `name` that concern the next word of `channel`."""
@@ -206,7 +190,7 @@ class Emulator(SpiDeviceEmulator):
     def _read(self, n: int, now_s: float) -> bytes:
         answer = self._answer
         if answer is None or n == 0:
-            return self._idle * n
+            return _IDLE * n
         if answer.early is not None and now_s < answer.ready_s - _ROUNDING_S:
             answer = self._answer = self._error(answer.early)
         if answer.word:
@@ -216,9 +200,9 @@ class Emulator(SpiDeviceEmulator):
         if answer.word and answer.sent >= len(answer.data):
             self._answer = None
         # What follows a property's last byte is assumed: the driver reads texts up to a 00 or FF.
-        return out + self._idle * (n - len(out))
+        return out + _IDLE * (n - len(out))
 
-    def _command(self, first: int, second: int, now_s: float) -> _Answer | None:
+    def _command(self, first: int, second: int, now_s: float) -> _Answer:
         """Return the answer to a command; parity is checked first, then the command, then its channel [assumed]."""
         if first in (0x20, 0x50):
             # 20 [sourced: driver] and 50, as the manual prints it, of even parity.
@@ -235,7 +219,7 @@ class Emulator(SpiDeviceEmulator):
         return self._error(0x3F)
 
     def _sample(self, index: int, now_s: float) -> _Answer:
-        channel = _NAMES.get(index, "")
+        channel = NAMES.get(index, "")
         sensed = self._senses(now_s).get(channel, REST.get(channel))
         if sensed is None:
             return self._error(0x58)
@@ -249,11 +233,12 @@ class Emulator(SpiDeviceEmulator):
         answer.early, answer.ready_s = 0x2D, now_s + SAMPLING_PAUSE.to("s")
         return answer
 
-    def _resend(self, now_s: float) -> _Answer | None:
+    def _resend(self, now_s: float) -> _Answer:
         """Return the last two bytes that were sent, errors among them [assumed], without a pause [assumed]."""
         if self._last is not None:
             return self._word(self._last.word, self._last.channel, now_s)
-        return self._error(0x5F) if self._early_resend == "error" else None
+        # As the driver has it; the manual says that such a request is ignored.
+        return self._error(0x5F)
 
     def _word(self, word: bytes, channel: str, now_s: float) -> _Answer:
         """Return a word as it comes over the line; what may be asked for again is the word itself."""
@@ -264,7 +249,7 @@ class Emulator(SpiDeviceEmulator):
             answer.data = (int.from_bytes(answer.data, "big") ^ 1 << self._turned % 16).to_bytes(2, "big")
             self._turned += 1
         if self._shown("dropped-reply", channel, now_s):
-            answer.data = self._idle * 2
+            answer.data = _IDLE * 2
         return answer
 
     def _error(self, second: int) -> _Answer:

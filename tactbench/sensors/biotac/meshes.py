@@ -69,46 +69,43 @@ def core_reach_mm(from_mm: float, ray_rad: float, angle_rad: float) -> float:
     return min(CORE_MM, (_FACET_MM + _AXIAL * (RAYS_FROM_MM - from_mm)) / leaning)
 
 
-ANGLES_DEG = (0.0, 10.0, 20.0, 30.0, 40.0, 50.0, 60.0, 70.0, 80.0, 90.0, 100.0)
+ANGLES_DEG = (0.0, 10.0, 20.0, 30.0, 40.0, 50.0, 60.0, 70.0, 80.0, 90.0)
 AT_X_MM: dict[float, tuple[float, ...]] = {
-    -17.2: (0.10,) * 11,
-    -17: (0.19, 0.20, 0.16, 0.18, 0.16, 0.15, 0.12, 0.15, 0.15, 0.14, 0.10),
-    -16: (0.34, 0.39, 0.36, 0.36, 0.32, 0.29, 0.23, 0.20, 0.16, 0.15, 0.11),
-    -15: (0.59, 0.63, 0.60, 0.58, 0.52, 0.44, 0.38, 0.31, 0.22, 0.16, 0.12),
-    -14: (0.80, 0.84, 0.79, 0.75, 0.68, 0.59, 0.49, 0.38, 0.26, 0.16, 0.07),
-    -13: (0.96, 1.00, 0.95, 0.88, 0.80, 0.69, 0.58, 0.43, 0.28, 0.15, 0),
-    -12: (1.08, 1.11, 1.06, 0.99, 0.89, 0.76, 0.61, 0.46, 0.28, 0.15, 0.04),
-    -10: (1.23, 1.26, 1.19, 1.10, 0.99, 0.84, 0.65, 0.49, 0.29, 0.15, 0.01),
-    -8: (1.31, 1.33, 1.25, 1.15, 1.02, 0.86, 0.66, 0.48, 0.28, 0.14, 0.06),
-    -6: (1.32, 1.35, 1.28, 1.17, 1.04, 0.86, 0.66, 0.47, 0.27, 0.14, 0.03),
-    -4: (1.33, 1.35, 1.27, 1.16, 1.03, 0.86, 0.65, 0.48, 0.28, 0.14, 0.01),
-    -2: (1.29, 1.32, 1.24, 1.13, 1.00, 0.84, 0.64, 0.47, 0.27, 0.13, 0.03),
-    0: (1.24, 1.24, 1.15, 1.05, 0.93, 0.78, 0.61, 0.45, 0.26, 0.14, 0.04),
-    1: (1.53, 1.44, 1.23, 1.05, 0.88, 0.73, 0.56, 0.41, 0.24, 0.13, 0.01),
+    -17.2: (0.10,) * 10,
+    -17: (0.19, 0.20, 0.16, 0.18, 0.16, 0.15, 0.12, 0.15, 0.15, 0.14),
+    -16: (0.34, 0.39, 0.36, 0.36, 0.32, 0.29, 0.23, 0.20, 0.16, 0.15),
+    -15: (0.59, 0.63, 0.60, 0.58, 0.52, 0.44, 0.38, 0.31, 0.22, 0.16),
+    -14: (0.80, 0.84, 0.79, 0.75, 0.68, 0.59, 0.49, 0.38, 0.26, 0.16),
+    -13: (0.96, 1.00, 0.95, 0.88, 0.80, 0.69, 0.58, 0.43, 0.28, 0.15),
+    -12: (1.08, 1.11, 1.06, 0.99, 0.89, 0.76, 0.61, 0.46, 0.28, 0.15),
+    -10: (1.23, 1.26, 1.19, 1.10, 0.99, 0.84, 0.65, 0.49, 0.29, 0.15),
+    -8: (1.31, 1.33, 1.25, 1.15, 1.02, 0.86, 0.66, 0.48, 0.28, 0.14),
+    -6: (1.32, 1.35, 1.28, 1.17, 1.04, 0.86, 0.66, 0.47, 0.27, 0.14),
+    -4: (1.33, 1.35, 1.27, 1.16, 1.03, 0.86, 0.65, 0.48, 0.28, 0.14),
+    -2: (1.29, 1.32, 1.24, 1.13, 1.00, 0.84, 0.64, 0.47, 0.27, 0.13),
+    0: (1.24, 1.24, 1.15, 1.05, 0.93, 0.78, 0.61, 0.45, 0.26, 0.14),
+    1: (1.53, 1.44, 1.23, 1.05, 0.88, 0.73, 0.56, 0.41, 0.24, 0.13),
 }  # fmt: skip
 """Millimetres by axial place and angle, inner skin less core, left and right averaged (they differ by .011 mm on
 average); the meshes' edges of .6-.8 mm leave about .03 mm. -17.2 mm, the seal, is the law's: see SOURCE."""
 AT_RAY_DEG: dict[float, tuple[float, ...]] = {
-    5: (2.04, 1.96, 1.69, 1.27, 0.92, 0.67, 0.53, 0.38, 0.23, 0.11, 0),
-    15: (2.32, 2.24, 2.01, 1.61, 1.12, 0.70, 0.52, 0.39, 0.26, 0.15, 0.03),
-    25: (2.45, 2.37, 2.15, 1.77, 1.27, 0.81, 0.54, 0.41, 0.31, 0.18, 0.07),
-    35: (2.38, 2.32, 2.12, 1.80, 1.34, 0.88, 0.59, 0.42, 0.32, 0.22, 0.10),
-    45: (2.17, 2.12, 1.95, 1.67, 1.28, 0.87, 0.61, 0.45, 0.37, 0.28, 0.17),
-    55: (1.79, 1.74, 1.60, 1.37, 1.06, 0.81, 0.59, 0.47, 0.40, 0.32, 0.21),
-    65: (1.25, 1.21, 1.12, 0.98, 0.80, 0.60, 0.55, 0.48, 0.40, 0.34, 0.24),
-    75: (0.73, 0.73, 0.70, 0.65, 0.60, 0.52, 0.48, 0.45, 0.41, 0.38, 0.33),
-    85: (0.45, 0.46, 0.47, 0.46, 0.45, 0.44, 0.43, 0.44, 0.44, 0.42, 0.41),
+    5: (2.04, 1.96, 1.69, 1.27, 0.92, 0.67, 0.53, 0.38, 0.23, 0.11),
+    15: (2.32, 2.24, 2.01, 1.61, 1.12, 0.70, 0.52, 0.39, 0.26, 0.15),
+    25: (2.45, 2.37, 2.15, 1.77, 1.27, 0.81, 0.54, 0.41, 0.31, 0.18),
+    35: (2.38, 2.32, 2.12, 1.80, 1.34, 0.88, 0.59, 0.42, 0.32, 0.22),
+    45: (2.17, 2.12, 1.95, 1.67, 1.28, 0.87, 0.61, 0.45, 0.37, 0.28),
+    55: (1.79, 1.74, 1.60, 1.37, 1.06, 0.81, 0.59, 0.47, 0.40, 0.32),
+    65: (1.25, 1.21, 1.12, 0.98, 0.80, 0.60, 0.55, 0.48, 0.40, 0.34),
+    75: (0.73, 0.73, 0.70, 0.65, 0.60, 0.52, 0.48, 0.45, 0.41, 0.38),
+    85: (0.45, 0.46, 0.47, 0.46, 0.45, 0.44, 0.43, 0.44, 0.44, 0.42),
 }  # fmt: skip
 """The same at the tip, by the ray's angle from straight down towards the tip."""
+_FILM_MM = (*AT_X_MM.values(), *AT_RAY_DEG.values())
 SOURCE = Source(
     tag="derived",
     reference=f"inner skin less core, {MESHES}; at the seal the law max(min(.13, g), .05 + (g - .05) cos(angle)) "
     "through x <= 0 (rms .026 mm), g = .10 mm",
 )
-
-
-_ANGLES_DEG = tuple(angle for angle in ANGLES_DEG if angle <= 90)
-"""Of the pad's half of the finger, the sheet's."""
 
 
 def film_table(outer_mm: float, dome_mm: float) -> SheetTable:
@@ -119,7 +116,7 @@ def film_table(outer_mm: float, dome_mm: float) -> SheetTable:
     outer_mm, dome_mm
         Radius of the sheet's cylinder, and where its dome begins.
     """
-    return SheetTable(x_mm=_places(outer_mm, dome_mm), angle_deg=_ANGLES_DEG, value_mm=tuple(_rows()), source=SOURCE)
+    return SheetTable(x_mm=_places(outer_mm, dome_mm), angle_deg=ANGLES_DEG, value_mm=_FILM_MM, source=SOURCE)
 
 
 def relief_table(outer_mm: float, dome_mm: float, skin_mm: float) -> SheetTable:
@@ -139,13 +136,13 @@ def relief_table(outer_mm: float, dome_mm: float, skin_mm: float) -> SheetTable:
     rows = tuple(
         tuple(
             round(way - (core_reach_mm(begin, ray, math.radians(angle)) + thickness + skin_mm), 3)
-            for angle, thickness in zip(_ANGLES_DEG, film, strict=True)
+            for angle, thickness in zip(ANGLES_DEG, film, strict=True)
         )
-        for (begin, ray, way), film in zip(reach, _rows(), strict=True)
+        for (begin, ray, way), film in zip(reach, _FILM_MM, strict=True)
     )
     return SheetTable(
         x_mm=_places(outer_mm, dome_mm),
-        angle_deg=_ANGLES_DEG,
+        angle_deg=ANGLES_DEG,
         value_mm=rows,
         source=Source(
             tag="derived",
@@ -153,10 +150,6 @@ def relief_table(outer_mm: float, dome_mm: float, skin_mm: float) -> SheetTable:
             "core's axis (rms .02 mm); such a skin has 1660 mm^3, the mesh 1631",
         ),
     )
-
-
-def _rows() -> list[tuple[float, ...]]:
-    return [row[: len(_ANGLES_DEG)] for row in (*AT_X_MM.values(), *AT_RAY_DEG.values())]
 
 
 def _places(outer_mm: float, dome_mm: float) -> tuple[float, ...]:

@@ -21,8 +21,8 @@ import numpy.typing as npt
 
 from tactbench.plugin import FloatArray, RigError
 
-_DIRECTIONS = ((0, -1), (0, 1), (1, -1), (1, 1))
-"""(axis, sign) of a cell's four faces."""
+_AXIS, _SIGN = np.array([0, 0, 1, 1]), np.array([[-1], [1], [-1], [1]])
+"""Of a cell's four faces."""
 _MOST_DECAYS = 9.0
 """Decay lengths inside the rim beyond which a cell counts as joined perfectly: exp(9) is stiff enough."""
 _LEAST_WAY = 0.02
@@ -64,8 +64,7 @@ class RimmedDiscs:
         self.count = len(electrodes)
         cell = (float(x_mm[1] - x_mm[0]), float(s_mm[1] - s_mm[0]))
         discs = [*electrodes, *excitation]
-        owner, row, column = [], [], []
-        offset: list[npt.NDArray[np.float64]] = []
+        found = []
         for number, disc in enumerate(discs):
             along, across = (x_mm - disc.x_mm) * disc.stretch[0], (s_mm - disc.s_mm) * disc.stretch[1]
             i, j = np.nonzero(along[:, None] ** 2 + across[None, :] ** 2 < disc.radius_mm**2)
@@ -75,20 +74,17 @@ class RimmedDiscs:
                     f"a conduction grid of {cell[0]:.2f} x {cell[1]:.2f} mm.",
                     hint="Correct the sensor's electrode positions or its SkinSheet, or ask for more cells.",
                 )
-            owner.append(np.full(i.size, number))
-            row.append(i)
-            column.append(j)
-            offset.append(np.stack([along[i], across[j]]))
-        whose, i, j = np.concatenate(owner), np.concatenate(row), np.concatenate(column)
+            found.append((np.full(i.size, number), np.stack([i, j]), np.stack([along[i], across[j]])))
+        whose, place, offset = (np.concatenate(parts, axis=-1) for parts in zip(*found, strict=True))
         self._radius = np.array([disc.radius_mm for disc in discs])[whose]
         # Of each cell, as large as its disc's own stretch makes it.
         step = np.array(cell)[:, None] * np.array([disc.stretch for disc in discs])[whose].T
         self._area = step[0] * step[1]
-        self._cell = i * s_mm.size + j
+        self._cell = place[0] * s_mm.size + place[1]
         electrode = whose < self.count
         self.owner, self.under = whose[electrode], self._cell[electrode]
         self._driven = self._cell[~electrode]
-        self._rims(np.concatenate(offset, axis=1), whose, i, j, step, (x_mm.size, s_mm.size))
+        self._rims(offset, place, step, np.array([[x_mm.size], [s_mm.size]]))
         plain = self._area.copy()
         plain[self._beside] = self._beside_rim(np.full(self._beside.size, _THICK)) * _THICK**2
         true_area = np.array([np.pi * disc.radius_mm**2 for disc in discs])
@@ -96,54 +92,32 @@ class RimmedDiscs:
         self._scale = (true_area / np.bincount(whose, weights=plain))[whose]
 
     def _rims(
-        self,
-        offset: FloatArray,
-        whose: npt.NDArray[np.intp],
-        i: npt.NDArray[np.intp],
-        j: npt.NDArray[np.intp],
-        step: FloatArray,
-        shape: tuple[int, int],
+        self, offset: FloatArray, place: npt.NDArray[np.intp], step: FloatArray, shape: npt.NDArray[np.intp]
     ) -> None:
-        """Find the faces that cross a rim, and what plane each cell beside one sees."""
-        radius = self._radius
+        """Find the faces that cross a rim, and what plane each cell beside one sees; all are (4, cells)."""
         distance = np.maximum(np.hypot(*offset), 1e-9)
-        normal = offset / distance
-        crossing = np.zeros((4, whose.size), dtype=bool)
-        exists = np.ones((4, whose.size), dtype=bool)
-        faces: list[list[npt.NDArray[np.intp]]] = [[], []]
-        inner: list[list[npt.NDArray[np.intp]]] = [[], []]
-        ways: list[list[FloatArray]] = [[], []]
-        slopes: list[list[FloatArray]] = [[], []]
-        lengths: list[list[FloatArray]] = [[], []]
-        for place, (axis, sign) in enumerate(_DIRECTIONS):
-            beyond = offset[axis] + sign * step[axis]
-            there = (i, j)[axis] + sign
-            # At the sheet's insulated edge there is no face.
-            exists[place] = (there >= 0) & (there < shape[axis])
-            out = (beyond**2 + offset[1 - axis] ** 2 >= radius**2) & exists[place]
-            crossing[place] = out
-            rim = np.sqrt(np.maximum(radius**2 - offset[1 - axis] ** 2, 0.0))
-            way = np.clip(sign * beyond - rim, _LEAST_WAY * step[axis], step[axis])
-            lengths[axis].append(step[axis][out])
-            first = i - (axis == 0) * (sign < 0), j - (axis == 1) * (sign < 0)
-            # Faces along x are numbered like cells, those along s have a column less.
-            faces[axis].append((first[0] * (shape[1] - axis) + first[1])[out])
-            inner[axis].append(np.flatnonzero(out))
-            ways[axis].append(way[out])
-            slopes[axis].append(np.maximum(sign * normal[axis][out], _GRAZING))
-        self._faces = [np.concatenate(found) for found in faces]
-        self._inner = [np.concatenate(found) for found in inner]
-        self._way = [np.concatenate(found) for found in ways]
-        self._slope = [np.concatenate(found) for found in slopes]
-        self._length = [np.concatenate(found) for found in lengths]
-        self._beside = np.flatnonzero(crossing.any(axis=0))
-        self._crossing = crossing[:, self._beside]
-        self._exists = exists[:, self._beside]
-        self._depth = (radius - distance)[self._beside]
-        # Of each face: width over distance, and how far it leads along the normal.
-        self._outward = np.stack([sign * normal[axis][self._beside] for axis, sign in _DIRECTIONS])
-        self._width = np.stack([step[1 - axis][self._beside] for axis, _ in _DIRECTIONS])
-        self._reach = np.stack([step[axis][self._beside] for axis, _ in _DIRECTIONS])
+        outward = _SIGN * (offset / distance)[_AXIS]
+        reach, width = step[_AXIS], step[1 - _AXIS]
+        beyond, sideways = offset[_AXIS] + _SIGN * reach, offset[1 - _AXIS]
+        there = place[_AXIS] + _SIGN
+        # At the sheet's insulated edge there is no face.
+        exists = (there >= 0) & (there < shape[_AXIS])
+        crossing = (beyond**2 + sideways**2 >= self._radius**2) & exists
+        rim = np.sqrt(np.maximum(self._radius**2 - sideways**2, 0.0))
+        way = np.clip(_SIGN * beyond - rim, _LEAST_WAY * reach, reach)
+        slope = np.maximum(outward, _GRAZING)
+        self._crossed = []
+        for axis in (0, 1):
+            rows, crossed = slice(2 * axis, 2 * axis + 2), crossing[2 * axis : 2 * axis + 2]
+            _, inner = np.nonzero(crossed)
+            # A face has the number of the cell before it; those along s have a column less.
+            first = place[:, None, :] - np.eye(2, dtype=int)[axis][:, None, None] * (_SIGN[rows] < 0)
+            face = first[0] * (shape[1] - axis) + first[1]
+            self._crossed.append((face[crossed], inner, *(part[rows][crossed] for part in (reach, slope, way))))
+        self._beside = beside = np.flatnonzero(crossing.any(axis=0))
+        self._crossing, self._exists = crossing[:, beside], exists[:, beside]
+        self._depth = (self._radius - distance)[beside]
+        self._outward, self._width, self._reach = outward[:, beside], width[:, beside], reach[:, beside]
 
     def _decay(self, film: FloatArray, cells: npt.NDArray[np.intp] | slice = slice(None)) -> FloatArray:
         """Return lambda, for a film given at the discs' cells."""
@@ -171,8 +145,7 @@ class RimmedDiscs:
     def narrow(self, film_mm: FloatArray, along_x: FloatArray, along_s: FloatArray) -> None:
         """Shorten the way of the faces that cross a rim; changes the (nx-1, ns) and (nx, ns-1) conductances."""
         flat = film_mm.reshape(-1)
-        for axis, conductance in enumerate((along_x.reshape(-1), along_s.reshape(-1))):
-            inner, step, slope, way = self._inner[axis], self._length[axis], self._slope[axis], self._way[axis]
+        for (face, inner, step, slope, way), conductance in zip(self._crossed, (along_x, along_s), strict=True):
             decay = self._decay(flat[self._cell[inner]], inner)
             inside = (decay / slope) * -np.expm1(-(step - way) * slope / decay)
-            conductance[self._faces[axis]] *= step / np.maximum(way + inside, _LEAST_WAY * step)
+            conductance.reshape(-1)[face] *= step / np.maximum(way + inside, _LEAST_WAY * step)

@@ -11,19 +11,22 @@ from functools import lru_cache
 import numpy as np
 
 from tactbench.plugin import FloatArray, RigError, SensorSpec
-from tactbench.plugin.simulation import SkinGrid, SkinState
-from tactbench.sensors.biotac.discs import discs_on, dome_mm, outer_radius_mm, shell_of
+from tactbench.plugin.simulation import FluidBackedShell, SkinGrid, SkinState
 from tactbench.sensors.biotac.electrodes import NAMES
 from tactbench.sensors.biotac.film import REFINEMENT, edges, mid_film_mm, refined, spectral_interpolation
+from tactbench.sensors.biotac.meshes import sheet_x
+from tactbench.sensors.biotac.rims import Disc, RimmedDiscs
 from tactbench.sensors.biotac.sheet import FilmSheet, faces_between
+
+_STEP_MM = 0.1
+"""Over which the film's stretch under a disc is taken: an eighth of the disc or less."""
 
 
 class Preparation:
     """What does not depend on the load: geometry and interpolation."""
 
     def __init__(self, sensor: SensorSpec, grid: SkinGrid, refinement: int) -> None:
-        self.skin = shell_of(sensor)
-        outer, dome = outer_radius_mm(sensor), dome_mm(sensor)
+        self.skin, outer, dome = finger_of(sensor)
         self.coarse_film = self.skin.film.at(grid.x_mm, grid.s_mm / outer)
         fine = refined(grid, refinement)
         self.film = self.skin.film.at(fine.x_mm, fine.s_mm / outer)
@@ -131,23 +134,59 @@ def build(
 
 def prepared(sensor: SensorSpec, grid: SkinGrid, refinement: int = REFINEMENT) -> Preparation:
     """Return the preparation for `sensor` and `grid`, made once and kept."""
-    return _prepared(_Key(sensor, grid, refinement))
-
-
-class _Key:
-    """Specs hold dictionaries and grids arrays: neither can be hashed, their contents can."""
-
-    def __init__(self, sensor: SensorSpec, grid: SkinGrid, refinement: int) -> None:
-        self.sensor, self.grid, self.refinement = sensor, grid, refinement
-        self._text = (sensor.model_dump_json(), grid.x_mm.tobytes(), grid.s_mm.tobytes(), refinement)
-
-    def __hash__(self) -> int:
-        return hash(self._text)
-
-    def __eq__(self, other: object) -> bool:
-        return isinstance(other, _Key) and self._text == other._text
+    return _prepared(sensor.model_dump_json(), grid.x_mm.tobytes(), grid.s_mm.tobytes(), refinement)
 
 
 @lru_cache(maxsize=8)
-def _prepared(key: _Key) -> Preparation:
-    return Preparation(key.sensor, key.grid, key.refinement)
+def _prepared(sensor: str, x_mm: bytes, s_mm: bytes, refinement: int) -> Preparation:
+    """Specs hold dictionaries and grids arrays: neither can be hashed, their contents can."""
+    return Preparation(
+        SensorSpec.model_validate_json(sensor), SkinGrid(np.frombuffer(x_mm), np.frombuffer(s_mm)), refinement
+    )
+
+
+def discs_on(sensor: SensorSpec, grid: SkinGrid) -> RimmedDiscs:
+    """Return electrodes and excitation on the cells of `grid`, round in the metric of the film's middle.
+
+    Raises
+    ------
+    RigError
+        If an electrode has no position, or lies outside the sheet.
+    """
+    par = sensor.parameters
+    electrode_radius, excitation_radius = par["electrode_radius"].to("mm"), par["excitation_radius"].to("mm")
+    _, outer, dome = finger_of(sensor)
+    electrodes = []
+    for channel in sensor.channels("taxel"):
+        if channel.position_m is None:
+            raise RigError(f"{channel.name} of {sensor.name} has no position.", hint="Give ChannelSpec.position_m.")
+        x, y, z = (1e3 * component for component in channel.position_m)
+        place = sheet_x(x, float(np.hypot(y, z)), outer, dome)
+        electrodes.append(disc_at(sensor, place, float(np.arctan2(y, -z)), electrode_radius))
+    excitation = []
+    for pair in ("front", "back"):
+        x = par[f"excitation_x_{pair}"].to("mm")
+        angle = par[f"excitation_arc_{pair}"].to("mm") / par["core_radius"].to("mm")
+        excitation += [disc_at(sensor, x, side, excitation_radius) for side in (-angle, angle)]
+    return RimmedDiscs(grid.x_mm, grid.s_mm, electrodes, excitation)
+
+
+def disc_at(sensor: SensorSpec, x_mm: float, angle_rad: float, radius_mm: float) -> Disc:
+    """Return a disc at a place of the sheet, with the stretch of the film's middle there."""
+    skin, outer, dome = finger_of(sensor)
+    x, angle = x_mm + _STEP_MM * np.array([-1.0, 1.0]), angle_rad + _STEP_MM / outer * np.array([-1.0, 1.0])
+    corners = mid_film_mm(x, angle, skin.film.at(x, angle), outer, dome)
+    along, across = corners[1] - corners[0], corners[:, 1] - corners[:, 0]
+    stretch = tuple(float(np.linalg.norm(way.mean(axis=0))) / (2 * _STEP_MM) for way in (along, across))
+    return Disc(x_mm, angle_rad * outer, radius_mm, (stretch[0], stretch[1]))
+
+
+def finger_of(sensor: SensorSpec) -> tuple[FluidBackedShell, float, float]:
+    """Return the shell, its outer radius and where its dome begins [mm]; raises RigError for another skin."""
+    skin = sensor.skin
+    if not isinstance(skin, FluidBackedShell) or skin.sheet.outer_radius is None or skin.sheet.dome is None:
+        raise RigError(
+            f"{sensor.name} has no fluid-backed shell with an outer radius and a dome, which this transduction needs.",
+            hint="Declare the skin as FluidBackedShell with both, or name another transducer.",
+        )
+    return skin, skin.sheet.outer_radius.to("mm"), skin.sheet.dome.start.to("mm")

@@ -109,7 +109,8 @@ def build(sensor: SensorSpec, grid: SkinGrid, channel_names: Sequence[str]) -> I
         raise RigError(f"{sensor.name} has no taxel {', '.join(unknown)}.", hint=f"Taxels: {', '.join(taxels)}.")
     radius = sensor.parameters["taxel_radius"].to("mm")
     outer = skin.sheet.outer_radius.to("mm")
-    weights = [_kept(_Grid(grid), _place_mm(taxels[name], outer), radius) for name in channel_names]
+    cells = grid.x_mm.tobytes(), grid.s_mm.tobytes()
+    weights = [_kept(*cells, _place_mm(taxels[name], outer), radius) for name in channel_names]
     return ICubTransducer(
         np.stack(weights) if weights else np.empty((0, len(grid.x_mm) * len(grid.s_mm))),
         np.array([_rest(taxels[name]) for name in channel_names]),
@@ -119,24 +120,10 @@ def build(sensor: SensorSpec, grid: SkinGrid, channel_names: Sequence[str]) -> I
     )
 
 
-class _Grid:
-    """A grid as a key: arrays cannot be hashed, their contents can."""
-
-    def __init__(self, grid: SkinGrid) -> None:
-        self.grid = grid
-        self._text = (grid.x_mm.tobytes(), grid.s_mm.tobytes())
-
-    def __hash__(self) -> int:
-        return hash(self._text)
-
-    def __eq__(self, other: object) -> bool:
-        return isinstance(other, _Grid) and self._text == other._text
-
-
 @lru_cache(maxsize=64)
-def _kept(grid: _Grid, centre_mm: tuple[float, float], radius_mm: float) -> FloatArray:
+def _kept(x_mm: bytes, s_mm: bytes, centre_mm: tuple[float, float], radius_mm: float) -> FloatArray:
     """Return the flat weight of a taxel, made once for all recordings of a process."""
-    return taxel_weight(grid.grid, centre_mm, radius_mm).ravel()
+    return taxel_weight(SkinGrid(np.frombuffer(x_mm), np.frombuffer(s_mm)), centre_mm, radius_mm).ravel()
 
 
 def _place_mm(taxel: ChannelSpec, outer_radius_mm: float) -> tuple[float, float]:

@@ -11,19 +11,16 @@ import numpy as np
 import pytest
 
 from tactbench.links.bridge_emulator import BridgeEmulator
-from tactbench.plugin import Quality, RigError, UsageError, load_object
+from tactbench.plugin import Quality, RigError, UsageError
 from tactbench.plugin.devices import (
     DriverSettings,
     EmulatorSettings,
     LinkError,
-    LinkTimeout,
     LinkUnplugged,
     SpiLink,
     SpiReply,
     open_link,
 )
-from tactbench.sensors.biotac import driver as module
-from tactbench.sensors.biotac import tactbench_sensors
 from tactbench.sensors.biotac.codec import CHANNELS
 from tactbench.sensors.biotac.driver import build
 from tactbench.sensors.biotac.emulator import Emulator, build_emulator
@@ -162,14 +159,6 @@ def assert_sensed(streams, sensed):
         assert fast["quality"][row, 0] or fast["data"][row, 0] == sensed.count(2 * n + 1), n
 
 
-def test_the_sensor_names_driver_emulator_and_log_reader():
-    (descriptor,) = tactbench_sensors()
-    assert load_object(descriptor.driver) is build
-    assert load_object(descriptor.emulator) is build_emulator
-    assert descriptor.emulated_link == "spi"
-    assert callable(load_object(descriptor.log_reader))
-
-
 # In virtual time
 
 
@@ -192,10 +181,6 @@ def test_the_mean_rate_is_4400_words_a_second(speed_hz):
     late_ns = fast["t_ns"][21::22] - fast["device_ns"][21::22]
     assert 0 < late_ns.min() <= late_ns.max() < 227_273 + 1000
     assert_sensed(streams, sensed)
-
-
-def test_no_clock_but_the_settings_is_asked():
-    assert not hasattr(module, "time")
 
 
 def test_the_counter_is_counted_on_over_its_wraps():
@@ -467,48 +452,6 @@ def test_a_second_at_full_rate_through_the_bridge():
 
 
 @needs_pty
-@pytest.mark.parametrize(
-    ("fault", "column", "quality", "counts"),
-    [
-        ("parity:channels=E5", "E5", SUSPECT, {"parity E5": 4}),
-        ("dropped-reply:channels=E5", "E5", MISSING, {"not connected E5": 4}),
-        ("error-reply:channels=E5", "E5", MISSING, {"error reply E5": 4}),
-        ("doubled-reply:channels=E5", "E5", 0, {}),
-        ("stuck-channel:channels=E5", "E5", 0, {}),
-    ],
-    ids=lambda value: value.partition(":")[0] if isinstance(value, str) else None,
-)
-def test_a_fault_of_one_channel_through_the_bridge(fault, column, quality, counts):
-    sensed = Sensed()
-    with bridged(sensed, fault, options={"batches_ahead": 4}) as (driver, _, _):
-        driver.start()
-        streams = read_frames(driver, 4)
-        frames = len(streams["electrodes"]["sequence"])
-        seen = {name: n for name, n in driver.counts.items() if not name.startswith(("batches", "frames"))}
-    assert seen == dict.fromkeys(counts, frames)
-    slow, fast = streams["electrodes"], streams["vibration"]
-    assert set(slow["quality"][:, COLUMN[column]]) == {quality}
-    assert not np.delete(slow["quality"], COLUMN[column], axis=1).any()
-    assert not fast["quality"].any()
-    values = slow["data"][:, COLUMN[column]]
-    if fault.startswith("doubled"):
-        assert np.array_equal(values, fast["data"][3::22, 0])
-    if fault.startswith("stuck"):
-        assert set(values) == {sensed.count(DEFAULT_FRAME.index(column))}
-
-
-@needs_pty
-def test_a_sensor_that_is_not_connected_through_the_bridge():
-    with bridged(Sensed(), "not-connected") as (driver, _, _):
-        with pytest.raises(RigError, match="No BioTac answers"):
-            driver.identify()
-        driver.start()
-        streams = read_frames(driver, 2)
-        assert driver.counts["not connected E7"] == len(streams["electrodes"]["sequence"])
-    assert all((stream["quality"] == MISSING).all() for stream in streams.values())
-
-
-@needs_pty
 @pytest.mark.parametrize("fault", ["dropped", "damaged"])
 def test_replies_that_the_bridge_loses_are_gaps_and_the_next_frame_is_whole(fault):
     sensed = Sensed()
@@ -564,21 +507,3 @@ def test_a_bridge_that_takes_short_batches_only():
     with bridged(Sensed(), options={"batch_words": 20}, largest_payload=300) as (driver, _, _):
         driver.start()
         read_frames(driver, 3)
-
-
-@needs_pty
-def test_a_bridge_that_holds_fewer_batches_gets_fewer():
-    sensed = Sensed()
-    with bridged(sensed, holds=2) as (driver, _, _):
-        driver.start()
-        streams = read_frames(driver, 5)
-        counts = driver.counts
-    assert_nothing_lost(streams, counts, sensed)
-
-
-@needs_pty
-def test_a_bridge_that_does_not_answer_is_a_timeout():
-    with bridged(Sensed()) as (driver, model, _):
-        model.faults.add("dropped")
-        with pytest.raises(LinkTimeout):
-            driver.identify()

@@ -9,18 +9,8 @@ from hypothesis import strategies as st
 
 from tactbench.plugin import UsageError
 from tactbench.plugin.devices import EmulatorSettings
-from tactbench.sensors.biotac.codec import (
-    INDEX,
-    PROPERTIES,
-    RESEND,
-    Fault,
-    decoded,
-    property_command,
-    property_text,
-    sampling_command,
-)
-from tactbench.sensors.biotac.emulator import DEFAULT_PROPERTIES, REST, BioTacFault, Emulator, build_emulator
-from tactbench.sensors.biotac.frames import DEFAULT_FRAME
+from tactbench.sensors.biotac.codec import INDEX, RESEND, Fault, decoded, sampling_command
+from tactbench.sensors.biotac.emulator import REST, BioTacFault, Emulator, build_emulator
 from tactbench.sensors.biotac.spec import SPEC
 
 COUNTS = {**REST, "E1": 1739.0, "PAC": 2021.0, "PDC": 2000.0, "TDC": 1500.0}
@@ -49,10 +39,6 @@ def test_a_resend_repeats_the_last_word(resend):
     assert exchange(sensor, bytes.fromhex("8600")) == bytes.fromhex("5DE0")
     for n in range(1, 3):
         assert exchange(sensor, bytes.fromhex(resend), at_s=n * 1e-3, pause_s=0.0) == bytes.fromhex("5DE0")
-
-
-def test_a_resend_before_any_word_may_be_ignored():
-    assert exchange(Emulator(early_resend="ignored"), RESEND) == b"\xff\xff"
 
 
 def test_bt_4_too_short_a_pause():
@@ -101,23 +87,6 @@ def test_bt_4_no_sensor():
     assert exchange(sensor, b"\x61\x15", 1) == b"\xff"
 
 
-def test_the_default_properties_are_read_back():
-    sensor = Emulator()
-    shown = {
-        name: property_text(name, exchange(sensor, property_command(name), fact.length, at_s=float(n)))
-        for n, (name, fact) in enumerate(PROPERTIES.items())
-        if name != "sampling frequency"
-    }
-    assert shown == {
-        "flex version": "B.D",
-        "software version": "2.38",
-        "serial number": "BT-2P-02.2.0-B-11-E-0004",
-        "cpu speed": "16.0 MIPS",
-        "sampling pattern": " ".join(DEFAULT_FRAME),
-    }
-    assert all(len(data) == PROPERTIES[name].length for name, data in DEFAULT_PROPERTIES.items())
-
-
 @pytest.mark.parametrize(
     ("command", "pause_s", "answer"),
     [("6112", 50e-6, "A545"), ("6192", 50e-6, "A53F"), ("4013", 50e-6, "A552"), ("6113", 10e-6, "A52E")],
@@ -127,50 +96,13 @@ def test_property_commands_that_are_refused(command, pause_s, answer):
     assert exchange(Emulator(), bytes.fromhex(command), pause_s=pause_s) == bytes.fromhex(answer)
 
 
-def test_what_is_left_out_is_at_rest():
-    sensor = Emulator()
-    for n, channel in enumerate(SPEC.channels()):
-        reply = decoded(exchange(sensor, sampling_command(INDEX[channel.name]), at_s=float(n)))
-        # To the converter's step, half a count.
-        assert reply.value == pytest.approx(channel.rest.value, abs=0.5)
-
-
 @given(counts=st.floats(-1e4, 1e4), channel=st.sampled_from(SPEC.channels()))
-def test_what_is_sensed_comes_back_to_the_converters_step(counts, channel):
-    reply = decoded(exchange(Emulator(lambda t_s: {channel.name: counts}), sampling_command(INDEX[channel.name])))
+def test_what_is_sensed_comes_back_to_the_converters_step_and_what_is_left_out_is_at_rest(counts, channel):
+    command = sampling_command(INDEX[channel.name])
+    assert decoded(exchange(Emulator(), command)).value == pytest.approx(channel.rest.value, abs=0.5)
+    reply = decoded(exchange(Emulator(lambda t_s: {channel.name: counts}), command))
     assert reply.fault is None
     assert abs(reply.value - min(max(counts, 0.0), 4095.0)) <= 0.5
-
-
-def test_it_samples_at_the_commands_last_bit():
-    asked = []
-    sensor = Emulator(lambda t_s: asked.append(t_s) or COUNTS)
-    exchange(sensor, b"\xa2\x00", at_s=2.0)
-    assert asked == pytest.approx([2.0 + WORD_S], abs=1e-12)
-
-
-def test_sensors_selected_together_sample_together_and_are_read_one_by_one():
-    sensors = [Emulator(lambda t_s, k=k: {"PAC": 1000.0 * (k + 1) + 1e6 * t_s}) for k in range(3)]
-    for sensor in sensors:
-        sensor.exchange(1, b"\x80\x00", 1e-4)
-    read = [
-        decoded(sensor.exchange(1, b"\x00\x00", 1e-4 + READ_S + k * 2e-5)).value for k, sensor in enumerate(sensors)
-    ]
-    assert read == [1104, 2104, 3104]
-
-
-def test_a_word_that_was_not_read_is_gone_with_the_next_command():
-    sensor = Emulator(lambda t_s: COUNTS)
-    sensor.exchange(1, b"\xa2\x00", 0.0)
-    assert exchange(sensor, b"\x80\x00", at_s=1e-3) == b"\x7f\x29"
-    assert sensor.exchange(1, b"\x00", 2e-3) == b"\xff"
-
-
-def test_parity_turns_every_bit_in_turn():
-    sensor = Emulator(lambda t_s: COUNTS, faults=[BioTacFault("parity")])
-    words = [exchange(sensor, b"\xa2\x00", at_s=float(n)) for n in range(16)]
-    assert {decoded(word).fault for word in words} == {Fault.PARITY}
-    assert {int.from_bytes(word, "big") ^ 0x6D58 for word in words} == {1 << bit for bit in range(16)}
 
 
 def test_a_resend_of_a_turned_word_is_the_word():
@@ -181,20 +113,10 @@ def test_a_resend_of_a_turned_word_is_the_word():
 
 
 def test_faults_concern_their_channels_and_times_only():
-    sensor = Emulator(
-        lambda t_s: COUNTS,
-        faults=[BioTacFault("dropped-reply", start_s=1.0, end_s=2.0, channels=frozenset({"PAC"}))],
-    )
-    assert exchange(sensor, b"\x80\x00", at_s=0.5) == b"\x7f\x29"
-    assert exchange(sensor, b"\x80\x00", at_s=1.5) == b"\xff\xff"
-    assert exchange(sensor, b"\xa2\x00", at_s=1.6) == b"\x6d\x58"
-    assert exchange(sensor, b"\x80\x00", at_s=2.0) == b"\x7f\x29"
-
-
-def test_a_doubled_reply_is_the_word_before():
-    sensor = Emulator(lambda t_s: COUNTS, faults=[BioTacFault("doubled-reply", channels=frozenset({"PDC"}))])
-    assert exchange(sensor, b"\xa2\x00") == b"\x6d\x58"
-    assert exchange(sensor, b"\x83\x01", at_s=1.0) == b"\x6d\x58"
+    fault = BioTacFault("dropped-reply", start_s=1.0, end_s=2.0, channels=frozenset({"PAC"}))
+    sensor = Emulator(lambda t_s: COUNTS, faults=[fault])
+    for command, at_s, answer in ((b"\x80\x00", 0.5, "7F29"), (b"\x80\x00", 1.5, "FFFF"), (b"\xa2\x00", 1.6, "6D58")):
+        assert exchange(sensor, command, at_s=at_s) == bytes.fromhex(answer)
     assert exchange(sensor, b"\x80\x00", at_s=2.0) == b"\x7f\x29"
 
 
@@ -210,18 +132,12 @@ def test_a_stuck_channel_holds_what_it_read_and_lets_go():
     assert read == [[1000, 1100, 1100, 1100, 1100, 1500, 1600], [1000, 1100, 1200, 1300, 1400, 1500, 1600]]
 
 
-@pytest.mark.parametrize("idle", [0x00, 0xFF])
-def test_a_sensor_that_is_not_connected_leaves_the_line_and_forgets(idle):
-    sensor = Emulator(lambda t_s: COUNTS, faults=[BioTacFault("not-connected", start_s=1.0, end_s=2.0)], idle=idle)
+def test_a_sensor_that_is_not_connected_leaves_the_line_and_forgets():
+    sensor = Emulator(lambda t_s: COUNTS, faults=[BioTacFault("not-connected", start_s=1.0, end_s=2.0)])
     assert exchange(sensor, b"\xa2\x00") == b"\x6d\x58"
     assert decoded(exchange(sensor, b"\xa2\x00", at_s=1.0)).fault is Fault.NOT_CONNECTED
     assert exchange(sensor, RESEND, at_s=2.0) == b"\xa5\x5f"
     assert exchange(sensor, b"\xa2\x00", at_s=3.0) == b"\x6d\x58"
-
-
-def test_an_error_reply_is_that_which_is_asked_for():
-    sensor = Emulator(faults=[BioTacFault("error-reply", error=0x57)])
-    assert exchange(sensor, b"\xa2\x00") == b"\xa5\x57"
 
 
 @pytest.mark.parametrize(
@@ -263,12 +179,6 @@ def test_a_built_emulator_keeps_the_pause_at_every_clock(clock_hz):
     assert sensor.exchange(2, bytes(2), 0.5 + 16 / clock_hz + 1e-6) == b"\xa5\x2d"
     sensor.exchange(2, b"\xa2\x00", 1.0)
     assert sensor.exchange(2, bytes(2), 1.1) == b"\xa5\x2e"
-
-
-@pytest.mark.parametrize(("options", "faults"), [({"colour": 1}, ()), ({}, ("gremlin",))])
-def test_what_an_emulator_does_not_know_is_refused(options, faults):
-    with pytest.raises(UsageError, match=r"colour|gremlin"):
-        build_emulator(EmulatorSettings(lambda t_s: {}, np.random.default_rng(1), options, faults))
 
 
 @given(periods=st.lists(st.binary(max_size=5), max_size=20), pause_us=st.sampled_from([0, 60]))

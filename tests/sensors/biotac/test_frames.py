@@ -140,17 +140,6 @@ def test_blocks_are_handed_out_once_and_as_soon_as_they_are_whole():
     assert batches.blocks() == []
 
 
-def test_with_a_resend_words_of_bad_parity_are_replaced():
-    batches = FrameBatches(speed_hz=SPEED_HZ, resends=1)
-    blocks = run(batches, Emulator(wave, faults=[BioTacFault("parity", every=7)]), 10)
-    clean = run(FrameBatches(speed_hz=SPEED_HZ, resends=1), Emulator(wave), 10)
-    for name, block in blocks.items():
-        assert np.array_equal(block.data, clean[name].data)
-        assert not block.quality.any()
-    # Every seventh of 880 words, one half of them resends: 125, and every second of those in a first reply.
-    assert sum(counts[Fault.PARITY] for counts in batches.faults.values()) == batches.resent.total() == 63
-
-
 def test_a_resend_that_is_bad_too_leaves_the_first_word_marked():
     batches = FrameBatches(speed_hz=SPEED_HZ, resends=1)
     faults = [BioTacFault("parity", channels=frozenset({"E5"}))]
@@ -168,11 +157,6 @@ def test_each_resend_follows_its_own_word():
     assert sum(8 * len(step.data) / SPEED_HZ + 1e-6 * step.pause_us for step in steps) == pytest.approx(
         2 / 4400, abs=1e-6
     )
-
-
-def test_a_clock_that_leaves_no_time_is_refused():
-    with pytest.raises(ValueError, match="64 bits at 500000 Hz"):
-        FrameBatches(speed_hz=500_000, resends=1)
 
 
 def test_bad_parity_is_marked_with_the_number_that_came():
@@ -257,19 +241,6 @@ def test_batches_without_a_reply_and_words_that_were_not_asked_for_are_gaps():
     # By place in the frame, PDC, TAC and TDC the last: 20 slow words, 21 from the second on, 9, 13 left of the fourth.
     assert np.count_nonzero(~missing, axis=1).tolist() == [20, 21, 9, 13, 12]
     assert slow.data[1, COLUMN["E2"]] == expected("E2", 90)
-
-
-def test_another_frame_has_streams_of_its_own():
-    frame = ("PAC", "PDC")
-    blocks = run(FrameBatches(frame, speed_hz=SPEED_HZ), Emulator(wave), 10)
-    assert blocks["vibration"].sequence.tolist() == list(range(10))
-    assert blocks["electrodes"].sequence.tolist() == list(range(10))
-    assert blocks["electrodes"].data[:, 0].tolist() == [expected("PDC", 2 * n + 1) for n in range(10)]
-    slow, fast = streams_of(frame, 4400.0)
-    assert [channel.name for channel in slow.channels] == ["PDC"]
-    assert (slow.rate_hz, fast.rate_hz) == (2200.0, 2200.0)
-    (only,) = streams_of(("E1", "E2"), None)
-    assert (only.name, only.rate_hz) == ("electrodes", None)
 
 
 def test_frames_that_are_none_are_refused():

@@ -157,11 +157,3 @@ def driver_on(address: str, **options: Any) -> FingertipDriver:
         return open_link(address)
 
     return build(DriverSettings(opened, STREAMS, options))
-
-
-def serve_forever(address: str) -> None:
-    """Emulate in a process of its own, which its parent ends."""
-    with open_link(address) as link:
-        assert isinstance(link, CanLink)
-        print("ready", flush=True)
-        serve(emulator(), link, threading.Event())

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from tactbench.plugin import Quality, RigError, UsageError
+from tactbench.plugin import Quality, UsageError
 from tactbench.plugin.devices import CanFrame
 from tactbench.sensors.icub.codec import (
     NO_ACK,
@@ -274,32 +274,12 @@ def test_halves_of_different_samples_are_never_joined():
     assert second.quality[:7] == (MISSING,) * 7
 
 
-@pytest.mark.parametrize("half", [0, 1])
-def test_a_doubled_frame_is_kept_out_and_marked(half):
-    decoder = SkinDecoder(PERIOD_S)
-    first, second = pair(), pair(PERIOD_NS)
-    frames = [first[0], first[half], first[1], *second]
-    samples = fed(decoder, *frames)
-    assert [sample.taxels for sample in samples] == [bytes([240] * 12)] * 2
-    doubled = [{taxel for taxel, mark in enumerate(sample.quality) if mark == SUSPECT} for sample in samples]
-    # A doubled tail comes when its sample has gone: the next one carries the mark.
-    assert doubled == ([set(range(7)), set()] if half == 0 else [set(), set(range(7, 12))])
-    assert decoder.counts[14, 3].doubled == 1
-
-
 def test_equal_samples_in_a_burst_are_not_doubled():
     # A host that was late reads several equal samples at one time.
     decoder = SkinDecoder(PERIOD_S)
     samples = fed(decoder, *pair(), *pair(), *pair())
     assert [sample.sequence for sample in samples] == [0, 1, 2]
     assert decoder.counts[14, 3].doubled == 0
-
-
-def test_a_lost_sample_shows_as_a_long_interval_only():
-    decoder = SkinDecoder(PERIOD_S)
-    fed(decoder, *pair(), *pair(PERIOD_NS), *pair(3 * PERIOD_NS))
-    assert decoder.counts[14, 3].samples == 3
-    assert decoder.counts[14, 3].long_intervals == 1
 
 
 def test_flush_gives_what_waits():
@@ -364,13 +344,6 @@ def test_blocks_are_in_the_units_of_the_spec():
     # The boards have no counter of their own, and a block's sequence is just that.
     assert block.sequence is None
     assert to_block([]).data.shape == (0, 12)
-
-
-def test_a_block_is_of_one_triangle():
-    decoder = SkinDecoder(PERIOD_S)
-    samples = fed(decoder, *skin_frames(14, 3, [0] * 12), *skin_frames(14, 4, [0] * 12))
-    with pytest.raises(RigError, match="several triangles"):
-        to_block(samples)
 
 
 frames = st.builds(

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import socket
-import subprocess
 import sys
 import time
 from collections.abc import Mapping
@@ -14,17 +12,15 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tactbench.plugin import Block, Quality, UsageError, load_object
+from tactbench.plugin import Block, Quality, UsageError
 from tactbench.plugin.devices import (
     CanFrame,
-    CanLink,
     DriverSettings,
     EmulatorSettings,
     LinkError,
     LinkUnplugged,
     open_link,
 )
-from tactbench.sensors.icub import tactbench_sensors
 from tactbench.sensors.icub.channels import STREAMS
 from tactbench.sensors.icub.codec import (
     BoardSetup,
@@ -36,7 +32,7 @@ from tactbench.sensors.icub.codec import (
     skin_frames,
 )
 from tactbench.sensors.icub.driver import SETTLE_S, FingertipDriver, build
-from tactbench.sensors.icub.emulator import BoardFault, build_emulator
+from tactbench.sensors.icub.emulator import build_emulator
 from tests.links.ends import pty
 from tests.sensors.icub.emulated import (
     NAMES,
@@ -110,13 +106,6 @@ def test_every_count_comes_through_whatever_the_set_up(counts, no_load, shift, s
         (block,) = driver.read(1.0)
         assert block.data.tolist() == [counts]
         assert block.quality.tolist() == [[SATURATED if value in (0, 255) else GOOD for value in counts]]
-
-
-def test_untouched_taxels_read_the_rest_of_the_spec():
-    driver, link = in_virtual_time(lambda now_s: {"T3": 180.4})
-    with driver:
-        driver.start()
-        assert read_until(driver, link, 0.53).data.tolist() == [[243, 243, 180] + [243] * 9]
 
 
 def test_streams_have_the_rate_of_the_set_up():
@@ -273,10 +262,6 @@ def test_each_fault_ends_as_documented(fault):
             assert block.data[row][is_good].tolist() == usual.data[periods[1].index(period)][is_good].tolist()
 
 
-def test_every_fault_is_tried():
-    assert {text.partition(":")[0] for text in FAULTS} == set(BoardFault.known)
-
-
 def test_a_stuck_taxel_stays_where_it_was_and_is_not_marked():
     block, _ = ten("stuck-taxel:start_s=0.55,channels=T6")
     usual, _ = ten()
@@ -380,25 +365,9 @@ def test_options_that_cannot_be_are_refused(options, said):
         build_emulator(EmulatorSettings(rising, np.random.default_rng(1), options))
 
 
-@pytest.mark.parametrize(
-    "fault",
-    ["unheard-of", "stuck-taxel:channels=T13", "dropped-frame:half=middle", "dropped-frame:evry=2", "no-ack:every=0"],
-)
-def test_faults_that_cannot_be_are_refused(fault):
-    with pytest.raises(UsageError):
-        emulator(faults=(fault,))
-
-
 def test_a_link_of_another_kind_is_refused():
     with pytest.raises(UsageError, match="speaks CAN"):
         build(DriverSettings(lambda: open_link("loop://")))
-
-
-def test_the_descriptor_finds_all_of_it():
-    (descriptor,) = tactbench_sensors()
-    assert load_object(descriptor.driver) is build
-    assert load_object(descriptor.emulator) is build_emulator
-    assert descriptor.emulated_link == "can"
 
 
 # In real time, on buses.
@@ -446,37 +415,3 @@ def read_on(driver: FingertipDriver) -> None:
     """Read what had come, and further."""
     for _ in range(100):
         driver.read(0.1)
-
-
-CHILD = "from tests.sensors.icub.emulated import serve_forever; serve_forever({address!r})"
-
-
-def test_on_udp_multicast_across_two_processes():
-    pytest.importorskip("msgpack", reason="python-can's udp_multicast needs msgpack")
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as free:
-        free.bind(("", 0))
-        address = f"can://udp_multicast/239.74.163.2?port={free.getsockname()[1]}"
-    with subprocess.Popen(
-        [sys.executable, "-c", CHILD.format(address=address)], stdout=subprocess.PIPE, stderr=subprocess.PIPE, cwd=ROOT
-    ) as child:
-        try:
-            if child.stdout.readline() != b"ready\n":
-                pytest.skip(f"no multicast here: {child.communicate()[1].decode().splitlines()[-1]}")
-            try:
-                check(in_real_time(driver_on(address)))
-            except LinkError as error:
-                pytest.skip(f"no multicast here: {error}")
-        finally:
-            child.kill()
-
-
-def test_on_socketcan():
-    try:
-        with socket.socket(socket.AF_CAN, socket.SOCK_RAW, socket.CAN_RAW) as raw:
-            raw.bind(("vcan0",))
-    except (AttributeError, OSError) as error:
-        pytest.skip(f"no socketcan network vcan0 here: {error}")
-    with open_link("can://socketcan/vcan0") as far:
-        assert isinstance(far, CanLink)
-        with served(emulator(), far):
-            check(in_real_time(driver_on("can://socketcan/vcan0")))

@@ -1,0 +1,227 @@
+"""Film and discs against conductors whose resistance is known."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from tactbench.plugin import RigError
+from tactbench.sensors.biotac.rims import Disc, RimmedDiscs
+from tactbench.sensors.biotac.sheet import Faces, FilmSheet
+
+RADIUS, RING = 0.6, 3.0
+
+
+def flat_faces(shape, cell_mm=(1.0, 1.0)) -> Faces:
+    """Faces of equal rectangles."""
+    (nx, ns), (dx, ds) = shape, cell_mm
+    return Faces(np.full((nx - 1, ns), ds / dx), np.full((nx, ns - 1), dx / ds))
+
+
+def centred(cells, half_mm):
+    """Centres of cells, and their length."""
+    step = 2 * half_mm / cells
+    return -half_mm + (np.arange(cells) + 0.5) * step, step
+
+
+class Held:
+    """One electrode and the drive as cells held almost perfectly.
+
+    Their joints have a millionth of the sheet's own resistance: smaller still, and float64 would not resolve the sheet
+    beside them.
+    """
+
+    def __init__(self, electrode, drive):
+        self.count, self.under = 1, np.flatnonzero(electrode)
+        self.owner = np.zeros_like(self.under)
+        self._drive = 1e6 * drive.ravel()
+
+    def joints(self, film_mm):
+        return np.full(self.under.size, 1e6), self._drive
+
+    def narrow(self, film_mm, along_x, along_s):
+        pass
+
+
+class WithRing:
+    """A disc inside a drive that holds everything beyond a circle, both on one grid."""
+
+    def __init__(self, x, centre, radius=RADIUS, ring=RING):
+        self._disc = RimmedDiscs(x, x, [Disc(*centre, radius)], [Disc(*centre, radius)])
+        self.count, self.owner, self.under = 1, self._disc.owner, self._disc.under
+        self._ring = 1e4 * (np.hypot(x[:, None] - centre[0], x[None, :] - centre[1]) > ring).ravel()
+
+    def joints(self, film_mm):
+        return self._disc.joints(film_mm)[0], self._ring
+
+    def narrow(self, film_mm, along_x, along_s):
+        self._disc.narrow(film_mm, along_x, along_s)
+
+
+def resistance(contacts, film, cell_mm=(1.0, 1.0)) -> float:
+    """Times sigma, between drive and the only electrode."""
+    return float(FilmSheet(flat_faces(film.shape, cell_mm), contacts).resistances(film)[0, 0])
+
+
+@given(width=st.integers(2, 12), length=st.integers(3, 30), film=st.floats(0.05, 3.0), aspect=st.floats(0.3, 3.0))
+@settings(max_examples=40, deadline=None)  # the first example imports scipy
+def test_a_uniform_strip_has_the_resistance_of_a_strip(width, length, film, aspect):
+    ends = np.zeros((2, length, width))
+    ends[0, 0] = ends[1, -1] = 1.0
+    found = resistance(Held(ends[1], ends[0]), np.full((length, width), film), (aspect, 1.0))
+    # L / (h W) between the centres of the end cells
+    assert found == pytest.approx((length - 1) * aspect / (film * width), rel=1e-4)
+
+
+def test_an_annulus_has_the_resistance_of_an_annulus():
+    inner, outer, film = 1.0, 4.0, 0.7
+    expected = np.log(outer / inner) / (2 * np.pi * film)
+    found = {}
+    for n in (30, 60, 120):
+        x, step = centred(n, 5.0)
+        r = np.hypot(x[:, None], x[None, :])
+        found[n] = resistance(Held(r < inner, (r > outer).astype(float)), np.full((n, n), film), (step, step))
+        # The rims run between cell centres, at most one cell inside the disc and one outside the ring.
+        widest = np.log((outer + step) / (inner - step)) / (2 * np.pi * film)
+        assert expected < found[n] < widest
+    # Between these bounds the error is of first order in the cell; taking it out leaves that of the staircase.
+    assert abs(2 * found[120] - found[60] - expected) < 0.015 * expected
+
+
+@pytest.mark.parametrize("film", [0.06, 0.2, 0.6, 1.2])
+def test_a_disc_on_a_coarse_grid_has_the_resistance_of_a_disc(film):
+    # Times sigma, from the ring's edge into the disc: a ring of film, and under the disc I0(r / lambda).
+    from scipy.special import i0, i1
+
+    decay = film / np.sqrt(3 + 4 * film / (np.pi * RADIUS))
+    exact = np.log(RING / RADIUS) / (2 * np.pi * film)
+    exact += decay / (2 * np.pi * film * RADIUS) * i0(RADIUS / decay) / i1(RADIUS / decay)
+    # 0.25 mm cells, 2.4 of them along the radius, at places of the disc on its grid.
+    x, step = centred(32, 4.0)
+    places = np.random.default_rng(2).uniform(0, step, size=(12, 2))
+    errors = [resistance(WithRing(x, tuple(p)), np.full((32, 32), film), (step, step)) / exact - 1 for p in places]
+    # Cells beyond the ring are held: where its edge is, is known to a cell, and the mean error must lie within that.
+    assert 0 < np.mean(errors) < np.log((RING + step) / RING) / (2 * np.pi * film) / exact
+    # The scatter is the disc's own: seen, 0.0018 to 0.0035. A disc of cells' areas has 0.02 under the closed film.
+    assert np.std(errors) < 0.006
+
+
+@pytest.mark.parametrize("ratio", [1.2, 2.0, 4.2])
+def test_a_small_disc_on_a_thick_film_agrees_with_the_method_of_images(ratio):
+    outer, (x, step) = 10.0, centred(128, 12.0)
+    images = 1 / 4 + (np.log(outer / (4 * ratio)) + np.euler_gamma) / (2 * np.pi * ratio)
+    found = resistance(WithRing(x, (0.0, 0.0), 1.0, outer), np.full((128, 128), ratio), (step, step))
+    # The contact law is within 2 % of 1/(4a); the ring's staircase adds 0.2 mm of 10.
+    assert found == pytest.approx(images, abs=0.03 / 4)
+
+
+@pytest.mark.parametrize("thin", [0.9, 0.5, 0.1])
+def test_a_thinner_film_never_conducts_better(thin):
+    # No conductor does (Rayleigh); the depth-averaged contact alone would, for small discs on thick films.
+    x, step = centred(48, 6.0)
+    discs = RimmedDiscs(x, x, [Disc(3.0, 0.0, 0.3)], [Disc(-4.0, 0.0, 0.8)])
+    thick = np.full((48, 48), 1.27)
+    assert resistance(discs, thin * thick, (step, step)) > resistance(discs, thick, (step, step))
+
+
+def several(seed, shape=(24, 24)):
+    """Discs at random places, and a film from closed to open, 0.06 to 2.4 mm: steeper than the BioTac's ever gets."""
+    rng = np.random.default_rng(seed)
+    (x, dx), (s, ds) = (centred(n, 3.0) for n in shape)
+    at = [Disc(*rng.uniform(-2.4, 2.4, 2), max(0.5, 0.75 * max(dx, ds))) for _ in range(5)]
+    sheet = FilmSheet(flat_faces(shape, (dx, ds)), RimmedDiscs(x, s, at[1:], at[:1]))
+    return rng, sheet, np.exp(rng.uniform(np.log(0.06), np.log(2.4), shape))
+
+
+@given(seed=st.integers(0, 10_000), shape=st.sampled_from([(24, 24), (12, 16), (16, 12)]))
+@settings(max_examples=25, deadline=None)
+def test_the_elimination_agrees_with_a_dense_inverse(seed, shape):
+    """The same by one dense matrix of cells and electrodes, assembled face by face."""
+    _, sheet, film = several(seed, shape)
+    contacts, faces = sheet._contacts, sheet._faces
+    joints, drive = contacts.joints(film)
+    size = film.size + contacts.count
+    matrix, number = np.diag(np.append(drive, np.zeros(contacts.count))), np.arange(film.size).reshape(shape)
+
+    def join(one, other, conductance):
+        for i, j, g in zip(np.ravel(one), np.ravel(other), np.ravel(conductance), strict=True):
+            matrix[[i, j], [i, j]] += g
+            matrix[[i, j], [j, i]] -= g
+
+    mean = lambda a, b: (b - a) / np.log(b / a)  # noqa: E731
+    along_x = faces.along_x * mean(film[1:], film[:-1])
+    along_s = faces.along_s * mean(film[:, 1:], film[:, :-1])
+    contacts.narrow(film, along_x, along_s)
+    join(number[1:], number[:-1], along_x)
+    join(number[:, 1:], number[:, :-1], along_s)
+    join(contacts.under, film.size + contacts.owner, joints)
+    assert matrix.shape == (size, size)
+    # Conductances over four decades: rounding of 1e-16, multiplied by as much.
+    np.testing.assert_allclose(
+        sheet.resistances(film), np.linalg.inv(matrix)[film.size :, film.size :], rtol=1e-9, atol=1e-12
+    )
+
+
+@given(seed=st.integers(0, 10_000), share=st.floats(0.3, 0.95))
+@settings(max_examples=25, deadline=None)
+def test_resistances_obey_the_laws_of_conductors(seed, share):
+    rng, sheet, film = several(seed)
+    found = sheet.resistances(film)
+    np.testing.assert_allclose(found, found.T, rtol=1e-9)
+    # The maximum principle: the others lie between ground and the electrode that is fed.
+    assert found.min() > 0
+    assert np.all(found.max(axis=0) == np.diag(found))
+    # Rayleigh's law, with the others floating: none falls where film is lost. Beside the discs: under one, a film fed
+    # from its face joins it the better the thinner it is.
+    touched = sheet._contacts.joints(film)[1] > 0
+    touched[sheet._contacts.under] = True
+    lost = np.where((rng.random(film.shape) < 0.3) & ~touched.reshape(film.shape), share * film, film)
+    assert np.all(np.diag(sheet.resistances(lost)) >= np.diag(found) * (1 - 1e-9))
+
+
+@pytest.mark.parametrize("bad", [0.0, -0.1, np.nan, np.inf])
+def test_a_film_that_is_none_is_refused(bad):
+    _, sheet, film = several(2)
+    film[3, 4] = bad
+    with pytest.raises(RigError, match="finite and positive"):
+        sheet.resistances(film)
+
+
+@given(film=st.floats(0.06, 1.3), x=st.floats(-0.2, 0.2), s=st.floats(-0.2, 0.2), edge=st.booleans())
+@settings(max_examples=30, deadline=None)
+def test_conductances_stay_positive_and_a_rim_only_shortens_the_way(film, x, s, edge):
+    axis, _ = centred(32, 4.0)
+    at = -3.7 if edge else 0.0  # a disc may reach the sheet's edge
+    discs = RimmedDiscs(axis, axis, [Disc(x + at, s, RADIUS)], [Disc(2.0, 2.0, RADIUS)])
+    thickness = np.full((32, 32), film)
+    joints, drive = discs.joints(thickness)
+    along_x, along_s = np.full((31, 32), film), np.full((32, 31), film)
+    discs.narrow(thickness, along_x, along_s)
+    assert joints.min() >= 0
+    assert 0 < joints.sum() < np.inf
+    assert drive.min() >= 0
+    assert min(along_x.min(), along_s.min()) > film * (1 - 1e-9)  # but for rounding
+
+
+def test_a_thick_film_sees_the_discs_area():
+    axis, _ = centred(32, 4.0)
+    discs = RimmedDiscs(axis, axis, [Disc(0.07, -0.11, RADIUS)], [Disc(2.0, 2.0, RADIUS)])
+    thick = 1e5
+    joints, _ = discs.joints(np.full((32, 32), thick))
+    # kappa A with kappa = 3/h + 4/(pi a); what the film's own decay length leaves is of order a / lambda = 0.003.
+    assert joints.sum() == pytest.approx(np.pi * RADIUS**2 * (3 / thick + 4 / (np.pi * RADIUS)), rel=0.01)
+
+
+def test_a_stretched_disc_is_the_disc_on_the_stretched_grid():
+    x, film = (np.arange(40) + 0.5) * 0.2, np.full((40, 40), 0.5)
+    plain = RimmedDiscs(x, x, [Disc(2.0, 3.1, 0.6)], [Disc(6.0, 5.0, 0.8)])
+    squeezed = RimmedDiscs(x / 2, 4 * x, [Disc(1.0, 12.4, 0.6, (2.0, 0.25))], [Disc(3.0, 20.0, 0.8, (2.0, 0.25))])
+    assert resistance(plain, film) == pytest.approx(resistance(squeezed, film), rel=1e-12)
+
+
+def test_a_disc_that_covers_no_cell_is_refused():
+    axis = np.arange(10) + 0.5
+    with pytest.raises(RigError, match="covers no cell"):
+        RimmedDiscs(axis, axis, [Disc(5.0, 5.0, 0.3)], [Disc(2.5, 2.5, 0.6)])
