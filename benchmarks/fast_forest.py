@@ -41,7 +41,7 @@ def arrays(sensor: str, folder: Path) -> TimedEstimator:
     (row,) = run_matrix(MatrixSpec(repeats=1, sensors=(sensor,), tasks=(choice,)), Store(folder)).rows
     spec = registry.tasks[TASK].spec
     data = load_dataset(spec, [folder / path for path in row["recordings"]])
-    return timed_estimator(spec, registry.estimators["forest"], {}, PROTOCOL, "roles", data, seed=1, threads=1)
+    return timed_estimator(spec, registry.estimators["forest"], {}, PROTOCOL, "roles", data, seed=1)
 
 
 def of_seed(one: TimedEstimator, name: str, seed: int) -> TimedEstimator:

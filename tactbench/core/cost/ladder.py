@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from tactbench.core.cost.ladder_rows import Record, by_score, mark_fronts, opening, stopped, timed
-from tactbench.core.cost.rounds import BUDGET_S, measure
+from tactbench.core.cost.rounds import BUDGET_S, THREADS, measure
 from tactbench.core.cost.timed_estimators import TimedEstimator, timed_estimator
 from tactbench.core.errors import UsageError
 from tactbench.core.evaluation.dataset import load_dataset
@@ -88,7 +88,7 @@ def climb(
             continue
         try:
             timed_estimators[row["cell"]] = timed_estimator(
-                task, descriptor, row["params"], row["protocol"], row["split"], data, seed=matrix.seed, threads=1
+                task, descriptor, row["params"], row["protocol"], row["split"], data, seed=matrix.seed
             )
         except Exception as error:
             rows[row["cell"]] |= stopped(error)
@@ -104,7 +104,7 @@ def climb(
     measured = {
         "higher_is_better": better, "fold": fold,
         "remarks": list(dict.fromkeys(remark for one in timed_estimators.values() for remark in one.remarks)),
-        "rounds": rounds, "budget_s": BUDGET_S, "threads": 1, "load": load, "cores": os.cpu_count(),
+        "rounds": rounds, "budget_s": BUDGET_S, "threads": THREADS, "load": load, "cores": os.cpu_count(),
     }  # fmt: skip
     return Ladder(_about(outcome) | measured, found)
 

@@ -21,35 +21,27 @@ from tactbench.core.spec.rig import EstimatorDescriptor
 
 Record = dict[str, Any]
 
-LOOPS_HZ = (100, 1000)
-"""Rates of control loops the verdict is about (assumed): how often taxels are read in the paper, and how often joint
-torques are commonly closed."""
-
 SAME_SCORE = 1e-9
 """Largest relative difference of scores that still is the same answer: rounding of sums in another order."""
 
 _MEASURED = (
-    "n_train", "n_test", "n_features", "fit_s", "fit_s_q1", "fit_s_q3", "fits", "batch_s_per_row",
-    "batch_s_per_row_q1", "batch_s_per_row_q3", "batches", "latency_ms_p50", "latency_ms_p95", "latency_ms_max",
-    "latency_ms_q1", "latency_ms_q3", "latency_n", "answer_delay_ms", "answer_delay_ms_q1", "answer_delay_ms_q3",
-    "data_s", "data_kind",
+    "n_train", "n_test", "n_features", "fit_s", "fit_s_q1", "fit_s_q3", "fits", "batch_s_per_row", "batches",
+    "latency_ms_p50", "latency_ms_p95", "latency_ms_max", "latency_n", "answer_delay_ms", "answer_delay_ms_q1",
+    "answer_delay_ms_q3", "data_s",
 )  # fmt: skip
 
 
 def opening(row: Row, descriptor: EstimatorDescriptor) -> Record:
     """Return what a cell's row says of an estimator; what is still to be measured is None."""
+    kept = ("chosen", "status", "reason", "score", "ci_low", "ci_high", "ci_method", "search_s")
     return {
         "estimator": row["estimator"],
-        "title": descriptor.title,
-        "family": descriptor.where.partition(":")[0].rpartition(".")[2],
         "is_baseline": row["is_baseline"],
         "looks_at": descriptor.looks_at,
         "params": {**descriptor.params, **row["params"]},
-        "chosen": row["chosen"],
-        **{key: row[key] for key in ("status", "reason", "score", "ci_low", "ci_high", "ci_method", "search_s")},
+        **{key: row[key] for key in kept},
         **dict.fromkeys(_MEASURED),
         "delay_parts_ms": {},
-        **{f"loop_{rate}_hz": None for rate in LOOPS_HZ},
         "front_fit": False,
         "front_delay": False,
         "notes": [],
@@ -66,39 +58,35 @@ def timed(one: TimedEstimator, timing: Timing, scores: Mapping[str, float], roun
     """Return what changes in a row by having been timed; `scores` are those of the cell, by fold among others."""
     if timing.trouble is not None:
         return stopped(timing.trouble)
-    p95, largest = tail_ms(np.array(timing.latency_s))
-    latency = _quartiles("latency_ms", [1e3 * spent for spent in timing.latency_s], middle="latency_ms_p50")
-    parts = {**one.delay_parts_ms, "prediction": latency["latency_ms_p50"]}
-    spread = [latency[f"latency_ms_{end}"] - parts["prediction"] for end in ("q1", "q3")]
-    later = (largest if p95 is None else p95) - parts["prediction"]
-    if timing.features_s:
-        features = _quartiles("features", [1e3 * spent for spent in timing.features_s])
-        parts["features"] = features["features"]
-        spread = [so_far + features[f"features_{end}"] - parts["features"]
-                  for so_far, end in zip(spread, ("q1", "q3"), strict=True)]  # fmt: skip
-        p95_features, largest = tail_ms(np.array(timing.features_s))
-        later += (largest if p95_features is None else p95_features) - parts["features"]
+    quartiles = {
+        name: np.quantile(1e3 * np.array(spent), (0.25, 0.5, 0.75))
+        for name, spent in (("prediction", timing.latency_s), ("features", timing.features_s))
+        if spent
+    }
+    parts = {**one.delay_parts_ms, **{name: float(median) for name, (_, median, _) in quartiles.items()}}
+    low, median, high = sum(quartiles.values()).tolist()  # type: ignore[union-attr]
     delay = answer_delay_ms(parts, one.looks_at)
-    kind, spent = _acquisition(one.trained_on)
+    p95, largest = tail_ms(np.array(timing.latency_s))
+    fit_q1, fit_s, fit_q3 = np.quantile(timing.fit_s, (0.25, 0.5, 0.75)).tolist()
     return {
         "n_train": len(one.X_train),
         "n_test": len(one.X_test),
         "n_features": one.X_train.shape[1],
-        **_quartiles("fit_s", timing.fit_s),
+        "fit_s": fit_s,
+        "fit_s_q1": fit_q1,
+        "fit_s_q3": fit_q3,
         "fits": len(timing.fit_s),
-        **_quartiles("batch_s_per_row", [took / len(one.X_test) for took in timing.batch_s]),
+        "batch_s_per_row": float(np.median(timing.batch_s)) / len(one.X_test),
         "batches": len(timing.batch_s),
-        **latency,
+        "latency_ms_p50": parts["prediction"],
         "latency_ms_p95": p95,
-        "latency_ms_max": 1e3 * max(timing.latency_s),
+        "latency_ms_max": largest,
         "latency_n": len(timing.latency_s),
         "answer_delay_ms": delay,
-        "answer_delay_ms_q1": None if delay is None else delay + spread[0],
-        "answer_delay_ms_q3": None if delay is None else delay + spread[1],
+        "answer_delay_ms_q1": None if delay is None else delay + low - median,
+        "answer_delay_ms_q3": None if delay is None else delay + high - median,
         "delay_parts_ms": parts,
-        "data_s": spent,
-        "data_kind": kind,
-        **{f"loop_{rate}_hz": None if delay is None else delay + later < 1e3 / rate for rate in LOOPS_HZ},
+        "data_s": _recorded_s(one.trained_on),
         "notes": [*_cut_short(timing, rounds), *_other_answers(one, timing, scores)],
     }
 
@@ -122,18 +110,10 @@ def _other_answers(one: TimedEstimator, timing: Timing, scores: Mapping[str, flo
     return [f"the timed model scores {score:.6g} on fold {one.fold}, the cell's {stored:.6g}"]
 
 
-def _quartiles(name: str, times: Sequence[float], *, middle: str = "") -> dict[str, float]:
-    low, median, high = np.quantile(times, (0.25, 0.5, 0.75)).tolist()
-    return {middle or name: median, f"{name}_q1": low, f"{name}_q3": high}
-
-
-def _acquisition(metas: Sequence[RecordingMeta]) -> tuple[str | None, float | None]:
-    """Return how the recordings were come by, and the seconds that took; None where any of them does not say."""
-    for kind, key in (("simulated", "sim_s"), ("acquired", "acquisition_s")):
-        spent = [float(meta.provenance[key]) for meta in metas if key in meta.provenance]
-        if spent and len(spent) == len(metas):
-            return kind, sum(spent)
-    return None, None
+def _recorded_s(metas: Sequence[RecordingMeta]) -> float | None:
+    """Return the seconds that simulating or acquiring the recordings took; None where any of them does not say."""
+    spent = [meta.provenance.get("sim_s", meta.provenance.get("acquisition_s")) for meta in metas]
+    return None if None in spent or not spent else float(sum(map(float, spent)))  # type: ignore[arg-type]
 
 
 def mark_fronts(rows: Sequence[Record], *, higher_is_better: bool) -> None:

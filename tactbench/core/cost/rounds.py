@@ -25,6 +25,8 @@ WARM_UP_ROWS = 300
 
 BUDGET_S = 20.0
 """Of one fit, or of one answer to all test rows, unless a caller says otherwise."""
+THREADS = 1
+"""That BLAS, OpenMP and estimators may use."""
 REPEATS, REPEATS_S = 10, 0.05
 """What takes milliseconds is done up to ten times a round, within 0.05 s, and its median counts: one interruption by
 the machine would else be all that is measured."""
@@ -54,7 +56,6 @@ def measure(
     *,
     rounds: int,
     budget_s: float = BUDGET_S,
-    threads: int = 1,
     seed: int,
     clock: Callable[[], float],
     progress: Progress,
@@ -67,8 +68,6 @@ def measure(
         How often; each round fits anew, answers all test rows, and single ones.
     budget_s
         A fit, or an answer to all test rows, that took longer once is not repeated.
-    threads
-        Threads that BLAS and OpenMP may use.
     clock
         Seconds, monotonic.
 
@@ -82,9 +81,8 @@ def measure(
     for one in timed_estimators.values():
         progress.working(f"warm-up of {one.name}")
         _warm_up(one)
-    limits = importlib.import_module("threadpoolctl").threadpool_limits(limits=threads)
     progress.begin("timing", rounds * len(timed_estimators))
-    with limits, _what_is_there_kept():
+    with importlib.import_module("threadpoolctl").threadpool_limits(limits=THREADS):
         for number in range(rounds):
             for key in rng.permutation(sorted(timed_estimators)).tolist():
                 one, timing = timed_estimators[key], found[key]
@@ -141,22 +139,6 @@ def _warm_up(one: TimedEstimator) -> None:
         model = one.build()
         model.fit(one.X_train[places], one.y_train[places])
         model.predict(one.X_test[:1])
-
-
-@contextmanager
-def _what_is_there_kept() -> Iterator[None]:
-    """Let collections pass over the modules that are loaded: they take longer than most of what is timed.
-
-    What the caller had kept from collections stays kept: both cannot be told apart afterwards.
-    """
-    was_kept = gc.get_freeze_count() > 0
-    gc.collect()
-    gc.freeze()
-    try:
-        yield
-    finally:
-        if not was_kept:
-            gc.unfreeze()
 
 
 @contextmanager

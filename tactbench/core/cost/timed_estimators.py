@@ -62,7 +62,6 @@ def timed_estimator(
     data: Dataset,
     *,
     seed: int,
-    threads: int,
 ) -> TimedEstimator:
     """Prepare `descriptor` as a cell does, for the last fold: the one whose model a cell's times are taken from.
 
@@ -73,14 +72,12 @@ def timed_estimator(
         data, which is not timed here: the cell's row has it.
     split
         One of those that the recordings can serve, as the cell's row names it.
-    threads
-        What the estimator is told it may use.
     """
     metric, frames = metric_called(task.metric), task.answer_per == "frame"
     loaded = load_task(task, data, protocol, split, estimator=descriptor, seed=seed)
     descriptor = without_windows(descriptor, task)
     made, rules, assignment = loaded.data, loaded.rules, loaded.assignments[-1]
-    build = builder(descriptor, params, task, seed, threads)
+    build = builder(descriptor, params, task, seed, 1)
     choice = select(descriptor, params, build, made, rules, assignment, metric, Counter())
     k = choice.k if choice else descriptor.window_grid[0]
     fold = prepared(assignment, made, rules, k, Counter())

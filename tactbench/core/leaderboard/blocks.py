@@ -14,7 +14,7 @@ from typing import Any
 
 from tactbench.core.evaluation.protocols import is_probe
 from tactbench.core.leaderboard.columns import Line, line_of
-from tactbench.core.leaderboard.names import Row, distinct, grouped, hardware_name, metric_name, sign_of
+from tactbench.core.leaderboard.names import Row, distinct, grouped, hardware_name, metric_name, sign_of, split_name
 from tactbench.core.leaderboard.sentences import NO_BETTER, Board, Note, above, below
 from tactbench.core.leaderboard.trivial import Bars, error_of
 from tactbench.core.statistics.rank import Rank, beyond_floor, excess_of
@@ -70,12 +70,15 @@ def _block(key: _Key, members: Sequence[Row], columns: Sequence[str], question: 
     lines = [
         *(line_of(row, None if few else placing, columns, board.marks(row)) for row, placing in placed),
         *(line_of(row, None, columns, board.marks(row), NO_BETTER) for row in unplaced),
-        *(line_of(row, None, columns, board.marks(row), _trivial_place(row)) for row in trivial),
+        *(
+            line_of(row, None, columns, board.marks(row), "oracle" if row.get("looks_at") == "reference" else "")
+            for row in trivial
+        ),
         *(line_of(row, None, columns, ()) for row in stopped),
     ]
     direction = "lower" if sign_of(members[0]) > 0 else "higher"
     setting = [f"{metric_name(members[0])}, {direction} is better", f"protocol {protocol}"]
-    setting += [f"split {split}"] if split else []
+    setting += [split_name(split)] if split else []
     return Block(
         title=visible(
             f"{task[:1].upper()}{task[1:]}" + (f": {question[:1].lower()}{question[1:]}" if question else "")
@@ -86,10 +89,6 @@ def _block(key: _Key, members: Sequence[Row], columns: Sequence[str], question: 
         verdict=tuple(map(visible, above(board))),
         notes=tuple(Note(visible(one.text), visible(one.hint), one.printed) for one in below(board)),
     )
-
-
-def _trivial_place(row: Row) -> str:
-    return "oracle" if row.get("looks_at") == "reference" else ""
 
 
 def _origin(finished: Sequence[Row], hardware: str) -> str:
@@ -135,18 +134,15 @@ def places(results: Sequence[Row]) -> tuple[dict[str, Rank], str]:
     They are the finished answers of one block, no baselines, the best score first. A row without replicates enters
     with its own interval.
     """
-    if not all(_may_be_placed(row) for row in results):
-        return {row["cell"]: Rank(1, None, None, len(results) > 1) for row in results}, "few"
-    if any(row.get("replicates") for row in results):
+    if any(row.get("replicates") for row in results) and all(map(_may_be_placed, results)):
         from tactbench.core.statistics.ranking import ranks  # numerics
 
         return ranks(results), ""
     ordered = errors(results)
     spans = [(bisect_left(ordered, error), bisect_right(ordered, error)) for error in ordered]
     by_score = [Rank(first + 1, None, None, after - first > 1) for first, after in spans]
-    return dict(
-        zip((row["cell"] for row in results), by_score, strict=True)
-    ), "these rows keep no replicates" if results else ""
+    why = "few" if not all(map(_may_be_placed, results)) else "these rows keep no replicates" if results else ""
+    return dict(zip((row["cell"] for row in results), by_score, strict=True)), why
 
 
 def _may_be_placed(row: Row) -> bool:

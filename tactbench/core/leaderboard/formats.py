@@ -30,8 +30,8 @@ SUFFIXES = {
 IN_FOLDER = ("md", "csv", "json")
 """A run's result folder has these, ``leaderboard.md`` and so on; the others are made when asked for."""
 _IN_A_PAPER = ("sensor", "estimator", "score", "interval", "published")
-_COLUMNS = {"sensor": "l", "estimator": r"p{0.24\columnwidth}", "notes": "l"}
-"""How LaTeX sets columns that are no numbers: long names of estimators go on in a further line."""
+_LONG = 12
+"""Letters of a name in a paper from which its column breaks it."""
 
 
 def plain_text(table: Table, width: int = 240, view: View = DEFAULT_VIEW) -> str:
@@ -57,7 +57,9 @@ def latex(table: Table, view: View = DEFAULT_VIEW) -> str:
 
 def _in_a_paper(block: Block, grid: TextTable, names: Sequence[str], number: int) -> str:
     """Return a block as LaTeX; a paper gives no commands, and no places unless they were asked for."""
-    lines = [dict(zip(grid.columns, line, strict=True)) for line in grid.lines]
+    # Cells without a score stand above the rule: trivial answers alone are below it.
+    order = sorted(range(len(grid.lines)), key=lambda place: grid.kinds[place] == "baseline")
+    lines = [dict(zip(grid.columns, grid.lines[place], strict=True)) for place in order]
     marked = [line.get("notes") or (NO_BETTER if line.get("place") == NO_BETTER else "") for line in lines]
     names = [name for name in names if name in grid.columns and name != "notes"]
     shown = (tuple(line[name].replace(" … ", "–") for name in names) for line in lines)
@@ -70,9 +72,17 @@ def _in_a_paper(block: Block, grid: TextTable, names: Sequence[str], number: int
         lines=tuple((*line, mark) for line, mark in zip(shown, marked, strict=True)),
         notes=tuple(f"{note.text.rstrip('.')}." for note in block.notes if note.printed),
     ).compact()
-    rule = grid.kinds.index("baseline") if "baseline" in grid.kinds[1:] else None
-    columns = "".join(_COLUMNS.get(name, "r") for name in table.columns)
+    trivial = grid.kinds.count("baseline")
+    rule = len(lines) - trivial if 0 < trivial < len(lines) else None
+    columns = "".join(map(_column, table.columns, zip(*table.lines, strict=True)))
     return latex_table(table, number=number, columns=f"@{{}}{columns}@{{}}", rule=rule)
+
+
+def _column(name: str, texts: Sequence[str]) -> str:
+    """Return how LaTeX sets a column: long names go on in a further line."""
+    if name not in ("sensor", "estimator", "notes"):
+        return "r"
+    return r"p{0.23\columnwidth}" if max(map(len, texts)) > _LONG else "l"
 
 
 def _caption(block: Block) -> str:
@@ -84,7 +94,7 @@ def _caption(block: Block) -> str:
         for row in rows
         if row["ci_low"] is not None and row.get("n_replicates")
     ).get("", [])
-    sentences = [block.title, block.setting.replace(" · ", ", "), block.origin]
+    sentences = [block.title, f"Score: {block.setting.replace(' · ', ', ')}", block.origin]
     if counts:
         sentences.append(f"n = {'–'.join(map(whole, dict.fromkeys((counts[0], counts[-1]))))} test samples")
     if len(over) == 1:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping
 from typing import Any, TypeVar
 
+from tactbench.core.evaluation.protocols import shots
 from tactbench.core.spec.row import LOWER_IS_BETTER as LOWER_IS_BETTER
 from tactbench.core.tables.text import visible
 
@@ -26,6 +27,12 @@ METRIC_NAMES = {
     "balanced_accuracy": "balanced accuracy",
     "event_f1": "event F1",
 }
+_SPLITS = {
+    "roles": "tested on recordings apart from training",
+    "in-session": "split in-session: each recording cut in time",
+    "shuffled": "split shuffled: rows dealt at random",
+}
+"""Splits that are not named by what they keep apart."""
 
 
 def sensor_name(row: Row) -> str:
@@ -44,6 +51,11 @@ def metric_name(row: Row) -> str:
     """Return the metric with its unit: ``RMSE [N]``."""
     unit = f" [{row['unit']}]" if row["unit"] != "1" else ""
     return visible(f"{METRIC_NAMES.get(row['metric'], row['metric'])}{unit}")
+
+
+def split_name(split: str) -> str:
+    """Return what is kept apart between training and test."""
+    return _SPLITS.get(split, f"split {'' if shots(split) else 'by '}{split}")
 
 
 def sign_of(row: Row) -> float:

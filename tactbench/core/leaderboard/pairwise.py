@@ -9,7 +9,7 @@ from itertools import chain
 from typing import Any, Literal
 
 from tactbench.core.errors import UnknownNameError
-from tactbench.core.leaderboard.names import Row, answer_name, grouped, hardware_name, metric_name
+from tactbench.core.leaderboard.names import Row, answer_name, grouped, hardware_name, metric_name, split_name
 from tactbench.core.spec.matrix import ComparisonChoice
 from tactbench.core.statistics.paired import Difference, FoldDifference, difference, holm, over_folds
 from tactbench.core.tables.numbers import ABSENT, score, signed, suffix
@@ -141,11 +141,9 @@ def _compared(
     ones, others = ({_key(kind, row): row for row in rows} for rows in (first_rows, second_rows))
     found = []
     for key in dict.fromkeys([*ones, *others]):
-        alone = (
-            ""
-            if key in ones and key in others
-            else _why_alone(key, *((second, others) if key in ones else (first, ones)))
-        )
+        alone = ""
+        if not (key in ones and key in others):
+            alone = _why_alone(key, second, others) if key in ones else _why_alone(key, first, ones)
         found.append(_pair(kind, first, second, ones.get(key), others.get(key), alone))
     return found
 
@@ -153,8 +151,13 @@ def _compared(
 def _pair(
     kind: Kind, first: str, second: str, one: Row | None, other: Row | None, refused: str = ""
 ) -> PairwiseComparison:
-    if one is None or other is None or (refused := _why_not(one, other, first, second)):
+    for name, row in ((first, one), (second, other)):
+        if row is not None and row["status"] != "done":
+            refused = refused or f"{name} {row['status']}: {row['reason']}"
+    if one is None or other is None or refused:
         return PairwiseComparison(kind, first, second, one, other, refused)
+    if (one["metric"], list(one["classes"])) != (other["metric"], list(other["classes"])):
+        return PairwiseComparison(kind, first, second, one, other, "they were scored by other metrics or classes")
     return PairwiseComparison(kind, first, second, one, other, "", difference(one, other), over_folds(one, other))
 
 
@@ -180,15 +183,6 @@ def _why_alone(alone: Key, missing: str, others: Iterable[Key]) -> str:
     return f"{missing} has no such cell"
 
 
-def _why_not(one: Row, other: Row, first: str, second: str) -> str:
-    for name, row in ((first, one), (second, other)):
-        if row["status"] != "done":
-            return f"{name} {row['status']}: {row['reason']}"
-    if (one["metric"], list(one["classes"])) != (other["metric"], list(other["classes"])):
-        return "they were scored by other metrics or classes"
-    return ""
-
-
 def tables_of(comparisons: Sequence[PairwiseComparison]) -> list[TextTable]:
     """Return a table for each question: task, metric, protocol, split and hardware; notes stand below the last."""
     groups = grouped(comparisons, _title)
@@ -202,7 +196,7 @@ def tables_of(comparisons: Sequence[PairwiseComparison]) -> list[TextTable]:
 def _title(pair: PairwiseComparison) -> str:
     row = pair.row
     protocol = [f"{row['protocol']}{' †' if row['dagger'] else ''}"] if pair.kind != "protocols" else []
-    split = [f"split {row['split']}"] if row["split"] and pair.kind != "splits" else []
+    split = [split_name(row["split"])] if row["split"] and pair.kind != "splits" else []
     names = f"A = {pair.first}, B = {pair.second}"
     return " · ".join([names, row["task"], metric_name(row), *protocol, *split, hardware_name(row)])
 
@@ -227,19 +221,15 @@ def _line(pair: PairwiseComparison) -> tuple[str, ...]:
         ABSENT if found.effect is None else signed(found.effect, "1"),
         ABSENT if found.improved is None else f"{found.improved:.2f}",
         f"{found.replicates}" + ("" if found.paired else " unpaired"),
-        _verdict(pair),
+        _verdict(pair, found),
     )
 
 
-def _verdict(pair: PairwiseComparison) -> str:
-    """Return who is better, or that it cannot be told."""
-    found = pair.difference
-    if found is None or found.verdict in ("equivalent", "undecided"):
-        return found.verdict if found else ""
-    winner = pair.first if found.verdict == "better" else pair.second
-    region = pair.row.get("equivalence")
-    beyond = f" by more than {region:g}{suffix(pair.row['unit'])}" if region and found.beyond else ""
-    return f"{winner} better{beyond}"
+def _verdict(pair: PairwiseComparison, found: Difference) -> str:
+    """Return which is better, or that it is not known."""
+    if found.verdict in ("equivalent", "undecided"):
+        return found.verdict
+    return f"{pair.first if found.verdict == 'better' else pair.second} better"
 
 
 def _probability(p: float | None) -> str:
@@ -255,8 +245,9 @@ def notes_of(comparisons: Sequence[PairwiseComparison]) -> tuple[str, ...]:
     if not found:
         return ()
     notes = [
-        "A − B is in the metric's unit; p is of no difference at all, by exchanging A and B within replicates; effect "
-        "is the difference over the standard deviation of the replicates' differences; n counts replicates."
+        "A − B is in the metric's unit; of campaigns it is the mean of their differences, while A and B are medians. "
+        "p: of no difference at all, by exchanging A and B within replicates. Effect: the difference over the standard "
+        "deviation of the replicates' differences. n counts replicates."
     ]
     for pair, apart in found:
         task, region = pair.row["task"], pair.row.get("equivalence")

@@ -12,7 +12,7 @@ from tactbench.core.tables.text_table import Entry, TextTable, finite, text_tabl
 _SORTED_BY = {
     "estimator": "", "score": "score", "95 % interval": "ci_low", "fit": "fit_s", "quartiles": "fit_s_q1",
     "delay": "answer_delay_ms", "latency p50": "latency_ms_p50", "p95": "latency_ms_p95",
-    "batch/row": "batch_s_per_row", "data": "data_s", "front": "", "100 Hz loop": "", "1 kHz loop": "", "remark": "",
+    "batch/row": "batch_s_per_row", "data": "data_s", "front": "", "remark": "",
 }  # fmt: skip
 """Column -> key of the number behind it."""
 COLUMNS = tuple(_SORTED_BY)
@@ -52,17 +52,7 @@ def line(row: Mapping[str, Any], unit: str) -> dict[str, str]:
         "batch/row": duration(row["batch_s_per_row"]),
         "data": duration(row["data_s"]),
         "front": ", ".join(fronts),
-        "100 Hz loop": _verdict(row, "loop_100_hz"),
-        "1 kHz loop": _verdict(row, "loop_1000_hz"),
     }
-
-
-def _verdict(row: Mapping[str, Any], loop: str) -> str:
-    """Return whether the answer keeps up with a loop; if not, which part of its delay is the longest."""
-    if row[loop] is None:
-        return ""
-    parts = row["delay_parts_ms"]
-    return "yes" if row[loop] else f"no ({max(parts, key=parts.__getitem__)})"
 
 
 def ladder_table(about: Mapping[str, Any]) -> TextTable:

@@ -15,10 +15,10 @@ from typing import TYPE_CHECKING
 
 import tactbench
 from tactbench.core.errors import TactbenchError
-from tactbench.core.leaderboard.columns import DEFAULT
+from tactbench.core.leaderboard.columns import DEFAULT, NUMERIC
 from tactbench.core.leaderboard.levels import KEY as LEVEL
 from tactbench.core.leaderboard.pairwise import asked_in_several_ways, tables_of
-from tactbench.core.leaderboard.view import full_grid
+from tactbench.core.leaderboard.view import REASON, View, grid
 from tactbench.core.recording.reader import read_meta
 from tactbench.core.report.cells import details
 from tactbench.core.report.costs import ladder_table
@@ -74,8 +74,9 @@ def leaderboards_section(subject: ReportData) -> Section:
             f"More than {MOST_ROWS} cells: {len(subject.shown)} of {len(subject.rows)} are shown, the first of each "
             "table. All of them are in `leaderboard.csv` in the result folder."
         )
-    shown = (full_grid(replace(block, lines=tuple(lines))) for block, lines in subject.blocks)
-    tables = tuple(table.only((*DEFAULT, "reason")) for table in shown)
+    view = View(columns=(*DEFAULT, REASON))
+    shown = (grid(replace(block, lines=tuple(lines)), view) for block, lines in subject.blocks)
+    tables = tuple(replace(table, numeric=NUMERIC).compact() for table in shown)
     return Section(paragraphs=tuple(paragraphs), tables=tables)
 
 

@@ -9,12 +9,13 @@ from collections.abc import Iterable
 from tactbench.core.tables.text_table import TextTable
 
 _TEX = {
-    "\\": r"\textbackslash{}", "&": r"\&", "%": r"\%", "$": r"\$", "#": r"\#", "_": r"\_", "{": r"\{", "}": r"\}",
+    "\\": r"\textbackslash{}", "&": r"\&", "%": r"\%", "$": r"\$", "#": r"\#", "_": r"\_\allowbreak{}",
+    "{": r"\{", "}": r"\}",
     "~": r"\textasciitilde{}", "^": r"\textasciicircum{}", "<": r"\textless{}", ">": r"\textgreater{}",
     "|": r"\textbar{}", '"': "{''}", "[": "{[}", "]": "{]}", "*": "{*}", "†": r"$\dagger$", "‡": r"$\ddagger$",
     "‖": r"$\|$", "–": "--", "—": "---", "…": r"\ldots{}", "·": r"$\cdot$", "×": r"$\times$", "±": r"$\pm$",
     "≤": r"$\le$", "≥": r"$\ge$", "−": "$-$", "µ": r"$\mu$", "μ": r"$\mu$", "²": r"$^2$", "³": r"$^3$",
-    "°": r"$^\circ$", "ß": r"{\ss}", "\n": " ", "\u202f": r"\,",
+    "=": r"=\allowbreak{}", "°": r"$^\circ$", "ß": r"{\ss}", "\n": " ", "\u202f": r"\,",
 }  # fmt: skip
 """Brackets and the star are options of ``\\\\`` where they follow it: in braces they are text."""
 
@@ -50,7 +51,7 @@ def latex_table(table: TextTable, *, number: int = 1, columns: str = "", rule: i
         rf"\begin{{{environment}}}[t]",
         r"\centering",
         r"\footnotesize",
-        r"\setlength{\tabcolsep}{2.5pt}",
+        r"\setlength{\tabcolsep}{2.5pt}\setlength{\belowcaptionskip}{4pt}",
         rf"\caption{{{tex(table.title)}}}",
         rf"\label{{{_label(table.title, number)}}}",
         rf"\begin{{tabular}}{{{columns or ''.join('r' if right else 'l' for right in table.right)}}}",

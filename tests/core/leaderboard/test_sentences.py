@@ -5,6 +5,7 @@ import re
 
 import numpy as np
 import pytest
+import scipy.stats
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -169,16 +170,27 @@ class Truth:
         }  # fmt: skip
         return set(text.split(", ")) == expected
 
-    def ahead(self, name, other, wins, count, value):
+    def ahead(self, name, other):
         first, second = self.called(name), self.called(other)
+        behind = [one for one in self.better if one is not first]
         assert self.ranks[first["cell"]].place == 1
-        assert all(self.ranks[one["cell"]].behind for one in self.better if one is not first)
-        if wins is None:
-            return self.leads(name)
-        key = "beyond" if "beyond" in first["replicates"] else "scores"
+        assert self.order(second) == min(map(self.order, behind))
+        return all(self.ranks[one["cell"]].behind for one in behind)
+
+    def by_campaign(self, name, other, wins, count, value, beyond, low, high):
+        first, second = self.called(name), self.called(other)
+        key = "beyond" if beyond else "scores"
+        assert bool(beyond) == ("beyond" in first["replicates"])
         apart = self.sign * (np.array(second["replicates"][key]) - np.array(first["replicates"][key]))
-        assert float(value) == pytest.approx(apart.mean(), abs=6e-4)
-        return self.leads(name) and (int(wins), int(count)) == ((apart > 0).sum(), len(apart))
+        assert [float(value), *map(float, (low, high))] == pytest.approx(self.student(apart), abs=6e-4)
+        assert all(one["score"] == np.median(one["replicates"]["scores"]) for one in (first, second))
+        return (int(wins), int(count)) == ((apart > 0).sum(), len(apart))
+
+    @staticmethod
+    def student(values):
+        """The mean and Student's interval of it."""
+        half = scipy.stats.t.ppf(0.975, len(values) - 1) * values.std(ddof=1) / len(values) ** 0.5
+        return values.mean(), values.mean() - half, values.mean() + half
 
     def beside(self, text):
         where = None
@@ -211,9 +223,11 @@ class Truth:
 NAME = r"(?:In simulation )?(\S+)"
 QUALITY = "(?:the best score|the smallest error beyond the floor)"
 ABOVE = {
-    rf"{NAME} is best, ahead of (\S+)(?: in (\d+) of (\d+) campaigns)?"
-    r"(?: \((?:mean )?difference(?: beyond the floor)? ([\d.]+)(?: N)?, 95 % .*\))?\.":
-        lambda t, a, b, k, n, d: t.ahead(a, b, k, n, d),
+    rf"{NAME} is best: better than (\S+?)(?: by [\d.]+(?: N)? \(95 % [^;]*\))?\.":
+        lambda t, a, b: t.ahead(a, b) and t.leads(a),
+    rf"{NAME} is best: better than (\S+) in (\d+) of (\d+) campaigns, on average by ([\d.]+)(?: N)?"
+    r"( beyond the floor)? \(95 % ([\d.]+) … ([\d.]+); scores below are medians\)\.":
+        lambda t, a, b, *numbers: t.ahead(a, b) and t.leads(a) and t.by_campaign(a, b, *numbers),
     rf"{NAME} has {QUALITY}; (.*?)(?:, \d+ more)? cannot be told from it\.":
         lambda t, a, b: t.leads(a) and all(not t.ranks[t.called(one)["cell"]].behind for one in b.split(", ")),
     rf"{NAME} has {QUALITY}, and is not shown to be better than the "
@@ -243,16 +257,16 @@ BELOW = {
     r"Protocol deployable uses statistics of the test set, .*": lambda t: any(one["dagger"] for one in t.rows),
     r"Beyond floor: the root of RMSE² − floor²(; places go by it)?\. Floor: .* \((?:[abc] 0\.1000(?:, )?)+\)\.":
         lambda t, by: bool(by) == (bool(t.better) and t.floor),
-    r"Score(, interval)?: median over (.*? campaigns?), each simulated anew .*?; = not all of these .*":
-        lambda t, i, n: t.tied() and t.counts(n, t.answers),
-    r"(?:Score(, interval)?: median over (.*? campaigns?), each simulated anew with its own seed[^=]*)":
-        lambda t, i, n: t.counts(n, t.answers) and bool(i) == any(o["ci_low"] is not None for o in t.answers),
-    r"Interval: over (.*?)\..*|Interval: over (.*?); = not all.*":
-        lambda t, n, m: t.counts(n or m, [o for o in t.answers if o["ci_low"] is not None]),
-    r"Delay: sampling, link, window, computing\.": lambda t: any(o["answer_delay_ms"] is not None for o in t.answers),
+    r"(?:(Score(, interval)?: median over (.*? campaigns?), each simulated anew with its own seed[^=.]*|"
+    r"Interval: over ([^.]*))(?:\. |\.$))?(= marks a shared place: .*? apart\.)? ?"
+    r"(Delay: sampling, link, window, computing\.)?":
+        lambda t, s, i, n, m, tied, delay: (not tied or t.tied())
+        and (not n or (t.counts(n, t.answers) and bool(i) == any(o["ci_low"] is not None for o in t.answers)))
+        and (not m or t.counts(m, [o for o in t.answers if o["ci_low"] is not None]))
+        and bool(delay) == any(o["answer_delay_ms"] is not None for o in t.answers),
     r"Times cannot be compared: (taken on 2 hosts)?(?: and )?(taken while up to 4 cells ran)?\.":
-        lambda t, hosts, many: bool(hosts) == (len({o["host"] for o in t.rows}) == 2)
-        and bool(many) == any(o["concurrency"] == 4 for o in t.rows),
+        lambda t, hosts, many: bool(hosts) == (len({o["host"] for o in t.answers}) == 2)
+        and bool(many) == any(o["concurrency"] == 4 for o in t.answers),
     r"a/x.*?(?: and (\d+) more)? (failed|skipped)(?:; (\d+) more ended otherwise)?: (\w+\.)":
         lambda t, more, status, others, reason: t.ended(status, int(others or 0), reason),
 }  # fmt: skip

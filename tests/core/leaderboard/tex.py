@@ -4,7 +4,8 @@ import re
 import unicodedata
 
 _SIGNS = {
-    r"\textbackslash{}": "\\", r"\&": "&", r"\%": "%", r"\$": "$", r"\#": "#", r"\_": "_", r"\{": "{", r"\}": "}",
+    r"\textbackslash{}": "\\", r"\&": "&", r"\%": "%", r"\$": "$", r"\#": "#", r"\{": "{", r"\}": "}",
+    r"\_\allowbreak{}": "_", r"=\allowbreak{}": "=",
     r"\textasciitilde{}": "~", r"\textasciicircum{}": "^", r"\textless{}": "<", r"\textgreater{}": ">",
     r"\textbar{}": "|", "{''}": '"', "{[}": "[", "{]}": "]", "{*}": "*", r"$\dagger$": "†", r"$\ddagger$": "‡",
     r"$\|$": "‖", "---": "—", "--": "–", r"\ldots{}": "…", r"$\cdot$": "·", r"$\times$": "×", r"$\pm$": "±",
@@ -15,7 +16,7 @@ _SIGNS = {
 _TOKEN = re.compile(
     "|".join(re.escape(sign) for sign in sorted(_SIGNS, key=len, reverse=True))
     # What a line of text may hold as it is; two of these that TeX draws as one have been taken apart.
-    + r"|(?P<plain>(?!--|``|''|\?`|!`|,,)[A-Za-z0-9À-ÖØ-öø-ÿ .:;()/=+@,'`?!-])"
+    + r"|(?P<plain>(?!--|``|''|\?`|!`|,,)[A-Za-z0-9À-ÖØ-öø-ÿ .:;()/+@,'`?!-])"
 )
 
 
