@@ -6,7 +6,6 @@ is no better than a trivial one is never proposed; simulated and measured rows a
 
 from __future__ import annotations
 
-import statistics
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from math import isfinite
@@ -109,29 +108,26 @@ class _Choosing:
     def __init__(self, rows: Sequence[Row], wish: Wish, task: TaskSpec, sensors: Mapping[str, SensorSpec]) -> None:
         self.wish, self.task, self.sensors, self.rows = wish, task, sensors, rows
         done = [row for row in rows if row["status"] == "done" and not row["is_baseline"] and isfinite(row["score"])]
-        self.lower = task.metric in LOWER_IS_BETTER
-        self.sign = 1.0 if self.lower else -1.0
+        self.sign = 1.0 if task.metric in LOWER_IS_BETTER else -1.0
         self.beyond = bool(done) and all(row.get("score_beyond_floor") is not None for row in done)
-        self.answers = _one_each(done)
+        self.answers = done
 
     def choice(self, hardware: str) -> Choice:
-        by_sensor: dict[str, list[Candidate]] = {}
-        trivial: dict[str, None] = {}
+        by_sensor: dict[str, list[Candidate]] = {name: [] for name in dict.fromkeys(r["sensor"] for r in self.answers)}
         for row in self.answers:
-            trivial[row["sensor"]] = None
             if not no_better(row):
-                by_sensor.setdefault(row["sensor"], []).append(self.candidate(row))
-        chosen = sorted((min(found, key=self.order) for found in by_sensor.values()), key=self.order)
+                by_sensor[row["sensor"]].append(self.candidate(row))
         left_out = []
-        for name in dict.fromkeys([*trivial, *(row["sensor"] for row in self.rows)]):
-            if name not in trivial:
-                left_out.append(f"{visible(name)}: there is no finished answer beside trivial ones.")
+        for name in dict.fromkeys([*by_sensor, *(row["sensor"] for row in self.rows)]):
+            if name in self.sensors and not self.sensors[name].data_sheet.exists:
+                by_sensor.pop(name, None)
+                left_out.append(f"{visible(name)}: it exists as a definition only.")
             elif name not in by_sensor:
+                left_out.append(f"{visible(name)}: there is no finished answer beside trivial ones.")
+            elif not by_sensor[name]:
                 why = self.run(name, "--probe")
                 left_out.append(f"{visible(name)}: no answer of it is better than a trivial one; `{why}` says why.")
-            elif not self.exists(name):
-                left_out.append(f"{visible(name)}: it exists as a definition only.")
-        chosen = [one for one in chosen if self.exists(one.row["sensor"])]
+        chosen = sorted((min(found, key=self.order) for found in by_sensor.values() if found), key=self.order)
         unknown = dict.fromkeys(sentence for one in chosen for sentence in self.unknown(one))
         unknown.update(dict.fromkeys(self.of_all(chosen)))
         name = metric_name({"metric": self.task.metric, "unit": self.task.unit})
@@ -142,9 +138,6 @@ class _Choosing:
             hardware, quantity, self.task.unit, self.verdict(chosen), tuple(chosen), intervals, tuple(unknown),
             tuple(left_out),
         )  # fmt: skip
-
-    def exists(self, sensor: str) -> bool:
-        return sensor not in self.sensors or self.sensors[sensor].data_sheet.exists
 
     def candidate(self, row: Row) -> Candidate:
         keys = ("score_beyond_floor", "beyond_floor_ci_low", "beyond_floor_ci_high")
@@ -160,7 +153,7 @@ class _Choosing:
         missed, unknown = one.named("missed"), one.named("unknown")
         worst = max((criterion.relative for criterion in missed), default=0.0)
         better = (self.sign * one.score, self.sign * one.row["score"], one.sensor, one.estimator)
-        return bool(missed), len(missed), len(unknown), round(worst, 9), *better
+        return len(missed), len(unknown), round(worst, 9), *better
 
     def verdict(self, chosen: Sequence[Candidate]) -> str:
         if not chosen:
@@ -170,7 +163,7 @@ class _Choosing:
         missed, unknown = first.named("missed"), [one.wish for one in first.named("unknown")]
         unsure = unknown and f"its {listed(unknown)} {'is' if len(unknown) == 1 else 'are'} unknown"
         if missed:
-            by = " and ".join(one.missed_by for one in missed)
+            by = " and ".join(f"{one.wish} {one.text}" for one in missed)
             return f"None meets all: nearest is {name}, {by}" + (f"; {unsure}." if unknown else ".")
         if unknown:
             return f"Cannot say: none is known to meet all; {name} misses nothing that is known, but {unsure}."
@@ -180,8 +173,7 @@ class _Choosing:
         met = "meets the wish" if count == 1 else f"meets all {count} wishes"
         if not others:
             return f"{name} {met}."
-        apart = "" if _apart(first, others[0]) else "; their scores are not told apart"
-        return f"{name} {met}; {', '.join(f'{one.sensor} / {one.estimator}' for one in others)} too{apart}."
+        return f"{name} {met}; {', '.join(f'{one.sensor} / {one.estimator}' for one in others)} too."
 
     def unknown(self, one: Candidate) -> Iterable[str]:
         """Yield what is not known of a candidate, and what to do about it."""
@@ -216,21 +208,3 @@ class _Choosing:
         protocol = self.rows[0]["protocol"]
         return command_line("tactbench", "run", "--sensor", sensor, "--task", self.task.name,
                             "--protocol", protocol, *more)  # fmt: skip
-
-
-def _one_each(rows: Sequence[Row]) -> list[Row]:
-    """Return one row for each answer of a sensor: of several replicates the one of median score (the lower median)."""
-    found: dict[tuple[str, str, str], list[Row]] = {}
-    for row in rows:
-        found.setdefault((row["rig"], row["sensor"], answer_name(row)), []).append(row)
-    return [
-        next(row for row in same if row["score"] == statistics.median_low([one["score"] for one in same]))
-        for same in found.values()
-    ]
-
-
-def _apart(one: Candidate, other: Candidate) -> bool:
-    """Return whether the intervals of two scores do not overlap; without intervals nothing is apart."""
-    if one.low is None or one.high is None or other.low is None or other.high is None:
-        return False
-    return one.high < other.low or other.high < one.low

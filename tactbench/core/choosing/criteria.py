@@ -43,15 +43,11 @@ class Criterion:
     """``answer delay``, ``force range``, ``rate`` or ``score``."""
     state: State
     text: str
-    """What is known, in a few words."""
+    """What is known, in a few words, and by how much the wish is missed."""
     value: float | None = None
     """What the wish is compared with, in its unit; None: unknown."""
-    short_by: float = 0.0
-    """By how much it is missed, in its unit; 0 where it is not."""
     relative: float = 0.0
-    """The same over the wish [1]."""
-    missed_by: str = ""
-    """The same in words."""
+    """By how much it is missed, over the wish [1]; 0 where it is not."""
 
 
 class ScoreInterval(NamedTuple):
@@ -74,15 +70,19 @@ def criteria_of(
     spec
         Of the sensor; None: not installed, so that its range and rate are unknown.
     """
-    found = [
-        wish.max_delay_ms and _delay(row, wish.max_delay_ms, _sampled(task, spec)[1]),
-        wish.range_n and _range(wish.range_n, spec),
-        wish.rate_hz and _rate(row, wish.rate_hz, *_sampled(task, spec)),
-        _score(figure, wish, task, pressed_n(row, task)),
-    ]
+    sampled, stated = _sampled(task, spec)
+    found = []
+    if wish.max_delay_ms is not None:
+        found.append(_delay(row, wish.max_delay_ms, stated))
+    if wish.range_n is not None:
+        found.append(_range(wish.range_n, spec))
+    if wish.rate_hz is not None:
+        found.append(_rate(row, wish.rate_hz, sampled, stated))
+    if wish.score is not None:
+        found.append(_score(figure, wish.score, wish.range_n, task, pressed_n(row, task)))
     if row.get("baseline") is None:
         found.append(Criterion("trivial answer", "unknown", "no trivial answer beside it"))
-    return tuple(one for one in found if isinstance(one, Criterion))
+    return tuple(found)
 
 
 def pressed_n(row: Row, task: TaskSpec) -> float | None:
@@ -103,20 +103,19 @@ def listed(words: Sequence[str]) -> str:
 
 
 def _delay(row: Row, wished: float, rate_stated: bool) -> Criterion:
-    name, looks = "answer delay", row.get("looks_at") == "features"
-    delay_ms = row.get("answer_delay_ms")
+    name, delay_ms = "answer delay", row.get("answer_delay_ms")
     parts = {part: time for part, time in (row.get("delay_parts_ms") or {}).items() if time is not None}
     least = delay_ms if delay_ms is not None else sum(parts.values()) if parts else row.get("latency_ms_p50")
     if least is None:
         return Criterion(name, "unknown", "not timed")
+    # Without the link an answer from readings is later than its row says.
+    lacking = [part for part in _PARTS if part not in parts] if parts and row.get("looks_at") == "features" else []
     assumed = "sampling" in parts and not rate_stated
     sure = least - parts["sampling"] if assumed else least
-    # Without the link an answer from readings is later than its row says.
-    whole = delay_ms is not None and not assumed and not (parts and looks and "link" not in parts)
+    whole = delay_ms is not None and not assumed and "link" not in lacking
     if sure > wished or whole:
         how = "" if whole else "at least "
-        return _compared(name, sure, wished, how + _ms(sure), lambda ms: how + _ms(ms), "too slow", least=False)
-    lacking = [part for part in _PARTS if part not in parts]
+        return _compared(name, sure, wished, lambda ms: how + _ms(ms), "too slow", least=False)
     without = f" without {listed(lacking)}" if lacking else ""
     text = f"{_ms(least)}{without}" if parts else f"prediction alone {_ms(least)}"
     return Criterion(name, "unknown", text + (" by an assumed rate" if assumed else ""))
@@ -127,7 +126,7 @@ def _range(wished: float, spec: SensorSpec | None) -> Criterion:
     if stated is None or stated.source.tag == "assumed":
         return Criterion(name, "unknown", "not stated" if stated is None else f"{stated}, assumed")
     upper = stated.upper * conversion(stated.unit, "N")
-    return _compared(name, upper, wished, str(stated), newtons, "short of range", least=True)
+    return _compared(name, upper, wished, newtons, "short of range", least=True)
 
 
 def _rate(row: Row, wished: float, sampled: float | None, stated: bool) -> Criterion:
@@ -136,14 +135,12 @@ def _rate(row: Row, wished: float, sampled: float | None, stated: bool) -> Crite
         return Criterion(name, "unknown", "not stated")
     answered = 1e3 / taken if taken else None
     if answered is not None and answered < min(sampled, wished):
-        text = f"{_hz(answered)}: an answer takes {_ms(1e3 / answered)}"
-        return _compared(name, answered, wished, text, _hz, "too low", least=True)
+        return _compared(name, answered, wished, _hz, "too low", least=True)
     if not stated:
         return Criterion(name, "unknown", f"{_hz(sampled)}, assumed")
     if answered is None and sampled >= wished:
         return Criterion(name, "unknown", f"samples at {_hz(sampled)}, answers not timed")
-    rate = sampled if answered is None else min(sampled, answered)
-    return _compared(name, rate, wished, _hz(rate), _hz, "too low", least=True)
+    return _compared(name, sampled if answered is None else min(sampled, answered), wished, _hz, "too low", least=True)
 
 
 def _sampled(task: TaskSpec, spec: SensorSpec | None) -> tuple[float | None, bool]:
@@ -160,41 +157,34 @@ def _sampled(task: TaskSpec, spec: SensorSpec | None) -> tuple[float | None, boo
     return min(rates), all(source is not None and source.tag != "assumed" for source in sources)
 
 
-def _score(figure: ScoreInterval, wish: Wish, task: TaskSpec, pressed: float | None) -> Criterion | None:
+def _score(
+    figure: ScoreInterval, wished: float, range_n: float | None, task: TaskSpec, pressed: float | None
+) -> Criterion:
     lower = task.metric in LOWER_IS_BETTER
-    wished = wish.score
-    if wished is None:
-        return None
-
-    def formatted(number: float) -> str:
-        return score_with_unit(number, task.unit)
-
     word = "above the wished error" if lower else "below the wished score"
-    found = _compared("score", figure.value, wished, "", formatted, word, least=not lower)
-    if found.state == "missed":
-        return replace(found, text=found.missed_by)
-    if wish.range_n is not None and pressed is None:
-        return Criterion("score", "unknown", "how hard was pressed is not stated")
-    if wish.range_n is not None and pressed is not None and wish.range_n > pressed:
-        return Criterion("score", "unknown", f"pressed to {newtons(pressed)} only")
-    crosses = (
-        figure.high is not None and figure.high > wished if lower else figure.low is not None and figure.low < wished
+
+    found = _compared(
+        "score", figure.value, wished, lambda number: score_with_unit(number, task.unit), word, least=not lower
     )
+    if found.state == "missed":
+        return found
+    if range_n is not None and pressed is None:
+        return Criterion("score", "unknown", "how hard was pressed is not stated")
+    if range_n is not None and pressed is not None and range_n > pressed:
+        return Criterion("score", "unknown", f"pressed to {newtons(pressed)} only")
+    end = figure.high if lower else figure.low
+    crosses = end is not None and (end > wished if lower else end < wished)
     return replace(found, text="but not by its whole interval" if crosses else "")
 
 
-_Formatter = Callable[[float], str]
-
-
 def _compared(
-    name: str, value: float, wished: float, text: str, formatted: _Formatter, word: str, *, least: bool
+    name: str, value: float, wished: float, formatted: Callable[[float], str], word: str, *, least: bool
 ) -> Criterion:
     """Return how a value stands to the least, or else the most, that is wished."""
     short = wished - value if least else value - wished
     if not short > 0:
-        return Criterion(name, "met", text, value)
-    missed = f"{formatted(short)} {word}"
-    return Criterion(name, "missed", f"{text}, {missed}", value, short, short / wished if wished else 1.0, missed)
+        return Criterion(name, "met", formatted(value), value)
+    return Criterion(name, "missed", f"{formatted(value)}, {formatted(short)} {word}", value, short / wished)
 
 
 def _ms(milliseconds: float) -> str:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -15,11 +15,10 @@ from tactbench.core.report.page import make_page
 from tactbench.core.report.published import published_table, records, reproduce
 from tactbench.core.report.results import Results, SavedFigure
 from tactbench.core.report.section import ReportData
-from tactbench.core.spec.row import JSON_KEYS
 from tactbench.core.tables.text_table import TextTable
 
 Drawer = Callable[[Results, Path, Progress, Callable[[str], None]], Sequence[SavedFigure]]
-"""Told the results, the folder for figures, where progress goes and what to call with each figure it leaves out."""
+"""Takes the results, the folder for figures, where progress goes, and what is called with each figure left out."""
 
 
 @dataclass(frozen=True)
@@ -44,27 +43,16 @@ def make_report(results: Results, out: Path, progress: Progress, *, draw: Drawer
     UnwritableError
         If `out` refuses the page or the figures; an earlier page is then still whole.
     """
-    readable = tuple(row for row in results.rows if set(JSON_KEYS) <= set(row))
-    foreign = [row for row in results.rows if row not in readable]
-    if not any(row["status"] == "done" for row in readable):
+    if not any(row["status"] == "done" for row in results.rows):
         raise UsageError(
-            f"No cell in {results.store.folder} has finished, or all are of another version: there is nothing to "
-            "report.",
+            f"No cell in {results.store.folder} has finished: there is nothing to report.",
             hint="Finish some with `tactbench run --out DIR`.",
         )
-    results = replace(results, rows=readable)
-    drawn: Sequence[SavedFigure] = ()
     undrawn: list[str] = []
-    trouble: tuple[str, ...] = ()
     try:
         (out / "figures").mkdir(parents=True, exist_ok=True)
-        try:
-            drawn = draw(results, out / "figures", progress, undrawn.append)
-        except OSError:
-            raise
-        except Exception as error:  # does not take the tables with it
-            trouble = (f"The figures could not be drawn: {type(error).__name__}: {error}",)
-        page = make_page(ReportData(results, drawn, (*undrawn, *trouble)))
+        drawn = draw(results, out / "figures", progress, undrawn.append)
+        page = make_page(ReportData(results, drawn, tuple(undrawn)))
         # A lone surrogate, which JSON may hold, is no UTF-8: a question mark then.
         replace_file(out / "index.html", page.html.encode("utf-8", "replace"))
     except OSError as error:
@@ -72,11 +60,10 @@ def make_report(results: Results, out: Path, progress: Progress, *, draw: Drawer
             f"The report cannot be written to {out}: {error.strerror or error}.",
             hint="Give another folder with --out.",
         ) from error
-    lacking = [one for one in page.missing if not one.endswith(trouble)]
     return Report(
         page=out / "index.html",
-        reproduction=published_table(results.registry, readable),
-        records=records(reproduce(results.registry, readable)),
-        missing=(*lacking, *(f"{row.get('cell')}: its row is of another version; run it again" for row in foreign)),
-        broken=(*page.broken, *trouble),
+        reproduction=published_table(results.registry, results.rows),
+        records=records(reproduce(results.registry, results.rows)),
+        missing=page.missing,
+        broken=page.broken,
     )

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import base64
-import hashlib
 import json
 from collections import Counter
 from collections.abc import Callable
@@ -22,18 +21,17 @@ from tactbench.core.leaderboard.view import REASON, View, grid
 from tactbench.core.recording.reader import read_meta
 from tactbench.core.report.cells import details
 from tactbench.core.report.costs import ladder_table
-from tactbench.core.report.datasheet import details as of_sensors
 from tactbench.core.report.datasheet import sensor_table, table_one
 from tactbench.core.report.figures.published_and_ours import NAME as PUBLISHED
 from tactbench.core.report.published import published_table, reproduce
 from tactbench.core.report.results import SavedFigure
-from tactbench.core.report.section import MOST_ROWS, Picture, ReportData, Section
+from tactbench.core.report.section import MOST_ROWS, ReportData, Section
 from tactbench.core.spec.sensor import SensorSpec
 from tactbench.core.tables.text import command_line
 from tactbench.core.tables.text_table import WORDY, sort_value
 
 if TYPE_CHECKING:
-    from jinja2 import Environment
+    from jinja2 import Template
     from markupsafe import Markup
 
 
@@ -42,8 +40,6 @@ MOST_TASKS = 2
 """So many tasks are named in the first section; the leaderboards have them all."""
 MOST_WHOLE = 200
 """Cells of which the page has whatever there is: each further one takes a file to be read and 20 kB."""
-_READINGS = 5
-"""So many first lines of a sensor's details are about readings; `tactbench show --all` has the parameters."""
 
 
 def answers_section(subject: ReportData) -> Section:
@@ -55,7 +51,7 @@ def answers_section(subject: ReportData) -> Section:
     simulated = any(row["simulated"] for row in subject.rows if row["status"] == "done")
     paragraphs = ["SIM: simulated by a twin of the sensor; no sensor was touched."] if simulated else []
     paragraphs += [*_published(subject), *list(found.values())[:MOST_TASKS]]
-    pictures = tuple(_picture(one) for one in subject.drawn if one.name == PUBLISHED)
+    pictures = tuple(one for one in subject.drawn if one.name == PUBLISHED)
     return Section(paragraphs=tuple(paragraphs), pictures=pictures)
 
 
@@ -88,13 +84,9 @@ def published_section(subject: ReportData) -> Section:
 
 def figures_section(subject: ReportData) -> Section:
     """Return the section of figures: those that were drawn for this page."""
-    pictures = tuple(_picture(one) for one in subject.drawn if one.name != PUBLISHED)
+    pictures = tuple(one for one in subject.drawn if one.name != PUBLISHED)
     paragraphs = ("The same figures lie beside this page as `figures/*.pdf` and `figures/*.png`.",) if pictures else ()
     return Section(paragraphs=paragraphs, pictures=pictures, missing=subject.undrawn)
-
-
-def _picture(one: SavedFigure) -> Picture:
-    return Picture(one.title, one.caption, one.png.read_bytes())
 
 
 def compared_section(subject: ReportData) -> Section:
@@ -104,10 +96,7 @@ def compared_section(subject: ReportData) -> Section:
         "No question was asked in two ways: `tactbench run --probe` adds shuffled rows and the first frame alone, "
         "`--protocol` and `--split` ask otherwise."
     )
-    return Section(
-        tables=tuple(table.compact() for table in tables),
-        missing=() if tables else (lacks,),
-    )  # fmt: skip
+    return Section(tables=tuple(table.compact() for table in tables), missing=() if tables else (lacks,))
 
 
 def costs_section(subject: ReportData) -> Section:
@@ -118,7 +107,7 @@ def costs_section(subject: ReportData) -> Section:
         with suppress(KeyError, TypeError, ValueError):  # twin.json has no such table, nor has a damaged file
             tables.append(ladder_table(json.loads(path.read_bytes())))
     pictures = tuple(
-        Picture(path.stem, "As `tactbench cost` has drawn it.", path.read_bytes())
+        SavedFigure(path.stem, path.stem, "As `tactbench cost` has drawn it.", path)
         for path in sorted((folder / "cost").glob("*.png"))
     )
     timed = (row for row in subject.rows if row["status"] == "done" and row["answer_per"] != "recording")
@@ -137,10 +126,10 @@ def sensors_section(subject: ReportData) -> Section:
     levels = {str(row["sensor"]): str(row[LEVEL]) for row in subject.rows if LEVEL in row}
     listed = ", ".join(f"{name} {level}" for name, level in levels.items())
     command = command_line("tactbench", "show", *found, "--all")
-    parts = (("Sensor comparison", table_one(specs)), ("Readings", of_sensors(specs)[:_READINGS])) if specs else ()
+    tables = (sensor_table("Sensor comparison", specs, table_one(specs), with_source=True).compact(),) if specs else ()
     return Section(
         paragraphs=(f"Every parameter of these sensors, and who states it: `{command}`.",) if specs else (),
-        tables=tuple(sensor_table(name, specs, properties, with_source=True).compact() for name, properties in parts),
+        tables=tables,
         notes=(f"Levels that `tactbench check` has computed: {listed}.",) if levels else (),
         missing=tuple(f"{name}: neither installed nor in a recording of these results."
                       for name, spec in found.items() if spec is None),
@@ -222,47 +211,30 @@ def make_page(subject: ReportData) -> Page:
             broken.append(f"{title}: {reason}")
             sections.append(Section(anchor, title, missing=(reason,)))
     missing = [f"{section.title}: {lacked}" for section in sections for lacked in section.missing]
-    style, script = _text("page.css"), _text("page.js")
-    html = (
-        _environment()
-        .get_template("page.html")
-        .render(
-            title=TITLE, version=tactbench.__version__, sections=sections, anchors=subject.anchors, style=style,
-            script=script, style_hash=_digest(style), script_hash=_digest(script),
-        )
-    )  # fmt: skip
+    html = _template().render(
+        title=TITLE,
+        version=tactbench.__version__,
+        sections=sections,
+        anchors=subject.anchors,
+        style=_text("page.css"),
+        script=_text("page.js"),
+    )
     return Page(f"{html}\n", tuple(one for one in missing if one not in broken), tuple(broken))
 
 
 @lru_cache(maxsize=1)
-def _environment() -> Environment:
-    """Return what renders the template; everything in it is escaped."""
+def _template() -> Template:
+    """Return the template; everything that it is given is escaped."""
     from jinja2 import Environment, PackageLoader, StrictUndefined
 
     loader = PackageLoader("tactbench.core.report", "template")
     environment = Environment(loader=loader, autoescape=True, undefined=StrictUndefined)
     environment.globals["wordy"] = WORDY
-    environment.filters.update(prose=_prose, sort_value=sort_value, base64=lambda png: base64.b64encode(png).decode())
-    return environment
+    environment.filters.update(sort_value=sort_value, picture=lambda path: base64.b64encode(path.read_bytes()).decode())
+    return environment.get_template("page.html")
 
 
 def _text(name: str) -> Markup:
     from markupsafe import Markup
 
     return Markup((resources.files("tactbench.core.report") / "template" / name).read_text(encoding="utf-8"))
-
-
-def _digest(text: str) -> str:
-    """Return what a Content-Security-Policy calls the text by."""
-    return "sha256-" + base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()
-
-
-def _prose(text: str) -> Markup:
-    """Return text with what stands between backticks as code; everything in it is escaped."""
-    from markupsafe import Markup, escape
-
-    parts = str(text).split("`")
-    if len(parts) % 2 == 0:  # a backtick without its partner is a backtick
-        return escape(str(text))
-    shown = [Markup("<code>{}</code>").format(part) if place % 2 else escape(part) for place, part in enumerate(parts)]
-    return Markup("").join(shown)

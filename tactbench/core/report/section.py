@@ -59,15 +59,6 @@ class ReportData:
 
 
 @dataclass(frozen=True)
-class Picture:
-    """A figure inside the page."""
-
-    title: str
-    caption: str
-    png: bytes
-
-
-@dataclass(frozen=True)
 class Details:
     """Everything that is known about one cell, to be unfolded."""
 
@@ -88,7 +79,7 @@ class Section:
     title: str = ""
     paragraphs: tuple[str, ...] = ()
     tables: tuple[TextTable, ...] = ()
-    pictures: tuple[Picture, ...] = ()
+    pictures: tuple[SavedFigure, ...] = ()
     notes: tuple[str, ...] = ()
     details: tuple[Details, ...] = ()
     missing: tuple[str, ...] = ()

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from tactbench.core.errors import NotApplicable
-from tactbench.core.report.figures.group import Group, Panel, Remark, Sketch, class_name, with_unit
+from tactbench.core.report.figures.group import Group, Panel, Sketch, class_name, with_unit
 from tactbench.core.report.figures.style import COLUMN_IN, PAGE_IN, panels
 from tactbench.core.samples import FloatArray, IntArray
 from tactbench.core.tables.numbers import score
@@ -21,7 +21,7 @@ NUMBERS_UP_TO = 14
 """With more classes numbers no longer fit into their squares."""
 
 
-def draw(group: Group, remark: Remark) -> Sketch:
+def draw(group: Group) -> Sketch:
     """Draw one row a sensor: left the validation set where there is one, right the test set.
 
     Raises

@@ -9,14 +9,14 @@ from typing import Any
 
 import numpy as np
 
-from tactbench.core.errors import DataError, NotApplicable, TactbenchError
+from tactbench.core.errors import DataError, NotApplicable
 from tactbench.core.evaluation.cell import load_task
 from tactbench.core.evaluation.fitting import features_of
 from tactbench.core.evaluation.sets import prepared
-from tactbench.core.report.figures.group import Group, Panel, Remark, Sketch, class_name, with_unit
+from tactbench.core.report.figures.group import Group, Sketch, class_name, with_unit
+from tactbench.core.report.figures.score_by_force import WINDOW_S, smoothed_force
 from tactbench.core.report.figures.style import MARKERS, cycled, legend, ordered, panels
 from tactbench.core.report.results import Results
-from tactbench.core.report.smoothing import WINDOW_S, smoothed_force
 from tactbench.core.samples import Answers, FloatArray, IntArray
 
 AT_MOST = 1000
@@ -27,22 +27,15 @@ SMALLEST_PT2, LARGEST_PT2 = 1.5, 9.0
 """Areas of the points of least and of most force."""
 
 
-def draw(group: Group, remark: Remark) -> Sketch:
+def draw(group: Group) -> Sketch:
     """Draw one row a sensor: left by class, right by force.
 
     Raises
     ------
     NotApplicable
-        If no sensor's test set can be embedded.
+        If a sensor's test set cannot be embedded.
     """
-    found: list[tuple[Panel, IntArray, FloatArray]] = []
-    for panel in group.panels:
-        try:
-            found.append((panel, *embed(group.results, panel.row, panel.answers["test"])))
-        except TactbenchError as error:
-            remark(f"No embedding of {panel.row['cell']}: {error}")
-    if not found:
-        raise NotApplicable("no test set can be embedded")
+    found = [(panel, *embed(group.results, panel.row, panel.answers["test"])) for panel in group.panels]
     figure, axes = panels(len(found), 2, 1.55)
     forces = [smoothed_force(panel.answers["test"])[rows] for panel, rows, _ in found]
     known = [force for own in forces for force in own[np.isfinite(own)]]

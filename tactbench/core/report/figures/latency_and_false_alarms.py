@@ -10,7 +10,7 @@ import numpy as np
 from tactbench.core.errors import NotApplicable
 from tactbench.core.evaluation.event_answers import BOUNDS_PER_MINUTE
 from tactbench.core.leaderboard.names import answer_name
-from tactbench.core.report.figures.group import Group, Remark, Sketch
+from tactbench.core.report.figures.group import Group, Sketch
 from tactbench.core.report.figures.style import LINES, MARKERS, PAGE_IN, cycled, legend, panels
 
 LEAST_RECALL = 0.25
@@ -19,7 +19,7 @@ SMALLEST_PT, LARGEST_PT = 2.0, 8.0
 """Sizes of marks at recall 0 and 1."""
 
 
-def draw(group: Group, remark: Remark) -> Sketch:
+def draw(group: Group) -> Sketch:
     """Draw one panel a sensor and a line a detector, through its operating points.
 
     Raises

@@ -6,7 +6,7 @@ import numpy as np
 
 from tactbench.core.errors import NotApplicable
 from tactbench.core.evaluation.metrics import distances
-from tactbench.core.report.figures.group import Group, Remark, Sketch, with_unit
+from tactbench.core.report.figures.group import Group, Sketch, with_unit
 from tactbench.core.report.figures.style import GREY, tiled
 from tactbench.core.samples import Answers, FloatArray
 from tactbench.core.spec.row import MEDIAN_ERROR
@@ -19,7 +19,7 @@ CELLS = 20
 """Of the map, along its longer side: the rows of a cell are one dot."""
 
 
-def draw(group: Group, remark: Remark) -> Sketch:
+def draw(group: Group) -> Sketch:
     """Draw the test set's true places, coloured by the error there, one panel a sensor.
 
     Raises

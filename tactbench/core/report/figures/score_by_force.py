@@ -9,18 +9,21 @@ import numpy.typing as npt
 
 from tactbench.core.errors import NotApplicable
 from tactbench.core.evaluation.metrics import metric_called
-from tactbench.core.report.figures.group import Group, Panel, Remark, Sketch
+from tactbench.core.report.figures.group import Group, Panel, Sketch
 from tactbench.core.report.figures.style import GREY, MARKERS, cycled, legend, panels
-from tactbench.core.report.smoothing import WINDOW_S, smoothed_force
-from tactbench.core.samples import FloatArray
+from tactbench.core.samples import Answers, FloatArray
 from tactbench.core.tables.numbers import whole
 
+WINDOW_S = 1.0
+"""A reading of a reference carries noise as large as a band is wide; the mean of a hundred a tenth of it."""
+_CLOCK_S = 1e-9
+"""Resolution of the clocks: rounding must not decide whether a row just half a second away is in a mean."""
 EDGES_N = (1.5, 3.0)
 """A band is from one edge up to the next; the outer ones are open."""
 BANDS = ("below 1.5", "1.5 to 3", "3 and above")
 
 
-def draw(group: Group, remark: Remark) -> Sketch:
+def draw(group: Group) -> Sketch:
     """Draw the score in each band, one line a sensor, with the trivial baseline below.
 
     Raises
@@ -68,3 +71,26 @@ def membership(force_n: FloatArray) -> list[npt.NDArray[np.bool_]]:
     """Return a mask for each band; a row without force is in none."""
     edges = (-np.inf, *EDGES_N, np.inf)
     return [(force_n >= low) & (force_n < high) for low, high in itertools.pairwise(edges)]
+
+
+def smoothed_force(answers: Answers) -> FloatArray:
+    """Return (n,) the mean force, N, of the rows of the same recording within half a second to either side.
+
+    Rows without force are left out of the means, and a mean of none is NaN. Near the ends, and where the protocol has
+    discarded samples, a mean is over what there is.
+    """
+    smooth = np.full(len(answers), np.nan)
+    for one in np.unique(answers.recording):
+        mine = np.flatnonzero(answers.recording == one)
+        mine = mine[np.argsort(answers.time_s[mine], kind="stable")]
+        time, force = answers.time_s[mine], answers.force_n[mine]
+        there = np.isfinite(force)
+        if not there.any():
+            continue
+        centre = force[there].mean()  # cumulative sums of a large offset would lose digits
+        sums = np.cumsum([there, np.where(there, force - centre, 0.0)], axis=1)
+        half = WINDOW_S / 2 + _CLOCK_S
+        ends = np.searchsorted(time, [time - half, time + half]) - 1
+        count, total = np.where(ends < 0, 0.0, sums[:, ends])[:, 1] - np.where(ends < 0, 0.0, sums[:, ends])[:, 0]
+        smooth[mine] = np.divide(total, count, out=np.full(len(mine), np.nan), where=count > 0) + centre
+    return smooth

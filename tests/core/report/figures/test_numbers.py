@@ -15,18 +15,13 @@ from tactbench.core.report.figures import (
     score_by_force,
 )
 from tactbench.core.report.figures.style import COLUMN_IN, ordered, styled
-from tactbench.core.report.smoothing import smoothed_force
 
 from .made import group_of
 
 
-def ignore(_):
-    pass
-
-
 def drawn(make, group):
     with styled():
-        return make.draw(group, ignore)
+        return make.draw(group)
 
 
 def squares(axes, n):
@@ -109,7 +104,7 @@ def test_banded_scores_are_those_of_scikit_learn_on_the_same_rows(finished):
     lines = {line.get_label(): line for line in drawn(score_by_force, group).figure.axes[0].get_lines()}
     for panel in group.panels:
         test = panel.answers["test"]
-        force = smoothed_force(test)
+        force = score_by_force.smoothed_force(test)
         scores, rows = score_by_force.banded(group, panel)
         masks = (force < 1.5, (force >= 1.5) & (force < 3.0), force >= 3.0)
         expected = [
@@ -131,7 +126,7 @@ def test_text_is_legible_at_a_column_s_width(finished, task):
     for draw in FIGURES[group.task.kind]:
         try:
             with styled():
-                figure = draw(group, ignore).figure
+                figure = draw(group).figure
         except ValueError:
             continue  # what does not apply here
         assert figure.get_figwidth() <= COLUMN_IN
