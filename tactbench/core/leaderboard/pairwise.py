@@ -99,7 +99,7 @@ def asked_in_several_ways(rows: Sequence[Row]) -> Iterator[PairwiseComparison]:
             yield from (_pair(kind, _NAMES[kind](first), _NAMES[kind](other), first, other) for other in others)
 
 
-def _answers(rows: Sequence[Row]) -> list[Row]:
+def _answers(rows: Iterable[Row]) -> list[Row]:
     return [row for row in rows if not row["is_baseline"]]
 
 
@@ -141,9 +141,7 @@ def _compared(
     ones, others = ({_key(kind, row): row for row in rows} for rows in (first_rows, second_rows))
     found = []
     for key in dict.fromkeys([*ones, *others]):
-        alone = ""
-        if not (key in ones and key in others):
-            alone = _why_alone(key, second, others) if key in ones else _why_alone(key, first, ones)
+        alone = "" if key in ones and key in others else f"{second if key in ones else first} has no such cell"
         found.append(_pair(kind, first, second, ones.get(key), others.get(key), alone))
     return found
 
@@ -168,19 +166,6 @@ def _key(kind: Kind, row: Row) -> Key:
     protocol = "" if kind == "protocols" else row["protocol"]
     split = "" if kind == "splits" else row["split"]
     return (hardware_name(row), protocol, split, row["task"], row["repeat"], of)
-
-
-def _why_alone(alone: Key, missing: str, others: Iterable[Key]) -> str:
-    """Return why a row with the key `alone` has nothing to stand against among `others`, which are of `missing`."""
-    hardware, protocol, split, *rest = alone
-    near = [key for key in others if list(key[3:]) == rest]
-    if any(key[0] != hardware and key[1:3] == (protocol, split) for key in near):
-        return "SIM is never compared with hardware, EMULATED with neither"
-    if any(key[:2] == (hardware, protocol) for key in near):
-        return f"{missing} was asked with another split"
-    if any(key[0] == hardware for key in near):
-        return f"{missing} was asked under another protocol"
-    return f"{missing} has no such cell"
 
 
 def tables_of(comparisons: Sequence[PairwiseComparison]) -> list[TextTable]:
@@ -252,20 +237,14 @@ def notes_of(comparisons: Sequence[PairwiseComparison]) -> tuple[str, ...]:
     for pair, apart in found:
         task, region = pair.row["task"], pair.row.get("equivalence")
         same = f"scores within {region:g}{suffix(pair.row['unit'])} are practically the same" if region else ""
-        notes.append(f"{task}: {apart.method}; {same or 'no region of practical equivalence is declared'}.")
-        if apart.smallest_p and apart.smallest_p > 0.01:
-            notes.append(f"{apart.replicates} replicates cannot give a p below {apart.smallest_p:.2g}.")
+        least = f"; p cannot be below {apart.smallest_p:.2g}" if apart.smallest_p and apart.smallest_p > 0.01 else ""
+        notes.append(f"{task}: {apart.method}; {same or 'no region of practical equivalence is declared'}{least}.")
         if pair.folds:
             notes.append(
                 f"p folds: {pair.folds.method}; training data of folds overlap, so p over replicates is too small "
                 "for a claim about estimators trained anew."
             )
-    if any(pair.declared for pair, _ in found):
-        notes.append("p Holm is corrected for all declared comparisons of these results; others are exploratory.")
-    else:
-        notes.append("None of these was declared in the matrix: exploratory, p is not corrected for being one of many.")
-    if any(pair.row["simulated"] for pair, _ in found):
-        notes.append("SIM, EMULATED: simulated by the twin; says nothing of hardware.")
+    notes.append("p Holm is corrected for all comparisons that the matrix declares; others are exploratory.")
     return tuple(dict.fromkeys(notes))
 
 

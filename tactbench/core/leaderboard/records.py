@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import io
 import math
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from typing import Any
 
 import tactbench
@@ -74,7 +74,7 @@ def parquet(table: Table) -> bytes:
     Raises
     ------
     UsageError
-        If pyarrow is not installed, or a number of a row has no place in 64 bits.
+        If pyarrow is not installed.
     """
     try:
         import pyarrow as pa
@@ -91,11 +91,8 @@ def parquet(table: Table) -> bytes:
     }
     schema = pa.schema([(name, types[_kind(name)]) for name in names], metadata=metadata)
     out = io.BytesIO()
-    try:
-        columns = zip(*lines, strict=True) if lines else [()] * len(names)
-        pq.write_table(pa.table(list(map(list, columns)), schema=schema), out, compression="zstd")
-    except (pa.ArrowException, OverflowError) as error:
-        raise UsageError(f"These rows do not fit Parquet: {error}.", hint="Use --format json.") from error
+    columns = zip(*lines, strict=True) if lines else [()] * len(names)
+    pq.write_table(pa.table(list(map(list, columns)), schema=schema), out, compression="zstd")
     return out.getvalue()
 
 
@@ -122,30 +119,26 @@ def xlsx(table: Table) -> bytes:
     """
     try:
         from openpyxl import Workbook
-        from openpyxl.cell import WriteOnlyCell
     except ImportError as error:
         raise _lacking("An Excel file", "openpyxl", "xlsx", error) from error
     book = Workbook(write_only=True)
     names, lines = flat_records(table)
-    said = [(one,) for block in table.blocks for one in (block.title, block.setting, block.origin, *block.verdict)]
-    sheets: dict[str, list[Iterable[Any]]] = {
-        "leaderboard": [names, *lines],
-        "notes": [*said, *((one,) for one in (*table.notes, *table.footer))],
-    }
+    said = [one for block in table.blocks for one in (block.title, block.setting, block.origin, *block.verdict)]
+    sheets = {"leaderboard": [names, *lines], "notes": [[one] for one in (*said, *table.notes, *table.footer)]}
     for title, rows in sheets.items():
         sheet = book.create_sheet(title)
         for row in rows:
-            cells = [WriteOnlyCell(sheet, value=_value(value)) for value in row]
-            for cell in cells:
-                if isinstance(cell.value, str):
-                    cell.data_type = "s"  # never a formula: names may come from strangers
-            sheet.append(cells)
+            sheet.append([_cell(sheet, value) for value in row])
     out = io.BytesIO()
     book.save(out)
     return out.getvalue()
 
 
-def _value(value: Any) -> Any:
-    if isinstance(value, float):
-        return value if math.isfinite(value) else None
-    return value if isinstance(value, int | None) else visible(str(value))
+def _cell(sheet: Any, value: Any) -> Any:
+    from openpyxl.cell import WriteOnlyCell
+
+    if isinstance(value, str):
+        cell = WriteOnlyCell(sheet, value=visible(value))
+        cell.data_type = "s"  # a text that begins with = is no formula
+        return cell
+    return None if isinstance(value, float) and not math.isfinite(value) else value

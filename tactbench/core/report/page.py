@@ -13,12 +13,10 @@ from importlib import resources
 from typing import TYPE_CHECKING
 
 import tactbench
-from tactbench.core.errors import TactbenchError
 from tactbench.core.leaderboard.columns import DEFAULT, NUMERIC
 from tactbench.core.leaderboard.levels import KEY as LEVEL
 from tactbench.core.leaderboard.pairwise import asked_in_several_ways, tables_of
 from tactbench.core.leaderboard.view import REASON, View, grid
-from tactbench.core.recording.reader import read_meta
 from tactbench.core.report.cells import details
 from tactbench.core.report.costs import ladder_table
 from tactbench.core.report.datasheet import sensor_table, table_one
@@ -26,7 +24,6 @@ from tactbench.core.report.figures.published_and_ours import NAME as PUBLISHED
 from tactbench.core.report.published import published_table, reproduce
 from tactbench.core.report.results import SavedFigure
 from tactbench.core.report.section import MOST_ROWS, ReportData, Section
-from tactbench.core.spec.sensor import SensorSpec
 from tactbench.core.tables.text import command_line
 from tactbench.core.tables.text_table import WORDY, sort_value
 
@@ -43,23 +40,21 @@ MOST_WHOLE = 200
 
 
 def answers_section(subject: ReportData) -> Section:
-    """Return the first section: what came out in three sentences, and published scores and ours in one picture."""
+    """Return the first section: what came out in a few sentences, and published scores and ours in one picture."""
     found: dict[str, str] = {}
     for block in subject.leaderboard.blocks:
         if block.verdict:
             found.setdefault(str(block.lines[0].row["task"]), f"{block.title} {block.verdict[0]}")
-    simulated = any(row["simulated"] for row in subject.rows if row["status"] == "done")
-    paragraphs = ["SIM: simulated by a twin of the sensor; no sensor was touched."] if simulated else []
-    paragraphs += [*_published(subject), *list(found.values())[:MOST_TASKS]]
+    verdicts = [line.verdict for line in reproduce(subject.results.registry, subject.rows)]
+    inside, judged = verdicts.count("inside"), sum(verdict in ("inside", "outside") for verdict in verdicts)
+    paragraphs = (
+        "SIM: simulated by a twin of the sensor; no sensor was touched."
+        * any(row["simulated"] for row in subject.rows),
+        f"Published numbers in the interval of ours: {inside} of {judged}." if judged else "",
+        *list(found.values())[:MOST_TASKS],
+    )
     pictures = tuple(one for one in subject.drawn if one.name == PUBLISHED)
-    return Section(paragraphs=tuple(paragraphs), pictures=pictures)
-
-
-def _published(subject: ReportData) -> list[str]:
-    """Return how many published numbers lie in the interval of ours."""
-    verdicts = Counter(line.verdict for line in reproduce(subject.results.registry, subject.rows))
-    judged = verdicts["inside"] + verdicts["outside"]
-    return [f"Published numbers in the 95 % interval of ours: {verdicts['inside']} of {judged}."] if judged else []
+    return Section(paragraphs=tuple(filter(None, paragraphs)), pictures=pictures)
 
 
 def leaderboards_section(subject: ReportData) -> Section:
@@ -120,35 +115,19 @@ def costs_section(subject: ReportData) -> Section:
 
 def sensors_section(subject: ReportData) -> Section:
     """Return the comparison of the sensors that the results are about."""
-    names = dict.fromkeys(str(row["sensor"]) for row in subject.rows)
-    found = {name: _spec(name, subject) for name in names}
-    specs = [spec for spec in found.values() if spec is not None]
+    known = subject.results.registry.sensors
+    names = list(dict.fromkeys(str(row["sensor"]) for row in subject.rows))
+    specs = [known[name].spec for name in names if name in known]
     levels = {str(row["sensor"]): str(row[LEVEL]) for row in subject.rows if LEVEL in row}
     listed = ", ".join(f"{name} {level}" for name, level in levels.items())
-    command = command_line("tactbench", "show", *found, "--all")
-    tables = (sensor_table("Sensor comparison", specs, table_one(specs), with_source=True).compact(),) if specs else ()
+    command = command_line("tactbench", "show", *(name for name in names if name in known), "--all")
+    table = sensor_table("Sensor comparison", specs, table_one(specs), with_source=True).compact()
     return Section(
         paragraphs=(f"Every parameter of these sensors, and who states it: `{command}`.",) if specs else (),
-        tables=tables,
+        tables=(table,) if specs else (),
         notes=(f"Levels that `tactbench check` has computed: {listed}.",) if levels else (),
-        missing=tuple(f"{name}: neither installed nor in a recording of these results."
-                      for name, spec in found.items() if spec is None),
-    )  # fmt: skip
-
-
-def _spec(name: str, subject: ReportData) -> SensorSpec | None:
-    """Return a sensor's spec: the installed one, else the one that a recording carries."""
-    registry = subject.results.registry
-    try:
-        if name in registry.sensors:
-            return registry.sensors[name].spec
-        for row in subject.rows:
-            if row["sensor"] == name:
-                for path in subject.results.recordings(row):
-                    return read_meta(path).sensor
-    except TactbenchError:
-        pass  # given twice, or a damaged file: the section says that it is not known
-    return None
+        missing=tuple(f"{name}: not installed." for name in names if name not in known),
+    )
 
 
 def cells_section(subject: ReportData) -> Section:

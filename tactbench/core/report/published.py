@@ -6,9 +6,9 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
 
-from tactbench.core.leaderboard.columns import row_interval
 from tactbench.core.plugins.registry import Registry
 from tactbench.core.spec.task import Published, TaskSpec
+from tactbench.core.tables.numbers import interval as ends
 from tactbench.core.tables.numbers import score, signed
 from tactbench.core.tables.text import command_line
 from tactbench.core.tables.text_table import ABSENT, Entry, TextTable, finite, text_table
@@ -53,7 +53,7 @@ def reproduce(registry: Registry, rows: Sequence[Row]) -> list[Reproduction]:
             beside = [row for row in rows if stands_beside(row, task, published)]
             lines += [Reproduction(task, published, row, *_verdict(row, published.score)) for row in beside]
             if not beside and not _needs_recordings(task, published, registry):
-                command = _command(task, published, registry)
+                command = _command(task, published)
                 lines.append(Reproduction(task, published, None, "no answer", f"not run: `{command}`"))
     return lines
 
@@ -79,7 +79,7 @@ def _verdict(row: Row, published: float) -> tuple[Verdict, str]:
     return "inside" if row["ci_low"] <= published <= row["ci_high"] else "outside", ""
 
 
-def _command(task: TaskSpec, published: Published, registry: Registry) -> str:
+def _command(task: TaskSpec, published: Published) -> str:
     """Return what to type for a row that the number may stand beside."""
     words = ["tactbench", "run", *(["--sensor", published.sensor] if published.sensor else []), "--task", task.name]
     words += ["--protocol", published.protocol]
@@ -87,8 +87,6 @@ def _command(task: TaskSpec, published: Published, registry: Registry) -> str:
         words += ["--split", published.split]
     if published.estimator and published.estimator not in task.baselines:  # those are run with any other
         words += ["--estimator", published.estimator]
-    if _needs_recordings(task, published, registry):
-        words += ["--rig", "replay", "--recordings", "DIR"]
     return command_line(*words)
 
 
@@ -133,8 +131,14 @@ def _entries(line: Reproduction) -> tuple[str, ...]:
     if row and row["score"] is not None:
         marks = (" SIM" if row["simulated"] else "") + (" †" if row["dagger"] else "")
         ours = Entry(score(row["score"], unit) + marks, finite(row["score"]), cell=row["cell"])
-        interval = Entry(row_interval(row), finite(row["ci_low"]))
+        interval = Entry(ends(row["ci_low"], row["ci_high"], unit), finite(row["ci_low"]))
         apart = Entry(signed(row["score"] - published, unit), row["score"] - published)
     digits = f"{published:g}" if unit == "1" else score(published, unit)
-    verdict = ": ".join(filter(None, (line.verdict, line.reason)))
-    return f"{line.title}; {line.published.reference}", Entry(digits, published), ours, interval, apart, verdict
+    return (
+        f"{line.title}; {line.published.reference}",
+        Entry(digits, published),
+        ours,
+        interval,
+        apart,
+        line.reason or line.verdict,
+    )

@@ -19,9 +19,6 @@ _TEX = {
 }  # fmt: skip
 """Brackets and the star are options of ``\\\\`` where they follow it: in braces they are text."""
 
-_LIGATURE = re.compile(r"-(?=-)|`(?=`)|'(?=')|[!?](?=`)|,(?=,)")
-"""The first of two characters that TeX draws as one."""
-
 
 def latex(tables: Iterable[TextTable]) -> str:
     """Return tables as LaTeX over both columns of a paper."""
@@ -75,12 +72,10 @@ def _label(title: str, number: int) -> str:
 
 def tex(text: str) -> str:
     """Return text that LaTeX sets as it is; a character it has no letter for is told by its number, ``U+4E2D``."""
-    return "".join(map(_character, _LIGATURE.sub("\\g<0>\0", text)))
+    return "".join(map(_character, text))
 
 
 def _character(character: str) -> str:
-    if character == "\0":
-        return "{}"
     if character in _TEX:
         return _TEX[character]
     if character.isascii():

@@ -34,7 +34,6 @@ def test_the_table_the_files_and_the_verb_leaderboard_say_whether_the_first_fram
     written = (verbs.folder / "tactbench-results" / "leaderboard.md").read_text()
     for text in (shown, written, verbs("leaderboard").stdout):
         assert "does the score come from the contact?" in text
-        assert ("LEAK: the first frame alone scores 1.000" in text) == leaks
         assert ("no leak shown" in text) != leaks
     rows = json.loads((verbs.folder / "tactbench-results" / "leaderboard.json").read_text())
     ways = [(row["protocol"], row["split"]) for row in rows if row["estimator"] == "logistic"]

@@ -32,7 +32,7 @@ Leaderboard [filter]
   Force: how large is the normal force?: sensor estimator RMSE [N] beyond floor [N] published delay after touch training
   Grasp-stability: will the object slip when it is lifted?: sensor estimator accuracy reason
 Published numbers
-  Published numbers, and ours: number published ours interval ours − published verdict
+  Published numbers, and ours: number published ours ours − published verdict
 Figures [1 figure]
 Across protocols, splits and tasks
 What accuracy costs in time

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -9,7 +10,7 @@ import numpy as np
 from tactbench.core.errors import NotApplicable
 from tactbench.core.report.figures.group import Group, Panel, Sketch, class_name, with_unit
 from tactbench.core.report.figures.style import COLUMN_IN, PAGE_IN, panels
-from tactbench.core.samples import FloatArray, IntArray
+from tactbench.core.samples import IntArray
 from tactbench.core.tables.numbers import score
 
 if TYPE_CHECKING:
@@ -46,10 +47,14 @@ def draw(group: Group) -> Sketch:
             here.set_title(f"{panel.sensor}, {role}")
             here.set_xlabel(with_unit("answered", group.unit))
         axes[place, 0].set_ylabel(with_unit(f"true {group.quantity}", group.unit))
+    counts = ", ".join(
+        f"{panel.sensor} {np.sum(panel.row['confusion'], axis=1).min()} to {np.sum(panel.row['confusion'], axis=1).max()}"
+        for panel in shown
+    )
     scores = ", ".join(f"{panel.sensor} {score(panel.row['score'], group.task.unit)}" for panel in shown)
     caption = (
-        f"Rows are the true {group.quantity}, columns the answer; numbers are per cent of the row, whose "
-        f"count of {group.task.answer_per}s stands on the right (n). {group.metric} of the test set: {scores}."
+        f"Rows are the true {group.quantity}, columns the answer; numbers are per cent of the row. Tested "
+        f"{group.task.answer_per}s of a class: {counts}. {group.metric} of the test set: {scores}."
     )
     return group.sketch("confusion", f"Which {group.quantity} is taken for which?", caption, figure)
 
@@ -64,25 +69,14 @@ def matrices(panel: Panel) -> dict[str, IntArray]:
     return found
 
 
-def shares(table: IntArray) -> FloatArray:
-    """Return the table normalised by row; a class that never occurs has a row of zeros."""
-    total = table.sum(axis=1, keepdims=True)
-    return np.asarray(np.divide(table, total, out=np.zeros(table.shape), where=total > 0))
-
-
 def _matrix(here: Axes, table: IntArray, classes: list[Any]) -> None:
-    share = shares(table)
-    n = len(classes)
-    here.imshow(share, cmap="Blues", vmin=0.0, vmax=1.0, aspect="equal")
+    total = table.sum(axis=1, keepdims=True)
+    per_cent = np.divide(100 * table, total, out=np.zeros(table.shape), where=total > 0)
     names = list(map(class_name, classes))
-    here.set_xticks(range(n), names, rotation=90 if max(map(len, names)) > 4 and n > 3 else 0)
-    here.set_yticks(range(n), names)
+    importlib.import_module("sklearn.metrics").ConfusionMatrixDisplay(per_cent, display_labels=names).plot(
+        ax=here, cmap="Blues", colorbar=False, values_format=".0f", include_values=len(names) <= NUMBERS_UP_TO,
+        im_kw={"vmin": 0.0, "vmax": 100.0}, xticks_rotation=90 if max(map(len, names)) > 4 and len(names) > 3 else 0.0,
+    )  # fmt: skip
+    here.set_ylabel("")
     here.tick_params(length=0)
     here.spines[:].set_visible(False)
-    if n > NUMBERS_UP_TO:
-        return
-    for (i, j), one in np.ndenumerate(share):
-        here.text(j, i, f"{100 * one:.0f}", ha="center", va="center", color="white" if one > 0.55 else "black")
-    for i in range(n):
-        here.text(n - 0.35, i, str(table[i].sum()), ha="left", va="center")
-    here.text(n - 0.35, -0.6, "n", ha="left", va="bottom")

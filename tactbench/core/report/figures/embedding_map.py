@@ -87,7 +87,7 @@ def embed(results: Results, row: dict[str, Any], test: Answers) -> tuple[IntArra
     Raises
     ------
     NotApplicable
-        If the test set is in several folds, each with features of its own, or too small.
+        If the test set is in several folds, each with features of its own.
     DataError
         If the recordings are not those the cell was answered from.
 
@@ -103,17 +103,13 @@ def embed(results: Results, row: dict[str, Any], test: Answers) -> tuple[IntArra
     if np.ptp(test.fold):
         raise NotApplicable(f"split {row['split']!r} has a test set a fold, and no two are scaled alike")
     rows = np.arange(0, len(test), -(-len(test) // AT_MOST), dtype=np.int64)
-    perplexity = min(PERPLEXITY, (len(rows) - 1) / 3)
-    if perplexity < 1:
-        raise NotApplicable(f"{len(rows)} test rows have no neighbourhoods")
     features = _features(results, row, test)[rows]
-    manifold = importlib.import_module("sklearn.manifold")
-    threads = importlib.import_module("threadpoolctl")
-    model = manifold.TSNE(
-        perplexity=perplexity, max_iter=ITERATIONS, init="pca", learning_rate="auto", random_state=int(row["seed"]),
+    model = importlib.import_module("sklearn.manifold").TSNE(
+        perplexity=min(PERPLEXITY, (len(rows) - 1) / 3), max_iter=ITERATIONS, init="pca", learning_rate="auto",
+        random_state=int(row["seed"]),
         n_jobs=1,
     )  # fmt: skip
-    with threads.threadpool_limits(limits=1):
+    with importlib.import_module("threadpoolctl").threadpool_limits(limits=1):
         return rows, np.asarray(model.fit_transform(features), dtype=np.float64)
 
 

@@ -83,9 +83,11 @@ class Group:
             return "state of slip"
         if isinstance(target, LabelTarget):
             return target.name.removesuffix(f"_{target.unit}").replace("_", " ")
-        if isinstance(target, VectorTarget):
-            return f"{target.kind} ({', '.join(target.names)})"
-        return (target.name if target.name and len(target.name) > 2 else target.kind).replace("_", " ")
+        return (
+            f"{target.kind} ({', '.join(target.names)})"
+            if isinstance(target, VectorTarget)
+            else target.kind.replace("_", " ")
+        )
 
     @property
     def unit(self) -> str:
@@ -93,31 +95,21 @@ class Group:
         target = self.task.target
         return target.unit if isinstance(target, LabelTarget) else self.task.unit
 
-    @property
-    def heading(self) -> str:
-        """What stands above a figure: question, answer, protocol with its marks, SIM; in lines that fit a column."""
-        row = self.row
-        parts = [row["task"], answer_name(row), row["protocol"] + (" †" if row["dagger"] else "")]
-        if row["split"] not in (None, "roles"):
-            parts.append(f"split {row['split']}" + (" ‡" if row["stamps"] else ""))
-        parts += ["SIM" if row["simulated"] else f"rig {row['rig']}", *self._shown()]
-        return fill(" · ".join(parts), _LINE)
-
-    def _shown(self) -> list[str]:
-        """Return which of several replicates a figure of single answers shows; of recordings, which of the seeds."""
-        row = self.row
-        what = "replicate" if row["simulated"] else "seed"
-        return [f"{what} {row['repeat']} of {row['repeats']}"] if row["repeats"] > 1 else []
-
     def sketch(self, kind: str, title: str, caption: str, figure: Figure) -> Sketch:
-        """Return the group's figure of a kind, with its heading, and what its marks mean in the caption."""
+        """Return the group's figure of a kind, with a heading, and what its marks mean in the caption."""
         row = self.row
         parts = (kind, row["task"], row["protocol"], row["split"], answer_name(row))
         words = "-".join(filter(None, (*parts, "" if row["simulated"] else row["rig"])))
         name = re.sub(r"[^a-z0-9]+", "-", words.lower()).strip("-")
-        figure.suptitle(self.heading)
+        # Of several replicates, or of several seeds of the same recordings, a figure of single answers shows one.
+        shown = f"replicate {row['repeat']} of {row['repeats']}" if row["repeats"] > 1 else ""
+        heading = [row["task"], answer_name(row), row["protocol"] + (" †" if row["dagger"] else "")]
+        if row["split"] not in (None, "roles"):
+            heading.append(f"split {row['split']}" + (" ‡" if row["stamps"] else ""))
+        heading += ["SIM" if row["simulated"] else f"rig {row['rig']}", shown]
+        figure.suptitle(fill(" · ".join(filter(None, heading)), _LINE))
         marks = [MARKS[key] for key in MARKS if row[key]] + [f"‡: {stamp}" for stamp in row["stamps"]]
-        marks += [f"Shown: {one}; the tables are over all of them." for one in self._shown()]
+        marks += [f"Shown: {shown}; the tables are over all of them."] if shown else []
         return Sketch(name, title, " ".join((caption, *marks)), figure)
 
 

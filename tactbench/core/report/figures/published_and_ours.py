@@ -39,7 +39,7 @@ def draw_published(results: Results) -> Sketch | None:
     legend(figure, axes[:, 0])
     parts = [
         "Open black diamonds are the published scores; filled circles are our scores, the median over replicates where "
-        "there are several (small strokes), with their 95 % intervals where there are five or more."
+        "there are several (small strokes), with their intervals where there are five or more."
     ]
     parts += [text for key, text in MARKS.items() if any(row[key] for row in rows)]
     parts.append(f"Published: {'; '.join(dict.fromkeys(line.published.reference for line, _ in every))}.")

@@ -80,17 +80,16 @@ def smoothed_force(answers: Answers) -> FloatArray:
     discarded samples, a mean is over what there is.
     """
     smooth = np.full(len(answers), np.nan)
+    half = WINDOW_S / 2 + _CLOCK_S
     for one in np.unique(answers.recording):
-        mine = np.flatnonzero(answers.recording == one)
-        mine = mine[np.argsort(answers.time_s[mine], kind="stable")]
-        time, force = answers.time_s[mine], answers.force_n[mine]
-        there = np.isfinite(force)
-        if not there.any():
+        mine = answers.recording == one
+        own = np.flatnonzero(mine & np.isfinite(answers.force_n))
+        if not len(own):
             continue
-        centre = force[there].mean()  # cumulative sums of a large offset would lose digits
-        sums = np.cumsum([there, np.where(there, force - centre, 0.0)], axis=1)
-        half = WINDOW_S / 2 + _CLOCK_S
-        ends = np.searchsorted(time, [time - half, time + half]) - 1
-        count, total = np.where(ends < 0, 0.0, sums[:, ends])[:, 1] - np.where(ends < 0, 0.0, sums[:, ends])[:, 0]
-        smooth[mine] = np.divide(total, count, out=np.full(len(mine), np.nan), where=count > 0) + centre
+        own = own[np.argsort(answers.time_s[own], kind="stable")]
+        centre = answers.force_n[own].mean()  # cumulative sums of a large offset would lose digits
+        total = np.concatenate([[0.0], np.cumsum(answers.force_n[own] - centre)])
+        first, last = (np.searchsorted(answers.time_s[own], answers.time_s[mine] + end) for end in (-half, half))
+        with np.errstate(invalid="ignore"):  # no rows: NaN
+            smooth[mine] = (total[last] - total[first]) / (last - first) + centre
     return smooth
