@@ -3,23 +3,38 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from tactbench.core.cost.ladder_rows import Record, by_score, mark_fronts, opening, stopped, timed
-from tactbench.core.cost.rounds import BUDGET_S, THREADS, measure
+import numpy as np
+
+from tactbench.core.cost.precision import front
+from tactbench.core.cost.rounds import BUDGET_S, THREADS, Timing, measure
 from tactbench.core.cost.timed_estimators import TimedEstimator, timed_estimator
-from tactbench.core.errors import UsageError
+from tactbench.core.errors import NotApplicable, TactbenchError, UsageError
 from tactbench.core.evaluation.dataset import load_dataset
+from tactbench.core.evaluation.delay import answer_delay_ms, tail_ms
 from tactbench.core.evaluation.metrics import metric_called
 from tactbench.core.matrix.plan import plan_cells
 from tactbench.core.matrix.progress import Progress
 from tactbench.core.matrix.run import EngineChoice, Outcome, run_matrix
-from tactbench.core.matrix.store import Store
+from tactbench.core.matrix.store import Row, Store
 from tactbench.core.plugins.registry import Registry
 from tactbench.core.spec.matrix import MatrixSpec
+from tactbench.core.spec.recording import RecordingMeta
+from tactbench.core.spec.rig import EstimatorDescriptor
 from tactbench.core.statistics.replicates import over_replicates
+
+Record = dict[str, Any]
+SAME_SCORE = 1e-9
+"""Largest relative difference of scores that still is the same answer: rounding of sums in another order."""
+
+_MEASURED = (
+    "n_train", "n_test", "n_features", "fit_s", "fit_s_q1", "fit_s_q3", "fits", "batch_s_per_row", "batches",
+    "latency_ms_p50", "latency_ms_p95", "latency_ms_max", "latency_n", "answer_delay_ms", "answer_delay_ms_q1",
+    "answer_delay_ms_q3", "data_s",
+)  # fmt: skip
 
 
 class Ladder(NamedTuple):
@@ -117,3 +132,112 @@ def _about(outcome: Outcome) -> dict[str, Any]:
         **{key: first[key] for key in keys},
         "provenance": {key: value for key, value in outcome.provenance.items() if key != "jobs"},
     }
+
+
+def opening(row: Row, descriptor: EstimatorDescriptor) -> Record:
+    """Return what a cell's row says of an estimator; what is still to be measured is None."""
+    kept = ("chosen", "status", "reason", "score", "ci_low", "ci_high", "ci_method", "search_s")
+    return {
+        "estimator": row["estimator"],
+        "is_baseline": row["is_baseline"],
+        "looks_at": descriptor.looks_at,
+        "params": {**descriptor.params, **row["params"]},
+        **{key: row[key] for key in kept},
+        **dict.fromkeys(_MEASURED),
+        "delay_parts_ms": {},
+        "front_fit": False,
+        "front_delay": False,
+        "notes": [],
+    }
+
+
+def stopped(error: Exception) -> Record:
+    """Return what changes in a row whose estimator could not be timed: it was skipped, or failed, and why."""
+    reason = str(error) if isinstance(error, TactbenchError) else f"{type(error).__name__}: {error}"
+    return {"status": "skipped" if isinstance(error, NotApplicable) else "failed", "reason": reason}
+
+
+def timed(one: TimedEstimator, timing: Timing, scores: Mapping[str, float], rounds: int) -> Record:
+    """Return what changes in a row by having been timed; `scores` are those of the cell, by fold among others."""
+    if timing.trouble is not None:
+        return stopped(timing.trouble)
+    quartiles = {
+        name: np.quantile(1e3 * np.array(spent), (0.25, 0.5, 0.75))
+        for name, spent in (("prediction", timing.latency_s), ("features", timing.features_s))
+        if spent
+    }
+    parts = {**one.delay_parts_ms, **{name: float(median) for name, (_, median, _) in quartiles.items()}}
+    low, median, high = sum(quartiles.values()).tolist()  # type: ignore[union-attr]
+    delay = answer_delay_ms(parts, one.looks_at)
+    p95, largest = tail_ms(np.array(timing.latency_s))
+    fit_q1, fit_s, fit_q3 = np.quantile(timing.fit_s, (0.25, 0.5, 0.75)).tolist()
+    return {
+        "n_train": len(one.X_train),
+        "n_test": len(one.X_test),
+        "n_features": one.X_train.shape[1],
+        "fit_s": fit_s,
+        "fit_s_q1": fit_q1,
+        "fit_s_q3": fit_q3,
+        "fits": len(timing.fit_s),
+        "batch_s_per_row": float(np.median(timing.batch_s)) / len(one.X_test),
+        "batches": len(timing.batch_s),
+        "latency_ms_p50": parts["prediction"],
+        "latency_ms_p95": p95,
+        "latency_ms_max": largest,
+        "latency_n": len(timing.latency_s),
+        "answer_delay_ms": delay,
+        "answer_delay_ms_q1": None if delay is None else delay + low - median,
+        "answer_delay_ms_q3": None if delay is None else delay + high - median,
+        "delay_parts_ms": parts,
+        "data_s": _recorded_s(one.trained_on),
+        "notes": [*_cut_short(timing, rounds), *_other_answers(one, timing, scores)],
+    }
+
+
+def _cut_short(timing: Timing, rounds: int) -> list[str]:
+    return [
+        f"{what} in {len(times)} of {rounds} rounds: one took more than {BUDGET_S:g} s"
+        for what, times in (("fitted", timing.fit_s), ("all test rows answered", timing.batch_s))
+        if len(times) < rounds
+    ]
+
+
+def _other_answers(one: TimedEstimator, timing: Timing, scores: Mapping[str, float]) -> list[str]:
+    """Return a note if the model that was timed is not the one whose score stands beside its times."""
+    stored = scores.get(f"fold {one.fold}")
+    if timing.answers is None or stored is None or one.metric is None:
+        return []
+    score = one.metric.of(one.y_test, timing.answers, one.n_classes)
+    if abs(score - stored) <= SAME_SCORE * abs(stored):
+        return []
+    return [f"the timed model scores {score:.6g} on fold {one.fold}, the cell's {stored:.6g}"]
+
+
+def _recorded_s(metas: Sequence[RecordingMeta]) -> float | None:
+    """Return the seconds that simulating or acquiring the recordings took; None where any of them does not say."""
+    spent = [meta.provenance.get("sim_s", meta.provenance.get("acquisition_s")) for meta in metas]
+    return None if None in spent or not spent else float(sum(map(float, spent)))  # type: ignore[arg-type]
+
+
+def mark_fronts(rows: Sequence[Record], *, higher_is_better: bool) -> None:
+    """Mark who is beaten by nobody.
+
+    Trivial answers compete with nobody: they do not look at the sensor. Nor does who is no better than the best of
+    those that look at nothing.
+    """
+    sign = -1.0 if higher_is_better else 1.0
+    done = [row for row in rows if row["status"] == "done"]
+    trivial = (row for row in done if row["is_baseline"] and row.get("looks_at") not in ("time", "reference"))
+    bar = min((sign * row["score"] for row in trivial), default=float("inf"))
+    able = [row for row in done if not row["is_baseline"] and sign * row["score"] < bar]
+    for mark, time in (("front_fit", "fit_s"), ("front_delay", "answer_delay_ms")):
+        measured = [row for row in able if row[time] is not None]
+        for row in front(measured, seconds=lambda row, key=time: row[key], error=lambda row: sign * row["score"]):  # type: ignore[misc]
+            row[mark] = True
+
+
+def by_score(rows: Sequence[Record], *, higher_is_better: bool) -> list[Record]:
+    """Return the rows, the best score first; those without one last, in the order given."""
+    sign = -1.0 if higher_is_better else 1.0
+    scored = [row for row in rows if row["score"] is not None]
+    return sorted(scored, key=lambda row: float(sign * row["score"])) + [row for row in rows if row["score"] is None]

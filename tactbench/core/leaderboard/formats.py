@@ -8,11 +8,10 @@ from pathlib import Path
 
 from tactbench.core.errors import UsageError
 from tactbench.core.files import replace_file
-from tactbench.core.leaderboard.blocks import Block
 from tactbench.core.leaderboard.names import Row, distinct
 from tactbench.core.leaderboard.records import csv_text, json_array, parquet, xlsx
 from tactbench.core.leaderboard.sentences import NO_BETTER
-from tactbench.core.leaderboard.table import Table, build_table
+from tactbench.core.leaderboard.table import Block, Table, build_table
 from tactbench.core.leaderboard.view import DEFAULT_VIEW, WHOLE, View, document, grids
 from tactbench.core.statistics.replicates import counted
 from tactbench.core.tables import markdown as markdown_format

@@ -141,7 +141,11 @@ def _compared(
     ones, others = ({_key(kind, row): row for row in rows} for rows in (first_rows, second_rows))
     found = []
     for key in dict.fromkeys([*ones, *others]):
-        alone = "" if key in ones and key in others else f"{second if key in ones else first} has no such cell"
+        alone = (
+            ""
+            if key in ones and key in others
+            else f"{second if key in ones else first} has no such cell on this rig, protocol and split"
+        )
         found.append(_pair(kind, first, second, ones.get(key), others.get(key), alone))
     return found
 

@@ -8,10 +8,9 @@ from dataclasses import dataclass, replace
 
 from tactbench.core.errors import UnknownNameError
 from tactbench.core.evaluation.protocols import is_probe
-from tactbench.core.leaderboard.blocks import Block
 from tactbench.core.leaderboard.columns import COLUMNS, DEFAULT, NUMERIC, SHOWN, Line
 from tactbench.core.leaderboard.names import Row, grouped, metric_name
-from tactbench.core.leaderboard.table import Table
+from tactbench.core.leaderboard.table import Block, Table
 from tactbench.core.statistics.replicates import percent
 from tactbench.core.tables.text import command_line, visible
 from tactbench.core.tables.text_table import Entry, TextTable, finite

@@ -8,9 +8,8 @@ from functools import cached_property
 from hashlib import sha256
 from typing import Any
 
-from tactbench.core.leaderboard.blocks import Block
 from tactbench.core.leaderboard.columns import Line
-from tactbench.core.leaderboard.table import Table, build_table
+from tactbench.core.leaderboard.table import Block, Table, build_table
 from tactbench.core.report.results import Results, SavedFigure
 from tactbench.core.tables.text_table import TextTable
 

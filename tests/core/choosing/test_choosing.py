@@ -6,8 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tactbench.core.choosing.choosing import choose
-from tactbench.core.choosing.criteria import Wish
+from tactbench.core.choosing.choosing import Wish, choose
 from tactbench.core.spec.task import PlannedScene
 from tactbench.plugin import ChannelSpec, DataSheet, PhysicalRange, Scene, SensorSpec, Source, StreamSpec
 from tests.core.leaderboard.rows import TASK, row

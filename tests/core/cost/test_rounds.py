@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from threadpoolctl import threadpool_info
 
-from tactbench.core.cost.ladder_rows import by_score, mark_fronts, stopped, timed
+from tactbench.core.cost.ladder import by_score, mark_fronts, stopped, timed
 from tactbench.core.cost.rounds import REPEATS, WARM_UP_ROWS, Timing, measure
 from tactbench.core.cost.timed_estimators import TimedEstimator
 from tactbench.core.errors import NotApplicable

@@ -10,10 +10,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tactbench.core.leaderboard.formats import plain_text
+from tactbench.core.leaderboard.records import json_array
 from tactbench.core.leaderboard.table import build_table
 from tactbench.core.statistics.ranking import ranks as ranked
 from tactbench.core.statistics.replicates import over_replicates
-from tests.core.leaderboard.rendering import to_json
 
 from .rows import row
 
@@ -30,7 +30,11 @@ def answers(sensor, score, time_index, **more):
 
 
 def ranks(rows):
-    return {one["cell"].split("/")[0]: one["rank"] for one in json.loads(to_json(rows)) if not one["is_baseline"]}
+    return {
+        one["cell"].split("/")[0]: one["rank"]
+        for one in json.loads(json_array(build_table(rows)))
+        if not one["is_baseline"]
+    }
 
 
 def test_the_time_index_of_another_device_says_nothing_of_this_one():

@@ -1,22 +1,18 @@
 """What stands together, in what order, in which columns."""
 
-import io
 import random
-import sys
 
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tactbench.core.errors import UnknownNameError, UsageError
+from tactbench.core.errors import UnknownNameError
 from tactbench.core.leaderboard.columns import COLUMNS, SHOWN
-from tactbench.core.leaderboard.formats import plain_text
+from tactbench.core.leaderboard.formats import plain_text, rendered
 from tactbench.core.leaderboard.notes import count_texts, picked
-from tactbench.core.leaderboard.records import xlsx
 from tactbench.core.leaderboard.table import build_table
 from tactbench.core.leaderboard.view import View, best, commands, grids, known_columns
 from tactbench.core.tables.numbers import duration, score
-from tests.core.leaderboard.rendering import to_csv, to_json, to_latex, to_markdown
 
 from .rows import row
 from .strategies import some_rows
@@ -71,8 +67,7 @@ def test_every_row_is_one_line_in_whatever_order_they_come_and_no_block_mixes_wh
         assert len({one["rig"] for one in done if not one["simulated"]}) <= 1
     other = list(rows)
     rng.shuffle(other)
-    for form in (to_json, to_csv, to_markdown, to_latex):
-        assert form(rows) == form(other)
+    assert rendered(build_table(rows), "json") == rendered(build_table(other), "json")
 
 
 def test_a_cell_that_was_not_begun_stands_with_those_of_its_rig_where_these_agree():
@@ -145,22 +140,6 @@ def test_the_best_of_each_sensor_keep_the_places_they_have_among_all():
     assert "places among all" in block.setting
 
 
-def test_a_workbook_has_numbers_as_numbers_and_no_formula(monkeypatch):
-    from openpyxl import load_workbook
-
-    rows = [row("=1+1", score=0.25, published=0.7), row("b", protocol="karl2016", estimator="mean")]
-    book = load_workbook(io.BytesIO(xlsx(build_table(rows, [{"host": "h"}]))))
-    assert book.sheetnames == ["leaderboard", "notes"]
-    names, values, _ = book["leaderboard"].iter_rows(values_only=True)
-    read = dict(zip(names, values, strict=True))
-    assert (read["score"], read["published"], read["rank"], read["rank_tied"]) == (0.25, 0.7, 1, False)
-    assert {one.data_type for line in book["leaderboard"] for one in line if one.value == "=1+1"} == {"s"}
-    assert any("SIMULATED" in str(one) for (one,) in book["notes"].iter_rows(values_only=True))
-    monkeypatch.setitem(sys.modules, "openpyxl", None)
-    with pytest.raises(UsageError, match=r"pip install 'tactbench\[xlsx\]'"):
-        xlsx(build_table([row()]))
-
-
 def test_durations_have_three_digits_and_a_unit_and_scores_with_a_unit_four_decimals():
     texts = {
         None: "–",
@@ -182,6 +161,4 @@ def test_what_was_left_out_and_chosen_is_told_in_words():
         "rows before the press begins: 1200",
         "rows beyond three sigma in T6 12, T5 10, T4 8, T3 6 and 3 more channels",
     ]
-    assert picked(row(chosen={"k": 40, "lambda_": 0.2})) == (
-        "k = 40 samples before the newest in the mean filter, lambda = 0.2 (parameter of lasso)"
-    )
+    assert picked(row(chosen={"k": 40, "lambda_": 0.2})) == "k = 40, lambda_ = 0.2"

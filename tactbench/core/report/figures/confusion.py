@@ -47,10 +47,8 @@ def draw(group: Group) -> Sketch:
             here.set_title(f"{panel.sensor}, {role}")
             here.set_xlabel(with_unit("answered", group.unit))
         axes[place, 0].set_ylabel(with_unit(f"true {group.quantity}", group.unit))
-    counts = ", ".join(
-        f"{panel.sensor} {np.sum(panel.row['confusion'], axis=1).min()} to {np.sum(panel.row['confusion'], axis=1).max()}"
-        for panel in shown
-    )
+    rows = [np.sum(panel.row["confusion"], axis=1) for panel in shown]
+    counts = ", ".join(f"{panel.sensor} {own.min()} to {own.max()}" for panel, own in zip(shown, rows, strict=True))
     scores = ", ".join(f"{panel.sensor} {score(panel.row['score'], group.task.unit)}" for panel in shown)
     caption = (
         f"Rows are the true {group.quantity}, columns the answer; numbers are per cent of the row. Tested "
