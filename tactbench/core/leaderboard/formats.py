@@ -8,7 +8,7 @@ from pathlib import Path
 
 from tactbench.core.errors import UsageError
 from tactbench.core.files import replace_file
-from tactbench.core.leaderboard.names import Row, distinct
+from tactbench.core.leaderboard.names import Row
 from tactbench.core.leaderboard.records import csv_text, json_array, parquet, xlsx
 from tactbench.core.leaderboard.sentences import NO_BETTER
 from tactbench.core.leaderboard.table import Block, Table, build_table
@@ -88,16 +88,16 @@ def _caption(block: Block) -> str:
     """Return the title of a block, its setting, where it comes from, and how many samples and what intervals are of."""
     rows = [line.row for line in block.lines if line.kind == "result"]
     counts = sorted({row["n_test"] for row in rows if row["n_test"] is not None})
-    over = distinct(
-        ("", (row["n_replicates"], row["replicate_unit"]))
+    over = {
+        (row.get("n_replicates"), row.get("replicate_unit"))
         for row in rows
         if row["ci_low"] is not None and row.get("n_replicates")
-    ).get("", [])
+    }
     sentences = [block.title, f"Score: {block.setting.replace(' · ', ', ')}", block.origin]
     if counts:
         sentences.append(f"n = {'–'.join(map(whole, dict.fromkeys((counts[0], counts[-1]))))} test samples")
     if len(over) == 1:
-        number, unit = over[0]
+        number, unit = over.pop()
         sentences.append(f"Intervals are over {counted(number, 'campaign' if unit == 'replicate' else visible(unit))}")
     if any(line.kind == "baseline" for line in block.lines):
         sentences.append("Below the rule: trivial answers")

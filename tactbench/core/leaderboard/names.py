@@ -76,11 +76,3 @@ def grouped(members: Iterable[_Value], key: Callable[[_Value], _Key]) -> dict[_K
     for one in members:
         groups.setdefault(key(one), []).append(one)
     return groups
-
-
-def distinct(pairs: Iterable[tuple[_Key, _Value]]) -> dict[_Key, list[_Value]]:
-    """Return the different values of each key, both in the order in which they come."""
-    found: dict[_Key, dict[_Value, None]] = {}
-    for key, value in pairs:
-        found.setdefault(key, {})[value] = None
-    return {key: list(values) for key, values in found.items()}

@@ -43,10 +43,8 @@ class PairwiseComparison:
     difference: Difference | None = None
     folds: FoldDifference | None = None
     """the same over folds whose training data overlap, where there are several"""
-    declared: bool = False
-    """the matrix says that it is run to compare these"""
     p_corrected: float | None = None
-    """p corrected for all declared comparisons; None: exploratory"""
+    """p corrected for all comparisons that the matrix declares; None: exploratory"""
 
     @property
     def row(self) -> Row:
@@ -122,7 +120,7 @@ def with_declared(
     every = [pair for choice in declared for pair in _declared(rows, choice)]
     family = {pair.cells: pair.difference.p for pair in reversed(every) if pair.difference is not None}
     corrected = dict(zip(family, holm(list(family.values())), strict=True))
-    return [replace(pair, declared=pair.cells in corrected, p_corrected=corrected.get(pair.cells)) for pair in found]
+    return [replace(pair, p_corrected=corrected.get(pair.cells)) for pair in found]
 
 
 def _declared(rows: Sequence[Row], choice: ComparisonChoice) -> list[PairwiseComparison]:
@@ -206,7 +204,7 @@ def _line(pair: PairwiseComparison) -> tuple[str, ...]:
         " … ".join(signed(end, unit) for end in (found.low, found.high) if end is not None) or ABSENT,
         _probability(found.p),
         _probability(pair.folds.p) if pair.folds else ABSENT,
-        _probability(pair.p_corrected) if pair.declared else "exploratory",
+        "exploratory" if pair.p_corrected is None else _probability(pair.p_corrected),
         ABSENT if found.effect is None else signed(found.effect, "1"),
         ABSENT if found.improved is None else f"{found.improved:.2f}",
         f"{found.replicates}" + ("" if found.paired else " unpaired"),
@@ -262,7 +260,7 @@ def record_of(pair: PairwiseComparison) -> dict[str, Any]:
         "score_a": pair.first_row and pair.first_row["score"], "score_b": pair.second_row and pair.second_row["score"],
         "difference": found.get("value"), **{key: found.get(key) for key in ("low", "high", "p", "smallest_p")},
         "p_folds": folds and folds.p, "folds_low": folds and folds.low, "folds_high": folds and folds.high,
-        "declared": pair.declared, "p_holm": pair.p_corrected, "effect": found.get("effect"),
+        "declared": pair.p_corrected is not None, "p_holm": pair.p_corrected, "effect": found.get("effect"),
         "improved": found.get("improved"), "equivalence": row.get("equivalence"),
         **{key: found.get(key) for key in ("verdict", "beyond", "paired", "replicates")},
         "replicate_unit": found.get("unit"), "method": found.get("method"), "refused": pair.refused,

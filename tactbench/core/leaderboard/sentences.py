@@ -10,7 +10,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from tactbench.core.leaderboard.names import Row, answer_name, distinct, grouped, sign_of
+from tactbench.core.leaderboard.names import Row, answer_name, grouped, sign_of
 from tactbench.core.leaderboard.trivial import Bars
 from tactbench.core.spec.status import STOPPED
 from tactbench.core.statistics.rank import Rank, beyond_floor
@@ -23,7 +23,7 @@ MOST_NAMES = 4
 """Answers that a sentence names; it counts the others."""
 LONGEST = 300
 """Characters of a note; `why`, JSON, CSV and Parquet have the whole reason of a cell."""
-NO_BETTER, UNSHOWN, STAMPED = "–", "*", "‡"
+NO_BETTER, UNSHOWN, STAMPED, SHARED = "–", "*", "‡", "="
 
 
 class Note(NamedTuple):
@@ -102,7 +102,10 @@ def above(board: Board) -> tuple[str, ...]:
 def _outcome(board: Board) -> str:
     """Return who is best, or that it cannot be told."""
     if not board.placed:
-        return _none_better(board)
+        count = len(board.unplaced)
+        whom = "The only answer scores no" if count == 1 else f"None of {count} answers scores"
+        bars = board.bars_of(board.unplaced)
+        return f"{whom} better than the trivial one of its own sensor ({bars})." if count else ""
     (first, leader), *others = board.placed
     name = board.name(first)
     where = "In simulation " if first["simulated"] and not first.get("emulated") else ""
@@ -125,14 +128,6 @@ def _outcome(board: Board) -> str:
     if alike:
         return f"{where}{name} has {quality}; {_some(list(map(board.name, alike)))} cannot be told from it."
     return f"{where}{name} is best: {_ahead(board, first, others[0][0])}."
-
-
-def _none_better(board: Board) -> str:
-    count = len(board.unplaced)
-    if not count:
-        return ""
-    whom = "The only answer scores no" if count == 1 else f"None of {count} answers scores"
-    return f"{whom} better than the trivial one of its own sensor ({board.bars_of(board.unplaced)})."
 
 
 def _too_few(rows: Sequence[Row]) -> str:
@@ -185,7 +180,12 @@ def _published(board: Board) -> str:
     if not rows:
         return ""
     alone = len({row["sensor"] for row in rows}) == len(rows)
-    figures = grouped(rows, lambda row: _beside(row["ci_low"], row["ci_high"], row["published"]))
+
+    def beside(row: Row) -> str:
+        value = row["published"]
+        return "below" if value < row["ci_low"] else "above" if value > row["ci_high"] else "inside"
+
+    figures = grouped(rows, beside)
     parts: list[str] = []
     for where, members in figures.items():
         shown = [(row["sensor"] if alone else board.name(row), score(row["published"], row["unit"])) for row in members]
@@ -196,17 +196,11 @@ def _published(board: Board) -> str:
     return f"Published values: {', '.join(parts)}{tail}."
 
 
-def _beside(low: float, high: float, value: float) -> str:
-    return "inside" if low <= value <= high else "below" if value < low else "above"
-
-
 def below(board: Board) -> tuple[Note, ...]:
     """Return the notes below a table."""
     notes = (
         *_ended(board, True),
-        *_stamps(board),
-        *_footnotes(board),
-        *_protocol(board),
+        *_marks(board),
         *_floors(board),
         *_how(board),
         *_hosts(board),
@@ -227,34 +221,24 @@ def _ended(board: Board, stopped: bool) -> Iterator[Note]:
     yield Note(text, " `tactbench why CELL` tells more." if stopped else "")
 
 
-def _stamps(board: Board) -> Iterator[Note]:
-    rows = (*board.answers, *board.trivial)
-    stamps = list(dict.fromkeys(str(stamp) for row in rows for stamp in row["stamps"] or ()))
+def _marks(board: Board) -> Iterator[Note]:
+    """Yield what marks mean, and how the scores came about: notes that a paper prints too."""
+    finished = (*board.answers, *board.trivial)
+    stamps = list(dict.fromkeys(str(stamp) for row in finished for stamp in row["stamps"] or ()))
     if stamps:
         yield Note(f"{STAMPED}  {'; '.join(stamps)}", printed=True)
-
-
-def _footnotes(board: Board) -> Iterator[Note]:
-    """Yield what the marks of answers mean that are not better than a trivial one, or not shown to be."""
+    if any(rank.tied for _, rank in board.placed) and not board.unranked:
+        yield Note(f"{SHARED}  shared place: at least two of its answers cannot be told apart")
+    of_own = "better than the trivial answer of its own sensor"
     if board.unplaced and board.placed:
-        yield Note(
-            f"{NO_BETTER}  no better than the trivial answer of its own sensor ({board.bars_of(board.unplaced)})",
-            printed=True,
-        )
+        yield Note(f"{NO_BETTER}  no {of_own} ({board.bars_of(board.unplaced)})", printed=True)
     unshown = [row for row, _ in board.placed if UNSHOWN in board.marks(row)]
     if unshown:
-        yield Note(
-            f"{UNSHOWN}  not shown to be better than the trivial answer of its own sensor ({board.bars_of(unshown)})",
-            printed=True,
-        )
-
-
-def _protocol(board: Board) -> Iterator[Note]:
-    flattered = [row for row in (*board.answers, *board.trivial) if row["dagger"]]
-    if flattered:
-        name = flattered[0]["protocol"]
-        yield Note(f"Protocol {name} uses statistics of the test set, as no sensor in use can",
-                   "; `--protocol deployable` does not.", True)  # fmt: skip
+        yield Note(f"{UNSHOWN}  not shown to be {of_own} ({board.bars_of(unshown)})", printed=True)
+    protocol = next((row["protocol"] for row in finished if row["dagger"]), None)
+    if protocol is not None:
+        text = f"Protocol {protocol} uses statistics of the test set, as no sensor in use can"
+        yield Note(text, "; `--protocol deployable` does not.", printed=True)
 
 
 def _floors(board: Board) -> Iterator[Note]:
@@ -262,12 +246,13 @@ def _floors(board: Board) -> Iterator[Note]:
     known = [row for row in board.answers if row.get("reference_floor") is not None]
     if not known:
         return
-    floors = distinct((str(row["sensor"]), row["reference_floor"]) for row in known)
-    unit = known[0]["unit"]
-    ends = {sensor: dict.fromkeys((min(found), max(found))) for sensor, found in floors.items()}
-    each = ", ".join(f"{sensor} {' … '.join(score(end, unit) for end in found)}" for sensor, found in ends.items())
+    parts = []
+    for sensor, rows in grouped(known, lambda row: str(row["sensor"])).items():
+        floors = sorted(row["reference_floor"] for row in rows)
+        ends = dict.fromkeys(score(end, rows[0]["unit"]) for end in (floors[0], floors[-1]))
+        parts.append(f"{sensor} {' … '.join(ends)}")
     by = "; places go by it" if board.placed and board.by_floor else ""
-    yield Note(f"Beyond floor: the root of RMSE² − floor²{by}. Floor: the reference's own noise ({each}).")
+    yield Note(f"Beyond floor: the root of RMSE² − floor²{by}. Floor: the reference's own noise ({', '.join(parts)}).")
 
 
 def _how(board: Board) -> Iterator[Note]:
@@ -286,8 +271,6 @@ def _how(board: Board) -> Iterator[Note]:
     for unit, rows in over.items():
         parts.append(f"Interval: over {_counts([row['n_replicates'] for row in rows], unit)}")
     sentences = ["; ".join(parts)] if parts else []
-    if any(rank.tied for _, rank in board.placed) and not board.unranked:
-        sentences.append("= marks a shared place: at least two of its answers cannot be told apart")
     if board.times and any(row.get("answer_delay_ms") is not None for row in board.answers):
         sentences.append("Delay: sampling, link, window, computing")
     if sentences:

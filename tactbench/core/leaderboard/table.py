@@ -17,7 +17,7 @@ from typing import Any
 from tactbench.core.evaluation.protocols import is_probe
 from tactbench.core.leaderboard.columns import Line, columns, line_of
 from tactbench.core.leaderboard.events import events_table
-from tactbench.core.leaderboard.names import Row, distinct, grouped, hardware_name, metric_name, sign_of, split_name
+from tactbench.core.leaderboard.names import Row, grouped, hardware_name, metric_name, sign_of, split_name
 from tactbench.core.leaderboard.probe import build_probe
 from tactbench.core.leaderboard.sentences import NO_BETTER, Board, Note, above, below
 from tactbench.core.leaderboard.trivial import Bars, error_of
@@ -183,21 +183,16 @@ def _grouped(rows: Sequence[Row]) -> dict[_Key, list[Row]]:
     A cell that was not begun knows neither its split, if nobody asked for one, nor whether it would have been
     simulated: it stands with the finished cells of its rig, if these agree.
     """
-    finished = distinct((row["rig"], hardware_name(row)) for row in rows if row["status"] == "done")
-
-    def without_split(row: Row) -> tuple[str, str, str]:
-        known = finished.get(row["rig"], [])
-        return row["task"], row["protocol"], known[0] if len(known) == 1 else hardware_name(row)
-
-    splits = distinct((without_split(row), row["split"]) for row in rows if row["split"] is not None)
-
-    def key(row: Row) -> _Key:
-        task, protocol, hardware = without_split(row)
-        known = splits.get((task, protocol, hardware), [])
-        split = row["split"] if row["split"] is not None else known[0] if len(known) == 1 else ""
-        return task, protocol, split, hardware
-
-    return grouped(rows, key)
+    done = [row for row in rows if row["status"] == "done"]
+    groups = grouped(done, lambda row: (row["task"], row["protocol"], row["split"], hardware_name(row)))
+    near = {key: (*key[:2], members[0]["rig"]) for key, members in groups.items()}
+    for row in rows:
+        if row["status"] != "done":
+            asked = (row["task"], row["protocol"], row["rig"])
+            found = [key for key, rig in near.items() if rig == asked and row["split"] in (None, key[2])]
+            alone = (*asked[:2], row["split"] or "", hardware_name(row))
+            groups.setdefault(found[0] if len(found) == 1 else alone, []).append(row)
+    return groups
 
 
 def places(results: Sequence[Row]) -> tuple[dict[str, Rank], str]:

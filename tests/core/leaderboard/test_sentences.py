@@ -219,6 +219,12 @@ class Truth:
         family = [one for one in self.stopped if one["status"] == status]
         return len([one for one in family if one["reason"] != reason]) == others < len(family)
 
+    def how(self, interval, campaigns, units, delay):
+        some = [one for one in self.answers if one["ci_low"] is not None]
+        assert not campaigns or (self.counts(campaigns, self.answers) and bool(interval) == bool(some))
+        assert not units or self.counts(units, some)
+        return bool(delay) == any(one["answer_delay_ms"] is not None for one in self.answers)
+
     def counts(self, text, rows):
         numbers = [int(one) for one in re.findall(r"\d+", text)]
         return (min(numbers), max(numbers)) == tuple(f(one["n_replicates"] for one in rows) for f in (min, max))
@@ -255,6 +261,7 @@ ABOVE = {
 }  # fmt: skip
 BELOW = {
     r"‡  It leaks\.": lambda t: any(one["stamps"] for one in t.rows),
+    "=  shared place: at least two of its answers cannot be told apart": lambda t: t.tied(),
     r"–  no better than the trivial answer of its own sensor \((.*)\)":
         lambda t, b: t.bars(b, t.worse),
     r"\*  not shown to be better than the trivial answer of its own sensor \((.*)\)": lambda t, b: t.bars(b, t.unshown),
@@ -262,12 +269,8 @@ BELOW = {
     r"Beyond floor: the root of RMSE² − floor²(; places go by it)?\. Floor: .* \((?:[abc] 0\.1000(?:, )?)+\)\.":
         lambda t, by: bool(by) == (bool(t.better) and t.floor),
     r"(?:(Score(, interval)?: median over (.*? campaigns?), each simulated anew with its own seed[^=.]*|"
-    r"Interval: over ([^.]*))(?:\. |\.$))?(= marks a shared place: .*? apart\.)? ?"
-    r"(Delay: sampling, link, window, computing\.)?":
-        lambda t, s, i, n, m, tied, delay: (not tied or t.tied())
-        and (not n or (t.counts(n, t.answers) and bool(i) == any(o["ci_low"] is not None for o in t.answers)))
-        and (not m or t.counts(m, [o for o in t.answers if o["ci_low"] is not None]))
-        and bool(delay) == any(o["answer_delay_ms"] is not None for o in t.answers),
+    r"Interval: over ([^.]*))(?:\. |\.$))?(Delay: sampling, link, window, computing\.)?":
+        lambda t, s, i, n, m, delay: t.how(i, n, m, delay),
     r"Times cannot be compared: (taken on 2 hosts)?(?: and )?(taken while up to 4 cells ran)?\.":
         lambda t, hosts, many: bool(hosts) == (len({o["host"] for o in t.answers}) == 2)
         and bool(many) == any(o["concurrency"] == 4 for o in t.answers),

@@ -13,7 +13,6 @@ from tactbench.core.matrix.progress import Progress
 from tactbench.core.report.figures import (
     confusion,
     embedding_map,
-    latency_and_false_alarms,
     location_map,
     prediction_against_time,
     residuals,
@@ -28,7 +27,6 @@ from tactbench.core.spec.task import VectorTarget
 FIGURES: dict[str, tuple[Callable[[Group], Sketch], ...]] = {
     "regression": (prediction_against_time.draw, residuals.draw),
     "vector": (location_map.draw, residuals.draw),
-    "events": (latency_and_false_alarms.draw,),
     "classification": (confusion.draw, score_by_force.draw, embedding_map.draw),
 }
 """By kind of task, vectors apart, in the order of a report; each raises NotApplicable where it does not apply."""
@@ -60,7 +58,7 @@ def draw_figures(
     for group in groups(results, remark):
         kind = "vector" if isinstance(group.task.target, VectorTarget) else group.task.kind
         where = f" under {group.row['protocol']}, split {group.row['split']}"
-        for draw in FIGURES[kind]:
+        for draw in FIGURES.get(kind, ()):
             name = draw.__module__.rpartition(".")[2].replace("_", " ")
             work.append((f"{name} of {group.task.name}", where, partial(draw, group)))
     if work:
