@@ -158,10 +158,9 @@ class _Choosing:
         unknown.update(dict.fromkeys(self.of_all(chosen)))
         name = metric_name({"metric": self.task.metric, "unit": self.task.unit})
         quantity = name.replace(" [", " beyond the reference's noise [") if self.beyond else name
-        methods = dict.fromkeys(visible(str(one.row.get("ci_method") or "")) for one in chosen if one.low is not None)
-        intervals = tuple(method if "%" in method else f"95 %, {method}" for method in methods if method)
+        intervals = dict.fromkeys(visible(str(one.row.get("ci_method"))) for one in chosen if one.low is not None)
         return Choice(
-            hardware, quantity, self.task.unit, self.verdict(chosen), tuple(chosen), intervals, tuple(unknown),
+            hardware, quantity, self.task.unit, self.verdict(chosen), tuple(chosen), tuple(intervals), tuple(unknown),
             tuple(left_out),
         )  # fmt: skip
 

@@ -111,7 +111,7 @@ def climb(
     load = os.getloadavg()[0] if hasattr(os, "getloadavg") else None
     scores = {row["cell"].removesuffix(f"/{row['repeat']}"): row["scores"] for row in done}
     for cell, one in timed_estimators.items():
-        rows[cell] |= timed(one, times[cell], scores[cell], rounds)
+        rows[cell] |= timed(one, times[cell], scores[cell])
     better = metric_called(task.metric).higher_is_better
     found = by_score(list(rows.values()), higher_is_better=better)
     mark_fronts(found, higher_is_better=better)
@@ -157,7 +157,7 @@ def stopped(error: Exception) -> Record:
     return {"status": "skipped" if isinstance(error, NotApplicable) else "failed", "reason": reason}
 
 
-def timed(one: TimedEstimator, timing: Timing, scores: Mapping[str, float], rounds: int) -> Record:
+def timed(one: TimedEstimator, timing: Timing, scores: Mapping[str, float]) -> Record:
     """Return what changes in a row by having been timed; `scores` are those of the cell, by fold among others."""
     if timing.trouble is not None:
         return stopped(timing.trouble)
@@ -190,16 +190,8 @@ def timed(one: TimedEstimator, timing: Timing, scores: Mapping[str, float], roun
         "answer_delay_ms_q3": None if delay is None else delay + high - median,
         "delay_parts_ms": parts,
         "data_s": _recorded_s(one.trained_on),
-        "notes": [*_cut_short(timing, rounds), *_other_answers(one, timing, scores)],
+        "notes": _other_answers(one, timing, scores),
     }
-
-
-def _cut_short(timing: Timing, rounds: int) -> list[str]:
-    return [
-        f"{what} in {len(times)} of {rounds} rounds: one took more than {BUDGET_S:g} s"
-        for what, times in (("fitted", timing.fit_s), ("all test rows answered", timing.batch_s))
-        if len(times) < rounds
-    ]
 
 
 def _other_answers(one: TimedEstimator, timing: Timing, scores: Mapping[str, float]) -> list[str]:

@@ -89,7 +89,7 @@ def _caption(block: Block) -> str:
     rows = [line.row for line in block.lines if line.kind == "result"]
     counts = sorted({row["n_test"] for row in rows if row["n_test"] is not None})
     over = {
-        (row.get("n_replicates"), row.get("replicate_unit"))
+        (int(row["n_replicates"]), visible(str(row["replicate_unit"])))
         for row in rows
         if row["ci_low"] is not None and row.get("n_replicates")
     }
@@ -98,7 +98,7 @@ def _caption(block: Block) -> str:
         sentences.append(f"n = {'–'.join(map(whole, dict.fromkeys((counts[0], counts[-1]))))} test samples")
     if len(over) == 1:
         number, unit = over.pop()
-        sentences.append(f"Intervals are over {counted(number, 'campaign' if unit == 'replicate' else visible(unit))}")
+        sentences.append(f"Intervals are over {counted(number, 'campaign' if unit == 'replicate' else unit)}")
     if any(line.kind == "baseline" for line in block.lines):
         sentences.append("Below the rule: trivial answers")
     return " ".join(sentence if sentence.endswith("?") else f"{sentence}." for sentence in sentences)

@@ -8,13 +8,11 @@ from collections import Counter
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass, replace
-from functools import lru_cache
 from importlib import resources
 from typing import TYPE_CHECKING
 
 import tactbench
 from tactbench.core.leaderboard.columns import DEFAULT, NUMERIC
-from tactbench.core.leaderboard.levels import KEY as LEVEL
 from tactbench.core.leaderboard.pairwise import asked_in_several_ways, tables_of
 from tactbench.core.leaderboard.view import REASON, View, grid
 from tactbench.core.report.cells import details
@@ -118,14 +116,11 @@ def sensors_section(subject: ReportData) -> Section:
     known = subject.results.registry.sensors
     names = list(dict.fromkeys(str(row["sensor"]) for row in subject.rows))
     specs = [known[name].spec for name in names if name in known]
-    levels = {str(row["sensor"]): str(row[LEVEL]) for row in subject.rows if LEVEL in row}
-    listed = ", ".join(f"{name} {level}" for name, level in levels.items())
     command = command_line("tactbench", "show", *(name for name in names if name in known), "--all")
     table = sensor_table("Sensor comparison", specs, table_one(specs), with_source=True).compact()
     return Section(
         paragraphs=(f"Every parameter of these sensors, and who states it: `{command}`.",) if specs else (),
         tables=(table,) if specs else (),
-        notes=(f"Levels that `tactbench check` has computed: {listed}.",) if levels else (),
         missing=tuple(f"{name}: not installed." for name in names if name not in known),
     )
 
@@ -201,7 +196,6 @@ def make_page(subject: ReportData) -> Page:
     return Page(f"{html}\n", tuple(one for one in missing if one not in broken), tuple(broken))
 
 
-@lru_cache(maxsize=1)
 def _template() -> Template:
     """Return the template; everything that it is given is escaped."""
     from jinja2 import Environment, PackageLoader, StrictUndefined

@@ -79,7 +79,6 @@ class Section:
     paragraphs: tuple[str, ...] = ()
     tables: tuple[TextTable, ...] = ()
     pictures: tuple[SavedFigure, ...] = ()
-    notes: tuple[str, ...] = ()
     details: tuple[Details, ...] = ()
     missing: tuple[str, ...] = ()
     """What the section lacks: one sentence each, with the command that makes it."""

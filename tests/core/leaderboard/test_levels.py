@@ -16,10 +16,6 @@ from tactbench.core.leaderboard.levels import (
     write_level,
 )
 from tactbench.core.matrix.store import Store
-from tactbench.core.plugins.registry import installed
-from tactbench.core.report.page import sensors_section
-from tactbench.core.report.results import open_results
-from tactbench.core.report.section import ReportData
 from tests.core.matrix import made
 
 PAD = {"distribution": "acme", "version": "1.2", "package": "acme_pad", "source": "abc", "commit": ""}
@@ -84,8 +80,6 @@ def test_check_keeps_the_level_and_every_table_shows_it(verbs, kept):
     assert re.search(r"\| pad +\| silver +\|", verbs("leaderboard", "kept", "--format", "md").stdout)
     assert "shown_level" in verbs("leaderboard", "kept", "--format", "csv").stdout
     assert "level" not in verbs("leaderboard", "kept", "--no-times").stdout  # no seed decides it
-    notes = sensors_section(ReportData(open_results(store, installed()))).notes
-    assert "Levels that `tactbench check` has computed: pad silver." in notes
 
 
 def test_where_nothing_was_checked_there_is_no_column(verbs, kept):
