@@ -16,7 +16,6 @@ from tactbench.core.errors import NotApplicable, TactbenchError, UsageError
 from tactbench.core.evaluation.dataset import load_dataset
 from tactbench.core.evaluation.delay import answer_delay_ms, tail_ms
 from tactbench.core.evaluation.metrics import metric_called
-from tactbench.core.matrix.plan import plan_cells
 from tactbench.core.matrix.progress import Progress
 from tactbench.core.matrix.run import EngineChoice, Outcome, run_matrix
 from tactbench.core.matrix.store import Row, Store
@@ -73,17 +72,13 @@ def climb(
     Raises
     ------
     UsageError
-        If something is asked for that is not there, more than one protocol or split, or a task of whole recordings.
+        If something is asked for that is not there, or a task of whole recordings.
 
     Returns
     -------
     Ladder
         A row for every estimator, also for those that were skipped or failed; the best score first.
     """
-    ways = {(cell.protocol, cell.split) for cell in plan_cells(matrix, matrix.sensors, registry)}
-    if len(ways) > 1:
-        several = ", ".join(sorted(f"{protocol} {split or ''}".strip() for protocol, split in ways))
-        raise UsageError(f"One ladder is for one protocol and one split, not {several}.", hint="Ask for one of them.")
     task = registry.tasks[matrix.tasks[0].name].spec
     if task.answer_per == "recording":
         raise UsageError(

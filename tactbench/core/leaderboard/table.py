@@ -8,7 +8,6 @@ its text is fit to be shown (`text.visible`); a format escapes what its own synt
 from __future__ import annotations
 
 import math
-from bisect import bisect_left, bisect_right
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from operator import itemgetter
@@ -206,8 +205,7 @@ def places(results: Sequence[Row]) -> tuple[dict[str, Rank], str]:
 
         return ranks(results), ""
     ordered = errors(results)
-    spans = [(bisect_left(ordered, error), bisect_right(ordered, error)) for error in ordered]
-    by_score = [Rank(first + 1, None, None, after - first > 1) for first, after in spans]
+    by_score = [Rank(1 + ordered.index(error), None, None, ordered.count(error) > 1) for error in ordered]
     why = "few" if not all(map(_may_be_placed, results)) else "these rows keep no replicates" if results else ""
     return dict(zip((row["cell"] for row in results), by_score, strict=True)), why
 

@@ -64,8 +64,7 @@ def leaderboards_section(subject: ReportData) -> Section:
             "table. All of them are in `leaderboard.csv` in the result folder."
         )
     view = View(columns=(*DEFAULT, REASON))
-    shown = (grid(replace(block, lines=tuple(lines)), view) for block, lines in subject.blocks)
-    tables = tuple(replace(table, numeric=NUMERIC).compact() for table in shown)
+    tables = tuple(replace(grid(block, view), numeric=NUMERIC).compact() for block in subject.blocks)
     return Section(paragraphs=tuple(paragraphs), tables=tables)
 
 

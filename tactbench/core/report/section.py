@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
-from hashlib import sha256
 from typing import Any
 
-from tactbench.core.leaderboard.columns import Line
 from tactbench.core.leaderboard.table import Block, Table, build_table
 from tactbench.core.report.results import Results, SavedFigure
 from tactbench.core.tables.text_table import TextTable
@@ -39,22 +37,21 @@ class ReportData:
         return build_table(self.rows, self.results.provenance(), questions=questions)
 
     @cached_property
-    def blocks(self) -> list[tuple[Block, Sequence[Line]]]:
+    def blocks(self) -> list[Block]:
         """The blocks of the leaderboard, each with the lines that the page shows."""
         blocks = self.leaderboard.blocks
         most = MOST_ROWS if len(self.rows) <= MOST_ROWS else max(1, MOST_ROWS // len(blocks))
-        return [(block, block.lines[:most]) for block in blocks]
+        return [replace(block, lines=block.lines[:most]) for block in blocks]
 
     @cached_property
     def shown(self) -> list[Row]:
         """The rows of these lines."""
-        return [line.row for _, lines in self.blocks for line in lines]
+        return [line.row for block in self.blocks for line in block.lines]
 
     @cached_property
     def anchors(self) -> dict[str, str]:
         """Where the page tells everything about a cell, by the cell's name."""
-        names = [str(row["cell"]) for row in self.shown]
-        return {name: f"cell-{sha256(name.encode('utf-8', 'replace')).hexdigest()[:16]}" for name in names}
+        return {str(row["cell"]): f"cell-{place}" for place, row in enumerate(self.shown, 1)}
 
 
 @dataclass(frozen=True)

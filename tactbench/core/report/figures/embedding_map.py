@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import importlib
 from collections import Counter
-from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -23,8 +22,6 @@ AT_MOST = 1000
 """Points of an embedding: more take longer and hide each other in a column's width."""
 PERPLEXITY = 30.0
 ITERATIONS = 1000
-SMALLEST_PT2, LARGEST_PT2 = 1.5, 9.0
-"""Areas of the points of least and of most force."""
 
 
 def draw(group: Group) -> Sketch:
@@ -38,47 +35,35 @@ def draw(group: Group) -> Sketch:
     found = [(panel, *embed(group.results, panel.row, panel.answers["test"])) for panel in group.panels]
     figure, axes = panels(len(found), 2, 1.55)
     forces = [smoothed_force(panel.answers["test"])[rows] for panel, rows, _ in found]
-    known = [force for own in forces for force in own[np.isfinite(own)]]
-    shade: Any = None
+    known = np.concatenate([own[np.isfinite(own)] for own in forces])
     for (by_class, by_force), (panel, rows, xy), force in zip(axes, found, forces, strict=True):
-        _classes(by_class, panel.row["classes"], panel.answers["test"].y_true[rows], xy)
-        if known:
-            shade = _forces(by_force, force, xy, min(known), max(known))
+        classes, label = panel.row["classes"], panel.answers["test"].y_true[rows]
+        for place, (one, colour) in enumerate(zip(classes, ordered(len(classes)), strict=True)):
+            by_class.plot(
+                *xy[label == place].T, linestyle="none", marker=cycled(MARKERS, place), markersize=2.0,
+                markeredgewidth=0, color=colour, label=class_name(one), rasterized=True,
+            )  # fmt: skip
+        if len(known):
+            shade = by_force.scatter(*xy.T, c=force, s=4.0, cmap="cividis", vmin=known.min(), vmax=known.max(),
+                                     linewidths=0, rasterized=True)  # fmt: skip
         for here, what in ((by_class, group.quantity), (by_force, "force")):
             here.set_title(f"{panel.sensor}, by {what}")
             here.set(xticks=[], yticks=[])
             here.set_aspect("equal", adjustable="datalim")
             here.spines[:].set_visible(True)
-    if shade is not None:
+    if len(known):
         figure.colorbar(shade, ax=axes[:, 1], shrink=0.8, aspect=30, pad=0.02, label="force [N]")
     title = with_unit(group.quantity, group.unit)
     legend(figure, axes[:, 0], ncols=6, title=title, markerscale=1.8, handletextpad=0.1, columnspacing=0.8)
     points = ", ".join(f"{panel.sensor} {len(rows)} of {len(panel.answers['test'])}" for panel, rows, _ in found)
     caption = (
         f"t-SNE of the test set's features as the estimator saw them; left by {group.quantity}, right by reference "
-        f"force (centred mean over {WINDOW_S:g} s; larger and lighter points are more force). Test rows shown: "
+        f"force (centred mean over {WINDOW_S:g} s; lighter points are more force). Test rows shown: "
         f"{points}; perplexity {PERPLEXITY:g} or a third of the points, {ITERATIONS} iterations from the principal "
         f"components, seed {group.row['seed']}. Near points look alike to the estimator; distances between clusters, "
         "their sizes and the axes mean little."
     )
     return group.sketch("embedding", f"Which test rows look alike, by {group.quantity} and force?", caption, figure)
-
-
-def _classes(here: Any, classes: Sequence[Any], label: IntArray, xy: FloatArray) -> None:
-    for place, (one, colour) in enumerate(zip(classes, ordered(len(classes)), strict=True)):
-        here.plot(
-            *xy[label == place].T, linestyle="none", marker=cycled(MARKERS, place), markersize=2.0, markeredgewidth=0,
-            color=colour, label=class_name(one), rasterized=True,
-        )  # fmt: skip
-
-
-def _forces(here: Any, force_n: FloatArray, xy: FloatArray, low: float, high: float) -> Any:
-    there = np.isfinite(force_n)
-    share = (force_n[there] - low) / max(high - low, np.finfo(np.float64).tiny)
-    return here.scatter(
-        *xy[there].T, c=force_n[there], cmap="cividis", vmin=low, vmax=high, linewidths=0, rasterized=True,
-        s=SMALLEST_PT2 + (LARGEST_PT2 - SMALLEST_PT2) * share,
-    )  # fmt: skip
 
 
 def embed(results: Results, row: dict[str, Any], test: Answers) -> tuple[IntArray, FloatArray]:

@@ -57,8 +57,6 @@ class Group:
     results: Results
     task: TaskSpec
     panels: tuple[Panel, ...]
-    baselines: Mapping[str, Panel]
-    """The trivial answer of the table's column, by sensor."""
 
     @property
     def row(self) -> Row:
@@ -156,15 +154,13 @@ def groups(results: Results, remark: Callable[[str], None]) -> list[Group]:
         if len(names) > 1:
             others = ", ".join(one for one in names if one != shown)
             remark(f"Figures of {name} under {protocol}, split {split} show {shown}; not shown: {others}.")
-        trivial = [row for row in rows if row["is_baseline"]]
         panels = _panels(results, [row for row in answers if answer_name(row) == shown], remark)
         if panels:
-            first = [row for row in trivial if row["estimator"] == trivial[0]["estimator"]]
-            found.append(Group(results, task, tuple(panels.values()), _panels(results, first, remark)))
+            found.append(Group(results, task, panels))
     return found
 
 
-def _panels(results: Results, rows: list[Row], remark: Callable[[str], None]) -> dict[str, Panel]:
+def _panels(results: Results, rows: list[Row], remark: Callable[[str], None]) -> tuple[Panel, ...]:
     """Return the first readable cell of each sensor."""
     found: dict[str, Panel] = {}
     for row in rows:
@@ -173,4 +169,4 @@ def _panels(results: Results, rows: list[Row], remark: Callable[[str], None]) ->
             found.setdefault(row["sensor"], Panel(results.replicate(row), answers))
         else:
             remark(f"{row['cell']} is in no figure: cells/{row['key']}.h5 cannot be read. Run it again.")
-    return found
+    return tuple(found.values())

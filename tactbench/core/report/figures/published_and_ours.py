@@ -65,8 +65,6 @@ def _panel(here: Axes, lines: Sequence[tuple[Reproduction, Any]], colours: Mappi
             label="published",
         )  # fmt: skip
     here.set_yticks(range(len(lines)), [f"{row['sensor']}, {answer_name(row)}" for _, row in lines])
-    for label, (_, row) in zip(here.get_yticklabels(), lines, strict=True):
-        label.set_color(colours[row["sensor"]])
     here.set_ylim(len(lines) - 0.4, -0.6)
     here.grid(axis="x", linewidth=0.4, color=GREY, alpha=0.3)
     row = lines[0][1]
