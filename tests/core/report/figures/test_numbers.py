@@ -1,11 +1,7 @@
 """Figures carry the numbers of the rows: read back from what was drawn."""
 
-import itertools
-
 import numpy as np
 import pytest
-from matplotlib.colors import to_rgb
-from matplotlib.text import Text
 from sklearn.metrics import confusion_matrix, f1_score
 
 from tactbench.core.report.figures import (
@@ -14,7 +10,7 @@ from tactbench.core.report.figures import (
     residuals,
     score_by_force,
 )
-from tactbench.core.report.figures.style import COLUMN_IN, ordered, styled
+from tactbench.core.report.figures.style import styled
 
 from .made import group_of
 
@@ -58,16 +54,6 @@ def test_prediction_against_time_shows_every_answer(finished):
     assert axes[-1].get_xlabel() == "time [s]"
 
 
-def test_recordings_of_a_set_stand_end_to_end(finished):
-    answers = group_of(finished, "curvature").panels[0].answers["test"]
-    time = prediction_against_time.end_to_end(answers)
-    assert len(np.unique(answers.recording)) == 5
-    assert (np.diff(time) >= 0).all()
-    for one in np.unique(answers.recording):
-        mine = answers.recording == one
-        np.testing.assert_allclose(np.diff(time[mine]), np.diff(answers.time_s[mine]), atol=1e-9)
-
-
 def test_residuals_show_every_test_answer_and_the_line_of_perfect_ones(finished):
     group = group_of(finished, "force")
     axes = drawn(residuals, group).figure.axes
@@ -94,28 +80,3 @@ def test_banded_scores_are_those_of_scikit_learn_on_the_same_rows(finished):
         # Sums of whole counts: only the order of a mean of five differs.
         assert scores == pytest.approx(expected, rel=1e-12)
         assert list(lines[panel.sensor].get_ydata()) == scores
-
-
-@pytest.mark.parametrize("task", ["force", "curvature"])
-def test_text_is_legible_at_a_column_s_width(finished, task):
-    from tactbench.core.report.figures.drawing import FIGURES
-
-    group = group_of(finished, task)
-    made = 0
-    for draw in FIGURES[group.task.kind]:
-        try:
-            with styled():
-                figure = draw(group).figure
-        except ValueError:
-            continue  # what does not apply here
-        assert figure.get_figwidth() <= COLUMN_IN
-        assert min(text.get_fontsize() for text in figure.findobj(Text)) >= 7.0
-        made += 1
-    assert made == (2 if task == "force" else 3)
-
-
-def test_ordered_colours_are_ordered_in_grey_too():
-    weights = np.array([0.2126, 0.7152, 0.0722])  # relative luminance, ITU-R BT.709
-    grey = [float(weights @ to_rgb(colour)) for colour in ordered(6)]
-    assert all(dark + 0.02 < light for dark, light in itertools.pairwise(grey))
-    assert max(grey) < 0.85
