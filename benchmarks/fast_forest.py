@@ -20,8 +20,7 @@ from pathlib import Path
 
 from sklearn.ensemble import RandomForestClassifier
 
-from tactbench.core.cost.rounds import measure
-from tactbench.core.cost.timed_estimators import TimedEstimator, timed_estimator
+from tactbench.core.cost.rounds import TimedEstimator, measure, timed_estimator
 from tactbench.core.evaluation.dataset import load_dataset
 from tactbench.core.matrix.progress import Progress
 from tactbench.core.matrix.run import run_matrix

@@ -12,8 +12,14 @@ from dataclasses import asdict, dataclass, replace
 from math import isfinite
 from typing import Any, Literal, NamedTuple
 
-from tactbench.core.leaderboard.names import LOWER_IS_BETTER, answer_name, hardware_name, metric_name, sensor_name
-from tactbench.core.leaderboard.trivial import no_better
+from tactbench.core.leaderboard.names import (
+    LOWER_IS_BETTER,
+    answer_name,
+    hardware_name,
+    metric_name,
+    no_better,
+    sensor_name,
+)
 from tactbench.core.spec.sensor import SensorSpec
 from tactbench.core.spec.task import TaskSpec
 from tactbench.core.spec.units import conversion

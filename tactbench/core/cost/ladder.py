@@ -10,8 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from tactbench.core.cost.precision import front
-from tactbench.core.cost.rounds import BUDGET_S, THREADS, Timing, measure
-from tactbench.core.cost.timed_estimators import TimedEstimator, timed_estimator
+from tactbench.core.cost.rounds import BUDGET_S, THREADS, TimedEstimator, Timing, measure, timed_estimator
 from tactbench.core.errors import NotApplicable, TactbenchError, UsageError
 from tactbench.core.evaluation.dataset import load_dataset
 from tactbench.core.evaluation.delay import answer_delay_ms, tail_ms

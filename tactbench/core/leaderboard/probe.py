@@ -6,8 +6,7 @@ import importlib
 from collections.abc import Iterator, Sequence
 
 from tactbench.core.evaluation.protocols import DEPLOYABLE, FIRST_FRAME
-from tactbench.core.leaderboard.names import Row, answer_name, grouped, sensor_name, sign_of
-from tactbench.core.leaderboard.trivial import WORSE_END, Bars
+from tactbench.core.leaderboard.names import WORSE_END, Bars, Row, answer_name, grouped, sensor_name, sign_of
 from tactbench.core.tables.numbers import ABSENT, interval, score
 from tactbench.core.tables.text import visible
 from tactbench.core.tables.text_table import Entry, TextTable

@@ -10,8 +10,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from tactbench.core.leaderboard.names import Row, answer_name, grouped, sign_of
-from tactbench.core.leaderboard.trivial import Bars
+from tactbench.core.leaderboard.names import Bars, Row, answer_name, grouped, sign_of
 from tactbench.core.spec.status import STOPPED
 from tactbench.core.statistics.rank import Rank, beyond_floor
 from tactbench.core.statistics.replicates import FEWEST, counted, percent

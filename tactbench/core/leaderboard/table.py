@@ -16,10 +16,18 @@ from typing import Any
 from tactbench.core.evaluation.protocols import is_probe
 from tactbench.core.leaderboard.columns import Line, columns, line_of
 from tactbench.core.leaderboard.events import events_table
-from tactbench.core.leaderboard.names import Row, grouped, hardware_name, metric_name, sign_of, split_name
+from tactbench.core.leaderboard.names import (
+    Bars,
+    Row,
+    error_of,
+    grouped,
+    hardware_name,
+    metric_name,
+    sign_of,
+    split_name,
+)
 from tactbench.core.leaderboard.probe import build_probe
 from tactbench.core.leaderboard.sentences import NO_BETTER, Board, Note, above, below
-from tactbench.core.leaderboard.trivial import Bars, error_of
 from tactbench.core.statistics.rank import Rank, beyond_floor, excess_of
 from tactbench.core.statistics.replicates import FEWEST
 from tactbench.core.tables.text import cut, visible

@@ -9,9 +9,8 @@ from typing import Any
 import numpy as np
 
 from tactbench.core.evaluation.metrics import METRICS
-from tactbench.core.leaderboard.names import METRIC_NAMES
-from tactbench.core.report.results import Results
-from tactbench.core.report.section import Details, Row
+from tactbench.core.leaderboard.names import METRIC_NAMES, Row
+from tactbench.core.report.results import Details, Results
 from tactbench.core.samples import Answers
 from tactbench.core.spec.row import RowModel
 from tactbench.core.tables.text_table import ABSENT, Entry, TextTable, finite, text_table

@@ -5,25 +5,29 @@ from __future__ import annotations
 import base64
 import json
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from importlib import resources
-from typing import TYPE_CHECKING
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import tactbench
+from tactbench.core.errors import UnwritableError, UsageError
+from tactbench.core.files import replace_file
 from tactbench.core.leaderboard.columns import DEFAULT, NUMERIC
 from tactbench.core.leaderboard.pairwise import asked_in_several_ways, tables_of
 from tactbench.core.leaderboard.view import REASON, View, grid
+from tactbench.core.matrix.progress import Progress
 from tactbench.core.report.cells import details
 from tactbench.core.report.costs import ladder_table
 from tactbench.core.report.datasheet import sensor_table, table_one
+from tactbench.core.report.figures.drawing import draw_figures
 from tactbench.core.report.figures.published_and_ours import NAME as PUBLISHED
-from tactbench.core.report.published import published_table, reproduce
-from tactbench.core.report.results import SavedFigure
-from tactbench.core.report.section import MOST_ROWS, ReportData, Section
+from tactbench.core.report.published import published_table, records, reproduce
+from tactbench.core.report.results import MOST_ROWS, ReportData, Results, SavedFigure, Section
 from tactbench.core.tables.text import command_line
-from tactbench.core.tables.text_table import WORDY, sort_value
+from tactbench.core.tables.text_table import WORDY, TextTable, sort_value
 
 if TYPE_CHECKING:
     from jinja2 import Template
@@ -102,10 +106,10 @@ def costs_section(subject: ReportData) -> Section:
         SavedFigure(path.stem, path.stem, "As `tactbench cost` has drawn it.", path)
         for path in sorted((folder / "cost").glob("*.png"))
     )
-    timed = (row for row in subject.rows if row["status"] == "done" and row["answer_per"] != "recording")
-    some = next(timed, None)
-    command = command_line("tactbench", "cost", *(("--sensor", some["sensor"], "--task", some["task"]) if some else ()))
-    lacks = f"What an answer costs in time beside its score: `{command}`; of the simulation: `tactbench cost --twin`."
+    lacks = (
+        "What an answer costs in time beside its score: `tactbench cost --sensor NAME --task NAME`; of the simulation: "
+        "`tactbench cost --twin`."
+    )
     return Section(tables=tuple(tables), pictures=pictures,
                    missing=() if tables or pictures else (lacks,))  # fmt: skip
 
@@ -158,8 +162,7 @@ SECTIONS: tuple[tuple[str, str, Callable[[ReportData], Section]], ...] = (
 )
 
 
-@dataclass(frozen=True)
-class Page:
+class Page(NamedTuple):
     """The text, and what it lacks."""
 
     html: str
@@ -210,3 +213,55 @@ def _text(name: str) -> Markup:
     from markupsafe import Markup
 
     return Markup((resources.files("tactbench.core.report") / "template" / name).read_text(encoding="utf-8"))
+
+
+Drawer = Callable[[Results, Path, Progress, Callable[[str], None]], Sequence[SavedFigure]]
+"""Takes the results, the folder for figures, where progress goes, and what is called with each figure left out."""
+
+
+@dataclass(frozen=True)
+class Report:
+    """A report that has been written, and what it lacks."""
+
+    page: Path
+    reproduction: TextTable
+    records: Sequence[Mapping[str, Any]]
+    """The reproduction table for programs."""
+    missing: tuple[str, ...]
+    broken: tuple[str, ...]
+
+
+def make_report(results: Results, out: Path, progress: Progress, *, draw: Drawer = draw_figures) -> Report:
+    """Draw the figures and write the page: ``index.html`` and ``figures/`` in `out`.
+
+    Raises
+    ------
+    UsageError
+        If no cell has finished.
+    UnwritableError
+        If `out` refuses the page or the figures; an earlier page is then still whole.
+    """
+    if not any(row["status"] == "done" for row in results.rows):
+        raise UsageError(
+            f"No cell in {results.store.folder} has finished: there is nothing to report.",
+            hint="Finish some with `tactbench run --out DIR`.",
+        )
+    undrawn: list[str] = []
+    try:
+        (out / "figures").mkdir(parents=True, exist_ok=True)
+        drawn = draw(results, out / "figures", progress, undrawn.append)
+        html, missing, broken = make_page(ReportData(results, drawn, tuple(undrawn)))
+        # A lone surrogate, which JSON may hold, is no UTF-8: a question mark then.
+        replace_file(out / "index.html", html.encode("utf-8", "replace"))
+    except OSError as error:
+        raise UnwritableError(
+            f"The report cannot be written to {out}: {error.strerror or error}.",
+            hint="Give another folder with --out.",
+        ) from error
+    return Report(
+        page=out / "index.html",
+        reproduction=published_table(results.registry, results.rows),
+        records=records(reproduce(results.registry, results.rows)),
+        missing=missing,
+        broken=broken,
+    )

@@ -9,8 +9,7 @@ import pytest
 from tactbench.core.matrix.store import Store
 from tactbench.core.plugins.registry import load_registry
 from tactbench.core.report.page import costs_section
-from tactbench.core.report.results import Results
-from tactbench.core.report.section import ReportData
+from tactbench.core.report.results import ReportData, Results
 from tests.core.evaluation.made import record
 from tests.core.leaderboard.rows import row
 

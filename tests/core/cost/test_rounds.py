@@ -8,8 +8,7 @@ import pytest
 from threadpoolctl import threadpool_info
 
 from tactbench.core.cost.ladder import by_score, mark_fronts, stopped, timed
-from tactbench.core.cost.rounds import REPEATS, WARM_UP_ROWS, Timing, measure
-from tactbench.core.cost.timed_estimators import TimedEstimator
+from tactbench.core.cost.rounds import REPEATS, WARM_UP_ROWS, TimedEstimator, Timing, measure
 from tactbench.core.errors import NotApplicable
 from tactbench.core.evaluation.metrics import metric_called
 from tactbench.core.matrix.progress import Progress

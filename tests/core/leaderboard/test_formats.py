@@ -14,8 +14,17 @@ from rich.cells import cell_len
 
 from tactbench.core.errors import UsageError
 from tactbench.core.leaderboard.columns import SHOWN
-from tactbench.core.leaderboard.formats import latex, markdown, plain_text, rendered, write_tables
-from tactbench.core.leaderboard.records import JSON_KEYS, OF_REPLICATES, OF_THE_MACHINE, RANK_KEYS
+from tactbench.core.leaderboard.formats import (
+    JSON_KEYS,
+    OF_REPLICATES,
+    OF_THE_MACHINE,
+    RANK_KEYS,
+    latex,
+    markdown,
+    plain_text,
+    rendered,
+    write_tables,
+)
 from tactbench.core.leaderboard.table import build_table
 from tactbench.core.leaderboard.view import DEFAULT_VIEW, WHOLE, View, grids
 from tactbench.core.tables.latex import tex

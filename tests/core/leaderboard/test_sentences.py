@@ -9,8 +9,7 @@ import scipy.stats
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tactbench.core.leaderboard.formats import plain_text
-from tactbench.core.leaderboard.records import json_array
+from tactbench.core.leaderboard.formats import json_array, plain_text
 from tactbench.core.leaderboard.table import build_table
 from tactbench.core.statistics.ranking import ranks as ranked
 from tactbench.core.statistics.replicates import over_replicates

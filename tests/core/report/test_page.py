@@ -7,12 +7,11 @@ import pytest
 
 from tactbench.core.matrix.store import Store
 from tactbench.core.plugins.registry import load_registry
-from tactbench.core.report import section
+from tactbench.core.report import results as sections
 from tactbench.core.report.cells import recording_scores
 from tactbench.core.report.costs import ladder_table
 from tactbench.core.report.page import compared_section, make_page
-from tactbench.core.report.results import Results, SavedFigure, open_results
-from tactbench.core.report.section import ReportData
+from tactbench.core.report.results import ReportData, Results, SavedFigure, open_results
 from tests.core.leaderboard.rows import row as made_row
 
 from .html import Reader
@@ -26,7 +25,7 @@ HOSTILE = "<script>alert('`x`')</script><img src=x onerror=alert(1)> & \"quoted\
 
 STRUCTURE = """\
 What came out [1 figure]
-Leaderboard [filter]
+Leaderboard [1 filter]
   Curvature: which of five spherical caps touches the sensor?: sensor estimator macro F1 delay after touch training
   Force: how large is the normal force?: sensor estimator RMSE [N] beyond floor [N] published delay after touch training
   Grasp-stability: will the object slip when it is lifted?: sensor estimator accuracy reason
@@ -62,13 +61,12 @@ def structure(html):
     lines = []
     for part in re.findall(r"<section.*?</section>", html, flags=re.S):
         own = part.partition('<details class="cell')[0]
-        counts = [f"{n} {what}" for what in ("figure", "cells")
-                  if (n := part.count("<figure>" if what == "figure" else '<details class="cell'))]  # fmt: skip
-        counts += ["filter"] if 'id="filter"' in part else []
-        lines.append(re.search("<h2.*?>(.*?)</h2>", part)[1] + (f" [{', '.join(counts)}]" if counts else ""))
+        counts = {"figure": part.count("<figure>"), "cells": part.count('<details class="cell')}
+        counts["filter"] = part.count('id="filter"')
+        listed = ", ".join(f"{count} {what}" for what, count in counts.items() if count)
+        lines.append(re.search("<h2.*?>(.*?)</h2>", part)[1] + (f" [{listed}]" if listed else ""))
         for title, head in re.findall(r'<p class="caption">(.*?)</p>.*?<thead>(.*?)</thead>', own, flags=re.S):
-            columns = re.findall(r"<th[^>]*>(.*?)</th>", head)
-            lines.append(f"  {title.partition(' <span')[0]}: {' '.join(columns)}")
+            lines.append(f"  {title.partition(' <span')[0]}: {' '.join(re.findall(r'<th[^>]*>(.*?)</th>', head))}")
     return "\n".join(lines).replace("&#39;", "'") + "\n"
 
 
@@ -116,7 +114,7 @@ def test_text_from_plugins_is_text(material):
 
 
 def test_a_large_board_shows_the_best_of_each_table_and_names_the_file(material, monkeypatch):
-    monkeypatch.setattr(section, "MOST_ROWS", 6)
+    monkeypatch.setattr(sections, "MOST_ROWS", 6)
     html = make_page(ReportData(material)).html
     assert "6 of 10 are shown" in html
     assert "<code>leaderboard.csv</code>" in html

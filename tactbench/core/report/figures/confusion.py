@@ -35,8 +35,8 @@ def draw(group: Group) -> Sketch:
         raise NotApplicable("no cell has a confusion matrix")
     roles = ("validation", "test") if any("validation" in panel.answers for panel in shown) else ("test",)
     wide = max(len(panel.row["classes"]) for panel in shown) >= WIDE_FROM
-    height = 3.0 if wide or len(roles) == 1 else 1.4
-    figure, axes = panels(len(shown), len(roles), height, width_in=PAGE_IN if wide and len(roles) > 1 else COLUMN_IN)
+    width = PAGE_IN if wide else COLUMN_IN
+    figure, axes = panels(len(shown), len(roles), 0.85 * width / len(roles), width_in=width)
     for place, panel in enumerate(shown):
         tables = matrices(panel)
         for here, role in zip(axes[place], roles, strict=True):
