@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from tactbench.core.cost.precision import front
-from tactbench.core.cost.rounds import BUDGET_S, THREADS, TimedEstimator, Timing, measure, timed_estimator
+from tactbench.core.cost.rounds import THREADS, TimedEstimator, Timing, measure, timed_estimator
 from tactbench.core.errors import NotApplicable, TactbenchError, UsageError
 from tactbench.core.evaluation.dataset import load_dataset
 from tactbench.core.evaluation.delay import answer_delay_ms, tail_ms
@@ -20,18 +20,14 @@ from tactbench.core.matrix.run import EngineChoice, Outcome, run_matrix
 from tactbench.core.matrix.store import Row, Store
 from tactbench.core.plugins.registry import Registry
 from tactbench.core.spec.matrix import MatrixSpec
-from tactbench.core.spec.recording import RecordingMeta
 from tactbench.core.spec.rig import EstimatorDescriptor
 from tactbench.core.statistics.replicates import over_replicates
 
 Record = dict[str, Any]
-SAME_SCORE = 1e-9
-"""Largest relative difference of scores that still is the same answer: rounding of sums in another order."""
-
 _MEASURED = (
     "n_train", "n_test", "n_features", "fit_s", "fit_s_q1", "fit_s_q3", "fits", "batch_s_per_row", "batches",
     "latency_ms_p50", "latency_ms_p95", "latency_ms_max", "latency_n", "answer_delay_ms", "answer_delay_ms_q1",
-    "answer_delay_ms_q3", "data_s",
+    "answer_delay_ms_q3",
 )  # fmt: skip
 
 
@@ -103,9 +99,8 @@ def climb(
             rows[row["cell"]] |= stopped(error)
     times = measure(timed_estimators, rounds=rounds, seed=matrix.seed, clock=clock, progress=progress)
     load = os.getloadavg()[0] if hasattr(os, "getloadavg") else None
-    scores = {row["cell"].removesuffix(f"/{row['repeat']}"): row["scores"] for row in done}
     for cell, one in timed_estimators.items():
-        rows[cell] |= timed(one, times[cell], scores[cell])
+        rows[cell] |= timed(one, times[cell])
     better = metric_called(task.metric).higher_is_better
     found = by_score(list(rows.values()), higher_is_better=better)
     mark_fronts(found, higher_is_better=better)
@@ -113,7 +108,7 @@ def climb(
     measured = {
         "higher_is_better": better, "fold": fold,
         "remarks": list(dict.fromkeys(remark for one in timed_estimators.values() for remark in one.remarks)),
-        "rounds": rounds, "budget_s": BUDGET_S, "threads": THREADS, "load": load, "cores": os.cpu_count(),
+        "rounds": rounds, "threads": THREADS, "load": load, "cores": os.cpu_count(),
     }  # fmt: skip
     return Ladder(_about(outcome) | measured, found)
 
@@ -141,7 +136,6 @@ def opening(row: Row, descriptor: EstimatorDescriptor) -> Record:
         "delay_parts_ms": {},
         "front_fit": False,
         "front_delay": False,
-        "notes": [],
     }
 
 
@@ -151,8 +145,8 @@ def stopped(error: Exception) -> Record:
     return {"status": "skipped" if isinstance(error, NotApplicable) else "failed", "reason": reason}
 
 
-def timed(one: TimedEstimator, timing: Timing, scores: Mapping[str, float]) -> Record:
-    """Return what changes in a row by having been timed; `scores` are those of the cell, by fold among others."""
+def timed(one: TimedEstimator, timing: Timing) -> Record:
+    """Return what changes in a row by having been timed."""
     if timing.trouble is not None:
         return stopped(timing.trouble)
     quartiles = {
@@ -183,26 +177,7 @@ def timed(one: TimedEstimator, timing: Timing, scores: Mapping[str, float]) -> R
         "answer_delay_ms_q1": None if delay is None else delay + low - median,
         "answer_delay_ms_q3": None if delay is None else delay + high - median,
         "delay_parts_ms": parts,
-        "data_s": _recorded_s(one.trained_on),
-        "notes": _other_answers(one, timing, scores),
     }
-
-
-def _other_answers(one: TimedEstimator, timing: Timing, scores: Mapping[str, float]) -> list[str]:
-    """Return a note if the model that was timed is not the one whose score stands beside its times."""
-    stored = scores.get(f"fold {one.fold}")
-    if timing.answers is None or stored is None or one.metric is None:
-        return []
-    score = one.metric.of(one.y_test, timing.answers, one.n_classes)
-    if abs(score - stored) <= SAME_SCORE * abs(stored):
-        return []
-    return [f"the timed model scores {score:.6g} on fold {one.fold}, the cell's {stored:.6g}"]
-
-
-def _recorded_s(metas: Sequence[RecordingMeta]) -> float | None:
-    """Return the seconds that simulating or acquiring the recordings took; None where any of them does not say."""
-    spent = [meta.provenance.get("sim_s", meta.provenance.get("acquisition_s")) for meta in metas]
-    return None if None in spent or not spent else float(sum(map(float, spent)))  # type: ignore[arg-type]
 
 
 def mark_fronts(rows: Sequence[Record], *, higher_is_better: bool) -> None:

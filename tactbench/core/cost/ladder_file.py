@@ -8,10 +8,10 @@
 
 The JSON file has ``version`` 3, what was asked (``sensor``, ``task``, ``rig``, ``protocol``, ``split``, ``seed``), the
 score's ``metric``, ``unit``, ``higher_is_better``, ``simulated`` and ``dagger`` as in a leaderboard's row, how it was
-timed (``fold``, ``rounds``, ``budget_s``, ``threads``, ``load``, ``cores``, ``remarks``), ``provenance``, and ``rows``:
+timed (``fold``, ``rounds``, ``threads``, ``load``, ``cores``, ``remarks``), ``provenance``, and ``rows``:
 one for each estimator, the best score first, what nobody could measure null. Times of different hosts are never
 compared. docs/glossary.md says what each time of a row is; ``_q1`` and ``_q3`` are quartiles, ``delay_parts_ms`` what a
-delay is the sum of, ``data_s`` the seconds that the training recordings took.
+delay is the sum of.
 """
 
 from __future__ import annotations

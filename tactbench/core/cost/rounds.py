@@ -24,7 +24,6 @@ from tactbench.core.evaluation.summaries import without_windows
 from tactbench.core.matrix.progress import Progress
 from tactbench.core.plugins.interfaces import Estimator
 from tactbench.core.samples import FloatArray
-from tactbench.core.spec.recording import RecordingMeta
 from tactbench.core.spec.rig import EstimatorDescriptor
 from tactbench.core.spec.task import TaskSpec
 
@@ -55,8 +54,6 @@ class TimedEstimator:
     n_classes: int
     metric: Metric | None
     """None: the score is not of rows"""
-    trained_on: tuple[RecordingMeta, ...]
-    """The recordings that the training rows are from."""
     looks_at: str = "features"
     k: int = 0
     """Rows that the mean filter looks back."""
@@ -113,7 +110,6 @@ def timed_estimator(
         y_test=fold.test.y,
         n_classes=0 if task.kind == "events" else len(made.classes),
         metric=metric if task.kind != "events" else None,
-        trained_on=tuple(made.metas[place] for place in np.unique(fold.train.recording)),
         looks_at=descriptor.looks_at,
         k=k,
         tared=rules.tare,
@@ -135,8 +131,6 @@ class Timing:
     """of ``predict`` on one row, all calls of all rounds"""
     features_s: list[float] = field(default_factory=list)
     """of making one row of features ready, all calls of all rounds; none for answers that look at no reading"""
-    answers: npt.NDArray[Any] | None = None
-    """to the test rows, by the last fit"""
     trouble: Exception | None = None
     """what ended it"""
     _model: Estimator | None = field(default=None, repr=False)
@@ -211,7 +205,7 @@ def _fit(one: TimedEstimator, timing: Timing) -> None:
 
 def _answer(one: TimedEstimator, timing: Timing) -> None:
     assert timing._model is not None
-    timing.answers = answers(timing._model, one.X_test, one.name, one.n_classes, one.y_test.shape[1:])
+    answers(timing._model, one.X_test, one.name, one.n_classes, one.y_test.shape[1:])
 
 
 def _median_s(work: Callable[[], None], clock: Callable[[], float]) -> float:

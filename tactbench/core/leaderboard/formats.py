@@ -19,9 +19,9 @@ from tactbench.core.leaderboard.table import Block, Table, build_table
 from tactbench.core.leaderboard.view import DEFAULT_VIEW, WHOLE, View, document, grids
 from tactbench.core.spec.row import FORMAT, JSON_KEYS, NESTED, OF_REPLICATES, RowModel
 from tactbench.core.statistics.replicates import counted
-from tactbench.core.tables import csv_text as csv_format
 from tactbench.core.tables import markdown as markdown_format
 from tactbench.core.tables import terminal
+from tactbench.core.tables.csv_text import csv_text
 from tactbench.core.tables.latex import latex_table
 from tactbench.core.tables.numbers import whole
 from tactbench.core.tables.text import json_text, visible
@@ -130,7 +130,7 @@ def rendered(table: Table, shape: str, view: View = WHOLE, width: int = 240) -> 
     if shape in ("md", "latex"):
         text = markdown(table, view) if shape == "md" else latex(table, view)
     else:
-        text = csv_text(table) if shape == "csv" else json_array(table)
+        text = csv_text(*flat_records(table)) if shape == "csv" else json_array(table)
     return text.encode("utf-8", "replace")
 
 
@@ -197,11 +197,6 @@ def _flat(key: str, value: Any) -> Any:
     if key in NESTED:
         return json_text(value)
     return visible(value) if isinstance(value, str) else value
-
-
-def csv_text(table: Table) -> str:
-    """Return a leaderboard's records as CSV."""
-    return csv_format.csv_text(*flat_records(table))
 
 
 def json_array(table: Table) -> str:

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 from itertools import chain
 from typing import Any, Literal
 
@@ -86,15 +85,6 @@ def folder_comparisons(
 ) -> list[PairwiseComparison]:
     """Compare the same cells of two result folders; raises UnknownNameError for a task that one has not."""
     return _compared("folders", first, second, *(_answers(_in_task(rows, task)) for rows in (first_rows, second_rows)))
-
-
-def asked_in_several_ways(rows: Sequence[Row]) -> Iterator[PairwiseComparison]:
-    """Compare finished answers under each further protocol, and each further split, with that under the first."""
-    finished = [row for row in _answers(rows) if row["status"] == "done"]
-    kinds: tuple[Kind, ...] = ("protocols", "splits")
-    for kind in kinds:
-        for first, *others in grouped(finished, partial(_key, kind)).values():
-            yield from (_pair(kind, _NAMES[kind](first), _NAMES[kind](other), first, other) for other in others)
 
 
 def _answers(rows: Iterable[Row]) -> list[Row]:

@@ -17,7 +17,7 @@ from tactbench.core.statistics.replicates import FEWEST, counted, percent
 from tactbench.core.tables.numbers import interval, score, score_with_unit
 from tactbench.core.tables.text import cut
 
-MOST_ABOVE, MOST_BELOW = 2, 4
+MOST_BELOW = 4
 MOST_NAMES = 4
 """Answers that a sentence names; it counts the others."""
 LONGEST = 300

@@ -16,7 +16,6 @@ import tactbench
 from tactbench.core.errors import UnwritableError, UsageError
 from tactbench.core.files import replace_file
 from tactbench.core.leaderboard.columns import DEFAULT, NUMERIC
-from tactbench.core.leaderboard.pairwise import asked_in_several_ways, tables_of
 from tactbench.core.leaderboard.view import REASON, View, grid
 from tactbench.core.matrix.progress import Progress
 from tactbench.core.report.cells import details
@@ -86,13 +85,10 @@ def figures_section(subject: ReportData) -> Section:
 
 
 def compared_section(subject: ReportData) -> Section:
-    """Return the tables below the leaderboard: events, means over tasks, probes, comparisons."""
-    tables = (*subject.leaderboard.sections, *tables_of(list(asked_in_several_ways(subject.rows))))
-    lacks = (
-        "No question was asked in two ways: `tactbench run --probe` adds shuffled rows and the first frame alone, "
-        "`--protocol` and `--split` ask otherwise."
-    )
-    return Section(tables=tuple(table.compact() for table in tables), missing=() if tables else (lacks,))
+    """Return the tables below the leaderboard: events and probes."""
+    lacks = "What the recordings give away: `tactbench run --probe` adds shuffled rows and the first frame alone."
+    found = tuple(table.compact() for table in subject.leaderboard.sections)
+    return Section(tables=found, missing=() if found else (lacks,))
 
 
 def costs_section(subject: ReportData) -> Section:
@@ -154,7 +150,7 @@ SECTIONS: tuple[tuple[str, str, Callable[[ReportData], Section]], ...] = (
     ("leaderboards", "Leaderboard", leaderboards_section),
     ("reproduction", "Published numbers", published_section),
     ("figures", "Figures", figures_section),
-    ("compared", "Across protocols, splits and tasks", compared_section),
+    ("compared", "Events and probes", compared_section),
     ("cost", "What accuracy costs in time", costs_section),
     ("sensors", "Sensors (the paper's Table I)", sensors_section),
     ("cells", "Details of each cell", cells_section),

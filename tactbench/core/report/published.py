@@ -127,7 +127,7 @@ def published_table(registry: Registry, rows: Sequence[Row]) -> TextTable:
 
 def _entries(line: Reproduction) -> tuple[str, ...]:
     row, unit, published = line.row or {}, line.task.unit, line.published.score
-    ours = interval = apart = Entry(ABSENT)
+    ours = interval = apart = ABSENT
     if row and row["score"] is not None:
         marks = (" SIM" if row["simulated"] else "") + (" †" if row["dagger"] else "")
         ours = Entry(score(row["score"], unit) + marks, finite(row["score"]), cell=row["cell"])

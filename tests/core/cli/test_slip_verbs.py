@@ -57,4 +57,3 @@ def test_detectors_are_timed_with_the_features_of_a_frame(answered):
     parts = by_name["pac-band"]["delay_parts_ms"]
     assert (parts["window"], parts["sampling"]) == (50.0, 10.0)
     assert parts["features"] > 0
-    assert by_name["pac-band"]["notes"] == []

@@ -7,9 +7,8 @@ import numpy as np
 import pytest
 from threadpoolctl import threadpool_info
 
-from tactbench.core.cost.ladder import by_score, mark_fronts, stopped, timed
+from tactbench.core.cost.ladder import by_score, mark_fronts, timed
 from tactbench.core.cost.rounds import REPEATS, WARM_UP_ROWS, TimedEstimator, Timing, measure
-from tactbench.core.errors import NotApplicable
 from tactbench.core.evaluation.metrics import metric_called
 from tactbench.core.matrix.progress import Progress
 
@@ -58,7 +57,7 @@ def timed_estimator(clock, name, *, fit_s=512 * BINARY, batch_s=256 * BINARY, ro
     rows = np.zeros((N, 2))
     return TimedEstimator(
         name=name, build=lambda: Worker(clock, name, fit_s, batch_s, row_s, broken_fit), fold="roles", X_train=rows,
-        y_train=np.zeros(N), X_test=rows, y_test=np.ones(N), n_classes=0, metric=metric_called("rmse"), trained_on=(),
+        y_train=np.zeros(N), X_test=rows, y_test=np.ones(N), n_classes=0, metric=metric_called("rmse"),
     )  # fmt: skip
 
 
@@ -89,7 +88,7 @@ def test_a_fit_beyond_the_budget_is_done_once_and_its_row_says_so():
     slow = timed_estimator(clock, "slow", fit_s=21.0, batch_s=22.0)
     found = run(clock, slow, timed_estimator(clock, "a"))
     assert (found["slow"].fit_s, found["slow"].batch_s, len(found["a"].fit_s)) == ([21.0], [22.0], 5)
-    row = timed(slow, found["slow"], {})
+    row = timed(slow, found["slow"])
     assert (row["fits"], row["batches"]) == (1, 1)
 
 
@@ -110,26 +109,14 @@ def test_a_short_fit_is_repeated_so_that_one_interruption_is_not_all_that_is_mea
 def test_a_row_has_medians_quartiles_and_every_part_of_the_delay():
     one = replace(timed_estimator(Clock(), "a"), delay_parts_ms={"sampling": 4.0, "link": 0.5, "window": 5.0})
     times = Timing([5.0, 1.0, 3.0, 2.0, 4.0], [2.0], [0.0001] * 198 + [0.05], [0.0003] * 199)
-    found = timed(one, times, {})
+    found = timed(one, times)
     assert (found["fit_s_q1"], found["fit_s"], found["fit_s_q3"], found["fits"]) == (2.0, 3.0, 4.0, 5)
     assert found["batch_s_per_row"] == 2.0 / N
     assert found["answer_delay_ms"] == pytest.approx(4.0 + 0.5 + 5.0 + 0.3 + 0.1)
     assert found["answer_delay_ms"] == pytest.approx(sum(found["delay_parts_ms"].values()))
     assert (found["latency_ms_p95"], found["latency_ms_max"]) == (None, 50.0), "too few calls: the largest"
-    assert found["data_s"] is None
-    unknown = timed(timed_estimator(Clock(), "a"), times, {})
+    unknown = timed(timed_estimator(Clock(), "a"), times)
     assert (unknown["answer_delay_ms"], unknown["answer_delay_ms_q1"]) == (None, None)
-
-
-def test_a_model_that_is_not_the_scored_one_and_what_stops_an_estimator_are_said():
-    clock = Clock()
-    one = timed_estimator(clock, "a")
-    times = run(clock, one, rounds=1)["a"]
-    # Noughts against ones: an rmse of exactly 1.
-    assert timed(one, times, {"fold roles": 1.0})["notes"] == []
-    assert timed(one, times, {"fold roles": 0.9})["notes"] == ["the timed model scores 1 on fold roles, the cell's 0.9"]
-    assert stopped(NotApplicable("needs a licence")) == {"status": "skipped", "reason": "needs a licence"}
-    assert stopped(ValueError("no")) == {"status": "failed", "reason": "ValueError: no"}
 
 
 def row(name, score, fit_s, delay_ms, **more):
