@@ -81,18 +81,3 @@ def test_the_page_never_scrolls_sideways_and_sentences_in_tables_are_read_withou
     assert boxes
     assert max(boxes) <= 0
     assert all(one.is_displayed() for one in opened.find_elements("css selector", "#leaderboards th button"))
-
-
-def test_without_script_the_page_is_read_all_the_same(chromium, page):
-    chromium.execute_cdp_cmd("Emulation.setScriptExecutionDisabled", {"value": True})
-    try:
-        chromium.get("about:blank")
-        chromium.get(page.as_uri())
-        assert not chromium.find_element("id", "filter").is_displayed()
-        assert chromium.find_elements("css selector", "th button") == []
-        link = chromium.find_element("css selector", "#leaderboards tbody a")
-        target = chromium.find_element("css selector", link.get_dom_attribute("href"))
-        link.click()
-        assert target.is_displayed()
-    finally:
-        chromium.execute_cdp_cmd("Emulation.setScriptExecutionDisabled", {"value": False})

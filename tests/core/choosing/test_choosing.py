@@ -61,12 +61,10 @@ def test_a_miss_says_by_how_much(wish, says):
     ("more", "state", "says"),
     [
         ({"answer_delay_ms": None, "delay_parts_ms": {}, "latency_ms_p50": 0.06}, "unknown", "prediction alone 60"),
-        ({"answer_delay_ms": None, "delay_parts_ms": {}, "latency_ms_p50": 9.0}, "missed", "at least 7.00 ms too slow"),
         ({"answer_delay_ms": None, "delay_parts_ms": {}, "latency_ms_p50": None}, "unknown", "not timed"),
         ({"answer_delay_ms": None, "delay_parts_ms": {"link": 1.0, "prediction": 0.5}}, "unknown", "without sampling"),
         ({"answer_delay_ms": 1.5, "delay_parts_ms": {"sampling": 1.0, "prediction": 0.5}}, "unknown", "without link"),
         ({"answer_delay_ms": 2.5, "delay_parts_ms": {"sampling": 2.0, "prediction": 0.5}}, "missed", "at least 500"),
-        ({"answer_delay_ms": 1.5, "delay_parts_ms": {}}, "met", "1.50 ms"),
         ({"answer_delay_ms": 0.5, "delay_parts_ms": {"prediction": 0.5}, "looks_at": "time"}, "met", "500"),
     ],
 )
@@ -74,12 +72,6 @@ def test_a_delay_that_lacks_a_part_is_a_lower_bound(more, state, says):
     (criterion,) = only([answer(**more)], Wish(max_delay_ms=2)).candidates[0].criteria
     assert criterion.state == state
     assert says in criterion.text
-
-
-def test_an_error_is_unknown_beyond_what_was_pressed_and_a_miss_within_it_stays_one():
-    assert states(only([answer()], Wish(range_n=8, score=0.6)))["score"] == "unknown"
-    assert states(only([answer()], Wish(range_n=8, score=0.4)))["score"] == "missed"
-    assert any("any error beyond 5 N" in one for one in only([answer()], Wish(range_n=8)).unknown)
 
 
 def test_errors_of_force_are_those_beyond_the_floor_if_all_have_one():

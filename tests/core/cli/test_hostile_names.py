@@ -6,10 +6,8 @@ import shlex
 import numpy as np
 import pytest
 
-from tactbench.core.matrix.store import Store
-from tactbench.core.plugins.registry import load_registry
-from tactbench.core.report.page import costs_section
-from tactbench.core.report.results import ReportData, Results
+from tactbench.core.leaderboard.table import build_table
+from tactbench.core.leaderboard.view import commands
 from tests.core.evaluation.made import record
 from tests.core.leaderboard.rows import row
 
@@ -49,8 +47,6 @@ def test_an_error_shows_them(verbs):
     assert "none\\x1b]0;owned\\x07.h5" in shown
 
 
-def test_what_is_printed_to_be_pasted_is_quoted(tmp_path):
-    subject = ReportData(Results(Store(tmp_path), load_registry(), (row(COMMAND),), {}))
-    (said,) = costs_section(subject).missing
-    command = said.split("`")[1]
-    assert shlex.split(command) == ["tactbench", "cost", "--sensor", COMMAND, "--task", "question"]
+def test_what_is_printed_to_be_pasted_is_quoted():
+    why = commands(build_table([row(COMMAND)]))[0].partition("tactbench why ")[2].partition("  ")[0]
+    assert shlex.split(why) == [f"{COMMAND}/question/lasso"]

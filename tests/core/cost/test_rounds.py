@@ -8,7 +8,7 @@ import pytest
 from threadpoolctl import threadpool_info
 
 from tactbench.core.cost.ladder import by_score, mark_fronts, timed
-from tactbench.core.cost.rounds import REPEATS, WARM_UP_ROWS, TimedEstimator, Timing, measure
+from tactbench.core.cost.rounds import WARM_UP_ROWS, TimedEstimator, Timing, measure
 from tactbench.core.evaluation.metrics import metric_called
 from tactbench.core.matrix.progress import Progress
 
@@ -97,13 +97,6 @@ def test_an_estimator_that_breaks_ends_its_own_timing_only():
     found = run(clock, timed_estimator(clock, "weak", broken_fit=3), timed_estimator(clock, "a"))
     assert (str(found["weak"].trouble), len(found["weak"].fit_s)) == ("broken", 2)
     assert (found["a"].trouble, len(found["a"].fit_s)) == (None, 5)
-
-
-def test_a_short_fit_is_repeated_so_that_one_interruption_is_not_all_that_is_measured():
-    clock = Clock()
-    interrupted = (1.0 if place % REPEATS == 3 else BINARY for place in range(10**6))
-    assert run(clock, timed_estimator(clock, "a", fit_s=interrupted), rounds=1)["a"].fit_s == [BINARY]
-    assert sum(what == "fit" for _, what, *_ in clock.log) == 4, "the interruption used up the time for repeats"
 
 
 def test_a_row_has_medians_quartiles_and_every_part_of_the_delay():

@@ -120,11 +120,6 @@ def test_latex_sets_signs_as_they_are_and_names_letters_that_it_lacks_by_number(
     assert labels == ["tab:tactbench-question-1", "tab:tactbench-question-2"]
 
 
-def test_numbers_that_are_none_are_null_in_json_and_told_in_the_table():
-    (entry,) = json.loads(written("json", [row(score=float("nan"), fit_s=float("inf"))]), parse_constant=pytest.fail)
-    assert (entry["score"], entry["shown"]["score"]) == (None, "nan")
-
-
 def test_without_times_nothing_is_left_that_a_machine_decides():
     here = row(host="here", concurrency=4, fit_s=1.0, made_by="x", wall_s=2.0, peak_rss_mb=1.0, threads=2, key="k")
     there = here | {

@@ -5,13 +5,10 @@ import json
 import pytest
 
 from tactbench.core.leaderboard.levels import (
-    KEY,
-    NOT_CHECKED,
     OTHER_VERSION,
     identity_of,
     merge_levels,
     read_levels,
-    with_levels,
     write_level,
 )
 from tactbench.core.matrix.store import Store
@@ -28,20 +25,6 @@ def kept(tmp_path):
         store.begin(MADE_WITH)
         made.kept(store, "pad/force/twin/karl2016/mean/1", sensor="pad", simulated=False)
     return tmp_path / "kept"
-
-
-def levels(rows, folder, provenance=MADE_WITH):
-    return [row.get(KEY) for row in with_levels(rows, folder, lambda made_by: provenance)]
-
-
-def test_a_level_is_of_the_package_that_made_the_rows(tmp_path):
-    rows = [{"sensor": "pad", "made_by": "x"}, {"sensor": "other", "made_by": "x"}]
-    facts = {"level": "silver", "package": "acme_pad", "identity": identity_of("acme_pad", MADE_WITH)}
-    write_level(tmp_path, "pad", facts)
-    assert levels(rows, tmp_path) == ["silver", NOT_CHECKED]
-    changed = {**MADE_WITH, "plugins": [{**PAD, "source": "abd"}]}
-    assert levels(rows, tmp_path, changed) == [OTHER_VERSION, NOT_CHECKED]
-    assert levels(rows, tmp_path, {}) == [OTHER_VERSION, NOT_CHECKED]
 
 
 def test_of_two_folders_the_lower_level_of_a_sensor_is_kept_in_whatever_order(tmp_path):

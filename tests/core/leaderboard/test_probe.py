@@ -64,16 +64,6 @@ def test_first_frames_and_shuffled_rows(rows, says):
     assert verdict(*rows) == says
 
 
-def test_each_split_has_the_first_frame_of_its_own():
-    table = build_probe([
-        classed(0.95), classed(0.93, split="trial"), classed(0.30, "first-frame"),
-        classed(0.90, "first-frame", split="trial"), classed(0.95, split="shuffled"),
-    ])  # fmt: skip
-    verdicts = {line[table.columns.index("split")]: line[-1] for line in table.lines}
-    assert verdicts["recording"] == "no leak shown"
-    assert verdicts["trial"].startswith("LEAK")
-
-
 def test_nothing_is_shown_where_nothing_was_probed():
     assert build_probe([classed(0.9), classed(0.2, is_baseline=True)]) is None
     assert build_probe([classed(0.95), classed(0.90, "first-frame", sensor="b")]) is None

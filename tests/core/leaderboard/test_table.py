@@ -11,7 +11,6 @@ from tactbench.core.leaderboard.formats import rendered
 from tactbench.core.leaderboard.notes import count_texts, picked
 from tactbench.core.leaderboard.table import build_table
 from tactbench.core.leaderboard.view import View, best, commands, grids, known_columns
-from tactbench.core.tables.numbers import duration, score
 
 from .rows import row
 from .strategies import some_rows
@@ -48,11 +47,6 @@ def test_trivial_answers_have_no_place_and_what_is_no_better_has_a_dash():
     assert lines(rows, "place", "estimator", "score") == [
         ("1", "lasso", "0.5000"), ("–", "ols", "0.8000"), ("", "mean", "0.7000"), ("", "x", "FAILED"),
     ]  # fmt: skip
-
-
-def test_errors_are_ordered_by_what_is_beyond_the_floor_where_all_have_one():
-    rows = [row("a", score=0.71, **FLOOR), row("b", score=0.75, **FLOOR | {"reference_floor": 0.74})]
-    assert lines(rows, "sensor", "beyond floor") == [("b", "0.1234"), ("a", "0.1234")]
 
 
 @settings(max_examples=40)
@@ -124,20 +118,6 @@ def test_the_best_of_each_sensor_keep_the_places_they_have_among_all():
     (block,) = best(build_table(rows), 1).blocks
     assert [(line.texts["place"], line.texts["sensor"]) for line in block.lines] == [("1", "a"), ("3", "b")]
     assert "places among all" in block.setting
-
-
-def test_durations_have_three_digits_and_a_unit_and_scores_with_a_unit_four_decimals():
-    texts = {
-        None: "–",
-        12.34: "12.3 s",
-        0.01234: "12.3 ms",
-        2e-5: "20.0 µs",
-        100.4: "100 s",
-        0: "0 s",
-        0.9999: "1.00 s",
-    }
-    assert {seconds: duration(seconds) for seconds in texts} == texts
-    assert (score(0.68754, "N"), score(0.60488, "1"), score(None, "1")) == ("0.6875", "0.605", "–")
 
 
 def test_what_was_left_out_and_chosen_is_told_in_words():

@@ -20,7 +20,6 @@ TOLD_BY_TITLE = (
     "scores", "counts", "chosen", "assumptions", "recordings", "replicates", "delay_parts_ms", "params", "remarks",
     "search", "confusion", "classes", "plan", "fold_sizes",
 )  # fmt: skip
-HOSTILE = "<script>alert('`x`')</script><img src=x onerror=alert(1)> & \"quoted\" \u202e"
 
 STRUCTURE = """\
 What came out [1 figure]
@@ -101,17 +100,6 @@ def test_everything_that_a_row_knows_is_on_the_page(material):
     assert "{'" not in text
 
 
-def test_text_from_plugins_is_text(material):
-    row = {**material.rows[0], "cell": HOSTILE, "estimator": HOSTILE, "status": "failed", "reason": HOSTILE,
-           "remarks": [HOSTILE], "assumptions": {HOSTILE: HOSTILE}, "traceback": HOSTILE, HOSTILE: 1.0}  # fmt: skip
-    page = make_page(with_rows(material, *material.rows, row))
-    read = Reader(page.html)
-    assert page.broken == ()
-    assert read.wrong == []
-    assert sum(tag == "script" for tag, _ in read.elements) == 1
-    assert not any(tag == "img" or "onerror" in given for tag, given in read.elements)
-
-
 def test_a_large_board_shows_the_best_of_each_table_and_names_the_file(material, monkeypatch):
     monkeypatch.setattr(sections, "MOST_ROWS", 6)
     html = make_page(ReportData(material)).html
@@ -122,19 +110,13 @@ def test_a_large_board_shows_the_best_of_each_table_and_names_the_file(material,
 
 
 def test_scores_of_folds_and_recordings(material):
-    row = next(one for one in material.rows if one["task"] == "force" and not one["is_baseline"])
-    tested = material.answers(row)["test"]
-    ((_, count, score),) = [found.values() for found in recording_scores(row, tested)]
-    assert (count, score) == (row["n_test"], pytest.approx(row["score"], rel=1e-12))
-    page = Reader(make_page(ReportData(material)).html)
-    assert "Score of each fold" in page.text
-    assert "Score of each recording" in page.text
+    text = Reader(make_page(ReportData(material)).html).text
+    assert "Score of each fold" in text
+    assert "Score of each recording" in text
     curvature = next(one for one in material.rows if one["task"] == "curvature" and one["estimator"] == "forest")
     found = recording_scores(curvature, material.answers(curvature)["test"])
-    assert len(found) == 5
     right = sum(one["test rows"] * one["accuracy"] for one in found) / curvature["n_test"]
-    assert right == pytest.approx(curvature["scores"]["accuracy"], rel=1e-12)
-    assert recording_scores({**row, "metric": "event_f1"}, tested) == []
+    assert (len(found), right) == (5, pytest.approx(curvature["scores"]["accuracy"], rel=1e-12))
 
 
 def test_a_section_that_cannot_be_made_takes_no_other_with_it(material):

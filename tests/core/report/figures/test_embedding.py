@@ -1,6 +1,5 @@
 """The embedding: which rows, which features."""
 
-import shutil
 from collections import Counter
 from dataclasses import replace
 
@@ -45,20 +44,17 @@ def test_the_features_are_those_the_estimator_answered_from(finished):
     np.testing.assert_array_equal(model.fit(learnt.X, learnt.y).predict(X), test.y_pred)
 
 
-def test_it_is_of_every_nth_row_the_same_each_time_and_not_of_other_recordings_or_folds(
-    finished, tmp_path, monkeypatch
-):
+def test_it_is_of_every_nth_row_and_not_of_other_recordings_or_folds(finished, tmp_path, monkeypatch):
     monkeypatch.setattr(embedding_map, "AT_MOST", 100)
     material, row, test = the_first(finished)
     rows, xy = embed(material, row, test)
     np.testing.assert_array_equal(rows, np.arange(0, len(test), 3))
-    np.testing.assert_array_equal(embed(material, row, test)[1], xy)
-    folder = results(tmp_path, sensors=("alpha",), tasks=("curvature",))
-    material, row, test = the_first(folder)
-    record(tmp_path / "again", "alpha", 2.0, 0, 40)
-    shutil.rmtree(tmp_path / "recordings" / "alpha")
-    (tmp_path / "again" / "alpha").rename(tmp_path / "recordings" / "alpha")
-    with pytest.raises(DataError, match="other test rows than were answered"):
-        embed(material, row, test)
+    assert xy.shape == (len(rows), 2)
     with pytest.raises(NotApplicable, match="a test set a fold"):
         embed(material, row, replace(test, fold=np.arange(len(test))))
+    material, row, test = the_first(results(tmp_path, sensors=("alpha",), tasks=("curvature",)))
+    for path in (tmp_path / "recordings" / "alpha").glob("*.h5"):
+        path.unlink()
+    record(tmp_path / "recordings", "alpha", 2.0, 0, 40)
+    with pytest.raises(DataError, match="other test rows than were answered"):
+        embed(material, row, test)

@@ -7,7 +7,6 @@ from sklearn.metrics import confusion_matrix, f1_score
 from tactbench.core.report.figures import (
     confusion,
     prediction_against_time,
-    residuals,
     score_by_force,
 )
 from tactbench.core.report.figures.style import styled
@@ -52,16 +51,6 @@ def test_prediction_against_time_shows_every_answer(finished):
             assert here.texts[0].get_text() == f"RMSE {error:.4f} N"
         assert axes[2 * place].get_title() == f"{panel.sensor}, training"
     assert axes[-1].get_xlabel() == "time [s]"
-
-
-def test_residuals_show_every_test_answer_and_the_line_of_perfect_ones(finished):
-    group = group_of(finished, "force")
-    axes = drawn(residuals, group).figure.axes
-    for here, panel in zip(axes, group.panels, strict=True):
-        dots, line = here.get_lines()
-        np.testing.assert_array_equal(dots.get_xdata(), panel.answers["test"].y_true)
-        np.testing.assert_array_equal(dots.get_ydata(), panel.answers["test"].y_pred)
-        np.testing.assert_array_equal(line.get_xdata(), line.get_ydata())
 
 
 def test_banded_scores_are_those_of_scikit_learn_on_the_same_rows(finished):
