@@ -71,14 +71,6 @@ def test_what_is_timed_is_what_was_scored_whatever_was_chosen_on_validation_data
     assert (by_name["knn"]["n_features"], by_name["time-index"]["n_features"]) == (3, 1)
 
 
-def test_scores_come_from_the_store_and_times_do_not(tmp_path):
-    store, folder = Store(tmp_path / "out"), presses(tmp_path / "shelf")
-    first, again = (climbed(folder, store, "ols", rounds=1, split="session") for _ in range(2))
-    assert [row["score"] for row in first.rows] == [row["score"] for row in again.rows]
-    assert [row["latency_ms_p50"] for row in first.rows] != [row["latency_ms_p50"] for row in again.rows]
-    assert not (store.folder / "leaderboard.md").exists(), "the files of the last run are not this verb's"
-
-
 def test_the_files_say_what_the_table_says(ladder, tmp_path):
     paths = write_ladder(ladder, tmp_path)
     assert [path.name for path in paths] == [f"made-force.{ending}" for ending in ("json", "csv", "png", "pdf")]
