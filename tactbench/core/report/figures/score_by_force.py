@@ -10,7 +10,7 @@ import numpy.typing as npt
 from tactbench.core.errors import NotApplicable
 from tactbench.core.evaluation.metrics import metric_called
 from tactbench.core.report.figures.group import Group, Panel, Sketch
-from tactbench.core.report.figures.style import GREY, MARKERS, cycled, legend, panels
+from tactbench.core.report.figures.style import MARKERS, cycled, legend, panels
 from tactbench.core.samples import Answers, FloatArray
 from tactbench.core.tables.numbers import whole
 
@@ -24,7 +24,7 @@ BANDS = ("below 1.5", "1.5 to 3", "3 and above")
 
 
 def draw(group: Group) -> Sketch:
-    """Draw the score in each band, one line a sensor, with the trivial answer below.
+    """Draw the score in each band, one line a sensor.
 
     Raises
     ------
@@ -43,8 +43,6 @@ def draw(group: Group) -> Sketch:
             label=panel.sensor,
         )  # fmt: skip
         counts.append(f"{panel.sensor} {', '.join(map(whole, rows))}")
-        if panel.row["baseline"] is not None:
-            here.axhline(panel.row["baseline"], color=GREY, linestyle=":", label="trivial, over all bands", zorder=0)
     here.set_xlabel(f"reference force [N], centred mean over {WINDOW_S:g} s")
     here.set_ylabel(group.metric)
     here.set_ylim(bottom=min(0.0, here.get_ylim()[0]))
@@ -52,7 +50,7 @@ def draw(group: Group) -> Sketch:
     caption = (
         f"{group.metric} of the test set in three bands of force, by the reference's, smoothed within a recording by a "
         f"centred mean over {WINDOW_S:g} s, since a single reading is noisy; test rows in them: {'; '.join(counts)}. A "
-        "class that is missing in a band counts as 0. Dotted: the trivial answer over all bands."
+        "class that is missing in a band counts as 0."
     )
     return group.sketch("score-by-force", f"Does more force tell the {group.quantity} better?", caption, figure)
 
