@@ -39,8 +39,7 @@ def command(
     FOLDER is what `run --out` wrote; default: tactbench-results, and the results that came with tactbench where that
     has none of the task.
     """
-    from tactbench.core.choosing.choosing import choose
-    from tactbench.core.choosing.criteria import Wish
+    from tactbench.core.choosing.choosing import Wish, choose
     from tactbench.core.plugins.registry import load_registry
     from tactbench.core.tables.text import json_text
 

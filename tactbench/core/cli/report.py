@@ -11,7 +11,7 @@ from tactbench.core.cli.options import format_option
 from tactbench.core.cli.threads import keep_threads
 
 if TYPE_CHECKING:
-    from tactbench.core.report.making import Report
+    from tactbench.core.report.page import Report
 
 
 @click.command(name="report")
@@ -34,7 +34,7 @@ def command(ctx: click.Context, folder: Path, out: Path | None, shape: str) -> N
     from tactbench.core.cli.results import opened
     from tactbench.core.cli.screen import remark
     from tactbench.core.plugins.registry import load_registry
-    from tactbench.core.report.making import make_report
+    from tactbench.core.report.page import make_report
     from tactbench.core.report.results import open_results
 
     store = opened(folder)
