@@ -198,8 +198,9 @@ def _published(board: Board) -> str:
 def below(board: Board) -> tuple[Note, ...]:
     """Return the notes below a table."""
     notes = (
-        *_ended(board, True),
         *_marks(board),
+        *_ended(board, True),
+        *_protocol(board),
         *_floors(board),
         *_how(board),
         *_hosts(board),
@@ -221,7 +222,7 @@ def _ended(board: Board, stopped: bool) -> Iterator[Note]:
 
 
 def _marks(board: Board) -> Iterator[Note]:
-    """Yield what marks mean, and how the scores came about: notes that a paper prints too."""
+    """Yield what the marks of this table mean: at most as many notes as there may be, so that none goes unexplained."""
     finished = (*board.answers, *board.trivial)
     stamps = list(dict.fromkeys(str(stamp) for row in finished for stamp in row["stamps"] or ()))
     if stamps:
@@ -234,6 +235,11 @@ def _marks(board: Board) -> Iterator[Note]:
     unshown = [row for row, _ in board.placed if UNSHOWN in board.marks(row)]
     if unshown:
         yield Note(f"{UNSHOWN}  not shown to be {of_own} ({board.bars_of(unshown)})", printed=True)
+
+
+def _protocol(board: Board) -> Iterator[Note]:
+    """Yield that the protocol looks at the test set."""
+    finished = (*board.answers, *board.trivial)
     protocol = next((row["protocol"] for row in finished if row["dagger"]), None)
     if protocol is not None:
         text = f"Protocol {protocol} uses statistics of the test set, as no sensor in use can"

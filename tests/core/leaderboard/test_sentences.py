@@ -287,5 +287,10 @@ def test_what_is_said_is_on_the_list_short_and_true(rows):
         assert holds(note.text, BELOW, truth), note
     for line in block.lines:
         if line.kind == "result":
+            marks = [mark for mark in "‡*" if mark in line.texts["notes"]]
+            marks += ["="] * (line.texts["place"].endswith("=") and truth.ranks is not None)
+            marks += ["–"] * bool(line.texts["place"] == "–" and truth.better)
+            explained = {note.text[0] for note in block.notes}
+            assert explained.issuperset(marks), (marks, explained)
             assert (line.texts["place"] == "–") == (line.row not in truth.better)
             assert ("*" in line.texts["notes"]) == (line.row in truth.unshown)
