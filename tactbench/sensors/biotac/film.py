@@ -36,8 +36,8 @@ def _divided_axis(centres: FloatArray, cells: int) -> FloatArray:
     return np.asarray(edge + (np.arange(cells) + 0.5) * (step * len(centres) / cells))
 
 
-def spectral_interpolation(n: int, cells: int) -> FloatArray:
-    """Return the matrix that takes n periodic cell-centred samples to `cells` cells on the same length.
+def spectral_interpolation(n: int, cells: int, *, mirrored: bool = False) -> FloatArray:
+    """Return the matrix that takes n cell-centred samples to `cells` cells on the same length.
 
     It is the Dirichlet kernel, that is a zero-padded Fourier transform with the shift between the cells' centres
     (which do not coincide), written as a matrix: two small products do both axes.
@@ -48,17 +48,24 @@ def spectral_interpolation(n: int, cells: int) -> FloatArray:
         Number of samples, even.
     cells
         Number of cells wanted.
+    mirrored
+        The samples go on as their own image at both ends; otherwise they are periodic.
 
     Returns
     -------
     (cells, n); rows sum to 1; exact for every wave below the Nyquist one.
     """
-    fine = (np.arange(cells) + 0.5) * (n / cells)
+    fine = ((np.arange(cells) + 0.5) * (n / cells))[:, None]  # in coarse cells
     coarse = np.arange(n) + 0.5
-    distance = fine[:, None] - coarse[None, :]  # in coarse cells
-    turn = np.pi * distance / n
+    if mirrored:
+        return _dirichlet(fine - coarse, 2 * n) + _dirichlet(fine + coarse, 2 * n)
+    return _dirichlet(fine - coarse, n)
+
+
+def _dirichlet(distance: FloatArray, period: int) -> FloatArray:
+    turn = np.pi * distance / period
     at_node = np.abs(np.sin(turn)) < 1e-12
-    kernel = np.sin(n * turn) / (n * np.tan(np.where(at_node, 0.5, turn)))
+    kernel = np.sin(period * turn) / (period * np.tan(np.where(at_node, 0.5, turn)))
     return np.asarray(np.where(at_node, 1.0, kernel))
 
 

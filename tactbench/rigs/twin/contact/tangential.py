@@ -71,10 +71,13 @@ class _Patch:
 
 
 class _Spectral:
-    """Waves of a periodic sheet."""
+    """Waves of a periodic sheet, or of one that its ends along x mirror: half of a periodic one."""
 
-    def __init__(self, grid: SkinGrid) -> None:
-        spectrum = Spectrum(grid)
+    def __init__(self, grid: SkinGrid, *, mirrored: bool = False) -> None:
+        self._mirrored, self._cells = mirrored, grid.x_mm.size
+        dx = grid.cell_mm[0]
+        x = grid.x_mm[0] + dx * np.arange(self._cells * (2 if mirrored else 1))
+        spectrum = Spectrum(SkinGrid(x_mm=x, s_mm=grid.s_mm))
         nx, ns = self._shape = spectrum.shape
         self.k2 = spectrum.k2.copy()
         self.k2[0, 0] = 1.0
@@ -89,7 +92,8 @@ class _Spectral:
 
     def filtered(self, field: FloatArray, multiplier: npt.NDArray[np.complex128]) -> FloatArray:
         """Return the (2, nx, ns) fields whose waves are those of (nx, ns) `field` times (2, nx, ns//2+1)."""
-        return np.asarray(np.fft.irfft2(np.fft.rfft2(field) * multiplier, self._shape))
+        whole = np.concatenate([field, field[::-1]]) if self._mirrored else field
+        return np.asarray(np.fft.irfft2(np.fft.rfft2(whole) * multiplier, self._shape)[:, : self._cells])
 
 
 class _Shell(_Patch):
@@ -101,7 +105,7 @@ class _Shell(_Patch):
 
     def __init__(self, skin: FluidBackedShell, grid: SkinGrid) -> None:
         super().__init__(skin)
-        self._waves = _Spectral(grid)
+        self._waves = _Spectral(grid, mirrored=skin.sheet.dome is not None)
         (along, across), k4 = self._waves.slope, self._waves.k2**2
         kx2, ks2, poisson = np.abs(along) ** 2, np.abs(across) ** 2, skin.poisson.to("1")
         membrane = np.stack([along * (ks2 - poisson * kx2), -across * (ks2 + (2 + poisson) * kx2)])

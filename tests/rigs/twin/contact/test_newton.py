@@ -9,11 +9,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tactbench.plugin import Quantity, RigError
-from tactbench.rigs.twin.contact import newton
+from tactbench.plugin import Quantity, RigError, assumed
+from tactbench.rigs.twin.contact import newton, shell
 from tactbench.rigs.twin.contact.newton import NewtonSolver
 from tactbench.rigs.twin.contact.press import Press
-from tactbench.rigs.twin.geometry import Contact, gap_mm
+from tactbench.rigs.twin.geometry import Contact, gap_mm, skin_grid
 
 FLAT = math.inf
 PLACES = {"biotac": -5.0, "icub": 0.0}
@@ -155,6 +155,35 @@ def test_force_scales_with_the_moduli(solver, specs, name):
     # Equal up to the solver's tolerance on each.
     assert stiff.depth_mm == pytest.approx(soft.depth_mm, rel=1e-5)
     np.testing.assert_allclose(stiff.deflection_mm, soft.deflection_mm, atol=1e-5)
+
+
+@pytest.mark.parametrize(("x", "s"), [(-5.0, 0.0), (6.0, 1.3), (9.0, 0.0)])
+def test_a_finger_with_a_dome_is_half_of_a_sheet_that_is_sealed_at_both_ends(solver, specs, x, s):
+    # Its other half is pressed alike. No seal is near the tip, nor comes near it round a period.
+    half, skin = solver("biotac", 10.0, x, s, core=False), specs["biotac"].skin
+    sheet, mid = skin.sheet, skin.sheet.x_max.to("mm")
+    both = sheet.model_copy(update={
+        "x_max": assumed(2 * mid - sheet.x_min.to("mm"), "mm", "test"), "dome": None, "cells": (128, 64),
+    })  # fmt: skip
+    made = shell.medium(skin.model_copy(update={"sheet": both}), skin_grid(both))
+    whole = NewtonSolver(made, np.concatenate([half.gap_mm, half.gap_mm[::-1]]))
+    for force in (0.1, 2.0):
+        found, both_found = half.solve(force), whole.solve(2 * force)
+        # Both within the tolerance of the one minimiser.
+        np.testing.assert_allclose(found.deflection_mm, both_found.deflection_mm[:64], atol=5e-6)
+        assert found.depth_mm == pytest.approx(both_found.depth_mm, abs=5e-6)
+
+
+def test_the_tip_gives_way_as_the_pad_does(solver):
+    # With a clamp at the tip a newton raises the fluid's pressure there by a seventh of what it does under the pad.
+    pad, tip = (_fluid_mpa(solver("biotac", 10.0, x), 1.0) for x in (-5.0, 6.0))
+    assert 0.5 * pad < tip < 2 * pad
+
+
+def _fluid_mpa(press, force):
+    found = press.solve(force)
+    local, _ = press.medium.respond(found.deflection_mm, np.empty(press.gap_mm.shape))
+    return float(np.mean(found.pressure_mpa - local))
 
 
 @settings(max_examples=12, deadline=None)
