@@ -71,8 +71,9 @@ def clamp(skin: FluidBackedShell, grid: SkinGrid) -> LocalLaw:
 
     At the tip of a dome, b, nothing is clamped. ``a`` and ``b`` lie half a cell of the *sheet's own* division inside
     its ends: there the ends' clamp has its full stiffness, on whatever grid, so that a finer one converges to the same
-    skin. The seam's distance counts from the sheet's edge. The reference figures of the solver hold for this choice; measured from the sheet's ends instead,
-    the clamp is weaker by half a cell's decay and the approach under a flat surface grows by 8 %.
+    skin. The seam's distance counts from the sheet's edge. The reference figures of the solver hold for this choice;
+    measured from the sheet's ends instead, the clamp is weaker by half a cell's decay and the approach under a flat
+    surface grows by 8 %.
     """
     length, sheet = skin.clamp_length.to("mm"), skin.sheet
     x_min, x_max = sheet.x_min.to("mm"), sheet.x_max.to("mm")
