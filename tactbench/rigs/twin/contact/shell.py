@@ -11,19 +11,6 @@ from tactbench.rigs.twin.contact.spectrum import Spectrum
 from tactbench.rigs.twin.geometry import outer_radius_mm
 
 
-class Clamp:
-    """The soft clamp at the sleeve's sealed ends and along its seam: a linear foundation that fades inwards."""
-
-    def __init__(self, stiffness: FloatArray) -> None:
-        self._stiffness = stiffness
-
-    def __call__(self, deflection_mm: FloatArray, tangent: FloatArray) -> tuple[FloatArray, float]:
-        """Return restoring pressure and summed energy density; fill the tangent."""
-        np.copyto(tangent, self._stiffness)
-        pressure = self._stiffness * deflection_mm
-        return pressure, 0.5 * float(pressure.reshape(-1) @ deflection_mm.reshape(-1))
-
-
 def medium(skin: FluidBackedShell, grid: SkinGrid) -> Medium:
     """Return the shell on `grid`, without its core.
 
@@ -83,4 +70,11 @@ def clamp(skin: FluidBackedShell, grid: SkinGrid) -> LocalLaw:
         inside = np.minimum(inside, (x_max - inset) - grid.x_mm)
     ends = np.exp(-np.maximum(inside, 0.0) / length)
     seam = np.exp(-(skin.sheet.arc.to("mm") / 2 - np.abs(grid.s_mm)) / length)
-    return Clamp(skin.clamp_stiffness.to("MPa/mm") * (ends[:, None] + seam[None, :]))
+    stiffness = skin.clamp_stiffness.to("MPa/mm") * (ends[:, None] + seam[None, :])
+
+    def respond(deflection_mm: FloatArray, tangent: FloatArray) -> tuple[FloatArray, float]:
+        np.copyto(tangent, stiffness)
+        pressure = stiffness * deflection_mm
+        return pressure, 0.5 * float(pressure.reshape(-1) @ deflection_mm.reshape(-1))
+
+    return respond

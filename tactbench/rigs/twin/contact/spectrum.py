@@ -9,7 +9,6 @@ from __future__ import annotations
 import math
 
 import numpy as np
-import numpy.typing as npt
 
 from tactbench.plugin import FloatArray
 from tactbench.plugin.simulation import SkinGrid
@@ -102,21 +101,22 @@ class LowModes:
         """Number of basis functions: cosines, sines and, unless the mean is held at zero, the constant."""
         apart, together = m[:, None] - m, m[:, None] + m
         less, more = (n[:, None] - n) % ns, (n[:, None] + n) % ns
-        self._own = m % nx * ns + n
-        if spectrum.mirrored:
-            # In a product of cosines along x either wave number goes with either one along s. Modes of the first column
-            # and row have norms of their own; one without a wave along s has no sine, only the row of one.
-            norm = np.where(m > 0, math.sqrt(2.0), 1.0) * np.where(n > 0, 1.0, math.sqrt(0.5))
-            self._own_norm, self._norms = norm, np.outer(norm, norm) / 2
-            self._difference = np.stack([np.abs(apart) * ns + less, together * ns + less])
-            self._sum = np.stack([np.abs(apart) * ns + more, together * ns + more])
-            waves = np.pi / nx * np.arange(together.max() + 1)
-            self._along = np.cos(np.outer(waves, np.arange(nx) + 0.5))
-        else:
-            self._difference, self._sum = apart % nx * ns + less, together % nx * ns + more
-        self._mirrored = spectrum.mirrored
         # On a periodic sheet modes of the first column are stored twice, as k and -k, each with half of the weight.
-        twice = (n == 0) & (not spectrum.mirrored)
+        twice, norm, self._along = n == 0, np.ones(m.size), None
+        ways = np.stack([apart % nx, together % nx])[:, None]
+        if spectrum.mirrored:
+            # In a product of cosines along x both wave numbers go with either one along s. Modes of the first column
+            # and row have norms of their own; one without a wave along s has no sine, only the row of one.
+            twice = n < 0
+            ways = np.broadcast_to(np.stack([np.abs(apart), together]), (2, 2, *apart.shape))
+            self._along = np.cos(np.pi / nx * np.outer(np.arange(together.max() + 1), np.arange(nx) + 0.5))
+            norm = np.where(m > 0, 1.0, math.sqrt(0.5)) * np.where(n > 0, 1.0, math.sqrt(0.5))
+        self._places_apart, self._places_together = ways[0] * ns + less, ways[1] * ns + more
+        self._norms, self._own, self._own_norm = (
+            np.outer(norm, norm),
+            m % nx * ns + n,
+            norm * math.sqrt(2.0 * len(ways[0])),
+        )
         doubled = np.where(twice, math.sqrt(2.0), 1.0)
         places = [2 * chosen, 2 * chosen + 1]
         scales = [doubled, doubled]
@@ -150,12 +150,11 @@ class LowModes:
 
     def matrix(self, local: FloatArray, out: FloatArray) -> None:
         """Fill ``out[:size, :size]`` with the matrix of ``K + local`` for a (nx, ns) local stiffness."""
-        waves: npt.NDArray[np.complex128] = np.fft.fft(self._along @ local) if self._mirrored else np.fft.fft2(local)
-        moments = waves.reshape(-1) / self._cells
-        difference, total = moments[self._difference], moments[self._sum]
-        if self._mirrored:
-            difference = (difference[0] + difference[1]) * self._norms
-            total = (total[0] + total[1]) * self._norms
+        moments = np.fft.fft2(local) if self._along is None else np.fft.fft(self._along @ local)
+        moments = moments.reshape(-1) / self._cells
+        difference, total = (
+            moments[places].sum(axis=0) * self._norms for places in (self._places_apart, self._places_together)
+        )
         n = self._modes
         # Coefficient at q: sum D cos(qx) - i sum D sin(qx), over the number of cells.
         np.add(difference.real, total.real, out=out[:n, :n])
@@ -164,9 +163,7 @@ class LowModes:
         np.add(total.imag, difference.imag, out=out[n : 2 * n, :n])
         out[:n, n : 2 * n] = out[n : 2 * n, :n].T
         if self._mean:
-            own = moments[self._own] * math.sqrt(2.0)
-            if self._mirrored:
-                own *= self._own_norm
+            own = moments[self._own] * self._own_norm
             out[2 * n, :n], out[2 * n, n : 2 * n] = own.real, own.imag
             out[:n, 2 * n], out[n : 2 * n, 2 * n] = own.real, own.imag
             out[2 * n, 2 * n] = moments[0].real

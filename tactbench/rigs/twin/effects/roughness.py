@@ -9,38 +9,45 @@ from tactbench.plugin.simulation import Surface
 
 COMPONENTS = 48
 """Cosines the profile is made of: enough to be close to Gaussian; they set the effect's cost."""
+LONGEST_MM, SHORTEST_MM = 100.0, 0.02
+"""Of their wavelengths. Assumed: longer ones pass within seconds; shorter ones, at 20 mm/s, above the band of PAC."""
 _RADII = 1025
 """Radii for which the mean over the contact is computed; straight between them it is right to 1e-4."""
 
 
 class Profile:
-    """A random profile with a given dominant wavelength: a function of the place, the same whenever it is asked.
+    """A random self-affine profile: a function of the place, the same whenever it is asked.
 
-    A sum of cosines of equal amplitude, wavelengths log-normal about the dominant one, phases uniform.
+    Its spectrum over the wave number k is even up to the roll-off and falls as ``k^-(1 + 2 H)`` beyond (Persson et al.
+    2005, J. Phys.: Condens. Matter 17 R1). Of each of equal steps in ln k one cosine, anywhere within it, has the
+    step's share of the variance; phases are uniform.
 
     Parameters
     ----------
     surface
-        Roughness (root mean square), wavelength and spread.
+        Roughness (root mean square), roll-off wavelength and Hurst exponent H.
     generator
         Where wavelengths and phases come from.
     """
 
     def __init__(self, surface: Surface, generator: np.random.Generator) -> None:
-        count = 1 if surface.spread == 0 else COMPONENTS
-        turns = generator.standard_normal(COMPONENTS)[:count]
-        self.wave_mm = surface.wavelength.to("mm") * np.exp(surface.spread * turns)
-        self._phase = generator.uniform(0.0, 2.0 * np.pi, COMPONENTS)[:count]
-        self._amplitude_mm = surface.roughness.to("mm") * np.sqrt(2.0 / count)
+        edges = np.geomspace(2.0 * np.pi / LONGEST_MM, 2.0 * np.pi / SHORTEST_MM, COMPONENTS + 1)
+        roll_off, twice_hurst = 2.0 * np.pi / surface.roll_off.to("mm"), 2.0 * surface.hurst.to("1")
+        beyond = np.maximum(edges / roll_off, 1.0)
+        below = np.minimum(edges / roll_off, 1.0) + (1.0 - beyond**-twice_hurst) / twice_hurst
+        shares = np.diff(below) / (below[-1] - below[0])
+        self._wave_per_mm = edges[:-1] * (edges[1] / edges[0]) ** generator.uniform(size=COMPONENTS)
+        self._phase = generator.uniform(0.0, 2.0 * np.pi, COMPONENTS)
+        self._amplitude_mm = surface.roughness.to("mm") * np.sqrt(2.0 * shares)
 
     def felt_mm(self, place_mm: FloatArray, contact_radius_mm: FloatArray) -> FloatArray:
         """Return (n,) the profile's mean over a contact of (n,) radii around (n,) places."""
         height = np.zeros(place_mm.size)
         radii = np.linspace(0.0, float(contact_radius_mm.max(initial=0.0)), _RADII)
-        for wave, phase in zip(2.0 * np.pi / self.wave_mm, self._phase, strict=True):
-            felt = np.interp(contact_radius_mm, radii, patch_mean(wave * radii))
+        for wave, phase, amplitude in zip(self._wave_per_mm, self._phase, self._amplitude_mm, strict=True):
+            felt = np.interp(contact_radius_mm, radii, amplitude * patch_mean(wave * radii))
             height += felt * np.cos(wave * place_mm + phase)
-        return np.asarray(self._amplitude_mm * height)
+        return height
 
 
 def patch_mean(turn: FloatArray) -> FloatArray:

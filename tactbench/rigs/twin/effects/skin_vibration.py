@@ -48,5 +48,3 @@ def apply(run: Synthesis) -> None:
     force_n = run.load.at(run.t_s)
     stiffness = table.per_mm(lambda force_n: force_n[:, None], force_n)[:, 0]
     run.reference_n += stiffness * rough(run.t_s, force_n, run.sliding(run.t_s).slip_mm)
-    waves = profile.wave_mm
-    run.drawn.update(roughness_shortest_mm=float(waves.min()), roughness_longest_mm=float(waves.max()))
