@@ -162,10 +162,10 @@ class Surface(Frozen):
     @classmethod
     def _of_one_band(cls, given: Any) -> Any:
         """Read the surface of an earlier recording, a band about one wavelength, by that wavelength."""
-        if not isinstance(given, Mapping) or "wavelength" not in given:
-            return given
-        left = {name: value for name, value in given.items() if name not in ("wavelength", "spread")}
-        return {**left, "roll_off": given["wavelength"]}
+        if isinstance(given, Mapping) and "wavelength" in given:
+            left = {name: value for name, value in given.items() if name != "spread"}
+            return {"roll_off": left.pop("wavelength"), **left}
+        return given
 
     @model_validator(mode="after")
     def _is_possible(self) -> Surface:

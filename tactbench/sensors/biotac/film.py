@@ -55,18 +55,13 @@ def spectral_interpolation(n: int, cells: int, *, mirrored: bool = False) -> Flo
     -------
     (cells, n); rows sum to 1; exact for every wave below the Nyquist one.
     """
-    fine = ((np.arange(cells) + 0.5) * (n / cells))[:, None]  # in coarse cells
+    fine = (np.arange(cells) + 0.5) * (n / cells)
     coarse = np.arange(n) + 0.5
-    if mirrored:
-        return _dirichlet(fine - coarse, 2 * n) + _dirichlet(fine + coarse, 2 * n)
-    return _dirichlet(fine - coarse, n)
-
-
-def _dirichlet(distance: FloatArray, period: int) -> FloatArray:
-    turn = np.pi * distance / period
+    images, period = ([coarse, -coarse], 2 * n) if mirrored else ([coarse], n)
+    turn = np.pi / period * (fine[:, None] - np.array(images)[:, None])  # distance in coarse cells, as a phase
     at_node = np.abs(np.sin(turn)) < 1e-12
     kernel = np.sin(period * turn) / (period * np.tan(np.where(at_node, 0.5, turn)))
-    return np.asarray(np.where(at_node, 1.0, kernel))
+    return np.asarray(np.where(at_node, 1.0, kernel).sum(axis=0))
 
 
 def mid_film_mm(

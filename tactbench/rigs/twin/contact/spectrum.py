@@ -118,13 +118,9 @@ class LowModes:
             norm * math.sqrt(2.0 * len(ways[0])),
         )
         doubled = np.where(twice, math.sqrt(2.0), 1.0)
-        places = [2 * chosen, 2 * chosen + 1]
-        scales = [doubled, doubled]
-        if self._mean:
-            places.append(np.array([0]))
-            scales.append(np.ones(1))
-        self._places = np.concatenate(places)
-        self._scales = np.concatenate(scales)
+        constant = int(self._mean)
+        self._places = np.concatenate([2 * chosen, 2 * chosen + 1, np.zeros(constant, dtype=np.intp)])
+        self._scales = np.concatenate([doubled, doubled, np.ones(constant)])
         pairs = np.flatnonzero(twice)
         mirror = ((-m[pairs]) % nx) * nh
         self._mirror_places = np.concatenate([2 * mirror, 2 * mirror + 1])
@@ -132,11 +128,8 @@ class LowModes:
         root = math.sqrt(0.5)
         self._mirror_scales = np.concatenate([np.full(pairs.size, root), np.full(pairs.size, -root)])
         self._cells = nx * ns
-        own_stiffness = stiffness.reshape(-1)[chosen]
-        parts = [own_stiffness, own_stiffness]
-        if self._mean:
-            parts.append(stiffness.reshape(-1)[:1])
-        self._stiffness = np.concatenate(parts)
+        flat = stiffness.reshape(-1)
+        self._stiffness = np.concatenate([flat[chosen], flat[chosen], flat[:constant]])
 
     def take(self, vector: FloatArray) -> FloatArray:
         """Return the (size,) coefficients of a flat vector."""
