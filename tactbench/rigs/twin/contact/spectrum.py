@@ -37,9 +37,9 @@ class Spectrum:
         """Of one cell."""
         kx = np.pi / (nx * dx) * np.arange(nx) if mirrored else 2 * np.pi * np.fft.fftfreq(nx, dx)
         ks = 2 * np.pi * np.fft.rfftfreq(ns, ds)
-        self.kx = np.broadcast_to(kx[:, None], self.half).copy()
-        """(nx, ns//2+1) axial wave number, 1/mm."""
-        self.k2 = kx[:, None] ** 2 + ks[None, :] ** 2
+        self.kx = kx[:, None]
+        """(nx, 1) axial wave number, 1/mm."""
+        self.k2 = self.kx**2 + ks**2
         """(nx, ns//2+1) squared wave number, 1/mm²."""
         # Columns between the first and the last stand for themselves and their conjugates.
         weight = np.full((1, self.half[1]), math.sqrt(2.0))

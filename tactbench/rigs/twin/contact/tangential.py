@@ -14,7 +14,6 @@ import numpy.typing as npt
 
 from tactbench.plugin import FloatArray
 from tactbench.plugin.simulation import BondedLayer, FluidBackedShell, Skin, SkinGrid, SkinState
-from tactbench.rigs.twin.contact.spectrum import Spectrum
 from tactbench.rigs.twin.layer_kernel import shear_shapes
 from tactbench.rigs.twin.partial_slip import shear_modulus_mpa, sliding_stiffness
 
@@ -75,13 +74,11 @@ class _Spectral:
 
     def __init__(self, grid: SkinGrid, *, mirrored: bool = False) -> None:
         self._mirrored, self._cells = mirrored, grid.x_mm.size
-        dx = grid.cell_mm[0]
-        x = grid.x_mm[0] + dx * np.arange(self._cells * (2 if mirrored else 1))
-        spectrum = Spectrum(SkinGrid(x_mm=x, s_mm=grid.s_mm))
-        nx, ns = self._shape = spectrum.shape
-        self.k2 = spectrum.k2.copy()
+        nx, ns = self._shape = (self._cells * (1 + mirrored), grid.s_mm.size)
+        dx, ds = grid.cell_mm
+        kx, ks = 2 * np.pi * np.stack(np.meshgrid(np.fft.fftfreq(nx, dx), np.fft.rfftfreq(ns, ds), indexing="ij"))
+        self.k2 = kx**2 + ks**2
         self.k2[0, 0] = 1.0
-        kx, ks = spectrum.kx.copy(), np.broadcast_to(np.sqrt(spectrum.k2[:1]), spectrum.half).copy()
         # A wave of two cells has no slope on the grid: odd operators leave it out.
         if nx % 2 == 0:
             kx[nx // 2] = 0.0
