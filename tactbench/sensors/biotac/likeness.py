@@ -232,6 +232,7 @@ _OTHER = (
     _figure(
         "residual-after-contact", "release", 0.115, 0.08, 0.15, "1",
         source=f"{RF}: 0.11-0.12 of the median contact response in 20 pauses; a third either way",
+        cause=_SOFT,
     ),
 )  # fmt: skip
 
