@@ -68,7 +68,7 @@ OF_ROWS: dict[str, Column] = {
     "estimator": Column("estimator", answer_name),
     "score": _score("score", "score"),
     "interval": _interval("interval", "ci_low", "ci_high"),
-    "one campaign": Column("one_campaign", _one_campaign, lambda row: row.get("score_min")),
+    "range": Column("one_campaign", _one_campaign, lambda row: row.get("score_min")),
     "beyond floor": _score("beyond_floor", "score_beyond_floor"),
     "interval beyond floor": _interval("beyond_floor_interval", "beyond_floor_ci_low", "beyond_floor_ci_high"),
     "true error": _score("true_error", "true_score"),
@@ -91,7 +91,7 @@ OF_ROWS: dict[str, Column] = {
         timed=True,
     ),
 }
-COLUMNS = ("place", *OF_ROWS, "notes")
+COLUMNS = ("place", "sensor", "level", "estimator", "score", "notes", *list(OF_ROWS)[4:])
 SHOWN = {name: OF_ROWS[name].shown if name in OF_ROWS else _RANKED[name] for name in COLUMNS}
 WIDE = ("interval beyond floor", "true error", "recordings right", "test samples", "simulation", "latency p50",
         "latency p95")  # fmt: skip

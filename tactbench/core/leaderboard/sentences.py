@@ -156,8 +156,8 @@ def _ahead(board: Board, first: Row, second: Row) -> str:
         return f"better than {name} by {by} ({ends})"
     wins = sum(sign * (one - other) > 0 for one, other in zip(*(one[key] for one in kept), strict=True))
     return (
-        f"better than {name} in {wins} of {counted(len(kept[0][key]), 'campaign')}, on average by {by}"
-        f"{' beyond the floor' if key == 'beyond' else ''} ({ends}; scores below are medians)"
+        f"better than {name} in {wins} of {counted(len(kept[0][key]), 'campaign')}; mean of the differences"
+        f"{' beyond the floor' if key == 'beyond' else ''} within campaigns {by} ({ends})"
     )
 
 
@@ -190,8 +190,8 @@ def _published(board: Board) -> str:
         shown = [(row["sensor"] if alone else board.name(row), score(row["published"], row["unit"])) for row in members]
         verb = f" {'lies' if len(shown) == 1 else 'lie'}" if not parts else ""
         listed = ", ".join(f"{name} {value}" for name, value in shown)
-        parts.append(f"{listed}{verb} {where} {'it' if parts else 'our interval'}")
-    tail = "; that concerns the simulation, not the sensors" if rows[0]["simulated"] else ""
+        parts.append(f"{listed}{verb} {where} {'its interval' if len(shown) == 1 else 'their intervals'}")
+    tail = "; a gap is an error of the simulation, not of a sensor" if rows[0]["simulated"] else ""
     return f"Published values: {', '.join(parts)}{tail}."
 
 
@@ -228,7 +228,7 @@ def _marks(board: Board) -> Iterator[Note]:
     if stamps:
         yield Note(f"{STAMPED}  {'; '.join(stamps)}", printed=True)
     if any(rank.tied for _, rank in board.placed) and not board.unranked:
-        yield Note(f"{SHARED}  shared place: at least two of its answers cannot be told apart")
+        yield Note(f"{SHARED}  shared place: not all pairs of these rows can be told apart")
     of_own = "better than the trivial answer of its own sensor"
     if board.unplaced and board.placed:
         yield Note(f"{NO_BETTER}  no {of_own} ({board.bars_of(board.unplaced)})", printed=True)
@@ -242,8 +242,8 @@ def _protocol(board: Board) -> Iterator[Note]:
     finished = (*board.answers, *board.trivial)
     protocol = next((row["protocol"] for row in finished if row["dagger"]), None)
     if protocol is not None:
-        text = f"Protocol {protocol} uses statistics of the test set, as no sensor in use can"
-        yield Note(text, "; `--protocol deployable` does not.", printed=True)
+        text = f"Protocol {protocol} uses statistics of the test set, which are unknown in use"
+        yield Note(text, "; `tactbench run --protocol deployable` does not.", printed=True)
 
 
 def _floors(board: Board) -> Iterator[Note]:
@@ -267,7 +267,7 @@ def _how(board: Board) -> Iterator[Note]:
     if campaigns:
         counts = [row["n_replicates"] for row in campaigns]
         what = "Score, interval" if any(row["ci_low"] is not None for row in campaigns) else "Score"
-        range_of = "; one campaign: lowest … highest" if max(counts) > 1 else ""
+        range_of = "; range: lowest … highest campaign" if max(counts) > 1 else ""
         parts.append(
             f"{what}: median over {_counts(counts, 'campaign')}, each simulated anew with its own seed{range_of}"
         )

@@ -23,7 +23,7 @@ _Texts = tuple[dict[str, str], str]
 """The texts of a line by column, and its kind."""
 _FIRST_TO_GO = (
     "cell", "latency p95", "latency p50", "simulation", "test samples", "true error", "interval beyond floor",
-    "recordings right", "one campaign", "training", "level", "published", "delay after touch",
+    "recordings right", "range", "training", "level", "published", "delay after touch",
 )  # fmt: skip
 """Columns that a terminal does without, in this order; those that were asked for by name are never left out."""
 

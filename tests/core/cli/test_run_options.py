@@ -103,7 +103,7 @@ def test_probes_say_whether_the_first_frame_tells(verbs, offset, leaks):
         record(path, X, labels={"object": f"o{number % 2}"}, trial=str(number // 2))
     run = ("run", "--recordings", "grasps", "--task", "object-identity", "--estimator", "logistic", "--probe")
     for text in (verbs(*run).stdout, verbs("leaderboard").stdout):
-        assert (re.search(r"\bLEAK\b", text) is not None) == leaks
+        assert (re.search(r"\bLEAK$", text, re.MULTILINE) is not None) == leaks
         assert ("no leak shown" in text) != leaks
     rows = json.loads((verbs.folder / "tactbench-results" / "leaderboard.json").read_text())
     ways = [(row["protocol"], row["split"]) for row in rows if row["estimator"] == "logistic"]

@@ -168,7 +168,7 @@ class Truth:
         assert self.order(second) == min(map(self.order, behind))
         return all(self.ranks[one["cell"]].behind for one in behind)
 
-    def by_campaign(self, name, other, wins, count, value, beyond, low, high):
+    def by_campaign(self, name, other, wins, count, beyond, value, low, high):
         first, second = self.called(name), self.called(other)
         key = "beyond" if beyond else "scores"
         assert bool(beyond) == ("beyond" in first["replicates"])
@@ -222,8 +222,8 @@ QUALITY = "(?:the best score|the smallest error beyond the floor)"
 ABOVE = {
     rf"{NAME} is best: better than (\S+?)(?: by [\d.]+(?: N)? \(95 % [^;]*\))?\.":
         lambda t, a, b: t.ahead(a, b) and t.leads(a),
-    rf"{NAME} is best: better than (\S+) in (\d+) of (\d+) campaigns, on average by ([\d.]+)(?: N)?"
-    r"( beyond the floor)? \(95 % ([\d.]+) … ([\d.]+); scores below are medians\)\.":
+    rf"{NAME} is best: better than (\S+) in (\d+) of (\d+) campaigns; mean of the "
+    r"differences( beyond the floor)? within campaigns ([\d.]+)(?: N)? \(95 % ([\d.]+) … ([\d.]+)\)\.":
         lambda t, a, b, *numbers: t.ahead(a, b) and t.leads(a) and t.by_campaign(a, b, *numbers),
     rf"{NAME} has {QUALITY}; (.*?)(?: and \d+ more)? cannot be told from it\.":
         lambda t, a, b: t.leads(a) and all(not t.ranks[t.called(one)["cell"]].behind for one in b.split(", ")),
@@ -244,11 +244,11 @@ ABOVE = {
         lambda t, n, b: not t.better and int(n or 1) == len(t.answers) and t.bars(b, t.answers),
     r"time reads no sensor, only the time: such a score needs no touch\.":
         lambda t: any(t.bar(o)["looks_at"] == "time" for o in [*t.worse, *t.unshown]),
-    r"Published values: (.*?)(?:; that concerns the simulation, not the sensors)?\.": lambda t, a: t.beside(a),
+    r"Published values: (.*?)(?:; a gap is an error of the simulation, not of a sensor)?\.": lambda t, a: t.beside(a),
 }  # fmt: skip
 BELOW = {
     r"‡  It leaks\.": lambda t: any(one["stamps"] for one in t.rows),
-    "=  shared place: at least two of its answers cannot be told apart": lambda t: t.tied(),
+    "=  shared place: not all pairs of these rows can be told apart": lambda t: t.tied(),
     r"–  no better than the trivial answer of its own sensor \((.*)\)":
         lambda t, b: t.bars(b, t.worse),
     r"\*  not shown to be better than the trivial answer of its own sensor \((.*)\)": lambda t, b: t.bars(b, t.unshown),
