@@ -5,7 +5,7 @@ from __future__ import annotations
 from tactbench.plugin import TaskDescriptor, TaskSpec, VectorTarget, hookimpl
 from tactbench.tasks.contact_scenes import LOCATION_SCENES
 
-TACTBENCH_API = 1
+TACTBENCH_API = 2
 
 SPEC = TaskSpec(
     name="contact-location",

@@ -174,7 +174,7 @@ def _facts(descriptor: Any) -> Iterator[tuple[str, str]]:
         yield "may be set", ", ".join(f"{name}={value}" for name, value in descriptor.params.items()) or "nothing"
         yield "chosen on validation data", "; ".join(grid) or "nothing"
     elif isinstance(descriptor, RigDescriptor):
-        offered = ("verification", "work_precision", "likeness")
+        offered = ("verification", "work_precision")
         able = [name.replace("_", " ") for name in offered if getattr(descriptor, name)]
         yield (
             "scenes are",

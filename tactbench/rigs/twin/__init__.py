@@ -5,7 +5,7 @@ from __future__ import annotations
 from tactbench.plugin import IndenterDescriptor, Parameter, RigDescriptor, hookimpl
 from tactbench.plugin.simulation import EffectDescriptor
 
-TACTBENCH_API = 1
+TACTBENCH_API = 2
 
 _HERE = "tactbench.rigs.twin"
 _DRIFT, _NOISE = ("drift",), ("noise",)
@@ -23,10 +23,9 @@ def tactbench_rigs() -> list[RigDescriptor]:
             title="Simulated twin",
             where=f"{_HERE}.rig:build",
             simulated=True,
-            likeness=f"{_HERE}.likeness.report:checks",
             rungs=("closed-form", "default", "fine", "reference"),
             work_precision=f"{_HERE}.work_precision:study",
-            verification=f"{_HERE}.verification.everything:checks",
+            verification=f"{_HERE}.verify:verdicts",
         )
     ]
 

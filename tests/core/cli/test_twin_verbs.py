@@ -114,8 +114,6 @@ def test_a_scenario_is_asked_for_by_a_matrix_file(verbs):
     [
         (("twin", "explain", "--sensor", "icub", "--task", "grasp-stability"), "plans no scenes"),
         (("twin", "explain", "--sensor", "icub", "--task", "forse"), "Did you mean 'force'"),
-        (("twin", "verify", "--recordings", "."), "--real"),
-        (("twin", "verify", "--only", "omision"), "Did you mean 'omission'"),
         (("run", "--effects", "drift"), "Write +drift or -drift"),
         (("run", "--effects", "+creeep"), "Did you mean 'creep'"),
         (("run", "--set", "rung=defaut"), "Did you mean 'default'"),
@@ -130,11 +128,19 @@ def test_wrong_words_are_answered_with_the_next_step(verbs, arguments, says):
     assert_one_clear_screen(verbs(*arguments, code=2), says)
 
 
-def test_an_oracle_can_be_run_alone(verbs):
-    done = verbs("twin", "verify", "--only", "omission-icub-force", "--format", "json")
-    verdicts = json.loads(done.stdout)
-    assert all(verdict["met"] for verdict in verdicts)
-    assert "2 of 2 within their bounds" in done.stderr
+def test_the_simulation_meets_its_laws_each_with_what_was_expected_and_a_bound(verbs):
+    done = verbs("twin", "verify", "--format", "json")
+    rows = json.loads(done.stdout)
+    assert len(rows) <= 12
+    assert all(row["met"] and row["source"] and abs(row["found"] - row["expected"]) <= row["bound"] for row in rows)
+    assert f"{len(rows)} of {len(rows)} within their bounds" in done.stderr
+
+
+def test_a_law_that_is_missed_is_a_failure_and_says_so(verbs, monkeypatch):
+    monkeypatch.setattr("tactbench.rigs.twin.verify.lag", lambda t_s, load, tau_s: load)
+    done = verbs("twin", "verify", code=1)
+    (missed,) = [line for line in done.stdout.splitlines() if "MISS" in line]
+    assert "creep" in missed
 
 
 def test_a_score_that_takes_long_is_made_only_if_asked_for(monkeypatch, capsys):

@@ -4,7 +4,7 @@ import pytest
 from pydantic import ValidationError
 
 from tactbench.core.report.datasheet import table_one
-from tactbench.plugin import ChannelSpec, SensorSpec, StreamSpec, load_registry
+from tactbench.plugin import ChannelSpec, SensorSpec, StreamSpec
 from tests.core.evaluation.made import sensor
 
 
@@ -33,11 +33,3 @@ def test_a_site_in_two_places_is_refused(field):
     elsewhere = ChannelSpec(name="at", kind="taxel", site="a", **{field: (0.0, 0.0, 1.0)})
     with pytest.raises(ValidationError, match="site a: the place of at is not that of ax"):
         magnets(*axes("a"), elsewhere)
-
-
-def test_no_recording_carries_figures_of_real_units_and_no_key_depends_on_them():
-    spec = load_registry().sensors["icub"].spec
-    assert spec.likeness
-    without = spec.model_copy(update={"likeness": ()})
-    assert spec.model_dump_json() == without.model_dump_json()
-    assert SensorSpec.model_validate_json(spec.model_dump_json()).likeness == ()

@@ -9,7 +9,6 @@ import numpy as np
 
 from tactbench.plugin import FloatArray, NotApplicable, PluginContractError, RigError, SensorDescriptor, load_object
 from tactbench.plugin.simulation import (
-    BondedLayer,
     FluidBackedShell,
     Skin,
     SkinGrid,
@@ -72,10 +71,6 @@ def press_of(run: Synthesis, fidelity: Fidelity) -> AnyPress:
         from tactbench.rigs.twin.contact.local import LocalPress
 
         return LocalPress(skin, medium_of(skin, grid), gap, run.contact)
-    if fidelity.solver == "elements" and isinstance(skin, BondedLayer):
-        from tactbench.rigs.twin.contact.elements import ElementsPress
-
-        return ElementsPress(skin, medium_of(skin, grid), gap, run.contact)
     core: Callable[[Medium], Medium] | None = None
     if "core" in run.lent and isinstance(skin, FluidBackedShell):
         where = run.lent["core"]

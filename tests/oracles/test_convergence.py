@@ -15,6 +15,8 @@ from tactbench.rigs.twin.contact.press import Press
 from tactbench.rigs.twin.contact.skins import medium_of
 from tactbench.rigs.twin.fidelity import DEFAULT
 from tactbench.rigs.twin.geometry import Contact, gap_mm, skin_grid
+from tactbench.sensors.biotac.spec import SPEC as BIOTAC
+from tactbench.sensors.icub.spec import SPEC as ICUB
 
 LOADS = np.array([0.25, 0.8, 1.6, 3.0, 5.0])
 
@@ -46,16 +48,15 @@ def _error(change, reference):
 
 
 # The promised errors against a converged grid. The reference is itself off by a quarter of the default's error.
-@pytest.mark.parametrize(("name", "finest", "promise"), [("biotac", (2.0, 2), 0.01), ("icub", (2.0, 2), 0.003)])
+@pytest.mark.parametrize(("spec", "promise"), [(BIOTAC, 0.01), (ICUB, 0.003)], ids=["biotac", "icub"])
 @pytest.mark.parametrize("radius", [5.0, 40.0, math.inf])
-def test_the_default_is_near_the_converged_grid_and_refining_brings_it_nearer(specs, name, finest, promise, radius):
-    spec = specs[name]
+def test_the_default_is_near_the_converged_grid_and_refining_brings_it_nearer(spec, promise, radius):
 
     def fidelity(cells, conduction):
         return dataclasses.replace(DEFAULT, cells_factor=cells, conduction_refinement=conduction)
 
-    reference = _changes(spec, fidelity(*finest), radius)
-    grids = [(0.5, 2), (1.0, 2)] if name == "icub" else [(1.0, 1), (1.0, 2)]
+    reference = _changes(spec, fidelity(2.0, 2), radius)
+    grids = [(0.5, 2), (1.0, 2)] if spec is ICUB else [(1.0, 1), (1.0, 2)]
     coarse, default = (_error(_changes(spec, fidelity(*grid), radius), reference) for grid in grids)
     assert default < promise
     # Twice as fine: at least twice as near.

@@ -14,7 +14,7 @@ from tactbench.rigs.twin.contact.stages import skin_under_load
 from tactbench.rigs.twin.effects.thermal_called_for import widest_contact_mm
 from tactbench.rigs.twin.preparation import carried_out, prepare
 from tactbench.rigs.twin.rig import build
-from tactbench.rigs.twin.verification.omission import difference
+from tactbench.rigs.twin.verify import omitted
 
 
 def _q(value, unit):
@@ -29,9 +29,8 @@ def twin():
 @pytest.mark.parametrize("name", ["biotac", "icub"])
 @pytest.mark.parametrize("task", ["force", "curvature"])
 def test_scenes_of_the_default_matrix_lose_nothing(twin, sensors, name, task):
-    # One scene a role here, the tasks' first; `tactbench twin verify` runs all of them.
     scene = load_registry().tasks[task].spec.scenes[0].scene
-    largest, bound, hidden = difference(twin, sensors[name], scene)
+    largest, bound, hidden = omitted(twin, sensors[name], scene)
     assert largest <= bound + 1e-9
     assert largest < hidden
 
@@ -55,7 +54,7 @@ def test_a_slow_ramp_goes_without_creep_and_the_bound_holds(twin, sensors):
     assert not entry.included
     assert "slowly" in entry.reason
     assert "load table" in entry.reason
-    largest, bound, hidden = difference(twin, sensors["biotac"], scene)
+    largest, bound, hidden = omitted(twin, sensors["biotac"], scene)
     assert bound == entry.change
     # Not vacuous: within a factor of ten of what really happens, which is not nothing.
     assert bound / 10 < largest <= bound
@@ -128,7 +127,7 @@ def test_a_ramp_of_a_minute_does_not(twin, sensors):
     entry = _creep(twin, sensors["biotac"], scene)
     assert entry.included
     asked = scene.model_copy(update={"simulation": scene.simulation.model_copy(update={"effects": ("-creep",)})})
-    largest, bound, hidden = difference(twin, sensors["biotac"], asked)
+    largest, bound, hidden = omitted(twin, sensors["biotac"], asked)
     # Left out against the plan: nobody promises anything, and it shows.
     assert bound == float("inf")
     assert largest > 10 * hidden
