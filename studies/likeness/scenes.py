@@ -23,7 +23,7 @@ from tactbench.plugin import (
 from tactbench.plugin.simulation import FluidBackedShell, rig_context
 from tactbench.rigs.twin.contact.core import with_core
 from tactbench.rigs.twin.contact.press import Press
-from tactbench.rigs.twin.contact.skins import medium_of
+from tactbench.rigs.twin.contact.pressing import medium_of
 from tactbench.rigs.twin.geometry import Contact, finger_surface_mm, gap_mm, outer_radius_mm, skin_grid
 from tactbench.rigs.twin.rig import build
 

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from tactbench.rigs.twin.layer_kernel import compliance_shape
+from tactbench.rigs.twin.contact.layer import compliance_shape
 from tests.oracles import finite_elements
 from tests.oracles.boundary_elements import HalfSpace, Layer, paraboloid_mm, pressed
 from tests.oracles.closed_forms import CattaneoMindlin, FlatPunch, Hertz, ThinLayer

@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 
 from tactbench.rigs.twin.effects.bristle import bristle, coefficient
-from tactbench.rigs.twin.effects.skin_mode import shaken
-from tactbench.rigs.twin.effects.slip_event import Mode, slip_s, swing
+from tactbench.rigs.twin.effects.skin_mode import Mode, shaken, slip_s, swing
 from tactbench.rigs.twin.effects.stick_slip import Dragged, Drive
 from tactbench.rigs.twin.partial_slip import share_of_force, sliding_stiffness, stick_ratio
 

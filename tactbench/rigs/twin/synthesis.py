@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -12,9 +13,20 @@ import numpy.typing as npt
 
 from tactbench.plugin import ChannelKind, ChannelSpec, FloatArray, Scalar, Scene, SensorDescriptor, load_object
 from tactbench.plugin.simulation import EffectDescriptor, EffectRun, Nuisances
-from tactbench.rigs.twin import draws
 from tactbench.rigs.twin.fidelity import DEFAULT, Fidelity
 from tactbench.rigs.twin.geometry import Contact
+
+
+def generator(seed: int, *scope: str) -> np.random.Generator:
+    """Return the generator of one scope, for example ``(sensor, "unit", "gain")``.
+
+    The scope's text is hashed (BLAKE2), so that the same seed and names give the same draws in every process and on
+    every machine, and a new effect does not shift the draws of the others.
+    """
+    digest = hashlib.blake2b("\x1f".join(scope).encode(), digest_size=16).digest()
+    words = [int.from_bytes(digest[i : i + 4], "little") for i in range(0, 16, 4)]
+    # A negative seed is as good as any: SeedSequence wants its words unsigned.
+    return np.random.default_rng(np.random.SeedSequence([seed % 2**64, *words]))
 
 
 @dataclass(frozen=True)
@@ -170,15 +182,15 @@ class Synthesis:
     def of_unit(self, *what: str) -> np.random.Generator:
         """Return the generator of what belongs to this sensor unit: the same in every recording of it under a seed."""
         scope = "unit" if self.scene.first_unit else f"unit {self.scene.unit}"
-        return draws.generator(self.seed, self.sensor.name, scope, *what)
+        return generator(self.seed, self.sensor.name, scope, *what)
 
     def of_session(self, *what: str) -> np.random.Generator:
         """Return the generator of what the recordings of a session share."""
-        return draws.generator(self.seed, self.sensor.name, "session", self.scene.session, *what)
+        return generator(self.seed, self.sensor.name, "session", self.scene.session, *what)
 
     def of_recording(self, *what: str) -> np.random.Generator:
         """Return the generator of what is this recording's own."""
-        return draws.generator(self.seed, self.sensor.name, "recording", self.scene.session, self.scene.name, *what)
+        return generator(self.seed, self.sensor.name, "recording", self.scene.session, self.scene.name, *what)
 
     def of_every_channel(self, track: Track, kind: ChannelKind, generator: np.random.Generator) -> FloatArray:
         """Return one standard normal number for each recorded channel of `kind` in `track`.

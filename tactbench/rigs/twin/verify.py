@@ -14,10 +14,10 @@ import numpy as np
 from tactbench.plugin import FloatArray, PlanEntry, Scene, SensorDescriptor, assumed, load_registry
 from tactbench.plugin.simulation import BondedLayer, SkinSheet, SkinState, Verdict, rig_context
 from tactbench.rigs.twin.contact.press import Press
-from tactbench.rigs.twin.contact.skins import medium_of
+from tactbench.rigs.twin.contact.pressing import medium_of
 from tactbench.rigs.twin.effects.heated_core import HeatedCore
 from tactbench.rigs.twin.effects.memory import lag, wandering
-from tactbench.rigs.twin.effects.slip_event import Mode
+from tactbench.rigs.twin.effects.skin_mode import Mode
 from tactbench.rigs.twin.effects.stick_slip import Dragged, Drive
 from tactbench.rigs.twin.fidelity import DEFAULT
 from tactbench.rigs.twin.geometry import Contact, skin_grid

@@ -15,7 +15,7 @@ from tactbench.plugin.simulation import BondedLayer, SheetTable, SkinSheet
 from tactbench.rigs.twin.contact.core import with_core
 from tactbench.rigs.twin.contact.media import Medium
 from tactbench.rigs.twin.contact.newton import NewtonSolver
-from tactbench.rigs.twin.contact.skins import medium_of
+from tactbench.rigs.twin.contact.pressing import medium_of
 from tactbench.rigs.twin.geometry import Contact, gap_mm, skin_grid
 from tactbench.sensors.biotac.spec import SPEC as BIOTAC
 from tactbench.sensors.icub.spec import SPEC as ICUB

@@ -11,7 +11,7 @@ from tactbench.core.spec.scene import Simulation
 from tactbench.plugin import ForceRamp, Indenter, Placement, RigContext, Scene, assumed, load_registry
 from tactbench.rigs.twin import tactbench_effects
 from tactbench.rigs.twin.contact.stages import skin_under_load
-from tactbench.rigs.twin.effects.thermal_called_for import widest_contact_mm
+from tactbench.rigs.twin.effects.called_for import widest_contact_mm
 from tactbench.rigs.twin.preparation import carried_out, prepare
 from tactbench.rigs.twin.rig import build
 from tactbench.rigs.twin.verify import omitted

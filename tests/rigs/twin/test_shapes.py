@@ -21,7 +21,7 @@ from tactbench.plugin.simulation import BondedLayer, FoamPad, SkinSheet, Slide
 from tactbench.rigs.twin import tactbench_effects, tactbench_indenters
 from tactbench.rigs.twin.contact.local import LocalPress
 from tactbench.rigs.twin.contact.press import Press
-from tactbench.rigs.twin.contact.skins import medium_of
+from tactbench.rigs.twin.contact.pressing import medium_of
 from tactbench.rigs.twin.contact.validity import remarks
 from tactbench.rigs.twin.geometry import Contact, check_contact, gap_mm, skin_grid
 from tactbench.rigs.twin.rig import build

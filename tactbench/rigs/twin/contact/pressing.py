@@ -7,9 +7,19 @@ from collections.abc import Callable
 
 import numpy as np
 
-from tactbench.plugin import FloatArray, NotApplicable, PluginContractError, RigError, SensorDescriptor, load_object
+from tactbench.plugin import (
+    FloatArray,
+    NotApplicable,
+    PluginContractError,
+    Quantity,
+    RigError,
+    SensorDescriptor,
+    load_object,
+)
 from tactbench.plugin.simulation import (
+    BondedLayer,
     FluidBackedShell,
+    FoamPad,
     Skin,
     SkinGrid,
     SkinState,
@@ -18,7 +28,6 @@ from tactbench.plugin.simulation import (
 )
 from tactbench.rigs.twin.contact.media import Medium
 from tactbench.rigs.twin.contact.press import AnyPress, Press
-from tactbench.rigs.twin.contact.skins import medium_of
 from tactbench.rigs.twin.fidelity import Fidelity
 from tactbench.rigs.twin.geometry import gap_mm, outer_radius_mm, skin_grid
 from tactbench.rigs.twin.synthesis import Synthesis
@@ -124,3 +133,36 @@ def slide_of(run: Synthesis) -> tuple[tuple[float, float], float] | None:
 def no_channels(state: SkinState) -> FloatArray:
     """Return depth, contact radius and fluid pressure: what is looked at when no channel is."""
     return np.array([state.depth_mm, state.contact_radius_mm, state.fluid_pressure_mpa])
+
+
+def medium_of(skin: FluidBackedShell | FoamPad | BondedLayer, grid: SkinGrid) -> Medium:
+    """Return the medium a spec declares, on `grid`; only its own module is imported.
+
+    Raises
+    ------
+    RigError
+        If the parameters are not physical, or the medium is none the twin can press.
+    """
+    for name in type(skin).model_fields:
+        stated = getattr(skin, name)
+        if isinstance(stated, Quantity) and not 0 <= stated.value < math.inf:
+            raise RigError(
+                f"The skin's {name} is {stated}; it must be finite and not below zero.",
+                hint="Correct the skin in the sensor's spec.",
+            )
+    if isinstance(skin, FluidBackedShell):
+        from tactbench.rigs.twin.contact import shell
+
+        return shell.medium(skin, grid)
+    if isinstance(skin, FoamPad):
+        from tactbench.rigs.twin.contact import foam
+
+        return foam.medium(skin, grid)
+    if isinstance(skin, BondedLayer):
+        from tactbench.rigs.twin.contact import layer
+
+        return layer.medium(skin, grid)
+    raise RigError(
+        f"The twin cannot press a skin of type {type(skin).__name__}.",
+        hint="Declare one of FluidBackedShell, FoamPad and BondedLayer.",
+    )

@@ -14,8 +14,8 @@ import numpy.typing as npt
 
 from tactbench.plugin import FloatArray
 from tactbench.plugin.simulation import BondedLayer, FluidBackedShell, Skin, SkinGrid, SkinState
+from tactbench.rigs.twin.contact.layer import shear_shapes
 from tactbench.rigs.twin.contact.spectrum import Spectrum
-from tactbench.rigs.twin.layer_kernel import shear_shapes
 from tactbench.rigs.twin.partial_slip import shear_modulus_mpa, sliding_stiffness
 
 Direction = tuple[float, float]

@@ -12,7 +12,7 @@ from tactbench.plugin import ForceRamp, Indenter, RigContext, RigError, Scene, S
 from tactbench.plugin.simulation import Environment
 from tactbench.rigs.twin import tactbench_effects, tactbench_rigs
 from tactbench.rigs.twin.contact.local import LocalPress
-from tactbench.rigs.twin.contact.skins import medium_of
+from tactbench.rigs.twin.contact.pressing import medium_of
 from tactbench.rigs.twin.fidelity import RUNGS, Fidelity, rung
 from tactbench.rigs.twin.geometry import Contact, gap_mm, skin_grid
 from tactbench.rigs.twin.rig import build

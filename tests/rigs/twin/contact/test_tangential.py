@@ -12,12 +12,12 @@ from hypothesis import strategies as st
 
 from tactbench.plugin import assumed
 from tactbench.plugin.simulation import BondedLayer, SkinSheet
+from tactbench.rigs.twin.contact.layer import shear_shapes
 from tactbench.rigs.twin.contact.press import Press, at_rest
-from tactbench.rigs.twin.contact.skins import medium_of
+from tactbench.rigs.twin.contact.pressing import medium_of
 from tactbench.rigs.twin.contact.slide_table import dragged_state, traction_shares
 from tactbench.rigs.twin.contact.tangential import pressed_state, tangential_of
 from tactbench.rigs.twin.geometry import Contact, gap_mm, outer_radius_mm, skin_grid
-from tactbench.rigs.twin.layer_kernel import shear_shapes
 from tactbench.rigs.twin.partial_slip import sliding_stiffness
 
 YOUNG, SIDE_MM, FORCE_N, RADIUS_MM, MU = 1.0, 12.0, 0.3, 1.0, 0.6
