@@ -96,7 +96,6 @@ class Press:
         self.contact = contact
         self.touched_core = False
         self.solves = 0
-        self.products = 0
         self._solver = NewtonSolver(medium, self.gap_mm)
         self._core = core
         self._wants_fluid_pressure = fluid_pressure
@@ -134,13 +133,15 @@ class Press:
     def _solve(self, force: float) -> Solution:
         if force in self._solutions:
             return self._solutions[force]
-        solution = self._count(self._started(force))
+        solution = self._started(force)
+        self.solves += 1
         if self.medium.has_core and not self.touched_core and self.medium.closing_mm(solution.deflection_mm) > 0:
             self.touched_core = True
             if self._core is not None:
                 self.medium = self._core(self.medium)
                 self._solver = NewtonSolver(self.medium, self.gap_mm)
-                solution = self._count(self._solver.solve(force, solution.vector, tolerance=self._tolerance))
+                solution = self._solver.solve(force, solution.vector, tolerance=self._tolerance)
+                self.solves += 1
         self._solutions[force] = solution
         return solution
 
@@ -156,11 +157,6 @@ class Press:
             except RigError:
                 pass
         return self._solver.solve(force, None, tolerance=self._tolerance)
-
-    def _count(self, solution: Solution) -> Solution:
-        self.solves += 1
-        self.products += solution.products
-        return solution
 
     def _guess(self, force: float) -> FloatArray | None:
         """Return a state near `force` from the solved loads around it (Lagrange in the square root of the load)."""
