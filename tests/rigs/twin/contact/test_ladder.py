@@ -38,7 +38,7 @@ def _recorded(sensor, simulation, radius=10.0):
 @pytest.fixture
 def local(layer):
     def make(poisson, thickness=0.2, penalty=1e6):
-        skin, _ = layer(poisson, thickness=thickness, penalty=penalty, cells=192)
+        skin, _ = layer(poisson, thickness_mm=thickness, penalty=penalty, cells=192)
         grid = skin_grid(skin.sheet)
         contact = Contact(10.0, 0.0, 0.0)
         return LocalPress(skin, medium_of(skin, grid), gap_mm(grid, contact), contact), skin
