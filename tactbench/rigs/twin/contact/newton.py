@@ -32,8 +32,6 @@ MAX_STEPS = 40
 """Newton steps before giving up; the hard cases of the tests take up to 25 from a cold start."""
 _ARMIJO = 1e-4
 _HALVINGS = 12
-_MOST_PRODUCTS = 300
-"""Of one linear system with the Hessian; 4 to 12 are usual."""
 _EPS = float(np.finfo(np.float64).eps)
 _BALANCED = 1e-12
 """Relative force balance of what is handed out: rounding of a sum over thousands of cells."""
@@ -43,7 +41,6 @@ _BALANCED = 1e-12
 class Solution:
     """The skin under one load."""
 
-    force_n: float
     vector: FloatArray
     """(size + 1,) Fourier coefficients of the deflection and, last, the approach [mm]."""
     deflection_mm: FloatArray
@@ -257,7 +254,7 @@ class NewtonSolver:
         expected = rho  # the curvature along `direction` if the preconditioner were the Hessian's inverse
         if not rho > 0:
             return step
-        for _ in range(_MOST_PRODUCTS):
+        for _ in range(300):
             product = self._multiply(direction, stiffness)
             curvature = float(direction @ product)
             if not curvature > _EPS * expected:
@@ -283,7 +280,6 @@ class NewtonSolver:
         vector = vector.copy()
         vector[-1], lift = self._balanced(vector, force_n / self._spectrum.area_mm2)
         return Solution(
-            force_n=force_n,
             vector=vector,
             deflection_mm=self._spectrum.field(vector[:-1]),
             pressure_mpa=self._k * lift,

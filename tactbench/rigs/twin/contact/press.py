@@ -134,14 +134,13 @@ class Press:
         if force in self._solutions:
             return self._solutions[force]
         solution = self._started(force)
-        self.solves += 1
         if self.medium.has_core and not self.touched_core and self.medium.closing_mm(solution.deflection_mm) > 0:
             self.touched_core = True
             if self._core is not None:
                 self.medium = self._core(self.medium)
                 self._solver = NewtonSolver(self.medium, self.gap_mm)
-                solution = self._solver.solve(force, solution.vector, tolerance=self._tolerance)
                 self.solves += 1
+                solution = self._solver.solve(force, solution.vector, tolerance=self._tolerance)
         self._solutions[force] = solution
         return solution
 
@@ -150,6 +149,7 @@ class Press:
 
         A state guessed for loads of a fraction of a piconewton is off by more than such a load can move.
         """
+        self.solves += 1
         guess = self._guess(force)
         if guess is not None:
             try:

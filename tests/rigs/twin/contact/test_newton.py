@@ -19,6 +19,17 @@ FLAT = math.inf
 PLACES = {"biotac": -5.0, "icub": 0.0}
 
 
+def _energy(press, vector, force_n):
+    """Return energy over cell area [N mm / mm²] and its gradient."""
+    return press._evaluate(vector, force_n / press.medium.spectrum.area_mm2)
+
+
+def _hessian_product(press, vector, direction, force_n):
+    _energy(press, vector, force_n)
+    press._coupling = float(press._contact.sum())
+    return press._multiply(direction, press._tangent + press._contact).copy()
+
+
 def _scaled(quantity: Quantity, factor: float) -> Quantity:
     return quantity.model_copy(update={"value": quantity.value * factor})
 
@@ -76,18 +87,6 @@ def test_reference_values(prototype, case, depths):
             assert fluid == pytest.approx(PRESSURES[radius][i], abs=0.5e-2 + 1e-4)
 
 
-def energy(solver, vector, force_n):
-    """Return energy over cell area and its gradient at a state."""
-    solver._gap = solver.gap_mm
-    return solver._evaluate(vector, force_n / solver.medium.spectrum.area_mm2)
-
-
-def hessian_product(solver, vector, direction, force_n):
-    energy(solver, vector, force_n)
-    solver._coupling = float(solver._contact.sum())
-    return solver._multiply(direction, solver._tangent + solver._contact).copy()
-
-
 @pytest.mark.parametrize("name", ["biotac", "icub"])
 def test_the_gradient_is_the_energys(solver, name):
     press = solver(name, 10.0, PLACES[name])
@@ -98,10 +97,10 @@ def test_the_gradient_is_the_energys(solver, name):
         field = rng.standard_normal(press.gap_mm.shape) * 1e-2
         direction[:-1] = press.medium.spectrum.of(field - field.mean())
         direction[-1] = rng.standard_normal() * 1e-2
-        _, gradient = energy(press, state, 3.0)
+        _, gradient = _energy(press, state, 3.0)
         step = 1e-4
-        up, _ = energy(press, state + step * direction, 3.0)
-        down, _ = energy(press, state - step * direction, 3.0)
+        up, _ = _energy(press, state + step * direction, 3.0)
+        down, _ = _energy(press, state - step * direction, 3.0)
         # Central differences: error of order step², and rounding of the energy (about 1e2) over the step.
         assert (up - down) / (2 * step) == pytest.approx(gradient @ direction, rel=1e-5, abs=1e-8)
 
@@ -125,11 +124,11 @@ def test_the_hessian_is_the_gradients_and_symmetric_and_positive(solver, name):
         direction[:-1] = press.medium.spectrum.of(field - field.mean())
         direction[-1] = rng.standard_normal()
         directions.append(direction)
-    products = [hessian_product(press, state, direction, 3.0) for direction in directions]
+    products = [_hessian_product(press, state, direction, 3.0) for direction in directions]
     for direction, product in zip(directions, products, strict=True):
         step = 1e-7
-        _, up = energy(press, state + step * direction, 3.0)
-        _, down = energy(press, state - step * direction, 3.0)
+        _, up = _energy(press, state + step * direction, 3.0)
+        _, down = _energy(press, state - step * direction, 3.0)
         difference = (up - down) / (2 * step)
         # Rounding of the gradient (1e-16 x 1e3) over 1e-7.
         np.testing.assert_allclose(product, difference, atol=2e-6 * np.abs(product).max())
