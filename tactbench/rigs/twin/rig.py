@@ -265,7 +265,7 @@ def _along_the_slide(run: Synthesis) -> dict[str, tuple[ChannelSpec, FloatArray]
     }
 
 
-_TOLD = frozenset({
+_STATED = frozenset({
     "placement_scatter_mm", "drift_scale", "noise_scale", "offset_scale", "session_offset_scale", "since_power_on_s",
     "force_noise_n", "force_filter_hz", "indenter_temperature_degc", "drive_proportional_mm_per_n",
     "drive_integral_mm_per_n_s", "drive_cutoff_hz", "drive_delay_ms", "surface_static_friction",
@@ -277,8 +277,8 @@ _TOLD = frozenset({
 def _stated(scene: Scene, sensor: SensorSpec) -> dict[str, Scalar]:
     """Return the nuisances of the scene that decide most, those that were set, and the slide."""
     asked = dict(scene.simulation.nuisances)
-    told = _TOLD | asked.keys() | ({"ambient_degc"} if scene.environment.indenter_temperature is not None else set())
-    stated: dict[str, Scalar] = {name: value for name, value in scene.nuisances().items() if name in told}
+    kept = _STATED | asked.keys() | ({"ambient_degc"} if scene.environment.indenter_temperature is not None else set())
+    stated: dict[str, Scalar] = {name: value for name, value in scene.nuisances().items() if name in kept}
     stated |= {name: amount.value for name, amount in sensor.settable().items() if name in asked}
     if scene.drive is not None and scene.drive.cutoff is None:
         stated["drive_cutoff_hz"] = "none"

@@ -94,7 +94,7 @@ class Track:
     effective_n: dict[ChannelKind, FloatArray] = field(default_factory=dict)
     """(n,) force the response of a kind of channel follows, where it is not the true one."""
     vibration_mm: FloatArray | None = None
-    """(n,) motion of the skin along its normal, beyond what the load explains; None: nobody shakes it."""
+    """(n,) motion of the skin along its normal, beyond what the load explains; None: nothing shakes it."""
     gain: FloatArray | None = None
     """(channels,) factors on the response; None: all one."""
     warmth_k: FloatArray | None = None
@@ -133,9 +133,9 @@ class Synthesis:
     reference_n: FloatArray
     """(n,) what the force sensor says; starts at the true force."""
     fluid_pressure: bool = False
-    """Somebody looks at the pressure of the fluid."""
+    """The pressure of the fluid is observed."""
     tangential: bool = False
-    """Somebody looks at what the skin does along itself."""
+    """What the skin does along itself is observed."""
     reference_more: dict[str, tuple[ChannelSpec, FloatArray]] = field(default_factory=dict)
     """Further channels of the force sensor's stream, by name: (n,) on the reference clock."""
     sliding: Callable[[FloatArray], Tangential] | None = None
@@ -151,7 +151,7 @@ class Synthesis:
     rung: str = ""
     """Name of the rung that was chosen to keep a tolerance."""
     rung_error: float | None = None
-    """Its estimated error in the worst observed channel, in the channel's unit; None: nobody asked."""
+    """Its estimated error in the worst observed channel, in the channel's unit; None: not estimated."""
     drawn: dict[str, Scalar] = field(default_factory=dict)
     """What was drawn or achieved."""
     clock: Callable[[], float] = time.perf_counter

@@ -122,7 +122,7 @@ def _reader(
 
 
 def slide_of(run: Synthesis) -> tuple[tuple[float, float], float] | None:
-    """Return a slide's direction and static friction; None if nothing slides or nobody looks along the skin."""
+    """Return a slide's direction and static friction; None if nothing slides or no channel looks along the skin."""
     slide = run.scene.slide
     if slide is None or not run.tangential or not run.load.largest_n > 0:
         return None

@@ -267,7 +267,7 @@ def skin_vibration(scene: Scene, sensor: SensorSpec) -> Reason:
 
 
 def ac_pressure(scene: Scene, sensor: SensorSpec) -> Reason:
-    """Answer whether somebody looks at what a band lets through of a fluid's pressure."""
+    """Answer whether a channel of what a band lets through of a fluid's pressure is observed."""
     if "ac_pressure" not in scene.observe:
         return _no("no channel of dynamic pressure is observed")
     if not isinstance(sensor.skin, FluidBackedShell):
@@ -282,12 +282,12 @@ def ac_pressure(scene: Scene, sensor: SensorSpec) -> Reason:
 
 
 def dc_temperature(scene: Scene, sensor: SensorSpec) -> Reason:
-    """Answer whether somebody looks at a thermistor that the spec describes."""
+    """Answer whether a channel of a thermistor that the spec describes is observed."""
     return _thermistor(scene, sensor, "dc_temperature", THERMISTOR)
 
 
 def ac_temperature(scene: Scene, sensor: SensorSpec) -> Reason:
-    """Answer whether somebody looks at the rate of a thermistor that the spec describes."""
+    """Answer whether a channel of the rate of such a thermistor is observed."""
     return _thermistor(scene, sensor, "ac_temperature", (*THERMISTOR, "thermal_high_pass", "thermal_gain"))
 
 
