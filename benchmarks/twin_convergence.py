@@ -73,9 +73,7 @@ def rows(spec: SensorSpec) -> list[tuple[str, Fidelity]]:
     return [
         (
             f"skin x {factor:g}, conduction x {refinement}",
-            dataclasses.replace(
-                DEFAULT, cells_factor=factor, conduction_refinement=refinement, conduction_tolerance=3e-7
-            ),
+            dataclasses.replace(DEFAULT, cells_factor=factor, conduction_refinement=refinement),
         )
         for factor, refinement in points
     ]

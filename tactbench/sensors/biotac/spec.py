@@ -57,7 +57,7 @@ SKIN = FluidBackedShell(
     film=film_table(_OUTER_MM, _DOME_MM),
     residual_film=assumed(0.06, "mm", "asperities of the inner skin keep a film open at touch-down"),
     clamp_stiffness=assumed(
-        3.0,
+        3.3,
         "MPa/mm",
         "clamp instead of the real seal, seam and nail; the value at which the largest rise under a plate is 0.45 per "
         "count of pressure (200-350 counts), as measured. It stands for what holds and stretches the real skin, too",

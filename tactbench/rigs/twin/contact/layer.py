@@ -6,7 +6,7 @@ import numpy as np
 
 from tactbench.plugin import FloatArray
 from tactbench.plugin.simulation import BondedLayer, SkinGrid
-from tactbench.rigs.twin.contact.media import Medium, no_local_law, require_poisson, require_positive
+from tactbench.rigs.twin.contact.media import Medium, no_local_law
 from tactbench.rigs.twin.contact.spectrum import Spectrum
 
 _SERIES_BELOW = 0.35
@@ -66,9 +66,6 @@ def medium(skin: BondedLayer, grid: SkinGrid) -> Medium:
     An incompressible layer does not yield to a uniform pressure: its mean deflection is held at zero.
     """
     young, poisson, thickness = skin.young.to("MPa"), skin.poisson.to("1"), skin.thickness.to("mm")
-    contact_stiffness = skin.contact_stiffness.to("MPa/mm")
-    require_positive(young=young, thickness=thickness, contact_stiffness=contact_stiffness)
-    require_poisson(poisson)
     spectrum = Spectrum(grid)
     k = np.sqrt(spectrum.k2)
     k[0, 0] = 1.0
@@ -81,7 +78,7 @@ def medium(skin: BondedLayer, grid: SkinGrid) -> Medium:
         spectrum=spectrum,
         stiffness=stiffness,
         respond=no_local_law,
-        contact_stiffness=contact_stiffness,
+        contact_stiffness=skin.contact_stiffness.to("MPa/mm"),
         zero_mean=incompressible,
         rest_thickness_mm=np.full(spectrum.shape, thickness),
         least_thickness_mm=0.0,

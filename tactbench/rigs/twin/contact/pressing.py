@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import sys
 from collections.abc import Callable
 
 import numpy as np
@@ -33,6 +34,9 @@ from tactbench.rigs.twin.geometry import gap_mm, outer_radius_mm, skin_grid
 from tactbench.rigs.twin.synthesis import Synthesis
 
 Read = Callable[[SkinState], FloatArray]
+_MAY_BE_ZERO = frozenset({
+    "poisson", "shear", "tension", "cover_tension", "cover_bending", "clamp_stiffness", "residual_film",
+})  # fmt: skip
 
 
 def pressed(run: Synthesis, names: list[str], fidelity: Fidelity) -> tuple[AnyPress, Read]:
@@ -141,13 +145,15 @@ def medium_of(skin: FluidBackedShell | FoamPad | BondedLayer, grid: SkinGrid) ->
     Raises
     ------
     RigError
-        If the parameters are not physical, or the medium is none the twin can press.
+        If a parameter is not physical.
     """
     for name in type(skin).model_fields:
-        stated = getattr(skin, name)
-        if isinstance(stated, Quantity) and not 0 <= stated.value < math.inf:
+        stated, zero = getattr(skin, name), name in _MAY_BE_ZERO
+        most = 0.5 if name == "poisson" else sys.float_info.max
+        if isinstance(stated, Quantity) and not (0 < stated.value <= most or (zero and stated.value == 0)):
             raise RigError(
-                f"The skin's {name} is {stated}; it must be finite and not below zero.",
+                f"The skin's {name} is {stated}; it must be finite, {'at least' if zero else 'above'} 0"
+                f"{' and at most 0.5' if most < 1 else ''}.",
                 hint="Correct the skin in the sensor's spec.",
             )
     if isinstance(skin, FluidBackedShell):
@@ -158,11 +164,6 @@ def medium_of(skin: FluidBackedShell | FoamPad | BondedLayer, grid: SkinGrid) ->
         from tactbench.rigs.twin.contact import foam
 
         return foam.medium(skin, grid)
-    if isinstance(skin, BondedLayer):
-        from tactbench.rigs.twin.contact import layer
+    from tactbench.rigs.twin.contact import layer
 
-        return layer.medium(skin, grid)
-    raise RigError(
-        f"The twin cannot press a skin of type {type(skin).__name__}.",
-        hint="Declare one of FluidBackedShell, FoamPad and BondedLayer.",
-    )
+    return layer.medium(skin, grid)

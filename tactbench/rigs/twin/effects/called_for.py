@@ -262,8 +262,8 @@ def skin_vibration(scene: Scene, sensor: SensorSpec) -> Reason:
     if not found.called_for or scene.slide is None:
         return found
     surface = scene.slide.surface
-    per_s = scene.slide.speed.to("mm/s") / surface.wavelength.to("mm")
-    return found._replace(text=f"a profile of {surface.roughness} rms passes at {per_s:g} Hz")
+    per_s = scene.slide.speed.to("mm/s") / surface.roll_off.to("mm")
+    return found._replace(text=f"a profile of {surface.roughness} rms passes, its spectrum even up to {per_s:g} Hz")
 
 
 def ac_pressure(scene: Scene, sensor: SensorSpec) -> Reason:
