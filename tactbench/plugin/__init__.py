@@ -1,6 +1,6 @@
 """The door: what an author of a sensor, a task, an estimator or a rig imports.
 
-A plugin is a module, named by an entry point of group ``tactbench``, that states ``TACTBENCH_API = 1`` and implements
+A plugin is a module, named by an entry point of group ``tactbench``, that states ``TACTBENCH_API = 2`` and implements
 one or more of the hooks; ``docs/plugins.md`` shows how. What being simulated takes is in
 :mod:`tactbench.plugin.simulation`; drivers, emulators and links are in :mod:`tactbench.plugin.devices`.
 """

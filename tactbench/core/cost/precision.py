@@ -50,7 +50,7 @@ def measured(study: CostStudy, subject: str, progress: Progress) -> tuple[list[C
     """Carry out the jobs of a study, and say of those that its subject cannot have why not."""
     points: list[CostPoint] = []
     skipped: list[Skipped] = []
-    progress.begin(subject, study.total)
+    progress.begin(subject, len(study.jobs))
     for job in study.jobs:
         progress.working(job.label)
         try:

@@ -11,7 +11,7 @@ from pathlib import Path
 from tactbench.plugin import RigDescriptor, hookimpl
 from tactbench.plugin.devices import DeviceDescriptor
 
-TACTBENCH_API = 1
+TACTBENCH_API = 2
 
 
 @hookimpl

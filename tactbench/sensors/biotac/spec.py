@@ -18,7 +18,6 @@ from tactbench.plugin import (
 )
 from tactbench.plugin.simulation import Dome, FluidBackedShell, SkinSheet
 from tactbench.sensors.biotac.channels import MANUAL, STREAMS
-from tactbench.sensors.biotac.likeness import LIKENESS
 from tactbench.sensors.biotac.meshes import ELECTRODES_MM, MESHES, film_table, relief_table
 from tactbench.sensors.biotac.nuisances import HARD_HANDLED, NUISANCES
 from tactbench.sensors.biotac.thermal import THERMAL
@@ -139,7 +138,6 @@ SPEC = SensorSpec(
     parameters=PARAMETERS,
     nuisances=NUISANCES,
     scenarios={"hard-handled": HARD_HANDLED},
-    likeness=LIKENESS,
     data_sheet=DATA_SHEET,
     references=(
         "Karl et al. 2016, ML-based tactile sensor calibration: A universal approach",

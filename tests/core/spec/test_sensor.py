@@ -44,14 +44,6 @@ def test_a_site_in_two_places_is_refused(field):
         magnets(*axes("a"), elsewhere)
 
 
-def test_no_recording_carries_figures_of_real_units_and_no_key_depends_on_them():
-    spec = load_registry().sensors["icub"].spec
-    assert spec.likeness
-    without = spec.model_copy(update={"likeness": ()})
-    assert spec.model_dump_json() == without.model_dump_json()
-    assert SensorSpec.model_validate_json(spec.model_dump_json()).likeness == ()
-
-
 def test_every_fact_of_a_data_sheet_has_a_source_and_no_sample_depends_on_it():
     for descriptor in load_registry().sensors:
         spec = descriptor.spec

@@ -24,8 +24,8 @@ from tactbench.plugin import (
 )
 from tactbench.plugin.simulation import Environment, Slide, Surface
 from tactbench.rigs.twin import tactbench_effects
-from tactbench.rigs.twin.closed_forms.tangential import CattaneoMindlin
 from tactbench.rigs.twin.rig import build
+from tests.oracles.closed_forms import CattaneoMindlin
 
 TWIN = RigDescriptor(name="twin", title="Twin", where="tactbench.rigs.twin.rig:build", simulated=True)
 EDGES = (2, 10, 30, 100, 200, 500, 1000)

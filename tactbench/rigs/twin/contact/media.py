@@ -1,4 +1,4 @@
-"""What every skin medium offers the solver: a stiffness per Fourier mode and a local law."""
+"""What every skin medium offers the solver, a stiffness per Fourier mode and a local law."""
 
 from __future__ import annotations
 

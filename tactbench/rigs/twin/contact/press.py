@@ -35,20 +35,6 @@ class AnyPress(Protocol):
         """Return how far the film of `state` is past closing [mm]; minus infinity without a core."""
 
 
-class Coreless:
-    """What has no film that could close."""
-
-    touched_core = False
-
-    def closing_at(self, force_n: float) -> float:
-        """Return minus infinity: there is no core."""
-        return -np.inf
-
-    def closing_mm(self, state: SkinState) -> float:
-        """Return minus infinity: there is no core."""
-        return -np.inf
-
-
 def at_rest(medium: Medium) -> SkinState:
     """Return the skin with nothing touching."""
     zero = np.zeros(medium.spectrum.shape)

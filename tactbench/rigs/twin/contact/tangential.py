@@ -14,7 +14,7 @@ import numpy.typing as npt
 
 from tactbench.plugin import FloatArray
 from tactbench.plugin.simulation import BondedLayer, FluidBackedShell, Skin, SkinGrid, SkinState
-from tactbench.rigs.twin.layer_kernel import shear_shapes
+from tactbench.rigs.twin.contact.layer import shear_shapes
 from tactbench.rigs.twin.partial_slip import shear_modulus_mpa, sliding_stiffness
 
 Direction = tuple[float, float]
@@ -44,7 +44,7 @@ def tangential_of(skin: Skin, grid: SkinGrid) -> TangentialResponse:
 def pressed_state(state: SkinState, along: TangentialResponse | None) -> SkinState:
     """Return `state` with what a press without friction does along the surface, and no traction.
 
-    None: nobody looks, or the scene leaves it out; nothing moves.
+    None: no channel looks, or the scene leaves it out; nothing moves.
     """
     moved = np.zeros((2, *state.pressure_mpa.shape)) if along is None else along.pressed(state)
     return replace(state, tangential_displacement_mm=moved, shear_mpa=np.zeros_like(moved))

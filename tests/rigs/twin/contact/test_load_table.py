@@ -12,7 +12,7 @@ from tactbench.rigs.twin.contact.core import with_core
 from tactbench.rigs.twin.contact.interpolant import Interpolant, slopes
 from tactbench.rigs.twin.contact.load_table import build_table
 from tactbench.rigs.twin.contact.press import Press
-from tactbench.rigs.twin.contact.skins import medium_of
+from tactbench.rigs.twin.contact.pressing import medium_of
 from tactbench.rigs.twin.geometry import Contact, gap_mm, skin_grid
 
 FLAT = math.inf

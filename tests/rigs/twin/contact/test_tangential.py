@@ -10,28 +10,20 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tactbench.plugin import assumed
-from tactbench.plugin.simulation import BondedLayer, SkinSheet
+from tactbench.rigs.twin.contact.layer import shear_shapes
 from tactbench.rigs.twin.contact.press import Press, at_rest
-from tactbench.rigs.twin.contact.skins import medium_of
+from tactbench.rigs.twin.contact.pressing import medium_of
 from tactbench.rigs.twin.contact.slide_table import dragged_state, traction_shares
 from tactbench.rigs.twin.contact.tangential import pressed_state, tangential_of
 from tactbench.rigs.twin.geometry import Contact, gap_mm, outer_radius_mm, skin_grid
-from tactbench.rigs.twin.layer_kernel import shear_shapes
 from tactbench.rigs.twin.partial_slip import sliding_stiffness
+from tests.oracles.layers import bonded_layer
 
 YOUNG, SIDE_MM, FORCE_N, RADIUS_MM, MU = 1.0, 12.0, 0.3, 1.0, 0.6
 
 
-def _q(value, unit):
-    return assumed(value, unit, "test")
-
-
 def _layer(poisson, *, cells=64, thickness_mm=20.0):
-    sheet = SkinSheet(x_min=_q(-SIDE_MM / 2, "mm"), x_max=_q(SIDE_MM / 2, "mm"), arc=_q(SIDE_MM, "mm"),
-                      cells=(cells, cells))  # fmt: skip
-    return BondedLayer(sheet=sheet, young=_q(YOUNG, "MPa"), poisson=_q(poisson, "1"), thickness=_q(thickness_mm, "mm"),
-                       contact_stiffness=_q(1000, "MPa/mm"))  # fmt: skip
+    return bonded_layer(poisson, thickness_mm=thickness_mm, side_mm=SIDE_MM, cells=cells, penalty=1000.0)
 
 
 def _r(grid):

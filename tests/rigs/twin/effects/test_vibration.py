@@ -11,10 +11,9 @@ from hypothesis import strategies as st
 from tactbench.plugin import RigError, assumed
 from tactbench.plugin.simulation import Surface
 from tactbench.rigs.twin.effects.ac_pressure import within_band
-from tactbench.rigs.twin.effects.hum import band_noise
-from tactbench.rigs.twin.effects.skin_mode import shaken
+from tactbench.rigs.twin.effects.channels import band_noise
+from tactbench.rigs.twin.effects.skin_mode import Mode, shaken
 from tactbench.rigs.twin.effects.skin_vibration import Profile, patch_mean
-from tactbench.rigs.twin.effects.slip_event import Mode
 
 RATE_HZ = 2200.0
 
