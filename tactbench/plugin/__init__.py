@@ -14,7 +14,6 @@ from tactbench.core.errors import (
     PluginContractError,
     RigError,
     TactbenchError,
-    UnknownNameError,
     UsageError,
 )
 from tactbench.core.plugins.hookspecs import API_VERSION, hookimpl
@@ -103,7 +102,6 @@ __all__ = [
     "TactbenchError",
     "TaskDescriptor",
     "TaskSpec",
-    "UnknownNameError",
     "UsageError",
     "VectorTarget",
     "assumed",

@@ -10,7 +10,8 @@ from pathlib import Path
 
 import pytest
 
-from tactbench.plugin.devices import LinkClosed, LinkError, LinkTimeout, LinkUnplugged
+from tactbench.core.errors import LinkClosed
+from tactbench.plugin.devices import LinkError, LinkTimeout, LinkUnplugged
 from tests.links.ends import ENDS
 
 pytestmark = pytest.mark.skipif(os.name != "posix", reason="pseudo-terminals are POSIX")

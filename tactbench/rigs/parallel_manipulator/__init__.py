@@ -42,7 +42,7 @@ def tactbench_devices() -> list[DeviceDescriptor]:
             name="faulhaber",
             title="linear motor on a Faulhaber drive, ASCII by RS232",
             kind="motor",
-            driver=f"{here}.motor.driver:build",
+            driver=f"{here}.motor.driver:FaulhaberDriver",
             emulator=f"{here}.motor.emulator:build",
             emulated_link="bytes",
         ),

@@ -10,14 +10,8 @@ import pytest
 
 from tactbench.core.errors import LinkError, UnknownNameError, UsageError
 from tactbench.core.plugins.registry import load_registry
-from tactbench.plugin.devices import (
-    DeviceEntry,
-    EmulatedDevices,
-    RigFile,
-    drivers_of,
-    emulation_of,
-    emulators_of,
-)
+from tactbench.core.spec.rig_file import DeviceEntry
+from tactbench.plugin.devices import EmulatedDevices, RigFile, drivers_of, emulation_of, emulators_of
 from tests.core.plugins import talking
 
 REGISTRY = load_registry([EntryPoint("talking", talking.HERE, "tactbench")])

@@ -10,9 +10,9 @@ from tactbench.core.errors import RigError, UsageError
 from tactbench.core.recording.health import examine
 from tactbench.core.recording.reader import open_recording
 from tactbench.core.spec.quantity import assumed
-from tactbench.core.spec.rig_file import EmulationSettings
+from tactbench.core.spec.rig_file import DeviceEntry, EmulationSettings
 from tactbench.plugin import ForceRamp, Quality, RigContext, Scene, load_object, load_registry
-from tactbench.plugin.devices import DeviceEntry, ForceEntry, RigFile
+from tactbench.plugin.devices import ForceEntry, RigFile
 from tactbench.sensors.icub.emulator import Bus
 
 REGISTRY = load_registry()

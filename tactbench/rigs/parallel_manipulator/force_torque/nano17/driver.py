@@ -10,7 +10,17 @@ import numpy as np
 import numpy.typing as npt
 
 from tactbench.plugin import Block, Quality, RigError, StreamSpec
-from tactbench.plugin.devices import ByteLink, Driver, DriverSettings, LinkTimeout, LinkUnplugged, Unwrap
+from tactbench.plugin.devices import (
+    ByteLink,
+    Driver,
+    DriverSettings,
+    LinkTimeout,
+    LinkUnplugged,
+    Unwrap,
+    open_for,
+    read_file,
+    read_options,
+)
 from tactbench.rigs.parallel_manipulator.force_torque.nano17.codec import GAUGES, read_calibration
 from tactbench.rigs.parallel_manipulator.force_torque.nano17.gauges import (
     STEP_V,
@@ -19,7 +29,6 @@ from tactbench.rigs.parallel_manipulator.force_torque.nano17.gauges import (
     Nano17Options,
 )
 from tactbench.rigs.parallel_manipulator.force_torque.wrench import STREAM, SampleCounter, stream
-from tactbench.rigs.parallel_manipulator.options import open_for, read_file, read_options
 
 if TYPE_CHECKING:
     from tactbench.plugin import FloatArray

@@ -15,7 +15,16 @@ from typing import ClassVar
 import numpy as np
 
 from tactbench.plugin import UsageError
-from tactbench.plugin.devices import CanFrame, DeviceEmulator, EmulatorSettings, Fault, Sent, fault_concerns
+from tactbench.plugin.devices import (
+    CanFrame,
+    DeviceEmulator,
+    EmulatorSettings,
+    Fault,
+    Sent,
+    fault_concerns,
+    read_file,
+    read_options,
+)
 from tactbench.rigs.parallel_manipulator.force_torque.nano17.codec import GaugeCalibration, read_calibration
 from tactbench.rigs.parallel_manipulator.force_torque.nano17.gauges import (
     STEP_V,
@@ -25,7 +34,6 @@ from tactbench.rigs.parallel_manipulator.force_torque.nano17.gauges import (
     encode_sample,
 )
 from tactbench.rigs.parallel_manipulator.force_torque.wrench import wrench_of
-from tactbench.rigs.parallel_manipulator.options import read_file, read_options
 
 EMULATED_CALIBRATION = Path(__file__).with_name("FT8577.cal")
 """Of a Nano17 SI-25-0.25 (sourced: a public MATLAB script for ATI matrices quotes it)."""

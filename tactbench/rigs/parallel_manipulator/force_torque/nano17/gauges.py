@@ -14,8 +14,7 @@ import numpy.typing as npt
 from pydantic import Field
 
 from tactbench.plugin import RigError
-from tactbench.plugin.devices import Frame, FrameDecoder, Received, encode_frame
-from tactbench.rigs.parallel_manipulator.options import Options
+from tactbench.plugin.devices import Frame, FrameDecoder, Options, Received, encode_frame
 
 VERSION = 1
 RANGE_V = 10.0

@@ -16,6 +16,7 @@ import numpy.typing as npt
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from tactbench.plugin import Quality, RigError
+from tactbench.plugin.devices import Options
 from tactbench.rigs.parallel_manipulator.force_torque.ati_xml import (
     FORCE_UNITS,
     TORQUE_UNITS,
@@ -23,7 +24,6 @@ from tactbench.rigs.parallel_manipulator.force_torque.ati_xml import (
     elements,
     unit,
 )
-from tactbench.rigs.parallel_manipulator.options import Options
 
 if TYPE_CHECKING:
     from tactbench.plugin import FloatArray

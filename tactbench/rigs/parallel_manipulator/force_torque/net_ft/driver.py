@@ -21,6 +21,9 @@ from tactbench.plugin.devices import (
     LinkUnplugged,
     Received,
     Unwrap,
+    open_for,
+    read_file,
+    read_options,
 )
 from tactbench.rigs.parallel_manipulator.force_torque.ati_xml import LARGEST_BYTES
 from tactbench.rigs.parallel_manipulator.force_torque.net_ft.codec import (
@@ -39,7 +42,6 @@ from tactbench.rigs.parallel_manipulator.force_torque.net_ft.codec import (
     status_text,
 )
 from tactbench.rigs.parallel_manipulator.force_torque.wrench import AXES, STREAM, SampleCounter, stream
-from tactbench.rigs.parallel_manipulator.options import open_for, read_file, read_options
 
 ANSWER_S = 0.5
 """Within which a box answers, over the time its records take (assumed: a network of one cable)."""

@@ -13,7 +13,16 @@ from typing import ClassVar
 from xml.sax.saxutils import escape
 
 from tactbench.plugin import UsageError
-from tactbench.plugin.devices import CanFrame, DeviceEmulator, EmulatorSettings, Fault, Sent, fault_concerns
+from tactbench.plugin.devices import (
+    CanFrame,
+    DeviceEmulator,
+    EmulatorSettings,
+    Fault,
+    Sent,
+    fault_concerns,
+    read_file,
+    read_options,
+)
 from tactbench.rigs.parallel_manipulator.force_torque.net_ft.codec import (
     GREATEST_COUNT,
     LEAST_COUNT,
@@ -31,7 +40,6 @@ from tactbench.rigs.parallel_manipulator.force_torque.net_ft.codec import (
     encode_record,
 )
 from tactbench.rigs.parallel_manipulator.force_torque.wrench import AXES, wrench_of
-from tactbench.rigs.parallel_manipulator.options import read_file, read_options
 
 
 @dataclass(frozen=True)

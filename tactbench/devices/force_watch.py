@@ -13,8 +13,9 @@ from itertools import chain, pairwise
 
 import numpy as np
 
-from tactbench.plugin import Block, Quality, StreamSpec
-from tactbench.rigs.parallel_manipulator.guard_interface import Limits, Trigger
+from tactbench.core.samples import Block, Quality
+from tactbench.core.spec.sensor import StreamSpec
+from tactbench.devices.guard_messages import Limits, Trigger
 
 DELAY_WINDOW_NS = 1_000_000_000
 """The least delay of a device's samples is looked for in this one and the one before (assumed: clocks that differ by
@@ -79,7 +80,9 @@ class ForceWatch:
             return None
         return Trigger.FORCE_OLD, f"the newest force is {1e3 * age_s:.1f} ms old, {1e3 * limits.force_age_s:.1f} may be"
 
-    def take(self, block: Block, newer: Block | None, limits: Limits | None) -> Problem | None:
+    def take(
+        self, block: Block, newer: Block | None, limits: Limits | None, *, travelling: bool = False
+    ) -> Problem | None:
         """Take samples; return the first thing that is wrong with them.
 
         Parameters
@@ -90,6 +93,8 @@ class ForceWatch:
             Those of them that are newer than each one before, in order; None: there are none.
         limits
             None: only what needs none is kept up: numbers, times, equal samples.
+        travelling
+            Whether the ceiling of travel counts.
         """
         lost, same = (0, self._same) if newer is None else self._take_newer(newer)
         if limits is None or not len(block.data):
@@ -102,7 +107,7 @@ class ForceWatch:
             self.norm_n = _norm(own[-1], self._forces)
         return (
             self._unknown(wrenches, block.quality)
-            or self._too_large(wrenches, limits)
+            or self._too_large(wrenches, limits, travelling)
             or self._irregular(lost, same, limits)
         )
 
@@ -132,10 +137,12 @@ class ForceWatch:
             return Trigger.FORCE_FLAGGED, "a sample of the force sensor is flagged as missing or suspect"
         return None
 
-    def _too_large(self, wrenches: _Rows, limits: Limits) -> Problem | None:
+    def _too_large(self, wrenches: _Rows, limits: Limits, travelling: bool) -> Problem | None:
         largest = max([_norm(wrench, self._forces) for wrench in wrenches])
-        if largest >= limits.force_ceiling_n:
-            return Trigger.FORCE_CEILING, f"{largest:.3f} N, the ceiling is {limits.force_ceiling_n:g} N"
+        ceiling = limits.travel_ceiling_n if travelling else limits.force_ceiling_n
+        if largest >= ceiling:
+            trigger = Trigger.TRAVEL_CEILING if travelling else Trigger.FORCE_CEILING
+            return trigger, f"{largest:.3f} N, the ceiling is {ceiling:g} N"
         if limits.torque_ceiling_nm is not None and self._torques:
             torque = max([_norm(wrench, self._torques) for wrench in wrenches])
             if torque >= limits.torque_ceiling_nm:

@@ -1,4 +1,4 @@
-"""What a rig file says of a device, checked."""
+"""What a rig file says of a device, or of a rig, checked against a pydantic model."""
 
 from __future__ import annotations
 
@@ -8,8 +8,9 @@ from typing import Any, TypeVar
 
 from pydantic import BaseModel, ConfigDict, ValidationError
 
-from tactbench.plugin import UnknownNameError, UsageError
-from tactbench.plugin.devices import DriverSettings, Link
+from tactbench.core.errors import UnknownNameError, UsageError
+from tactbench.devices.driver import DriverSettings
+from tactbench.links.link import Link
 
 
 class Options(BaseModel):
@@ -18,30 +19,30 @@ class Options(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
 
-_Options = TypeVar("_Options", bound=Options)
+_Model = TypeVar("_Model", bound=BaseModel)
 _Link = TypeVar("_Link", bound=Link)
 
 
-def read_options(kind: type[_Options], given: Mapping[str, Any], device: str) -> _Options:
-    """Return the options of a device.
+def read_options(kind: type[_Model], given: Mapping[str, Any], device: str) -> _Model:
+    """Return what is given as a model.
 
     Raises
     ------
     UsageError
-        For one that is not known, is missing or has no such value.
+        For an option that is not known, is missing, has no such value, or contradicts another.
     """
     for name in given:
         if name not in kind.model_fields:
             raise UnknownNameError(f"option of {device}", name, kind.model_fields)
     try:
-        return kind(**given)
+        return kind.model_validate(dict(given))
     except ValidationError as error:
-        first = error.errors()[0]
+        first = error.errors(include_url=False)[0]
         name = ".".join(map(str, first["loc"]))
         what = f"The option {name!r} of {device}" if name else f"What is said of {device}"
+        problem = "is missing" if first["type"] == "missing" else f"is wrong: {first['msg']}"
         raise UsageError(
-            f"{what} is wrong: {first['msg'].removeprefix('Value error, ')}.",
-            hint="See docs/hardware.md for its options.",
+            f"{what} {problem.replace('Value error, ', '')}.", hint="docs/hardware.md lists the options."
         ) from error
 
 

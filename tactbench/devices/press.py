@@ -3,8 +3,6 @@
 ::
 
     standoff -> approach -> contact -> lift -> unloaded -> return -> ramp -> hold -> unload -> done
-                    ^                                                  |       |
-                    +------------- again, once: contact lost ----------+-------+
     any of them -> retreat -> failed
 
 The surface is found first: a quick way to where it cannot be yet, a slow one until the raw force says that it is
@@ -21,9 +19,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 
-from tactbench.rigs.parallel_manipulator.force_law import ForceController, ForceLaw
-from tactbench.rigs.parallel_manipulator.guard_interface import CommandKind, GuardState, Report
-from tactbench.rigs.parallel_manipulator.settings import RigSettings
+from tactbench.devices.force_loop import ForceController, ForceLaw
+from tactbench.devices.guard_messages import Beat, CommandKind, GuardState, Report
 
 SWINGS = 6
 """Half swings of the error in a row, each above the band of errors, after which the loop is said to swing (assumed:
@@ -58,14 +55,48 @@ class PressState(StrEnum):
 _REGULATED = (PressState.CONTACT, PressState.RAMP, PressState.HOLD)
 
 
-@dataclass(frozen=True)
-class Command:
-    """What the guard is asked for in the next beat."""
+def _command(kind: CommandKind = CommandKind.NONE, **more: float) -> Beat:
+    """Return a beat that lacks its number, time and state."""
+    return Beat(0, 0, command=kind, **more)  # type: ignore[arg-type]
 
-    kind: CommandKind = CommandKind.NONE
-    distance_m: float = 0.0
-    position_m: float = math.nan
-    speed_m_s: float = math.nan
+
+@dataclass(frozen=True)
+class PressPlan:
+    """The numbers of a press, in m, N and s."""
+
+    law: ForceLaw
+    """In m."""
+    resolution_m: float
+    """Of the axis: shorter steps are not sent, and kept for later ones."""
+    step_m: float
+    """Largest increment of a control period."""
+    near_m: float
+    """Where the axis goes over to the speed of touching: above where the surface can be."""
+    deepest_m: float
+    """The greatest position that is ever asked for."""
+    speed_m_s: float
+    """To `near_m`."""
+    touch_speed_m_s: float
+    """From there on."""
+    unload_speed_m_s: float
+    mean_n: float
+    """A touch: the mean of the raw forces of the last `mean_s` above it; the guard stops at single ones."""
+    mean_s: float
+    contact_n: float
+    """Force that is kept after the touch until the surface is known; and the least on the ramp."""
+    settle_s: float
+    """How long."""
+    lift_m: float
+    """How far the axis goes back from there for the unloaded hold."""
+    error_band_n: float
+    """Filtered force this far from the wanted one for a second: retreat. Also the least height of a growing swing."""
+    band_n: float
+    """Filtered forces below it count as no force."""
+    lost_s: float
+    """Contact is lost, which ends the press, if the force is in the band for so long while more than twice the band is
+    wanted."""
+    hold_s: float = 0.0
+    """How long the largest force is held after the course."""
 
 
 @dataclass(frozen=True)
@@ -87,12 +118,10 @@ class Press:
 
     Parameters
     ----------
-    settings
+    plan
         Of the rig.
     course
         Of the scene.
-    increment_m
-        The motor's: shorter steps are not sent, and kept for later ones.
 
     Attributes
     ----------
@@ -102,8 +131,6 @@ class Press:
         Why it failed; empty: it has not.
     not_out
         What is to be done where the motor did not come out; empty: it did.
-    remarks
-        What happened on the way that did not end it.
     contact_m
         Position of the motor at which the small force was kept; NaN: not yet.
     touch_n
@@ -112,32 +139,26 @@ class Press:
         Filtered minus wanted force of the last regulated step.
     """
 
-    def __init__(self, settings: RigSettings, course: Course, increment_m: float) -> None:
+    def __init__(self, plan: PressPlan, course: Course) -> None:
         self.state = PressState.STANDOFF
         self.ended = ""
         self.not_out = ""
-        self.remarks: list[str] = []
         self.contact_m = math.nan
         self.touch_n = 0.0
         self.error_n = math.nan
         self.setpoint_n = 0.0
-        self._settings, self._course, self._increment_m = settings, course, increment_m
-        limits, loop = settings.limits, settings.force_loop
-        self._law: ForceLaw = loop.law(limits.travel_mm)
-        self._step_m = loop.step_m
+        self._plan, self._course = plan, course
         self._raw: deque[tuple[float, float]] = deque()
         self._sum_n = 0.0
         self._force_n = math.nan
         self._controller: ForceController | None = None
-        self._goal: Command | None = None
+        self._stepped_s = 0.0
+        self._goal: Beat | None = None
         self._requested_s: float | None = None
         self._since_s = self._due_s = 0.0
         self._began_s: float | None = None
-        self._paused_s = 0.0
-        self._waiting_s = math.nan
         self._band_since_s = self._error_since_s = math.nan
         self._swings, self._peak_n = 0, 0.0
-        self._lost = False
         self._go = False
 
     # What a rig says --------------------------------------------------------------------------------------------------
@@ -173,7 +194,7 @@ class Press:
 
     # Stepping ---------------------------------------------------------------------------------------------------------
 
-    def step(self, report: Report, raw: Sequence[tuple[float, float]], now_s: float) -> Command:
+    def step(self, report: Report, raw: Sequence[tuple[float, float]], now_s: float) -> Beat:
         """Go on by one control period.
 
         Parameters
@@ -192,7 +213,7 @@ class Press:
             case PressState.STANDOFF:
                 if self._go:
                     self._enter(PressState.APPROACH, now_s)
-                    self._move(self._settings.near_m, self._settings.touch.speed_mm_s)
+                    self._move(self._plan.near_m, self._plan.speed_m_s)
             case PressState.APPROACH:
                 self._approach(report, now_s)
             case PressState.LIFT | PressState.RETURN | PressState.UNLOAD:
@@ -200,11 +221,11 @@ class Press:
             case PressState.UNLOADED:
                 if self._began_s is not None and now_s - self._began_s >= self._course.ramp_s:
                     self._enter(PressState.RETURN, now_s)
-                    self._move(self.contact_m, self._settings.touch.touch_speed_mm_s)
+                    self._move(self.contact_m, self._plan.touch_speed_m_s)
             case PressState.CONTACT | PressState.RAMP | PressState.HOLD:
                 return self._regulated(report, now_s)
             case PressState.RETREAT:
-                return Command(CommandKind.RETREAT)
+                return _command(CommandKind.RETREAT)
         return self._asking(report, now_s)
 
     def _take(self, raw: Sequence[tuple[float, float]], now_s: float) -> None:
@@ -215,7 +236,7 @@ class Press:
             self._force_n = sample[1]
             if self.state in (PressState.APPROACH, PressState.CONTACT):
                 self.touch_n = max(self.touch_n, sample[1])
-        oldest = now_s - 1e-3 * self._settings.touch.mean_ms
+        oldest = now_s - self._plan.mean_s
         while self._raw and self._raw[0][0] < oldest:
             self._sum_n -= self._raw.popleft()[1]
 
@@ -224,7 +245,7 @@ class Press:
         """Mean of the raw forces of the last `mean_ms` [N]; NaN: there are none."""
         return self._sum_n / len(self._raw) if self._raw else math.nan
 
-    def _guarded(self, report: Report, now_s: float) -> Command:
+    def _guarded(self, report: Report, now_s: float) -> Beat:
         """Note that the guard retreats, or has retreated."""
         if self.state is not PressState.RETREAT and not self.over:
             self.ended = f"in {self.state}: {report.trigger or report.state}"
@@ -232,7 +253,7 @@ class Press:
         if report.state is not GuardState.RETREATING and not self.over:
             self.not_out = report.not_out
             self._enter(PressState.FAILED, now_s)
-        return Command()
+        return _command()
 
     def _enter(self, state: PressState, now_s: float) -> None:
         self.state, self._since_s = state, now_s
@@ -242,18 +263,18 @@ class Press:
 
     # Moves ------------------------------------------------------------------------------------------------------------
 
-    def _move(self, position_m: float, speed_mm_s: float) -> None:
-        self._goal = Command(CommandKind.MOVE_TO, position_m=position_m, speed_m_s=1e-3 * speed_mm_s)
+    def _move(self, position_m: float, speed_m_s: float) -> None:
+        self._goal = _command(CommandKind.MOVE_TO, position_m=position_m, speed_m_s=speed_m_s)
         self._requested_s = None
 
-    def _asking(self, report: Report, now_s: float) -> Command:
+    def _asking(self, report: Report, now_s: float) -> Beat:
         """Return the move that is to be begun, until the guard has accepted it; a stop at once."""
         if self._goal is None or self._requested_s is not None:
-            return Command()
-        if report.moving and self._goal.kind is not CommandKind.STOP:
-            return Command()
+            return _command()
+        if report.moving and self._goal.command is not CommandKind.STOP:
+            return _command()
         self._requested_s = now_s
-        if self._goal.kind is CommandKind.MOVE_TO:
+        if self._goal.command is CommandKind.MOVE_TO:
             way_m = abs(self._goal.position_m - report.position_m)
             self._due_s = now_s + SLOW * way_m / self._goal.speed_m_s + SLACK_S
         return self._goal
@@ -272,24 +293,24 @@ class Press:
         return True
 
     def _approach(self, report: Report, now_s: float) -> None:
-        touch, settings = self._settings.touch, self._settings
+        plan = self._plan
         if self._goal is None:  # standing after a touch
             if not report.moving:
                 self._close_loop(report, now_s)
             return
-        slowly = self._goal.position_m == settings.deepest_m
-        if slowly and self._requested_s is not None and (report.touched or self.mean_n > touch.mean_n):
+        slowly = self._goal.position_m == plan.deepest_m
+        if slowly and self._requested_s is not None and (report.touched or self.mean_n > plan.mean_n):
             # The guard has stopped it at a single touch; a mean that is reached is stopped here.
-            self._goal = None if report.touched else Command(CommandKind.STOP)
+            self._goal = None if report.touched else _command(CommandKind.STOP)
             self._requested_s = None
             return
-        if self._goal.kind is CommandKind.STOP:
+        if self._goal.command is CommandKind.STOP:
             if self._requested_s is not None and not report.moving:
                 self._goal = None
             return
         if self._arrived(report, now_s):
             if not slowly:
-                self._move(settings.deepest_m, touch.touch_speed_mm_s)
+                self._move(plan.deepest_m, plan.touch_speed_m_s)
             elif not report.touched:
                 self.fail(f"no contact down to {1e3 * report.position_m:.3f} mm")
 
@@ -303,85 +324,77 @@ class Press:
             case PressState.LIFT:
                 self._enter(PressState.UNLOADED, now_s)
             case PressState.UNLOAD:
-                if self.mean_n < self._settings.press.band_n:
+                if self.mean_n < self._plan.band_n:
                     self._enter(PressState.DONE, now_s)
-                elif now_s - self._since_s > SLACK_S + self._duration_of_unloading():
+                elif now_s > self._due_s + SLACK_S:
                     self.fail(f"{self.mean_n:.2f} N are left after unloading")
             case _:
                 self._enter(PressState.RAMP, now_s)
-                self._controller = ForceController(self._law, self._force_n, report.position_m, now_s)
-
-    def _duration_of_unloading(self) -> float:
-        heights = self._settings.heights
-        return (heights.depth_mm + heights.stand_off_mm) / self._settings.press.unload_speed_mm_s
+                self._begin_loop(report, now_s)
 
     # Under force ------------------------------------------------------------------------------------------------------
 
     def _close_loop(self, report: Report, now_s: float) -> None:
-        """Begin to regulate after a touch: the small force, or where the ramp was when contact was lost."""
-        self._enter(PressState.RAMP if self._lost else PressState.CONTACT, now_s)
-        self._controller = ForceController(self._law, self._force_n, report.position_m, now_s)
-        if self._lost:
-            self._paused_s += now_s - self._waiting_s
+        """Begin to regulate the small force after a touch."""
+        self._enter(PressState.CONTACT, now_s)
+        self._begin_loop(report, now_s)
+
+    def _begin_loop(self, report: Report, now_s: float) -> None:
+        self._controller, self._stepped_s = ForceController(self._plan.law, self._force_n, report.position_m), now_s
 
     def _setpoint(self, now_s: float) -> tuple[float, float]:
         """Return the wanted force and its slope."""
-        least = self._settings.touch.contact_n
+        least = self._plan.contact_n
         if self.state is PressState.CONTACT or self._began_s is None:
             return least, 0.0
-        scene_s = now_s - self._began_s - self._paused_s
+        scene_s = now_s - self._began_s
         setpoint = self._course.setpoint_n(scene_s)
         rising = self.state is PressState.RAMP and setpoint > least and scene_s < self._course.end_s
         return max(least, setpoint), self._course.slope_n_s if rising else 0.0
 
-    def _regulated(self, report: Report, now_s: float) -> Command:
+    def _regulated(self, report: Report, now_s: float) -> Beat:
         controller = self._controller
         assert controller is not None
         self.setpoint_n, slope = self._setpoint(now_s)
-        controller.step(self._force_n, report.position_m, now_s, self.setpoint_n, slope)
+        controller.step(self._force_n, report.position_m, now_s - self._stepped_s, self.setpoint_n, slope)
+        self._stepped_s = now_s
         self.error_n = controller.filtered_n - self.setpoint_n
         if self.state is PressState.CONTACT:
-            if now_s - self._since_s >= self._settings.touch.settle_s:
-                self.contact_m = controller.target_m
+            if now_s - self._since_s >= self._plan.settle_s:
+                self.contact_m = controller.target
                 self._enter(PressState.LIFT, now_s)
-                lift = 1e-3 * self._settings.touch.lift_mm
-                self._move(self.contact_m - lift, self._settings.touch.touch_speed_mm_s)
+                self._move(self.contact_m - self._plan.lift_m, self._plan.touch_speed_m_s)
                 return self._asking(report, now_s)
         elif self._kept(controller, now_s):
             self._end_of(now_s)
         if self.state not in _REGULATED:
-            return self._asking(report, now_s) if self.state is not PressState.RETREAT else Command(CommandKind.RETREAT)
+            return (
+                self._asking(report, now_s) if self.state is not PressState.RETREAT else _command(CommandKind.RETREAT)
+            )
         if report.moving:
-            return Command()
-        way = controller.target_m - report.target_m
-        if abs(way) < 0.5 * self._increment_m:
-            return Command()
-        return Command(CommandKind.STEP, distance_m=min(max(way, -self._step_m), self._step_m))
+            return _command()
+        way = controller.target - report.target_m
+        if abs(way) < 0.5 * self._plan.resolution_m:
+            return _command()
+        return _command(CommandKind.STEP, distance_m=min(max(way, -self._plan.step_m), self._plan.step_m))
 
     def _end_of(self, now_s: float) -> None:
         """Go over from ramp to hold, and from hold to unloading."""
         assert self._began_s is not None
-        scene_s = now_s - self._began_s - self._paused_s
+        scene_s = now_s - self._began_s
         if self.state is PressState.RAMP and scene_s >= self._course.end_s:
             self._enter(PressState.HOLD, now_s)
-        if self.state is PressState.HOLD and scene_s >= self._course.end_s + self._settings.press.hold_s:
+        if self.state is PressState.HOLD and scene_s >= self._course.end_s + self._plan.hold_s:
             self._enter(PressState.UNLOAD, now_s)
-            lift = 1e-3 * self._settings.touch.lift_mm
-            self._move(self.contact_m - lift, self._settings.press.unload_speed_mm_s)
+            self._move(self.contact_m - self._plan.lift_m, self._plan.unload_speed_m_s)
 
     def _kept(self, controller: ForceController, now_s: float) -> bool:
         """Return whether force and contact are as they should be; else see to what follows."""
-        rules = self._settings.press
+        rules = self._plan
         in_band = controller.filtered_n < rules.band_n and self.setpoint_n > 2 * rules.band_n
         self._band_since_s = _since(self._band_since_s, in_band, now_s)
         if now_s - self._band_since_s >= rules.lost_s:
-            if self._lost:
-                self.fail(f"contact lost a second time, at {self.setpoint_n:.2f} N")
-                return False
-            self._lost, self._waiting_s = True, self._band_since_s
-            self.remarks.append(f"contact lost at {self.setpoint_n:.2f} N, and approached again")
-            self._enter(PressState.APPROACH, now_s)
-            self._move(self._settings.deepest_m, self._settings.touch.touch_speed_mm_s)
+            self.fail(f"contact was lost, at {self.setpoint_n:.2f} N")
             return False
         self._error_since_s = _since(self._error_since_s, abs(self.error_n) > rules.error_band_n, now_s)
         if now_s - self._error_since_s >= 1.0:

@@ -8,58 +8,22 @@ from __future__ import annotations
 import signal
 import threading
 from collections import deque
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
+from dataclasses import replace
 from types import FrameType
-from typing import TYPE_CHECKING, Any
 
-from tactbench.plugin import Block, StreamSpec, TactbenchError
-from tactbench.plugin.devices import Driver
-from tactbench.rigs.parallel_manipulator.guard_interface import Beat, Event, Guard, Limits, Report
-from tactbench.rigs.parallel_manipulator.press import Press
-
-if TYPE_CHECKING:
-    from tactbench.plugin.devices import Clock
+from tactbench.core.errors import TactbenchError
+from tactbench.core.samples import Block
+from tactbench.devices.guard_messages import Event, Limits, Report
+from tactbench.devices.guard_process import Guard
+from tactbench.devices.press import Press
+from tactbench.links.link import Clock
 
 STOP_S = 10.0
 """The thread is waited for so long (assumed: a control period, and what a guard in another process takes to answer)."""
 COUNTED_NS = 250_000_000
 """After which the guard's counts are asked for again."""
-
-
-class WatchedDriver(Driver):
-    """The sensor's driver, and when its last rows came."""
-
-    def __init__(self, driver: Driver, clock: Clock) -> None:
-        self._driver, self._clock = driver, clock
-        self.last_ns = 0
-        """On the rig's clock; 0: none came yet."""
-
-    @property
-    def streams(self) -> tuple[StreamSpec, ...]:  # noqa: D102  (inherited)
-        return self._driver.streams
-
-    @property
-    def counts(self) -> Mapping[str, int]:  # noqa: D102  (inherited)
-        return self._driver.counts
-
-    def identify(self) -> Mapping[str, str]:  # noqa: D102  (inherited)
-        return self._driver.identify()
-
-    def start(self) -> None:  # noqa: D102  (inherited)
-        self._driver.start()
-
-    def read(self, timeout_s: float) -> list[Block]:  # noqa: D102  (inherited)
-        blocks = self._driver.read(timeout_s)
-        if blocks:
-            self.last_ns = self._clock()
-        return blocks
-
-    def stop(self) -> None:  # noqa: D102  (inherited)
-        self._driver.stop()
-
-    def close(self) -> None:  # noqa: D102  (inherited)
-        self._driver.close()
 
 
 class Control:
@@ -75,14 +39,14 @@ class Control:
         What it answered.
     press
         What is done.
-    sensor
-        Whose rows may not become old.
+    received
+        Returns how many rows of the sensor have come; while it stays the same they become old.
     clock
         The rig's.
     period_s
         Control period.
     stale_s
-        How old the sensor's rows may be.
+        How old they may be.
     """
 
     def __init__(
@@ -91,7 +55,7 @@ class Control:
         limits: Limits,
         armed: Report,
         press: Press,
-        sensor: WatchedDriver,
+        received: Callable[[], int],
         clock: Clock,
         *,
         period_s: float,
@@ -100,12 +64,12 @@ class Control:
         self.press = press
         self.late = 0
         """Control periods that began more than one period late."""
-        self._guard, self._limits, self._sensor, self._clock = guard, limits, sensor, clock
+        self._guard, self._limits, self._received, self._clock = guard, limits, received, clock
         self._period_ns, self._stale_ns = round(1e9 * period_s), round(1e9 * stale_s)
         self._report = armed
         self._beats = 0
-        self._began_ns = clock()
-        self._next_ns = self._began_ns + self._period_ns
+        self._rows, self._rows_ns = -1, clock()
+        self._next_ns = self._rows_ns + self._period_ns
         self._raw: list[tuple[float, float]] = []
         self._blocks: deque[Block] = deque()
         self._events: deque[Event] = deque()
@@ -200,31 +164,27 @@ class Control:
     def _period(self) -> None:
         now_ns = self._clock()
         self.late += now_ns - self._next_ns > self._period_ns
-        if now_ns - self._next_ns > self._stale_ns:
-            self._began_ns = now_ns  # it was this process that hung, and the sensor's reading with it
+        rows = self._received()
+        # Where it was this process that hung, the sensor's reading hung with it.
+        if rows != self._rows or now_ns - self._next_ns > self._stale_ns:
+            self._rows, self._rows_ns = rows, now_ns
         self._next_ns = max(self._next_ns + self._period_ns, now_ns + self._period_ns // 2)
         self._gather()
         raw, self._raw = self._raw, []
-        press, last_ns = self.press, max(self._sensor.last_ns, self._began_ns)
+        press = self.press
         if self._stop:
             press.fail(self._stop)
-        if now_ns - last_ns > self._stale_ns:
-            press.fail(f"the sensor has sent nothing for {1e-6 * (now_ns - last_ns):.0f} ms")
+        if now_ns - self._rows_ns > self._stale_ns:
+            press.fail(f"the sensor has sent nothing for {1e-6 * (now_ns - self._rows_ns):.0f} ms")
         try:
-            command = press.step(self._report, raw, 1e-9 * now_ns)
+            beat = press.step(self._report, raw, 1e-9 * now_ns)
         except TactbenchError as error:
             press.fail(_error_text(error))
-            command = press.step(self._report, (), 1e-9 * now_ns)
+            beat = press.step(self._report, (), 1e-9 * now_ns)
         self._beats += 1
-        request: dict[str, Any] = {
-            "command": command.kind,
-            "distance_m": command.distance_m,
-            "position_m": command.position_m,
-            "speed_m_s": command.speed_m_s,
-        }
-        self._report = self._guard.beat(
-            Beat(self._beats, now_ns, str(press.state), force_sequence=self._report.force_sequence, **request)
-        )
+        number = self._report.force_sequence
+        beat = replace(beat, sequence=self._beats, t_ns=now_ns, state=str(press.state), force_sequence=number)
+        self._report = self._guard.beat(beat)
 
 
 @contextmanager
