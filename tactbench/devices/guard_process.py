@@ -349,6 +349,7 @@ class GuardProcess:
 
 
 Guard: TypeAlias = LocalGuard | GuardProcess
+"""What a rig drives its axes through: in its own process, or in one of its own."""
 
 
 class _Server:

@@ -20,7 +20,6 @@ from tactbench.core.plugins.hookspecs import API_VERSION, hookimpl
 from tactbench.core.plugins.interfaces import Acquisition, Estimator, ReplayRig, Rig, RigContext
 from tactbench.core.plugins.registry import load_object, load_registry
 from tactbench.core.samples import Block, Quality, StreamReadings
-from tactbench.core.spec.drive import ForceLoop
 from tactbench.core.spec.events import AlarmPolicy, SlipTarget
 from tactbench.core.spec.force_profiles import press_hold_release, sine, staircase
 from tactbench.core.spec.parameter import Parameter
@@ -65,7 +64,6 @@ __all__ = [
     "Estimator",
     "EstimatorDescriptor",
     "FloatArray",
-    "ForceLoop",
     "ForcePath",
     "ForceRamp",
     "Indenter",
