@@ -71,7 +71,7 @@ def _row(
         "remarks": [], "assumptions": assumptions, "plan": PLAN, "chosen": {}, "search": [],
         "recordings": [f"sensor-{sensor:03d}/scene-{task:02d}.h5"],
         "scores": {f"fold {fold}": float(draw.normal(score, 0.02)) for fold in range(1, FOLDS + 1)},
-        "confusion": None, "classes": [], "equivalence": 0.05, "reference_score": None,
+        "confusion": None, "classes": [], "equivalence": 0.05,
         "fold_sizes": {f"fold {fold}": [32_000, 8_000] for fold in range(1, FOLDS + 1)},
         "replicates": {"unit": "session", "names": [f"s{n}" for n in range(6)], "strata": None,
                        "sums": draw.uniform(0, 10, (6, 2)).tolist()},

@@ -20,8 +20,7 @@ from pathlib import Path
 
 from sklearn.ensemble import RandomForestClassifier
 
-from tactbench.core.cost.rounds import measure
-from tactbench.core.cost.timed_estimators import TimedEstimator, timed_estimator
+from tactbench.core.cost.rounds import TimedEstimator, measure, timed_estimator
 from tactbench.core.evaluation.dataset import load_dataset
 from tactbench.core.matrix.progress import Progress
 from tactbench.core.matrix.run import run_matrix
@@ -41,7 +40,7 @@ def arrays(sensor: str, folder: Path) -> TimedEstimator:
     (row,) = run_matrix(MatrixSpec(repeats=1, sensors=(sensor,), tasks=(choice,)), Store(folder)).rows
     spec = registry.tasks[TASK].spec
     data = load_dataset(spec, [folder / path for path in row["recordings"]])
-    return timed_estimator(spec, registry.estimators["forest"], {}, PROTOCOL, "roles", data, seed=1, threads=1)
+    return timed_estimator(spec, registry.estimators["forest"], {}, PROTOCOL, "roles", data, seed=1)
 
 
 def of_seed(one: TimedEstimator, name: str, seed: int) -> TimedEstimator:

@@ -42,7 +42,7 @@ COLD_S, CACHED_S = 0.3, 0.35
 TASK = """
 from tactbench.plugin import LabelTarget, TaskDescriptor, TaskSpec, hookimpl
 
-TACTBENCH_API = 1
+TACTBENCH_API = 2
 
 
 @hookimpl

@@ -44,7 +44,6 @@ from tactbench.plugin import (
     load_registry,
 )
 from tactbench.plugin.simulation import Nuisances
-from tactbench.rigs.twin.likeness.statistics import warming
 
 REGISTRY = load_registry()
 RIG = REGISTRY.rigs["twin"]
@@ -160,10 +159,35 @@ def score(sensor: str, task: str, undone: frozenset[str], seed: int, *, full: bo
         ).score
 
 
+def warming(t_s: np.ndarray, level: np.ndarray) -> tuple[float, float]:
+    """Return (rise still to come at the first sample, time constant [s]) of ``level = a - w exp(-t / tau)``.
+
+    Least squares: for each time constant the other two are linear; the best one by golden section between a twentieth
+    and five times the length of the record, beyond which a record cannot tell.
+    """
+    t = t_s - t_s[0]
+
+    def fit(tau: float) -> tuple[float, float]:
+        basis = np.stack([np.ones_like(t), -np.exp(-t / tau)], axis=1)
+        found, *_ = np.linalg.lstsq(basis, level, rcond=None)
+        return float(np.sum((basis @ found - level) ** 2)), float(found[1])
+
+    low, high = np.log(t[-1] / 20.0), np.log(5.0 * t[-1])
+    ratio = (np.sqrt(5.0) - 1.0) / 2.0
+    for _ in range(60):
+        left, right = high - ratio * (high - low), low + ratio * (high - low)
+        if fit(float(np.exp(left)))[0] < fit(float(np.exp(right)))[0]:
+            high = right
+        else:
+            low = left
+    tau = float(np.exp((low + high) / 2.0))
+    return fit(tau)[1], tau
+
+
 def time_constants(seeds: Sequence[int], scenario: str | None = None) -> list[float]:
     """Return the time constant [s] fitted to the mean rest levels of the BioTac's logs, by seed.
 
-    Each log is a recording of its own, with its own offsets, from power-on; the fit is that of the likeness report.
+    Each log is a recording of its own, with its own offsets, from power-on; the fit is :func:`warming`.
     """
     rig, sensor = load_object(RIG.where)(RigContext(effects=tuple(REGISTRY.effects))), REGISTRY.sensors["biotac"]
     starts_s = np.linspace(0.0, LOGGED_S, LOGS)

@@ -22,7 +22,7 @@ PLUGIN = '''
 import numpy as np
 from tactbench.plugin import ChannelTarget, EstimatorDescriptor, TaskDescriptor, TaskSpec, hookimpl
 
-TACTBENCH_API = 1
+TACTBENCH_API = 2
 
 
 class Nothing:

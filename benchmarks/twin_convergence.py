@@ -20,7 +20,7 @@ from tactbench.plugin import FloatArray, SensorSpec, load_object
 from tactbench.rigs.twin.contact.core import with_core
 from tactbench.rigs.twin.contact.load_table import build_table
 from tactbench.rigs.twin.contact.press import Press
-from tactbench.rigs.twin.contact.skins import medium_of
+from tactbench.rigs.twin.contact.pressing import medium_of
 from tactbench.rigs.twin.fidelity import DEFAULT, Fidelity
 from tactbench.rigs.twin.geometry import Contact, gap_mm, skin_grid
 from tactbench.sensors.biotac.spec import SPEC as BIOTAC
@@ -73,9 +73,7 @@ def rows(spec: SensorSpec) -> list[tuple[str, Fidelity]]:
     return [
         (
             f"skin x {factor:g}, conduction x {refinement}",
-            dataclasses.replace(
-                DEFAULT, cells_factor=factor, conduction_refinement=refinement, conduction_tolerance=3e-7
-            ),
+            dataclasses.replace(DEFAULT, cells_factor=factor, conduction_refinement=refinement),
         )
         for factor, refinement in points
     ]

@@ -349,7 +349,7 @@ class GuardProcess:
 
 
 Guard: TypeAlias = LocalGuard | GuardProcess
-"""A guard in this process or in one of its own; one thread uses it."""
+"""What a rig drives its axes through: in its own process, or in one of its own."""
 
 
 class _Server:

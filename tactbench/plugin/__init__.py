@@ -1,6 +1,6 @@
 """The door: what an author of a sensor, a task, an estimator or a rig imports.
 
-A plugin is a module, named by an entry point of group ``tactbench``, that states ``TACTBENCH_API = 1`` and implements
+A plugin is a module, named by an entry point of group ``tactbench``, that states ``TACTBENCH_API = 2`` and implements
 one or more of the hooks; ``docs/plugins.md`` shows how. What being simulated takes is in
 :mod:`tactbench.plugin.simulation`; drivers, emulators and links are in :mod:`tactbench.plugin.devices`.
 """
@@ -20,7 +20,6 @@ from tactbench.core.plugins.hookspecs import API_VERSION, hookimpl
 from tactbench.core.plugins.interfaces import Acquisition, Estimator, ReplayRig, Rig, RigContext
 from tactbench.core.plugins.registry import load_object, load_registry
 from tactbench.core.samples import Block, Quality, StreamReadings
-from tactbench.core.spec.drive import ForceLoop
 from tactbench.core.spec.events import AlarmPolicy, SlipTarget
 from tactbench.core.spec.force_profiles import press_hold_release, sine, staircase
 from tactbench.core.spec.parameter import Parameter
@@ -65,7 +64,6 @@ __all__ = [
     "Estimator",
     "EstimatorDescriptor",
     "FloatArray",
-    "ForceLoop",
     "ForcePath",
     "ForceRamp",
     "Indenter",

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from tactbench.plugin import MissingRecordingError, ReplayRig, RigContext, RigDescriptor, UsageError, hookimpl
 
-TACTBENCH_API = 1
+TACTBENCH_API = 2
 
 ENDING = ".h5"
 _HINT = "Make some with `tactbench import MAPPING.yaml --out DIR` or `tactbench record --out FILE`."

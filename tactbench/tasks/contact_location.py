@@ -23,7 +23,7 @@ from tactbench.plugin import (
     sourced,
 )
 
-TACTBENCH_API = 1
+TACTBENCH_API = 2
 
 REACH_MM = 5.0
 """Furthest commanded offset from the nominal contact point, along the finger and along its arc (assumed): a square of

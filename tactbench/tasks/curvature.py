@@ -5,7 +5,7 @@ from __future__ import annotations
 from tactbench.plugin import LabelTarget, Published, TaskDescriptor, TaskSpec, hookimpl
 from tactbench.tasks.surfaces import RADII_MM, at_places, few_shots, on_units, papers_caps
 
-TACTBENCH_API = 1
+TACTBENCH_API = 2
 
 _PAPER = "Karl et al. 2016"
 # Assumed: two answers in a hundred. The paper's own difference of the two sensors is 0.19.

@@ -25,7 +25,7 @@ from tactbench.plugin import (
 from tactbench.tasks import eflesh
 from tactbench.tasks.surfaces import at_places, few_shots, on_units
 
-TACTBENCH_API = 1
+TACTBENCH_API = 2
 
 _PAPER = "Karl et al. 2016, section III-A"
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from tactbench.plugin import LabelTarget, TaskDescriptor, TaskSpec, hookimpl
 
-TACTBENCH_API = 1
+TACTBENCH_API = 2
 
 SPEC = TaskSpec(
     name="grasp-stability",

@@ -10,7 +10,7 @@ from __future__ import annotations
 from tactbench.plugin import Indenter, LabelTarget, PlannedScene, Scene, TaskDescriptor, TaskSpec, hookimpl
 from tactbench.tasks.surfaces import RADII_MM, SLOT_S, at_places, few_shots, in_sessions, labels, on_units, papers_caps
 
-TACTBENCH_API = 1
+TACTBENCH_API = 2
 
 # Assumed: a tenth of the least step between two of the surfaces, from flat to a radius of 40 mm.
 SAME_PER_M = 2.5

@@ -5,7 +5,7 @@ from __future__ import annotations
 from tactbench.plugin import ChannelTarget, TaskDescriptor, TaskSpec, hookimpl
 from tactbench.tasks import eflesh
 
-TACTBENCH_API = 1
+TACTBENCH_API = 2
 
 SPEC = TaskSpec(
     name="shear-force",

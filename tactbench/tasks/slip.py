@@ -5,7 +5,7 @@ from __future__ import annotations
 from tactbench.plugin import AlarmPolicy, SlipTarget, Summary, TaskDescriptor, TaskSpec, hookimpl
 from tactbench.tasks.slip_scenes import SLIP_SCENES
 
-TACTBENCH_API = 1
+TACTBENCH_API = 2
 
 FRAMES = SlipTarget(hop_s=0.01, window_s=0.1)
 # Assumed, all of it: a gripper that is told within half a second can still hold on, and asks for no second alarm within

@@ -38,23 +38,22 @@ _GOLDEN = 0.6180339887498949
 """Multiples of it modulo 1 spread evenly."""
 
 
-def _surface(static: float, kinetic: float, rms_um: float, wave_mm: float, spread: float) -> Surface:
+def _surface(static: float, kinetic: float, rms_um: float, roll_off_mm: float) -> Surface:
     return Surface(
         static_friction=assumed(static, "1", _CHOICE),
         kinetic_friction=assumed(kinetic, "1", _CHOICE),
         roughness=assumed(rms_um, "um", _CHOICE),
-        wavelength=assumed(wave_mm, "mm", _CHOICE),
-        spread=spread,
+        roll_off=assumed(roll_off_mm, "mm", _CHOICE),
     )
 
 
 SURFACES: Mapping[str, Surface] = MappingProxyType({
-    "smooth": _surface(0.5, 0.45, 2.0, 6.25, 0.5),
+    "smooth": _surface(0.5, 0.45, 2.0, 0.1),
     "default": Surface(),
-    "grating": _surface(0.6, 0.5, 100.0, 1.0, 0.1),
-    "knit": _surface(0.9, 0.78, 60.0, 2.0, 0.3),
+    "coarse": _surface(0.6, 0.5, 150.0, 1.0),
+    "knit": _surface(0.9, 0.78, 100.0, 2.0),
 })  # fmt: skip
-"""What is dragged: a polished surface, the twin's default, a coarse grating of 1 mm, and a knitted fabric's ribs."""
+"""What is dragged: a polished surface, the twin's default, a coarse one, and a knitted fabric."""
 
 Points = list[tuple[float, float]]
 """Times [s] and forces [N]."""

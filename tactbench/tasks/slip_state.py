@@ -5,7 +5,7 @@ from __future__ import annotations
 from tactbench.plugin import SlipTarget, Summary, TaskDescriptor, TaskSpec, hookimpl
 from tactbench.tasks.slip_scenes import SLIP_SCENES
 
-TACTBENCH_API = 1
+TACTBENCH_API = 2
 
 SPEC = TaskSpec(
     name="slip-state",

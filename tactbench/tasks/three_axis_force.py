@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from tactbench.plugin import TaskDescriptor, TaskSpec, VectorTarget, hookimpl
 
-TACTBENCH_API = 1
+TACTBENCH_API = 2
 
 SPEC = TaskSpec(
     name="three-axis-force",

@@ -8,7 +8,7 @@ import pytest
 
 from tactbench.core.matrix.store import Store
 from tactbench.core.plugins.registry import load_registry
-from tactbench.core.report.making import make_report
+from tactbench.core.report.page import make_report
 from tactbench.core.report.results import open_results
 from tests.core.report.results import draw_one, make_results
 

@@ -1,6 +1,6 @@
 """Freeze the scores of result folders, or compare result folders with what was frozen.
 
-Made with commit ec0567c6, in an environment of constraints.txt::
+Made with commit ec0567c6 (recordings made elsewhere) and 694290cd (simulated), in an environment of constraints.txt::
 
     tactbench run --out default
     tactbench run --config beyond --repeats 2 --out beyond

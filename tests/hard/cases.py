@@ -16,7 +16,7 @@ from typing import Literal
 import numpy as np
 
 from tactbench.plugin import Scalar, TactbenchError
-from tactbench.rigs.twin.draws import generator
+from tactbench.rigs.twin.synthesis import generator
 
 Right = Literal["answer", "refusal", "either"]
 """What is right: an answer that keeps the laws, an explained refusal, or whichever of both it turns out to be."""

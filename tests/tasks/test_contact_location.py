@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from tactbench.core.acquisition import acquire
-from tactbench.core.cli.pages import _scenes
 from tactbench.core.errors import NotApplicable
 from tactbench.core.evaluation.cell import CellContext, evaluate_cell
 from tactbench.core.evaluation.protocols import protocol_called
@@ -126,13 +125,6 @@ def test_no_place_is_beyond_what_the_twin_answers_for(sensor):
         assert not [name for name in acquisition.drawn if name.startswith("remark")]
         taxels = [block for block in blocks if block.stream not in ("force_torque", "contact_point")]
         assert not any(block.quality is not None and (block.quality & Quality.SATURATED).any() for block in taxels)
-
-
-def test_many_places_are_one_line_of_a_page():
-    lines = _scenes(contact_location.SPEC)
-    assert [(line[0], line[1], line[3]) for line in lines] == [
-        ("train", "60", "60 places"), ("validation", "20", "20 places"), ("test", "30", "30 places"),
-    ]  # fmt: skip
 
 
 @pytest.mark.parametrize("spec", [contact_location.SPEC, three_axis_force.SPEC], ids=lambda spec: spec.name)

@@ -92,11 +92,11 @@ def test_friction_and_vibration_are_planned_where_something_slides_and_nowhere_e
 
 @pytest.mark.parametrize("sensor", ["biotac", "icub"])
 def test_what_a_plan_says_of_a_slip_names_speed_load_friction_and_profile(twin, sensor):
-    rows = twin.explain(REGISTRY.sensors[sensor], SCENES["grating-50mm-s-1.5N-test"])
+    rows = twin.explain(REGISTRY.sensors[sensor], SCENES["coarse-50mm-s-1.5N-test"])
     said = {row.entry.effect: row.entry.reason for row in rows if row.entry.included}
     assert said["friction"].startswith("slides at 50 mm/s from ")
     assert said["friction"].endswith("under up to 1.5 N; friction 0.6 to 0.5")
-    assert said["skin-vibration"] == "a profile of 100 um rms passes at 50 Hz"
+    assert said["skin-vibration"] == "a profile of 150 um rms passes, its spectrum even up to 50 Hz"
     assert ("ac-pressure" in said) == (sensor == "biotac")
 
 
@@ -150,7 +150,7 @@ def rest_and_slip(record, scene):
     return counts[(t_s > 0.9) & (t_s < start)], counts[t_s > start + 0.2]
 
 
-@pytest.mark.parametrize("name", ["grating-50mm-s-0.5N", "grating-50mm-s-1.5N", "knit-50mm-s-0.5N"])
+@pytest.mark.parametrize("name", ["coarse-50mm-s-0.5N", "coarse-50mm-s-1.5N", "knit-50mm-s-0.5N"])
 def test_a_texture_that_passes_at_tens_of_hertz_is_heard_between_30_and_200(record, name):
     rest, slip = rest_and_slip(record, SCENES[f"{name}-test"])
     # Hum and noise: 3.0 counts, known to 15 % from 0.8 s.
@@ -158,11 +158,7 @@ def test_a_texture_that_passes_at_tens_of_hertz_is_heard_between_30_and_200(reco
     assert band_rms(slip, 30, 200) > 2 * band_rms(rest, 30, 200)
 
 
-def test_a_grating_is_heard_where_it_passes_and_stick_slip_where_it_repeats(record):
-    scene = SCENES["grating-50mm-s-0.5N-test"]
-    _, slip = rest_and_slip(record, scene)
-    # 50 mm/s over 1 mm, its waves spread by a tenth: two standard deviations.
-    assert 40 < np.fft.rfftfreq(slip.size, 1 / 2200)[heard(slip, 20)] < 60
+def test_stick_slip_is_heard_where_it_repeats(record):
     acquisition = record("biotac", SCENES["default-10mm-s-1.5N-test"])
     _, slip = rest_and_slip(record, SCENES["default-10mm-s-1.5N-test"])
     per_s = 1 / np.median(np.diff(acquisition.run.sliding.let_go_s))

@@ -75,10 +75,6 @@ def main(arguments: list[str] | None = None) -> None:
     # A short-lived process that imports thousands of objects to keep: looking through them for garbage every 700 new
     # ones takes a sixth of the time of an import.
     gc.set_threshold(100_000, 50, 100)
-    if sys.stdout is None:
-        # The next file that is opened would take its number, and whatever writes to that would write into the file.
-        click.echo("Error: Standard output is closed.\n  Redirect it instead: > FILE, or > /dev/null.", err=True)
-        sys.exit(1)
     try:
         code: Any = cli.main(args=arguments, prog_name="tactbench", standalone_mode=False)
         sys.stdout.flush()  # what is still held back may be refused as well
@@ -97,18 +93,17 @@ def main(arguments: list[str] | None = None) -> None:
     sys.exit(code if isinstance(code, int) else 0)
 
 
+_KEPT = {
+    "run": "What was finished is kept; the same command goes on from there.",
+    "cost": "Recordings and scores are kept, times are not.",
+    "emulate": "The emulated devices and their links are gone.",
+}
+"""What is left of a verb that was interrupted."""
+
+
 def _interrupted(arguments: list[str] | None) -> int:
     words = sys.argv[1:] if arguments is None else arguments
-    kept = "Nothing is kept."
-    if words[:1] == ["run"]:
-        kept = "What was finished is kept; the same command goes on from there."
-    elif words[:1] == ["cost"] and "--twin" not in words:
-        kept = "Recordings and scores are kept, times are not: the same command measures them anew."
-    elif words[:1] == ["emulate"]:
-        kept = "The emulated devices and their links are gone."
-    elif words[:1] == ["record"]:
-        kept = ""  # it has said so itself
-    click.echo(f"Interrupted. {kept}".strip(), err=True)
+    click.echo(f"Interrupted. {_KEPT.get(words[0] if words else '', '')}".strip(), err=True)
     return 130
 
 

@@ -12,7 +12,7 @@ from tactbench.core.cli.options import YES, format_option
 from tactbench.core.cli.threads import keep_threads
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterator, Sequence
 
     from tactbench.core.conformance.run import CheckReport
     from tactbench.core.conformance.subject import Subject
@@ -41,6 +41,7 @@ def command(
     kind can run, 2 if nothing is called NAME.
     """
     keep_threads()
+    from tactbench.core.cli.grid import print_fields
     from tactbench.core.cli.operator import TerminalOperator
     from tactbench.core.cli.results import opened
     from tactbench.core.cli.screen import remark
@@ -74,31 +75,24 @@ def command(
         modes.append("invasive")
         _ask(subjects, load_rig_file(rig_file, registry), yes)
     operator = TerminalOperator(yes=yes)
-    reports = [
-        run_checks(one, modes=modes, recording=recording, rig_file=rig_file, operator=operator) for one in subjects
-    ]
-    if out is not None:
-        for checked, report in zip(subjects, reports, strict=True):
-            if checked.kind == "sensor":
-                _keep(out, checked, report)
+    reports = []
+    for one in subjects:
+        report = run_checks(one, modes=modes, recording=recording, rig_file=rig_file, operator=operator)
+        reports.append(report)
+        if out is not None and one.kind == "sensor":
+            _keep(out, one, report)
     if shape == "json":
         click.echo(json_text({"failed_plugins": wrong, "checked": [_plain(one) for one in reports]}, indent=1))
     else:
-        for text in wrong:
-            _line("could not be loaded", "red", text)
+        print_fields([("could not be loaded", text) for text in wrong])
         for report in reports:
-            _print(report)
+            print_fields(list(_lines(report)))
+            click.secho(report.summary, bold=True)
     ctx.exit(1 if wrong or not all(one.ok for one in reports) or not reports else 0)
 
 
 def _ask(subjects: Sequence[Subject], file: RigFile, yes: bool) -> None:
-    """Say what is about to be opened and moved, and wait for a yes.
-
-    Raises
-    ------
-    UsageError
-        If nobody is there to say it, or the file is for another rig than the only one that is checked.
-    """
+    """Say what is about to be opened and moved, and wait for a yes; raises UsageError without a terminal."""
     from tactbench.core.conformance.invasive import FORCE_N
     from tactbench.core.errors import UsageError
 
@@ -108,15 +102,12 @@ def _ask(subjects: Sequence[Subject], file: RigFile, yes: bool) -> None:
     if yes:
         return
     if not sys.stdin.isatty():
-        raise UsageError(
-            "--rig-file asks before anything moves, and nobody is there.", hint="Add --yes if all is clear."
-        )
-    known = {*file.sensors, *(getattr(one, "device", None) for one in file.entries().values())}
-    lines = [one.name for one in subjects if one.kind in ("sensor", "device") and one.name in known]
-    what = [f"opens the line of {name}" for name in lines]
-    if file.rig in rigs:
-        what.append(f"presses {next(iter(file.sensors))} twice to {FORCE_N:g} N with the rig {file.rig}")
-    click.confirm(f"This {' and '.join(what) or 'opens nothing'}. Is the rig clear?", abort=True, err=True)
+        raise UsageError("--rig-file prompts before anything moves, and stdin is no terminal.",
+                         hint="Add --yes if all is clear.")  # fmt: skip
+    click.confirm(
+        f"The lines of the devices and sensors that are checked are opened; the rig, where it is checked, presses a "
+        f"sensor twice to {FORCE_N:g} N. Is the rig clear?", abort=True, err=True,
+    )  # fmt: skip
 
 
 def _keep(out: Path, checked: Subject, report: CheckReport) -> None:
@@ -148,26 +139,19 @@ def _plain(report: CheckReport) -> dict[str, object]:
     }  # fmt: skip
 
 
-def _print(report: CheckReport) -> None:
+def _lines(report: CheckReport) -> Iterator[tuple[str, str]]:
+    """Yield what did not pass, field by field; checks that were skipped for one reason together."""
     from tactbench.core.conformance.kit import checks_of
 
     cures = {one.name: one for one in checks_of(report.kind, *report.modes)}
     for one in report.failed:
-        _line("FAILED", "red", f"{one.check}: {one.where}: {one.text}")
+        yield "FAILED", f"{one.check}: {one.where}: {one.text}"
         if one.check in cures:
-            click.echo(f"          why: {cures[one.check].why}\n          do:  {cures[one.check].cure}")
-    for one in report.expected:
-        _line("expected", "yellow", f"{one.check}: {one.text}")
+            yield "  why", cures[one.check].why
+            yield "  do", cures[one.check].cure
+    yield from (("expected", f"{one.check}: {one.text}") for one in report.expected)
     reasons: dict[str, list[str]] = {}
     for one in report.skipped:
         reasons.setdefault(one.text, []).append(one.check)
     for text, names in reasons.items():
-        _line("skipped", "yellow", f"{len(names)} checks: {text}" if len(names) > 1 else f"{names[0]}: {text}")
-    click.secho(report.summary, bold=True)
-
-
-def _line(word: str, colour: str, text: str) -> None:
-    from tactbench.core.tables.text import visible_lines
-
-    click.secho(f"{word:<8}  ", fg=colour, bold=word.isupper(), nl=False)
-    click.echo(visible_lines(text))
+        yield "skipped", f"{f'{len(names)} checks' if len(names) > 1 else names[0]}: {text}"

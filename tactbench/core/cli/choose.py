@@ -14,7 +14,6 @@ from tactbench.core.cli.results import is_results, opened, shown_rows
 if TYPE_CHECKING:
     from tactbench.core.choosing.choosing import Choice
     from tactbench.core.spec.task import TaskSpec
-    from tactbench.core.tables.text_table import TextTable
 
 Row = dict[str, Any]
 _DEFAULT = Path("tactbench-results")
@@ -40,8 +39,7 @@ def command(
     FOLDER is what `run --out` wrote; default: tactbench-results, and the results that came with tactbench where that
     has none of the task.
     """
-    from tactbench.core.choosing.choosing import choose
-    from tactbench.core.choosing.criteria import Wish
+    from tactbench.core.choosing.choosing import Wish, choose
     from tactbench.core.plugins.registry import load_registry
     from tactbench.core.tables.text import json_text
 
@@ -57,48 +55,40 @@ def command(
         click.echo(json_text(content, indent=1))
         return
     for choice in choices:
-        _print(choice, f"{heading} · {choice.hardware}")
-    from tactbench.core.cli.screen import console
-
-    console().print(f"From {origin}.", markup=False)
+        _print(choice, f"{heading} · {choice.hardware}", origin)
 
 
 def _results(folder: Path | None, task: TaskSpec) -> tuple[list[Row], str]:
     """Return the rows of a task, and where they are from."""
     from tactbench.core.errors import UsageError
 
-    hint = f"Make some: `tactbench run --task {task.name} --protocol {_PREFERRED}`."
     if folder is not None or is_results(_DEFAULT):
         store = opened(folder or _DEFAULT)
-        rows = [row for row in shown_rows(store) if row["task"] == task.name]
-        if rows:
-            return rows, f"the results in {store.folder}"
-        if folder is not None:
-            raise UsageError(f"{folder} has no results for the task {task.name}.", hint=hint)
-    rows, origin = _shipped()
-    rows = [row for row in rows if row["task"] == task.name]
-    if not rows:
-        raise UsageError(f"No results of the task {task.name} came with tactbench.", hint=hint)
-    return rows, origin
+        rows, origin = shown_rows(store), f"the results in {store.folder}"
+    else:
+        rows, origin = _shipped()
+    found = [row for row in rows if row["task"] == task.name]
+    if not found and folder is None:
+        rows, origin = _shipped()
+        found = [row for row in rows if row["task"] == task.name]
+    if not found:
+        raise UsageError(
+            f"There are no results of the task {task.name} in {folder or _DEFAULT}.",
+            hint=f"Make some: `tactbench run --task {task.name} --protocol {_PREFERRED}`.",
+        )
+    return found, origin
 
 
 def _shipped() -> tuple[list[Row], str]:
     """Return the rows that came with tactbench, and how they were made."""
     from tactbench.core.cli.config import shipped_results
-    from tactbench.core.errors import ConfigError
     from tactbench.core.matrix.summary import fill_baselines
 
-    path = shipped_results()
-    try:
-        shipped = json.loads(path.read_text(encoding="utf-8"))
-        rows: list[Row] = shipped["rows"]
-        made = (f"the results that came with tactbench (made by {shipped['command']} of version {shipped['version']}, "
-                f"seed {shipped['seed']}, {shipped['replicates']}; times of another machine)")  # fmt: skip
-    except (OSError, ValueError, KeyError, TypeError) as error:
-        raise ConfigError(str(path), None, f"cannot be used ({type(error).__name__}).",
-                          hint="Install tactbench again.") from error  # fmt: skip
+    shipped = json.loads(shipped_results().read_text(encoding="utf-8"))
+    rows: list[Row] = shipped["rows"]
     fill_baselines(rows)
-    return rows, made
+    return rows, (f"the results that came with tactbench ({shipped['command']} of version {shipped['version']}, seed "
+                  f"{shipped['seed']}, {shipped['replicates']}; times of another machine)")  # fmt: skip
 
 
 def _selected(rows: list[Row], task: TaskSpec, protocol: str | None) -> tuple[list[Row], str]:
@@ -113,46 +103,27 @@ def _selected(rows: list[Row], task: TaskSpec, protocol: str | None) -> tuple[li
     splits = list(dict.fromkeys(str(row["split"]) for row in done if row["protocol"] == chosen))
     kept = next((name for name in task.splits if name in splits), splits[0])
     found = [row for row in rows if row["protocol"] == chosen and str(row["split"]) in (kept, "None")]
-    dagger = " † (uses test-set statistics, as no sensor in use can)" if any(row["dagger"] for row in found) else ""
-    unasked = protocol is None and chosen != _PREFERRED
-    why = f", for there are no results under {_PREFERRED}" if unasked else ""
-    return found, f"{task.name} · protocol {chosen}{dagger}{why} · split {kept}"
+    dagger = " † (uses test-set statistics)" if any(row["dagger"] for row in found) else ""
+    return found, f"{task.name} · protocol {chosen}{dagger} · split {kept}"
 
 
-def _print(choice: Choice, heading: str) -> None:
-    from rich.text import Text
+def _print(choice: Choice, heading: str, origin: str) -> None:
+    from tactbench.core.cli.grid import print_fields, print_grid
+    from tactbench.core.tables.numbers import interval, score
 
-    from tactbench.core.cli.screen import console
-    from tactbench.core.tables.terminal import show
-
-    screen = console()
-    screen.print(Text(choice.verdict, style="bold"))
-    screen.print(Text(heading, style="dim"))
-    if choice.candidates:
-        show([_table(choice)], screen)
-    for title, sentences in (
-        ("interval", choice.intervals),
-        ("unknown", choice.unknown),
-        ("left out", choice.left_out),
-    ):
-        for sentence in sentences:
-            screen.print(Text(f"{title}: {sentence}"))
-    screen.print()
-
-
-def _table(choice: Choice) -> TextTable:
-    from tactbench.core.tables.numbers import ABSENT, interval, score
-    from tactbench.core.tables.text_table import TextTable
-
-    wishes = dict.fromkeys(one.wish for candidate in choice.candidates for one in candidate.criteria)
-    head = ("sensor / estimator", "score, interval", *(wish for wish in wishes if wish != "score"))
+    print_fields([("answer", choice.verdict), ("results", f"{heading}, from {origin}")])
     lines = []
     for one in choice.candidates:
-        entries = {
-            criterion.wish: ": ".join(filter(None, (criterion.state, criterion.text))) for criterion in one.criteria
-        }
-        ends = interval(one.low, one.high, choice.unit)
-        known = f"{score(one.score, choice.unit)}, {'no interval' if ends == ABSENT else ends}"
-        wished = f"; {entries['score']}" if "score" in entries else ""
-        lines.append((f"{one.sensor} / {one.estimator}", known + wished, *(entries.get(wish, "") for wish in head[2:])))
-    return TextTable(f"score: {choice.quantity}", head, tuple(lines))
+        wishes = {each.wish: f"{each.state}: {each.text}" for each in one.criteria}
+        wishes["score wished"] = wishes.pop("score", "")
+        lines.append({"sensor": one.sensor, "estimator": one.estimator, "score": score(one.score, choice.unit),
+                      "interval": interval(one.low, one.high, choice.unit), **wishes})  # fmt: skip
+    if lines:
+        click.echo()
+        print_grid(f"score: {choice.quantity}", tuple(lines[0]), lines, numeric=("score",))
+    several = {"interval": choice.intervals, "unknown": choice.unknown, "left out": choice.left_out}
+    fields = [(name, text) for name, texts in several.items() for text in texts]
+    if fields:
+        click.echo()
+        print_fields(fields)
+    click.echo()

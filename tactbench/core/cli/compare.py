@@ -3,29 +3,27 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
 
 import click
 
-COMPARISON_FORMATS = ("table", "json", "md", "latex", "csv")
+from tactbench.core.cli.options import RESULTS, format_option
 
 
 @click.command(name="compare")
 @click.argument("first", metavar="A")
 @click.argument("second", metavar="B")
-@click.option("--out", "folder", type=click.Path(path_type=Path), default=Path("tactbench-results"), show_default=True,
-              help="Result folder, unless A and B are folders.")  # fmt: skip
-@click.option("--task", help="This task only.")
+@RESULTS
+@click.option("--task", metavar="NAME", help="This task only.")
 @click.option("--config", metavar="FILE", help="Matrix whose declared comparisons p-values are corrected for.")
-@click.option("--format", "shape", type=click.Choice(COMPARISON_FORMATS), default="table", show_default=True)
-def command(first: str, second: str, folder: Path, task: str | None, config: str | None, shape: str) -> None:
+@format_option("table", "json", "md", "latex", "csv")
+def command(first: str, second: str, out: Path, task: str | None, config: str | None, shape: str) -> None:
     """Compare A and B replicate by replicate: two sensors, estimators, protocols, splits, or result folders.
 
     Of two folders the same cells are compared: before and after a change, or two laboratories.
     """
     from tactbench.core.cli.config import default_matrix, matrix_called
     from tactbench.core.cli.grid import print_records, print_tables
-    from tactbench.core.cli.results import is_results
+    from tactbench.core.cli.results import is_results, opened, shown_rows
     from tactbench.core.errors import UsageError
     from tactbench.core.leaderboard.pairwise import (
         comparisons,
@@ -36,10 +34,11 @@ def command(first: str, second: str, folder: Path, task: str | None, config: str
     )
 
     if all(is_results(Path(one)) for one in (first, second)):
-        found = folder_comparisons(kept_rows(Path(first)), kept_rows(Path(second)), first, second, task)
+        before, after = (shown_rows(opened(Path(one))) for one in (first, second))
+        found = folder_comparisons(before, after, first, second, task)
     else:
         matrix = matrix_called(config) if config else default_matrix()
-        rows = kept_rows(folder)
+        rows = shown_rows(opened(out))
         found = with_declared(comparisons(rows, first, second, task), rows, matrix.comparisons)
     if not found:
         raise UsageError(
@@ -50,10 +49,3 @@ def command(first: str, second: str, folder: Path, task: str | None, config: str
         print_records(list(map(record_of, found)), shape)
     else:
         print_tables(tables_of(found), shape)
-
-
-def kept_rows(folder: Path) -> list[dict[str, Any]]:
-    """Return the rows of a result folder; raises UsageError."""
-    from tactbench.core.cli.results import opened, shown_rows
-
-    return shown_rows(opened(folder))

@@ -12,7 +12,7 @@ from tactbench.core.spec.yaml_file import load_yaml
 _ENDINGS = (".yaml", ".yml")
 
 
-def shipped(name: str, in_checkout: str, hint: str) -> Path:
+def shipped(name: str, in_checkout: str) -> Path:
     """Return what came with tactbench: `name` in the installed package, or `in_checkout` in a checkout of it.
 
     Raises
@@ -24,26 +24,23 @@ def shipped(name: str, in_checkout: str, hint: str) -> Path:
     for place in (package / name, package.parent / in_checkout):
         if place.exists():
             return place
-    raise ConfigError(name, None, "tactbench was installed without it.", hint=hint)
+    raise ConfigError(name, None, "tactbench was installed without it.", hint="Install tactbench again.")
 
 
 def default_matrix() -> MatrixSpec:
     """Return ``benchmarks.yaml`` of this folder, else the one that came with tactbench; raises ConfigError."""
     own = Path("benchmarks.yaml")
-    hint = "Give a matrix with --config FILE."
-    return load_yaml(own if own.is_file() else shipped(own.name, own.name, hint), MatrixSpec)
+    return load_yaml(own if own.is_file() else shipped(own.name, own.name), MatrixSpec)
 
 
 def packaged_matrices() -> dict[str, Path]:
     """Return the matrices that came with tactbench, by name."""
-    folder = shipped("matrices", "examples/matrices", "Give a file with --config FILE.")
-    return {path.stem: path for path in sorted(folder.glob("*.yaml"))}
+    return {path.stem: path for path in sorted(shipped("matrices", "examples/matrices").glob("*.yaml"))}
 
 
 def shipped_results() -> Path:
     """Return the file of results that came with tactbench; raises ConfigError if the installation has lost it."""
-    hint = "Make some with `tactbench run --protocol deployable`."
-    return shipped("results/default.json", "examples/results/default.json", hint)
+    return shipped("results/default.json", "examples/results/default.json")
 
 
 def matrix_called(given: str) -> MatrixSpec:

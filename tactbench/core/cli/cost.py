@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -10,12 +9,9 @@ import click
 
 from tactbench.core.cli.options import RESULTS, format_option
 from tactbench.core.cli.threads import keep_threads
-from tactbench.core.tables.text import json_text
 
 if TYPE_CHECKING:
     from tactbench.core.cost.ladder import Ladder
-    from tactbench.core.matrix.store import Store
-    from tactbench.core.plugins.registry import Registry
     from tactbench.core.spec.matrix import MatrixSpec
 
 
@@ -58,66 +54,42 @@ def command(
         )
     import time
 
+    from tactbench.core.cli.grid import print_records
     from tactbench.core.cli.progress import progress
     from tactbench.core.cli.screen import remark
     from tactbench.core.cost.ladder import climb
     from tactbench.core.cost.ladder_file import write_ladder
     from tactbench.core.leaderboard.names import METRIC_NAMES
+    from tactbench.core.matrix.store import Store
     from tactbench.core.plugins.declared import declared_in, with_declared
     from tactbench.core.plugins.registry import load_registry
-    from tactbench.core.tables.csv_text import csv_of_records
 
     registry = with_declared(load_registry(), declared_in(recordings))
-    matrix = _matrix(registry, sensors[0], task, recordings, protocol, estimators)
-    store = _store(out, sensors[0], task)
+    matrix = _matrix(sensors[0], task, recordings, protocol, estimators)
     with progress() as display:
         ladder = climb(
-            matrix, registry, store, rounds=rounds, clock=time.perf_counter, progress=display, recordings=recordings
-        )
-    if shape == "json":
-        click.echo(json_text(ladder.rows, indent=1))
-    elif shape == "csv":
-        click.echo(csv_of_records(ladder.rows), nl=False)
-    else:
+            matrix, registry, Store(out / "cost"), rounds=rounds, clock=time.perf_counter, progress=display,
+            recordings=recordings,
+        )  # fmt: skip
+    if shape == "table":
         _print(ladder)
+    else:
+        print_records(ladder.rows, shape)
     paths = write_ladder(ladder, out, METRIC_NAMES.get(ladder.about["metric"], ""))
     remark(f"Files: {', '.join(map(str, paths))}")
 
 
 def _matrix(
-    registry: Registry, sensor: str, task: str, recordings: Path | None, protocol: str | None,
-    estimators: tuple[str, ...],
-) -> MatrixSpec:  # fmt: skip
+    sensor: str, task: str, recordings: Path | None, protocol: str | None, estimators: tuple[str, ...]
+) -> MatrixSpec:
     from tactbench.core.spec.matrix import EstimatorChoice, MatrixSpec, TaskChoice
 
     rig = "twin" if recordings is None else "replay"
-    if protocol is None and not registry.rigs[rig].simulated:
+    if protocol is None and recordings is not None:
         protocol = "deployable"  # as `run` has it: the paper's protocol needs the paper's three roles
     answerers = tuple(EstimatorChoice(name=name) for name in estimators or ("all",))
     choice = TaskChoice(name=task, protocol=protocol, estimators=answerers)
     return MatrixSpec(rig=rig, seed=1, repeats=1, sensors=(sensor,), tasks=(choice,))
-
-
-def _store(out: Path, sensor: str, task: str) -> Store:
-    """Return the folder of the ladder's own cells, `out`/cost, which no leaderboard of `out` shows.
-
-    What a run has finished of the same question, and what it recorded with the sensor, is linked into it and not done
-    again; what cannot be linked is.
-    """
-    from tactbench.core.matrix.store import Store
-
-    store = Store(out / "cost")
-    rows = Store(out).rows() if (out / "cells").is_dir() else []
-    finished_of = ("done", sensor, task)
-    finished = [row for row in rows if (row["status"], row["sensor"], row["task"]) == finished_of]
-    cells = [Path("cells", f"{row['key']}.h5") for row in finished]
-    recordings = [path.relative_to(out) for path in (out / "recordings" / sensor).glob("*.h5")]
-    for path in (*cells, *recordings):
-        link = store.folder / path
-        with suppress(OSError):
-            link.parent.mkdir(parents=True, exist_ok=True)
-            link.hardlink_to(out / path)
-    return store
 
 
 def _print(ladder: Ladder) -> None:
@@ -130,10 +102,7 @@ def _print(ladder: Ladder) -> None:
     kinds = ["result" if row["front_fit"] or row["front_delay"] else "" for row in ladder.rows]
     print_grid(title(about), COLUMNS, lines, numeric=RIGHT, kinds=kinds)
     if about["load"] is not None and about["load"] > about["cores"]:
-        remark(
-            f"The machine was busy: {about['load']:.1f} processes wanted its {about['cores']} cores. Others' work is "
-            "in these times, most of all in the 95th percentiles; time on an idle machine before you quote them."
-        )
+        remark(f"The machine was busy (load {about['load']:.1f} on {about['cores']} cores): the times are too long.")
     for text in about["remarks"]:
         remark(f"{text[0].upper()}{text[1:]}.")
     remark("docs/glossary.md says what each column is.")

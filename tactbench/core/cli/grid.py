@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import textwrap
 from collections.abc import Collection, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from tactbench.core.tables.text import json_text
+from tactbench.core.tables.text import json_text, visible
 
 if TYPE_CHECKING:
     from tactbench.core.tables.text_table import TextTable
@@ -53,11 +54,53 @@ def print_tables(tables: Sequence[TextTable], shape: str = "table") -> None:
         click.echo((markdown if shape == "md" else latex)(tables), nl=False)
 
 
-def print_records(records: Sequence[Mapping[str, Any]], shape: str) -> None:
-    """Print records on stdout as ``json`` or ``csv``; all have the keys of the first."""
+def print_fields(fields: Sequence[tuple[str, str]]) -> None:
+    """Print names and values on stdout, a field a line; long values are broken at spaces of the terminal's width."""
+    from tactbench.core.cli.screen import console
+
+    left, width = max((len(name) for name, _ in fields), default=0) + 2, console().width
+    for name, value in fields:
+        lines = textwrap.wrap(
+            f"{visible(name):<{left}}{visible(value)}", width, subsequent_indent=" " * left,
+            break_long_words=False, break_on_hyphens=False,
+        )  # fmt: skip
+        click.echo("\n".join(lines))
+
+
+def field_text(value: Any) -> str:
+    """Return a value in a line; empty for none."""
+    from pydantic import BaseModel
+
+    if isinstance(value, BaseModel):
+        value = value.model_dump(mode="json")
+    if isinstance(value, dict):
+        return ", ".join(f"{name} = {text}" for name, one in value.items() if (text := field_text(one)))
+    if isinstance(value, list | tuple):
+        return ", ".join(map(field_text, value))
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    return f"{value:.5g}" if isinstance(value, float) else "" if value is None else str(value)
+
+
+def print_records(
+    records: Sequence[Mapping[str, Any]], shape: str, *, title: str = "", columns: Sequence[str] = (),
+    kinds: Sequence[str] = (),
+) -> None:  # fmt: skip
+    """Print records on stdout as ``json``, ``csv`` or ``table``; all have the keys of the first.
+
+    Parameters
+    ----------
+    title, columns, kinds
+        Of a table: its title, the keys that it shows (default: all), and one word a record, as of `print_grid`.
+    """
     from tactbench.core.tables.csv_text import csv_of_records
 
     if shape == "json":
         click.echo(json_text(list(records), indent=1))
-    else:
+    elif shape == "csv":
         click.echo(csv_of_records(records), nl=False)
+    elif records:
+        shown = columns or tuple(records[0])
+        numeric = [name for name in shown if any(type(one[name]) in (int, float) for one in records)]
+        lines = [{name: field_text(one[name]) for name in shown} for one in records]
+        print_grid(title, shown, lines, numeric=numeric, kinds=kinds)

@@ -17,8 +17,6 @@ ARPHRD_CAN = 280
 """Type of a CAN interface in /sys/class/net (linux/if_arp.h)."""
 IFF_UP = 1
 """Flag of an interface that is up (linux/if.h)."""
-MULTICAST_GROUP = "239.74.163.2"
-"""python-can's group for udp_multicast over IPv4 (``UdpMulticastBus.DEFAULT_GROUP_IPv4``)."""
 REQUESTED_BUFFER_BYTES = 4 << 20
 """What a datagram link asks of the system unless its address says otherwise."""
 FOR_DEVELOPERS = ("docs", "test", "dev")
@@ -67,22 +65,20 @@ def spi_devices() -> Iterator[HostItem]:
     yield from (_device("SPI", str(path)) for path in paths)
     if not paths:
         yield HostItem(
-            "SPI", "SPI", "missing", "no /dev/spidev*", "A bridge on a serial port needs none: docs/links.md."
+            "SPI", "spidev", "missing", "no /dev/spidev*", "A bridge on a serial port needs none: docs/links.md."
         )
 
 
 def _device(kind: str, path: str, text: str = "") -> HostItem:
     place = Path(path)
     try:
-        mode, group = place.stat().st_mode, place.group()
+        group = place.group()
     except (OSError, KeyError, NotImplementedError, ImportError):  # Windows has no groups, a group may have no name
         return HostItem(kind, path, "works", text)
     if os.access(place, os.R_OK | os.W_OK):  # opening it would reset some devices
         return HostItem(kind, path, "works", text)
-    hint = f"Join its group, then log in again: sudo usermod -aG {group} $USER"
-    if mode & 0o060 != 0o060 or group == "root":
-        hint = "Only root may open it: let a udev rule give it to a group, such as dialout."
-    return HostItem(kind, path, "denied", text, hint)
+    hint = f"Join its group, {group}, then log in again: sudo usermod -aG {group} $USER"
+    return HostItem(kind, path, "denied", text, "A udev rule may give it to a group." if group == "root" else hint)
 
 
 def can_interfaces() -> Iterator[HostItem]:
@@ -105,14 +101,7 @@ def can_interfaces() -> Iterator[HostItem]:
 
 
 def network() -> Iterator[HostItem]:
-    """Yield what the network can do for datagrams; nothing is sent."""
-    try:
-        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
-            probe.connect((MULTICAST_GROUP, 9))
-            yield HostItem("network", "multicast", "works", f"from {probe.getsockname()[0]}")
-    except OSError:
-        hint = "For can://udp_multicast on this machine alone: sudo ip route add 239.0.0.0/8 dev lo"
-        yield HostItem("network", "multicast", "missing", "no route", hint)
+    """Yield how many datagrams the system holds for a process that is late."""
     try:
         largest = int(Path("/proc/sys/net/core/rmem_max").read_text())
     except (OSError, ValueError):
@@ -125,18 +114,15 @@ def network() -> Iterator[HostItem]:
 
 def extras() -> Iterator[HostItem]:
     """Yield the extras that tactbench's own metadata states, but those of :data:`FOR_DEVELOPERS`."""
-    requirements: dict[str, list[str]] = {
-        name: [] for name in metadata.metadata("tactbench").get_all("Provides-Extra") or ()
-    }
+    requirements: dict[str, list[str]] = {}
     for requirement in metadata.requires("tactbench") or ():
-        for name in re.findall(r"extra\s*==\s*['\"]([^'\"]+)", requirement):
-            requirements.setdefault(name, []).append(re.split(r"[^A-Za-z0-9._-]", requirement, maxsplit=1)[0])
+        found = re.match(r"([\w.-]+).*extra\s*==\s*['\"]([^'\"]+)", requirement)
+        if found and found[2] not in FOR_DEVELOPERS:
+            requirements.setdefault(found[2], []).append(found[1])
     for name, distributions in requirements.items():
-        if name not in FOR_DEVELOPERS:
-            lacking = [one for one in distributions if not _installed(one)]
-            text = f"not installed: {', '.join(lacking)}" if lacking else ""
-            hint = f"pip install 'tactbench[{name}]'" if lacking else ""
-            yield HostItem("extra", name, "missing" if lacking else "works", text, hint)
+        lacking = ", ".join(one for one in distributions if not _installed(one))
+        text, hint = (f"not installed: {lacking}", f"pip install 'tactbench[{name}]'") if lacking else ("", "")
+        yield HostItem("extra", name, "missing" if lacking else "works", text, hint)
 
 
 def _installed(distribution: str) -> bool:

@@ -7,11 +7,12 @@ from typing import TYPE_CHECKING, Any, get_args
 
 import click
 
+from tactbench.core.cli.grid import field_text, print_fields
 from tactbench.core.cli.screen import remark
-from tactbench.core.tables.text import command_line, visible
+from tactbench.core.tables.text import command_line
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Iterable, Iterator
 
     from tactbench.core.recording.device_log import ImportedLog
     from tactbench.core.recording.health import Finding
@@ -65,8 +66,7 @@ def command(
         source, load_registry().sensors[sensor], _pairs("--option", options), out=target, session=session, role=role,
         labels=named, replace=replace,
     )  # fmt: skip
-    for line in log_summary(made, target):
-        click.echo(visible(line))
+    print_fields(list(log_fields(made, target)))
     remark(f"See what is in it:  {command_line('tactbench', 'inspect', str(target))}")
     ctx.exit(0 if _sound(made.findings) else 1)
 
@@ -82,18 +82,14 @@ def _import_tables(mapping: Path, root: Path | None, out: Path | None, replace: 
 
     target = Path("recordings") / mapping.stem if out is None else out
     with progress() as display:
-        begun = False
 
-        def tell(_done: int, total: int, what: str) -> None:
-            nonlocal begun
-            if not begun:
+        def tell(done: int, total: int, what: str) -> None:
+            if done == 1:
                 display.begin("importing", total)
-                begun = True
             display.advance(what)
 
         report = import_tables(mapping, root=root, out=target, progress=tell, replace=replace)
-    for line in summary(report, target):
-        click.echo(visible(line))
+    print_fields(list(fields(report, target)))
     return _sound(finding for recording in report.recordings for finding in recording.findings)
 
 
@@ -104,41 +100,33 @@ def _pairs(option: str, given: tuple[str, ...]) -> dict[str, Any]:
     found: dict[str, Any] = {}
     for text in given:
         key, separator, value = text.partition("=")
-        if not separator or not key or key in found:
-            raise click.UsageError(f"{option} {text!r}: {PAIRS} is expected, each key once.")
+        if not separator or not key:
+            raise click.UsageError(f"{option} {text!r}: {PAIRS} is expected.")
         found[key] = plain_value(value)
     return found
 
 
-def log_summary(made: ImportedLog, out: Path) -> list[str]:
-    """Return what became of a log, line by line."""
+def log_fields(made: ImportedLog, out: Path) -> Iterator[tuple[str, str]]:
+    """Yield what became of a log, field by field."""
     meta = made.meta
-    rows = ", ".join(f"{number} rows of {stream}" for stream, number in made.rows.items())
-    lines = [f"{out}: {meta.sensor.name} from {meta.origin}, {rows}; clock {meta.clock}"]
-    lines += [f"  {name}: {number}" for name, number in meta.counts.items()]
-    lines += [f"  {finding.severity}: {finding.message}" for finding in made.findings]
-    return lines + [f"  remark: {remark}" for remark in meta.remarks]
+    stated = {"recording": out, "sensor": meta.sensor.name, "from": meta.origin, "clock": meta.clock,
+              "rows": dict(made.rows), "counted": meta.counts}  # fmt: skip
+    yield from ((name, field_text(value)) for name, value in stated.items())
+    yield from ((finding.severity, finding.message) for finding in made.findings)
+    yield from (("remark", remark) for remark in meta.remarks)
 
 
-def summary(report: ImportReport, folder: Path) -> list[str]:
-    """Return what an import did, line by line."""
+def fields(report: ImportReport, folder: Path) -> Iterator[tuple[str, str]]:
+    """Yield what an import did, field by field."""
     from collections import Counter
 
-    from tactbench.core.spec.declared_task import FILE
-
-    lines = [
-        f"{report.title}: {len(report.recordings)} recordings of {', '.join(report.sensors)}, {report.rows} rows, "
-        f"from {report.files_read} files, in {folder}"
-    ]
-    if report.tasks:
-        lines.append(f"  tasks of their own, in {folder / FILE}: {', '.join(report.tasks)}")
-    if report.missing:
-        counts = ", ".join(f"{channel} {count}" for channel, count in report.missing.items())
-        lines.append(f"  rows without a sample, marked and left out of every evaluation: {counts}")
-    for reason, count in report.excluded.items():
-        names = [recording.name for recording in report.recordings if recording.excluded == reason]
-        shown = ", ".join(names[:3]) + (" …" if count > 3 else "")
-        lines.append(f"  {count} recordings are marked as excluded ({shown}): {reason}")
+    stated = {
+        "title": report.title, "recordings": len(report.recordings), "in": folder, "sensors": report.sensors,
+        "rows": report.rows, "files": report.files_read, "tasks declared": report.tasks,
+        "rows without a sample": dict(report.missing),
+    }  # fmt: skip
+    yield from ((name, field_text(value)) for name, value in stated.items() if value)
+    yield from (("excluded", f"{count} recordings: {reason}") for reason, count in report.excluded.items())
     found = Counter(
         (finding.severity, finding.message)
         for recording in report.recordings
@@ -147,9 +135,6 @@ def summary(report: ImportReport, folder: Path) -> list[str]:
     )
     order = ("error", "warning", "info")
     worst = sorted(found.items(), key=lambda item: (order.index(item[0][0]), -item[1]))
-    for (severity, message), count in worst[:MOST_NAMED]:
-        where = f" (in {count} of {len(report.recordings)} recordings)" if len(report.recordings) > 1 else ""
-        lines.append(f"  {severity}: {message}{where}")
+    yield from ((severity, f"{message} (in {n} recordings)") for (severity, message), n in worst[:MOST_NAMED])
     if len(worst) > MOST_NAMED:
-        lines.append(f"  … and {len(worst) - MOST_NAMED} more remarks; see `tactbench inspect`")
-    return lines
+        yield "more", f"{len(worst) - MOST_NAMED} findings; see `tactbench inspect`"

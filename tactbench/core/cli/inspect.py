@@ -2,19 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
 from tactbench.core.cli.options import format_option
-from tactbench.core.tables.text import json_text, visible
+from tactbench.core.tables.text import json_text
 
 if TYPE_CHECKING:
     from tactbench.core.recording.reader import Recording
 
-COLOURS = {"error": "red", "warning": "yellow", "info": "blue"}
+_COLUMNS = ("stream", "of", "rows", "mean_rate_hz", "stated_rate_hz", "seconds", "channels", "annotations")
+_STRUCTURES = ("scene", "plan", "clocks", "streams", "drawn", "provenance")
+"""Of a recording's meta data, with a form of their own or none on the screen; JSON has them."""
 
 
 @click.command(name="inspect")
@@ -94,71 +95,37 @@ def _stream(recording: Recording, name: str) -> dict[str, Any]:
 
 
 def _print(about: dict[str, Any]) -> None:
-    click.secho(visible(about["file"]), bold=True)
-    for text in _lines(about):
-        click.echo(f"  {visible(text)}")
-    for finding in about["findings"]:
-        click.secho(f"  {finding['severity']}: ", fg=COLOURS[finding["severity"]], nl=False)
-        click.echo(visible(finding["message"]))
-    if not about["findings"]:
-        click.echo("  healthy: nothing was found")
-    if not about["complete"]:
-        click.echo("  unfinished: this is what a crash left behind")
-    click.echo(f"  content {about['content_sha256'][:16]}{' (verified)' if about['complete'] else ''}")
+    from tactbench.core.cli.grid import field_text, print_fields, print_records
 
-
-def _lines(about: dict[str, Any]) -> Iterator[str]:
-    """Yield what a recording is, of what, and how it was made."""
     meta = about["meta"]
-    texts = [f"session {meta['session']}", f"clock {meta['clock']}"]
-    texts += [f"{name} {meta[name]}" for name in ("trial", "role") if meta[name]]
-    mark = " (EMULATED)" if meta["emulation"] else " (SIM)" if meta["simulated"] else ""
-    yield f"{about['sensor']} on {meta['rig']}{mark}; {'; '.join(texts)}"
-    for stream in about["streams"]:
-        rate = "no rate"
-        if stream["mean_rate_hz"]:
-            rate = f"{stream['mean_rate_hz']:.4g} Hz over {stream['seconds']:.4g} s"
-        channels = "; ".join(
-            f"{len(one['names'])} {one['kind']} [{one['unit']}] {_ends(one['names'])}" for one in stream["channels"]
-        )
-        notes = f"; labels {', '.join(stream['annotations'])}" if stream["annotations"] else ""
-        yield f"{stream['stream']} ({stream['of']}): {stream['rows']} rows, {rate}, {channels}{notes}"
-    for name, clock in meta["clocks"].items():
-        yield f"clock of {name}: {_clock(clock)}"
-    if meta["emulation"]:
-        yield f"emulated: {_emulation(meta['emulation'])}"
-    plan = {taken: [one["effect"] + " (asked)" * one["asked"] for one in meta["plan"] if one["included"] == taken]
-            for taken in (True, False)}  # fmt: skip
-    pairs = {title: [f"{name} = {value}" for name, value in meta[key].items()]
-             for title, key in (("labels", "labels"), ("assumed", "assumptions"))}  # fmt: skip
-    for title, words in {"effects": plan[True], "left out": plan[False], **pairs}.items():
-        if words:
-            yield f"{title}: {', '.join(words)}"
-    yield from (f"remark: {remark}" for remark in meta["remarks"])
+    effects = {taken: [one["effect"] + " (asked)" * one["asked"] for one in meta["plan"] if one["included"] is taken]
+               for taken in (True, False)}  # fmt: skip
+    verified = "verified" if about["complete"] else "unfinished: this is what a crash left behind"
+    stated: dict[str, Any] = {
+        "file": about["file"], "sensor": about["sensor"],
+        **{name: value for name, value in meta.items() if name not in _STRUCTURES},
+        **{f"clock of {stream}": _clock(clock) for stream, clock in meta["clocks"].items()},
+        "effects": effects[True], "left out": effects[False], "content": f"{about['content_sha256'][:16]} ({verified})",
+    }  # fmt: skip
+    print_fields([(name, text) for name, value in stated.items() if (text := field_text(value))])
+    click.echo()
+    records = []
+    for one in about["streams"]:
+        channels = (f"{len(each['names'])} {each['kind']} [{each['unit']}] {_ends(each['names'])}"
+                    for each in one["channels"])  # fmt: skip
+        records.append({**one, "channels": "; ".join(channels)})
+    print_records(records, "table", title="streams", columns=_COLUMNS)
+    fields = [(finding["severity"], finding["message"]) for finding in about["findings"]]
+    print_fields(fields or [("healthy", "nothing was found")])
 
 
-def _clock(clock: dict[str, Any]) -> str:
-    """Return one line: whose it is, how it was put on the host's, and how well."""
-    text = str(clock["source"])
+def _clock(clock: dict[str, Any]) -> dict[str, Any]:
+    """Return how a device's clock was put on the host's, and how well; each line of the fit stands in JSON."""
     lines = clock["segments"]
-    if lines:
-        drifts = [line["drift"] * 1e6 for line in lines]
-        bounds = [line["bound_ns"] for line in lines]
-        within = "no bound" if None in bounds else f"within {max(bounds) * 1e-6:.3g} ms"
-        drift = f"drift {min(drifts):.3g} to {max(drifts):.3g} ppm"
-        text += f", on the host's by {clock['method']} ({len(lines)} lines, {drift}, {within})"
-    if any(clock["delay_ns"]):
-        low, high = (edge * 1e-6 for edge in clock["delay_ns"])
-        text += f"; least delay {low:.3g} to {high:.3g} ms, not taken off"
-    return text + "".join(f"; {name}: {clock[name]}" for name in ("wraps", "breaks") if clock[name])
-
-
-def _emulation(emulation: dict[str, Any]) -> str:
-    factor = f" (factor {emulation['factor']:.3g})" if emulation["factor"] else ""
-    moved = f", moved by {emulation['physics']}" if emulation["physics"] else ""
-    faults = "".join(f"; fault {fault}" for fault in emulation["faults"])
-    devices = ", ".join(emulation["devices"]) or "devices"
-    return f"{devices} in {emulation['time']} time{factor}{moved}, seed {emulation['seed']}{faults}"
+    drift = max((line["drift"] * 1e6 for line in lines), key=abs, default=None)
+    error_us = max((line["bound_ns"] * 1e-3 for line in lines if line["bound_ns"] is not None), default=None)
+    return {"source": clock["source"], "method": clock["method"], "drift ppm": drift, "error us": error_us,
+            "breaks": clock["breaks"]}  # fmt: skip
 
 
 def _ends(names: list[str]) -> str:

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from tactbench.core.cli.grid import print_fields, print_records
 from tactbench.core.cli.options import format_option
 from tactbench.core.tables.text import json_text
 
@@ -38,9 +39,7 @@ def command(ctx: click.Context, family: str | None, shape: str) -> None:
         return
     for name, entries in found.items():
         click.secho(name, bold=True)
-        width = max(map(len, entries), default=0)
-        for entry, title in entries.items():
-            click.echo(f"  {entry:<{width}}  {title}")
+        print_fields([(f"  {entry}", title) for entry, title in entries.items()])
     tell_failed(registry)
 
 
@@ -63,12 +62,13 @@ def _plugins(registry: Registry, shape: str) -> None:
     if shape == "json":
         click.echo(json_text({"plugins": [asdict(row) for row in registry.plugins], "refused": refused}, indent=1))
         return
-    width = max((len(row.entry_point) for row in registry.plugins), default=0)
-    for row in sorted(registry.plugins, key=lambda row: row.status == "loaded"):
-        loaded = row.status == "loaded"
-        click.secho(f"{row.entry_point:<{width}}  ", nl=False, bold=True)
-        click.secho(f"{row.status:<7}", nl=False, fg="green" if loaded else "red")
-        click.echo(f"{row.distribution} {row.version}  {', '.join(row.brings) if loaded else row.reason}")
+    rows = sorted(registry.plugins, key=lambda row: row.status == "loaded")
+    records = [
+        {"plugin": row.entry_point, "status": row.status, "distribution": f"{row.distribution} {row.version}",
+         "brings": ", ".join(row.brings) if row.status == "loaded" else row.reason}
+        for row in rows
+    ]  # fmt: skip
+    print_records(records, "table", title="plugins", kinds=["" if row.status == "loaded" else "failed" for row in rows])
     for text in refused:
         click.secho(text, fg="red")
 

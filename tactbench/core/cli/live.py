@@ -1,22 +1,23 @@
-"""What is being recorded, while it is: on a terminal a screen drawn over and over, elsewhere a line now and then."""
+"""What is being recorded, while it is: on a terminal a screen of rich's widgets."""
 
 from __future__ import annotations
 
-import os
-import sys
-import threading
+import math
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Self
 
-from tactbench.core.cli.live_frame import Frame, force_text, losses_of, rate_text
 from tactbench.core.cli.screen import remark
-from tactbench.core.cli.stream_state import StreamState, Watched
+from tactbench.core.cli.stream_state import COUNTED, StreamState
+from tactbench.core.samples import Quality
 
 if TYPE_CHECKING:
     from types import TracebackType
 
-    from rich.console import Console
+    from rich.console import RenderableType
+    from rich.table import Table
+    from rich.text import Text
 
     from tactbench.core.plugins.interfaces import Acquisition, Rig
     from tactbench.core.samples import Block
@@ -24,33 +25,38 @@ if TYPE_CHECKING:
     from tactbench.core.spec.scene import Scene
 
 REFRESHES_PER_S = 10
-"""At most; each sends a screen of characters, 2 kB at 80 x 24, which a slow connection still carries."""
-LINE_S = 5.0
-"""Seconds between two lines where stderr is no terminal."""
+RATE_S = 2.0
+"""Seconds over which a rate is measured, and after which a stream of which nothing came is called silent."""
+BAR = 8
+"""Characters of a taxel's full bar."""
+BAD = "bold red"
 
 
 class LiveView:
     """Shows on stderr what is being recorded, from when the rig knows its streams to the end of the ``with`` block.
 
-    Give the rig of :meth:`beside` and :meth:`watch` to `acquire`. It is drawn in a thread of its own: a slow terminal
-    holds nothing back, and Ctrl-C comes amid no picture.
-
-    Parameters
-    ----------
-    scene
-        What is carried out.
-    title
-        What is shown at the top.
+    Give the rig of :meth:`beside` and :meth:`watch` to `acquire`. rich draws in a thread of its own: a slow terminal
+    holds nothing back.
     """
 
     def __init__(self, scene: Scene, title: str) -> None:
+        from rich.console import Console
+        from rich.live import Live
+
         self._scene = scene
         self._title = title
+        self._sensor: list[StreamState] = []
+        self._reference: list[StreamState] = []
         self._states: dict[str, StreamState] = {}
-        self._watched: Watched | None = None
-        self._console: Console | None = None
-        self._over = threading.Event()
-        self._thread: threading.Thread | None = None
+        self._console = Console(stderr=True, highlight=False)
+        self._live: Live | None = None
+        if self._console.is_terminal and not self._console.is_dumb_terminal:
+            self._live = Live(
+                get_renderable=self.picture, console=self._console, screen=True, refresh_per_second=REFRESHES_PER_S,
+                redirect_stdout=False, redirect_stderr=False,
+            )  # fmt: skip
+        else:
+            remark("stderr is no terminal that --live can draw on: nothing is shown.")
 
     def beside(self, rig: Rig) -> Rig:
         """Return a rig that does what `rig` does, and tells this view of its streams once they are known."""
@@ -58,60 +64,29 @@ class LiveView:
 
     def begin(self, acquisition: Acquisition) -> None:
         """Begin to draw."""
-        sensor = tuple(map(StreamState, acquisition.streams))
-        reference = tuple(map(StreamState, acquisition.reference))
-        self._watched = Watched(self._title, self._scene, sensor, reference)
-        self._states = {state.spec.name: state for state in self._watched.streams}
-        if sys.stderr.isatty() and os.environ.get("TERM", "").lower() not in ("dumb", "unknown"):
-            from rich.console import Console
-
-            # A way of its own to the terminal, whatever becomes of stderr meanwhile.
-            terminal = os.fdopen(os.dup(sys.stderr.fileno()), "w", encoding="utf-8", errors="replace")
-            self._console = Console(file=terminal, highlight=False)
-        self._start()
+        self._sensor = [StreamState(spec, rate_s=RATE_S) for spec in acquisition.streams]
+        self._reference = [StreamState(spec, rate_s=RATE_S) for spec in acquisition.reference]
+        self._states = {state.spec.name: state for state in self._sensor + self._reference}
+        if self._live is not None:
+            self._live.start()
 
     def watch(self, block: Block) -> None:
-        """Remember the newest of a block: no waiting, no drawing, no reference to the block is kept."""
+        """Remember the newest of a block; no reference to the block is kept."""
         state = self._states.get(block.stream)
         if state is not None:
             state.take(block)
 
     @contextmanager
     def paused(self) -> Iterator[None]:
-        """Leave the terminal alone for a while, for somebody who is asked something."""
-        was_drawing = self._thread is not None
-        self._stop()
+        """Leave the terminal alone meanwhile, for a prompt."""
+        drawing = self._live is not None and self._live.is_started
+        if self._live is not None:
+            self._live.stop()
         try:
             yield
         finally:
-            if was_drawing:
-                self._start()
-
-    def _start(self) -> None:
-        self._over.clear()
-        self._thread = threading.Thread(target=self._draw, name="live view")
-        self._thread.start()
-
-    def _stop(self) -> None:
-        self._over.set()
-        if self._thread is not None:
-            self._thread.join()
-            self._thread = None
-
-    def _draw(self) -> None:
-        """Draw until it is over: on the terminal's second screen, or a line now and then."""
-        assert self._watched is not None
-        if self._console is None:
-            while not self._over.wait(LINE_S):
-                remark(one_line(self._watched))
-            return
-        from rich.live import Live
-
-        frame = Frame(self._watched)
-        with Live(frame, console=self._console, screen=True, auto_refresh=False, redirect_stdout=False,
-                  redirect_stderr=False) as live:  # fmt: skip
-            while not self._over.wait(1 / REFRESHES_PER_S):
-                live.refresh()
+            if self._live is not None and drawing:
+                self._live.start()
 
     def __enter__(self) -> Self:
         return self
@@ -120,14 +95,84 @@ class LiveView:
         self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
     ) -> None:
         """Leave the terminal as it was, and the last state on it."""
-        self._stop()
-        if self._watched is None:
+        if self._live is None or not self._states:
             return
-        if self._console is None:
-            remark(one_line(self._watched))
-            return
-        with self._console.file:
-            self._console.print(Frame(self._watched), end="")
+        self._live.stop()
+        for state in self._states.values():
+            state.seen_s = None  # nothing more is to come
+        self._console.print(self.picture())
+
+    def picture(self) -> RenderableType:
+        """Return the picture of this moment; what a terminal has no room for is cut off below."""
+        from rich.columns import Columns
+        from rich.console import Group
+        from rich.progress_bar import ProgressBar
+        from rich.table import Table
+        from rich.text import Text
+
+        head = Table.grid(expand=True, padding=(0, 1))
+        head.add_column(no_wrap=True)
+        head.add_column(ratio=1)
+        force_n, _, wrong = self._force()
+        bar = ProgressBar(self._scene.profile.largest_n, max(0.0, force_n or 0.0))
+        head.add_row(Text(self._title, "bold"), Text(self._time(), justify="right"))
+        head.add_row(Text(self._force_text(), BAD if wrong else "bold"), bar)
+        every = [(state, place) for state in self._sensor for place in range(len(state.spec.channels))]
+        taxels = [(state, place) for state, place in every if state.spec.channels[place].kind == "taxel"]
+        full = max((float(state.largest[place]) for state, place in taxels if state.largest is not None), default=0.0)
+        parts: list[RenderableType] = [head, self._rates(), Text("   ".join(_others(every)), overflow="ellipsis")]
+        if taxels:
+            unit = taxels[0][0].spec.channels[taxels[0][1]].unit
+            parts.append(Text(f"{len(taxels)} taxels: change since start [{unit}]; full bar {full:.3g}", "dim"))
+            parts.append(Columns([_taxel(*one, full) for one in taxels], padding=(0, 2), column_first=True))
+        return Group(*parts)
+
+    def _rates(self) -> Table:
+        """Return a line a stream: rows, rate, marks."""
+        from rich.table import Table
+        from rich.text import Text
+
+        table = Table("stream", box=None, padding=(0, 1), pad_edge=False, header_style="dim")
+        for name in ("rows", "Hz/nominal", "lost", *(str(flag.name) for flag in COUNTED)):
+            table.add_column(name, justify="right", no_wrap=True)
+        for state in self._states.values():
+            silent_s = 0.0 if state.seen_s is None else time.monotonic() - state.seen_s
+            silent = silent_s >= RATE_S
+            rate = Text(f"silent {silent_s:.0f} s" if silent else _rate(state), BAD if silent else "")
+            counts = (state.lost, *state.counts.values())
+            table.add_row(state.spec.name, str(state.rows), rate, *(Text(str(n), BAD if n else "") for n in counts))
+        return table
+
+    def _elapsed_s(self) -> float | None:
+        """Return the seconds from the first sample to the last one, by the samples' times; None: no times yet."""
+        firsts = [state.first_ns for state in self._states.values() if state.first_ns is not None]
+        lasts = [state.last_ns for state in self._states.values() if state.last_ns is not None]
+        return (max(lasts) - min(firsts)) * 1e-9 if firsts and lasts else None
+
+    def _time(self) -> str:
+        elapsed_s, duration_s = self._elapsed_s(), self._scene.profile.duration.to("s")
+        return "waiting for samples" if elapsed_s is None else f"{elapsed_s:.1f} of {duration_s:.1f} s"
+
+    def _force(self) -> tuple[float | None, float | None, bool]:
+        """Return the reference's force (`normal` or `fz`, else the first) and the profile's [N]; whether it is bad."""
+        import numpy as np
+
+        from tactbench.core.spec import units
+
+        elapsed_s = self._elapsed_s()
+        wanted_n = None if elapsed_s is None else float(np.interp(elapsed_s, *self._scene.profile.corners))
+        found = [(one, place, channel) for one in self._reference for place, channel in enumerate(one.spec.channels)
+                 if channel.kind == "force"]  # fmt: skip
+        found.sort(key=lambda one: one[2].name not in ("normal", "fz"))
+        for state, place, channel in found[:1]:
+            if state.latest is not None and math.isfinite(state.latest[place]):
+                return float(state.latest[place]) * units.conversion(channel.unit, "N"), wanted_n, _bad(state, place)
+        return None, wanted_n, False
+
+    def _force_text(self) -> str:
+        force_n, wanted_n, _ = self._force()
+        texts = ("-" if value is None else f"{value:.2f} N" for value in (force_n, wanted_n))
+        return "force {}, wanted {}".format(*texts) if self._reference else "no reference force"
 
 
 class _ObservedRig:
@@ -144,13 +189,31 @@ class _ObservedRig:
             yield acquisition
 
 
-def one_line(watched: Watched) -> str:
-    """Return time, force, rates and losses in a line."""
-    elapsed_s = watched.elapsed_s
-    texts = ["no times yet" if elapsed_s is None else f"{elapsed_s:.1f} of {watched.duration_s:.1f} s"]
-    if watched.force() is not None:
-        texts.append(f"force {force_text(watched)}")
-    for state in watched.streams:
-        lost = losses_of(state)
-        texts.append(f"{state.spec.name} {rate_text(state)} Hz" + (f" ({lost})" if lost else ""))
-    return f"{watched.title}: {'; '.join(texts)}"
+def _bad(state: StreamState, place: int) -> bool:
+    """Return whether the last sample of a channel has a mark of quality other than a gap before it."""
+    return state.wrong is not None and bool(int(state.wrong[place]) & ~Quality.GAP)
+
+
+def _rate(state: StreamState) -> str:
+    """Return the measured rate over the nominal one [Hz]: ``99.8/100``."""
+    return "/".join("-" if rate is None else f"{rate:.4g}" for rate in (state.rate_hz, state.spec.rate_hz))
+
+
+def _others(channels: list[tuple[StreamState, int]]) -> Iterator[str]:
+    """Yield the last values of the sensor's channels that are no taxels."""
+    for state, place in channels:
+        channel = state.spec.channels[place]
+        if channel.kind != "taxel" and state.latest is not None:
+            yield f"{channel.name} {state.latest[place]:.5g} {channel.unit}"
+
+
+def _taxel(state: StreamState, place: int, full: float) -> Text:
+    """Return name, change and bar of a taxel; the change rises under load where the channel's sign is known."""
+    from rich.text import Text
+
+    channel, change = state.spec.channels[place], math.nan
+    if state.latest is not None and state.first is not None:
+        change = float(state.latest[place] - state.first[place]) * (channel.sign or 1)
+    bar = "━" * round(BAR * abs(change) / full) if full and math.isfinite(change) else ""
+    style = BAD if _bad(state, place) else "cyan" if change >= 0 else "yellow"
+    return Text(f"{channel.name[:8]:<8} {change:>+8.4g} {bar:<{BAR}}", style)

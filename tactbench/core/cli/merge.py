@@ -29,10 +29,7 @@ def command(ctx: click.Context, folders: tuple[Path, ...], out: Path) -> None:
     from tactbench.core.matrix.merge import merge
 
     merged = merge(folders, out, also=partial(_write_tables, folders))
-    done = sum(row["status"] == "done" for row in merged.rows)
-    hosts = len({row.get("host", "") for row in merged.rows})
-    remark(f"{len(merged.rows)} cells, {done} of them finished, on {hosts} host{'s' if hosts != 1 else ''}; "
-           f"{merged.recordings} recordings.")  # fmt: skip
+    remark(f"{len(merged.rows)} cells, {merged.recordings} recordings.")
     for sentence in merged.left_out:
         remark(f"Left out: {sentence}")
     click.echo(out)

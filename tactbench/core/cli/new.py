@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from importlib.resources import files
 from pathlib import Path
 from string import Template
@@ -28,16 +29,18 @@ def command(kind: str, name: str, into: Path) -> None:
     from tactbench.core.errors import UsageError
     from tactbench.core.plugins.registry import load_registry
 
-    check_name(kind, name)
+    if not re.fullmatch(NAME, name) or name == "all":
+        raise UsageError(
+            f"{name!r} is no name for a {kind}.",
+            hint=f"Lower-case letters, digits and single hyphens, a letter first, not `all`: my-{kind}, for example.",
+        )
     family = load_registry().families()[f"{kind}s"]
     if name in family:
         raise UsageError(f"A {kind} called {name} is installed already.", hint="Choose another name.")
     package = rendered(kind, name)
     taken = [path for path in package if (into / path).exists()]
     if taken:
-        raise UsageError(
-            f"{into / taken[0]} is there already{_and_more(taken)}.", hint="Give an empty folder: --into DIR."
-        )
+        raise UsageError(f"{into / taken[0]} is there already.", hint="Give an empty folder: --into DIR.")
     for path, text in package.items():
         (into / path).parent.mkdir(parents=True, exist_ok=True)
         (into / path).write_text(text, encoding="utf-8")
@@ -47,28 +50,6 @@ def command(kind: str, name: str, into: Path) -> None:
     click.echo(
         f"Try next:\n  {here}pip install -e .\n  tactbench check {name}\n  tactbench run {_TESTED_WITH[kind]} {asked}",
         err=True,
-    )
-
-
-def check_name(kind: str, name: str) -> None:
-    """Refuse a name that a plugin cannot have, or that a command line takes for something else.
-
-    Raises
-    ------
-    UsageError
-        With what is wrong and, where there is one, a name that would do.
-    """
-    import re
-
-    from tactbench.core.errors import UsageError
-
-    if re.fullmatch(NAME, name) and name != "all":
-        return
-    better = re.sub(r"[^a-z0-9]+", "-", name.lower()).strip("-").lstrip("0123456789-")
-    hint = f"Perhaps {better}." if better and better != "all" else f"Call it my-{kind}, for example."
-    raise UsageError(
-        f"{name!r} is no name for a {kind}: lower-case letters, digits and single hyphens, a letter first, not `all`.",
-        hint=hint,
     )
 
 
@@ -94,7 +75,3 @@ def rendered(kind: str, name: str) -> dict[str, str]:
             text = Template(file.read_text(encoding="utf-8")).substitute(words)
             found[places.get(template, f"{module}/{template}")] = text
     return found
-
-
-def _and_more(taken: list[str]) -> str:
-    return f", and {len(taken) - 1} more" if len(taken) > 1 else ""

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import sys
-import time
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager, nullcontext
 from typing import Any, TextIO
@@ -24,18 +23,15 @@ class Display(Progress):
         """Show what `text` returns while the rest is under way, in place of what was shown before; not in a log."""
 
 
-_QUIET_S = 5.0
-"""A log gets no further line of a stage sooner."""
 _FEW = 10
-"""Stages of so few steps have a line for each, and no estimate of the time to go: a forest and a mean differ by orders
-of magnitude."""
+"""Stages of so few steps have no estimate of the time to go: a forest and a mean differ by orders of magnitude."""
 
 
 @contextmanager
 def progress() -> Iterator[Display]:
     """Show progress on stderr."""
     if not sys.stderr.isatty():
-        yield Lines(time.monotonic)
+        yield _Lines()
         return
     # A cell in this process prints to its log: what is shown meanwhile needs a way of its own to the terminal.
     with os.fdopen(os.dup(sys.stderr.fileno()), "w", encoding="utf-8", errors="replace") as terminal:
@@ -46,50 +42,19 @@ def progress() -> Iterator[Display]:
             bar.end()
 
 
-def duration(seconds: float) -> str:
-    """Return a rough duration for readers who wait: ``40 s``, ``7 min``, ``2 h 5 min``."""
-    if seconds < 90:
-        return f"{max(1, round(seconds))} s"
-    minutes = round(seconds / 60)
-    return f"{minutes} min" if minutes < 90 else f"{minutes // 60} h {minutes % 60} min"
-
-
-class Lines(Display):
-    """One line a stage and one a finished tenth of it: readable in a log.
-
-    Parameters
-    ----------
-    clock
-        Seconds, monotonic.
-    """
-
-    def __init__(self, clock: Callable[[], float]) -> None:
-        self._clock = clock
-        self._began_s = self._printed_s = 0.0
-        self._stage, self._total, self._done, self._stopped = "", 0, 0, 0
+class _Lines(Display):
+    """One line a stage and one a finished tenth of it: readable in a log."""
 
     def begin(self, stage: str, total: int) -> None:
-        """Say what begins."""
         self._stage, self._total, self._done, self._stopped = stage, total, 0, 0
-        self._began_s = self._clock()
-        self._printed_s = self._began_s - _QUIET_S
         remark(f"{stage}: {total} to do")
 
     def advance(self, what: str, *, stopped: bool = False) -> None:
-        """Say how far it is: at the end, after the first tenth, and after further ones that took their time."""
         self._done += 1
         self._stopped += stopped
-        if self._done * 10 // self._total == (self._done - 1) * 10 // self._total:
-            return
-        now_s = self._clock()
-        if self._done == self._total or self._total <= _FEW or now_s - self._printed_s >= _QUIET_S:
-            self._printed_s = now_s
-            texts = [f"{self._stopped} stopped"] if self._stopped else []
-            left = self._total - self._done
-            if left and self._total > _FEW:
-                texts.append(f"about {duration((now_s - self._began_s) / self._done * left)} to go")
-            more = f" ({', '.join(texts)})" if texts else ""
-            remark(f"{self._stage}: {self._done}/{self._total} {what}{more}")
+        if self._done * 10 // self._total > (self._done - 1) * 10 // self._total:
+            ended = f" ({self._stopped} stopped)" if self._stopped else ""
+            remark(f"{self._stage}: {self._done}/{self._total} {what}{ended}")
 
 
 class _Bar(Display):

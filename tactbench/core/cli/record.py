@@ -99,9 +99,8 @@ def command(
             remark("\n".join(getattr(error, "__notes__", ())) or "Nothing is kept.")
         raise
     meta = made.meta
-    spent = float(meta.provenance.get("sim_s", meta.provenance.get("acquisition_s", 0.0)))
     mark = " (EMULATED)" if meta.emulation else " (SIM)" if meta.simulated else ""
-    click.echo(f"{out}: {meta.sensor.name} on {meta.rig}{mark}, {scene.indenter}, in {spent:.2f} s")
+    click.echo(f"{out}: {meta.sensor.name} on {meta.rig}{mark}, {scene.indenter}")
     for name, value in meta.assumptions.items():
         remark(f"  assumed: {name} = {value}")
     remark(f"See what is in it:  {command_line('tactbench', 'inspect', str(out))}")

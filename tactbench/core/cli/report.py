@@ -7,10 +7,11 @@ from typing import TYPE_CHECKING
 
 import click
 
+from tactbench.core.cli.options import format_option
 from tactbench.core.cli.threads import keep_threads
 
 if TYPE_CHECKING:
-    from tactbench.core.report.making import Report
+    from tactbench.core.report.page import Report
 
 
 @click.command(name="report")
@@ -21,8 +22,7 @@ if TYPE_CHECKING:
     metavar="DIR",
     help="Where page and figures are put; default: FOLDER/report.",
 )
-@click.option("--format", "shape", type=click.Choice(("table", "md", "json", "csv")), default="table",
-              show_default=True, help="How the published numbers and ours are printed.")  # fmt: skip
+@format_option("table", "md", "json", "csv")
 @click.pass_context
 def command(ctx: click.Context, folder: Path, out: Path | None, shape: str) -> None:
     """Make one page of all results in FOLDER, which is what `run --out` wrote.
@@ -34,7 +34,7 @@ def command(ctx: click.Context, folder: Path, out: Path | None, shape: str) -> N
     from tactbench.core.cli.results import opened
     from tactbench.core.cli.screen import remark
     from tactbench.core.plugins.registry import load_registry
-    from tactbench.core.report.making import make_report
+    from tactbench.core.report.page import make_report
     from tactbench.core.report.results import open_results
 
     store = opened(folder)

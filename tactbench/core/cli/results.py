@@ -9,9 +9,6 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from tactbench.core.matrix.store import Store
 
-_MOST_PRINTED = 5
-"""Rows that cannot be shown and are told one by one."""
-
 
 def is_results(folder: Path) -> bool:
     """Return whether a folder is one that ``run --out`` has made."""
@@ -23,8 +20,6 @@ def opened(folder: Path) -> Store:
     from tactbench.core.errors import UsageError
     from tactbench.core.matrix.store import Store
 
-    if folder.exists() and not folder.is_dir():
-        raise UsageError(f"{folder} is no folder.", hint="Name the folder that `tactbench run --out DIR` wrote.")
     if not is_results(folder):
         raise UsageError(f"There are no results in {folder}.", hint="Make some with `tactbench run --out DIR`.")
     return Store(folder)
@@ -42,19 +37,12 @@ def shown_rows(store: Store) -> list[dict[str, Any]]:
     from tactbench.core.errors import UsageError
     from tactbench.core.leaderboard.levels import with_levels
     from tactbench.core.statistics.replicates import over_replicates
-    from tactbench.core.tables.text import cut, visible
 
     rows = store.rows()
-    messages = [cut(visible(one), 300) for one in store.troubles]
-    if not rows:
-        raise UsageError(
-            f"{store.folder} has no row that can be shown" + (f": {messages[0]}." if messages else "."),
-            hint="Run `tactbench run` again.",
-        )
-    for one in messages[:_MOST_PRINTED]:
+    for one in store.troubles:
         remark(f"Left out: {one}")
-    if len(messages) > _MOST_PRINTED:
-        remark(f"Left out: {len(messages) - _MOST_PRINTED} more rows.")
+    if not rows:
+        raise UsageError(f"{store.folder} has no row that can be shown.", hint="Run `tactbench run` again.")
     return with_levels(over_replicates(rows), store.folder, store.provenance)
 
 

@@ -3,17 +3,15 @@
 from __future__ import annotations
 
 import os
-from collections import Counter
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from tactbench.core.cli.options import ENGINE, YES, options
+from tactbench.core.cli.options import ENGINE, RESULTS, YES, format_option, options
 from tactbench.core.cli.selection import SELECTING, requested_matrix
 from tactbench.core.cli.tables import (
-    DEFAULT_FOLDER,
     TABLE_FORMATS,
     check_destination,
     print_table,
@@ -31,11 +29,9 @@ _REASON_CHARACTERS = 200
 
 @click.command(name="run")
 @options(*SELECTING, *ENGINE)
-@click.option("--out", type=click.Path(path_type=Path), default=DEFAULT_FOLDER, show_default=True,
-              metavar="DIR", help="Where results lie; what is there already is reused.")  # fmt: skip
+@RESULTS
 @YES
-@click.option("--format", "shape", type=click.Choice(TABLE_FORMATS), default="table", show_default=True,
-              help="How the leaderboard is printed.")  # fmt: skip
+@format_option(*TABLE_FORMATS)
 @click.pass_context
 def command(
     ctx: click.Context,
@@ -51,7 +47,8 @@ def command(
 ) -> None:
     """Acquire, evaluate, rank.
 
-    Without options: the whole of benchmarks.yaml. Options select from it or replace its choices.
+    Without options: the whole of benchmarks.yaml. Options select from it or replace its choices. What the result folder
+    holds already is reused.
     """
     check_destination(shape)
     keep_threads()
@@ -88,7 +85,7 @@ def command(
     table = build_table(rows, provenance, questions=questions_of(rows))
     print_table(table, shape, view_of(store.folder))
     write_tables(rows, store.folder, provenance, table)
-    _farewell(outcome, rows, store.folder)
+    _farewell(outcome, store.folder)
     ctx.exit(1 if outcome.failures else 0)
 
 
@@ -103,14 +100,13 @@ def _so_far(rows: Sequence[Mapping[str, Any]]) -> str:
     return plain_text(grids(build_table(over_replicates(rows))), console().width)
 
 
-def _farewell(outcome: Outcome, rows: Sequence[Mapping[str, Any]], folder: Path) -> None:
+def _farewell(outcome: Outcome, folder: Path) -> None:
     """Say what there is now, and where it lies."""
     from tactbench.core.cli.screen import remark
 
-    answers = len(outcome.rows)
-    of = f"{len(rows)} cells" if answers == len(rows) else f"{len(rows)} cells over their replicates"
-    remark(f"\n{of}: {answers - outcome.computed} of {answers} answers were found finished, {outcome.computed} "
-           f"computed now; {outcome.recorded} recordings made now.")  # fmt: skip
+    found = len(outcome.rows) - outcome.computed
+    remark(f"\n{found} of {len(outcome.rows)} answers were found finished, {outcome.computed} computed now; "
+           f"{outcome.recorded} recordings made now.")  # fmt: skip
     remark(f"Files: {folder}/leaderboard.md, .csv, .json; results.sqlite; recordings/; cells/")
     tell_stopped(outcome.failures, folder)
 
@@ -120,19 +116,12 @@ def tell_stopped(rows: Sequence[Mapping[str, Any]], folder: Path) -> None:
     if not rows:
         return
     from tactbench.core.cli.screen import remark
-    from tactbench.core.tables.text import command_line
+    from tactbench.core.tables.text import command_line, cut
 
-    counts = Counter(row["status"] for row in rows)
-    remark(f"\nStopped: {', '.join(f'{number} {status}' for status, number in sorted(counts.items()))}.")
+    remark(f"\nStopped: {len(rows)}.")
     for row in rows:
-        remark(f"  {row['status']:<13}  {row['cell']}: {one_line(row['reason'])}")
+        reason = cut(" ".join(str(row["reason"]).split()), _REASON_CHARACTERS)
+        remark(f"  {row['status']:<13}  {row['cell']}: {reason}")
     which = str(rows[0]["cell"]), "--out", str(folder)
     remark(f"Look into one:  {command_line('tactbench', 'why', *which)}")
     remark(f"Try it again:   {command_line('tactbench', 'why', *which, '--again')}")
-
-
-def one_line(reason: str) -> str:
-    """Return `reason` in one line of readable length; what could move a terminal's cursor is shown, not done."""
-    from tactbench.core.tables.text import cut, visible
-
-    return cut(visible(" ".join(str(reason).split())), _REASON_CHARACTERS)

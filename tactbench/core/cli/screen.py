@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import sys
 from typing import TYPE_CHECKING
 
@@ -12,7 +11,7 @@ if TYPE_CHECKING:
     from rich.console import Console
 
 WITHOUT_EDGE = 400
-"""Wide enough for every column of names of ordinary length."""
+"""Width of a table in a file or a pipe, which have no edge: enough for every column of names of ordinary length."""
 
 
 def console() -> Console:
@@ -21,13 +20,7 @@ def console() -> Console:
 
     if sys.stdout.isatty():
         return Console(highlight=False)
-    return Console(highlight=False, width=width_without_terminal(), color_system=None)
-
-
-def width_without_terminal() -> int:
-    """Return how wide a table may be in a file or a pipe, which have no edge; wider if ``COLUMNS`` says so."""
-    columns = os.environ.get("COLUMNS", "")
-    return max(int(columns) if columns.isdecimal() else 0, WITHOUT_EDGE)
+    return Console(highlight=False, width=WITHOUT_EDGE, color_system=None)
 
 
 def remark(text: str) -> None:

@@ -1,7 +1,8 @@
-"""``tactbench show``: specs side by side."""
+"""``tactbench show``: sensors side by side, and anything else field by field."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -10,14 +11,17 @@ from tactbench.core.cli.options import format_option
 from tactbench.core.tables.text import json_text
 
 if TYPE_CHECKING:
-    from tactbench.core.plugins.registry import Owned, Registry
+    from tactbench.core.plugins.registry import Owned
+    from tactbench.core.spec.scene import Scene
     from tactbench.core.spec.sensor import SensorSpec
+    from tactbench.core.spec.task import TaskSpec
+    from tactbench.core.tables.text_table import TextTable
 
 
 @click.command(name="show")
 @click.argument("names", nargs=-1, required=True)
 @click.option("--all", "everything", is_flag=True,
-              help="Show every parameter and its source; of a task in JSON every scene of its campaigns.")  # fmt: skip
+              help="Show every parameter of a sensor and its source.")  # fmt: skip
 @format_option("table", "json", "md")
 def command(names: tuple[str, ...], everything: bool, shape: str) -> None:
     """Show sensors side by side (Table I and data sheets), or details of anything else that is installed."""
@@ -28,100 +32,113 @@ def command(names: tuple[str, ...], everything: bool, shape: str) -> None:
     families = registry.families()
     for name in names:
         if not any(name in family for family in families.values()):
-            known = [known for family in families.values() for known in family.names()]
-            raise UnknownNameError("plugin", name, known)
-    only_sensors = all(name in registry.sensors for name in names)
-    if shape == "md" and not only_sensors:
-        raise UsageError("Only sensors can be shown as Markdown.", hint="Leave --format out, or take --format json.")
-    if shape == "json" and not only_sensors:
-        found = [shown for name in names for shown in _described(name, registry)]
-        for shown in found if not everything else ():
-            _count_campaigns(shown)
-        click.echo(json_text(found[0] if len(found) == 1 else found, indent=1))
-        return
+            raise UnknownNameError("plugin", name, [known for family in families.values() for known in family.names()])
+    found = [family.owned(name) for name in names for family in families.values() if name in family]
     sensors = [registry.sensors[name].spec for name in names if name in registry.sensors]
+    if shape == "json":
+        click.echo(json_text([_described(owned) for owned in found], indent=1))
+        return
+    if shape == "md":
+        from tactbench.core.report.datasheet import parameters_markdown
+
+        if len(sensors) < len(found):
+            raise UsageError("Only sensors can be shown as Markdown.", hint="Leave --format out, or take json.")
+        click.echo(parameters_markdown(sensors), nl=False)
+        return
     if sensors:
-        _sensors(sensors, everything, shape)
-    if not only_sensors:
-        _pages([family.owned(name) for name in names for kind, family in families.items()
-                if kind != "sensors" and name in family])  # fmt: skip
+        _sensors(sensors, everything)
+    for owned in found:
+        if owned.descriptor.name not in registry.sensors:
+            _page(owned)
 
 
-def _count_campaigns(shown: dict[str, Any]) -> None:
-    """Put the number of scenes in the place of those of each campaign: thousands of lines."""
-    campaigns = shown.get("spec", {}).pop("campaigns", None)
-    if campaigns:
-        shown["spec"]["campaign_scenes"] = {name: len(scenes) for name, scenes in campaigns.items()}
-
-
-def _described(name: str, registry: Registry) -> list[dict[str, Any]]:
-    """Return what is installed under `name`, one description for each kind of plugin that has it."""
-    found = []
-    for owned in (family.owned(name) for family in registry.families().values() if name in family):
-        dumped: dict[str, Any] = owned.descriptor.model_dump(mode="json")
-        if hasattr(owned.descriptor, "transducer"):
-            dumped["spec"] = _sensor(owned.descriptor.spec)
-        found.append({"brought by": _owner(owned), **dumped})
-    return found
-
-
-def _sensor(spec: SensorSpec) -> dict[str, Any]:
-    return {**spec.model_dump(mode="json"), "data_sheet": spec.data_sheet.model_dump(mode="json")}
+def _described(owned: Owned[Any]) -> dict[str, Any]:
+    """Return a descriptor as plain data."""
+    dumped: dict[str, Any] = owned.descriptor.model_dump(mode="json")
+    if hasattr(owned.descriptor, "transducer"):
+        dumped["spec"]["data_sheet"] = owned.descriptor.spec.data_sheet.model_dump(mode="json")
+    return {"brought by": _owner(owned), **dumped}
 
 
 def _owner(owned: Owned[Any]) -> str:
     return f"{owned.distribution} {owned.version} ({owned.module})"
 
 
-def _pages(owners: list[Owned[Any]]) -> None:
-    from rich import box
-    from rich.table import Table
-    from rich.text import Text
-
-    from tactbench.core.cli.pages import page_of
-    from tactbench.core.cli.screen import console
-
-    screen = console()
-    for owned in owners:
-        title, sections = page_of(owned.descriptor)
-        screen.print(Text(title, style="bold"))
-        screen.print(Text(f"brought by {_owner(owned)}", style="dim"))
-        for section in sections:
-            if section.title:
-                screen.print(Text(f"\n{section.title}", style="bold"))
-            grid = Table(box=box.SIMPLE_HEAD if section.head else None, show_header=bool(section.head),
-                         pad_edge=False, padding=(0, 1))  # fmt: skip
-            for place in range(max(map(len, section.lines))):
-                name = section.head[place] if section.head else ""
-                words = " ".join([name, *(line[place] for line in section.lines)]).split()
-                grid.add_column(Text(name), min_width=max(map(len, words), default=1) if section.head else None)
-            for line in section.lines:
-                grid.add_row(*map(Text, line))
-            screen.print(grid)
-        screen.print()
+_HIDDEN = ("name", "scenes", "campaigns", "published", "protocols", "dimensions", "parameters")
+"""Of what is stated: has a table of its own, or none on the screen; JSON has it."""
 
 
-def _sensors(sensors: list[SensorSpec], everything: bool, shape: str) -> None:
-    from tactbench.core.cli.grid import print_tables
-    from tactbench.core.report.datasheet import data_sheets, details, parameters_markdown, sensor_table, table_one
+def _page(owned: Owned[Any]) -> None:
+    """Print what a descriptor states, field by field, and its scenes or parameters as tables."""
+    from tactbench.core.cli.grid import field_text, print_fields, print_tables
+    from tactbench.core.leaderboard.names import LOWER_IS_BETTER
+    from tactbench.core.spec.rig import TaskDescriptor
+    from tactbench.core.tables.text_table import text_table
 
-    if shape == "json":
-        click.echo(json_text([_sensor(sensor) for sensor in sensors], indent=1))
-        return
-    if shape == "md":
-        click.echo(parameters_markdown(sensors), nl=False)
-        return
-    rows = table_one(sensors)
-    print_tables(
-        [sensor_table("Sensor comparison (Table I of Karl et al. 2016)", sensors, rows, with_source=everything)]
-    )
-    print_tables([sensor_table("Data sheet", sensors, data_sheets(sensors), with_source=everything)])
-    rows += data_sheets(sensors)
-    more = details(sensors)
-    if everything:
-        print_tables([sensor_table("Everything the specs state", sensors, more, with_source=True)])
+    one = owned.descriptor
+    stated = one.spec if isinstance(one, TaskDescriptor) else one
+    fields = [(type(one).__name__.removesuffix("Descriptor").lower(), one.name), ("brought by", _owner(owned))]
+    fields += [(name.replace("_", " "), field_text(value)) for name, value in stated if name not in _HIDDEN]
+    if isinstance(one, TaskDescriptor):
+        fields.append(("better", "lower" if stated.metric in LOWER_IS_BETTER else "higher"))
+        fields.append(("recordings", "" if stated.scenes else "made elsewhere: run --rig replay --recordings DIR"))
+        tables = [*_task_tables(stated)]
     else:
-        print_tables([sensor_table("Readings", sensors, more[:6], with_source=False)])
-        tags = [fact.tag for row in more + rows for fact in row.facts if fact.tag]
-        counted = ", ".join(f"{tags.count(tag)} {tag}" for tag in ("sourced", "measured", "derived", "assumed"))
-        click.echo(f"Facts behind these sensors: {counted}. See them all with --all.")
+        parameters = getattr(one, "dimensions", getattr(one, "parameters", {}))
+        lines = [(name, f"{p.default:g}", p.unit, p.range, p.text) for name, p in parameters.items()]
+        head = ("parameter", "default", "unit", "may be", "what it is")
+        tables = [text_table(f"Given as {one.name}:NAME=VALUE,…", head, lines, numeric=("default",))] if lines else []
+    print_fields([(name, text) for name, text in fields if text])
+    if tables:
+        click.echo()
+        print_tables(tables)
+    click.echo()
+
+
+def _task_tables(task: TaskSpec) -> Iterator[TextTable]:
+    from tactbench.core.evaluation.protocols import PROTOCOLS
+    from tactbench.core.tables.numbers import suffix
+    from tactbench.core.tables.text_table import text_table
+
+    groups: dict[tuple[str, str], list[Scene]] = {}
+    for planned in task.scenes:
+        groups.setdefault((str(planned.role), str(planned.scene.profile.duration)), []).append(planned.scene)
+    lines = []
+    for (role, duration), scenes in groups.items():
+        indenters = dict.fromkeys(str(scene.indenter) for scene in scenes)
+        places = {(str(scene.placement.x), str(scene.placement.s)) for scene in scenes}
+        forces = dict.fromkeys(f"{scene.profile.largest_n:g}" for scene in scenes)
+        slides = dict.fromkeys(str(scene.slide.speed) for scene in scenes if scene.slide)
+        lines.append((role, str(len(scenes)), ", ".join(indenters), str(len(places)), f"{', '.join(forces)} N",
+                      ", ".join(slides), duration))  # fmt: skip
+    if lines:
+        head = ("role", "scenes", "indenter", "places", "force up to", "slides at", "duration")
+        yield text_table("Recordings", head, lines, numeric=("scenes", "places"))
+    marks = {True: " (uses test-set statistics: †)", False: ""}
+    specs = [PROTOCOLS[name] for name in task.protocols if name in PROTOCOLS]
+    protocols = [(spec.name, spec.title + marks[spec.uses_test_statistics]) for spec in specs]
+    yield text_table("Protocols, the default first", ("protocol", "what it does"), protocols)
+    published = [
+        (f"{one.score:g}{suffix(task.unit)}", one.sensor or "any", one.estimator or "their own", one.protocol,
+         one.reference + (f" ({one.remark})" if one.remark else ""))
+        for one in task.published
+    ]  # fmt: skip
+    if published:
+        yield text_table("Published", ("score", "sensor", "estimator", "protocol", "reference"), published)
+
+
+def _sensors(sensors: list[SensorSpec], everything: bool) -> None:
+    from tactbench.core.cli.grid import print_tables
+    from tactbench.core.report.datasheet import data_sheets, details, sensor_table, table_one
+
+    one, sheets, more = table_one(sensors), data_sheets(sensors), details(sensors)
+    print_tables(
+        [
+            sensor_table("Sensor comparison (Table I of Karl et al. 2016)", sensors, one, with_source=everything),
+            sensor_table("Data sheet", sensors, sheets, with_source=everything),
+            sensor_table("Everything the specs state" if everything else "Readings", sensors,
+                         more if everything else more[:6], with_source=everything),
+        ]
+    )  # fmt: skip
+    if not everything:
+        click.echo("Every parameter with its source: --all.")

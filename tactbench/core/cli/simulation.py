@@ -47,63 +47,53 @@ def simulation_of(
         If a word of --effects is not one, nobody declares what --set names, it cannot have its value, or the rig is not
         simulated at all.
     """
+    from pydantic import ValidationError
+
     from tactbench.core.errors import UnknownNameError, UsageError
     from tactbench.core.spec.scene import NUISANCES, Simulation
 
-    change = _settings(settings)
+    given = dict(map(_setting, settings))
+    change: dict[str, Any] = {name: given.pop(name) for name in (*_NAMED, "tolerance") if name in given}
     if effects is not None:
         change["effects"] = tuple(word.strip() for word in effects.split(",") if word.strip())
-    if not change and (stated is None or not stated.nuisances):
+    if not change and not given and (stated is None or not stated.nuisances):
         return stated
     descriptor = registry.rigs[rig]
     if not descriptor.simulated:
         raise UsageError(f"--effects and --set are for simulated rigs; {rig} is not one.", hint="Leave them out.")
     _check(registry, descriptor, change)
+    before = stated or Simulation()
     if "rung" in change or "tolerance" in change:  # one takes the other's place
         change = {"rung": None, "tolerance": None, **change}
-    given = change.pop("nuisances", {})
-    before = stated or Simulation()
-    simulation = Simulation.model_validate(
-        {**before.model_dump(), **change, "nuisances": {**dict(before.nuisances), **given}}
-    )
+    change["nuisances"] = {**dict(before.nuisances), **given}
+    try:
+        simulation = Simulation.model_validate({**before.model_dump(), **change})
+    except ValidationError as error:
+        raise UsageError(f"--set: {error.errors()[0]['msg']}.", hint="See `tactbench run --help`.") from error
     specs = [registry.sensors[name].spec for name in sensors]
     known = dict.fromkeys([*NUISANCES, *(name for sensor in specs for name in sensor.settable())])
     for name, _ in simulation.nuisances:
         if name not in known:
-            raise UnknownNameError("nuisance", name, [*known, *(_NAMED if name in given else ())])
+            raise UnknownNameError("nuisance", name, known)
     for sensor in specs:
         sensor.with_nuisances(dict(simulation.nuisances))
     return simulation
 
 
-def _settings(given: Sequence[str]) -> dict[str, Any]:
-    """Return what --set changes; raises UsageError for what is no pair, or is given twice."""
+def _setting(text: str) -> tuple[str, Any]:
+    """Return a name and a value of --set; raises UsageError for a value that is no number where one is expected."""
     from tactbench.core.errors import UsageError
 
-    named: dict[str, Any] = {}
-    numbers: dict[str, float] = {}
-    for text in given:
-        name, _, value = text.partition("=")
-        if name in named or name in numbers:
-            raise UsageError(f"--set gives {name} twice.", hint="Give it once.")
-        if name in _NAMED and value:
-            named[name] = value
-            continue
-        try:
-            numbers[name] = float(value)
-        except ValueError:
-            numbers[name] = math.nan
-        if not math.isfinite(numbers[name]):
-            raise UsageError(
-                f"--set {text!r} is not a name and a number.", hint="Write --set placement_scatter_mm=0.3."
-            )
-    if "tolerance" in numbers:
-        named["tolerance"] = numbers.pop("tolerance")
-        if named["tolerance"] <= 0 or "rung" in named:
-            raise UsageError(
-                "--set tolerance is above 0, and picks the rung.", hint="Leave out --set rung, or the tolerance."
-            )
-    return {**named, "nuisances": numbers} if numbers else named
+    name, _, value = text.partition("=")
+    if name in _NAMED and value:
+        return name, value
+    try:
+        number = float(value)
+    except ValueError:
+        number = math.nan
+    if not math.isfinite(number):
+        raise UsageError(f"--set {text!r} is not a name and a number.", hint="Write --set placement_scatter_mm=0.3.")
+    return name, number
 
 
 def _check(registry: Registry, rig: RigDescriptor, change: dict[str, Any]) -> None:

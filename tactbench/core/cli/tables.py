@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from tactbench.core.cli.screen import console, width_without_terminal
+from tactbench.core.cli.screen import WITHOUT_EDGE, console
 
 if TYPE_CHECKING:
     from tactbench.core.leaderboard.table import Table
@@ -57,27 +57,15 @@ def questions_of(rows: Iterable[Mapping[str, Any]]) -> dict[str, str]:
 
 
 def format_of(shape: str | None, to: Path | None) -> str:
-    """Return the format that is meant: the one asked for, or what the name of the file says.
-
-    Raises
-    ------
-    UsageError
-        If the name of the file says nothing, or another format than was asked for.
-    """
-    if to is None:
-        return shape or "table"
+    """Return the format asked for, or what the name of the file says; raises UsageError if neither says one."""
     from tactbench.core.errors import UsageError
     from tactbench.core.leaderboard.formats import SUFFIXES
 
-    named = SUFFIXES.get(to.suffix.lower())
-    if named is None and shape is None:
-        raise UsageError(
-            f"What format {to} is to have cannot be told from its name.",
-            hint=f"Let it end in {', '.join(SUFFIXES)}, or give --format.",
-        )
-    if named is not None and shape is not None and named not in (shape, "table"):
-        raise UsageError(f"{to} is named as {named} and --format asks for {shape}.", hint="Leave out one of them.")
-    return shape or str(named)
+    found = shape or ("table" if to is None else SUFFIXES.get(to.suffix.lower()))
+    if found is None:
+        raise UsageError(f"The name of {to} says no format.",
+                         hint=f"Let it end in {', '.join(SUFFIXES)}, or give --format.")  # fmt: skip
+    return str(found)
 
 
 def check_destination(shape: str, to: Path | None = None) -> None:
@@ -92,7 +80,7 @@ def check_destination(shape: str, to: Path | None = None) -> None:
 
     if shape in NO_TEXT and to is None and sys.stdout.isatty():
         raise UsageError(
-            f"{'Parquet' if shape == 'parquet' else 'An Excel file'} is no text for a terminal.",
+            f"{shape} is no text for a terminal.",
             hint=f"Write it to a file: `tactbench leaderboard --to leaderboard.{shape}`, or into a pipe.",
         )
 
@@ -121,7 +109,7 @@ def print_table(table: Table, shape: str, view: View, *, to: Path | None = None)
     if shape == "table" and to is None and sys.stdout.isatty():
         show(document(table, view), console())
         return
-    content = rendered(table, shape, view, width_without_terminal())
+    content = rendered(table, shape, view, WITHOUT_EDGE)
     if to is None:
         click.echo(content, nl=False)
         return

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-from typing import TYPE_CHECKING
+import math
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -12,7 +12,10 @@ from tactbench.core.cli.simulation import EFFECTS
 from tactbench.core.cli.threads import keep_threads
 
 if TYPE_CHECKING:
+    from tactbench.core.plugins.checks import Verdict
     from tactbench.core.plugins.registry import Registry
+
+_COLUMNS = ("", "what", "found", "expected", "bound", "unit", "source")
 
 
 @click.group(name="twin")
@@ -30,8 +33,7 @@ def command() -> None:
 def explain(sensor: str, task: str, rounds: int, effects: str | None, shape: str) -> None:
     """Show which effects a task's scenes get, which they do not, why, and what each costs or would cost.
 
-    It ends with the task's score with the effects chosen beside that with all of them, unless that takes more than a
-    minute.
+    It ends with the task's score with the effects chosen beside that with all of them.
     """
     keep_threads()
     from tactbench.core.cli.explanations import print_explanations
@@ -45,32 +47,48 @@ def explain(sensor: str, task: str, rounds: int, effects: str | None, shape: str
 
 
 @command.command(name="verify")
-@click.option("--real", is_flag=True, help="Compare with figures measured on real sensors instead of oracles.")
-@click.option("--recordings", type=click.Path(path_type=Path), metavar="DIR",
-              help="With --real: check these recordings instead of simulated ones.")  # fmt: skip
-@click.option("--only", multiple=True, metavar="NAME",
-              help="Check, group of checks, or with --real a sensor; repeatable.")  # fmt: skip
 @format_option("table", "json", "csv")
 @click.pass_context
-def verify(ctx: click.Context, real: bool, recordings: Path | None, only: tuple[str, ...], shape: str) -> None:
-    """Compare the simulation with its oracles, or (--real) with real sensors.
+def verify(ctx: click.Context, shape: str) -> None:
+    """Compare the simulation with laws and closed forms.
 
-    Exit code 1 if an oracle fails. A miss against real sensors is printed with its cause and is no failure.
+    Exit code 1 if it misses one.
     """
     keep_threads()
-    from tactbench.core.cli.verdicts import carry_out, likeness_checks, oracle_checks, print_verdicts
+    from tactbench.core.cli.grid import print_grid, print_records
+    from tactbench.core.cli.screen import remark
     from tactbench.core.errors import UsageError
-    from tactbench.core.plugins.registry import load_registry
+    from tactbench.core.plugins.registry import load_object, load_registry
 
     registry = load_registry()
     rig = simulated_rig(registry)
-    if recordings and not real:
-        raise UsageError("--recordings belongs to --real.", hint="Add --real, or leave it out.")
-    sensors = [name for name in only if real and name in registry.sensors]
-    checks = likeness_checks(registry, rig, sensors, recordings) if real else oracle_checks(registry, rig)
-    found = carry_out(checks, [name for name in only if name not in sensors])
-    print_verdicts(found, shape, real=real)
-    ctx.exit(0 if real or all(verdict.met for _, verdict, _ in found) else 1)
+    where = registry.rigs[rig].verification
+    if where is None:
+        hint = "See `tactbench show` with its name."
+        raise UsageError(f"The rig {rig!r} states no laws to be held against.", hint=hint)
+    found: list[Verdict] = list(load_object(where)())
+    if shape != "table":
+        print_records([_record(verdict) for verdict in found], shape)
+    else:
+        kinds = ["" if verdict.met else "failed" for verdict in found]
+        lines = [_line(verdict) for verdict in found]
+        print_grid(rig, _COLUMNS, lines, numeric=("found", "expected", "bound"), kinds=kinds)
+    met = sum(verdict.met for verdict in found)
+    remark(f"{met} of {len(found)} within their bounds.")
+    ctx.exit(0 if met == len(found) else 1)
+
+
+def _line(verdict: Verdict) -> dict[str, str]:
+    numbers = (f"{verdict.found:.5g}", f"{verdict.expected:.5g}", f"{verdict.bound:.2g}")
+    unit = "" if verdict.unit == "1" else verdict.unit
+    met = "ok" if verdict.met else "MISS"
+    return dict(zip(_COLUMNS, (met, verdict.name, *numbers, unit, verdict.source), strict=True))
+
+
+def _record(verdict: Verdict) -> dict[str, Any]:
+    numbers = {name: getattr(verdict, name) for name in ("found", "expected", "bound")}
+    finite = {name: number if math.isfinite(number) else None for name, number in numbers.items()}
+    return {"what": verdict.name, "met": verdict.met, **finite, "unit": verdict.unit, "source": verdict.source}
 
 
 def simulated_rig(registry: Registry) -> str:

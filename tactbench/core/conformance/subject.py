@@ -75,7 +75,7 @@ class Subject:
         named = {"features_by": self.descriptor.spec.features_by} if self.kind == "task" else dict(self.descriptor)
         fields = (
             *("transducer", "driver", "emulator", "log_reader", "features_by", "where", "called_for"),
-            *("verification", "work_precision", "likeness", "file", "check"),
+            *("verification", "work_precision", "file", "check"),
         )
         return {field: named[field] for field in fields if isinstance(named.get(field), str)}
 

@@ -3,23 +3,32 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from tactbench.core.cost.ladder_rows import Record, by_score, mark_fronts, opening, stopped, timed
-from tactbench.core.cost.rounds import BUDGET_S, measure
-from tactbench.core.cost.timed_estimators import TimedEstimator, timed_estimator
-from tactbench.core.errors import UsageError
+import numpy as np
+
+from tactbench.core.cost.precision import front
+from tactbench.core.cost.rounds import THREADS, TimedEstimator, Timing, measure, timed_estimator
+from tactbench.core.errors import NotApplicable, TactbenchError, UsageError
 from tactbench.core.evaluation.dataset import load_dataset
+from tactbench.core.evaluation.delay import answer_delay_ms, tail_ms
 from tactbench.core.evaluation.metrics import metric_called
-from tactbench.core.matrix.plan import plan_cells
 from tactbench.core.matrix.progress import Progress
 from tactbench.core.matrix.run import EngineChoice, Outcome, run_matrix
-from tactbench.core.matrix.store import Store
+from tactbench.core.matrix.store import Row, Store
 from tactbench.core.plugins.registry import Registry
 from tactbench.core.spec.matrix import MatrixSpec
+from tactbench.core.spec.rig import EstimatorDescriptor
 from tactbench.core.statistics.replicates import over_replicates
+
+Record = dict[str, Any]
+_MEASURED = (
+    "n_train", "n_test", "n_features", "fit_s", "fit_s_q1", "fit_s_q3", "fits", "batch_s_per_row", "batches",
+    "latency_ms_p50", "latency_ms_p95", "latency_ms_max", "latency_n", "answer_delay_ms", "answer_delay_ms_q1",
+    "answer_delay_ms_q3",
+)  # fmt: skip
 
 
 class Ladder(NamedTuple):
@@ -58,17 +67,13 @@ def climb(
     Raises
     ------
     UsageError
-        If something is asked for that is not there, more than one protocol or split, or a task of whole recordings.
+        If something is asked for that is not there, or a task of whole recordings.
 
     Returns
     -------
     Ladder
         A row for every estimator, also for those that were skipped or failed; the best score first.
     """
-    ways = {(cell.protocol, cell.split) for cell in plan_cells(matrix, matrix.sensors, registry)}
-    if len(ways) > 1:
-        several = ", ".join(sorted(f"{protocol} {split or ''}".strip() for protocol, split in ways))
-        raise UsageError(f"One ladder is for one protocol and one split, not {several}.", hint="Ask for one of them.")
     task = registry.tasks[matrix.tasks[0].name].spec
     if task.answer_per == "recording":
         raise UsageError(
@@ -88,15 +93,14 @@ def climb(
             continue
         try:
             timed_estimators[row["cell"]] = timed_estimator(
-                task, descriptor, row["params"], row["protocol"], row["split"], data, seed=matrix.seed, threads=1
+                task, descriptor, row["params"], row["protocol"], row["split"], data, seed=matrix.seed
             )
         except Exception as error:
             rows[row["cell"]] |= stopped(error)
     times = measure(timed_estimators, rounds=rounds, seed=matrix.seed, clock=clock, progress=progress)
     load = os.getloadavg()[0] if hasattr(os, "getloadavg") else None
-    scores = {row["cell"].removesuffix(f"/{row['repeat']}"): row["scores"] for row in done}
     for cell, one in timed_estimators.items():
-        rows[cell] |= timed(one, times[cell], scores[cell], rounds)
+        rows[cell] |= timed(one, times[cell])
     better = metric_called(task.metric).higher_is_better
     found = by_score(list(rows.values()), higher_is_better=better)
     mark_fronts(found, higher_is_better=better)
@@ -104,7 +108,7 @@ def climb(
     measured = {
         "higher_is_better": better, "fold": fold,
         "remarks": list(dict.fromkeys(remark for one in timed_estimators.values() for remark in one.remarks)),
-        "rounds": rounds, "budget_s": BUDGET_S, "threads": 1, "load": load, "cores": os.cpu_count(),
+        "rounds": rounds, "threads": THREADS, "load": load, "cores": os.cpu_count(),
     }  # fmt: skip
     return Ladder(_about(outcome) | measured, found)
 
@@ -117,3 +121,84 @@ def _about(outcome: Outcome) -> dict[str, Any]:
         **{key: first[key] for key in keys},
         "provenance": {key: value for key, value in outcome.provenance.items() if key != "jobs"},
     }
+
+
+def opening(row: Row, descriptor: EstimatorDescriptor) -> Record:
+    """Return what a cell's row says of an estimator; what is still to be measured is None."""
+    kept = ("chosen", "status", "reason", "score", "ci_low", "ci_high", "ci_method", "search_s")
+    return {
+        "estimator": row["estimator"],
+        "is_baseline": row["is_baseline"],
+        "looks_at": descriptor.looks_at,
+        "params": {**descriptor.params, **row["params"]},
+        **{key: row[key] for key in kept},
+        **dict.fromkeys(_MEASURED),
+        "delay_parts_ms": {},
+        "front_fit": False,
+        "front_delay": False,
+    }
+
+
+def stopped(error: Exception) -> Record:
+    """Return what changes in a row whose estimator could not be timed: it was skipped, or failed, and why."""
+    reason = str(error) if isinstance(error, TactbenchError) else f"{type(error).__name__}: {error}"
+    return {"status": "skipped" if isinstance(error, NotApplicable) else "failed", "reason": reason}
+
+
+def timed(one: TimedEstimator, timing: Timing) -> Record:
+    """Return what changes in a row by having been timed."""
+    if timing.trouble is not None:
+        return stopped(timing.trouble)
+    quartiles = {
+        name: np.quantile(1e3 * np.array(spent), (0.25, 0.5, 0.75))
+        for name, spent in (("prediction", timing.latency_s), ("features", timing.features_s))
+        if spent
+    }
+    parts = {**one.delay_parts_ms, **{name: float(median) for name, (_, median, _) in quartiles.items()}}
+    low, median, high = sum(quartiles.values()).tolist()  # type: ignore[union-attr]
+    delay = answer_delay_ms(parts, one.looks_at)
+    p95, largest = tail_ms(np.array(timing.latency_s))
+    fit_q1, fit_s, fit_q3 = np.quantile(timing.fit_s, (0.25, 0.5, 0.75)).tolist()
+    return {
+        "n_train": len(one.X_train),
+        "n_test": len(one.X_test),
+        "n_features": one.X_train.shape[1],
+        "fit_s": fit_s,
+        "fit_s_q1": fit_q1,
+        "fit_s_q3": fit_q3,
+        "fits": len(timing.fit_s),
+        "batch_s_per_row": float(np.median(timing.batch_s)) / len(one.X_test),
+        "batches": len(timing.batch_s),
+        "latency_ms_p50": parts["prediction"],
+        "latency_ms_p95": p95,
+        "latency_ms_max": largest,
+        "latency_n": len(timing.latency_s),
+        "answer_delay_ms": delay,
+        "answer_delay_ms_q1": None if delay is None else delay + low - median,
+        "answer_delay_ms_q3": None if delay is None else delay + high - median,
+        "delay_parts_ms": parts,
+    }
+
+
+def mark_fronts(rows: Sequence[Record], *, higher_is_better: bool) -> None:
+    """Mark who is beaten by nobody.
+
+    Trivial answers compete with nobody: they do not look at the sensor. Nor does who is no better than the best of
+    those that look at nothing.
+    """
+    sign = -1.0 if higher_is_better else 1.0
+    done = [row for row in rows if row["status"] == "done"]
+    trivial = (row for row in done if row["is_baseline"] and row.get("looks_at") not in ("time", "reference"))
+    bar = min((sign * row["score"] for row in trivial), default=float("inf"))
+    able = [row for row in done if not row["is_baseline"] and sign * row["score"] < bar]
+    for mark, time in (("front_fit", "fit_s"), ("front_delay", "answer_delay_ms")):
+        measured = [row for row in able if row[time] is not None]
+        for row in front(measured, seconds=lambda row, key=time: row[key], error=lambda row: sign * row["score"]):  # type: ignore[misc]
+            row[mark] = True
+
+
+def by_score(rows: Sequence[Record], *, higher_is_better: bool) -> list[Record]:
+    """Return the rows, the best score first; those without one last, in the order given."""
+    sign = -1.0 if higher_is_better else 1.0
+    scored = [row for row in rows if row["score"] is not None]
+    return sorted(scored, key=lambda row: float(sign * row["score"])) + [row for row in rows if row["score"] is None]

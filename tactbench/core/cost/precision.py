@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import NamedTuple, TypeVar
+from typing import Any, NamedTuple, TypeVar
 
 from tactbench.core.errors import TactbenchError
 from tactbench.core.matrix.progress import Progress
@@ -50,7 +50,7 @@ def measured(study: CostStudy, subject: str, progress: Progress) -> tuple[list[C
     """Carry out the jobs of a study, and say of those that its subject cannot have why not."""
     points: list[CostPoint] = []
     skipped: list[Skipped] = []
-    progress.begin(subject, study.total)
+    progress.begin(subject, len(study.jobs))
     for job in study.jobs:
         progress.working(job.label)
         try:
@@ -89,30 +89,28 @@ def draw(points: Sequence[CostPoint], title: str, paths: Sequence[Path]) -> None
     from matplotlib.figure import Figure
 
     panels = diagrams(points)
-    families = list(dict.fromkeys(str(point.settings.get("family", "")) for point in points))
     across = min(2, len(panels))
     down = math.ceil(len(panels) / across)
     figure = Figure(figsize=(6.4 * across, 4.6 * down), layout="constrained")
     axes = figure.subplots(down, across, squeeze=False)
     for axis in axes.flat[len(panels) :]:
         axis.set_visible(False)
+
+    def mark(axis: Any, own: Sequence[CostPoint], shape: str, **more: Any) -> None:
+        axis.loglog([p.seconds for p in own], [max(p.error, 1e-12) for p in own], shape, **more)
+
     for axis, ((subject, observable), group) in zip(axes.flat, panels.items(), strict=False):
-        for place, family in enumerate(families):
+        families = list(dict.fromkeys(str(point.settings.get("family", "")) for point in group))
+        for family, (colour, shape) in zip(families, MARKS, strict=False):
             own = [point for point in group if str(point.settings.get("family", "")) == family]
-            if own:
-                colour, shape = MARKS[place % len(MARKS)]
-                axis.loglog([p.seconds for p in own], [max(p.error, 1e-12) for p in own], shape, color=colour, ms=6,
-                            label=family, ls="none")  # fmt: skip
-        best = precise(group)
-        axis.plot([p.seconds for p in best], [max(p.error, 1e-12) for p in best], color="#555555", lw=1, zorder=0)
-        for point in group:
-            if point.default:
-                axis.plot(point.seconds, point.error, "o", ms=15, mfc="none", mec="black", mew=1.6, label="default")
+            mark(axis, own, shape, color=colour, ms=6, label=family)
+        mark(axis, precise(group), "-", color="#555555", lw=1, zorder=0)
+        mark(axis, [p for p in group if p.default], "o", ms=15, mfc="none", mec="black", mew=1.6, label="default")
         if math.isfinite(group[0].floor):
             axis.axhline(SHARE * group[0].floor, color="black", ls="--", lw=0.9, label="a third of the noise")
-        axis.set_title(f"{subject}, {observable}")
-        axis.set_xlabel("seconds per recording")
-        axis.set_ylabel(f"error, rms [{group[0].unit}]")
+        axis.set(
+            title=f"{subject}, {observable}", xlabel="seconds per recording", ylabel=f"error, rms [{group[0].unit}]"
+        )
         axis.grid(True, which="major", alpha=0.3)
         axis.legend(fontsize=8, frameon=False)
     figure.suptitle(title)

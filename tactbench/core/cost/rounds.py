@@ -14,20 +14,109 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from tactbench.core.cost.timed_estimators import TimedEstimator
-from tactbench.core.evaluation.delay import single_row_latency_s, single_row_preparation_s
-from tactbench.core.evaluation.fitting import answers, fit
+from tactbench.core.evaluation.cell import load_task
+from tactbench.core.evaluation.dataset import Dataset
+from tactbench.core.evaluation.delay import features_s, single_row_latency_s, single_row_preparation_s, stated_delay_ms
+from tactbench.core.evaluation.fitting import answers, builder, features_of, fit, select
+from tactbench.core.evaluation.metrics import Metric, metric_called
+from tactbench.core.evaluation.sets import prepared
+from tactbench.core.evaluation.summaries import without_windows
 from tactbench.core.matrix.progress import Progress
 from tactbench.core.plugins.interfaces import Estimator
+from tactbench.core.samples import FloatArray
+from tactbench.core.spec.rig import EstimatorDescriptor
+from tactbench.core.spec.task import TaskSpec
 
 WARM_UP_ROWS = 300
 """Rows of the fit that nobody times: it imports what a library imports late, and starts its threads."""
 
 BUDGET_S = 20.0
 """Of one fit, or of one answer to all test rows, unless a caller says otherwise."""
+THREADS = 1
+"""That BLAS, OpenMP and estimators may use."""
 REPEATS, REPEATS_S = 10, 0.05
 """What takes milliseconds is done up to ten times a round, within 0.05 s, and its median counts: one interruption by
 the machine would else be all that is measured."""
+
+
+@dataclass(frozen=True)
+class TimedEstimator:
+    """An estimator with its parameters chosen, and the training and test rows of one fold."""
+
+    name: str
+    build: Callable[[], Estimator]
+    """Returns a fresh estimator; its imports are done."""
+    fold: str
+    X_train: FloatArray
+    y_train: npt.NDArray[Any]
+    X_test: FloatArray
+    y_test: npt.NDArray[Any]
+    n_classes: int
+    metric: Metric | None
+    """None: the score is not of rows"""
+    looks_at: str = "features"
+    k: int = 0
+    """Rows that the mean filter looks back."""
+    tared: bool = False
+    delay_parts_ms: Mapping[str, float] = field(default_factory=dict)
+    """Parts of the answer delay that no machine decides; see `tactbench.core.evaluation.delay`."""
+    remarks: tuple[str, ...] = ()
+    """on these parts"""
+    features_s: Callable[[Callable[[], float]], float] | None = None
+    """Given a clock, the seconds that the features of a frame take; None: those of a row are made from readings"""
+
+
+def timed_estimator(
+    task: TaskSpec,
+    descriptor: EstimatorDescriptor,
+    params: Mapping[str, Any],
+    protocol: str,
+    split: str,
+    data: Dataset,
+    *,
+    seed: int,
+) -> TimedEstimator:
+    """Prepare `descriptor` as a cell does, for the last fold: the one whose model a cell's times are taken from.
+
+    Parameters
+    ----------
+    params
+        Those other than the estimator's defaults; they are not searched. Others are chosen anew on the validation
+        data, which is not timed here: the cell's row has it.
+    split
+        One of those that the recordings can serve, as the cell's row names it.
+    """
+    metric, frames = metric_called(task.metric), task.answer_per == "frame"
+    loaded = load_task(task, data, protocol, split, estimator=descriptor, seed=seed)
+    descriptor = without_windows(descriptor, task)
+    made, rules, assignment = loaded.data, loaded.rules, loaded.assignments[-1]
+    build = builder(descriptor, params, task, seed, 1)
+    choice = select(descriptor, params, build, made, rules, assignment, metric, Counter())
+    k = choice.k if choice else descriptor.window_grid[0]
+    fold = prepared(assignment, made, rules, k, Counter())
+    chosen = choice.params if choice else {}
+    parts, remarks = stated_delay_ms(data, made, task, rules, descriptor, k)
+
+    def of_a_frame_s(clock: Callable[[], float]) -> float:
+        return features_s(data, task, rules, descriptor, fold.test.X, k, clock) or 0.0
+
+    return TimedEstimator(
+        name=descriptor.name,
+        build=lambda: build(chosen),
+        fold=assignment.name,
+        X_train=features_of(fold.train, descriptor),
+        y_train=fold.train.y,
+        X_test=features_of(fold.test, descriptor),
+        y_test=fold.test.y,
+        n_classes=0 if task.kind == "events" else len(made.classes),
+        metric=metric if task.kind != "events" else None,
+        looks_at=descriptor.looks_at,
+        k=k,
+        tared=rules.tare,
+        delay_parts_ms=parts,
+        remarks=remarks,
+        features_s=of_a_frame_s if frames else None,
+    )
 
 
 @dataclass
@@ -42,8 +131,6 @@ class Timing:
     """of ``predict`` on one row, all calls of all rounds"""
     features_s: list[float] = field(default_factory=list)
     """of making one row of features ready, all calls of all rounds; none for answers that look at no reading"""
-    answers: npt.NDArray[Any] | None = None
-    """to the test rows, by the last fit"""
     trouble: Exception | None = None
     """what ended it"""
     _model: Estimator | None = field(default=None, repr=False)
@@ -54,7 +141,6 @@ def measure(
     *,
     rounds: int,
     budget_s: float = BUDGET_S,
-    threads: int = 1,
     seed: int,
     clock: Callable[[], float],
     progress: Progress,
@@ -67,8 +153,6 @@ def measure(
         How often; each round fits anew, answers all test rows, and single ones.
     budget_s
         A fit, or an answer to all test rows, that took longer once is not repeated.
-    threads
-        Threads that BLAS and OpenMP may use.
     clock
         Seconds, monotonic.
 
@@ -82,9 +166,8 @@ def measure(
     for one in timed_estimators.values():
         progress.working(f"warm-up of {one.name}")
         _warm_up(one)
-    limits = importlib.import_module("threadpoolctl").threadpool_limits(limits=threads)
     progress.begin("timing", rounds * len(timed_estimators))
-    with limits, _what_is_there_kept():
+    with importlib.import_module("threadpoolctl").threadpool_limits(limits=THREADS):
         for number in range(rounds):
             for key in rng.permutation(sorted(timed_estimators)).tolist():
                 one, timing = timed_estimators[key], found[key]
@@ -122,7 +205,7 @@ def _fit(one: TimedEstimator, timing: Timing) -> None:
 
 def _answer(one: TimedEstimator, timing: Timing) -> None:
     assert timing._model is not None
-    timing.answers = answers(timing._model, one.X_test, one.name, one.n_classes, one.y_test.shape[1:])
+    answers(timing._model, one.X_test, one.name, one.n_classes, one.y_test.shape[1:])
 
 
 def _median_s(work: Callable[[], None], clock: Callable[[], float]) -> float:
@@ -141,22 +224,6 @@ def _warm_up(one: TimedEstimator) -> None:
         model = one.build()
         model.fit(one.X_train[places], one.y_train[places])
         model.predict(one.X_test[:1])
-
-
-@contextmanager
-def _what_is_there_kept() -> Iterator[None]:
-    """Let collections pass over the modules that are loaded: they take longer than most of what is timed.
-
-    What the caller had kept from collections stays kept: both cannot be told apart afterwards.
-    """
-    was_kept = gc.get_freeze_count() > 0
-    gc.collect()
-    gc.freeze()
-    try:
-        yield
-    finally:
-        if not was_kept:
-            gc.unfreeze()
 
 
 @contextmanager

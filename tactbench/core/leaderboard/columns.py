@@ -27,26 +27,24 @@ class Column(NamedTuple):
     """What it is sorted by, times in seconds, intervals by their middle; None: a column of words."""
     timed: bool = False
     """Whether no seed decides it: it belongs to the host that was timed."""
-    default: bool = False
-    """Whether it is printed unless all columns are asked for."""
 
 
-def _score(shown: str, key: str, *, default: bool = False) -> Column:
-    return Column(shown, lambda row: score(row.get(key), row["unit"]), lambda row: row.get(key), default=default)
+def _score(shown: str, key: str) -> Column:
+    return Column(shown, lambda row: score(row.get(key), row["unit"]), lambda row: row.get(key))
 
 
-def _interval(shown: str, low: str, high: str, *, default: bool = False) -> Column:
+def _interval(shown: str, low: str, high: str) -> Column:
     def middle(row: Row) -> float | None:
         return None if row.get(low) is None or row.get(high) is None else (row[low] + row[high]) / 2
 
-    return Column(shown, lambda row: interval(row.get(low), row.get(high), row["unit"]), middle, default=default)
+    return Column(shown, lambda row: interval(row.get(low), row.get(high), row["unit"]), middle)
 
 
-def _time(shown: str, key: str, per_second: float = 1.0, *, default: bool = False) -> Column:
+def _time(shown: str, key: str, per_second: float = 1.0) -> Column:
     def seconds(row: Row) -> float | None:
         return None if row.get(key) is None else row[key] / per_second
 
-    return Column(shown, lambda row: duration(seconds(row)), seconds, timed=True, default=default)
+    return Column(shown, lambda row: duration(seconds(row)), seconds, timed=True)
 
 
 def _one_campaign(row: Row) -> str:
@@ -65,26 +63,25 @@ def _right(row: Row) -> str:
 _RANKED: dict[str, str] = {"place": "rank", "notes": "marks"}
 """Columns that the block of a row decides."""
 OF_ROWS: dict[str, Column] = {
-    "sensor": Column("sensor", lambda row: visible(str(row["sensor"])), default=True),
-    "level": Column("level", lambda row: visible(str(row.get(LEVEL) or ABSENT)), timed=True, default=True),
-    "estimator": Column("estimator", answer_name, default=True),
-    "score": _score("score", "score", default=True),
-    "interval": _interval("interval", "ci_low", "ci_high", default=True),
-    "one campaign": Column("one_campaign", _one_campaign, lambda row: row.get("score_min"), default=True),
-    "beyond floor": _score("beyond_floor", "score_beyond_floor", default=True),
+    "sensor": Column("sensor", lambda row: visible(str(row["sensor"]))),
+    "level": Column("level", lambda row: visible(str(row.get(LEVEL) or ABSENT)), timed=True),
+    "estimator": Column("estimator", answer_name),
+    "score": _score("score", "score"),
+    "interval": _interval("interval", "ci_low", "ci_high"),
+    "range": Column("one_campaign", _one_campaign, lambda row: row.get("score_min")),
+    "beyond floor": _score("beyond_floor", "score_beyond_floor"),
     "interval beyond floor": _interval("beyond_floor_interval", "beyond_floor_ci_low", "beyond_floor_ci_high"),
     "true error": _score("true_error", "true_score"),
     "recordings right": Column("recordings_right", _right, lambda row: row.get("recordings_right")),
-    "published": _score("published", "published", default=True),
+    "published": _score("published", "published"),
     "test samples": Column("n_test", lambda row: whole(row["n_test"]), lambda row: row["n_test"]),
     "delay after touch": Column(
         "answer_delay",
         lambda row: delay(row.get("answer_delay_ms"), row.get("delay_parts_ms")),
         lambda row: None if row.get("answer_delay_ms") is None else row["answer_delay_ms"] / 1e3,
         timed=True,
-        default=True,
     ),
-    "training": _time("fit", "fit_s", default=True),
+    "training": _time("fit", "fit_s"),
     "simulation": _time("sim", "sim_s"),
     "latency p50": _time("latency_p50", "latency_ms_p50", 1e3),
     "latency p95": Column(
@@ -94,9 +91,12 @@ OF_ROWS: dict[str, Column] = {
         timed=True,
     ),
 }
-COLUMNS = ("place", *OF_ROWS, "notes")
+COLUMNS = ("place", "sensor", "level", "estimator", "score", "notes", *list(OF_ROWS)[4:])
 SHOWN = {name: OF_ROWS[name].shown if name in OF_ROWS else _RANKED[name] for name in COLUMNS}
-DEFAULT = tuple(name for name in COLUMNS if name in _RANKED or OF_ROWS[name].default)
+WIDE = ("interval beyond floor", "true error", "recordings right", "test samples", "simulation", "latency p50",
+        "latency p95")  # fmt: skip
+"""Columns that are printed only where all are asked for."""
+DEFAULT = tuple(name for name in COLUMNS if name not in WIDE)
 NUMERIC = frozenset(("place", *(name for name, column in OF_ROWS.items() if column.value)))
 
 
@@ -139,13 +139,3 @@ def line_of(row: Row, placing: Rank | None, names: Sequence[str], marks: Sequenc
     # An absent value is empty: the dash means one thing, that an answer has no place.
     texts = {name: "" if text == ABSENT and name != "place" else text for name, text in texts.items()}
     return Line(row, texts, "baseline" if row["is_baseline"] else "result", placing)
-
-
-def row_interval(row: Row) -> str:
-    """Return a row's interval; where too few replicates carry one, the range of their scores, named so."""
-    text = interval(row["ci_low"], row["ci_high"], row["unit"])
-    count = row.get("n_replicates")
-    if text != ABSENT or not count:
-        return text
-    spread = interval(row.get("score_min"), row.get("score_max"), row["unit"])
-    return "one replicate" if count == 1 else spread if spread == ABSENT else f"range {spread}"

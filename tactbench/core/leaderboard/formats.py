@@ -2,24 +2,29 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import io
+import math
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
+import tactbench
 from tactbench.core.errors import UsageError
 from tactbench.core.files import replace_file
-from tactbench.core.leaderboard.blocks import Block
-from tactbench.core.leaderboard.names import Row, distinct
-from tactbench.core.leaderboard.records import csv_text, json_array, parquet, xlsx
+from tactbench.core.leaderboard.columns import SHOWN
+from tactbench.core.leaderboard.names import Row
 from tactbench.core.leaderboard.sentences import NO_BETTER
-from tactbench.core.leaderboard.table import Table, build_table
+from tactbench.core.leaderboard.table import Block, Table, build_table
 from tactbench.core.leaderboard.view import DEFAULT_VIEW, WHOLE, View, document, grids
+from tactbench.core.spec.row import FORMAT, JSON_KEYS, NESTED, OF_REPLICATES, RowModel
 from tactbench.core.statistics.replicates import counted
 from tactbench.core.tables import markdown as markdown_format
 from tactbench.core.tables import terminal
+from tactbench.core.tables.csv_text import csv_text
 from tactbench.core.tables.latex import latex_table
 from tactbench.core.tables.numbers import whole
-from tactbench.core.tables.text import visible
+from tactbench.core.tables.text import json_text, visible
 from tactbench.core.tables.text_table import TextTable
 
 SUFFIXES = {
@@ -30,8 +35,8 @@ SUFFIXES = {
 IN_FOLDER = ("md", "csv", "json")
 """A run's result folder has these, ``leaderboard.md`` and so on; the others are made when asked for."""
 _IN_A_PAPER = ("sensor", "estimator", "score", "interval", "published")
-_COLUMNS = {"sensor": "l", "estimator": r"p{0.24\columnwidth}", "notes": "l"}
-"""How LaTeX sets columns that are no numbers: long names of estimators go on in a further line."""
+_LONG = 12
+"""Letters of a name in a paper from which its column breaks it."""
 
 
 def plain_text(table: Table, width: int = 240, view: View = DEFAULT_VIEW) -> str:
@@ -57,7 +62,9 @@ def latex(table: Table, view: View = DEFAULT_VIEW) -> str:
 
 def _in_a_paper(block: Block, grid: TextTable, names: Sequence[str], number: int) -> str:
     """Return a block as LaTeX; a paper gives no commands, and no places unless they were asked for."""
-    lines = [dict(zip(grid.columns, line, strict=True)) for line in grid.lines]
+    # Cells without a score stand above the rule: trivial answers alone are below it.
+    order = sorted(range(len(grid.lines)), key=lambda place: grid.kinds[place] == "baseline")
+    lines = [dict(zip(grid.columns, grid.lines[place], strict=True)) for place in order]
     marked = [line.get("notes") or (NO_BETTER if line.get("place") == NO_BETTER else "") for line in lines]
     names = [name for name in names if name in grid.columns and name != "notes"]
     shown = (tuple(line[name].replace(" … ", "–") for name in names) for line in lines)
@@ -70,26 +77,34 @@ def _in_a_paper(block: Block, grid: TextTable, names: Sequence[str], number: int
         lines=tuple((*line, mark) for line, mark in zip(shown, marked, strict=True)),
         notes=tuple(f"{note.text.rstrip('.')}." for note in block.notes if note.printed),
     ).compact()
-    rule = grid.kinds.index("baseline") if "baseline" in grid.kinds[1:] else None
-    columns = "".join(_COLUMNS.get(name, "r") for name in table.columns)
+    trivial = grid.kinds.count("baseline")
+    rule = len(lines) - trivial if 0 < trivial < len(lines) else None
+    columns = "".join(map(_column, table.columns, zip(*table.lines, strict=True)))
     return latex_table(table, number=number, columns=f"@{{}}{columns}@{{}}", rule=rule)
+
+
+def _column(name: str, texts: Sequence[str]) -> str:
+    """Return how LaTeX sets a column: long names go on in a further line."""
+    if name not in ("sensor", "estimator", "notes"):
+        return "r"
+    return r"p{0.23\columnwidth}" if max(map(len, texts)) > _LONG else "l"
 
 
 def _caption(block: Block) -> str:
     """Return the title of a block, its setting, where it comes from, and how many samples and what intervals are of."""
     rows = [line.row for line in block.lines if line.kind == "result"]
     counts = sorted({row["n_test"] for row in rows if row["n_test"] is not None})
-    over = distinct(
-        ("", (row["n_replicates"], row["replicate_unit"]))
+    over = {
+        (int(row["n_replicates"]), visible(str(row["replicate_unit"])))
         for row in rows
         if row["ci_low"] is not None and row.get("n_replicates")
-    ).get("", [])
-    sentences = [block.title, block.setting.replace(" · ", ", "), block.origin]
+    }
+    sentences = [block.title, f"Score: {block.setting.replace(' · ', ', ')}", block.origin]
     if counts:
         sentences.append(f"n = {'–'.join(map(whole, dict.fromkeys((counts[0], counts[-1]))))} test samples")
     if len(over) == 1:
-        number, unit = over[0]
-        sentences.append(f"Intervals are over {counted(number, 'campaign' if unit == 'replicate' else visible(unit))}")
+        number, unit = over.pop()
+        sentences.append(f"Intervals are over {counted(number, 'campaign' if unit == 'replicate' else unit)}")
     if any(line.kind == "baseline" for line in block.lines):
         sentences.append("Below the rule: trivial answers")
     return " ".join(sentence if sentence.endswith("?") else f"{sentence}." for sentence in sentences)
@@ -115,7 +130,7 @@ def rendered(table: Table, shape: str, view: View = WHOLE, width: int = 240) -> 
     if shape in ("md", "latex"):
         text = markdown(table, view) if shape == "md" else latex(table, view)
     else:
-        text = csv_text(table) if shape == "csv" else json_array(table)
+        text = csv_text(*flat_records(table)) if shape == "csv" else json_array(table)
     return text.encode("utf-8", "replace")
 
 
@@ -140,3 +155,127 @@ def write_tables(
             hint="Make room or give another folder; the results themselves are safe.",
         ) from error
     return tuple(paths)
+
+
+RANK_KEYS = ("rank", "rank_low", "rank_high", "rank_tied")
+"""Where a row stands in its block; they follow the keys of the row."""
+
+_FIELDS = list(RowModel.model_fields)
+OF_THE_MACHINE = {
+    *_FIELDS[_FIELDS.index("sim_s") : _FIELDS.index("simulated")],
+    "search", "recordings", "key", "events", "operating_points",
+}  # fmt: skip
+"""Keys that machine, place or hour decide, not the seed alone."""
+
+FORMAT_VERSION = "1"
+_RANKS = {"rank": int, "rank_low": int, "rank_high": int, "rank_tied": bool}
+
+
+def keys(table: Table) -> tuple[str, ...]:
+    """Return the keys that a table's records have, before their ranks."""
+    every = (*JSON_KEYS, *OF_REPLICATES)
+    return every if table.times else tuple(key for key in every if key not in OF_THE_MACHINE)
+
+
+def records(table: Table) -> Iterator[tuple[dict[str, Any], dict[str, str]]]:
+    """Yield each line's row, ranks among it, and its texts by what their columns are called for programs."""
+    chosen = keys(table)
+    for line in table.lines:
+        one = line.placing
+        ranks = (one.place, one.low, one.high, one.tied) if one else (None, None, None, None)
+        row = {key: line.row.get(key) for key in chosen} | dict(zip(RANK_KEYS, ranks, strict=True))
+        yield row, {SHOWN[name]: text for name, text in line.texts.items()}
+
+
+def flat_records(table: Table) -> tuple[list[str], list[list[Any]]]:
+    """Return names of columns and lines for formats whose cells hold one value: lists and tables are JSON."""
+    names = [*keys(table), *RANK_KEYS, *(f"shown_{SHOWN[name]}" for name in table.columns)]
+    return names, [[*(_flat(*one) for one in row.items()), *shown.values()] for row, shown in records(table)]
+
+
+def _flat(key: str, value: Any) -> Any:
+    if key in NESTED:
+        return json_text(value)
+    return visible(value) if isinstance(value, str) else value
+
+
+def json_array(table: Table) -> str:
+    """Return a table's records as a JSON array, one a line: every key, and the text of its columns in ``shown``."""
+    lines = (json_text(values | {"shown": shown}) for values, shown in records(table))
+    return "[\n" + ",\n".join(lines) + "\n]\n"
+
+
+def parquet(table: Table) -> bytes:
+    """Return a table's records as a Parquet file: lists and tables as JSON text, versions and provenance as metadata.
+
+    Raises
+    ------
+    UsageError
+        If pyarrow is not installed.
+    """
+    try:
+        import pyarrow as pa
+        import pyarrow.parquet as pq
+    except ImportError as error:
+        raise _lacking("Parquet", "pyarrow", "parquet", error) from error
+    types = {bool: pa.bool_(), float: pa.float64(), int: pa.int64(), str: pa.string()}
+    names, lines = flat_records(table)
+    metadata = {
+        "tactbench.format": "tactbench-leaderboard",
+        "tactbench.format_version": FORMAT_VERSION,
+        "tactbench.version": tactbench.__version__,
+        "tactbench.provenance": json_text(list(table.provenance), sort_keys=True),
+    }
+    schema = pa.schema([(name, types[_kind(name)]) for name in names], metadata=metadata)
+    out = io.BytesIO()
+    columns = zip(*lines, strict=True) if lines else [()] * len(names)
+    pq.write_table(pa.table(list(map(list, columns)), schema=schema), out, compression="zstd")
+    return out.getvalue()
+
+
+def _lacking(what: str, library: str, extra: str, error: ImportError) -> UsageError:
+    return UsageError(
+        f"{what} needs {library}, which cannot be imported: {error}.",
+        hint=f"Install it with `pip install 'tactbench[{extra}]'`.",
+    )
+
+
+def _kind(name: str) -> type:
+    """Return what a column holds: truth values, numbers, whole numbers or text; lists and tables are text."""
+    types = FORMAT.get(name) or {_RANKS.get(name, str)}
+    return next((one for one in (bool, float, int) if one in types), str)
+
+
+def xlsx(table: Table) -> bytes:
+    """Return a table's records as a workbook: numbers as numbers, no formula, and a sheet of what is said of them.
+
+    Raises
+    ------
+    UsageError
+        If openpyxl is not installed.
+    """
+    try:
+        from openpyxl import Workbook
+    except ImportError as error:
+        raise _lacking("An Excel file", "openpyxl", "xlsx", error) from error
+    book = Workbook(write_only=True)
+    names, lines = flat_records(table)
+    said = [one for block in table.blocks for one in (block.title, block.setting, block.origin, *block.verdict)]
+    sheets = {"leaderboard": [names, *lines], "notes": [[one] for one in (*said, *table.notes, *table.footer)]}
+    for title, rows in sheets.items():
+        sheet = book.create_sheet(title)
+        for row in rows:
+            sheet.append([_cell(sheet, value) for value in row])
+    out = io.BytesIO()
+    book.save(out)
+    return out.getvalue()
+
+
+def _cell(sheet: Any, value: Any) -> Any:
+    from openpyxl.cell import WriteOnlyCell
+
+    if isinstance(value, str):
+        cell = WriteOnlyCell(sheet, value=visible(value))
+        cell.data_type = "s"  # a text that begins with = is no formula
+        return cell
+    return None if isinstance(value, float) and not math.isfinite(value) else value

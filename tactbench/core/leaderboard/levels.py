@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Mapping, Sequence
-from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -48,12 +47,9 @@ def read_levels(folder: Path) -> dict[str, dict[str, Any]]:
 
 def merge_levels(folders: Sequence[Path], into: Path) -> None:
     """Write what was checked in any of `folders` into another one; of two levels of one sensor the lower one."""
-    found = sorted(
-        chain.from_iterable(read_levels(folder).items() for folder in folders),
-        key=lambda one: (_LEVELS.index(one[1]["level"]), json.dumps(one[1], sort_keys=True)),
-        reverse=True,
-    )
-    for sensor, facts in dict(found).items():
+    found = [one for folder in folders for one in read_levels(folder).items()]
+    # The last one that is written stays.
+    for sensor, facts in sorted(found, key=lambda one: (-_LEVELS.index(one[1]["level"]), json.dumps(one[1]))):
         write_level(into, sensor, facts)
 
 

@@ -1,10 +1,13 @@
-"""What rows, metrics and answers are called in tables."""
+"""What rows, metrics and answers are called in tables, and what trivial answers they are held against."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterable, Mapping
+from operator import itemgetter
 from typing import Any, TypeVar
 
+from tactbench.core.evaluation.protocols import shots
 from tactbench.core.spec.row import LOWER_IS_BETTER as LOWER_IS_BETTER
 from tactbench.core.tables.text import visible
 
@@ -26,6 +29,12 @@ METRIC_NAMES = {
     "balanced_accuracy": "balanced accuracy",
     "event_f1": "event F1",
 }
+_SPLITS = {
+    "roles": "tested on recordings apart from training",
+    "in-session": "split in-session: each recording cut in time",
+    "shuffled": "split shuffled: rows dealt at random",
+}
+"""Splits that are not named by what they keep apart."""
 
 
 def sensor_name(row: Row) -> str:
@@ -44,6 +53,11 @@ def metric_name(row: Row) -> str:
     """Return the metric with its unit: ``RMSE [N]``."""
     unit = f" [{row['unit']}]" if row["unit"] != "1" else ""
     return visible(f"{METRIC_NAMES.get(row['metric'], row['metric'])}{unit}")
+
+
+def split_name(split: str) -> str:
+    """Return what is kept apart between training and test."""
+    return _SPLITS.get(split, f"split {'' if shots(split) else 'by '}{split}")
 
 
 def sign_of(row: Row) -> float:
@@ -66,9 +80,54 @@ def grouped(members: Iterable[_Value], key: Callable[[_Value], _Key]) -> dict[_K
     return groups
 
 
-def distinct(pairs: Iterable[tuple[_Key, _Value]]) -> dict[_Key, list[_Value]]:
-    """Return the different values of each key, both in the order in which they come."""
-    found: dict[_Key, dict[_Value, None]] = {}
-    for key, value in pairs:
-        found.setdefault(key, {})[value] = None
-    return {key: list(values) for key, values in found.items()}
+comparison_key = itemgetter("sensor", "task", "rig", "protocol", "split")
+"""What answers must share to be held against a trivial one."""
+WORSE_END = {1.0: "ci_high", -1.0: "ci_low"}
+"""The worse end of an interval by `sign_of`: of an error, and of what is the higher the better."""
+
+
+def error_of(row: Row) -> float:
+    """Return a score as a number that is the lower the better; one that is no finite number is the worst."""
+    return sign_of(row) * row["score"] if math.isfinite(row["score"]) else math.inf
+
+
+class Bars:
+    """The score that each answer is held against: the best trivial one of its own sensor, whatever it looks at."""
+
+    def __init__(self, rows: Iterable[Row]) -> None:
+        """Take the finished trivial answers from `rows`; an oracle is none."""
+        trivial = (row for row in rows if row["is_baseline"] and row["status"] == "done")
+        groups = grouped((row for row in trivial if row.get("looks_at") != "reference"), comparison_key)
+        self._best = {key: min(alike, key=error_of) for key, alike in groups.items()}
+
+    def trivial(self, row: Row) -> Row | None:
+        """Return the trivial answer; None where it is not among the rows, and only its score may be known."""
+        return self._best.get(comparison_key(row))
+
+    def score(self, row: Row) -> float | None:
+        """Return its score; None where there is no trivial answer."""
+        trivial = self.trivial(row)
+        return row.get("baseline") if trivial is None else trivial["score"]
+
+    def name(self, row: Row) -> str:
+        """Return what it is called."""
+        trivial = self.trivial(row)
+        return "the trivial answer" if trivial is None else answer_name(trivial)
+
+    def no_better(self, row: Row) -> bool:
+        """Return whether the score of an answer is no better."""
+        return _reaches(error_of(row), row, self.score(row))
+
+    def unshown(self, row: Row) -> bool:
+        """Return whether the interval of an answer holds the score of the trivial one, or lies beyond it."""
+        end = row[WORSE_END[sign_of(row)]]
+        return end is not None and _reaches(sign_of(row) * end, row, self.score(row))
+
+
+def no_better(row: Row) -> bool:
+    """Return whether an answer is no better than the trivial one that used no more than it."""
+    return _reaches(error_of(row), row, row.get("baseline"))
+
+
+def _reaches(error: float, row: Row, bar: float | None) -> bool:
+    return bar is not None and error >= sign_of(row) * bar

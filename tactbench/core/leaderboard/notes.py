@@ -14,19 +14,11 @@ MOST_CHANNELS = 4
 
 
 def picked(row: Row) -> str:
-    """Return what an answer chose on validation data: k of `window_grid` with its meaning, others by name."""
-    parts = []
-    for key, value in sorted(row["chosen"].items()):
-        name, _, fold = str(key).partition(" of fold ")
-        text = f"{value:g}" if isinstance(value, int | float) else str(value)
-        where = f" of fold {fold}" if fold else ""
-        if name == "k":
-            parts.append(f"k = {text} samples before the newest in the mean filter{where}")
-        elif name == "threshold":
-            parts.append(f"{name} = {text}{where} (of the score that {row['estimator']} gives a frame)")
-        else:
-            parts.append(f"{name.rstrip('_')} = {text}{where} (parameter of {row['estimator']})")
-    return ", ".join(parts)
+    """Return what was chosen on validation data: parameters, and `k`, the samples that the mean filter looks back."""
+    return ", ".join(
+        f"{key} = {value:g}" if isinstance(value, int | float) else f"{key} = {value}"
+        for key, value in sorted(row["chosen"].items())
+    )
 
 
 def count_texts(counts: Mapping[str, int]) -> list[str]:

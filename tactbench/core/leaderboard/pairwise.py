@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 from itertools import chain
 from typing import Any, Literal
 
 from tactbench.core.errors import UnknownNameError
-from tactbench.core.leaderboard.names import Row, answer_name, grouped, hardware_name, metric_name
+from tactbench.core.leaderboard.names import Row, answer_name, grouped, hardware_name, metric_name, split_name
 from tactbench.core.spec.matrix import ComparisonChoice
 from tactbench.core.statistics.paired import Difference, FoldDifference, difference, holm, over_folds
 from tactbench.core.tables.numbers import ABSENT, score, signed, suffix
@@ -43,10 +42,8 @@ class PairwiseComparison:
     difference: Difference | None = None
     folds: FoldDifference | None = None
     """the same over folds whose training data overlap, where there are several"""
-    declared: bool = False
-    """the matrix says that it is run to compare these"""
     p_corrected: float | None = None
-    """p corrected for all declared comparisons; None: exploratory"""
+    """p corrected for all comparisons that the matrix declares; None: exploratory"""
 
     @property
     def row(self) -> Row:
@@ -90,16 +87,7 @@ def folder_comparisons(
     return _compared("folders", first, second, *(_answers(_in_task(rows, task)) for rows in (first_rows, second_rows)))
 
 
-def asked_in_several_ways(rows: Sequence[Row]) -> Iterator[PairwiseComparison]:
-    """Compare finished answers under each further protocol, and each further split, with that under the first."""
-    finished = [row for row in _answers(rows) if row["status"] == "done"]
-    kinds: tuple[Kind, ...] = ("protocols", "splits")
-    for kind in kinds:
-        for first, *others in grouped(finished, partial(_key, kind)).values():
-            yield from (_pair(kind, _NAMES[kind](first), _NAMES[kind](other), first, other) for other in others)
-
-
-def _answers(rows: Sequence[Row]) -> list[Row]:
+def _answers(rows: Iterable[Row]) -> list[Row]:
     return [row for row in rows if not row["is_baseline"]]
 
 
@@ -122,7 +110,7 @@ def with_declared(
     every = [pair for choice in declared for pair in _declared(rows, choice)]
     family = {pair.cells: pair.difference.p for pair in reversed(every) if pair.difference is not None}
     corrected = dict(zip(family, holm(list(family.values())), strict=True))
-    return [replace(pair, declared=pair.cells in corrected, p_corrected=corrected.get(pair.cells)) for pair in found]
+    return [replace(pair, p_corrected=corrected.get(pair.cells)) for pair in found]
 
 
 def _declared(rows: Sequence[Row], choice: ComparisonChoice) -> list[PairwiseComparison]:
@@ -144,7 +132,7 @@ def _compared(
         alone = (
             ""
             if key in ones and key in others
-            else _why_alone(key, *((second, others) if key in ones else (first, ones)))
+            else f"{second if key in ones else first} has no such cell on this rig, protocol and split"
         )
         found.append(_pair(kind, first, second, ones.get(key), others.get(key), alone))
     return found
@@ -153,8 +141,13 @@ def _compared(
 def _pair(
     kind: Kind, first: str, second: str, one: Row | None, other: Row | None, refused: str = ""
 ) -> PairwiseComparison:
-    if one is None or other is None or (refused := _why_not(one, other, first, second)):
+    for name, row in ((first, one), (second, other)):
+        if row is not None and row["status"] != "done":
+            refused = refused or f"{name} {row['status']}: {row['reason']}"
+    if one is None or other is None or refused:
         return PairwiseComparison(kind, first, second, one, other, refused)
+    if (one["metric"], list(one["classes"])) != (other["metric"], list(other["classes"])):
+        return PairwiseComparison(kind, first, second, one, other, "they were scored by other metrics or classes")
     return PairwiseComparison(kind, first, second, one, other, "", difference(one, other), over_folds(one, other))
 
 
@@ -165,28 +158,6 @@ def _key(kind: Kind, row: Row) -> Key:
     protocol = "" if kind == "protocols" else row["protocol"]
     split = "" if kind == "splits" else row["split"]
     return (hardware_name(row), protocol, split, row["task"], row["repeat"], of)
-
-
-def _why_alone(alone: Key, missing: str, others: Iterable[Key]) -> str:
-    """Return why a row with the key `alone` has nothing to stand against among `others`, which are of `missing`."""
-    hardware, protocol, split, *rest = alone
-    near = [key for key in others if list(key[3:]) == rest]
-    if any(key[0] != hardware and key[1:3] == (protocol, split) for key in near):
-        return "SIM is never compared with hardware, EMULATED with neither"
-    if any(key[:2] == (hardware, protocol) for key in near):
-        return f"{missing} was asked with another split"
-    if any(key[0] == hardware for key in near):
-        return f"{missing} was asked under another protocol"
-    return f"{missing} has no such cell"
-
-
-def _why_not(one: Row, other: Row, first: str, second: str) -> str:
-    for name, row in ((first, one), (second, other)):
-        if row["status"] != "done":
-            return f"{name} {row['status']}: {row['reason']}"
-    if (one["metric"], list(one["classes"])) != (other["metric"], list(other["classes"])):
-        return "they were scored by other metrics or classes"
-    return ""
 
 
 def tables_of(comparisons: Sequence[PairwiseComparison]) -> list[TextTable]:
@@ -202,7 +173,7 @@ def tables_of(comparisons: Sequence[PairwiseComparison]) -> list[TextTable]:
 def _title(pair: PairwiseComparison) -> str:
     row = pair.row
     protocol = [f"{row['protocol']}{' †' if row['dagger'] else ''}"] if pair.kind != "protocols" else []
-    split = [f"split {row['split']}"] if row["split"] and pair.kind != "splits" else []
+    split = [split_name(row["split"])] if row["split"] and pair.kind != "splits" else []
     names = f"A = {pair.first}, B = {pair.second}"
     return " · ".join([names, row["task"], metric_name(row), *protocol, *split, hardware_name(row)])
 
@@ -223,23 +194,19 @@ def _line(pair: PairwiseComparison) -> tuple[str, ...]:
         " … ".join(signed(end, unit) for end in (found.low, found.high) if end is not None) or ABSENT,
         _probability(found.p),
         _probability(pair.folds.p) if pair.folds else ABSENT,
-        _probability(pair.p_corrected) if pair.declared else "exploratory",
+        "exploratory" if pair.p_corrected is None else _probability(pair.p_corrected),
         ABSENT if found.effect is None else signed(found.effect, "1"),
         ABSENT if found.improved is None else f"{found.improved:.2f}",
         f"{found.replicates}" + ("" if found.paired else " unpaired"),
-        _verdict(pair),
+        _verdict(pair, found),
     )
 
 
-def _verdict(pair: PairwiseComparison) -> str:
-    """Return who is better, or that it cannot be told."""
-    found = pair.difference
-    if found is None or found.verdict in ("equivalent", "undecided"):
-        return found.verdict if found else ""
-    winner = pair.first if found.verdict == "better" else pair.second
-    region = pair.row.get("equivalence")
-    beyond = f" by more than {region:g}{suffix(pair.row['unit'])}" if region and found.beyond else ""
-    return f"{winner} better{beyond}"
+def _verdict(pair: PairwiseComparison, found: Difference) -> str:
+    """Return which is better, or that it is not known."""
+    if found.verdict in ("equivalent", "undecided"):
+        return found.verdict
+    return f"{pair.first if found.verdict == 'better' else pair.second} better"
 
 
 def _probability(p: float | None) -> str:
@@ -255,26 +222,21 @@ def notes_of(comparisons: Sequence[PairwiseComparison]) -> tuple[str, ...]:
     if not found:
         return ()
     notes = [
-        "A − B is in the metric's unit; p is of no difference at all, by exchanging A and B within replicates; effect "
-        "is the difference over the standard deviation of the replicates' differences; n counts replicates."
+        "A − B is in the metric's unit; of campaigns it is the mean of their differences, while A and B are medians. "
+        "p: of no difference at all, by exchanging A and B within replicates. Effect: the difference over the standard "
+        "deviation of the replicates' differences. n counts replicates."
     ]
     for pair, apart in found:
         task, region = pair.row["task"], pair.row.get("equivalence")
         same = f"scores within {region:g}{suffix(pair.row['unit'])} are practically the same" if region else ""
-        notes.append(f"{task}: {apart.method}; {same or 'no region of practical equivalence is declared'}.")
-        if apart.smallest_p and apart.smallest_p > 0.01:
-            notes.append(f"{apart.replicates} replicates cannot give a p below {apart.smallest_p:.2g}.")
+        least = f"; p cannot be below {apart.smallest_p:.2g}" if apart.smallest_p and apart.smallest_p > 0.01 else ""
+        notes.append(f"{task}: {apart.method}; {same or 'no region of practical equivalence is declared'}{least}.")
         if pair.folds:
             notes.append(
                 f"p folds: {pair.folds.method}; training data of folds overlap, so p over replicates is too small "
                 "for a claim about estimators trained anew."
             )
-    if any(pair.declared for pair, _ in found):
-        notes.append("p Holm is corrected for all declared comparisons of these results; others are exploratory.")
-    else:
-        notes.append("None of these was declared in the matrix: exploratory, p is not corrected for being one of many.")
-    if any(pair.row["simulated"] for pair, _ in found):
-        notes.append("SIM, EMULATED: simulated by the twin; says nothing of hardware.")
+    notes.append("p Holm is corrected for all comparisons that the matrix declares; others are exploratory.")
     return tuple(dict.fromkeys(notes))
 
 
@@ -288,7 +250,7 @@ def record_of(pair: PairwiseComparison) -> dict[str, Any]:
         "score_a": pair.first_row and pair.first_row["score"], "score_b": pair.second_row and pair.second_row["score"],
         "difference": found.get("value"), **{key: found.get(key) for key in ("low", "high", "p", "smallest_p")},
         "p_folds": folds and folds.p, "folds_low": folds and folds.low, "folds_high": folds and folds.high,
-        "declared": pair.declared, "p_holm": pair.p_corrected, "effect": found.get("effect"),
+        "declared": pair.p_corrected is not None, "p_holm": pair.p_corrected, "effect": found.get("effect"),
         "improved": found.get("improved"), "equivalence": row.get("equivalence"),
         **{key: found.get(key) for key in ("verdict", "beyond", "paired", "replicates")},
         "replicate_unit": found.get("unit"), "method": found.get("method"), "refused": pair.refused,

@@ -6,9 +6,8 @@ import importlib
 from collections.abc import Iterator, Sequence
 
 from tactbench.core.evaluation.protocols import DEPLOYABLE, FIRST_FRAME
-from tactbench.core.leaderboard.names import Row, answer_name, grouped, sensor_name, sign_of
-from tactbench.core.leaderboard.trivial import WORSE_END, Bars
-from tactbench.core.tables.numbers import ABSENT, interval, score, score_with_unit, suffix
+from tactbench.core.leaderboard.names import WORSE_END, Bars, Row, answer_name, grouped, sensor_name, sign_of
+from tactbench.core.tables.numbers import ABSENT, interval, score
 from tactbench.core.tables.text import visible
 from tactbench.core.tables.text_table import Entry, TextTable
 
@@ -25,9 +24,9 @@ COLUMNS = (
     "trivial", "verdict",
 )  # fmt: skip
 _NOTE = (
-    f"LEAK: the first frame alone has {LEAK_SHARE:.0%} or more of the skill (score beyond the trivial answer). "
-    "Optimistic: shuffled rows score beyond the interval of the split. TRIVIAL: an answer that reads no sensor "
-    "scores as well. See docs/real-recordings.md."
+    f"LEAK: the first frame alone has {LEAK_SHARE:.0%} or more of the skill (score beyond the trivial answer); PART: "
+    "less, but more than a guess. OPTIMISTIC: shuffled rows score beyond the interval of the split. TRIVIAL: an answer "
+    "that reads no sensor scores as well, or the interval does not exclude it (TRIVIAL?). See docs/real-recordings.md."
 )
 
 
@@ -50,7 +49,7 @@ def build_probe(rows: Sequence[Row]) -> TextTable | None:
             skipped[visible(f"{row['sensor']}/{row['task']}: {first['reason']}")] = None
     if not lines:
         return None
-    kinds = tuple("alarm" if line[-1].startswith(("LEAK", "TRIVIAL")) else "plain" for line in lines)
+    kinds = tuple("alarm" if {"LEAK", "TRIVIAL"} & set(line[-1].split(", ")) else "plain" for line in lines)
     title = "Probe · does the score come from the contact?"
     return TextTable(title, COLUMNS, tuple(lines), frozenset(COLUMNS[4:9]), notes=(_NOTE, *skipped), kinds=kinds)
 
@@ -61,58 +60,44 @@ def _answer(row: Row) -> tuple[str, ...]:
 
 def _probe_of(alike: Sequence[Row], protocol: str, split: str) -> Row | None:
     """Return the same answer under a protocol and split. A cell that was never begun may not know its split."""
-    for one in alike:
-        if one["protocol"] == protocol and (
-            one["split"] == split or (one["split"] is None and one["status"] != "done")
-        ):
-            return one
-    return None
+    return next((one for one in alike if one["protocol"] == protocol and one["split"] in (split, None)), None)
 
 
 def _line(row: Row, shuffled: Row | None, first: Row | None, bars: Bars) -> tuple[str, ...]:
-    unit = row["unit"]
-    found = [*_about_trivial(row, bars), *_about_first(row, first), *_about_shuffled(row, shuffled)]
-    bar = score(bars.score(row), unit) + (f" {bars.name(row)}" if bars.trivial(row) else "")
+    bar = score(bars.score(row), row["unit"]) + (f" {bars.name(row)}" if bars.trivial(row) else "")
     return (
         sensor_name(row), visible(row["task"]), answer_name(row), visible(row["split"]),
-        _shown(row), Entry(interval(row["ci_low"], row["ci_high"], unit), row["ci_low"], cell=row["cell"]),
+        _shown(row), Entry(interval(row["ci_low"], row["ci_high"], row["unit"]), row["ci_low"], cell=row["cell"]),
         _shown(shuffled), _shown(first), Entry(bar, bars.score(row), cell=row["cell"]),
-        visible("; ".join(found) or "no leak shown"),
+        ", ".join(_verdicts(row, shuffled, first, bars)) or "no leak shown",
     )  # fmt: skip
 
 
 def _shown(row: Row | None) -> str:
     if row is None:
         return ABSENT
-    return Entry(score(row["score"], row["unit"]) if row["status"] == "done" else row["status"], row["score"],
-                 cell=row["cell"])  # fmt: skip
+    text = score(row["score"], row["unit"]) if row["status"] == "done" else row["status"]
+    return Entry(text, row["score"], cell=row["cell"])
 
 
-def _about_trivial(row: Row, bars: Bars) -> Iterator[str]:
-    """Yield that the best trivial answer scores as well, or that the interval does not exclude it."""
-    trivial = bars.trivial(row)
-    if trivial is None:
-        return
-    values = f"{score(trivial['score'], row['unit'])} of {score_with_unit(row['score'], row['unit'])}"
-    if bars.no_better(row):
-        yield f"TRIVIAL: {answer_name(trivial)} scores {values}"
-    elif bars.unshown(row):
-        yield f"not shown to be better than {answer_name(trivial)}: {values}"
-
-
-def _about_first(row: Row, first: Row | None) -> Iterator[str]:
-    """Yield what the first frame says of the score, if anything."""
-    trivial, unit = row["baseline"], row["unit"]
-    if first is None or first["status"] != "done" or trivial is None:
-        return
-    beyond = _beyond_guessing(first, trivial)
-    says = f"the first frame alone scores {score(first['score'], unit)} of {score_with_unit(row['score'], unit)}"
-    if beyond is None:
-        yield "too few recordings or replicates to say what the first frame tells"
-    elif beyond and _skill(first["score"], trivial, row) >= LEAK_SHARE * _skill(row["score"], trivial, row):
-        yield f"LEAK: {says}"
-    elif beyond:
-        yield f"{says}: a part of the answer is known before"
+def _verdicts(row: Row, shuffled: Row | None, first: Row | None, bars: Bars) -> Iterator[str]:
+    sign, trivial = sign_of(row), row["baseline"]
+    if bars.trivial(row) is not None and (bars.no_better(row) or bars.unshown(row)):
+        yield "TRIVIAL" if bars.no_better(row) else "TRIVIAL?"
+    if first is not None and first["status"] == "done" and trivial is not None:
+        beyond = _beyond_guessing(first, trivial)
+        if beyond is None:
+            yield "too few recordings for the first frame"
+        elif beyond:
+            yield (
+                "LEAK" if sign * (trivial - first["score"]) >= LEAK_SHARE * sign * (trivial - row["score"]) else "PART"
+            )
+    if shuffled is not None and shuffled["status"] == "done":
+        best = row[WORSE_END[-sign]]
+        if best is None:
+            yield "no interval for shuffled rows"
+        elif sign * (best - shuffled["score"]) > 0:
+            yield "OPTIMISTIC"
 
 
 def _beyond_guessing(first: Row, trivial: float) -> bool | None:
@@ -128,25 +113,6 @@ def _beyond_guessing(first: Row, trivial: float) -> bool | None:
         if guess == 1.0 or right == 0:
             return False
         return float(importlib.import_module("scipy.special").bdtrc(right - 1, n, guess)) <= TAIL
-    worst = first[WORSE_END[sign_of(first)]]
-    if first["n_test"] < FEWEST or worst is None:
-        return None
-    return _skill(worst, trivial, first) > 0
-
-
-def _about_shuffled(row: Row, shuffled: Row | None) -> Iterator[str]:
-    """Yield by how much shuffled rows flatter the score, if by more than its interval."""
-    if shuffled is None or shuffled["status"] != "done":
-        return
-    best = row[WORSE_END[-sign_of(row)]]
-    if best is None:
-        yield "no interval to hold the shuffled score against"
-    elif _skill(shuffled["score"], best, row) > 0:
-        by = score(abs(shuffled["score"] - row["score"]), row["unit"])
-        same = shuffled["n_test"] == row["n_test"] and set(shuffled["recordings"]) == set(row["recordings"])
-        yield f"optimistic by {by}{suffix(row['unit'])} when shuffled" + ("" if same else " (tested on other rows)")
-
-
-def _skill(value: float, trivial: float, row: Row) -> float:
-    """Return how much better than `trivial` a score is."""
-    return sign_of(row) * (trivial - value)
+    sign = sign_of(first)
+    worst = first[WORSE_END[sign]]
+    return None if first["n_test"] < FEWEST or worst is None else sign * (trivial - worst) > 0

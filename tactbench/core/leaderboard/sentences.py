@@ -10,20 +10,19 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from tactbench.core.leaderboard.names import Row, answer_name, distinct, grouped, sign_of
-from tactbench.core.leaderboard.trivial import Bars
+from tactbench.core.leaderboard.names import Bars, Row, answer_name, grouped, sign_of
 from tactbench.core.spec.status import STOPPED
 from tactbench.core.statistics.rank import Rank, beyond_floor
 from tactbench.core.statistics.replicates import FEWEST, counted, percent
 from tactbench.core.tables.numbers import interval, score, score_with_unit
 from tactbench.core.tables.text import cut
 
-MOST_ABOVE, MOST_BELOW = 2, 4
+MOST_BELOW = 4
 MOST_NAMES = 4
 """Answers that a sentence names; it counts the others."""
 LONGEST = 300
 """Characters of a note; `why`, JSON, CSV and Parquet have the whole reason of a cell."""
-NO_BETTER, UNSHOWN, STAMPED = "–", "*", "‡"
+NO_BETTER, UNSHOWN, STAMPED, SHARED = "–", "*", "‡", "="
 
 
 class Note(NamedTuple):
@@ -61,15 +60,15 @@ class Board:
         """The answers, those with a place first."""
         return [*(row for row, _ in self.placed), *self.unplaced]
 
+    @property
+    def by_floor(self) -> bool:
+        """Whether places go by errors beyond the floor."""
+        return beyond_floor([row for row, _ in self.placed])
+
     def name(self, row: Row) -> str:
         """Return what tells a row from the others: the estimator, with the sensor where there are several."""
         several = len({one["sensor"] for one in (*self.answers, *self.trivial)}) > 1
         return f"{row['sensor']}/{answer_name(row)}" if several else answer_name(row)
-
-    def names(self, rows: Sequence[Row]) -> str:
-        """Return the names of rows, some of them if there are many."""
-        more = [f"{len(rows) - MOST_NAMES} more"] if len(rows) > MOST_NAMES else []
-        return ", ".join([*map(self.name, rows[:MOST_NAMES]), *more])
 
     def marks(self, row: Row) -> list[str]:
         """Return the marks of a finished row, other than its place."""
@@ -84,8 +83,13 @@ class Board:
             + f"{self.bars.name(row)} {score_with_unit(self.bars.score(row), row['unit'])}"
             for row in rows
         )
-        found = list(dict.fromkeys(texts))
-        return ", ".join(found[:MOST_NAMES]) + (" …" if len(found) > MOST_NAMES else "")
+        return _some(list(dict.fromkeys(texts)))
+
+
+def _some(names: Sequence[str]) -> str:
+    """Return a list of names, and how many more there are."""
+    more = f" and {len(names) - MOST_NAMES} more" if len(names) > MOST_NAMES else ""
+    return ", ".join(names[:MOST_NAMES]) + more
 
 
 def above(board: Board) -> tuple[str, ...]:
@@ -97,11 +101,14 @@ def above(board: Board) -> tuple[str, ...]:
 def _outcome(board: Board) -> str:
     """Return who is best, or that it cannot be told."""
     if not board.placed:
-        return _none_better(board)
+        count = len(board.unplaced)
+        whom = "The only answer scores no" if count == 1 else f"None of {count} answers scores"
+        bars = board.bars_of(board.unplaced)
+        return f"{whom} better than the trivial one of its own sensor ({bars})." if count else ""
     (first, leader), *others = board.placed
     name = board.name(first)
     where = "In simulation " if first["simulated"] and not first.get("emulated") else ""
-    quality = "the smallest error beyond the floor" if _by_floor(board) else "the best score"
+    quality = "the smallest error beyond the floor" if board.by_floor else "the best score"
     if board.unranked == "few":
         return f"{_too_few([row for row, _ in board.placed])} {name} has {quality}."
     if board.unranked or leader.low is None:
@@ -118,20 +125,8 @@ def _outcome(board: Board) -> str:
         return f"{where}{name} is {only} better than the trivial one of its own sensor ({board.bars_of([first])})."
     alike = [row for row, rank in others if not rank.behind]
     if alike:
-        return f"{where}{name} has {quality}; {board.names(alike)} cannot be told from it."
-    return f"{where}{name} is best, ahead of {_ahead(board, first, others[0][0])}."
-
-
-def _by_floor(board: Board) -> bool:
-    return beyond_floor([row for row, _ in board.placed])
-
-
-def _none_better(board: Board) -> str:
-    count = len(board.unplaced)
-    if not count:
-        return ""
-    whom = "The only answer scores no" if count == 1 else f"None of {count} answers scores"
-    return f"{whom} better than the trivial one of its own sensor ({board.bars_of(board.unplaced)})."
+        return f"{where}{name} has {quality}; {_some(list(map(board.name, alike)))} cannot be told from it."
+    return f"{where}{name} is best: {_ahead(board, first, others[0][0])}."
 
 
 def _too_few(rows: Sequence[Row]) -> str:
@@ -145,28 +140,25 @@ def _too_few(rows: Sequence[Row]) -> str:
 
 
 def _ahead(board: Board, first: Row, second: Row) -> str:
-    """Return of whom the best answer is ahead, how often, and by how much."""
+    """Return whom the best answer is better than, in how many campaigns, and by how much."""
     from tactbench.core.statistics.paired import difference  # numerics
 
     found = difference(first, second)
     name, unit, sign = board.name(second), first["unit"], -sign_of(first)
     if found.low is None or found.high is None or sign * found.value <= 0:
-        return name
+        return f"better than {name}"
     low, high = sorted((sign * found.low, sign * found.high))
-    key = "beyond" if _kept("beyond", first, second) else "scores"
-    scores = _kept(key, first, second)
-    mean = ("mean " if scores else "") + "difference" + (" beyond the floor" if key == "beyond" else "")
-    by = f"({mean} {score(sign * found.value, unit)}, {percent(None, None)} {interval(low, high, unit)})"
-    if not found.paired or not scores:
-        return f"{name} {by}"
-    wins = sum(sign * (one - other) > 0 for one, other in zip(*scores, strict=True))
-    return f"{name} in {wins} of {counted(len(scores[0]), 'campaign')} {by}"
-
-
-def _kept(key: str, *rows: Row) -> list[list[float]]:
-    """Return what is kept under `key` of the replicates of all rows; nothing if one has none."""
-    found = [(row.get("replicates") or {}).get(key) for row in rows]
-    return [] if None in found else found  # type: ignore[return-value]
+    by = score_with_unit(sign * found.value, unit)
+    ends = f"{percent(None, None)} {interval(low, high, unit)}"
+    kept = [row.get("replicates") or {} for row in (first, second)]
+    key = "beyond" if all("beyond" in one for one in kept) else "scores"
+    if not found.paired or not all(key in one for one in kept):
+        return f"better than {name} by {by} ({ends})"
+    wins = sum(sign * (one - other) > 0 for one, other in zip(*(one[key] for one in kept), strict=True))
+    return (
+        f"better than {name} in {wins} of {counted(len(kept[0][key]), 'campaign')}; mean of the differences"
+        f"{' beyond the floor' if key == 'beyond' else ''} within campaigns {by} ({ends})"
+    )
 
 
 def _timed(board: Board) -> str:
@@ -182,88 +174,76 @@ def _timed(board: Board) -> str:
 
 def _published(board: Board) -> str:
     """Return where published figures lie beside the intervals of ours."""
-    rows = [row for row in (*board.answers, *board.trivial) if _has_figure(row)]
+    finished = (*board.answers, *board.trivial)
+    rows = [row for row in finished if row.get("published") is not None and row["ci_low"] is not None]
     if not rows:
         return ""
     alone = len({row["sensor"] for row in rows}) == len(rows)
-    figures = grouped(rows, lambda row: _beside(row["ci_low"], row["ci_high"], row["published"]))
+
+    def beside(row: Row) -> str:
+        value = row["published"]
+        return "below" if value < row["ci_low"] else "above" if value > row["ci_high"] else "inside"
+
+    figures = grouped(rows, beside)
     parts: list[str] = []
     for where, members in figures.items():
         shown = [(row["sensor"] if alone else board.name(row), score(row["published"], row["unit"])) for row in members]
         verb = f" {'lies' if len(shown) == 1 else 'lie'}" if not parts else ""
         listed = ", ".join(f"{name} {value}" for name, value in shown)
-        parts.append(f"{listed}{verb} {where} {'it' if parts else 'our interval'}")
-    tail = "; that concerns the simulation, not the sensors" if rows[0]["simulated"] else ""
+        parts.append(f"{listed}{verb} {where} {'its interval' if len(shown) == 1 else 'their intervals'}")
+    tail = "; a gap is an error of the simulation, not of a sensor" if rows[0]["simulated"] else ""
     return f"Published values: {', '.join(parts)}{tail}."
-
-
-def _has_figure(row: Row) -> bool:
-    return row.get("published") is not None and row["ci_low"] is not None and row["ci_high"] is not None
-
-
-def _beside(low: float, high: float, value: float) -> str:
-    return "inside" if low <= value <= high else "below" if value < low else "above"
 
 
 def below(board: Board) -> tuple[Note, ...]:
     """Return the notes below a table."""
     notes = (
-        *_ended(board.stopped, True),
-        *_stamps(board),
-        *_footnotes(board),
+        *_marks(board),
+        *_ended(board, True),
         *_protocol(board),
         *_floors(board),
         *_how(board),
         *_hosts(board),
-        *_ended(board.stopped, False),
+        *_ended(board, False),
     )
     return tuple(note._replace(text=cut(note.text, LONGEST)) for note in notes)[:MOST_BELOW]
 
 
-def _ended(rows: Sequence[Row], stopped: bool) -> Iterator[Note]:
+def _ended(board: Board, stopped: bool) -> Iterator[Note]:
     """Yield which cells did not finish, or were skipped, and why."""
-    chosen = [row for row in rows if (row["status"] in STOPPED) is stopped]
-    alike = list(grouped(chosen, lambda row: (row["status"], row["reason"])).values())
-    if not alike:
+    rows = [row for row in board.stopped if (row["status"] in STOPPED) is stopped]
+    if not rows:
         return
-    members = alike[0]
-    names = list(dict.fromkeys(f"{row['sensor']}/{answer_name(row)}" for row in members))
-    more = f" and {len(names) - MOST_NAMES} more" if len(names) > MOST_NAMES else ""
-    others = len(chosen) - len(members)
-    ended = f"; {others} more ended otherwise" if others else ""
-    reason = str(members[0]["reason"]).rstrip(".")
-    text = f"{', '.join(names[:MOST_NAMES])}{more} {members[0]['status']}{ended}: {reason}."
+    alike = [row for row in rows if (row["status"], row["reason"]) == (rows[0]["status"], rows[0]["reason"])]
+    names = list(dict.fromkeys(f"{row['sensor']}/{answer_name(row)}" for row in alike))
+    others = f"; {len(rows) - len(alike)} more ended otherwise" if len(rows) > len(alike) else ""
+    text = f"{_some(names)} {rows[0]['status']}{others}: {str(rows[0]['reason']).rstrip('.')}."
     yield Note(text, " `tactbench why CELL` tells more." if stopped else "")
 
 
-def _stamps(board: Board) -> Iterator[Note]:
-    rows = (*board.answers, *board.trivial)
-    stamps = list(dict.fromkeys(str(stamp) for row in rows for stamp in row["stamps"] or ()))
+def _marks(board: Board) -> Iterator[Note]:
+    """Yield what the marks of this table mean: at most as many notes as there may be, so that none goes unexplained."""
+    finished = (*board.answers, *board.trivial)
+    stamps = list(dict.fromkeys(str(stamp) for row in finished for stamp in row["stamps"] or ()))
     if stamps:
         yield Note(f"{STAMPED}  {'; '.join(stamps)}", printed=True)
-
-
-def _footnotes(board: Board) -> Iterator[Note]:
-    """Yield what the marks of answers mean that are not better than a trivial one, or not shown to be."""
+    if any(rank.tied for _, rank in board.placed) and not board.unranked:
+        yield Note(f"{SHARED}  shared place: not all pairs of these rows can be told apart")
+    of_own = "better than the trivial answer of its own sensor"
     if board.unplaced and board.placed:
-        yield Note(
-            f"{NO_BETTER}  no better than the trivial answer of its own sensor ({board.bars_of(board.unplaced)})",
-            printed=True,
-        )
+        yield Note(f"{NO_BETTER}  no {of_own} ({board.bars_of(board.unplaced)})", printed=True)
     unshown = [row for row, _ in board.placed if UNSHOWN in board.marks(row)]
     if unshown:
-        yield Note(
-            f"{UNSHOWN}  not shown to be better than the trivial answer of its own sensor ({board.bars_of(unshown)})",
-            printed=True,
-        )
+        yield Note(f"{UNSHOWN}  not shown to be {of_own} ({board.bars_of(unshown)})", printed=True)
 
 
 def _protocol(board: Board) -> Iterator[Note]:
-    flattered = [row for row in (*board.answers, *board.trivial) if row["dagger"]]
-    if flattered:
-        name = flattered[0]["protocol"]
-        yield Note(f"Protocol {name} uses statistics of the test set, as no sensor in use can",
-                   "; `--protocol deployable` does not.", True)  # fmt: skip
+    """Yield that the protocol looks at the test set."""
+    finished = (*board.answers, *board.trivial)
+    protocol = next((row["protocol"] for row in finished if row["dagger"]), None)
+    if protocol is not None:
+        text = f"Protocol {protocol} uses statistics of the test set, which are unknown in use"
+        yield Note(text, "; `tactbench run --protocol deployable` does not.", printed=True)
 
 
 def _floors(board: Board) -> Iterator[Note]:
@@ -271,12 +251,13 @@ def _floors(board: Board) -> Iterator[Note]:
     known = [row for row in board.answers if row.get("reference_floor") is not None]
     if not known:
         return
-    floors = distinct((str(row["sensor"]), row["reference_floor"]) for row in known)
-    unit = known[0]["unit"]
-    ends = {sensor: dict.fromkeys((min(found), max(found))) for sensor, found in floors.items()}
-    each = ", ".join(f"{sensor} {' … '.join(score(end, unit) for end in found)}" for sensor, found in ends.items())
-    by = "; places go by it" if board.placed and _by_floor(board) else ""
-    yield Note(f"Beyond floor: the root of RMSE² − floor²{by}. Floor: the reference's own noise ({each}).")
+    parts = []
+    for sensor, rows in grouped(known, lambda row: str(row["sensor"])).items():
+        floors = sorted(row["reference_floor"] for row in rows)
+        ends = dict.fromkeys(score(end, rows[0]["unit"]) for end in (floors[0], floors[-1]))
+        parts.append(f"{sensor} {' … '.join(ends)}")
+    by = "; places go by it" if board.placed and board.by_floor else ""
+    yield Note(f"Beyond floor: the root of RMSE² − floor²{by}. Floor: the reference's own noise ({', '.join(parts)}).")
 
 
 def _how(board: Board) -> Iterator[Note]:
@@ -286,7 +267,7 @@ def _how(board: Board) -> Iterator[Note]:
     if campaigns:
         counts = [row["n_replicates"] for row in campaigns]
         what = "Score, interval" if any(row["ci_low"] is not None for row in campaigns) else "Score"
-        range_of = "; one campaign: lowest … highest" if max(counts) > 1 else ""
+        range_of = "; range: lowest … highest campaign" if max(counts) > 1 else ""
         parts.append(
             f"{what}: median over {_counts(counts, 'campaign')}, each simulated anew with its own seed{range_of}"
         )
@@ -294,8 +275,6 @@ def _how(board: Board) -> Iterator[Note]:
     over = grouped((row for row in sessions if row.get("n_replicates")), lambda row: str(row["replicate_unit"]))
     for unit, rows in over.items():
         parts.append(f"Interval: over {_counts([row['n_replicates'] for row in rows], unit)}")
-    if any(rank.tied for _, rank in board.placed) and not board.unranked:
-        parts.append("= not all of these can be told apart")
     sentences = ["; ".join(parts)] if parts else []
     if board.times and any(row.get("answer_delay_ms") is not None for row in board.answers):
         sentences.append("Delay: sampling, link, window, computing")
@@ -311,7 +290,7 @@ def _counts(counts: Sequence[int], unit: str) -> str:
 
 def _hosts(board: Board) -> Iterator[Note]:
     """Yield that times cannot be compared."""
-    timed = [row for row in (*board.answers, *board.trivial) if row["fit_s"] is not None] if board.times else []
+    timed = [row for row in board.answers if row["fit_s"] is not None] if board.times else []
     hosts = len({str(row.get("host") or "") for row in timed})
     at_once = max((int(row.get("concurrency") or 1) for row in timed), default=1)
     why = [f"taken on {hosts} hosts"] * (hosts > 1) + [f"taken while up to {at_once} cells ran"] * (at_once > 1)

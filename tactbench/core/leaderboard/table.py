@@ -1,25 +1,60 @@
 """From rows to the one table object that every format is made from.
 
-A table depends on its rows alone, never on their order. All its text is fit to be shown (`text.visible`); a format
-escapes what its own syntax would act on, and changes no digit.
+Rows that may be compared stand in one block; no rank spans two. Rows under different tasks, protocols or splits, and
+rows from the twin and from hardware, are not comparable. A table depends on its rows alone, never on their order. All
+its text is fit to be shown (`text.visible`); a format escapes what its own syntax would act on, and changes no digit.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from operator import itemgetter
+from typing import Any
 
-from tactbench.core.leaderboard.blocks import Block, blocks_of
-from tactbench.core.leaderboard.columns import Line, columns
+from tactbench.core.evaluation.protocols import is_probe
+from tactbench.core.leaderboard.columns import Line, columns, line_of
 from tactbench.core.leaderboard.events import events_table
-from tactbench.core.leaderboard.names import Row
+from tactbench.core.leaderboard.names import (
+    Bars,
+    Row,
+    error_of,
+    grouped,
+    hardware_name,
+    metric_name,
+    sign_of,
+    split_name,
+)
 from tactbench.core.leaderboard.probe import build_probe
+from tactbench.core.leaderboard.sentences import NO_BETTER, Board, Note, above, below
+from tactbench.core.statistics.rank import Rank, beyond_floor, excess_of
+from tactbench.core.statistics.replicates import FEWEST
 from tactbench.core.tables.text import cut, visible
 from tactbench.core.tables.text_table import TextTable
 
+_Key = tuple[str, str, str, str]
+PLACED_OVER = ("replicate", "session", None)
+"""What places may rest on: what is recorded anew. None: a row that does not say."""
 LONGEST = 1000
 """Characters of a sentence on the provenance; the whole of it lies in the result folder."""
+
+
+@dataclass(frozen=True)
+class Block:
+    """Rows that may be compared."""
+
+    title: str
+    """Task and question."""
+    setting: str
+    """Metric, protocol and split."""
+    origin: str
+    """Simulated, emulated or measured."""
+    lines: tuple[Line, ...]
+    verdict: tuple[str, ...] = ()
+    """What its rows come to: two sentences at most."""
+    notes: tuple[Note, ...] = ()
+    """What marks and numbers mean: four at most."""
 
 
 @dataclass(frozen=True)
@@ -85,3 +120,115 @@ def build_table(
     sections = (events_table(ordered) if times else None, build_probe(ordered))
     found = tuple(section for section in sections if section is not None)
     return Table(blocks, names, found, tuple(provenance) if times else (), times)
+
+
+def blocks_of(
+    rows: Sequence[Row], columns: Sequence[str], questions: Mapping[str, str], *, times: bool
+) -> tuple[Block, ...]:
+    """Arrange rows, in the order of their cells' names, into ranked blocks."""
+    groups = sorted(_grouped(rows).items(), key=lambda group: _order(group[0]))
+    return tuple(_block(key, members, columns, questions.get(key[0], ""), times) for key, members in groups)
+
+
+def _block(key: _Key, members: Sequence[Row], columns: Sequence[str], question: str, times: bool) -> Block:
+    task, protocol, split, hardware = key
+    bars = Bars(members)
+    finished = [row for row in members if row["status"] == "done"]
+    answers = [row for row in finished if not row["is_baseline"]]
+    entered = [row for row in answers if not bars.no_better(row)]
+    # What is equal stays in the order of the names.
+    ordered = sorted(zip(errors(entered), entered, strict=True), key=lambda one: (one[0], error_of(one[1])))
+    found, unranked = places([row for _, row in ordered])
+    # Of equal place stays the better one first.
+    placed = sorted(((row, found[row["cell"]]) for _, row in ordered), key=lambda one: one[1].place)
+    unplaced = sorted((row for row in answers if bars.no_better(row)), key=error_of)
+    trivial = sorted((row for row in finished if row["is_baseline"]), key=lambda row: (row["sensor"], error_of(row)))
+    stopped = sorted((row for row in members if row["status"] != "done"), key=lambda row: row["status"])
+    board = Board(placed, unplaced, trivial, stopped, unranked, bars, times)
+    few = unranked == "few"
+    lines = [
+        *(line_of(row, None if few else placing, columns, board.marks(row)) for row, placing in placed),
+        *(line_of(row, None, columns, board.marks(row), NO_BETTER) for row in unplaced),
+        *(
+            line_of(row, None, columns, board.marks(row), "oracle" if row.get("looks_at") == "reference" else "")
+            for row in trivial
+        ),
+        *(line_of(row, None, columns, ()) for row in stopped),
+    ]
+    direction = "lower" if sign_of(members[0]) > 0 else "higher"
+    setting = [f"{metric_name(members[0])}, {direction} is better", f"protocol {protocol}"]
+    setting += [split_name(split)] if split else []
+    return Block(
+        title=visible(
+            f"{task[:1].upper()}{task[1:]}" + (f": {question[:1].lower()}{question[1:]}" if question else "")
+        ),
+        setting=visible(" · ".join(setting)),
+        origin=visible(_origin(finished, hardware)),
+        lines=tuple(lines),
+        verdict=tuple(map(visible, above(board))),
+        notes=tuple(Note(visible(one.text), visible(one.hint), one.printed) for one in below(board)),
+    )
+
+
+def _origin(finished: Sequence[Row], hardware: str) -> str:
+    if not finished:
+        return "nothing finished"
+    if finished[0].get("emulated"):
+        return f"EMULATED devices (rig {finished[0]['rig']}): no sensor was touched"
+    return "SIMULATED: no sensor was touched" if finished[0]["simulated"] else f"MEASURED ({hardware})"
+
+
+def _order(key: _Key) -> tuple[Any, ...]:
+    """Return what blocks are sorted by: within a task, what probes or is not kept apart comes after what is."""
+    task, protocol, split, _ = key
+    return task, split in ("shuffled", "in-session"), is_probe(protocol), key
+
+
+def _grouped(rows: Sequence[Row]) -> dict[_Key, list[Row]]:
+    """Group rows by what must not be mixed.
+
+    A cell that was not begun knows neither its split, if nobody asked for one, nor whether it would have been
+    simulated: it stands with the finished cells of its rig, if these agree.
+    """
+    done = [row for row in rows if row["status"] == "done"]
+    groups = grouped(done, lambda row: (row["task"], row["protocol"], row["split"], hardware_name(row)))
+    near = {key: (*key[:2], members[0]["rig"]) for key, members in groups.items()}
+    for row in rows:
+        if row["status"] != "done":
+            asked = (row["task"], row["protocol"], row["rig"])
+            found = [key for key, rig in near.items() if rig == asked and row["split"] in (None, key[2])]
+            alone = (*asked[:2], row["split"] or "", hardware_name(row))
+            groups.setdefault(found[0] if len(found) == 1 else alone, []).append(row)
+    return groups
+
+
+def places(results: Sequence[Row]) -> tuple[dict[str, Rank], str]:
+    """Return where each of `results` stands, by the name of its cell, and why there are no rank intervals, if so.
+
+    They are the finished answers of one block, no baselines, the best score first. A row without replicates enters
+    with its own interval.
+    """
+    if any(row.get("replicates") for row in results) and all(map(_may_be_placed, results)):
+        from tactbench.core.statistics.ranking import ranks  # numerics
+
+        return ranks(results), ""
+    ordered = errors(results)
+    by_score = [Rank(1 + ordered.index(error), None, None, ordered.count(error) > 1) for error in ordered]
+    why = "few" if not all(map(_may_be_placed, results)) else "these rows keep no replicates" if results else ""
+    return dict(zip((row["cell"] for row in results), by_score, strict=True)), why
+
+
+def _may_be_placed(row: Row) -> bool:
+    count = row.get("n_replicates")
+    return count is None or (count >= FEWEST and row.get("replicate_unit") in PLACED_OVER)
+
+
+def errors(results: Sequence[Row]) -> list[float]:
+    """Return what answers of one metric are ordered by, the lower the better.
+
+    The score; of errors of force the mean square beyond the floor of the reference, if all of them have one. It may be
+    below zero, where the error beyond the floor is 0: two answers of one sensor differ by more than its floor tells.
+    """
+    if beyond_floor(results):
+        return [one if math.isfinite(one) else math.inf for one in map(excess_of, results)]
+    return list(map(error_of, results))

@@ -8,21 +8,22 @@ from dataclasses import dataclass, replace
 
 from tactbench.core.errors import UnknownNameError
 from tactbench.core.evaluation.protocols import is_probe
-from tactbench.core.leaderboard.blocks import Block
 from tactbench.core.leaderboard.columns import COLUMNS, DEFAULT, NUMERIC, SHOWN, Line
 from tactbench.core.leaderboard.names import Row, grouped, metric_name
-from tactbench.core.leaderboard.table import Table
+from tactbench.core.leaderboard.table import Block, Table
 from tactbench.core.statistics.replicates import percent
 from tactbench.core.tables.text import command_line, visible
 from tactbench.core.tables.text_table import Entry, TextTable, finite
 
-CELL = "cell"
-"""The column of cells' names, as `why` takes them."""
+CELL, REASON = "cell", "reason"
+"""Columns of cells' names, as `why` takes them, and of why cells did not end well."""
+_OF_TRIVIAL = ("place", "sensor", "estimator", "score", "beyond floor", "published", "notes", CELL)
+"""What a screen shows of trivial answers: nobody compares how long they take."""
 _Texts = tuple[dict[str, str], str]
 """The texts of a line by column, and its kind."""
 _FIRST_TO_GO = (
     "cell", "latency p95", "latency p50", "simulation", "test samples", "true error", "interval beyond floor",
-    "recordings right", "one campaign", "training", "level", "published", "delay after touch",
+    "recordings right", "range", "training", "level", "published", "delay after touch",
 )  # fmt: skip
 """Columns that a terminal does without, in this order; those that were asked for by name are never left out."""
 
@@ -67,19 +68,26 @@ def document(table: Table, view: View = DEFAULT_VIEW) -> list[TextTable | tuple[
 
 def grids(table: Table, view: View = DEFAULT_VIEW) -> list[TextTable]:
     """Return what is printed of a table's blocks."""
-    return [_grid(block, view) for block in table.blocks]
+    return [grid(block, view) for block in table.blocks]
 
 
-def _grid(block: Block, view: View) -> TextTable:
-    lines: list[_Texts] = [({**line.texts, CELL: visible(_cell(line.row))}, line.kind) for line in block.lines]
+def grid(block: Block, view: View = DEFAULT_VIEW) -> TextTable:
+    """Return what is printed of a block; numbers have what they are sorted by, and the cell that they are from."""
+    lines: list[_Texts] = [(_texts(line), line.kind) for line in block.lines]
     if not view.wide and not view.columns:
         lines = _with_trivial_once(lines)
     names = view.columns or ((*COLUMNS, CELL) if view.wide else DEFAULT)
     names = tuple(name for name in names if name in lines[0][0])
-    table = replace(
-        _text_table(block, names, [[texts[name] for name in names] for texts, _ in lines]),
-        numeric=NUMERIC - {"place"},
+    table = TextTable(
+        block.title,
+        names,
+        tuple(tuple(texts[name] for name in names) for texts, _ in lines),
+        NUMERIC - {"place"},
+        headings=headings(names, block),
         kinds=tuple(kind for _, kind in lines),
+        origin=block.origin,
+        summary=(block.setting, *block.verdict),
+        notes=tuple(map(str, block.notes)),
         first_to_go=() if view.columns else _FIRST_TO_GO,
         unbroken=frozenset({CELL}),
     )
@@ -88,48 +96,31 @@ def _grid(block: Block, view: View) -> TextTable:
     return table if view.columns else table.compact(keep)
 
 
-def full_grid(block: Block) -> TextTable:
-    """Return a block with every column and row, what numbers are sorted by, and why cells did not end well."""
-    names = (*block.lines[0].texts, "reason")
-    return _text_table(block, names, [[*_entries(line), _reason(line.row)] for line in block.lines]).compact()
-
-
-def _text_table(block: Block, names: Sequence[str], lines: Sequence[Sequence[str]]) -> TextTable:
-    return TextTable(
-        block.title,
-        tuple(names),
-        tuple(map(tuple, lines)),
-        NUMERIC,
-        headings=headings(names, block),
-        kinds=tuple(line.kind for line in block.lines),
-        origin=block.origin,
-        summary=(block.setting, *block.verdict),
-        notes=tuple(map(str, block.notes)),
-    )
+def _texts(line: Line) -> dict[str, str]:
+    row = line.row
+    found = {
+        name: text if name not in NUMERIC or not text else Entry(text, finite(line.value(name)), cell=row["cell"])
+        for name, text in line.texts.items()
+    }
+    why = "" if row["status"] == "done" else visible(f"{row['status']}: {row['reason']}")
+    return {**found, CELL: visible(_cell(row)), REASON: why}
 
 
 def _with_trivial_once(lines: Sequence[_Texts]) -> list[_Texts]:
-    """Return lines with one in place of a trivial answer of each sensor, where their scores agree to the last digit."""
+    """Return lines with the scores of trivial answers alone, one line where all sensors agree to the last digit."""
     sensors = {texts["sensor"] for texts, kind in lines if kind in ("result", "baseline")}
     found: list[_Texts] = []
     for (kind, _), same in grouped(
         lines, lambda one: (one[1], one[0]["estimator"] if one[1] == "baseline" else "")
     ).items():
-        alike = {name: text if all(one[name] == text for one, _ in same) else "" for name, text in same[0][0].items()}
-        once = kind == "baseline" and len(same) > 1 and {one["sensor"] for one, _ in same} == sensors and alike["score"]
-        found += [(alike, kind)] if once else same
+        if kind != "baseline":
+            found += same
+            continue
+        kept = [{name: text if name in _OF_TRIVIAL else "" for name, text in texts.items()} for texts, _ in same]
+        alike = {name: text if all(one[name] == text for one in kept) else "" for name, text in kept[0].items()}
+        once = len(kept) > 1 and {one["sensor"] for one in kept} == sensors and alike["score"]
+        found += [(texts, kind) for texts in ([alike] if once else kept)]
     return found
-
-
-def _entries(line: Line) -> list[str]:
-    return [
-        text if name not in NUMERIC or not text else Entry(text, finite(line.value(name)), cell=line.row["cell"])
-        for name, text in line.texts.items()
-    ]
-
-
-def _reason(row: Row) -> str:
-    return "" if row["status"] == "done" else visible(f"{row['status']}: {row['reason']}")
 
 
 def _cell(row: Row) -> str:

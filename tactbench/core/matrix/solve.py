@@ -152,7 +152,7 @@ def opening(cell: Cell, task: TaskSpec, *, simulated: bool = False) -> Row:
         "sensor", "task", "rig", "protocol", "split", "estimator", "repeat", "repeats", "seed", "declared_task",
         "include_incomplete",
     )  # fmt: skip
-    asked = ("answer_per", "answer_from", "metric", "unit", "equivalence", "reference_score")
+    asked = ("answer_per", "answer_from", "metric", "unit", "equivalence")
     return {
         **unknown,
         **{name: getattr(cell, name) for name in alike},

@@ -1,56 +1,37 @@
 """What rigs let people check.
 
-A simulated rig offers named checks that yield verdicts, each a number held against a range; a rig of real devices says
-what a rig file would let it do.
+A simulated rig yields verdicts, each a number held against a known one; a rig of real devices says what a rig file
+would let it do.
 """
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 
 @dataclass(frozen=True)
 class Verdict:
-    """One number held against the range it must lie in."""
+    """One number held against the one that a law or a closed form gives."""
 
     name: str
-    """Short, lower case, unique within its check: ``depth at 64 x 64``."""
+    """What was computed, in one line: ``Hertz: depth under a paraboloid``."""
     found: float
-    low: float
-    """Lower end of the range, included; minus infinity where only the upper end counts."""
-    high: float
-    """Upper end of the range, included; infinity where only the lower end counts."""
+    expected: float
+    bound: float
+    """Largest difference of the two that is allowed, included."""
     unit: str = "1"
     source: str = ""
-    """Where the range comes from: a formula, a measurement, a reason for the bound."""
-    note: str = ""
-    """For a miss: its cause, as far as it is known."""
+    """The law, where it stands, and the reason for the bound."""
 
     def __post_init__(self) -> None:
         """Keep plain numbers: a NumPy scalar would be no JSON."""
-        for name in ("found", "low", "high"):
+        for name in ("found", "expected", "bound"):
             object.__setattr__(self, name, float(getattr(self, name)))
 
     @property
     def met(self) -> bool:
-        """Whether the number lies in its range; not a number never does."""
-        return math.isfinite(self.found) and self.low <= self.found <= self.high
-
-
-@dataclass(frozen=True)
-class Check:
-    """One thing that can be checked, not yet carried out."""
-
-    name: str
-    """Short and unique: ``hertz``."""
-    group: str
-    """What it belongs to: ``contact``, ``memory``, ``channels`` …"""
-    title: str
-    """One line: what is compared with what."""
-    run: Callable[[], Sequence[Verdict]]
-    """Carries it out; may take seconds."""
+        """Whether the two agree within the bound; not a number never does."""
+        return abs(self.found - self.expected) <= self.bound
 
 
 @dataclass(frozen=True)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
@@ -52,7 +52,5 @@ class CostStudy(NamedTuple):
     title: str
     reference: str
     """What the errors are measured against, in one sentence."""
-    jobs: Iterator[CostJob]
+    jobs: Sequence[CostJob]
     """In order; the reference is computed with the first."""
-    total: int
-    """How many jobs there are."""

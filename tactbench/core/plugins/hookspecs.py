@@ -24,8 +24,8 @@ from tactbench.core.spec.rig import (
 GROUP = "tactbench"
 """Entry-point group, and the name of the pluggy project."""
 
-API_VERSION = 1
-"""A plugin module states the version it was written for: ``TACTBENCH_API = 1``."""
+API_VERSION = 2
+"""A plugin module states the version it was written for: ``TACTBENCH_API = 2``."""
 
 hookspec = pluggy.HookspecMarker(GROUP)
 hookimpl = pluggy.HookimplMarker(GROUP)

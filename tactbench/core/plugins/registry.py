@@ -260,7 +260,6 @@ def _plain(descriptor: Any) -> dict[str, Any]:
     if isinstance(descriptor, SensorDescriptor):  # with what stays out of recordings and keys
         spec = descriptor.spec
         plain["spec"]["data_sheet"] = spec.data_sheet.model_dump()
-        plain["spec"]["likeness"] = [figure.model_dump() for figure in spec.likeness]
     return plain
 
 

@@ -9,9 +9,8 @@ from typing import Any
 import numpy as np
 
 from tactbench.core.evaluation.metrics import METRICS
-from tactbench.core.leaderboard.names import METRIC_NAMES
-from tactbench.core.report.results import Results
-from tactbench.core.report.section import Details, Row
+from tactbench.core.leaderboard.names import METRIC_NAMES, Row
+from tactbench.core.report.results import Details, Results
 from tactbench.core.samples import Answers
 from tactbench.core.spec.row import RowModel
 from tactbench.core.tables.text_table import ABSENT, Entry, TextTable, finite, text_table
@@ -47,14 +46,6 @@ def details(row: Row, results: Results | None) -> Details:
     Without `results`, scores of recordings and whatever is a table are left out.
     """
     said = {name: value for name, value in row.items() if value not in (None, "", [], {}, ())}
-    single = {name: _text(value) for name, value in said.items() if not isinstance(value, Mapping | list | tuple)}
-    pairs: dict[str, dict[str, str]] = {}
-    title = ""
-    for name in RowModel.model_fields:
-        title = _GROUPS.get(name, title)
-        if name in single and name not in _TEXTS:
-            pairs.setdefault(title, {})[name] = single.pop(name)
-    pairs["Also"] = {name: text for name, text in single.items() if name not in _TEXTS}
     of = f", replicate {row['repeat']} of {row['repeats']}" if row["repeats"] > 1 else ""
     tested = results.answers(row).get("test") if results and row["status"] == "done" else None
     classes = list(map(str, row.get("classes") or ()))
@@ -66,16 +57,19 @@ def details(row: Row, results: Results | None) -> Details:
             {"true": true} | dict(zip(classes, answered, strict=False)) for true, answered in counts
         ],
     }
-    for name in (*_TITLES, *sorted(said.keys() - _TITLES.keys())):
+    pairs: dict[str, dict[str, str]] = {}
+    group = ""
+    for name in dict.fromkeys((*RowModel.model_fields, *said)):
+        group = _GROUPS.get(name, group if name in RowModel.model_fields else "Also")
         value, title = said.get(name), _TITLES.get(name, name)
-        if name in _APART:
+        if name not in said or name in (*_TEXTS, *_APART):
             continue
         if isinstance(value, Mapping):
             pairs[title] = {str(key): _text(one) for key, one in value.items() if not str(key).startswith("fold ")}
-        elif isinstance(value, list | tuple) and all(isinstance(one, Mapping) for one in value):
+        elif isinstance(value, list | tuple) and isinstance(value[0], Mapping):
             records[title] = value
-        elif isinstance(value, list | tuple):
-            pairs["Also"][title] = _text(value)
+        else:
+            pairs.setdefault(group, {})[title] = _text(value)
     return Details(
         cell=str(row["cell"]),
         status=str(row["status"]),

@@ -12,7 +12,7 @@ from tactbench.core.tables.text_table import Entry, TextTable, finite, text_tabl
 _SORTED_BY = {
     "estimator": "", "score": "score", "95 % interval": "ci_low", "fit": "fit_s", "quartiles": "fit_s_q1",
     "delay": "answer_delay_ms", "latency p50": "latency_ms_p50", "p95": "latency_ms_p95",
-    "batch/row": "batch_s_per_row", "data": "data_s", "front": "", "100 Hz loop": "", "1 kHz loop": "", "remark": "",
+    "batch/row": "batch_s_per_row", "front": "", "remark": "",
 }  # fmt: skip
 """Column -> key of the number behind it."""
 COLUMNS = tuple(_SORTED_BY)
@@ -24,11 +24,10 @@ def title(about: Mapping[str, Any]) -> str:
     better = "higher" if about["higher_is_better"] else "lower"
     simulated = f" · SIM ({about['rig']})" if about["simulated"] else ""
     dagger = " †" if about["dagger"] else ""
-    threads = "1 thread" if about["threads"] == 1 else f"{about['threads']} threads"
     metric = METRIC_NAMES.get(about["metric"], about["metric"])
     return (
         f"{about['sensor']}, {about['task']}: {metric}, {better} is better · "
-        f"{about['protocol']}{dagger} · split {about['split']}{simulated} · {about['rounds']} rounds, {threads}"
+        f"{about['protocol']}{dagger} · split {about['split']}{simulated} · {about['rounds']} rounds, 1 thread"
     )
 
 
@@ -36,7 +35,7 @@ def line(row: Mapping[str, Any], unit: str) -> dict[str, str]:
     """Return one estimator's texts by column; what was not measured is left out."""
     what = "oracle" if row.get("looks_at") == "reference" else "trivial"
     name = f"{row['estimator']} ({what})" if row["is_baseline"] else row["estimator"]
-    remark = "; ".join((*([f"{row['status']}: {row['reason']}"] if row["status"] != "done" else []), *row["notes"]))
+    remark = "" if row["status"] == "done" else f"{row['status']}: {row['reason']}"
     texts = {"estimator": name, "remark": remark}
     if row["score"] is not None:
         texts |= {"score": score(row["score"], unit), "95 % interval": interval(row["ci_low"], row["ci_high"], unit)}
@@ -50,19 +49,8 @@ def line(row: Mapping[str, Any], unit: str) -> dict[str, str]:
         "latency p50": duration(row["latency_ms_p50"] / 1e3),
         "p95": tail(row["latency_ms_p95"], row["latency_ms_max"], row["latency_n"]),
         "batch/row": duration(row["batch_s_per_row"]),
-        "data": duration(row["data_s"]),
         "front": ", ".join(fronts),
-        "100 Hz loop": _verdict(row, "loop_100_hz"),
-        "1 kHz loop": _verdict(row, "loop_1000_hz"),
     }
-
-
-def _verdict(row: Mapping[str, Any], loop: str) -> str:
-    """Return whether the answer keeps up with a loop; if not, which part of its delay is the longest."""
-    if row[loop] is None:
-        return ""
-    parts = row["delay_parts_ms"]
-    return "yes" if row[loop] else f"no ({max(parts, key=parts.__getitem__)})"
 
 
 def ladder_table(about: Mapping[str, Any]) -> TextTable:

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
 from functools import partial
+from typing import NamedTuple
 
 from tactbench.core.spec.quantity import Quantity, Source
 from tactbench.core.spec.sensor import ChannelKind, SensorSpec, Statement
@@ -26,8 +26,7 @@ _TABLE_ONE: tuple[tuple[str, ChannelKind, str], ...] = (
 )
 
 
-@dataclass(frozen=True)
-class Fact:
+class Fact(NamedTuple):
     """One cell of the comparison."""
 
     text: str
@@ -35,8 +34,7 @@ class Fact:
     reference: str = ""
 
 
-@dataclass(frozen=True)
-class Property:
+class Property(NamedTuple):
     """A titled row: one fact a sensor."""
 
     title: str
@@ -45,8 +43,12 @@ class Property:
 
 def table_one(sensors: Sequence[SensorSpec]) -> list[Property]:
     """Return the paper's Table I for any sensors."""
-    ranges = {title: partial(_range, kind=kind, which=which) for title, kind, which in _TABLE_ONE}
-    return _properties(sensors, {"# taxels": _number_of_taxels, "measurement principle": _principle, **ranges})
+    looks: dict[str, Callable[[SensorSpec], Fact]] = {
+        "# taxels": _number_of_taxels,
+        "measurement principle": lambda sensor: _fact(sensor.principle, sensor.principle_source),
+    }
+    looks |= {title: partial(_range, kind=kind, which=which) for title, kind, which in _TABLE_ONE}
+    return _properties(sensors, looks)
 
 
 def data_sheets(sensors: Sequence[SensorSpec]) -> list[Property]:
@@ -60,11 +62,13 @@ def details(sensors: Sequence[SensorSpec]) -> list[Property]:
         "streams": _streams, "delay of a reading": _delay, "taxel reading": _reading, "taxel at rest": _rest,
         "under load": _sign, "positions": _positions,
     }  # fmt: skip
-    tables = [_quantities(sensor) for sensor in sensors]
+    tables = list(map(_quantities, sensors))
     titles = dict.fromkeys(title for table in tables for title in table)
-    stated = {title: [table.get(title) for table in tables] for title in titles}
     return _properties(sensors, looks) + [
-        Property(title, tuple(_fact(one, one.source if one else None) for one in row)) for title, row in stated.items()
+        Property(
+            title, tuple(_fact(one, one.source if one else None) for one in (table.get(title) for table in tables))
+        )
+        for title in titles
     ]
 
 
@@ -109,10 +113,6 @@ def _range(sensor: SensorSpec, kind: ChannelKind, which: str) -> Fact:
     return _fact(found, found.source if found else None)
 
 
-def _principle(sensor: SensorSpec) -> Fact:
-    return _fact(sensor.principle, sensor.principle_source)
-
-
 def _number_of_taxels(sensor: SensorSpec) -> Fact:
     sites, channels = len(sensor.sites("taxel")), len(sensor.channels("taxel"))
     return Fact(str(sites) if sites == channels else f"{sites}, of {channels} channels")
@@ -142,21 +142,17 @@ def _delay(sensor: SensorSpec) -> Fact:
 
 
 def _reading(sensor: SensorSpec) -> Fact:
-    first = next(iter(sensor.channels("taxel")), None)
-    if first is None:
-        return Fact(ABSENT)
-    if first.lower is None or first.upper is None:
-        return Fact(first.unit)
-    return Fact(f"{first.lower:g}–{first.upper:g} {first.unit}")
+    for one in sensor.channels("taxel"):  # they are alike
+        return Fact(one.unit if one.lower is None or one.upper is None else f"{one.lower:g}–{one.upper:g} {one.unit}")
+    return Fact(ABSENT)
 
 
 def _rest(sensor: SensorSpec) -> Fact:
-    rests = [channel.rest for channel in sensor.channels("taxel") if channel.rest is not None]
+    rests = sorted((one.rest for one in sensor.channels("taxel") if one.rest is not None), key=lambda one: one.value)
     if not rests:
         return Fact(ABSENT)
-    low, high = min(rest.value for rest in rests), max(rest.value for rest in rests)
-    text = f"{low:g} {rests[0].unit}" if low == high else f"{low:.4g}–{high:.4g} {rests[0].unit}"
-    return _fact(text, rests[0].source)
+    values = dict.fromkeys(f"{rest.value:.4g}" for rest in (rests[0], rests[-1]))
+    return _fact(f"{'–'.join(values)} {rests[0].unit}", rests[0].source)
 
 
 def _sign(sensor: SensorSpec) -> Fact:

@@ -3,37 +3,33 @@
 from __future__ import annotations
 
 import base64
-import hashlib
 import json
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
-from functools import lru_cache
 from importlib import resources
-from typing import TYPE_CHECKING
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import tactbench
-from tactbench.core.errors import TactbenchError
-from tactbench.core.leaderboard.columns import DEFAULT
-from tactbench.core.leaderboard.levels import KEY as LEVEL
-from tactbench.core.leaderboard.pairwise import asked_in_several_ways, tables_of
-from tactbench.core.leaderboard.view import full_grid
-from tactbench.core.recording.reader import read_meta
+from tactbench.core.errors import UnwritableError, UsageError
+from tactbench.core.files import replace_file
+from tactbench.core.leaderboard.columns import DEFAULT, NUMERIC
+from tactbench.core.leaderboard.view import REASON, View, grid
+from tactbench.core.matrix.progress import Progress
 from tactbench.core.report.cells import details
 from tactbench.core.report.costs import ladder_table
-from tactbench.core.report.datasheet import details as of_sensors
 from tactbench.core.report.datasheet import sensor_table, table_one
+from tactbench.core.report.figures.drawing import draw_figures
 from tactbench.core.report.figures.published_and_ours import NAME as PUBLISHED
-from tactbench.core.report.published import published_table, reproduce
-from tactbench.core.report.results import SavedFigure
-from tactbench.core.report.section import MOST_ROWS, Picture, ReportData, Section
-from tactbench.core.spec.sensor import SensorSpec
+from tactbench.core.report.published import published_table, records, reproduce
+from tactbench.core.report.results import MOST_ROWS, ReportData, Results, SavedFigure, Section
 from tactbench.core.tables.text import command_line
-from tactbench.core.tables.text_table import WORDY, sort_value
+from tactbench.core.tables.text_table import WORDY, TextTable, sort_value
 
 if TYPE_CHECKING:
-    from jinja2 import Environment
+    from jinja2 import Template
     from markupsafe import Markup
 
 
@@ -42,28 +38,24 @@ MOST_TASKS = 2
 """So many tasks are named in the first section; the leaderboards have them all."""
 MOST_WHOLE = 200
 """Cells of which the page has whatever there is: each further one takes a file to be read and 20 kB."""
-_READINGS = 5
-"""So many first lines of a sensor's details are about readings; `tactbench show --all` has the parameters."""
 
 
 def answers_section(subject: ReportData) -> Section:
-    """Return the first section: what came out in three sentences, and published scores and ours in one picture."""
+    """Return the first section: what came out in a few sentences, and published scores and ours in one picture."""
     found: dict[str, str] = {}
     for block in subject.leaderboard.blocks:
         if block.verdict:
             found.setdefault(str(block.lines[0].row["task"]), f"{block.title} {block.verdict[0]}")
-    simulated = any(row["simulated"] for row in subject.rows if row["status"] == "done")
-    paragraphs = ["SIM: simulated by a twin of the sensor; no sensor was touched."] if simulated else []
-    paragraphs += [*_published(subject), *list(found.values())[:MOST_TASKS]]
-    pictures = tuple(_picture(one) for one in subject.drawn if one.name == PUBLISHED)
-    return Section(paragraphs=tuple(paragraphs), pictures=pictures)
-
-
-def _published(subject: ReportData) -> list[str]:
-    """Return how many published numbers lie in the interval of ours."""
-    verdicts = Counter(line.verdict for line in reproduce(subject.results.registry, subject.rows))
-    judged = verdicts["inside"] + verdicts["outside"]
-    return [f"Published numbers in the 95 % interval of ours: {verdicts['inside']} of {judged}."] if judged else []
+    verdicts = [line.verdict for line in reproduce(subject.results.registry, subject.rows)]
+    inside, judged = verdicts.count("inside"), sum(verdict in ("inside", "outside") for verdict in verdicts)
+    paragraphs = (
+        "SIM: simulated by a twin of the sensor; no sensor was touched."
+        * any(row["simulated"] for row in subject.rows),
+        f"Published numbers in the interval of ours: {inside} of {judged}." if judged else "",
+        *list(found.values())[:MOST_TASKS],
+    )
+    pictures = tuple(one for one in subject.drawn if one.name == PUBLISHED)
+    return Section(paragraphs=tuple(filter(None, paragraphs)), pictures=pictures)
 
 
 def leaderboards_section(subject: ReportData) -> Section:
@@ -74,8 +66,8 @@ def leaderboards_section(subject: ReportData) -> Section:
             f"More than {MOST_ROWS} cells: {len(subject.shown)} of {len(subject.rows)} are shown, the first of each "
             "table. All of them are in `leaderboard.csv` in the result folder."
         )
-    shown = (full_grid(replace(block, lines=tuple(lines))) for block, lines in subject.blocks)
-    tables = tuple(table.only((*DEFAULT, "reason")) for table in shown)
+    view = View(columns=(*DEFAULT, REASON))
+    tables = tuple(replace(grid(block, view), numeric=NUMERIC).compact() for block in subject.blocks)
     return Section(paragraphs=tuple(paragraphs), tables=tables)
 
 
@@ -87,26 +79,16 @@ def published_section(subject: ReportData) -> Section:
 
 def figures_section(subject: ReportData) -> Section:
     """Return the section of figures: those that were drawn for this page."""
-    pictures = tuple(_picture(one) for one in subject.drawn if one.name != PUBLISHED)
+    pictures = tuple(one for one in subject.drawn if one.name != PUBLISHED)
     paragraphs = ("The same figures lie beside this page as `figures/*.pdf` and `figures/*.png`.",) if pictures else ()
     return Section(paragraphs=paragraphs, pictures=pictures, missing=subject.undrawn)
 
 
-def _picture(one: SavedFigure) -> Picture:
-    return Picture(one.title, one.caption, one.png.read_bytes())
-
-
 def compared_section(subject: ReportData) -> Section:
-    """Return the tables below the leaderboard: events, means over tasks, probes, comparisons."""
-    tables = (*subject.leaderboard.sections, *tables_of(list(asked_in_several_ways(subject.rows))))
-    lacks = (
-        "No question was asked in two ways: `tactbench run --probe` adds shuffled rows and the first frame alone, "
-        "`--protocol` and `--split` ask otherwise."
-    )
-    return Section(
-        tables=tuple(table.compact() for table in tables),
-        missing=() if tables else (lacks,),
-    )  # fmt: skip
+    """Return the tables below the leaderboard: events and probes."""
+    lacks = "What the recordings give away: `tactbench run --probe` adds shuffled rows and the first frame alone."
+    found = tuple(table.compact() for table in subject.leaderboard.sections)
+    return Section(tables=found, missing=() if found else (lacks,))
 
 
 def costs_section(subject: ReportData) -> Section:
@@ -117,48 +99,29 @@ def costs_section(subject: ReportData) -> Section:
         with suppress(KeyError, TypeError, ValueError):  # twin.json has no such table, nor has a damaged file
             tables.append(ladder_table(json.loads(path.read_bytes())))
     pictures = tuple(
-        Picture(path.stem, "As `tactbench cost` has drawn it.", path.read_bytes())
+        SavedFigure(path.stem, path.stem, "As `tactbench cost` has drawn it.", path)
         for path in sorted((folder / "cost").glob("*.png"))
     )
-    timed = (row for row in subject.rows if row["status"] == "done" and row["answer_per"] != "recording")
-    some = next(timed, None)
-    command = command_line("tactbench", "cost", *(("--sensor", some["sensor"], "--task", some["task"]) if some else ()))
-    lacks = f"What an answer costs in time beside its score: `{command}`; of the simulation: `tactbench cost --twin`."
+    lacks = (
+        "What an answer costs in time beside its score: `tactbench cost --sensor NAME --task NAME`; of the simulation: "
+        "`tactbench cost --twin`."
+    )
     return Section(tables=tuple(tables), pictures=pictures,
                    missing=() if tables or pictures else (lacks,))  # fmt: skip
 
 
 def sensors_section(subject: ReportData) -> Section:
     """Return the comparison of the sensors that the results are about."""
-    names = dict.fromkeys(str(row["sensor"]) for row in subject.rows)
-    found = {name: _spec(name, subject) for name in names}
-    specs = [spec for spec in found.values() if spec is not None]
-    levels = {str(row["sensor"]): str(row[LEVEL]) for row in subject.rows if LEVEL in row}
-    listed = ", ".join(f"{name} {level}" for name, level in levels.items())
-    command = command_line("tactbench", "show", *found, "--all")
-    parts = (("Sensor comparison", table_one(specs)), ("Readings", of_sensors(specs)[:_READINGS])) if specs else ()
+    known = subject.results.registry.sensors
+    names = list(dict.fromkeys(str(row["sensor"]) for row in subject.rows))
+    specs = [known[name].spec for name in names if name in known]
+    command = command_line("tactbench", "show", *(name for name in names if name in known), "--all")
+    table = sensor_table("Sensor comparison", specs, table_one(specs), with_source=True).compact()
     return Section(
         paragraphs=(f"Every parameter of these sensors, and who states it: `{command}`.",) if specs else (),
-        tables=tuple(sensor_table(name, specs, properties, with_source=True).compact() for name, properties in parts),
-        notes=(f"Levels that `tactbench check` has computed: {listed}.",) if levels else (),
-        missing=tuple(f"{name}: neither installed nor in a recording of these results."
-                      for name, spec in found.items() if spec is None),
-    )  # fmt: skip
-
-
-def _spec(name: str, subject: ReportData) -> SensorSpec | None:
-    """Return a sensor's spec: the installed one, else the one that a recording carries."""
-    registry = subject.results.registry
-    try:
-        if name in registry.sensors:
-            return registry.sensors[name].spec
-        for row in subject.rows:
-            if row["sensor"] == name:
-                for path in subject.results.recordings(row):
-                    return read_meta(path).sensor
-    except TactbenchError:
-        pass  # given twice, or a damaged file: the section says that it is not known
-    return None
+        tables=(table,) if specs else (),
+        missing=tuple(f"{name}: not installed." for name in names if name not in known),
+    )
 
 
 def cells_section(subject: ReportData) -> Section:
@@ -187,7 +150,7 @@ SECTIONS: tuple[tuple[str, str, Callable[[ReportData], Section]], ...] = (
     ("leaderboards", "Leaderboard", leaderboards_section),
     ("reproduction", "Published numbers", published_section),
     ("figures", "Figures", figures_section),
-    ("compared", "Across protocols, splits and tasks", compared_section),
+    ("compared", "Events and probes", compared_section),
     ("cost", "What accuracy costs in time", costs_section),
     ("sensors", "Sensors (the paper's Table I)", sensors_section),
     ("cells", "Details of each cell", cells_section),
@@ -195,8 +158,7 @@ SECTIONS: tuple[tuple[str, str, Callable[[ReportData], Section]], ...] = (
 )
 
 
-@dataclass(frozen=True)
-class Page:
+class Page(NamedTuple):
     """The text, and what it lacks."""
 
     html: str
@@ -221,28 +183,26 @@ def make_page(subject: ReportData) -> Page:
             broken.append(f"{title}: {reason}")
             sections.append(Section(anchor, title, missing=(reason,)))
     missing = [f"{section.title}: {lacked}" for section in sections for lacked in section.missing]
-    style, script = _text("page.css"), _text("page.js")
-    html = (
-        _environment()
-        .get_template("page.html")
-        .render(
-            title=TITLE, version=tactbench.__version__, sections=sections, anchors=subject.anchors, style=style,
-            script=script, style_hash=_digest(style), script_hash=_digest(script),
-        )
-    )  # fmt: skip
+    html = _template().render(
+        title=TITLE,
+        version=tactbench.__version__,
+        sections=sections,
+        anchors=subject.anchors,
+        style=_text("page.css"),
+        script=_text("page.js"),
+    )
     return Page(f"{html}\n", tuple(one for one in missing if one not in broken), tuple(broken))
 
 
-@lru_cache(maxsize=1)
-def _environment() -> Environment:
-    """Return what renders the template; everything in it is escaped."""
+def _template() -> Template:
+    """Return the template; everything that it is given is escaped."""
     from jinja2 import Environment, PackageLoader, StrictUndefined
 
     loader = PackageLoader("tactbench.core.report", "template")
     environment = Environment(loader=loader, autoescape=True, undefined=StrictUndefined)
     environment.globals["wordy"] = WORDY
-    environment.filters.update(prose=_prose, sort_value=sort_value, base64=lambda png: base64.b64encode(png).decode())
-    return environment
+    environment.filters.update(sort_value=sort_value, picture=lambda path: base64.b64encode(path.read_bytes()).decode())
+    return environment.get_template("page.html")
 
 
 def _text(name: str) -> Markup:
@@ -251,17 +211,53 @@ def _text(name: str) -> Markup:
     return Markup((resources.files("tactbench.core.report") / "template" / name).read_text(encoding="utf-8"))
 
 
-def _digest(text: str) -> str:
-    """Return what a Content-Security-Policy calls the text by."""
-    return "sha256-" + base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()
+Drawer = Callable[[Results, Path, Progress, Callable[[str], None]], Sequence[SavedFigure]]
+"""Takes the results, the folder for figures, where progress goes, and what is called with each figure left out."""
 
 
-def _prose(text: str) -> Markup:
-    """Return text with what stands between backticks as code; everything in it is escaped."""
-    from markupsafe import Markup, escape
+@dataclass(frozen=True)
+class Report:
+    """A report that has been written, and what it lacks."""
 
-    parts = str(text).split("`")
-    if len(parts) % 2 == 0:  # a backtick without its partner is a backtick
-        return escape(str(text))
-    shown = [Markup("<code>{}</code>").format(part) if place % 2 else escape(part) for place, part in enumerate(parts)]
-    return Markup("").join(shown)
+    page: Path
+    reproduction: TextTable
+    records: Sequence[Mapping[str, Any]]
+    """The reproduction table for programs."""
+    missing: tuple[str, ...]
+    broken: tuple[str, ...]
+
+
+def make_report(results: Results, out: Path, progress: Progress, *, draw: Drawer = draw_figures) -> Report:
+    """Draw the figures and write the page: ``index.html`` and ``figures/`` in `out`.
+
+    Raises
+    ------
+    UsageError
+        If no cell has finished.
+    UnwritableError
+        If `out` refuses the page or the figures; an earlier page is then still whole.
+    """
+    if not any(row["status"] == "done" for row in results.rows):
+        raise UsageError(
+            f"No cell in {results.store.folder} has finished: there is nothing to report.",
+            hint="Finish some with `tactbench run --out DIR`.",
+        )
+    undrawn: list[str] = []
+    try:
+        (out / "figures").mkdir(parents=True, exist_ok=True)
+        drawn = draw(results, out / "figures", progress, undrawn.append)
+        html, missing, broken = make_page(ReportData(results, drawn, tuple(undrawn)))
+        # A lone surrogate, which JSON may hold, is no UTF-8: a question mark then.
+        replace_file(out / "index.html", html.encode("utf-8", "replace"))
+    except OSError as error:
+        raise UnwritableError(
+            f"The report cannot be written to {out}: {error.strerror or error}.",
+            hint="Give another folder with --out.",
+        ) from error
+    return Report(
+        page=out / "index.html",
+        reproduction=published_table(results.registry, results.rows),
+        records=records(reproduce(results.registry, results.rows)),
+        missing=missing,
+        broken=broken,
+    )

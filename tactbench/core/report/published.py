@@ -6,18 +6,16 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
 
-from tactbench.core.leaderboard.columns import row_interval
-from tactbench.core.leaderboard.names import LOWER_IS_BETTER
 from tactbench.core.plugins.registry import Registry
 from tactbench.core.spec.task import Published, TaskSpec
-from tactbench.core.statistics.replicates import counted, percent
-from tactbench.core.tables.numbers import score, score_with_unit
+from tactbench.core.tables.numbers import interval as ends
+from tactbench.core.tables.numbers import score, signed
 from tactbench.core.tables.text import command_line
 from tactbench.core.tables.text_table import ABSENT, Entry, TextTable, finite, text_table
 
 Row = Mapping[str, Any]
 Verdict = Literal["inside", "outside", "no interval", "no answer"]
-COLUMNS = ("number", "published", "ours", "95 % interval", "verdict")
+COLUMNS = ("number", "published", "ours", "interval", "ours − published", "verdict")
 
 
 @dataclass(frozen=True)
@@ -30,7 +28,8 @@ class Reproduction:
     """What stands beside it; None: nothing has been run."""
     verdict: Verdict
     """`inside`: the published number lies in the interval of our score; `no interval`: too few replicates have one."""
-    sentence: str
+    reason: str = ""
+    """Why there is no answer."""
 
     @property
     def title(self) -> str:
@@ -52,9 +51,9 @@ def reproduce(registry: Registry, rows: Sequence[Row]) -> list[Reproduction]:
     for task in sorted(tasks, key=lambda task: (order.get(task.name, len(order)), task.name)):
         for published in task.published:
             beside = [row for row in rows if stands_beside(row, task, published)]
-            lines += [Reproduction(task, published, row, *verdict(row, published.score)) for row in beside]
+            lines += [Reproduction(task, published, row, *_verdict(row, published.score)) for row in beside]
             if not beside and not _needs_recordings(task, published, registry):
-                command = _command(task, published, registry)
+                command = _command(task, published)
                 lines.append(Reproduction(task, published, None, "no answer", f"not run: `{command}`"))
     return lines
 
@@ -72,33 +71,15 @@ def stands_beside(row: Row, task: TaskSpec, published: Published) -> bool:
     return task.published_for(row["sensor"], row["protocol"], row["estimator"], row["split"]) == published
 
 
-def verdict(row: Row, published: float) -> tuple[Verdict, str]:
-    """Return how a row, of any status, compares with a published number, and one sentence that says so."""
+def _verdict(row: Row, published: float) -> tuple[Verdict, str]:
     if row["status"] != "done":
         return "no answer", f"{row['status']}: {row['reason']}"
-    n, unit = row.get("n_replicates"), row.get("replicate_unit")
-    over = counted(int(n or 1), str(unit or "replicate"))
     if row["ci_low"] is None or row["ci_high"] is None:
-        return "no interval", f"{over}: too few for an interval; {_difference(row, published)}"
-    interval = f"our {percent(n, unit)} interval{f' over {over}' if n else ''}"
-    if row["ci_low"] <= published <= row["ci_high"]:
-        return "inside", f"inside: the published lies in {interval}"
-    end = "below" if published < row["ci_low"] else "above"
-    sentence = f"outside: {_difference(row, published)}, and the published lies {end} {interval}"
-    return "outside", sentence if unit == "replicate" else f"{sentence}, by {row['ci_method']}"
+        return "no interval", ""
+    return "inside" if row["ci_low"] <= published <= row["ci_high"] else "outside", ""
 
 
-def _difference(row: Row, published: float) -> str:
-    ours, by = row["score"], abs(row["score"] - published)
-    if by == 0:
-        return "ours is the published"
-    share = f" ({100 * by / abs(published):.1f} %)" if published else ""
-    where = "below" if ours < published else "above"
-    better = "better" if (ours < published) == (row["metric"] in LOWER_IS_BETTER) else "worse"
-    return f"ours is {score_with_unit(by, row['unit'])}{share} {where} the published, which is {better}"
-
-
-def _command(task: TaskSpec, published: Published, registry: Registry) -> str:
+def _command(task: TaskSpec, published: Published) -> str:
     """Return what to type for a row that the number may stand beside."""
     words = ["tactbench", "run", *(["--sensor", published.sensor] if published.sensor else []), "--task", task.name]
     words += ["--protocol", published.protocol]
@@ -106,8 +87,6 @@ def _command(task: TaskSpec, published: Published, registry: Registry) -> str:
         words += ["--split", published.split]
     if published.estimator and published.estimator not in task.baselines:  # those are run with any other
         words += ["--estimator", published.estimator]
-    if _needs_recordings(task, published, registry):
-        words += ["--rig", "replay", "--recordings", "DIR"]
     return command_line(*words)
 
 
@@ -123,7 +102,7 @@ def records(lines: Iterable[Reproduction]) -> list[dict[str, Any]]:
             "remark": published.remark, "cell": row.get("cell"),
             "simulated": bool(row["simulated"]) if row else None,
             **{name: row.get(name) for name in ("score", "ci_low", "ci_high")},
-            "verdict": line.verdict, "sentence": line.sentence,
+            "verdict": line.verdict, "reason": line.reason,
         })  # fmt: skip
     return found
 
@@ -140,7 +119,7 @@ def published_table(registry: Registry, rows: Sequence[Row]) -> TextTable:
         "Published numbers, and ours",
         COLUMNS,
         [_entries(line) for line in lines],
-        numeric=COLUMNS[1:4],
+        numeric=COLUMNS[1:5],
         notes=notes,
         kinds=[line.verdict.replace(" ", "-") for line in lines],
     )
@@ -148,10 +127,18 @@ def published_table(registry: Registry, rows: Sequence[Row]) -> TextTable:
 
 def _entries(line: Reproduction) -> tuple[str, ...]:
     row, unit, published = line.row or {}, line.task.unit, line.published.score
-    ours = interval = Entry(ABSENT)
+    ours = interval = apart = ABSENT
     if row and row["score"] is not None:
         marks = (" SIM" if row["simulated"] else "") + (" †" if row["dagger"] else "")
         ours = Entry(score(row["score"], unit) + marks, finite(row["score"]), cell=row["cell"])
-        interval = Entry(row_interval(row), finite(row["ci_low"]))
+        interval = Entry(ends(row["ci_low"], row["ci_high"], unit), finite(row["ci_low"]))
+        apart = Entry(signed(row["score"] - published, unit), row["score"] - published)
     digits = f"{published:g}" if unit == "1" else score(published, unit)
-    return f"{line.title}; {line.published.reference}", Entry(digits, published), ours, interval, line.sentence
+    return (
+        f"{line.title}; {line.published.reference}",
+        Entry(digits, published),
+        ours,
+        interval,
+        apart,
+        line.reason or line.verdict,
+    )

@@ -87,13 +87,10 @@ class RigDescriptor(Frozen):
     rungs: tuple[str, ...] = ()
     """Names of the rungs of its ladder of solvers, the cheapest first; for simulated rigs."""
     verification: str | None = Field(default=None, pattern=WHERE)
-    """``module:callable``, called without arguments: the simulation against its oracles, a sequence of Check."""
+    """``module:callable``, called without arguments: the simulation against laws and closed forms, some Verdicts."""
     work_precision: str | None = Field(default=None, pattern=WHERE)
     """``module:callable``, called with a SensorDescriptor and, by name, ``rounds`` (how often a recording is timed): a
     CostStudy of error against seconds per recording."""
-    likeness: str | None = Field(default=None, pattern=WHERE)
-    """``module:callable``, called with (SensorDescriptor, folder of recordings or None): Checks of the simulated
-    sensor against what was measured on real ones, or of recordings against the same ranges."""
     file: str | None = Field(default=None, pattern=WHERE)
     """``module:class``, a RigFile that also checks the rig's own settings: complaints about them then name their
     line."""

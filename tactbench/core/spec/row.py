@@ -64,7 +64,6 @@ class RowModel(BaseModel):
     metric: str = ""
     unit: str = ""
     equivalence: float | None = None
-    reference_score: float | None = None
     score: float | None = None
     ci_low: float | None = None
     ci_high: float | None = None

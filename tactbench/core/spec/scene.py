@@ -21,7 +21,7 @@ from tactbench.core.errors import UsageError
 from tactbench.core.spec import units
 from tactbench.core.spec.drive import ForceLoop
 from tactbench.core.spec.profile import PAPER, ForceProfile, ForceRamp
-from tactbench.core.spec.quantity import Frozen, Quantity, assumed, derived, measured, sourced
+from tactbench.core.spec.quantity import Frozen, Quantity, assumed, measured, sourced
 from tactbench.core.spec.sensor import ChannelKind
 
 M = TypeVar("M", bound=BaseModel)
@@ -143,18 +143,29 @@ class Surface(Frozen):
     stribeck_speed: Quantity = assumed(5.0, "mm/s", "no source for this skin")
     """Speed over which friction falls from static to kinetic [speed]; 0: at once (Coulomb's two coefficients)."""
     roughness: Quantity = measured(
-        21.0,
+        73.0,
         "um",
-        "set so that PAC holds 77 counts (rms) between 2 and 10 Hz, the median of dexrob/BioTac_slide_20_50, in one "
+        "set so that PAC holds 110 counts (rms) between 2 and 30 Hz, the median of dexrob/BioTac_slide_20_50, in one "
         "simulated slide: cap R 20 mm, 0.5 N, 50 mm/s, all three assumed",
     )
     """Root mean square of the profile [length]."""
-    wavelength: Quantity = derived(
-        6.25, "mm", "dexrob/BioTac_slide_20_50: median frequency of PAC 8 Hz, at an assumed speed of 50 mm/s"
+    roll_off: Quantity = assumed(
+        1.0, "mm", "some tenths of a millimetre and more, by surface: Persson et al. 2005; none known of what slides"
     )
-    """Dominant spatial wavelength of the profile [length]."""
-    spread: float = Field(default=0.5, ge=0)
-    """Standard deviation of ln(wavelength) about the dominant one (assumed); 0: a grating."""
+    """Wavelength below which the profile is self-affine, and above which its spectrum is even [length]."""
+    hurst: Quantity = assumed(
+        0.8, "1", "0.7 to 0.9 for most surfaces; Persson et al. 2005, J. Phys.: Condens. Matter 17 R1, as recalled"
+    )
+    """Hurst exponent H of the profile [1]: its spectrum falls as k^-(1 + 2 H)."""
+
+    @model_validator(mode="before")
+    @classmethod
+    def _of_one_band(cls, given: Any) -> Any:
+        """Read the surface of an earlier recording, a band about one wavelength, by that wavelength."""
+        if isinstance(given, Mapping) and "wavelength" in given:
+            left = {name: value for name, value in given.items() if name != "spread"}
+            return {"roll_off": left.pop("wavelength"), **left}
+        return given
 
     @model_validator(mode="after")
     def _is_possible(self) -> Surface:
@@ -163,8 +174,8 @@ class Surface(Frozen):
             raise ValueError(f"friction must be static >= kinetic >= 0, not {static:g} and {kinetic:g}")
         if self.stribeck_speed.to("mm/s") < 0 or self.roughness.to("mm") < 0:
             raise ValueError("a Stribeck speed and a roughness are at least 0")
-        if not self.wavelength.to("mm") > 0:
-            raise ValueError("a wavelength is above 0")
+        if not (self.roll_off.to("mm") > 0 and 0 < self.hurst.to("1") <= 1):
+            raise ValueError("a roll-off is above 0, a Hurst exponent above 0 and at most 1")
         return self
 
 

@@ -10,7 +10,6 @@ from pydantic import Field, ValidationError, model_validator
 
 from tactbench.core.errors import NotApplicable, UsageError
 from tactbench.core.spec import units
-from tactbench.core.spec.figure import RealFigure
 from tactbench.core.spec.quantity import Frozen, Length, Mass, Power, Quantity, Share, Source, Time, Unit, assumed
 from tactbench.core.spec.skin import Skin
 
@@ -272,8 +271,6 @@ class SensorSpec(Frozen):
     references: tuple[str, ...] = ()
     data_sheet: DataSheet = Field(default=DataSheet(), exclude=True)
     """Size, range, interface … of the device. Left out of recordings and keys: no sample depends on it."""
-    likeness: tuple[RealFigure, ...] = Field(default=(), exclude=True)
-    """Figures of real units, to judge by. Left out of recordings and keys: no sample depends on them."""
 
     @model_validator(mode="after")
     def _names_are_unique(self) -> SensorSpec:

@@ -121,7 +121,7 @@ class FluidBackedShell(Frozen):
     residual_film: Length
     """Film that asperities keep open at touch-down [length]."""
     clamp_stiffness: Stiffness
-    """Clamp at the sleeve's ends and seam [pressure / length]."""
+    """Clamp at the sleeve's sealed ends and seam [pressure / length]; a dome's tip is no sealed end."""
     clamp_length: Length
     """Decay length of that clamp [length]."""
 

@@ -147,9 +147,6 @@ class TaskSpec(Frozen):
     equivalence: float | None = Field(default=None, ge=0)
     """Region of practical equivalence, in the metric's unit: two scores that differ by no more are the same to whoever
     uses the sensor. None: nobody has said, and only chance makes scores alike."""
-    reference_score: float | None = None
-    """What counts as 1 where scores of several tasks are averaged, the trivial baseline being 0; None: the metric's
-    perfect answer."""
     scenes: tuple[PlannedScene, ...] = ()
     """What a rig should record; empty: only recordings made elsewhere can answer."""
     campaigns: dict[str, tuple[PlannedScene, ...]] = Field(default_factory=dict)

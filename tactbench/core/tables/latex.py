@@ -9,17 +9,15 @@ from collections.abc import Iterable
 from tactbench.core.tables.text_table import TextTable
 
 _TEX = {
-    "\\": r"\textbackslash{}", "&": r"\&", "%": r"\%", "$": r"\$", "#": r"\#", "_": r"\_", "{": r"\{", "}": r"\}",
+    "\\": r"\textbackslash{}", "&": r"\&", "%": r"\%", "$": r"\$", "#": r"\#", "_": r"\_\allowbreak{}",
+    "{": r"\{", "}": r"\}",
     "~": r"\textasciitilde{}", "^": r"\textasciicircum{}", "<": r"\textless{}", ">": r"\textgreater{}",
     "|": r"\textbar{}", '"': "{''}", "[": "{[}", "]": "{]}", "*": "{*}", "†": r"$\dagger$", "‡": r"$\ddagger$",
     "‖": r"$\|$", "–": "--", "—": "---", "…": r"\ldots{}", "·": r"$\cdot$", "×": r"$\times$", "±": r"$\pm$",
     "≤": r"$\le$", "≥": r"$\ge$", "−": "$-$", "µ": r"$\mu$", "μ": r"$\mu$", "²": r"$^2$", "³": r"$^3$",
-    "°": r"$^\circ$", "ß": r"{\ss}", "\n": " ", "\u202f": r"\,",
+    "=": r"=\allowbreak{}", "°": r"$^\circ$", "ß": r"{\ss}", "\n": " ", "\u202f": r"\,",
 }  # fmt: skip
 """Brackets and the star are options of ``\\\\`` where they follow it: in braces they are text."""
-
-_LIGATURE = re.compile(r"-(?=-)|`(?=`)|'(?=')|[!?](?=`)|,(?=,)")
-"""The first of two characters that TeX draws as one."""
 
 
 def latex(tables: Iterable[TextTable]) -> str:
@@ -50,7 +48,7 @@ def latex_table(table: TextTable, *, number: int = 1, columns: str = "", rule: i
         rf"\begin{{{environment}}}[t]",
         r"\centering",
         r"\footnotesize",
-        r"\setlength{\tabcolsep}{2.5pt}",
+        r"\setlength{\tabcolsep}{2.5pt}\setlength{\belowcaptionskip}{4pt}",
         rf"\caption{{{tex(table.title)}}}",
         rf"\label{{{_label(table.title, number)}}}",
         rf"\begin{{tabular}}{{{columns or ''.join('r' if right else 'l' for right in table.right)}}}",
@@ -74,12 +72,10 @@ def _label(title: str, number: int) -> str:
 
 def tex(text: str) -> str:
     """Return text that LaTeX sets as it is; a character it has no letter for is told by its number, ``U+4E2D``."""
-    return "".join(map(_character, _LIGATURE.sub("\\g<0>\0", text)))
+    return "".join(map(_character, text))
 
 
 def _character(character: str) -> str:
-    if character == "\0":
-        return "{}"
     if character in _TEX:
         return _TEX[character]
     if character.isascii():

@@ -9,7 +9,6 @@ from tactbench.core.tables.text_table import TextTable
 
 _ACTS = re.compile(r"[\\|*\[\]~]|(?<![^\W_])_|_(?![^\W_])")
 """Begins something wherever it stands; an underscore does so only at the edge of a word."""
-_BEGINS_A_LINE = re.compile(r"[#>+=-]|[0-9]+[.)]")
 
 
 def markdown(parts: Iterable[TextTable | Sequence[str]]) -> str:
@@ -20,7 +19,7 @@ def markdown(parts: Iterable[TextTable | Sequence[str]]) -> str:
 def _table(table: TextTable) -> list[str]:
     """Return a table as lines of Markdown: a heading, sentences, columns of numbers to the right, notes."""
     return [
-        f"### {_heading(table.title)}\n",
+        f"### {markdown_text(table.title)}\n",
         *([f"{markdown_note(table.origin)}\n"] if table.origin else []),
         *(f"{markdown_note(text)}\n" for text in table.summary),
         "| " + " | ".join(markdown_text(name) for name in table.headers) + " |",
@@ -34,11 +33,6 @@ def _notes(notes: Sequence[str]) -> list[str]:
     return [f"- {markdown_note(note)}" for note in notes]
 
 
-def _heading(title: str) -> str:
-    text = markdown_text(title).rstrip()
-    return f"{text[:-1]}\\#" if text.endswith("#") else text
-
-
 def markdown_text(text: str) -> str:
     """Return text that Markdown shows as it is, in a table or a heading; its lines are one of the table."""
     return "<br>".join(_escaped(line).replace("`", "\\`") for line in text.split("\n"))
@@ -46,9 +40,7 @@ def markdown_text(text: str) -> str:
 
 def markdown_note(text: str) -> str:
     """Return a sentence that Markdown shows as it is, but for words between backticks, which are code."""
-    escaped = _escaped(text.strip())
-    begins = _BEGINS_A_LINE.match(escaped)
-    return f"{escaped[: begins.end() - 1]}\\{escaped[begins.end() - 1 :]}" if begins else escaped
+    return _escaped(text.strip())
 
 
 def _escaped(text: str) -> str:

@@ -95,25 +95,24 @@ def _widths(table: TextTable, room: int) -> dict[int, int]:
     """
     from rich.cells import cell_len
 
-    def widest(parts: Iterable[str]) -> int:
-        return max(map(cell_len, parts), default=0)
-
     widths, least, body = {}, {}, {}
     for place, (name, head, *texts) in enumerate(zip(table.columns, table.headers, *table.lines, strict=True)):
         lines = [line for text in texts for line in text.split("\n")]
-        whole = name in table.numeric or name in table.unbroken
-        body[place] = widest(lines)
-        widths[place] = max(1, body[place], widest([head]))
-        least[place] = max(1, widest([*head.split(), *(lines if whole else (w for one in lines for w in one.split()))]))
+        kept = lines if name in table.numeric | table.unbroken else " ".join(lines).split()
+        body[place] = max(map(cell_len, lines), default=0)
+        widths[place] = max(1, cell_len(head), body[place])
+        least[place] = max(map(cell_len, [*head.split(), *kept, " "]))
+
+    def excess(of: dict[int, int]) -> int:
+        return sum(of[place] + _GAP for place in widths) - _GAP - room
+
     for name in table.first_to_go:
-        if sum(least[place] + _GAP for place in widths) - _GAP > room and name in table.columns:
+        if excess(least) > 0 and name in table.columns:
             del widths[table.columns.index(name)]
-    kept = {place for place in widths if table.columns[place] in table.unbroken | table.numeric}
-    for bound in (least, {place: least[place] if place in kept else _LEAST for place in least}):
-        while sum(width + _GAP for width in widths.values()) - _GAP > room:
-            slack = [place for place, width in widths.items() if width > bound[place]]
-            if not slack:
-                break
+    words = {place: least[place] if name in table.numeric | table.unbroken else _LEAST
+             for place, name in enumerate(table.columns)}  # fmt: skip
+    for bound in (least, words):
+        while excess(widths) > 0 and (slack := [place for place in widths if widths[place] > bound[place]]):
             # Headings first: breaking one costs a single line.
             widths[max(slack, key=lambda place: (widths[place] > body[place], widths[place]))] -= 1
     return widths

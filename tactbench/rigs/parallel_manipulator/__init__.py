@@ -9,7 +9,7 @@ from __future__ import annotations
 from tactbench.plugin import RigDescriptor, hookimpl
 from tactbench.plugin.devices import DeviceDescriptor
 
-TACTBENCH_API = 1
+TACTBENCH_API = 2
 
 
 @hookimpl

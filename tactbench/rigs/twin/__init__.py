@@ -5,13 +5,11 @@ from __future__ import annotations
 from tactbench.plugin import IndenterDescriptor, Parameter, RigDescriptor, hookimpl
 from tactbench.plugin.simulation import EffectDescriptor
 
-TACTBENCH_API = 1
+TACTBENCH_API = 2
 
 _HERE = "tactbench.rigs.twin"
 _DRIFT, _NOISE = ("drift",), ("noise",)
-_LOAD, _TOLD = ("load",), ("reference-force",)
-_HEAT, _FORCE = "effects.thermal_called_for", "effects.force_called_for"
-_SLIDING = "effects.called_for_sliding"
+_LOAD, _REFERENCE = ("load",), ("reference-force",)
 
 
 @hookimpl
@@ -23,10 +21,9 @@ def tactbench_rigs() -> list[RigDescriptor]:
             title="Simulated twin",
             where=f"{_HERE}.rig:build",
             simulated=True,
-            likeness=f"{_HERE}.likeness.report:checks",
             rungs=("closed-form", "default", "fine", "reference"),
             work_precision=f"{_HERE}.work_precision:study",
-            verification=f"{_HERE}.verification.everything:checks",
+            verification=f"{_HERE}.verify:verdicts",
         )
     ]
 
@@ -35,12 +32,12 @@ def tactbench_rigs() -> list[RigDescriptor]:
 def tactbench_effects() -> list[EffectDescriptor]:
     """Offer the twin's own effects."""
     return [
-        _effect("force-loop", "Motor under force control", "effects.force_loop:apply", (), (*_LOAD, *_TOLD), _FORCE),
+        _effect("force-loop", "Motor under force control", "effects.force_loop:apply", (), (*_LOAD, *_REFERENCE)),
         _effect("contact", "Normal contact", "contact.stages:press_skin", ("load", "core"), ("skin",)),
         _effect("core", "Touch-down on the core", "contact.core:with_core", (), ("core",)),
         _effect("fluid-pressure", "Fluid pressure", "contact.stages:watch_fluid", ("skin",), ("dc_pressure", "fluid")),
-        _effect("shear", "Tangential state of the skin", "contact.stages:watch_shear", (), ("shear",), _SLIDING),
-        _effect("gain", "Scatter of gains", "effects.gain:apply", (), ("gain",)),
+        _effect("shear", "Tangential state of the skin", "contact.stages:watch_shear", (), ("shear",)),
+        _channels("gain", "Scatter of gains", produces=("gain",)),
         _effect("creep", "Creep of the skin", "effects.creep:apply", ("load", "skin", "gain"), ("effective-force",)),
         _effect(
             "transduction",
@@ -49,57 +46,47 @@ def tactbench_effects() -> list[EffectDescriptor]:
             ("skin", "gain", "effective-force", "vibration", "shear", "slip"),
             ("taxel", "reading"),
         ),
+        _heat("contact-heat", "Heat through the contact", ("skin",), ("warmth",)),
+        _heat("dc-temperature", "Temperature of the core", ("warmth",), ("dc_temperature", "reading")),
+        _heat("ac-temperature", "Rate of the core's temperature", ("warmth",), ("ac_temperature", "reading")),
+        _heat("thermal-drift", "Drift with the fluid's temperature", ("warmth", "taxel"), ("disturbance",), ("heat",)),
+        _channels("rest-spread", "Scatter of rest levels"),
+        _channels("unit-rest", "Rest levels of another unit"),
+        _channels("offset", "Offsets", groups=_DRIFT),
+        _channels("warm-up", "Shared warm-up", groups=_DRIFT),
+        _channels("wander", "Free drift", groups=_DRIFT),
+        _channels("white-noise", "White noise", groups=_NOISE),
         _effect(
-            "contact-heat", "Heat through the contact", "effects.contact_heat:apply", ("skin",), ("warmth",), _HEAT
+            "friction",
+            "Friction",
+            "effects.friction:apply",
+            ("skin",),
+            ("slip", "tangential-force", *_REFERENCE),
         ),
+        _effect("skin-vibration", "Skin vibration", "effects.skin_vibration:apply", ("slip", "skin"), ("vibration",)),
         _effect(
-            "dc-temperature",
-            "Temperature of the core",
-            "effects.temperature:read_dc",
-            ("warmth",),
-            ("dc_temperature", "reading"),
-            _HEAT,
+            "ac-pressure",
+            "Dynamic pressure",
+            "effects.ac_pressure:apply",
+            ("skin", "fluid", "vibration"),
+            ("ac_pressure", "reading"),
         ),
-        _effect(
-            "ac-temperature",
-            "Rate of the core's temperature",
-            "effects.temperature:read_ac",
-            ("warmth",),
-            ("ac_temperature", "reading"),
-            _HEAT,
-        ),
-        _effect(
-            "thermal-drift",
-            "Drift with the fluid's temperature",
-            "effects.thermal_drift:apply",
-            ("warmth", "taxel"),
-            ("disturbance",),
-            _HEAT,
-            groups=("heat",),
-        ),
-        _effect("rest-spread", "Scatter of rest levels", "effects.rest_spread:apply", (), ("disturbance",)),
-        _effect("unit-rest", "Rest levels of another unit", "effects.unit_rest:apply", (), ("disturbance",)),
-        _effect("offset", "Offsets", "effects.offset:apply", (), ("disturbance",), groups=_DRIFT),
-        _effect("warm-up", "Shared warm-up", "effects.warm_up:apply", (), ("disturbance",), groups=_DRIFT),
-        _effect("wander", "Free drift", "effects.wander:apply", (), ("disturbance",), groups=_DRIFT),
-        _effect("white-noise", "White noise", "effects.white_noise:apply", (), ("disturbance",), groups=_NOISE),
-        *_sliding(),
-        _effect("converter", "Converter", "effects.converter:apply", ("reading", "disturbance"), ("stored",)),
+        _channels("hum", "Hum of dynamic pressure", groups=_NOISE),
+        _channels("converter", "Converter", ("reading", "disturbance"), ("stored",)),
         _effect(
             "force-noise",
             "Noise of the force sensor",
-            "effects.force_noise:apply",
+            "effects.force_sensor:noise",
             (*_LOAD, "tangential-force"),
-            ("raw-force", *_TOLD),
-            groups=_NOISE,
+            ("raw-force", *_REFERENCE),
+            _NOISE,
         ),
         _effect(
             "force-filter",
             "Low-pass of the recorded force",
-            "effects.force_filter:apply",
+            "effects.force_sensor:low_pass",
             (*_LOAD, "tangential-force", "raw-force"),
-            _TOLD,
-            _FORCE,
+            _REFERENCE,
         ),
     ]
 
@@ -134,25 +121,12 @@ def _indenter(name: str, title: str, **dimensions: Parameter) -> IndenterDescrip
     return IndenterDescriptor(name=name, title=title, where=f"{_HERE}.shapes:{name}", dimensions=dimensions)
 
 
-def _sliding() -> list[EffectDescriptor]:
-    forces = ("slip", "tangential-force", "reference-force")
-    shakes, hears = ("slip", "skin"), ("skin", "fluid", "vibration")
-    heard = ("ac_pressure", "reading")
-    return [
-        _effect("friction", "Friction", "effects.friction:apply", ("skin",), forces, _SLIDING),
-        _effect("skin-vibration", "Skin vibration", "effects.skin_vibration:apply", shakes, ("vibration",), _SLIDING),
-        _effect("ac-pressure", "Dynamic pressure", "effects.ac_pressure:apply", hears, heard, _SLIDING),
-        _effect("hum", "Hum of dynamic pressure", "effects.hum:apply", (), ("disturbance",), _SLIDING, _NOISE),
-    ]
-
-
 def _effect(
     name: str,
     title: str,
     where: str,
     consumes: tuple[str, ...],
     produces: tuple[str, ...],
-    predicates: str = "effects.called_for",
     groups: tuple[str, ...] = (),
 ) -> EffectDescriptor:
     return EffectDescriptor(
@@ -162,5 +136,21 @@ def _effect(
         consumes=consumes,
         produces=produces,
         groups=groups,
-        called_for=f"{_HERE}.{predicates}:{name.replace('-', '_')}",
+        called_for=f"{_HERE}.effects.called_for:{name.replace('-', '_')}",
     )
+
+
+def _channels(
+    name: str,
+    title: str,
+    consumes: tuple[str, ...] = (),
+    produces: tuple[str, ...] = ("disturbance",),
+    groups: tuple[str, ...] = (),
+) -> EffectDescriptor:
+    return _effect(name, title, f"effects.channels:{name.replace('-', '_')}", consumes, produces, groups)
+
+
+def _heat(
+    name: str, title: str, consumes: tuple[str, ...], produces: tuple[str, ...], groups: tuple[str, ...] = ()
+) -> EffectDescriptor:
+    return _effect(name, title, f"effects.heat:{name.replace('-', '_')}", consumes, produces, groups)

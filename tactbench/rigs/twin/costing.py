@@ -49,7 +49,7 @@ def explained(
             rows.append(Explained(entry, statistics.median(run.spent_s[entry.effect] for run in runs)))
         else:
             rows.append(Explained(entry, *_if_asked_for(effects, sensor, scene, entry.effect, rounds, carry_out)))
-    forget_tables()  # whoever records the scene next pays for its contact
+    forget_tables()  # the next recording of the scene solves its contact itself
     return rows
 
 

@@ -1,6 +1,6 @@
-"""Which effects a scene gets, in which order, and why: the closure over what somebody will look at.
+"""Which effects a scene gets, in which order, and why: the closure over what is observed.
 
-Effects name tokens they produce and consume. What is observed is needed; whoever produces something needed is
+Effects name tokens they produce and consume. What is observed is needed; what produces something needed is
 included if its own predicate says that the scene calls for it, or if the scene asks for it by name; then everything it
 consumes is needed too. Nothing else is imported, allocated or stepped.
 """
@@ -29,7 +29,7 @@ REFERENCE = "reference-force"
 """Token of the other thing it always needs: the reference force."""
 LENT = "core"
 """Token of effects that the contact solver calls upon by itself, if a load needs them."""
-NOBODY = "no observed channel depends on it"
+UNNEEDED = "no observed channel depends on it"
 
 
 @dataclass(frozen=True)
@@ -68,7 +68,7 @@ def plan_scene(effects: Sequence[EffectDescriptor], scene: Scene, sensor: Sensor
     included: list[EffectDescriptor] = []
     entries: dict[str, PlanEntry] = {}
     for effect in effects:
-        reason = reasons.get(effect.name, Reason(False, NOBODY, 0.0))
+        reason = reasons.get(effect.name, Reason(False, UNNEEDED, 0.0))
         taken = asked.get(effect.name, reason.called_for)
         if taken:
             included.append(effect)
@@ -164,7 +164,7 @@ def _needed(
     needed = _closure(taking, begin)
     for effect in taking:
         if not needed.intersection(effect.produces):
-            reasons[effect.name] = Reason(False, NOBODY, 0.0)
+            reasons[effect.name] = Reason(False, UNNEEDED, 0.0)
     return reasons
 
 

@@ -18,6 +18,7 @@ from tactbench.plugin import (
     IndenterDescriptor,
     NotApplicable,
     PlanEntry,
+    Quality,
     RigContext,
     RigError,
     Scalar,
@@ -29,7 +30,6 @@ from tactbench.plugin import (
 )
 from tactbench.plugin.simulation import EffectDescriptor, Explained, effect_names
 from tactbench.rigs.twin.contact.stages import bare_skin
-from tactbench.rigs.twin.contact_point import contact_point
 from tactbench.rigs.twin.fidelity import DEFAULT, Fidelity
 from tactbench.rigs.twin.planner import Plan, plan_scene
 from tactbench.rigs.twin.preparation import carried_out, commanded_place_mm, handled
@@ -40,6 +40,8 @@ ROWS_PER_BLOCK = 1000
 _CURVE_POINTS = 4001
 """Of a press curve; straight between them, the force is off by less than 1e-4 of the largest, as in force_loop."""
 REFERENCE_STREAM = "force_torque"
+_PLACE_CHANNELS = tuple(ChannelSpec(name=name, kind="position", unit="m") for name in ("x", "y"))
+"""On the unrolled skin: ``x`` along the finger towards the tip, ``y`` along the arc of its outer surface."""
 _ONE_CLOCK = Source(
     tag="assumed",
     reference="the twin samples the sensor and the force sensor at once, on the scene's reference clock, as the "
@@ -202,7 +204,7 @@ def _acquisition(run: Synthesis, plan: Plan) -> TwinAcquisition:
     samples[REFERENCE_STREAM] = Samples(_ns(run.t_s), measured, None)
     places: tuple[StreamSpec, ...] = ()
     if "position" in run.scene.observe:
-        place, values, quality = contact_point(run, rate, _ONE_CLOCK)
+        place, values, quality = _contact_point(run, rate)
         samples[place.name] = Samples(_ns(run.t_s), values, quality)
         places = (place,)
     contact_x, contact_s = commanded_place_mm(run.sensor.spec, run.scene)
@@ -221,6 +223,27 @@ def _acquisition(run: Synthesis, plan: Plan) -> TwinAcquisition:
         samples=samples,
         run=run,
     )
+
+
+def _contact_point(run: Synthesis, rate_hz: float) -> tuple[StreamSpec, FloatArray, npt.NDArray[np.uint8]]:
+    """Return the stream of the apex of the indenter on the skin, its (n, 2) samples [m] and their quality.
+
+    While nothing presses there is no sample.
+
+    Raises
+    ------
+    NotApplicable
+        If the indenter slides: the twin computes its pressure where it was pressed on, and nowhere else.
+    """
+    if run.scene.slide is not None:
+        raise NotApplicable(
+            "The twin does not move the contact over the skin: no place can be recorded of an indenter that slides.",
+            hint="Leave `slide` out, or `position` out of what is observed.",
+        )
+    place_m = 1e-3 * np.array([run.contact.x_mm, run.contact.s_mm])
+    quality = np.where(run.load.at(run.t_s) > 0, Quality.GOOD, Quality.MISSING).astype(np.uint8)
+    stream = StreamSpec(name="contact_point", rate_hz=rate_hz, rate_source=_ONE_CLOCK, channels=_PLACE_CHANNELS)
+    return stream, np.tile(place_m, (run.t_s.size, 1)), np.column_stack([quality, quality])
 
 
 def _sizes(run: Synthesis) -> dict[str, Scalar]:
@@ -242,7 +265,7 @@ def _along_the_slide(run: Synthesis) -> dict[str, tuple[ChannelSpec, FloatArray]
     }
 
 
-_TOLD = frozenset({
+_STATED = frozenset({
     "placement_scatter_mm", "drift_scale", "noise_scale", "offset_scale", "session_offset_scale", "since_power_on_s",
     "force_noise_n", "force_filter_hz", "indenter_temperature_degc", "drive_proportional_mm_per_n",
     "drive_integral_mm_per_n_s", "drive_cutoff_hz", "drive_delay_ms", "surface_static_friction",
@@ -254,8 +277,8 @@ _TOLD = frozenset({
 def _stated(scene: Scene, sensor: SensorSpec) -> dict[str, Scalar]:
     """Return the nuisances of the scene that decide most, those that were set, and the slide."""
     asked = dict(scene.simulation.nuisances)
-    told = _TOLD | asked.keys() | ({"ambient_degc"} if scene.environment.indenter_temperature is not None else set())
-    stated: dict[str, Scalar] = {name: value for name, value in scene.nuisances().items() if name in told}
+    kept = _STATED | asked.keys() | ({"ambient_degc"} if scene.environment.indenter_temperature is not None else set())
+    stated: dict[str, Scalar] = {name: value for name, value in scene.nuisances().items() if name in kept}
     stated |= {name: amount.value for name, amount in sensor.settable().items() if name in asked}
     if scene.drive is not None and scene.drive.cutoff is None:
         stated["drive_cutoff_hz"] = "none"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -12,9 +13,20 @@ import numpy.typing as npt
 
 from tactbench.plugin import ChannelKind, ChannelSpec, FloatArray, Scalar, Scene, SensorDescriptor, load_object
 from tactbench.plugin.simulation import EffectDescriptor, EffectRun, Nuisances
-from tactbench.rigs.twin import draws
 from tactbench.rigs.twin.fidelity import DEFAULT, Fidelity
 from tactbench.rigs.twin.geometry import Contact
+
+
+def generator(seed: int, *scope: str) -> np.random.Generator:
+    """Return the generator of one scope, for example ``(sensor, "unit", "gain")``.
+
+    The scope's text is hashed (BLAKE2), so that the same seed and names give the same draws in every process and on
+    every machine, and a new effect does not shift the draws of the others.
+    """
+    digest = hashlib.blake2b("\x1f".join(scope).encode(), digest_size=16).digest()
+    words = [int.from_bytes(digest[i : i + 4], "little") for i in range(0, 16, 4)]
+    # A negative seed is as good as any: SeedSequence wants its words unsigned.
+    return np.random.default_rng(np.random.SeedSequence([seed % 2**64, *words]))
 
 
 @dataclass(frozen=True)
@@ -82,7 +94,7 @@ class Track:
     effective_n: dict[ChannelKind, FloatArray] = field(default_factory=dict)
     """(n,) force the response of a kind of channel follows, where it is not the true one."""
     vibration_mm: FloatArray | None = None
-    """(n,) motion of the skin along its normal, beyond what the load explains; None: nobody shakes it."""
+    """(n,) motion of the skin along its normal, beyond what the load explains; None: nothing shakes it."""
     gain: FloatArray | None = None
     """(channels,) factors on the response; None: all one."""
     warmth_k: FloatArray | None = None
@@ -121,9 +133,9 @@ class Synthesis:
     reference_n: FloatArray
     """(n,) what the force sensor says; starts at the true force."""
     fluid_pressure: bool = False
-    """Somebody looks at the pressure of the fluid."""
+    """The pressure of the fluid is observed."""
     tangential: bool = False
-    """Somebody looks at what the skin does along itself."""
+    """What the skin does along itself is observed."""
     reference_more: dict[str, tuple[ChannelSpec, FloatArray]] = field(default_factory=dict)
     """Further channels of the force sensor's stream, by name: (n,) on the reference clock."""
     sliding: Callable[[FloatArray], Tangential] | None = None
@@ -139,7 +151,7 @@ class Synthesis:
     rung: str = ""
     """Name of the rung that was chosen to keep a tolerance."""
     rung_error: float | None = None
-    """Its estimated error in the worst observed channel, in the channel's unit; None: nobody asked."""
+    """Its estimated error in the worst observed channel, in the channel's unit; None: not estimated."""
     drawn: dict[str, Scalar] = field(default_factory=dict)
     """What was drawn or achieved."""
     clock: Callable[[], float] = time.perf_counter
@@ -170,15 +182,15 @@ class Synthesis:
     def of_unit(self, *what: str) -> np.random.Generator:
         """Return the generator of what belongs to this sensor unit: the same in every recording of it under a seed."""
         scope = "unit" if self.scene.first_unit else f"unit {self.scene.unit}"
-        return draws.generator(self.seed, self.sensor.name, scope, *what)
+        return generator(self.seed, self.sensor.name, scope, *what)
 
     def of_session(self, *what: str) -> np.random.Generator:
         """Return the generator of what the recordings of a session share."""
-        return draws.generator(self.seed, self.sensor.name, "session", self.scene.session, *what)
+        return generator(self.seed, self.sensor.name, "session", self.scene.session, *what)
 
     def of_recording(self, *what: str) -> np.random.Generator:
         """Return the generator of what is this recording's own."""
-        return draws.generator(self.seed, self.sensor.name, "recording", self.scene.session, self.scene.name, *what)
+        return generator(self.seed, self.sensor.name, "recording", self.scene.session, self.scene.name, *what)
 
     def of_every_channel(self, track: Track, kind: ChannelKind, generator: np.random.Generator) -> FloatArray:
         """Return one standard normal number for each recorded channel of `kind` in `track`.

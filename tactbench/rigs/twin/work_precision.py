@@ -25,11 +25,10 @@ from tactbench.plugin import (
 )
 from tactbench.plugin.simulation import CostJob, CostPoint, CostStudy, EffectDescriptor, FluidBackedShell, rig_context
 from tactbench.rigs.twin.contact.pressing import pressed
-from tactbench.rigs.twin.contact.stages import READ_FROM_THE_SKIN, forget_tables, skin_under_load
+from tactbench.rigs.twin.contact.stages import forget_tables, read_names, skin_under_load
 from tactbench.rigs.twin.fidelity import DEFAULT, RUNGS, Fidelity
 from tactbench.rigs.twin.planner import Plan, plan_scene
 from tactbench.rigs.twin.preparation import carried_out, prepare
-from tactbench.rigs.twin.synthesis import Synthesis
 
 RADII_MM = (5.0, 10.0, 40.0, math.inf)
 """Contacts of the default matrix: caps from the sharpest to the bluntest, and the flat of the force task."""
@@ -56,16 +55,23 @@ def study(
     """
     if sensor.spec.skin is None or sensor.transducer is None:
         raise RigError(f"{sensor.name} cannot be simulated.", hint="It needs a skin and a transducer in its plugin.")
-    ways = list(_ways(sensor))
     effects = rig_context(load_registry()).effects
+    scenes = {radius: _planned(sensor, effects, radius) for radius in RADII_MM}
+    truth: dict[float, FloatArray] = {}
     caps = ", ".join(f"{radius:g}" for radius in RADII_MM if math.isfinite(radius))
     return CostStudy(
         title=f"error against time per recording (caps of {caps} mm and flat, 5 N, 5000 samples)",
         reference=f"Errors are against the rung 'reference' ({_REFERENCE.cells_factor:g} times as many cells each way, "
         f"no table), at {LOADS} loads for each cap, without noise; times are CPU seconds of one thread, medians of "
         f"{rounds * len(RADII_MM)} whole recordings, nothing kept from the one before.",
-        jobs=_jobs(sensor, effects, ways, clock, rounds),
-        total=len(ways),
+        jobs=[
+            CostJob(
+                label,
+                functools.partial(_measured, sensor, scenes, family, label, fidelity, truth, clock, rounds),
+                _rung(fidelity),
+            )
+            for family, label, fidelity in _ways(sensor)
+        ],
     )
 
 
@@ -99,20 +105,6 @@ def _rung(fidelity: Fidelity) -> str:
     return next((name for name, own in RUNGS.items() if own == fidelity), "")
 
 
-def _jobs(
-    sensor: SensorDescriptor,
-    effects: Sequence[EffectDescriptor],
-    ways: Sequence[tuple[str, str, Fidelity]],
-    clock: Callable[[], float],
-    rounds: int,
-) -> Iterator[CostJob]:
-    scenes = {radius: _planned(sensor, effects, radius) for radius in RADII_MM}
-    truth: dict[float, FloatArray] = {}
-    for family, label, fidelity in ways:
-        run = functools.partial(_measured, sensor, scenes, family, label, fidelity, truth, clock, rounds)
-        yield CostJob(label, run, _rung(fidelity))
-
-
 def _measured(
     sensor: SensorDescriptor,
     scenes: Mapping[float, tuple[Scene, Plan]],
@@ -126,7 +118,7 @@ def _measured(
     seconds: list[float] = []
     differences: list[FloatArray] = []
     for radius, (scene, plan) in scenes.items():
-        names = _names(prepare(sensor, scene, 1, plan))
+        names = read_names(prepare(sensor, scene, 1, plan))
         pressed(prepare(sensor, scene, 1, plan, fidelity), [], fidelity)  # refuses a skin that it does not do at once
         if radius not in truth:
             truth[radius] = _true(sensor, scene, plan, names)
@@ -177,10 +169,6 @@ def _planned(sensor: SensorDescriptor, effects: Sequence[EffectDescriptor], radi
         observe=observed,
     )
     return scene, plan_scene(effects, scene, sensor.spec)
-
-
-def _names(run: Synthesis) -> list[str]:
-    return [channel.name for track in run.tracks for channel in track.channels if channel.kind in READ_FROM_THE_SKIN]
 
 
 def _loads() -> FloatArray:

@@ -36,8 +36,8 @@ def _divided_axis(centres: FloatArray, cells: int) -> FloatArray:
     return np.asarray(edge + (np.arange(cells) + 0.5) * (step * len(centres) / cells))
 
 
-def spectral_interpolation(n: int, cells: int) -> FloatArray:
-    """Return the matrix that takes n periodic cell-centred samples to `cells` cells on the same length.
+def spectral_interpolation(n: int, cells: int, *, mirrored: bool = False) -> FloatArray:
+    """Return the matrix that takes n cell-centred samples to `cells` cells on the same length.
 
     It is the Dirichlet kernel, that is a zero-padded Fourier transform with the shift between the cells' centres
     (which do not coincide), written as a matrix: two small products do both axes.
@@ -48,6 +48,8 @@ def spectral_interpolation(n: int, cells: int) -> FloatArray:
         Number of samples, even.
     cells
         Number of cells wanted.
+    mirrored
+        The samples go on as their own image at both ends; otherwise they are periodic.
 
     Returns
     -------
@@ -55,11 +57,11 @@ def spectral_interpolation(n: int, cells: int) -> FloatArray:
     """
     fine = (np.arange(cells) + 0.5) * (n / cells)
     coarse = np.arange(n) + 0.5
-    distance = fine[:, None] - coarse[None, :]  # in coarse cells
-    turn = np.pi * distance / n
+    images, period = ([coarse, -coarse], 2 * n) if mirrored else ([coarse], n)
+    turn = np.pi / period * (fine[:, None] - np.array(images)[:, None])  # distance in coarse cells, as a phase
     at_node = np.abs(np.sin(turn)) < 1e-12
-    kernel = np.sin(n * turn) / (n * np.tan(np.where(at_node, 0.5, turn)))
-    return np.asarray(np.where(at_node, 1.0, kernel))
+    kernel = np.sin(period * turn) / (period * np.tan(np.where(at_node, 0.5, turn)))
+    return np.asarray(np.where(at_node, 1.0, kernel).sum(axis=0))
 
 
 def mid_film_mm(

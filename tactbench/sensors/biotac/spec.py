@@ -18,7 +18,6 @@ from tactbench.plugin import (
 )
 from tactbench.plugin.simulation import Dome, FluidBackedShell, SkinSheet
 from tactbench.sensors.biotac.channels import MANUAL, STREAMS
-from tactbench.sensors.biotac.likeness import LIKENESS
 from tactbench.sensors.biotac.meshes import ELECTRODES_MM, MESHES, film_table, relief_table
 from tactbench.sensors.biotac.nuisances import HARD_HANDLED, NUISANCES
 from tactbench.sensors.biotac.thermal import THERMAL
@@ -58,7 +57,7 @@ SKIN = FluidBackedShell(
     film=film_table(_OUTER_MM, _DOME_MM),
     residual_film=assumed(0.06, "mm", "asperities of the inner skin keep a film open at touch-down"),
     clamp_stiffness=assumed(
-        3.0,
+        3.3,
         "MPa/mm",
         "clamp instead of the real seal, seam and nail; the value at which the largest rise under a plate is 0.45 per "
         "count of pressure (200-350 counts), as measured. It stands for what holds and stretches the real skin, too",
@@ -139,7 +138,6 @@ SPEC = SensorSpec(
     parameters=PARAMETERS,
     nuisances=NUISANCES,
     scenarios={"hard-handled": HARD_HANDLED},
-    likeness=LIKENESS,
     data_sheet=DATA_SHEET,
     references=(
         "Karl et al. 2016, ML-based tactile sensor calibration: A universal approach",

@@ -30,7 +30,7 @@ class Preparation:
         self.coarse_film = self.skin.film.at(grid.x_mm, grid.s_mm / outer)
         fine = refined(grid, refinement)
         self.film = self.skin.film.at(fine.x_mm, fine.s_mm / outer)
-        self.to_fine_x = spectral_interpolation(len(grid.x_mm), len(fine.x_mm))
+        self.to_fine_x = spectral_interpolation(len(grid.x_mm), len(fine.x_mm), mirrored=True)
         self.to_fine_s = np.ascontiguousarray(spectral_interpolation(len(grid.s_mm), len(fine.s_mm)).T)
         self.residual_film = self.skin.residual_film.to("mm")
         # S/m times ohm is 1/m: a length, the only electrical scale of the problem.

@@ -5,7 +5,7 @@ from __future__ import annotations
 from tactbench.plugin import SensorDescriptor, hookimpl
 from tactbench.sensors.icub.spec import SPEC
 
-TACTBENCH_API = 1
+TACTBENCH_API = 2
 
 
 @hookimpl

@@ -7,7 +7,6 @@ import math
 from tactbench.plugin import DataSheet, Quantity, SensorSpec, Source, Statement, assumed, derived, measured, sourced
 from tactbench.plugin.simulation import Creep, FoamPad, Nuisances, SkinSheet
 from tactbench.sensors.icub.channels import OUTER_RADIUS_MM, STREAMS
-from tactbench.sensors.icub.likeness import LIKENESS
 
 _SCHMITZ = "Schmitz et al. 2010, abstract"
 _GRASP = "clear-nus/icub_grasp_dataset, 279 loaded fingertips"
@@ -100,7 +99,6 @@ SPEC = SensorSpec(
     skin=SKIN,
     parameters=PARAMETERS,
     nuisances={"taxel": NUISANCES},
-    likeness=LIKENESS,
     data_sheet=DATA_SHEET,
     references=(
         "Karl et al. 2016, ML-based tactile sensor calibration: A universal approach",

@@ -19,7 +19,7 @@ from tactbench.plugin import (
 )
 from tactbench.plugin.simulation import BondedLayer, Nuisances, SkinSheet
 
-TACTBENCH_API = 1
+TACTBENCH_API = 2
 
 _WHY = "by definition: this sensor is an oracle, not a product"
 _AT_MM = (-4.5, -1.5, 1.5, 4.5)

@@ -6,8 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tactbench.core.choosing.choosing import choose
-from tactbench.core.choosing.criteria import Wish
+from tactbench.core.choosing.choosing import Wish, choose
 from tactbench.core.spec.task import PlannedScene
 from tactbench.plugin import ChannelSpec, DataSheet, PhysicalRange, Scene, SensorSpec, Source, StreamSpec
 from tests.core.leaderboard.rows import TASK, row
@@ -42,53 +41,30 @@ def states(choice, place=0):
     return {one.wish: one.state for one in choice.candidates[place].criteria}
 
 
-def test_all_wishes_met():
-    choice = only([answer()], Wish(max_delay_ms=2, range_n=5, rate_hz=10, score=0.6))
-    assert states(choice) == dict.fromkeys(("answer delay", "force range", "rate", "score"), "met")
-    assert choice.verdict == "a SIM / lasso meets all 4 wishes."
-
-
 @pytest.mark.parametrize(
-    ("wish", "short_by", "says"),
+    ("wish", "says"),
     [
-        (Wish(max_delay_ms=0.4), 0.6, "600 µs too slow"),
-        (Wish(range_n=10.5), 0.5, "0.5 N short of range"),
-        (Wish(rate_hz=130), 30, "30 Hz too low"),
-        (Wish(score=0.3), 0.2, "0.2000 N above the wished error"),
+        (Wish(max_delay_ms=0.4), "answer delay 1.00 ms, 600 µs too slow"),
+        (Wish(range_n=10.5), "force range 10 N, 0.5 N short of range"),
+        (Wish(rate_hz=130), "rate 100 Hz, 30 Hz too low"),
+        (Wish(score=0.3), "score 0.5000 N, 0.2000 N above the wished error"),
     ],
 )
-def test_a_miss_says_by_how_much(wish, short_by, says):
+def test_a_miss_says_by_how_much(wish, says):
     choice = only([answer()], wish)
     (criterion,) = choice.candidates[0].criteria
-    assert (criterion.state, criterion.missed_by) == ("missed", says)
-    assert criterion.short_by == pytest.approx(short_by)
+    assert criterion.state == "missed"
     assert choice.verdict == f"None meets all: nearest is a SIM / lasso, {says}."
-
-
-@pytest.mark.parametrize("wish", [Wish(1.0), Wish(range_n=10), Wish(rate_hz=100), Wish(score=0.5)])
-def test_exactly_as_wished_is_met(wish):
-    assert set(states(only([answer()], wish)).values()) == {"met"}
-
-
-def test_a_score_is_to_be_large_and_an_error_small():
-    rows = [answer(score=0.7, baseline=0.2, metric="macro_f1", unit="1"),
-            answer("b", score=0.9, baseline=0.2, metric="macro_f1", unit="1")]  # fmt: skip
-    choice = only(rows, Wish(score=0.8), sensor(), sensor("b"), task=F1)
-    assert [one.row["sensor"] for one in choice.candidates] == ["b", "a"]
-    assert [states(choice, place)["score"] for place in (0, 1)] == ["met", "missed"]
-    assert choice.candidates[1].criteria[0].missed_by == "0.100 below the wished score"
 
 
 @pytest.mark.parametrize(
     ("more", "state", "says"),
     [
         ({"answer_delay_ms": None, "delay_parts_ms": {}, "latency_ms_p50": 0.06}, "unknown", "prediction alone 60"),
-        ({"answer_delay_ms": None, "delay_parts_ms": {}, "latency_ms_p50": 9.0}, "missed", "at least 7.00 ms too slow"),
         ({"answer_delay_ms": None, "delay_parts_ms": {}, "latency_ms_p50": None}, "unknown", "not timed"),
         ({"answer_delay_ms": None, "delay_parts_ms": {"link": 1.0, "prediction": 0.5}}, "unknown", "without sampling"),
         ({"answer_delay_ms": 1.5, "delay_parts_ms": {"sampling": 1.0, "prediction": 0.5}}, "unknown", "without link"),
         ({"answer_delay_ms": 2.5, "delay_parts_ms": {"sampling": 2.0, "prediction": 0.5}}, "missed", "at least 500"),
-        ({"answer_delay_ms": 1.5, "delay_parts_ms": {}}, "met", "1.50 ms"),
         ({"answer_delay_ms": 0.5, "delay_parts_ms": {"prediction": 0.5}, "looks_at": "time"}, "met", "500"),
     ],
 )
@@ -96,28 +72,6 @@ def test_a_delay_that_lacks_a_part_is_a_lower_bound(more, state, says):
     (criterion,) = only([answer(**more)], Wish(max_delay_ms=2)).candidates[0].criteria
     assert criterion.state == state
     assert says in criterion.text
-
-
-def test_what_is_only_assumed_is_unknown():
-    guess = sensor(rate_source=ASSUMED, range_source=ASSUMED)
-    choice = only([answer()], Wish(max_delay_ms=2, range_n=5, rate_hz=10), guess)
-    assert states(choice) == dict.fromkeys(("answer delay", "force range", "rate"), "unknown")
-    assert choice.verdict.startswith("Cannot say")
-    slow = {"sampling": 20.0, "link": 0.0, "window": 0.0, "features": 0.0, "prediction": 3.0}
-    late = only([answer(answer_delay_ms=23.0, delay_parts_ms=slow)], Wish(max_delay_ms=2), guess)
-    assert late.candidates[0].criteria[0].missed_by == "at least 1.00 ms too slow"
-
-
-def test_prediction_that_takes_longer_than_the_interval_limits_the_rate():
-    slow = answer(latency_ms_p50=50.0)
-    (criterion,) = only([slow], Wish(rate_hz=30)).candidates[0].criteria
-    assert (criterion.state, criterion.value) == ("missed", 20.0)
-
-
-def test_an_error_is_unknown_beyond_what_was_pressed_and_a_miss_within_it_stays_one():
-    assert states(only([answer()], Wish(range_n=8, score=0.6)))["score"] == "unknown"
-    assert states(only([answer()], Wish(range_n=8, score=0.4)))["score"] == "missed"
-    assert any("any error beyond 5 N" in one for one in only([answer()], Wish(range_n=8)).unknown)
 
 
 def test_errors_of_force_are_those_beyond_the_floor_if_all_have_one():
@@ -133,18 +87,15 @@ def test_errors_of_force_are_those_beyond_the_floor_if_all_have_one():
 def test_what_is_no_better_than_a_trivial_answer_is_never_proposed():
     worse = answer("bad", score=2.0)  # as bad as the mean
     trivial = answer("a", estimator="mean", score=0.1)
-    choice = only([answer(), worse, trivial], Wish(max_delay_ms=2), sensor(), sensor("bad"))
+    forest, defined = answer(estimator="forest", score=0.1, delay=20.0), answer("oracle", score=0.0)
+    rows = [forest, answer(), worse, trivial, defined]
+    choice = only(rows, Wish(max_delay_ms=2), sensor(), sensor("bad"), sensor("oracle", exists=False))
     assert [(one.row["sensor"], one.estimator) for one in choice.candidates] == [("a", "lasso")]
-    assert any(one.startswith("bad: no answer of it is better") for one in choice.left_out)
+    assert choice.left_out[0].startswith("bad: no answer of it is better")
+    assert choice.left_out[1] == "oracle: it exists as a definition only."
     alone = only([worse], Wish(max_delay_ms=2), sensor("bad"))
     assert alone.candidates == ()
     assert alone.verdict.startswith("Cannot say")
-
-
-def test_without_a_trivial_answer_beside_it_nobody_meets_all():
-    choice = only([answer(baseline=None)], Wish(max_delay_ms=2))
-    assert states(choice)["trivial answer"] == "unknown"
-    assert choice.verdict.startswith("Cannot say")
 
 
 def test_order_all_met_then_fewest_unknown_then_least_missed():
@@ -159,27 +110,7 @@ def test_order_all_met_then_fewest_unknown_then_least_missed():
     choice = only(rows, Wish(max_delay_ms=2, range_n=5, rate_hz=10), *sensors)
     order = [one.row["sensor"] for one in choice.candidates]
     assert order == ["better", "worse", "guessed", "unknown", "missed", "slower"]
-    assert (
-        choice.verdict
-        == "better SIM / lasso meets all 3 wishes; worse SIM / lasso too; their scores are not told apart."
-    )
-
-
-def test_order_of_those_that_miss_fewest_misses_then_fewest_unknowns_then_the_least_miss():
-    rows = [
-        answer("two", score=0.1, delay=2.1), answer("one-unsure", score=0.2), answer("far", score=0.3),
-        answer("near", score=0.4),
-    ]  # fmt: skip
-    sensors = (sensor("two", upper=4.9), sensor("one-unsure", upper=4.9, rate_source=ASSUMED),
-               sensor("far", upper=3.0), sensor("near", upper=4.0))  # fmt: skip
-    choice = only(rows, Wish(max_delay_ms=2, range_n=5, rate_hz=10), *sensors)
-    assert [one.row["sensor"] for one in choice.candidates] == ["near", "far", "one-unsure", "two"]
-
-
-def test_a_sensor_stands_with_the_estimator_that_comes_nearest():
-    rows = [answer(estimator="forest", score=0.1, delay=20.0), answer(score=0.3), answer(estimator="ols", score=0.4)]
-    choice = only(rows, Wish(max_delay_ms=2))
-    assert [one.estimator for one in choice.candidates] == ["lasso"]
+    assert choice.verdict == "better SIM / lasso meets all 3 wishes; worse SIM / lasso too."
 
 
 def test_simulated_and_measured_rows_are_apart_and_marked():
@@ -188,11 +119,6 @@ def test_simulated_and_measured_rows_are_apart_and_marked():
     assert [one.sensor for one in simulated.candidates] == ["a SIM"]
     assert any("real unit" in one for one in simulated.unknown)
     assert not any("real unit" in one for one in measured.unknown)
-
-
-def test_of_several_replicates_the_median_stands():
-    rows = [answer(score=score, repeat=place) for place, score in enumerate((0.9, 0.1, 0.4), 1)]
-    assert [one.score for one in only(rows, Wish()).candidates] == [0.4]
 
 
 def test_what_to_do_about_what_is_unknown():
@@ -208,21 +134,8 @@ def test_what_to_do_about_what_is_unknown():
     assert choice.left_out == ("gone: there is no finished answer beside trivial ones.",)
 
 
-def test_a_definition_is_never_proposed():
-    choice = only([answer(), answer("oracle", score=0.0)], Wish(), sensor(), sensor("oracle", exists=False))
-    assert [one.row["sensor"] for one in choice.candidates] == ["a"]
-    assert choice.left_out == ("oracle: it exists as a definition only.",)
-
-
 maybe = st.none() | st.floats(0.1, 100)
 sources = st.sampled_from([STATED, ASSUMED, None])
-
-
-def test_measured_rows_do_not_say_how_hard_was_pressed():
-    measured = answer(simulated=False)
-    assert states(only([measured], Wish(range_n=1, score=0.6)))["score"] == "unknown"
-    assert states(only([measured], Wish(score=0.6)))["score"] == "met"
-    assert any("do not say how hard" in one for one in only([measured], Wish(range_n=1)).unknown)
 
 
 @given(delay=maybe, link=st.booleans(), rate=maybe, rate_source=sources, upper=maybe,
@@ -249,7 +162,7 @@ def test_met_means_known_and_good_enough(
     }
     for criterion in one.criteria:
         assert (criterion.state == "met") == good[criterion.wish], asdict(criterion)
-        assert (criterion.short_by > 0) == (criterion.state == "missed")
+        assert (criterion.relative > 0) == (criterion.state == "missed")
         assert (criterion.value is None) == (criterion.state == "unknown")
     proposed = "meets" in choice.verdict and "None" not in choice.verdict
     assert proposed == (bool(one.criteria) and all(criterion.state == "met" for criterion in one.criteria))

@@ -7,7 +7,6 @@ import re
 import select
 import signal
 import struct
-import subprocess
 import sys
 import termios
 import time
@@ -64,16 +63,13 @@ class Terminal:
         self.read_until(None, 30)
         return plain(self.seen.rpartition(FIRST_SCREEN)[2])
 
-    def resize(self, columns, lines):
-        fcntl.ioctl(self.ours, termios.TIOCSWINSZ, struct.pack("HHHH", lines, columns, 0, 0))
-
 
 def plain(text):
     return CONTROL.sub("", text.replace("\r\n", "\n"))
 
 
 @contextmanager
-def on_terminal(command, *, columns=80, lines=24, cwd=None, stdout=None, path=(), **env):
+def on_terminal(command, *, columns=80, lines=24, cwd=None, path=(), **env):
     """Start Python with `command` as the foreground job of a new terminal."""
     ours, theirs = pty.openpty()
     fcntl.ioctl(theirs, termios.TIOCSWINSZ, struct.pack("HHHH", lines, columns, 0, 0))
@@ -85,13 +81,10 @@ def on_terminal(command, *, columns=80, lines=24, cwd=None, stdout=None, path=()
 
     around = {name: value for name, value in os.environ.items() if name not in ("COLUMNS", "LINES", "NO_COLOR")}
     around |= {"TERM": "xterm-256color", "PYTHONPATH": os.pathsep.join([str(ROOT), *map(str, path)]), **env}
-    streams = {"stdin": theirs, "stdout": theirs if stdout is None else stdout, "stderr": theirs}
+    streams = {"stdin": theirs, "stdout": theirs, "stderr": theirs}
     try:
         with ending([sys.executable, *command], cwd=cwd, env=around, preexec_fn=own_terminal, **streams) as process:
             os.close(theirs)
             yield Terminal(process, ours)
     finally:
         os.close(ours)
-
-
-PIPE = subprocess.PIPE

@@ -115,7 +115,6 @@ def test_a_rig_file_is_started_and_keeps_what_is_real(emulate, tmp_path):
     ("words", "said"),
     [
         ((), "Either devices or a rig file"),
-        (("pad", "--rig-file", "x.yaml"), "Either devices or a rig file"),
         (("pda",), "Did you mean 'pad'"),
         (("pad", "scale", "bare-scale"), "A rig has one force"),
         (("scale",), "A rig has a sensor, and none is named"),

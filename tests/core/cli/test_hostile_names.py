@@ -1,22 +1,14 @@
-"""Names from a stranger's file are shown, never acted on by a terminal, nor by a shell that a command is pasted to."""
+"""Names from a stranger's file are shown, never acted on by a terminal."""
 
 import json
-import shlex
 
 import numpy as np
 import pytest
 
-from tactbench.core.matrix.store import Store
-from tactbench.core.plugins.registry import load_registry
-from tactbench.core.report.page import costs_section
-from tactbench.core.report.results import Results
-from tactbench.core.report.section import ReportData
 from tests.core.evaluation.made import record
-from tests.core.leaderboard.rows import row
 
 TITLE = "\x1b]0;owned\x07"
 """Sets the title of a terminal; not one of the sequences that are taken out of a stream that is no terminal."""
-COMMAND = "x; touch owned"
 
 
 def acting(text):
@@ -32,26 +24,13 @@ def recording(tmp_path):
     )  # fmt: skip
 
 
-def test_inspect_shows_them(recording, verbs):
+def test_inspect_and_errors_show_them_and_json_holds_them_escaped(recording, verbs):
     shown = verbs("inspect", str(recording))
     assert acting(shown.stdout) == acting(shown.stderr) == []
     assert all(f"{letter}\\x1b]0;owned\\x07" in shown.stdout for letter in "abcef")
-
-
-def test_json_holds_them_escaped(recording, verbs):
     text = verbs("inspect", str(recording), "--format", "json").stdout
     assert acting(text) == []
     assert json.loads(text)[0]["meta"]["session"] == f"a{TITLE}"
-
-
-def test_an_error_shows_them(verbs):
     shown = verbs("inspect", f"none{TITLE}.h5", code=2).stderr
     assert acting(shown) == []
     assert "none\\x1b]0;owned\\x07.h5" in shown
-
-
-def test_what_is_printed_to_be_pasted_is_quoted(tmp_path):
-    subject = ReportData(Results(Store(tmp_path), load_registry(), (row(COMMAND),), {}))
-    (said,) = costs_section(subject).missing
-    command = said.split("`")[1]
-    assert shlex.split(command) == ["tactbench", "cost", "--sensor", COMMAND, "--task", "question"]

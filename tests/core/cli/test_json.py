@@ -26,7 +26,7 @@ VERBS = {
     "why": (CELL,),
     "cost": ("--sensor", "ideal", "--task", "force", "--estimator", "ols", "--rounds", "1"),
     "twin explain": ("--sensor", "icub", "--task", "force", "--rounds", "0"),
-    "twin verify": ("--only", "friction"),
+    "twin verify": (),
 }
 """What is asked of each verb that knows the format."""
 

@@ -1,104 +1,79 @@
-"""A real terminal: the bar moves, Ctrl-C reaches every process at once, and nobody prints where it was."""
+"""What a person sees of a run: on a terminal a bar, the table so far and one sentence on Ctrl-C; in a log, lines."""
 
-import fcntl
 import os
-import pty
-import select
-import sys
-import termios
-import time
-from contextlib import contextmanager
-from pathlib import Path
 
 import pytest
 
-from tests.core.pool.patience import ending
+from tactbench.core.cli.progress import progress
+from tactbench.core.cli.run import tell_stopped
+from tests.conftest import Verbs
+from tests.core.cli.terminals import on_terminal
 
-ROOT = Path(__file__).parents[3]
-
-COMMAND = [
-    *(sys.executable, "-m", "tactbench", "run", "--repeats", "1", "--sensor", "ideal", "--task", "curvature"),
-    *("--estimator", "logistic"),
-]
-FORCE = [
-    *(sys.executable, "-m", "tactbench", "run", "--repeats", "1", "--sensor", "ideal", "--task", "force"),
-    *("--estimator", "ols"),
-]
-
-
-@contextmanager
-def started(folder, command):
-    """Start a command as the foreground job of a new terminal; give the process and our end of the terminal."""
-    ours, theirs = pty.openpty()
-
-    def own_terminal():
-        os.setsid()
-        fcntl.ioctl(0, termios.TIOCSCTTY, 0)
-
-    env = {**os.environ, "COLUMNS": "140", "LINES": "40", "TERM": "xterm-256color", "PYTHONPATH": str(ROOT)}
-    try:
-        with ending(command, cwd=folder, env=env, stdin=theirs, stdout=theirs, stderr=theirs,
-                    preexec_fn=own_terminal) as process:  # fmt: skip
-            os.close(theirs)
-            yield process, ours
-    finally:
-        os.close(ours)
-
-
-def read_until(ours, text, seconds):
-    """Return what came up to `text`, or all if it does not come in time."""
-    seen, until = "", time.monotonic() + seconds
-    while text not in seen and time.monotonic() < until:
-        if not select.select([ours], [], [], 0.5)[0]:
-            continue
-        try:
-            piece = os.read(ours, 65536)
-        except OSError:  # the other side has closed
-            break
-        if not piece:
-            break
-        seen += piece.decode(errors="replace")
-    return seen
+RUN = ("-m", "tactbench", "run", "--sensor", "ideal")
+CURVATURE = (*RUN, "--task", "curvature", "--estimator", "logistic", "--repeats", "1")
+FORCE = (*RUN, "--task", "force", "--estimator", "ols", "--repeats")
 
 
 def interrupted(folder, command, at):
-    """Press Ctrl-C once `at` is on the screen; return the exit code, the screen and the files that were left aside."""
+    """Press Ctrl-C once `at` is on the screen; return the exit code and the screen."""
     folder.mkdir()
-    with started(folder, command) as (process, ours):
-        seen = read_until(ours, at, 60)
-        assert at in seen
-        os.write(ours, b"\x03")
-        seen += read_until(ours, "goes on from there", 60)
-        code = process.wait(60)
-        seen += read_until(ours, "\0", 1)
-    return code, seen, [path for path in folder.rglob("*") if path.suffix in (".partial", ".completing")]
+    with on_terminal(command, cwd=folder, columns=140, lines=40) as terminal:
+        assert at in terminal.read_until(at)
+        os.write(terminal.ours, b"\x03")
+        terminal.read_until(None)
+        code = terminal.process.wait(60)
+    return code, terminal.seen
 
 
 @pytest.mark.parametrize(
     ("command", "at"),
-    [(COMMAND, " 0/18"), (COMMAND, " 4/18"), ([*FORCE, "--estimator", "forest"], "/1")],
+    [(CURVATURE, " 0/18"), (CURVATURE, " 4/18"), ((*FORCE, "1", "--estimator", "forest"), "/1")],
     ids=["the first recording", "a later one", "evaluating"],
 )
-def test_ctrl_c_ends_it_with_one_sentence(tmp_path, command, at):
-    # Python prints and drops an interrupt that comes while it is inside a destructor. That is rare and nobody's to mend
-    # here; what this test is for, processes that say where they were, happens every time.
-    for attempt in range(3):
-        code, seen, left = interrupted(tmp_path / str(attempt), command, at)
+def test_ctrl_c_ends_it_with_one_sentence_and_the_next_run_continues(tmp_path, command, at):
+    for attempt in range(3):  # Python drops an interrupt that comes while it is inside a destructor: rare
+        code, seen = interrupted(tmp_path / str(attempt), command, at)
         if code == 130 and "Traceback" not in seen:
             break
     assert code == 130
     assert "goes on from there" in seen
     assert "Traceback" not in seen
     assert "KeyboardInterrupt" not in seen
-    assert left == []
+    folder = tmp_path / str(attempt)
+    assert not [path for path in folder.rglob("*") if path.suffix in (".partial", ".completing")]
+    finished = {path: path.read_bytes() for path in folder.rglob("*.h5")}
+    Verbs(folder, here=True)(*command[2:])
+    assert {path: path.read_bytes() for path in finished} == finished, "what was finished is reused, not made again"
 
 
 def test_the_table_so_far_comes_with_each_replicate_and_stays_off_the_end(tmp_path):
-    command = [*FORCE]
-    command[command.index("--repeats") + 1] = "2"
-    with started(tmp_path, command) as (process, ours):
-        seen = read_until(ours, "Files:", 100)
-        assert process.wait(60) == 0
+    with on_terminal((*FORCE, "2"), cwd=tmp_path, columns=140, lines=40) as terminal:
+        seen = terminal.read_until(None, 100)
+        assert terminal.process.wait(60) == 0
     assert seen.index("recording and evaluating") < seen.index("RMSE")
     assert seen.index("1 campaign") < seen.index("2 campaigns"), "the table is shown once a replicate is complete"
     assert "recording and evaluating" not in seen[seen.rindex("2 campaigns") :], "the last table alone is left"
+
+
+def test_a_line_a_tenth_says_how_far_and_how_many_stopped(capsys):
+    with progress() as display:
+        display.begin("evaluating", 40)
+        for number in range(40):
+            display.advance(f"cell {number}", stopped=number in (1, 2))
+    said = capsys.readouterr()
+    assert said.out == ""
+    assert len(said.err.splitlines()) == 1 + 10
+    assert said.err.splitlines()[-1] == "evaluating: 40/40 cell 39 (2 stopped)"
+
+
+def test_the_end_names_every_stopped_cell_and_how_to_look_into_it(capsys, tmp_path):
+    rows = [
+        {"cell": "a/b/c", "status": "failed", "reason": "RuntimeError: two\nlines\x1b[2J"},
+        {"cell": "a/b/d e", "status": "timeout", "reason": "x" * 1000},
+    ]
+    tell_stopped(rows, tmp_path)
+    said = capsys.readouterr()
+    assert said.out == ""
+    assert "a/b/c: RuntimeError: two lines\\x1b[2J\n" in said.err, "a reason moves no cursor"
+    assert f"tactbench why a/b/c --out {tmp_path} --again" in said.err
+    assert max(len(line) for line in said.err.splitlines() if "a/b/d e" in line) < 260

@@ -1,19 +1,22 @@
-"""``tactbench why``: hit or miss, what changed in words, and how a stopped cell ended."""
+"""``tactbench why``: hit or miss, what changed, how a stopped cell ended, and the same once more, bit for bit."""
 
 import json
 import os
 import shutil
 import subprocess
 import sys
+from dataclasses import replace
 
+import numpy as np
 import pytest
 
-from tests.conftest import ROOT, Verbs
+from tactbench.core.matrix.store import Store
+from tests.conftest import ROOT, Shell, Verbs
 from tests.core.matrix.plugin_packages import write_acme
 
 RUN = ("run", "--repeats", "1", "--sensor", "ideal", "--task", "force", "--estimator", "acme", "--estimator",
-       "acme-raises")  # fmt: skip
-ACME = "ideal/force/twin/karl2016/acme/1"
+       "acme-raises", "--effects", "-drift", "--seed", "3")  # fmt: skip
+ACME, MEAN = (f"ideal/force/twin/karl2016/{name}/1" for name in ("acme", "mean"))
 
 
 @pytest.fixture(scope="module")
@@ -21,27 +24,30 @@ def made(tmp_path_factory):
     """A folder with a plugin and the results of a run with it; one cell of it failed."""
     folder = tmp_path_factory.mktemp("why")
     write_acme(folder / "site")
-    Verbs(folder, here=True)(*RUN, "--out", "results", plugins=(str(folder / "site"),), code=1)
+    verbs = Verbs(folder, here=True)
+    verbs(*RUN, "--out", "results", plugins=(str(folder / "site"),), code=1)
+    verbs("run", "--rig", "replay", "--recordings", "results/recordings/ideal", "--task", "force",
+          "--estimator", "ols", "--protocol", "karl2016", "--out", "replayed")  # fmt: skip
     return folder
 
 
 @pytest.fixture
 def here(made, tmp_path):
     """A copy to be changed, and the command line in it with the plugin on the path."""
-    shutil.copytree(made, tmp_path / "copy")
     folder = tmp_path / "copy"
+    shutil.copytree(made, folder)
 
-    def call(*arguments, code=0):
-        ask = Verbs(folder, here=True)
-        return ask(*arguments, "--out", "results", plugins=(str(folder / "site"),), code=code)
+    def call(*arguments, code=0, out="results", ask=None):
+        ask = ask or Verbs(folder, here=True)
+        return ask(*arguments, "--out", out, plugins=(str(folder / "site"),), code=code)
 
     call.folder = folder
     call.acme = folder / "site" / "acme"
     return call
 
 
-def why(here, cell="acme/1", *options):
-    return json.loads(here("why", cell, *options, "--format", "json").stdout)
+def why(here, cell="acme/1", *options, **how):
+    return json.loads(here("why", cell, *options, "--format", "json", **how).stdout)
 
 
 def test_a_finished_cell_is_a_hit_and_says_where_it_lies(here):
@@ -50,10 +56,10 @@ def test_a_finished_cell_is_a_hit_and_says_where_it_lies(here):
     assert (here.folder / found["file"]).is_file()
     assert all((here.folder / "results" / path).is_file() for path in found["recordings"])
     assert found["try"] == f"tactbench why {ACME} --again --out results"
-    text = here("why", ACME).stdout
-    assert text.startswith(f"{ACME}\nstatus ")
-    assert "tactbench run             reuses it" in text
-    assert found["file"] in text
+    lines = dict(line.split(maxsplit=1) for line in here("why", ACME).stdout.splitlines()[:2])
+    assert lines == {"cell": ACME, "status": "done"}
+    assert ACME in here("why", "ideal/force", code=2).stderr, "a part of several names"
+    assert "Did you mean" in here("why", ACME.replace("karl", "carl"), code=2).stderr
 
 
 def test_the_words_and_the_run_agree(here):
@@ -65,12 +71,12 @@ def test_the_words_and_the_run_agree(here):
     assert found["answer"] == "miss"
     (reason,) = found["reasons"]
     assert reason.startswith("source: acme ")
+    again = why(here, ACME, "--again", code=1)
+    assert any(difference.startswith("score ") for difference in again["differences"])
+    assert again["circumstances"] == [reason]
     assert "2 of 4 answers were found finished" in here(*RUN, code=1).stderr
     assert why(here)["answer"] == "hit"
-    filters.write_text(original + "# a comment\n")
-    assert why(here)["answer"] == "miss", "every byte counts"
-    # Back as it was: the first result is still there.
-    filters.write_text(original)
+    filters.write_text(original)  # back as it was: the first result is still there
     assert why(here)["answer"] == "hit"
 
 
@@ -83,41 +89,53 @@ def test_a_recording_that_was_removed_or_replaced_is_named(here):
     shutil.copy(other, flat)
     (reason,) = why(here)["reasons"]
     assert reason.startswith(f"data: {flat.stem} ")
+    assert why(here, MEAN, "--again")["answer"] == "identical", "it is made anew, as the cell had it"
 
 
-def test_a_stopped_cell_shows_its_reason_its_traceback_and_what_to_try(here):
+def test_a_stopped_cell_shows_where_and_fails_again(here):
     found = why(here, "acme-raises")
     assert (found["answer"], found["status"]) == ("miss", "failed")
     assert "the pad came off" in found["reason"]
-    assert "acme/answers.py" in found["traceback"]
-    text = here("why", "acme-raises").stdout
-    assert "failed: RuntimeError: the pad came off" in text
-    assert "raise RuntimeError" in text
-    assert "Try: tactbench why ideal/force/twin/karl2016/acme-raises/1 --again --out results" in text
+    assert "raise RuntimeError" in here("why", "acme-raises").stdout
+    again = why(here, "acme-raises", "--again", code=1)
+    assert (again["status"], again["differences"]) == ("failed", [])
+    assert "acme/answers.py" in again["traceback"]
 
 
-def test_a_part_of_the_name_will_do_and_what_is_unclear_is_refused(here):
-    several = here("why", "ideal/force", code=2).stderr
-    assert "part of the names of 4 cells" in several
-    assert ACME in several
-    assert "Did you mean" in here("why", ACME.replace("karl", "carl"), code=2).stderr
+def test_a_cell_comes_out_the_same_and_nothing_in_the_folder_changes(here):
+    def every_file():  # but the index, which notes where recordings lie
+        files = (here.folder / "results").rglob("*")
+        return {path: path.read_bytes() for path in files if path.is_file() and path.suffix != ".sqlite"}
+
+    before = every_file()
+    found = why(here, ACME, "--again", ask=Shell(here.folder))
+    assert (found["answer"], found["differences"], found["recordings_made"]) == ("identical", [], 3)
+    assert every_file() == before
+    found = why(here, "ols/1", "--again", out="replayed")
+    assert (found["answer"], found["recordings_made"]) == ("identical", 0)
 
 
-def test_a_folder_that_is_not_there_is_refused(here):
-    assert "There is no folder" in Verbs(here.folder)("why", "acme", "--out", "nowhere", code=2).stderr
-    assert not (here.folder / "nowhere").exists()
+def test_another_prediction_in_the_folder_is_found(here):
+    store = Store(here.folder / "results")
+    (row,) = [row for row in store.rows() if row["cell"] == ACME]
+    answers = store.answers(row["key"])
+    y_pred = answers["test"].y_pred.copy()
+    y_pred[3] = np.nextafter(y_pred[3], np.inf)
+    store.keep(row, store.cell(row).sections, {**answers, "test": replace(answers["test"], y_pred=y_pred)})
+    (difference,) = why(here, ACME, "--again", code=1)["differences"]
+    assert difference.startswith("answers: test ")
 
 
 def test_a_cached_run_loads_no_numerical_library(here):
     text = (
         "import sys\nfrom tactbench.core.cli import main\n"
-        f"sys.argv = ['tactbench', *{RUN[:-2]!r}, '--out', 'results', '--format', 'csv']\n"
+        f"sys.argv = ['tactbench', *{RUN[:9]!r}, *{RUN[11:]!r}, '--out', 'results', '--format', 'csv']\n"
         "try:\n    main()\nexcept SystemExit as end:\n    assert end.code == 0\n"
         "print(sorted({'numpy', 'h5py', 'scipy', 'sklearn', 'matplotlib', 'pandas'} & set(sys.modules)))\n"
     )
     env = {**os.environ, "PYTHONPATH": os.pathsep.join([str(here.folder / "site"), str(ROOT)])}
     # The copied recordings are read once: they are other files than those that the run remembered.
-    here(*RUN[:-2], "--format", "csv")
+    here(*RUN[:9], *RUN[11:], "--format", "csv")
     done = subprocess.run([sys.executable, "-c", text], cwd=here.folder, env=env, capture_output=True, text=True,
                           check=True)  # fmt: skip
     assert done.stdout.splitlines()[-1] == "[]"

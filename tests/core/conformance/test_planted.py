@@ -12,7 +12,7 @@ from tactbench.plugin import (ChannelSpec, DataSheet, PhysicalRange, SensorDescr
                               assumed, hookimpl)
 from tactbench.plugin.simulation import BondedLayer, Creep, Nuisances, SkinSheet
 
-TACTBENCH_API = 1
+TACTBENCH_API = 2
 WHY = "its maker"
 PLACES = ((-3e-3, -1.5e-3, 0.0), (-3e-3, 1.5e-3, 0.0), (2e-3, -1.5e-3, 0.0), (2e-3, 1.5e-3, 0.0))
 TAXELS = tuple(
@@ -65,7 +65,7 @@ def build(sensor, grid, wanted):
 TASK = '''"""Which half of the sensor was pressed."""
 from tactbench.plugin import LabelTarget, Placement, PlannedScene, Scene, TaskDescriptor, TaskSpec, assumed, hookimpl
 
-TACTBENCH_API = 1
+TACTBENCH_API = 2
 WHY = "its maker"
 
 
@@ -95,7 +95,7 @@ def tactbench_tasks():
 ESTIMATOR = '''"""Ridge regression by hand."""
 from tactbench.plugin import EstimatorDescriptor, hookimpl
 
-TACTBENCH_API = 1
+TACTBENCH_API = 2
 
 
 @hookimpl
@@ -128,7 +128,7 @@ EFFECT = '''"""A ripple on every channel."""
 from tactbench.plugin import hookimpl
 from tactbench.plugin.simulation import EffectDescriptor
 
-TACTBENCH_API = 1
+TACTBENCH_API = 2
 
 
 @hookimpl
@@ -151,7 +151,7 @@ def apply(run):
 RIG = '''"""A rig that ramps a force."""
 from tactbench.plugin import RigDescriptor, hookimpl
 
-TACTBENCH_API = 1
+TACTBENCH_API = 2
 
 
 @hookimpl
@@ -210,7 +210,7 @@ MISTAKES = [
     ("sensor", 'link_delay=assumed(2, "ms", WHY)', 'link_delay=assumed(2, "mm", WHY)', "", "link_delay"),
     ("sensor", 'kind="taxel"', 'kind="taxels"', "", "kind"),
     ("sensor", 'f"t{n}"', '"t1"', "", "channel names must be unique"),
-    ("sensor", "TACTBENCH_API = 1", "TACTBENCH_API = 2", "", "TACTBENCH_API"),
+    ("sensor", "TACTBENCH_API = 2", "TACTBENCH_API = 3", "", "TACTBENCH_API"),
     ("sensor", "def tactbench_sensors", "def tactbench_sensor", "", "tactbench_sensor"),
     ("sensor", "PACKAGE.code:build", "PACKAGE.cod:build", "code-names-resolve", "transducer"),
     ("sensor", "(2e-3, 1.5e-3, 0.0)", "(2.0, 1.5, 0.0)", "positions-are-in-metres", "channels[t4].position_m"),

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from tactbench.core.cost.ladder import climb
-from tactbench.core.cost.ladder_figure import draw_ladder
-from tactbench.core.cost.ladder_file import write_ladder
+from tactbench.core.cost.ladder_file import draw_ladder, write_ladder
+from tactbench.core.cost.task_score import quick_estimator
 from tactbench.core.errors import UnwritableError
 from tactbench.core.matrix.progress import Progress
 from tactbench.core.matrix.store import Store
@@ -28,8 +28,7 @@ def presses(folder, sessions=3, n=120):
     for number in range(sessions):
         force = np.linspace(0.0, 5.0, n) + rng.normal(0.0, 0.1, n)
         X = force[:, None] * np.array([40.0, -25.0, 10.0]) + rng.normal(0.0, 60.0, (n, 3)) + 100.0
-        record(folder / f"press-{number}.h5", X, force, session=str(number),
-               provenance={"acquisition_s": 1.25} if number < 2 else {})  # fmt: skip
+        record(folder / f"press-{number}.h5", X, force, session=str(number))
     return folder
 
 
@@ -51,10 +50,9 @@ def test_what_is_timed_is_what_was_scored_whatever_was_chosen_on_validation_data
     assert {row["estimator"] for row in ladder.rows} == {*QUICK, "time-index"}
     for row in ladder.rows:
         assert row["status"] == "done", row["reason"]
-        assert row["notes"] == [], row["estimator"]
         assert (row["ci_low"], row["ci_high"]) == (None, None), "three sessions carry no interval"
         assert row["fit_s_q1"] <= row["fit_s"] <= row["fit_s_q3"]
-        assert 0 < row["latency_ms_q1"] <= row["latency_ms_p50"] <= row["latency_ms_q3"] <= row["latency_ms_max"]
+        assert 0 < row["latency_ms_p50"] <= row["latency_ms_max"]
         assert row["answer_delay_ms"] == pytest.approx(sum(row["delay_parts_ms"].values()))
         assert row["answer_delay_ms_q1"] <= row["answer_delay_ms"] <= row["answer_delay_ms_q3"]
         assert (row["fits"], row["batches"]) == (2, 2)
@@ -70,46 +68,25 @@ def test_what_is_timed_is_what_was_scored_whatever_was_chosen_on_validation_data
     assert set(by_name["ridge"]["delay_parts_ms"]) == {"sampling", "window", "features", "prediction"}
     assert by_name["ridge"]["delay_parts_ms"]["sampling"] == pytest.approx(10.0)
     assert ladder.about["remarks"] == ["link delay unknown: the answer delay is without it"]
-    assert by_name["knn"]["n_features"] == 3
-    assert by_name["time-index"]["n_features"] == 1
-
-
-def test_the_recordings_cost_what_those_of_the_training_rows_did(ladder):
-    # The last fold is tested on the third session, whose recording does not say; it is trained on the other two.
-    assert {(row["data_s"], row["data_kind"]) for row in ladder.rows} == {(2.5, "acquired")}
-
-
-def test_scores_come_from_the_store_and_times_do_not(tmp_path):
-    store, folder = Store(tmp_path / "out"), presses(tmp_path / "shelf")
-    first, again = (climbed(folder, store, "ols", rounds=1, split="session") for _ in range(2))
-    assert [row["score"] for row in first.rows] == [row["score"] for row in again.rows]
-    assert [row["search_s"] for row in first.rows] == [row["search_s"] for row in again.rows]
-    assert [row["latency_ms_p50"] for row in first.rows] != [row["latency_ms_p50"] for row in again.rows]
-    assert not (store.folder / "leaderboard.md").exists(), "the files of the last run are not this verb's"
+    assert (by_name["knn"]["n_features"], by_name["time-index"]["n_features"]) == (3, 1)
 
 
 def test_the_files_say_what_the_table_says(ladder, tmp_path):
     paths = write_ladder(ladder, tmp_path)
     assert [path.name for path in paths] == [f"made-force.{ending}" for ending in ("json", "csv", "png", "pdf")]
-    found = json.loads(paths[0].read_text())
-    assert found["rows"] == json.loads(json.dumps(ladder.rows))
-    assert found["metric"] == "rmse"
-    assert found["provenance"]["host"]
+    assert json.loads(paths[0].read_text())["rows"] == json.loads(json.dumps(ladder.rows))
     with paths[1].open() as file:
-        rows = list(csv.DictReader(file))
-    assert [row["estimator"] for row in rows] == [row["estimator"] for row in ladder.rows]
-    assert [float(row["fit_s"]) for row in rows] == [row["fit_s"] for row in ladder.rows]
-    assert paths[2].read_bytes()[:4] == b"\x89PNG"
-    assert paths[3].read_bytes()[:4] == b"%PDF"
-
-
-def test_what_cannot_be_written_is_said(ladder, tmp_path):
+        assert [float(row["fit_s"]) for row in csv.DictReader(file)] == [row["fit_s"] for row in ladder.rows]
+    figure = draw_ladder(ladder, [])
+    named = {text.get_text() for text in figure.legends[0].get_texts()}
+    assert named == {row["estimator"] for row in ladder.rows if not row["is_baseline"]}
     (tmp_path / "file").write_text("")
     with pytest.raises(UnwritableError, match="--out"):
         write_ladder(ladder, tmp_path / "file")
 
 
-def test_the_figure_has_every_estimator_and_no_trivial_answer(ladder, tmp_path):
-    figure = draw_ladder(ladder, [tmp_path / "a.png"])
-    named = {text.get_text() for text in figure.legends[0].get_texts()}
-    assert named == {row["estimator"] for row in ladder.rows if not row["is_baseline"]}
+def test_the_quick_estimator_is_linear_searches_nothing_and_is_no_trivial_one():
+    registry = load_registry()
+    for task in ("force", "curvature"):
+        chosen = registry.estimators[quick_estimator(registry, task)]
+        assert (chosen.linear, chosen.grid, chosen.baseline) == (True, {}, False)

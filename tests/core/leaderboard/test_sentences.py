@@ -5,14 +5,14 @@ import re
 
 import numpy as np
 import pytest
+import scipy.stats
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tactbench.core.leaderboard.formats import plain_text
+from tactbench.core.leaderboard.formats import json_array, plain_text
 from tactbench.core.leaderboard.table import build_table
 from tactbench.core.statistics.ranking import ranks as ranked
 from tactbench.core.statistics.replicates import over_replicates
-from tests.core.leaderboard.rendering import to_json
 
 from .rows import row
 
@@ -28,26 +28,18 @@ def answers(sensor, score, time_index, **more):
     ]
 
 
-def ranks(rows):
-    return {one["cell"].split("/")[0]: one["rank"] for one in json.loads(to_json(rows)) if not one["is_baseline"]}
-
-
-def test_the_time_index_of_another_device_says_nothing_of_this_one():
-    rows = [*answers("alike", 0.6, 0.17, **RECORDED), *answers("shuffled", 0.5, 1.85, **RECORDED)]
-    assert "these scores need no touch" not in " ".join(plain_text(build_table(rows), 140).split())
-    assert ranks(rows) == {"alike": None, "shuffled": 1}
+@pytest.mark.parametrize("more", [RECORDED, {}])
+def test_the_time_index_of_another_device_says_nothing_of_this_one_and_that_of_its_own_bars_it(more):
+    table = build_table([*answers("alike", 0.6, 0.17, **more), *answers("shuffled", 0.5, 1.85, **more)])
+    assert "these scores need no touch" not in " ".join(plain_text(table, 140).split())
+    ranks = {one["sensor"]: one["rank"] for one in json.loads(json_array(table)) if not one["is_baseline"]}
+    assert ranks == {"alike": None, "shuffled": 1}
 
 
 def test_one_session_is_not_said_of_five():
     few = {**RECORDED, "n_replicates": 1, "replicate_unit": "session", "n_sessions": 5, "ci_low": None, "ci_high": None}
     text = plain_text(build_table([row("a", **few), row("b", score=0.6, **few)]), 140)
-    assert "one session" not in text
-    assert "1 session" not in text
-
-
-def test_what_is_no_better_than_the_time_index_of_its_own_sensor_has_no_place():
-    rows = [*answers("a", 0.5, 0.17), *answers("b", 0.6, 1.85)]
-    assert ranks(rows) == {"a": None, "b": 1}
+    assert not re.search("(one|1) session", text)
 
 
 @st.composite
@@ -169,16 +161,27 @@ class Truth:
         }  # fmt: skip
         return set(text.split(", ")) == expected
 
-    def ahead(self, name, other, wins, count, value):
+    def ahead(self, name, other):
         first, second = self.called(name), self.called(other)
+        behind = [one for one in self.better if one is not first]
         assert self.ranks[first["cell"]].place == 1
-        assert all(self.ranks[one["cell"]].behind for one in self.better if one is not first)
-        if wins is None:
-            return self.leads(name)
-        key = "beyond" if "beyond" in first["replicates"] else "scores"
+        assert self.order(second) == min(map(self.order, behind))
+        return all(self.ranks[one["cell"]].behind for one in behind)
+
+    def by_campaign(self, name, other, wins, count, beyond, value, low, high):
+        first, second = self.called(name), self.called(other)
+        key = "beyond" if beyond else "scores"
+        assert bool(beyond) == ("beyond" in first["replicates"])
         apart = self.sign * (np.array(second["replicates"][key]) - np.array(first["replicates"][key]))
-        assert float(value) == pytest.approx(apart.mean(), abs=6e-4)
-        return self.leads(name) and (int(wins), int(count)) == ((apart > 0).sum(), len(apart))
+        assert [float(value), *map(float, (low, high))] == pytest.approx(self.student(apart), abs=6e-4)
+        assert all(one["score"] == np.median(one["replicates"]["scores"]) for one in (first, second))
+        return (int(wins), int(count)) == ((apart > 0).sum(), len(apart))
+
+    @staticmethod
+    def student(values):
+        """The mean and Student's interval of it."""
+        half = scipy.stats.t.ppf(0.975, len(values) - 1) * values.std(ddof=1) / len(values) ** 0.5
+        return values.mean(), values.mean() - half, values.mean() + half
 
     def beside(self, text):
         where = None
@@ -203,6 +206,12 @@ class Truth:
         family = [one for one in self.stopped if one["status"] == status]
         return len([one for one in family if one["reason"] != reason]) == others < len(family)
 
+    def how(self, interval, campaigns, units, delay):
+        some = [one for one in self.answers if one["ci_low"] is not None]
+        assert not campaigns or (self.counts(campaigns, self.answers) and bool(interval) == bool(some))
+        assert not units or self.counts(units, some)
+        return bool(delay) == any(one["answer_delay_ms"] is not None for one in self.answers)
+
     def counts(self, text, rows):
         numbers = [int(one) for one in re.findall(r"\d+", text)]
         return (min(numbers), max(numbers)) == tuple(f(one["n_replicates"] for one in rows) for f in (min, max))
@@ -211,10 +220,12 @@ class Truth:
 NAME = r"(?:In simulation )?(\S+)"
 QUALITY = "(?:the best score|the smallest error beyond the floor)"
 ABOVE = {
-    rf"{NAME} is best, ahead of (\S+)(?: in (\d+) of (\d+) campaigns)?"
-    r"(?: \((?:mean )?difference(?: beyond the floor)? ([\d.]+)(?: N)?, 95 % .*\))?\.":
-        lambda t, a, b, k, n, d: t.ahead(a, b, k, n, d),
-    rf"{NAME} has {QUALITY}; (.*?)(?:, \d+ more)? cannot be told from it\.":
+    rf"{NAME} is best: better than (\S+?)(?: by [\d.]+(?: N)? \(95 % [^;]*\))?\.":
+        lambda t, a, b: t.ahead(a, b) and t.leads(a),
+    rf"{NAME} is best: better than (\S+) in (\d+) of (\d+) campaigns; mean of the "
+    r"differences( beyond the floor)? within campaigns ([\d.]+)(?: N)? \(95 % ([\d.]+) … ([\d.]+)\)\.":
+        lambda t, a, b, *numbers: t.ahead(a, b) and t.leads(a) and t.by_campaign(a, b, *numbers),
+    rf"{NAME} has {QUALITY}; (.*?)(?: and \d+ more)? cannot be told from it\.":
         lambda t, a, b: t.leads(a) and all(not t.ranks[t.called(one)["cell"]].behind for one in b.split(", ")),
     rf"{NAME} has {QUALITY}, and is not shown to be better than the "
     r"trivial (\S+) of its own sensor\.":
@@ -233,26 +244,23 @@ ABOVE = {
         lambda t, n, b: not t.better and int(n or 1) == len(t.answers) and t.bars(b, t.answers),
     r"time reads no sensor, only the time: such a score needs no touch\.":
         lambda t: any(t.bar(o)["looks_at"] == "time" for o in [*t.worse, *t.unshown]),
-    r"Published values: (.*?)(?:; that concerns the simulation, not the sensors)?\.": lambda t, a: t.beside(a),
+    r"Published values: (.*?)(?:; a gap is an error of the simulation, not of a sensor)?\.": lambda t, a: t.beside(a),
 }  # fmt: skip
 BELOW = {
     r"‡  It leaks\.": lambda t: any(one["stamps"] for one in t.rows),
+    "=  shared place: not all pairs of these rows can be told apart": lambda t: t.tied(),
     r"–  no better than the trivial answer of its own sensor \((.*)\)":
         lambda t, b: t.bars(b, t.worse),
     r"\*  not shown to be better than the trivial answer of its own sensor \((.*)\)": lambda t, b: t.bars(b, t.unshown),
     r"Protocol deployable uses statistics of the test set, .*": lambda t: any(one["dagger"] for one in t.rows),
     r"Beyond floor: the root of RMSE² − floor²(; places go by it)?\. Floor: .* \((?:[abc] 0\.1000(?:, )?)+\)\.":
         lambda t, by: bool(by) == (bool(t.better) and t.floor),
-    r"Score(, interval)?: median over (.*? campaigns?), each simulated anew .*?; = not all of these .*":
-        lambda t, i, n: t.tied() and t.counts(n, t.answers),
-    r"(?:Score(, interval)?: median over (.*? campaigns?), each simulated anew with its own seed[^=]*)":
-        lambda t, i, n: t.counts(n, t.answers) and bool(i) == any(o["ci_low"] is not None for o in t.answers),
-    r"Interval: over (.*?)\..*|Interval: over (.*?); = not all.*":
-        lambda t, n, m: t.counts(n or m, [o for o in t.answers if o["ci_low"] is not None]),
-    r"Delay: sampling, link, window, computing\.": lambda t: any(o["answer_delay_ms"] is not None for o in t.answers),
+    r"(?:(Score(, interval)?: median over (.*? campaigns?), each simulated anew with its own seed[^=.]*|"
+    r"Interval: over ([^.]*))(?:\. |\.$))?(Delay: sampling, link, window, computing\.)?":
+        lambda t, s, i, n, m, delay: t.how(i, n, m, delay),
     r"Times cannot be compared: (taken on 2 hosts)?(?: and )?(taken while up to 4 cells ran)?\.":
-        lambda t, hosts, many: bool(hosts) == (len({o["host"] for o in t.rows}) == 2)
-        and bool(many) == any(o["concurrency"] == 4 for o in t.rows),
+        lambda t, hosts, many: bool(hosts) == (len({o["host"] for o in t.answers}) == 2)
+        and bool(many) == any(o["concurrency"] == 4 for o in t.answers),
     r"a/x.*?(?: and (\d+) more)? (failed|skipped)(?:; (\d+) more ended otherwise)?: (\w+\.)":
         lambda t, more, status, others, reason: t.ended(status, int(others or 0), reason),
 }  # fmt: skip
@@ -279,5 +287,10 @@ def test_what_is_said_is_on_the_list_short_and_true(rows):
         assert holds(note.text, BELOW, truth), note
     for line in block.lines:
         if line.kind == "result":
+            marks = [mark for mark in "‡*" if mark in line.texts["notes"]]
+            marks += ["="] * (line.texts["place"].endswith("=") and truth.ranks is not None)
+            marks += ["–"] * bool(line.texts["place"] == "–" and truth.better)
+            explained = {note.text[0] for note in block.notes}
+            assert explained.issuperset(marks), (marks, explained)
             assert (line.texts["place"] == "–") == (line.row not in truth.better)
             assert ("*" in line.texts["notes"]) == (line.row in truth.unshown)

@@ -27,7 +27,7 @@ ANSWERS = {
     "__init__.py": '''"""Estimators of a stranger."""
 from tactbench.plugin import EstimatorDescriptor, hookimpl
 
-TACTBENCH_API = 1
+TACTBENCH_API = 2
 
 
 @hookimpl

@@ -9,7 +9,7 @@ from tactbench.plugin import Block, ChannelSpec, SensorDescriptor, StreamSpec, U
 from tactbench.plugin.devices import DeviceDescriptor, Driver, LinkTimeout
 from tactbench.sensors.ideal import SPEC
 
-TACTBENCH_API = 1
+TACTBENCH_API = 2
 HERE = "tests.core.plugins.talking"
 WHERE = {"driver": f"{HERE}:TalkingDriver", "emulator": f"{HERE}:build_emulator", "emulated_link": "datagram"}
 

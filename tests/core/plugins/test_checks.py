@@ -1,4 +1,4 @@
-"""A verdict: one number held against the range it must lie in."""
+"""A verdict: one number held against the one that is known."""
 
 import json
 import math
@@ -10,10 +10,10 @@ from tactbench.core.plugins.checks import Verdict
 
 
 @pytest.mark.parametrize(
-    ("found", "low", "high", "met"),
-    [(1.0, 1.0, 2.0, True), (2.0, 1.0, 2.0, True), (2.5, 1.0, 2.0, False), (0.5, 1.0, 2.0, False),
-     (math.inf, 0.0, math.inf, False), (math.nan, -math.inf, math.inf, False)],
+    ("found", "expected", "bound", "met"),
+    [(1.0, 2.0, 1.0, True), (3.0, 2.0, 1.0, True), (3.5, 2.0, 1.0, False), (0.5, 2.0, 1.0, False),
+     (math.inf, 0.0, 1.0, False), (math.nan, 0.0, math.inf, False)],
 )  # fmt: skip
-def test_it_is_met_by_a_finite_number_between_the_ends_both_included(found, low, high, met):
-    assert Verdict("depth", found, low, high).met is met
-    json.dumps(Verdict("depth", np.asarray(found), low, high).found)  # a plain number
+def test_it_is_met_by_a_number_within_the_bound_which_is_included(found, expected, bound, met):
+    assert Verdict("depth", found, expected, bound).met is met
+    json.dumps(Verdict("depth", np.asarray(found), expected, bound).found)  # a plain number

@@ -18,7 +18,7 @@ from tactbench.plugin.devices import DeviceDescriptor
 from tactbench.tasks.force import SPEC as FORCE
 from tactbench.sensors.ideal import SPEC as IDEAL
 
-TACTBENCH_API = 1
+TACTBENCH_API = 2
 
 def sensor(name):
     return SensorDescriptor(spec=IDEAL.model_copy(update={"name": name}))
@@ -118,7 +118,7 @@ BAD = {
     "misses": ("import no_such_module_at_all", "ModuleNotFoundError.*no_such_module_at_all"),
     "unparsable": ("def f(:", "SyntaxError"),
     "no-version": ("", "TACTBENCH_API"),
-    "later": ("TACTBENCH_API = 2", "TACTBENCH_API = 2"),
+    "later": ("TACTBENCH_API = 3", "TACTBENCH_API = 3"),
     "no-hook": (HEAD, "implements none"),
     "misspelt": (HEAD + "@hookimpl\ndef tactbench_device():\n    return []", "unknown hook.*tactbench_device"),
     "arguments": (HEAD + "@hookimpl\ndef tactbench_rigs(sensor):\n    return []", "tactbench_rigs"),

@@ -1,6 +1,6 @@
 """The format of rows, and those who go by it."""
 
-from tactbench.core.leaderboard.records import JSON_KEYS, OF_REPLICATES
+from tactbench.core.leaderboard.formats import JSON_KEYS, OF_REPLICATES
 from tactbench.core.spec.row import FORMAT
 from tests.core.leaderboard.rows import row
 

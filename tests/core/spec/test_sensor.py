@@ -3,8 +3,17 @@
 import pytest
 from pydantic import ValidationError
 
-from tactbench.core.report.datasheet import table_one
-from tactbench.plugin import ChannelSpec, SensorSpec, StreamSpec, load_registry
+from tactbench.core.report.datasheet import OF_DEVICES, table_one
+from tactbench.plugin import (
+    ChannelSpec,
+    DataSheet,
+    PhysicalRange,
+    SensorSpec,
+    Source,
+    StreamSpec,
+    load_registry,
+    sourced,
+)
 from tests.core.evaluation.made import sensor
 
 
@@ -35,9 +44,18 @@ def test_a_site_in_two_places_is_refused(field):
         magnets(*axes("a"), elsewhere)
 
 
-def test_no_recording_carries_figures_of_real_units_and_no_key_depends_on_them():
-    spec = load_registry().sensors["icub"].spec
-    assert spec.likeness
-    without = spec.model_copy(update={"likeness": ()})
-    assert spec.model_dump_json() == without.model_dump_json()
-    assert SensorSpec.model_validate_json(spec.model_dump_json()).likeness == ()
+def test_every_fact_of_a_data_sheet_has_a_source_and_no_sample_depends_on_it():
+    for descriptor in load_registry().sensors:
+        spec = descriptor.spec
+        assert "data_sheet" not in spec.model_dump()
+        for name in OF_DEVICES:
+            fact = getattr(spec.data_sheet, name)
+            assert fact is None or (fact.source.tag in ("sourced", "derived", "measured") and fact.source.reference)
+
+
+def test_a_data_sheet_refuses_what_cannot_be():
+    with pytest.raises(ValueError, match="measure different things"):
+        DataSheet(mass=sourced(3.0, "mm", "a test"))
+    source = Source(tag="sourced", reference="a test")
+    with pytest.raises(ValueError, match="larger force"):
+        DataSheet(force_range=PhysicalRange(lower=5.0, upper=1.0, unit="N", source=source))

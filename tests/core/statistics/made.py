@@ -17,7 +17,7 @@ def row(cell, sums, *, metric="rmse", classes=0, names=None, unit="session", str
         "cell": cell, "sensor": cell, "task": "question", "rig": "twin", "protocol": "deployable", "split": "session",
         "estimator": "lasso", "params": {}, "repeat": 1, "repeats": 1, "status": "done", "is_baseline": False,
         "metric": metric, "unit": "N", "score": score, "ci_low": None, "ci_high": None, "equivalence": None,
-        "reference_score": None, "baseline": None, "simulated": True, "dagger": False, "stamps": [], "scores": {},
+        "baseline": None, "simulated": True, "dagger": False, "stamps": [], "scores": {},
         "classes": list(range(classes)), "n_sessions": len(sums), "n_test": int(sums[:, -1].sum()),
         "replicates": {"unit": unit, "names": names, "strata": strata, "sums": lines},
     } | more  # fmt: skip

@@ -5,7 +5,7 @@ import shlex
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tactbench.core.tables.text import command_line, cut, visible
+from tactbench.core.tables.text import command_line, visible
 
 
 def test_controls_are_written_out():
@@ -22,11 +22,6 @@ def test_all_text_becomes_printable_once_and_for_all(text):
     assert visible(text).isprintable()
     assert visible(visible(text)) == visible(text)
     visible(text).encode()
-
-
-def test_long_text_is_cut_where_it_says_so():
-    assert cut("abcdef", 4) == "abc…"
-    assert cut("abcd", 4) == "abcd"
 
 
 def test_a_command_is_one_that_a_shell_reads_back_word_by_word():

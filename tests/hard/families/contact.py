@@ -13,7 +13,7 @@ from tactbench.plugin.simulation import Skin as AnySkin
 from tactbench.rigs.twin.contact.core import with_core
 from tactbench.rigs.twin.contact.media import Medium
 from tactbench.rigs.twin.contact.press import Press
-from tactbench.rigs.twin.contact.skins import medium_of
+from tactbench.rigs.twin.contact.pressing import medium_of
 from tactbench.rigs.twin.contact.validity import check_reach, remarks
 from tactbench.rigs.twin.geometry import Contact, check_contact, gap_mm, outer_radius_mm, pad_of, skin_grid
 from tests.hard.cases import Case, Family

@@ -11,7 +11,7 @@ from tactbench.plugin.simulation import FluidBackedShell, FoamPad
 from tactbench.plugin.simulation import Skin as AnySkin
 from tactbench.rigs.twin.contact.foam import CUT_OVER, Foam
 from tactbench.rigs.twin.contact.press import Press
-from tactbench.rigs.twin.contact.skins import medium_of
+from tactbench.rigs.twin.contact.pressing import medium_of
 from tactbench.rigs.twin.geometry import skin_grid
 from tests.hard.cases import Case, Family
 from tests.hard.families.contact import SOLVED, draw_contact, draw_skin, lawful, press_of, skins

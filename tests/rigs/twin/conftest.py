@@ -11,14 +11,15 @@ import numpy as np
 import pytest
 
 from tactbench.plugin import SensorDescriptor, SensorSpec, assumed
-from tactbench.plugin.simulation import BondedLayer, SheetTable, SkinSheet
+from tactbench.plugin.simulation import BondedLayer, SheetTable
 from tactbench.rigs.twin.contact.core import with_core
 from tactbench.rigs.twin.contact.media import Medium
 from tactbench.rigs.twin.contact.newton import NewtonSolver
-from tactbench.rigs.twin.contact.skins import medium_of
+from tactbench.rigs.twin.contact.pressing import medium_of
 from tactbench.rigs.twin.geometry import Contact, gap_mm, skin_grid
 from tactbench.sensors.biotac.spec import SPEC as BIOTAC
 from tactbench.sensors.icub.spec import SPEC as ICUB
+from tests.oracles.layers import bonded_layer
 
 SPECS = {"biotac": BIOTAC, "icub": ICUB}
 
@@ -94,25 +95,9 @@ def prototype() -> Callable[..., tuple[Medium, Any]]:
 def layer() -> Callable[..., tuple[BondedLayer, NewtonSolver]]:
     """A flat bonded layer on 24 mm, pressed by a sphere of radius 10 mm in the middle."""
 
-    def make(
-        poisson: float, *, young: float = 1.0, thickness: float = 2.0, cells: int = 96, penalty: float = 300.0
-    ) -> tuple[BondedLayer, NewtonSolver]:
-        skin = BondedLayer(
-            sheet=SkinSheet(
-                x_min=assumed(-12, "mm", "test"),
-                x_max=assumed(12, "mm", "test"),
-                arc=assumed(24, "mm", "test"),
-                cells=(cells, cells),
-            ),
-            young=assumed(young, "MPa", "test"),
-            poisson=assumed(poisson, "1", "test"),
-            thickness=assumed(thickness, "mm", "test"),
-            contact_stiffness=assumed(penalty, "MPa/mm", "test"),
-        )
+    def make(poisson: float, **more: float) -> tuple[BondedLayer, NewtonSolver]:
+        skin = bonded_layer(poisson, **more)
         grid = skin_grid(skin.sheet)
         return skin, NewtonSolver(medium_of(skin, grid), gap_mm(grid, Contact(10.0, 0.0, 0.0)))
 
     return make
-
-
-FLAT = math.inf

@@ -51,7 +51,7 @@ def test_an_effect_that_is_not_called_for_drags_nothing_along(specs):
             called_for=f"tactbench.rigs.twin.effects.{predicate}",
         )  # fmt: skip
 
-    heir = effect("heir", ("oil",), ("disturbance",), "called_for_sliding:friction")
+    heir = effect("heir", ("oil",), ("disturbance",), "called_for:friction")
     well = effect("well", (), ("oil",), "called_for:converter")
     still = Scene(name="s")
     plan = _named(plan_scene([*EFFECTS, heir, well], still, specs["icub"]))

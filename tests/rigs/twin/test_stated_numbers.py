@@ -9,8 +9,8 @@ import pytest
 from tactbench.plugin import ForceRamp, Indenter, Placement, RigContext, RigError, Scene, assumed
 from tactbench.plugin.simulation import Environment
 from tactbench.rigs.twin import tactbench_effects
+from tactbench.rigs.twin.preparation import MOST_SAMPLES, check_numbers
 from tactbench.rigs.twin.rig import build
-from tactbench.rigs.twin.stated_numbers import MOST_SAMPLES, check_numbers
 
 
 def _q(value, unit="s"):

@@ -5,11 +5,12 @@ import pytest
 
 from tactbench.plugin import ForceRamp, Indenter, RigContext, Scene, assumed
 from tactbench.plugin.simulation import Environment
-from tactbench.rigs.twin import draws, tactbench_effects
-from tactbench.rigs.twin.effects import gain, rest_spread, unit_rest
+from tactbench.rigs.twin import tactbench_effects
+from tactbench.rigs.twin.effects.channels import gain, rest_spread, unit_rest
 from tactbench.rigs.twin.planner import plan_scene
 from tactbench.rigs.twin.preparation import prepare
 from tactbench.rigs.twin.rig import build
+from tactbench.rigs.twin.synthesis import generator
 
 EFFECTS = tactbench_effects()
 NO_NOISE = Environment(force_noise=assumed(0.0, "N", "test"))
@@ -29,13 +30,13 @@ def test_the_first_unit_draws_what_it_drew_before_there_were_units(sensors, name
     """Its scope is that of the sensor alone; recordings of it stay bit for bit what they were."""
     run = prepared(sensors[name], "1")
     for what in (("gain", "taxel"), ("rest", "taxel"), ("warm-up", "taxel")):
-        before = draws.generator(1, name, "unit", *what).standard_normal(5)
+        before = generator(1, name, "unit", *what).standard_normal(5)
         np.testing.assert_array_equal(run.of_unit(*what).standard_normal(5), before)
     readings = run.tracks[0].readings.copy()
-    unit_rest.apply(run)
+    unit_rest(run)
     np.testing.assert_array_equal(run.tracks[0].readings, readings)
-    gain.apply(run)
-    own = draws.generator(1, name, "unit", "gain", "taxel").standard_normal(len(run.tracks[0].channels))
+    gain(run)
+    own = generator(1, name, "unit", "gain", "taxel").standard_normal(len(run.tracks[0].channels))
     scatter = sensors[name].spec.nuisances["taxel"].gain_scatter.value
     np.testing.assert_array_equal(run.tracks[0].gain, 1.0 + scatter * own)
 
@@ -55,7 +56,7 @@ def over_units(sensors, name, effects):
         run = prepared(sensors[name], str(number))
         run.tracks[0].readings[:] = 0.0
         for effect in effects:
-            effect.apply(run)
+            effect(run)
         found.append(run.tracks[0])
     return found
 

@@ -88,6 +88,14 @@ def test_waves_below_nyquist_arrive_unchanged(n, factor):
             assert to_fine @ np.cos(2 * np.pi * wave * coarse + phase) == pytest.approx(there, abs=1e-12)
 
 
+def test_a_mirrored_sample_goes_on_as_its_own_image():
+    coarse, fine = (np.arange(64) + 0.5) / 64, (np.arange(96) + 0.5) / 96
+    for wave in (0, 1, 7, 63):
+        # Half waves, too, which a period of the same length does not hold.
+        there = spectral_interpolation(64, 96, mirrored=True) @ np.cos(np.pi * wave * coarse)
+        assert there == pytest.approx(np.cos(np.pi * wave * fine), abs=1e-12)
+
+
 def test_the_mean_is_kept():
     # The fluid's volume: zero stays zero on the finer grid.
     field = np.random.default_rng(3).normal(size=64)

@@ -8,7 +8,7 @@ tried on a real one.
 from tactbench.plugin import ChannelSpec, Quantity, SensorDescriptor, SensorSpec, Source, StreamSpec, assumed, hookimpl
 from tactbench.plugin.simulation import BondedLayer, Nuisances, SkinSheet
 
-TACTBENCH_API = 1
+TACTBENCH_API = 2
 FIRMWARE = Source(tag="sourced", reference="github.com/raunaqbhirangi/anyskin, arduino/5X_binary_burst_stream")
 LINE_RATE = Source(tag="derived", reference="82 bytes of 10 bits at 115200 baud, the line's limit; USB may be faster")
 WHY = "no source read so far states it"

@@ -2,7 +2,7 @@
 
 from tactbench.plugin import ChannelSpec, SensorDescriptor, SensorSpec, Source, StreamSpec, hookimpl
 
-TACTBENCH_API = 1
+TACTBENCH_API = 2
 MAKER = Source(tag="assumed", reference="an example: a pad that nobody has built; see mapping.yaml beside README.md")
 
 SPEC = SensorSpec(

@@ -8,7 +8,7 @@ from tactbench.plugin import (  # noqa: I001
     ForceRamp, Indenter, LabelTarget, Placement, PlannedScene, Scene, TaskDescriptor, TaskSpec, assumed, hookimpl,
 )  # fmt: skip
 
-TACTBENCH_API = 1
+TACTBENCH_API = 2
 WHY = "chosen for this task: within 3 mm of the contact point all sensors have taxels"
 PLACES_MM = (-3.0, -1.5, 0.0, 1.5, 3.0)
 SHORT = ForceRamp(end=assumed(2, "N", WHY), hold=assumed(2, "s", WHY), duration=assumed(10, "s", WHY), samples=250)

@@ -3,7 +3,7 @@
 from tactbench.plugin import hookimpl
 from tactbench.plugin.simulation import EffectDescriptor
 
-TACTBENCH_API = 1
+TACTBENCH_API = 2
 
 
 @hookimpl

@@ -9,7 +9,7 @@ from tactbench.plugin import (  # noqa: I001
     assumed, hookimpl, press_hold_release,
 )  # fmt: skip
 
-TACTBENCH_API = 1
+TACTBENCH_API = 2
 WHY = "chosen for this task: blunt enough for the skins of the simulated sensors"
 SHAPES = {
     "cap": {"radius": assumed(4, "mm", WHY)}, "cylinder": {"radius": assumed(4, "mm", WHY)},

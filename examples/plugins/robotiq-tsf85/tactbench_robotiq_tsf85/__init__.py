@@ -7,7 +7,7 @@ Assumed: principle, sizes, skin, gain, noise, and all that the module `driver` s
 from tactbench.plugin import ChannelSpec, Quantity, SensorDescriptor, SensorSpec, Source, StreamSpec, assumed, hookimpl
 from tactbench.plugin.simulation import BondedLayer, Nuisances, SkinSheet
 
-TACTBENCH_API = 1
+TACTBENCH_API = 2
 WHY = "no source read so far states it"
 GUESS = Source(tag="assumed", reference=WHY)
 ROWS, COLUMNS, PITCH_MM, REST = 7, 4, 5.0, 500

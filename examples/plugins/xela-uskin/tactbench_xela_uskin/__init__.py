@@ -12,7 +12,7 @@ from tactbench.plugin import ChannelSpec, SensorDescriptor, SensorSpec, Source, 
 from tactbench.plugin import DataSheet as Sheet
 from tactbench.plugin.simulation import BondedLayer, Nuisances, SkinSheet
 
-TACTBENCH_API = 1
+TACTBENCH_API = 2
 WHY = "no source read so far states it"
 DRIVER = Source(tag="sourced", reference="github.com/o2as/ur-o2as @ 51579353, o2as_xela_sensor/xela_sensor.py")
 TAXELS, REST = 16, 16384

@@ -4,88 +4,66 @@ from __future__ import annotations
 
 import importlib
 from collections import Counter
-from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
-from tactbench.core.errors import DataError, NotApplicable, TactbenchError
+from tactbench.core.errors import DataError, NotApplicable
 from tactbench.core.evaluation.cell import load_task
 from tactbench.core.evaluation.fitting import features_of
 from tactbench.core.evaluation.sets import prepared
-from tactbench.core.report.figures.group import Group, Panel, Remark, Sketch, class_name, with_unit
+from tactbench.core.report.figures.group import Group, Sketch, class_name, with_unit
+from tactbench.core.report.figures.score_by_force import WINDOW_S, smoothed_force
 from tactbench.core.report.figures.style import MARKERS, cycled, legend, ordered, panels
 from tactbench.core.report.results import Results
-from tactbench.core.report.smoothing import WINDOW_S, smoothed_force
 from tactbench.core.samples import Answers, FloatArray, IntArray
 
 AT_MOST = 1000
 """Points of an embedding: more take longer and hide each other in a column's width."""
 PERPLEXITY = 30.0
 ITERATIONS = 1000
-SMALLEST_PT2, LARGEST_PT2 = 1.5, 9.0
-"""Areas of the points of least and of most force."""
 
 
-def draw(group: Group, remark: Remark) -> Sketch:
+def draw(group: Group) -> Sketch:
     """Draw one row a sensor: left by class, right by force.
 
     Raises
     ------
     NotApplicable
-        If no sensor's test set can be embedded.
+        If a sensor's test set cannot be embedded.
     """
-    found: list[tuple[Panel, IntArray, FloatArray]] = []
-    for panel in group.panels:
-        try:
-            found.append((panel, *embed(group.results, panel.row, panel.answers["test"])))
-        except TactbenchError as error:
-            remark(f"No embedding of {panel.row['cell']}: {error}")
-    if not found:
-        raise NotApplicable("no test set can be embedded")
+    found = [(panel, *embed(group.results, panel.row, panel.answers["test"])) for panel in group.panels]
     figure, axes = panels(len(found), 2, 1.55)
     forces = [smoothed_force(panel.answers["test"])[rows] for panel, rows, _ in found]
-    known = [force for own in forces for force in own[np.isfinite(own)]]
-    shade: Any = None
+    known = np.concatenate([own[np.isfinite(own)] for own in forces])
     for (by_class, by_force), (panel, rows, xy), force in zip(axes, found, forces, strict=True):
-        _classes(by_class, panel.row["classes"], panel.answers["test"].y_true[rows], xy)
-        if known:
-            shade = _forces(by_force, force, xy, min(known), max(known))
+        classes, label = panel.row["classes"], panel.answers["test"].y_true[rows]
+        for place, (one, colour) in enumerate(zip(classes, ordered(len(classes)), strict=True)):
+            by_class.plot(
+                *xy[label == place].T, linestyle="none", marker=cycled(MARKERS, place), markersize=2.0,
+                markeredgewidth=0, color=colour, label=class_name(one), rasterized=True,
+            )  # fmt: skip
+        if len(known):
+            shade = by_force.scatter(*xy.T, c=force, s=4.0, cmap="cividis", vmin=known.min(), vmax=known.max(),
+                                     linewidths=0, rasterized=True)  # fmt: skip
         for here, what in ((by_class, group.quantity), (by_force, "force")):
             here.set_title(f"{panel.sensor}, by {what}")
             here.set(xticks=[], yticks=[])
             here.set_aspect("equal", adjustable="datalim")
             here.spines[:].set_visible(True)
-    if shade is not None:
+    if len(known):
         figure.colorbar(shade, ax=axes[:, 1], shrink=0.8, aspect=30, pad=0.02, label="force [N]")
     title = with_unit(group.quantity, group.unit)
     legend(figure, axes[:, 0], ncols=6, title=title, markerscale=1.8, handletextpad=0.1, columnspacing=0.8)
     points = ", ".join(f"{panel.sensor} {len(rows)} of {len(panel.answers['test'])}" for panel, rows, _ in found)
     caption = (
         f"t-SNE of the test set's features as the estimator saw them; left by {group.quantity}, right by reference "
-        f"force (centred mean over {WINDOW_S:g} s; larger and lighter points are more force). Test rows shown: "
+        f"force (centred mean over {WINDOW_S:g} s; lighter points are more force). Test rows shown: "
         f"{points}; perplexity {PERPLEXITY:g} or a third of the points, {ITERATIONS} iterations from the principal "
         f"components, seed {group.row['seed']}. Near points look alike to the estimator; distances between clusters, "
         "their sizes and the axes mean little."
     )
     return group.sketch("embedding", f"Which test rows look alike, by {group.quantity} and force?", caption, figure)
-
-
-def _classes(here: Any, classes: Sequence[Any], label: IntArray, xy: FloatArray) -> None:
-    for place, (one, colour) in enumerate(zip(classes, ordered(len(classes)), strict=True)):
-        here.plot(
-            *xy[label == place].T, linestyle="none", marker=cycled(MARKERS, place), markersize=2.0, markeredgewidth=0,
-            color=colour, label=class_name(one), rasterized=True,
-        )  # fmt: skip
-
-
-def _forces(here: Any, force_n: FloatArray, xy: FloatArray, low: float, high: float) -> Any:
-    there = np.isfinite(force_n)
-    share = (force_n[there] - low) / max(high - low, np.finfo(np.float64).tiny)
-    return here.scatter(
-        *xy[there].T, c=force_n[there], cmap="cividis", vmin=low, vmax=high, linewidths=0, rasterized=True,
-        s=SMALLEST_PT2 + (LARGEST_PT2 - SMALLEST_PT2) * share,
-    )  # fmt: skip
 
 
 def embed(results: Results, row: dict[str, Any], test: Answers) -> tuple[IntArray, FloatArray]:
@@ -94,7 +72,7 @@ def embed(results: Results, row: dict[str, Any], test: Answers) -> tuple[IntArra
     Raises
     ------
     NotApplicable
-        If the test set is in several folds, each with features of its own, or too small.
+        If the test set is in several folds, each with features of its own.
     DataError
         If the recordings are not those the cell was answered from.
 
@@ -110,17 +88,13 @@ def embed(results: Results, row: dict[str, Any], test: Answers) -> tuple[IntArra
     if np.ptp(test.fold):
         raise NotApplicable(f"split {row['split']!r} has a test set a fold, and no two are scaled alike")
     rows = np.arange(0, len(test), -(-len(test) // AT_MOST), dtype=np.int64)
-    perplexity = min(PERPLEXITY, (len(rows) - 1) / 3)
-    if perplexity < 1:
-        raise NotApplicable(f"{len(rows)} test rows have no neighbourhoods")
     features = _features(results, row, test)[rows]
-    manifold = importlib.import_module("sklearn.manifold")
-    threads = importlib.import_module("threadpoolctl")
-    model = manifold.TSNE(
-        perplexity=perplexity, max_iter=ITERATIONS, init="pca", learning_rate="auto", random_state=int(row["seed"]),
+    model = importlib.import_module("sklearn.manifold").TSNE(
+        perplexity=min(PERPLEXITY, (len(rows) - 1) / 3), max_iter=ITERATIONS, init="pca", learning_rate="auto",
+        random_state=int(row["seed"]),
         n_jobs=1,
     )  # fmt: skip
-    with threads.threadpool_limits(limits=1):
+    with importlib.import_module("threadpoolctl").threadpool_limits(limits=1):
         return rows, np.asarray(model.fit_transform(features), dtype=np.float64)
 
 

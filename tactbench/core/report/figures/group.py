@@ -9,7 +9,6 @@ from functools import cached_property
 from textwrap import fill
 from typing import TYPE_CHECKING, Any
 
-from tactbench.core.errors import TactbenchError
 from tactbench.core.leaderboard.names import METRIC_NAMES, answer_name
 from tactbench.core.matrix.store import Row
 from tactbench.core.report.figures.style import sensor_colours
@@ -21,7 +20,6 @@ from tactbench.core.spec.task import LabelTarget, TaskSpec, VectorTarget
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-Remark = Callable[[str], None]
 _LINE = 64
 """Letters that fit above a column, wide ones too."""
 
@@ -59,8 +57,6 @@ class Group:
     results: Results
     task: TaskSpec
     panels: tuple[Panel, ...]
-    baselines: Mapping[str, Panel]
-    """The trivial answer of the table's column, by sensor."""
 
     @property
     def row(self) -> Row:
@@ -85,9 +81,11 @@ class Group:
             return "state of slip"
         if isinstance(target, LabelTarget):
             return target.name.removesuffix(f"_{target.unit}").replace("_", " ")
-        if isinstance(target, VectorTarget):
-            return f"{target.kind} ({', '.join(target.names)})"
-        return (target.name if target.name and len(target.name) > 2 else target.kind).replace("_", " ")
+        return (
+            f"{target.kind} ({', '.join(target.names)})"
+            if isinstance(target, VectorTarget)
+            else target.kind.replace("_", " ")
+        )
 
     @property
     def unit(self) -> str:
@@ -95,31 +93,21 @@ class Group:
         target = self.task.target
         return target.unit if isinstance(target, LabelTarget) else self.task.unit
 
-    @property
-    def heading(self) -> str:
-        """What stands above a figure: question, answer, protocol with its marks, SIM; in lines that fit a column."""
-        row = self.row
-        parts = [row["task"], answer_name(row), row["protocol"] + (" †" if row["dagger"] else "")]
-        if row["split"] not in (None, "roles"):
-            parts.append(f"split {row['split']}" + (" ‡" if row["stamps"] else ""))
-        parts += ["SIM" if row["simulated"] else f"rig {row['rig']}", *self._shown()]
-        return fill(" · ".join(parts), _LINE)
-
-    def _shown(self) -> list[str]:
-        """Return which of several replicates a figure of single answers shows; of recordings, which of the seeds."""
-        row = self.row
-        what = "replicate" if row["simulated"] else "seed"
-        return [f"{what} {row['repeat']} of {row['repeats']}"] if row["repeats"] > 1 else []
-
     def sketch(self, kind: str, title: str, caption: str, figure: Figure) -> Sketch:
-        """Return the group's figure of a kind, with its heading, and what its marks mean in the caption."""
+        """Return the group's figure of a kind, with a heading, and what its marks mean in the caption."""
         row = self.row
         parts = (kind, row["task"], row["protocol"], row["split"], answer_name(row))
         words = "-".join(filter(None, (*parts, "" if row["simulated"] else row["rig"])))
         name = re.sub(r"[^a-z0-9]+", "-", words.lower()).strip("-")
-        figure.suptitle(self.heading)
+        # Of several replicates, or of several seeds of the same recordings, a figure of single answers shows one.
+        shown = f"replicate {row['repeat']} of {row['repeats']}" if row["repeats"] > 1 else ""
+        heading = [row["task"], answer_name(row), row["protocol"] + (" †" if row["dagger"] else "")]
+        if row["split"] not in (None, "roles"):
+            heading.append(f"split {row['split']}" + (" ‡" if row["stamps"] else ""))
+        heading += ["SIM" if row["simulated"] else f"rig {row['rig']}", shown]
+        figure.suptitle(fill(" · ".join(filter(None, heading)), _LINE))
         marks = [MARKS[key] for key in MARKS if row[key]] + [f"‡: {stamp}" for stamp in row["stamps"]]
-        marks += [f"Shown: {one}; the tables are over all of them." for one in self._shown()]
+        marks += [f"Shown: {shown}; the tables are over all of them."] if shown else []
         return Sketch(name, title, " ".join((caption, *marks)), figure)
 
 
@@ -140,11 +128,11 @@ def with_unit(words: str, unit: str) -> str:
     return words if unit == "1" else f"{words} [{unit}]"
 
 
-def groups(results: Results, remark: Remark) -> list[Group]:
+def groups(results: Results, remark: Callable[[str], None]) -> list[Group]:
     """Return the groups of finished cells, a figure's worth each.
 
     Of several estimators the first that the task names for itself is shown, or else the first in the folder; of several
-    replicates the one whose answers the cell's row leads to. Whatever is not shown is told to `remark`.
+    replicates the one whose answers the cell's row leads to. `remark` is called with a sentence on what is not shown.
     """
     alike: dict[tuple[Any, ...], list[Row]] = {}
     for trouble in results.store.troubles:
@@ -152,44 +140,33 @@ def groups(results: Results, remark: Remark) -> list[Group]:
     for row in results.rows:
         if row["status"] == "done":
             alike.setdefault((row["task"], row["protocol"], row["split"], row["rig"]), []).append(row)
-    made = [_group(results, rows, remark) for rows in alike.values()]
-    return [group for group in made if group is not None]
+    found = []
+    for (name, protocol, split, _), rows in alike.items():
+        answers = [row for row in rows if not row["is_baseline"]]
+        names = list(dict.fromkeys(map(answer_name, answers)))
+        if name not in results.registry.tasks or not names:
+            remark(
+                f"No figures of {name} under {protocol}, split {split}: no such task, or no cell done but baselines."
+            )
+            continue
+        task = results.registry.tasks[name].spec
+        shown = next((one for one in task.estimators if one in names), names[0])
+        if len(names) > 1:
+            others = ", ".join(one for one in names if one != shown)
+            remark(f"Figures of {name} under {protocol}, split {split} show {shown}; not shown: {others}.")
+        panels = _panels(results, [row for row in answers if answer_name(row) == shown], remark)
+        if panels:
+            found.append(Group(results, task, panels))
+    return found
 
 
-def _group(results: Results, rows: list[Row], remark: Remark) -> Group | None:
-    about = f"{rows[0]['task']} under {rows[0]['protocol']}, split {rows[0]['split']}"
-    try:
-        task = results.registry.tasks[rows[0]["task"]].spec
-    except TactbenchError as error:
-        remark(f"No figures of {about}: {error}")
-        return None
-    answers = [row for row in rows if not row["is_baseline"]]
-    names = list(dict.fromkeys(map(answer_name, answers)))
-    if not names:
-        remark(f"No figures of {about}: no cell is done but baselines.")
-        return None
-    shown = next((name for name in task.estimators if name in names), names[0])
-    if len(names) > 1:
-        others = ", ".join(name for name in names if name != shown)
-        remark(f"Figures of {about} show {shown}; not shown: {others}.")
-    panels = _panels(results, [row for row in answers if answer_name(row) == shown], remark)
-    if not panels:
-        remark(f"No figures of {about}: no answers of {shown} can be read.")
-        return None
-    first = next((row["estimator"] for row in rows if row["is_baseline"]), None)
-    trivial = [row for row in rows if row["estimator"] == first]
-    return Group(results, task, tuple(panels.values()), _panels(results, trivial, remark))
-
-
-def _panels(results: Results, rows: list[Row], remark: Remark) -> dict[str, Panel]:
+def _panels(results: Results, rows: list[Row], remark: Callable[[str], None]) -> tuple[Panel, ...]:
     """Return the first readable cell of each sensor."""
     found: dict[str, Panel] = {}
     for row in rows:
-        if row["sensor"] in found:
-            continue
         answers = results.answers(row)
         if "test" in answers:
-            found[row["sensor"]] = Panel(results.replicate(row), answers)
+            found.setdefault(row["sensor"], Panel(results.replicate(row), answers))
         else:
             remark(f"{row['cell']} is in no figure: cells/{row['key']}.h5 cannot be read. Run it again.")
-    return found
+    return tuple(found.values())

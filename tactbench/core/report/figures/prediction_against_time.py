@@ -6,7 +6,7 @@ import numpy as np
 
 from tactbench.core.errors import NotApplicable
 from tactbench.core.evaluation.metrics import metric_called
-from tactbench.core.report.figures.group import Group, Remark, Sketch, with_unit
+from tactbench.core.report.figures.group import Group, Sketch, with_unit
 from tactbench.core.report.figures.style import GREY, corner, panels
 from tactbench.core.samples import Answers, FloatArray
 from tactbench.core.tables.numbers import score_with_unit
@@ -14,7 +14,7 @@ from tactbench.core.tables.numbers import score_with_unit
 SHOWN = {"train": "training", "test": "test"}
 
 
-def draw(group: Group, remark: Remark) -> Sketch:
+def draw(group: Group) -> Sketch:
     """Draw one row a sensor: left the training set, right the test set.
 
     Raises

@@ -39,7 +39,7 @@ def draw_published(results: Results) -> Sketch | None:
     legend(figure, axes[:, 0])
     parts = [
         "Open black diamonds are the published scores; filled circles are our scores, the median over replicates where "
-        "there are several (small strokes), with their 95 % intervals where there are five or more."
+        "there are several (small strokes), with their intervals where there are five or more."
     ]
     parts += [text for key, text in MARKS.items() if any(row[key] for row in rows)]
     parts.append(f"Published: {'; '.join(dict.fromkeys(line.published.reference for line, _ in every))}.")
@@ -65,8 +65,6 @@ def _panel(here: Axes, lines: Sequence[tuple[Reproduction, Any]], colours: Mappi
             label="published",
         )  # fmt: skip
     here.set_yticks(range(len(lines)), [f"{row['sensor']}, {answer_name(row)}" for _, row in lines])
-    for label, (_, row) in zip(here.get_yticklabels(), lines, strict=True):
-        label.set_color(colours[row["sensor"]])
     here.set_ylim(len(lines) - 0.4, -0.6)
     here.grid(axis="x", linewidth=0.4, color=GREY, alpha=0.3)
     row = lines[0][1]

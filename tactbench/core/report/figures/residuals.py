@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from tactbench.core.report.figures.group import Group, Remark, Sketch, with_unit
+from tactbench.core.report.figures.group import Group, Sketch, with_unit
 from tactbench.core.report.figures.style import BLACK, corner, tiled
 from tactbench.core.samples import FloatArray
 from tactbench.core.spec.task import VectorTarget
@@ -27,7 +27,7 @@ class _Shown(NamedTuple):
     corner: str
 
 
-def draw(group: Group, remark: Remark) -> Sketch:
+def draw(group: Group) -> Sketch:
     """Draw the test set's predictions against their targets, one panel a sensor, or a component of its answers."""
     from matplotlib.ticker import MaxNLocator
 

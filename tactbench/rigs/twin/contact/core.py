@@ -12,7 +12,7 @@ import numpy as np
 
 from tactbench.plugin import FloatArray
 from tactbench.plugin.simulation import FluidBackedShell
-from tactbench.rigs.twin.contact.media import LocalLaw, Medium, require_positive
+from tactbench.rigs.twin.contact.media import LocalLaw, Medium
 
 
 class CoreReaction:
@@ -38,7 +38,5 @@ class CoreReaction:
 
 def with_core(medium: Medium, skin: FluidBackedShell) -> Medium:
     """Return `medium` with a core that answers once less than the residual film is left."""
-    stiffness = skin.core_stiffness.to("MPa/mm")
-    require_positive(core_stiffness=stiffness)
     film = medium.rest_thickness_mm - medium.least_thickness_mm
-    return replace(medium, respond=CoreReaction(medium.respond, stiffness, film))
+    return replace(medium, respond=CoreReaction(medium.respond, skin.core_stiffness.to("MPa/mm"), film))

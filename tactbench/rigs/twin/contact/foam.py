@@ -6,7 +6,7 @@ import numpy as np
 
 from tactbench.plugin import FloatArray
 from tactbench.plugin.simulation import FoamPad, SkinGrid
-from tactbench.rigs.twin.contact.media import Medium, require_positive
+from tactbench.rigs.twin.contact.media import Medium
 from tactbench.rigs.twin.contact.spectrum import Spectrum
 from tactbench.rigs.twin.geometry import skin_grid
 
@@ -77,8 +77,6 @@ def medium(skin: FoamPad, grid: SkinGrid) -> Medium:
     Pasternak shear and the cover in the modes, ``K = (G h / 3 + T) k² + D k⁴``; the foam's hardening cell by cell.
     """
     young, thickness = skin.young.to("MPa"), skin.thickness.to("mm")
-    densification, contact_stiffness = skin.densification.to("1"), skin.contact_stiffness.to("MPa/mm")
-    require_positive(young=young, thickness=thickness, densification=densification, contact_stiffness=contact_stiffness)
     spectrum = Spectrum(grid)
     shear = skin.shear.to("MPa") * thickness / 3 + skin.cover_tension.to("N/mm")
     stiffness = shear * spectrum.k2 + skin.cover_bending.to("N*mm") * spectrum.k2**2
@@ -94,8 +92,8 @@ def medium(skin: FoamPad, grid: SkinGrid) -> Medium:
         grid=grid,
         spectrum=spectrum,
         stiffness=stiffness,
-        respond=Foam(young / thickness, densification * thickness, weight),
-        contact_stiffness=contact_stiffness,
+        respond=Foam(young / thickness, skin.densification.to("1") * thickness, weight),
+        contact_stiffness=skin.contact_stiffness.to("MPa/mm"),
         zero_mean=False,
         rest_thickness_mm=np.full(spectrum.shape, thickness),
         least_thickness_mm=0.0,

@@ -42,10 +42,6 @@ _TOUCH_DOWN_N = 0.01
 """How closely the load is bracketed at which the film closes."""
 
 
-MOST_NODES = 14
-"""Nodes after which refining ends."""
-
-
 class SkinCurves(NamedTuple):
     """The skin's scalars at (m,) loads."""
 
@@ -152,7 +148,7 @@ def build_table(
     *,
     largest_n: float,
     tolerance: FloatArray,
-    most_nodes: int = MOST_NODES,
+    most_nodes: int = 14,
     clock: Callable[[], float] = time.perf_counter,
 ) -> LoadTable:
     """Solve and tabulate one contact.

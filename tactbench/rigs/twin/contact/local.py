@@ -11,7 +11,7 @@ import numpy as np
 from tactbench.plugin import FloatArray, RigError
 from tactbench.plugin.simulation import BondedLayer, FluidBackedShell, FoamPad, SkinState
 from tactbench.rigs.twin.contact.media import Medium
-from tactbench.rigs.twin.contact.press import Coreless, at_rest, contact_radius_mm
+from tactbench.rigs.twin.contact.press import at_rest, contact_radius_mm
 from tactbench.rigs.twin.geometry import Contact
 
 LARGEST_POISSON = 0.4
@@ -21,7 +21,7 @@ _CLOSED = 1e-12
 _STEPS = 60
 
 
-class LocalPress(Coreless):
+class LocalPress:
     """Solves a load cell by cell.
 
     Parameters
@@ -40,6 +40,8 @@ class LocalPress(Coreless):
     RigError
         For a fluid-backed skin, and for a layer whose Poisson's ratio is above 0.4.
     """
+
+    touched_core = False
 
     def __init__(
         self, skin: FluidBackedShell | FoamPad | BondedLayer, medium: Medium, gap_mm: FloatArray, contact: Contact
@@ -102,6 +104,14 @@ class LocalPress(Coreless):
             contact_radius_mm=contact_radius_mm(self.medium.grid, self.contact, pressure),
             residual=residual,
         )
+
+    def closing_at(self, force_n: float) -> float:
+        """Return minus infinity: there is no core."""
+        return -np.inf
+
+    def closing_mm(self, state: SkinState) -> float:
+        """Return minus infinity: there is no core."""
+        return -np.inf
 
     def _pushed(self, depth: float) -> tuple[FloatArray, FloatArray, float]:
         """Return deflection, contact pressure and the summed stiffness at an approach of `depth`.

@@ -1,4 +1,4 @@
-"""What every skin medium offers the solver: a stiffness per Fourier mode and a local law."""
+"""What every skin medium offers the solver, a stiffness per Fourier mode and a local law."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import Protocol
 
 import numpy as np
 
-from tactbench.plugin import FloatArray, RigError
+from tactbench.plugin import FloatArray
 from tactbench.plugin.simulation import SkinGrid
 from tactbench.rigs.twin.contact.spectrum import Spectrum
 
@@ -60,28 +60,3 @@ def no_local_law(deflection_mm: FloatArray, tangent: FloatArray) -> tuple[FloatA
     """Answer for media whose whole stiffness is in the Fourier modes."""
     tangent.fill(0.0)
     return np.zeros_like(deflection_mm), 0.0
-
-
-def require_positive(**values: float) -> None:
-    """Refuse parameters that would make the energy non-convex.
-
-    Raises
-    ------
-    RigError
-        Naming the first parameter that is not a positive finite number.
-    """
-    for name, value in values.items():
-        if not (value > 0 and np.isfinite(value)):
-            raise RigError(
-                f"The skin's {name} is {value:g}; it must be positive and finite.",
-                hint="Correct the skin in the sensor's spec.",
-            )
-
-
-def require_poisson(ratio: float) -> None:
-    """Refuse a Poisson's ratio outside 0 … 1/2; raises RigError."""
-    if not 0 <= ratio <= 0.5:
-        raise RigError(
-            f"Poisson's ratio of the skin is {ratio:g}; it must lie between 0 and 0.5.",
-            hint="Correct the skin in the sensor's spec.",
-        )

@@ -16,7 +16,7 @@ of the penetration, where a stiffer penalty would cost iterations with the root 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -41,7 +41,6 @@ _BALANCED = 1e-12
 class Solution:
     """The skin under one load."""
 
-    force_n: float
     vector: FloatArray
     """(size + 1,) Fourier coefficients of the deflection and, last, the approach [mm]."""
     deflection_mm: FloatArray
@@ -50,10 +49,6 @@ class Solution:
     """(nx, ns) contact pressure."""
     residual: float
     """Of the field equation, relative to the load; the force balance holds to rounding."""
-    steps: int
-    """Newton steps."""
-    products: int
-    """Products with the Hessian."""
 
     @property
     def depth_mm(self) -> float:
@@ -126,20 +121,18 @@ class NewtonSolver:
         found = self._minimised(force_n, self.start(force_n) if guess is None else guess, first)
         for last in range(updates - 1, -1, -1):
             self._gap = self.gap_mm - found.pressure_mpa / self._k
-            again = self._minimised(force_n, found.vector, first if last else tolerance)
-            found = replace(again, steps=found.steps + again.steps, products=found.products + again.products)
+            found = self._minimised(force_n, found.vector, first if last else tolerance)
         return found
 
     def _minimised(self, force_n: float, guess: FloatArray, tolerance: float) -> Solution:
         """Return the energy's minimiser over the gap at hand; raises RigError."""
         load = force_n / self._spectrum.area_mm2
         vector = guess.copy()
-        products = 0
         energy, gradient = self._evaluate(vector, load)
         residual = self._residual(gradient, load)
         for steps in range(MAX_STEPS + 1):
             if residual < max(tolerance, min(self._rounding(vector, load), TOLERANCE)):
-                return self._solution(force_n, vector, residual, steps, products)
+                return self._solution(force_n, vector, residual)
             if steps == MAX_STEPS:
                 break
             if not self._contact.any():
@@ -153,8 +146,7 @@ class NewtonSolver:
             # Far from the solution, at loads of nanonewtons above all, the contact set goes astray on loose steps.
             least = 1e-3 if residual < 0.1 else 1e-4
             forcing = min(0.05, max(0.3 * tolerance / residual, least))
-            step, used = self._conjugate_gradients(gradient, stiffness, forcing)
-            products += used
+            step = self._conjugate_gradients(gradient, stiffness, forcing)
             slope = float(gradient @ step)
             size = 1.0
             for _ in range(_HALVINGS):
@@ -172,18 +164,6 @@ class NewtonSolver:
             f"{tolerance:.0e} is the largest that is handed out.",
             hint="Check the skin's parameters: moduli and stiffnesses must be positive and of sensible size.",
         )
-
-    def energy(self, vector: FloatArray, force_n: float) -> tuple[float, FloatArray]:
-        """Return energy over cell area [N mm / mm²] and its gradient at a state, for tests and diagnosis."""
-        self._gap = self.gap_mm
-        return self._evaluate(vector, force_n / self._spectrum.area_mm2)
-
-    def hessian_product(self, vector: FloatArray, direction: FloatArray, force_n: float) -> FloatArray:
-        """Return the Hessian at `vector` times `direction`, for tests and diagnosis."""
-        self._gap = self.gap_mm
-        self._evaluate(vector, force_n / self._spectrum.area_mm2)
-        self._coupling = float(self._contact.sum())
-        return self._multiply(direction, self._tangent + self._contact).copy()
 
     def _evaluate(self, vector: FloatArray, load: float) -> tuple[float, FloatArray]:
         """Return energy and gradient; leave contact pressure, contact stiffness and tangent behind."""
@@ -258,9 +238,7 @@ class NewtonSolver:
             out[0] = 0.0
         return out
 
-    def _conjugate_gradients(
-        self, gradient: FloatArray, stiffness: FloatArray, forcing: float
-    ) -> tuple[FloatArray, int]:
+    def _conjugate_gradients(self, gradient: FloatArray, stiffness: FloatArray, forcing: float) -> FloatArray:
         """Return the Newton step for `gradient`, to a residual of `forcing` in the preconditioner's norm.
 
         It ends sooner, and keeps the step so far, at a direction along which the energy curves by no more than rounding
@@ -274,11 +252,9 @@ class NewtonSolver:
         rho = float(remainder @ conditioned)
         goal = rho * forcing**2
         expected = rho  # the curvature along `direction` if the preconditioner were the Hessian's inverse
-        products = 0
         if not rho > 0:
-            return step, products
-        while products < 300:
-            products += 1
+            return step
+        for _ in range(300):
             product = self._multiply(direction, stiffness)
             curvature = float(direction @ product)
             if not curvature > _EPS * expected:
@@ -294,9 +270,9 @@ class NewtonSolver:
             direction += conditioned
             expected = rho_next + (rho_next / rho) ** 2 * expected
             rho = rho_next
-        return step, products
+        return step
 
-    def _solution(self, force_n: float, vector: FloatArray, residual: float, steps: int, products: int) -> Solution:
+    def _solution(self, force_n: float, vector: FloatArray, residual: float) -> Solution:
         """Return the converged state, its approach moved by what the force balance still lacks.
 
         The residual summed both equations, so the field's stays below it.
@@ -304,11 +280,8 @@ class NewtonSolver:
         vector = vector.copy()
         vector[-1], lift = self._balanced(vector, force_n / self._spectrum.area_mm2)
         return Solution(
-            force_n=force_n,
             vector=vector,
             deflection_mm=self._spectrum.field(vector[:-1]),
             pressure_mpa=self._k * lift,
             residual=residual,
-            steps=steps,
-            products=products,
         )

@@ -35,20 +35,6 @@ class AnyPress(Protocol):
         """Return how far the film of `state` is past closing [mm]; minus infinity without a core."""
 
 
-class Coreless:
-    """What has no film that could close."""
-
-    touched_core = False
-
-    def closing_at(self, force_n: float) -> float:
-        """Return minus infinity: there is no core."""
-        return -np.inf
-
-    def closing_mm(self, state: SkinState) -> float:
-        """Return minus infinity: there is no core."""
-        return -np.inf
-
-
 def at_rest(medium: Medium) -> SkinState:
     """Return the skin with nothing touching."""
     zero = np.zeros(medium.spectrum.shape)
@@ -110,7 +96,6 @@ class Press:
         self.contact = contact
         self.touched_core = False
         self.solves = 0
-        self.products = 0
         self._solver = NewtonSolver(medium, self.gap_mm)
         self._core = core
         self._wants_fluid_pressure = fluid_pressure
@@ -148,13 +133,14 @@ class Press:
     def _solve(self, force: float) -> Solution:
         if force in self._solutions:
             return self._solutions[force]
-        solution = self._count(self._started(force))
+        solution = self._started(force)
         if self.medium.has_core and not self.touched_core and self.medium.closing_mm(solution.deflection_mm) > 0:
             self.touched_core = True
             if self._core is not None:
                 self.medium = self._core(self.medium)
                 self._solver = NewtonSolver(self.medium, self.gap_mm)
-                solution = self._count(self._solver.solve(force, solution.vector, tolerance=self._tolerance))
+                self.solves += 1
+                solution = self._solver.solve(force, solution.vector, tolerance=self._tolerance)
         self._solutions[force] = solution
         return solution
 
@@ -163,6 +149,7 @@ class Press:
 
         A state guessed for loads of a fraction of a piconewton is off by more than such a load can move.
         """
+        self.solves += 1
         guess = self._guess(force)
         if guess is not None:
             try:
@@ -170,11 +157,6 @@ class Press:
             except RigError:
                 pass
         return self._solver.solve(force, None, tolerance=self._tolerance)
-
-    def _count(self, solution: Solution) -> Solution:
-        self.solves += 1
-        self.products += solution.products
-        return solution
 
     def _guess(self, force: float) -> FloatArray | None:
         """Return a state near `force` from the solved loads around it (Lagrange in the square root of the load)."""

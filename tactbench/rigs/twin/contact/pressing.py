@@ -3,14 +3,24 @@
 from __future__ import annotations
 
 import math
+import sys
 from collections.abc import Callable
 
 import numpy as np
 
-from tactbench.plugin import FloatArray, NotApplicable, PluginContractError, RigError, SensorDescriptor, load_object
+from tactbench.plugin import (
+    FloatArray,
+    NotApplicable,
+    PluginContractError,
+    Quantity,
+    RigError,
+    SensorDescriptor,
+    load_object,
+)
 from tactbench.plugin.simulation import (
     BondedLayer,
     FluidBackedShell,
+    FoamPad,
     Skin,
     SkinGrid,
     SkinState,
@@ -19,12 +29,14 @@ from tactbench.plugin.simulation import (
 )
 from tactbench.rigs.twin.contact.media import Medium
 from tactbench.rigs.twin.contact.press import AnyPress, Press
-from tactbench.rigs.twin.contact.skins import medium_of
 from tactbench.rigs.twin.fidelity import Fidelity
 from tactbench.rigs.twin.geometry import gap_mm, outer_radius_mm, skin_grid
 from tactbench.rigs.twin.synthesis import Synthesis
 
 Read = Callable[[SkinState], FloatArray]
+_MAY_BE_ZERO = frozenset({
+    "poisson", "shear", "tension", "cover_tension", "cover_bending", "clamp_stiffness", "residual_film",
+})  # fmt: skip
 
 
 def pressed(run: Synthesis, names: list[str], fidelity: Fidelity) -> tuple[AnyPress, Read]:
@@ -72,10 +84,6 @@ def press_of(run: Synthesis, fidelity: Fidelity) -> AnyPress:
         from tactbench.rigs.twin.contact.local import LocalPress
 
         return LocalPress(skin, medium_of(skin, grid), gap, run.contact)
-    if fidelity.solver == "elements" and isinstance(skin, BondedLayer):
-        from tactbench.rigs.twin.contact.elements import ElementsPress
-
-        return ElementsPress(skin, medium_of(skin, grid), gap, run.contact)
     core: Callable[[Medium], Medium] | None = None
     if "core" in run.lent and isinstance(skin, FluidBackedShell):
         where = run.lent["core"]
@@ -118,7 +126,7 @@ def _reader(
 
 
 def slide_of(run: Synthesis) -> tuple[tuple[float, float], float] | None:
-    """Return a slide's direction and static friction; None if nothing slides or nobody looks along the skin."""
+    """Return a slide's direction and static friction; None if nothing slides or no channel looks along the skin."""
     slide = run.scene.slide
     if slide is None or not run.tangential or not run.load.largest_n > 0:
         return None
@@ -129,3 +137,33 @@ def slide_of(run: Synthesis) -> tuple[tuple[float, float], float] | None:
 def no_channels(state: SkinState) -> FloatArray:
     """Return depth, contact radius and fluid pressure: what is looked at when no channel is."""
     return np.array([state.depth_mm, state.contact_radius_mm, state.fluid_pressure_mpa])
+
+
+def medium_of(skin: FluidBackedShell | FoamPad | BondedLayer, grid: SkinGrid) -> Medium:
+    """Return the medium a spec declares, on `grid`; only its own module is imported.
+
+    Raises
+    ------
+    RigError
+        If a parameter is not physical.
+    """
+    for name in type(skin).model_fields:
+        stated, zero = getattr(skin, name), name in _MAY_BE_ZERO
+        most = 0.5 if name == "poisson" else sys.float_info.max
+        if isinstance(stated, Quantity) and not (0 < stated.value <= most or (zero and stated.value == 0)):
+            raise RigError(
+                f"The skin's {name} is {stated}; it must be finite, {'at least' if zero else 'above'} 0"
+                f"{' and at most 0.5' if most < 1 else ''}.",
+                hint="Correct the skin in the sensor's spec.",
+            )
+    if isinstance(skin, FluidBackedShell):
+        from tactbench.rigs.twin.contact import shell
+
+        return shell.medium(skin, grid)
+    if isinstance(skin, FoamPad):
+        from tactbench.rigs.twin.contact import foam
+
+        return foam.medium(skin, grid)
+    from tactbench.rigs.twin.contact import layer
+
+    return layer.medium(skin, grid)

@@ -6,22 +6,9 @@ import numpy as np
 
 from tactbench.plugin import FloatArray
 from tactbench.plugin.simulation import FluidBackedShell, SkinGrid
-from tactbench.rigs.twin.contact.media import LocalLaw, Medium, require_poisson, require_positive
+from tactbench.rigs.twin.contact.media import LocalLaw, Medium
 from tactbench.rigs.twin.contact.spectrum import Spectrum
 from tactbench.rigs.twin.geometry import outer_radius_mm
-
-
-class Clamp:
-    """The soft clamp at the sleeve's ends and along its seam: a linear foundation that fades inwards."""
-
-    def __init__(self, stiffness: FloatArray) -> None:
-        self._stiffness = stiffness
-
-    def __call__(self, deflection_mm: FloatArray, tangent: FloatArray) -> tuple[FloatArray, float]:
-        """Return restoring pressure and summed energy density; fill the tangent."""
-        np.copyto(tangent, self._stiffness)
-        pressure = self._stiffness * deflection_mm
-        return pressure, 0.5 * float(pressure.reshape(-1) @ deflection_mm.reshape(-1))
 
 
 def medium(skin: FluidBackedShell, grid: SkinGrid) -> Medium:
@@ -29,20 +16,10 @@ def medium(skin: FluidBackedShell, grid: SkinGrid) -> Medium:
 
     Shallow circular cylindrical shell (Donnell, Mushtari, Vlasov): ``K = D k⁴ + T k² + (E t / Rm²) kx⁴ / k⁴`` with
     ``D = E t³ / (12 (1 - nu²))``; the fluid keeps the mean deflection at zero and its pressure is that constraint's
-    multiplier.
+    multiplier. At the tip of a dome the skin runs on: the sheet is mirrored there, and at its rear.
     """
     young, poisson, thickness = skin.young.to("MPa"), skin.poisson.to("1"), skin.thickness.to("mm")
-    contact_stiffness = skin.contact_stiffness.to("MPa/mm")
-    require_positive(
-        young=young,
-        thickness=thickness,
-        mid_radius=skin.mid_radius.to("mm"),
-        contact_stiffness=contact_stiffness,
-        thinnest_film=skin.film.least_mm,
-        clamp_length=skin.clamp_length.to("mm"),
-    )
-    require_poisson(poisson)
-    spectrum = Spectrum(grid)
+    spectrum = Spectrum(grid, mirrored=skin.sheet.dome is not None)
     k2 = spectrum.k2.copy()
     k2[0, 0] = 1.0
     bending = young * thickness**3 / (12 * (1 - poisson**2))
@@ -54,14 +31,14 @@ def medium(skin: FluidBackedShell, grid: SkinGrid) -> Medium:
         spectrum=spectrum,
         stiffness=stiffness,
         respond=clamp(skin, grid),
-        contact_stiffness=contact_stiffness,
+        contact_stiffness=skin.contact_stiffness.to("MPa/mm"),
         zero_mean=True,
         # The asperities that keep a film open under load do so without.
         rest_thickness_mm=np.maximum(
             skin.film.at(grid.x_mm, grid.s_mm / outer_radius_mm(skin.sheet)), skin.residual_film.to("mm")
         ),
         least_thickness_mm=skin.residual_film.to("mm"),
-        low_modes=60,
+        low_modes=72,
         has_core=True,
     )
 
@@ -69,15 +46,25 @@ def medium(skin: FluidBackedShell, grid: SkinGrid) -> Medium:
 def clamp(skin: FluidBackedShell, grid: SkinGrid) -> LocalLaw:
     """Return the clamp ``c (max(e^-(x - a)/l, e^-(b - x)/l) + e^-(arc/2 - |s|)/l)``, never above c from the ends.
 
-    ``a`` and ``b`` lie half a cell of the *sheet's own* division inside its ends: there the ends' clamp has its full
-    stiffness, on whatever grid, so that a finer one converges to the same skin. The seam's distance counts from the
-    sheet's edge. The reference figures of the solver hold for this choice; measured from the sheet's ends instead,
-    the clamp is weaker by half a cell's decay and the approach under a flat surface grows by 8 %.
+    At the tip of a dome, b, nothing is clamped. ``a`` and ``b`` lie half a cell of the *sheet's own* division inside
+    its ends: there the ends' clamp has its full stiffness, on whatever grid, so that a finer one converges to the same
+    skin. The seam's distance counts from the sheet's edge. The reference figures of the solver hold for this choice;
+    measured from the sheet's ends instead, the clamp is weaker by half a cell's decay and the approach under a flat
+    surface grows by 8 %.
     """
     length, sheet = skin.clamp_length.to("mm"), skin.sheet
     x_min, x_max = sheet.x_min.to("mm"), sheet.x_max.to("mm")
     inset = (x_max - x_min) / sheet.cells[0] / 2
-    inside = np.minimum(grid.x_mm - (x_min + inset), (x_max - inset) - grid.x_mm)
+    inside = grid.x_mm - (x_min + inset)
+    if sheet.dome is None:
+        inside = np.minimum(inside, (x_max - inset) - grid.x_mm)
     ends = np.exp(-np.maximum(inside, 0.0) / length)
     seam = np.exp(-(skin.sheet.arc.to("mm") / 2 - np.abs(grid.s_mm)) / length)
-    return Clamp(skin.clamp_stiffness.to("MPa/mm") * (ends[:, None] + seam[None, :]))
+    stiffness = skin.clamp_stiffness.to("MPa/mm") * (ends[:, None] + seam[None, :])
+
+    def respond(deflection_mm: FloatArray, tangent: FloatArray) -> tuple[FloatArray, float]:
+        np.copyto(tangent, stiffness)
+        pressure = stiffness * deflection_mm
+        return pressure, 0.5 * float(pressure.reshape(-1) @ deflection_mm.reshape(-1))
+
+    return respond

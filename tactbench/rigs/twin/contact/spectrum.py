@@ -9,7 +9,6 @@ from __future__ import annotations
 import math
 
 import numpy as np
-import numpy.typing as npt
 
 from tactbench.plugin import FloatArray
 from tactbench.plugin.simulation import SkinGrid
@@ -22,10 +21,13 @@ class Spectrum:
     ----------
     grid
         Cell centres; the sheet is taken as periodic.
+    mirrored
+        Both ends along x are mirrors instead: fields are sums of cosines there, and go on as their own images.
     """
 
-    def __init__(self, grid: SkinGrid) -> None:
+    def __init__(self, grid: SkinGrid, *, mirrored: bool = False) -> None:
         self.shape = (grid.x_mm.size, grid.s_mm.size)
+        self.mirrored = mirrored
         nx, ns = self.shape
         self.half = (nx, ns // 2 + 1)
         self.size = 2 * self.half[0] * self.half[1]
@@ -33,18 +35,21 @@ class Spectrum:
         dx, ds = grid.cell_mm
         self.area_mm2 = dx * ds
         """Of one cell."""
-        kx = 2 * np.pi * np.fft.fftfreq(nx, dx)
+        kx = np.pi / (nx * dx) * np.arange(nx) if mirrored else 2 * np.pi * np.fft.fftfreq(nx, dx)
         ks = 2 * np.pi * np.fft.rfftfreq(ns, ds)
-        self.kx = np.broadcast_to(kx[:, None], self.half).copy()
-        """(nx, ns//2+1) axial wave number, 1/mm."""
-        self.k2 = kx[:, None] ** 2 + ks[None, :] ** 2
+        self.kx = kx[:, None]
+        """(nx, 1) axial wave number, 1/mm."""
+        self.k2 = self.kx**2 + ks**2
         """(nx, ns//2+1) squared wave number, 1/mm²."""
         # Columns between the first and the last stand for themselves and their conjugates.
         weight = np.full((1, self.half[1]), math.sqrt(2.0))
         weight[0, 0] = 1.0
         if ns % 2 == 0:
             weight[0, -1] = 1.0
-        root = math.sqrt(nx * ns)
+        root = math.sqrt(ns if mirrored else nx * ns)
+        if mirrored:
+            self._cosines = math.sqrt(2.0 / nx) * np.cos(np.pi / nx * np.outer(np.arange(nx), np.arange(nx) + 0.5))
+            self._cosines[0] *= math.sqrt(0.5)
         self._forward = weight / root
         self._backward = root / weight
         self._buffer = np.empty(self.half, dtype=np.complex128)
@@ -52,7 +57,7 @@ class Spectrum:
     def of(self, field: FloatArray) -> FloatArray:
         """Return the (size,) vector of a (nx, ns) field."""
         # Numpy's transforms are as quick as scipy's, whose package takes 40 ms to import.
-        coefficients = np.fft.fft(np.fft.rfft(field), axis=0)
+        coefficients = np.fft.rfft(self._cosines @ field) if self.mirrored else np.fft.fft(np.fft.rfft(field), axis=0)
         coefficients *= self._forward
         # NumPy 1.26 returns the transform along the first axis in column order.
         flat: FloatArray = np.ascontiguousarray(coefficients).view(np.float64).reshape(-1)
@@ -61,6 +66,8 @@ class Spectrum:
     def field(self, vector: FloatArray) -> FloatArray:
         """Return the (nx, ns) field of a (size,) vector."""
         np.multiply(vector.view(np.complex128).reshape(self.half), self._backward, out=self._buffer)
+        if self.mirrored:
+            return np.asarray(self._cosines.T @ np.fft.irfft(self._buffer, self.shape[1]))
         real: FloatArray = np.fft.irfft(np.fft.ifft(self._buffer, axis=0), self.shape[1])
         return real
 
@@ -80,10 +87,10 @@ class LowModes:
         nx, ns = spectrum.shape
         nh = spectrum.half[1]
         rows, columns = np.meshgrid(np.arange(nx), np.arange(nh), indexing="ij")
-        signed = np.where(rows > nx // 2, rows - nx, rows)
+        signed = rows if spectrum.mirrored else np.where(rows > nx // 2, rows - nx, rows)
         # One of each pair of conjugates, and no mode at the Nyquist rim, where cosine and sine coincide.
-        free = (columns > 0) | (signed > 0)
-        free &= (2 * np.abs(signed) < nx) & (2 * columns < ns)
+        free = ((columns > 0) | (signed > 0)) & (2 * columns < ns)
+        free &= spectrum.mirrored | (2 * np.abs(signed) < nx)
         chosen = np.flatnonzero(free)
         order = np.argsort(stiffness.reshape(-1)[chosen], kind="stable")
         chosen = np.sort(chosen[order[:count]])
@@ -92,33 +99,37 @@ class LowModes:
         self._mean = not zero_mean
         self.size = 2 * self._modes + int(self._mean)
         """Number of basis functions: cosines, sines and, unless the mean is held at zero, the constant."""
-        own = m[:, None], n[:, None]
-        other = m[None, :], n[None, :]
-        self._difference = ((own[0] - other[0]) % nx) * ns + (own[1] - other[1]) % ns
-        self._sum = ((own[0] + other[0]) % nx) * ns + (own[1] + other[1]) % ns
-        self._own = (m % nx) * ns + n
-        # Modes of the first column are stored twice, as k and -k, each with half of the weight.
-        doubled = np.where(n == 0, math.sqrt(2.0), 1.0)
-        places = [2 * chosen, 2 * chosen + 1]
-        scales = [doubled, doubled]
-        if self._mean:
-            places.append(np.array([0]))
-            scales.append(np.ones(1))
-        self._places = np.concatenate(places)
-        self._scales = np.concatenate(scales)
-        pairs = np.flatnonzero(n == 0)
+        apart, together = m[:, None] - m, m[:, None] + m
+        less, more = (n[:, None] - n) % ns, (n[:, None] + n) % ns
+        # On a periodic sheet modes of the first column are stored twice, as k and -k, each with half of the weight.
+        twice, norm, self._along = n == 0, np.ones(m.size), None
+        ways = np.stack([apart % nx, together % nx])[:, None]
+        if spectrum.mirrored:
+            # In a product of cosines along x both wave numbers go with either one along s. Modes of the first column
+            # and row have norms of their own; one without a wave along s has no sine, only the row of one.
+            twice = n < 0
+            ways = np.broadcast_to(np.stack([np.abs(apart), together]), (2, 2, *apart.shape))
+            self._along = np.cos(np.pi / nx * np.outer(np.arange(together.max() + 1), np.arange(nx) + 0.5))
+            norm = np.where(m > 0, 1.0, math.sqrt(0.5)) * np.where(n > 0, 1.0, math.sqrt(0.5))
+        self._places_apart, self._places_together = ways[0] * ns + less, ways[1] * ns + more
+        self._norms, self._own, self._own_norm = (
+            np.outer(norm, norm),
+            m % nx * ns + n,
+            norm * math.sqrt(2.0 * len(ways[0])),
+        )
+        doubled = np.where(twice, math.sqrt(2.0), 1.0)
+        constant = int(self._mean)
+        self._places = np.concatenate([2 * chosen, 2 * chosen + 1, np.zeros(constant, dtype=np.intp)])
+        self._scales = np.concatenate([doubled, doubled, np.ones(constant)])
+        pairs = np.flatnonzero(twice)
         mirror = ((-m[pairs]) % nx) * nh
         self._mirror_places = np.concatenate([2 * mirror, 2 * mirror + 1])
         self._mirror_from = np.concatenate([pairs, self._modes + pairs])
         root = math.sqrt(0.5)
         self._mirror_scales = np.concatenate([np.full(pairs.size, root), np.full(pairs.size, -root)])
         self._cells = nx * ns
-        self._root = math.sqrt(2.0 / self._cells)
-        own_stiffness = stiffness.reshape(-1)[chosen]
-        parts = [own_stiffness, own_stiffness]
-        if self._mean:
-            parts.append(stiffness.reshape(-1)[:1])
-        self._stiffness = np.concatenate(parts)
+        flat = stiffness.reshape(-1)
+        self._stiffness = np.concatenate([flat[chosen], flat[chosen], flat[:constant]])
 
     def take(self, vector: FloatArray) -> FloatArray:
         """Return the (size,) coefficients of a flat vector."""
@@ -132,9 +143,11 @@ class LowModes:
 
     def matrix(self, local: FloatArray, out: FloatArray) -> None:
         """Fill ``out[:size, :size]`` with the matrix of ``K + local`` for a (nx, ns) local stiffness."""
-        spectrum: npt.NDArray[np.complex128] = np.fft.fft2(local).reshape(-1)
-        spectrum /= self._cells
-        difference, total = spectrum[self._difference], spectrum[self._sum]
+        moments = np.fft.fft2(local) if self._along is None else np.fft.fft(self._along @ local)
+        moments = moments.reshape(-1) / self._cells
+        difference, total = (
+            moments[places].sum(axis=0) * self._norms for places in (self._places_apart, self._places_together)
+        )
         n = self._modes
         # Coefficient at q: sum D cos(qx) - i sum D sin(qx), over the number of cells.
         np.add(difference.real, total.real, out=out[:n, :n])
@@ -143,9 +156,9 @@ class LowModes:
         np.add(total.imag, difference.imag, out=out[n : 2 * n, :n])
         out[:n, n : 2 * n] = out[n : 2 * n, :n].T
         if self._mean:
-            own = spectrum[self._own] * math.sqrt(2.0)
+            own = moments[self._own] * self._own_norm
             out[2 * n, :n], out[2 * n, n : 2 * n] = own.real, own.imag
             out[:n, 2 * n], out[n : 2 * n, 2 * n] = own.real, own.imag
-            out[2 * n, 2 * n] = spectrum[0].real
+            out[2 * n, 2 * n] = moments[0].real
         diagonal = np.einsum("ii->i", out[: self.size, : self.size])
         diagonal += self._stiffness

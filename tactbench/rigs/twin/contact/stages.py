@@ -41,7 +41,7 @@ _TABLES: OrderedDict[bytes, _Tabulated] = OrderedDict()
 
 
 def press_skin(run: Synthesis) -> None:
-    """Refuse a contact that cannot be resolved; the solving itself follows the first wish for an answer."""
+    """Refuse a contact that cannot be resolved; it is solved when a reading is first needed."""
     skin = run.sensor.spec.skin
     if skin is None:
         raise NotApplicable(f"{run.sensor.name} declares no skin: it can be recorded or replayed, not simulated.")
@@ -143,7 +143,7 @@ def _tabulated(run: Synthesis, names: list[str], largest: float, *, only_skin: b
         return _TABLES[key]
     began = run.clock()
     made, read_s = _tabulate(run, names, largest, within_reach=not only_skin)
-    # Whoever asks first waits for all of it; reading belongs to transduction, the rest to the contact.
+    # The effect that needs it first takes all of the time; reading belongs to transduction, the rest to the contact.
     for effect, spent in (("transduction", read_s), ("contact", run.clock() - began - read_s)):
         if not spent:
             continue

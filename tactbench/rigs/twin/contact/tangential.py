@@ -14,8 +14,7 @@ import numpy.typing as npt
 
 from tactbench.plugin import FloatArray
 from tactbench.plugin.simulation import BondedLayer, FluidBackedShell, Skin, SkinGrid, SkinState
-from tactbench.rigs.twin.contact.spectrum import Spectrum
-from tactbench.rigs.twin.layer_kernel import shear_shapes
+from tactbench.rigs.twin.contact.layer import shear_shapes
 from tactbench.rigs.twin.partial_slip import shear_modulus_mpa, sliding_stiffness
 
 Direction = tuple[float, float]
@@ -45,7 +44,7 @@ def tangential_of(skin: Skin, grid: SkinGrid) -> TangentialResponse:
 def pressed_state(state: SkinState, along: TangentialResponse | None) -> SkinState:
     """Return `state` with what a press without friction does along the surface, and no traction.
 
-    None: nobody looks, or the scene leaves it out; nothing moves.
+    None: no channel looks, or the scene leaves it out; nothing moves.
     """
     moved = np.zeros((2, *state.pressure_mpa.shape)) if along is None else along.pressed(state)
     return replace(state, tangential_displacement_mm=moved, shear_mpa=np.zeros_like(moved))
@@ -71,14 +70,15 @@ class _Patch:
 
 
 class _Spectral:
-    """Waves of a periodic sheet."""
+    """Waves of a periodic sheet, or of one that its ends along x mirror: half of a periodic one."""
 
-    def __init__(self, grid: SkinGrid) -> None:
-        spectrum = Spectrum(grid)
-        nx, ns = self._shape = spectrum.shape
-        self.k2 = spectrum.k2.copy()
+    def __init__(self, grid: SkinGrid, *, mirrored: bool = False) -> None:
+        self._mirrored, self._cells = mirrored, grid.x_mm.size
+        nx, ns = self._shape = (self._cells * (1 + mirrored), grid.s_mm.size)
+        dx, ds = grid.cell_mm
+        kx, ks = 2 * np.pi * np.stack(np.meshgrid(np.fft.fftfreq(nx, dx), np.fft.rfftfreq(ns, ds), indexing="ij"))
+        self.k2 = kx**2 + ks**2
         self.k2[0, 0] = 1.0
-        kx, ks = spectrum.kx.copy(), np.broadcast_to(np.sqrt(spectrum.k2[:1]), spectrum.half).copy()
         # A wave of two cells has no slope on the grid: odd operators leave it out.
         if nx % 2 == 0:
             kx[nx // 2] = 0.0
@@ -89,7 +89,8 @@ class _Spectral:
 
     def filtered(self, field: FloatArray, multiplier: npt.NDArray[np.complex128]) -> FloatArray:
         """Return the (2, nx, ns) fields whose waves are those of (nx, ns) `field` times (2, nx, ns//2+1)."""
-        return np.asarray(np.fft.irfft2(np.fft.rfft2(field) * multiplier, self._shape))
+        whole = np.concatenate([field, field[::-1]]) if self._mirrored else field
+        return np.asarray(np.fft.irfft2(np.fft.rfft2(whole) * multiplier, self._shape)[:, : self._cells])
 
 
 class _Shell(_Patch):
@@ -101,7 +102,7 @@ class _Shell(_Patch):
 
     def __init__(self, skin: FluidBackedShell, grid: SkinGrid) -> None:
         super().__init__(skin)
-        self._waves = _Spectral(grid)
+        self._waves = _Spectral(grid, mirrored=skin.sheet.dome is not None)
         (along, across), k4 = self._waves.slope, self._waves.k2**2
         kx2, ks2, poisson = np.abs(along) ** 2, np.abs(across) ** 2, skin.poisson.to("1")
         membrane = np.stack([along * (ks2 - poisson * kx2), -across * (ks2 + (2 + poisson) * kx2)])

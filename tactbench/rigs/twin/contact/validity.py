@@ -115,6 +115,8 @@ def remarks(
             f"the contact reaches {reach:.2g} mm from the axis of a cap of radius {radius:g} mm, where its flank is "
             "steeper than 45 degrees"
         )
+    if dome is not None and press.contact.x_mm > dome.start.to("mm"):
+        found["remark dome"] = "the contact is on the dome, where the model has been held against no real press"
     share = float(pressure[~_active(pressure.shape, pad)].sum() / pressure.sum())
     if (math.isfinite(radius) or shape is not None) and share > AT_THE_EDGE:
         found["remark edge"] = f"{100 * share:.0f} % of the load stands on the margin, outside the active skin"

@@ -34,7 +34,7 @@ def within_band(t_s: FloatArray, pressure_pa: FloatArray, channel: ChannelSpec) 
     """Return what a band lets through of (n,) pressures that are straight between samples.
 
     A first-order high-pass and a first-order low-pass with their corners at the band's ends: the makers state the
-    ends, nobody the order. Both are exact for any step.
+    ends, no source the order. Both are exact for any step.
     """
     if channel.band is None:
         raise NotApplicable(
@@ -55,7 +55,7 @@ def stiffness_mpa_mm(table: LoadTable, force_n: FloatArray) -> FloatArray:
 def _pa_per_count(channel: ChannelSpec) -> float:
     if channel.scale is None:
         raise NotApplicable(
-            f"{channel.name} states no scale: its counts cannot be told from a pressure.",
+            f"{channel.name} states no scale: its counts cannot be computed from a pressure.",
             hint="State the channel's scale (Pa/count) in the sensor's spec.",
         )
     return channel.scale.to("Pa/count")

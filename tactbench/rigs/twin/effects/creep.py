@@ -75,7 +75,7 @@ def bounds(run: Synthesis, late: dict[ChannelKind, Nuisances]) -> dict[ChannelKi
 def _stretch(run: Synthesis) -> float:
     if run.scene.environment.indenter_temperature is None:
         return 1.0
-    from tactbench.rigs.twin.effects.thermal_drift import largest_stretch
+    from tactbench.rigs.twin.effects.heat import largest_stretch
 
     return largest_stretch(run)
 

@@ -1,4 +1,4 @@
-"""A heated core as one lump: a heater, a resistance to the room, another one through the contact.
+"""A heated core as one lump (a heater, a resistance to the room, another one through the contact) and its thermistor.
 
     C dT/dt = P + (T_room - T)/R + G (T_indenter - T)
 
@@ -18,6 +18,9 @@ from tactbench.rigs.twin.effects.memory import recurrence
 
 NEEDED = ("heater_power", "heat_resistance", "heat_capacity")
 """Parameters of a sensor with a heated core."""
+THERMISTOR = ("thermistor_b", "thermistor_p", "thermistor_q")
+"""Parameters of a sensor with a thermistor."""
+_ICE_K = 273.15
 
 
 @dataclass(frozen=True)
@@ -105,3 +108,31 @@ def relative_conductivity(degc: FloatArray, coefficient_per_k: float) -> FloatAr
     Raised to a tenth where the straight line would leave the range of liquids (below -20 degC for 2 % per kelvin).
     """
     return np.asarray(np.maximum(1.0 + coefficient_per_k * (degc - 25.0), 0.1))
+
+
+@dataclass(frozen=True)
+class Thermistor:
+    """``T = b / ln((p - q x)/x) - 273.15`` degC, with x the reading over full scale.
+
+    The form in which the maker of the BioTac states it (SynTouch BioTac SP product manual, section 5): a thermistor
+    of exponent b in a divider.
+    """
+
+    b_k: float
+    p: float
+    q: float
+    full_scale: float
+
+    @classmethod
+    def of(cls, sensor: SensorSpec, full_scale: float) -> Thermistor | None:
+        """Return the thermistor that the spec declares; None without one."""
+        if any(name not in sensor.parameters for name in THERMISTOR):
+            return None
+        b, p, q = (sensor.parameters[name] for name in THERMISTOR)
+        return cls(b.to("K"), p.to("1"), q.to("1"), full_scale)
+
+    def reading(self, degc: FloatArray) -> FloatArray:
+        """Return the readings at temperatures: ``x = p / (exp(b/T) + q)``, T in kelvin."""
+        # Above absolute zero by a kelvin: colder than that, the exponential overflows.
+        kelvin = np.maximum(np.asarray(degc, dtype=np.float64) + _ICE_K, 10.0)
+        return np.asarray(self.full_scale * self.p / (np.exp(self.b_k / kelvin) + self.q))

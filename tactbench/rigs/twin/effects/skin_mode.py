@@ -1,12 +1,117 @@
-"""A mode of the skin shaken by a motion that is straight between samples: exact for any step."""
+"""The skin's tangential mode: how it swings back in a slip, and how a motion shakes it.
+
+In a slip the skin under the contact is a damped oscillator ``x'' + 2 z w x' + w^2 (x - x_e) = 0`` about ``x_e``, the
+deflection that kinetic friction holds. It lets go at ``x_e + u`` with the surface's speed V and is caught when it has
+that speed again. Without damping (two-coefficient friction, Rabinowicz 1965) it is caught at ``x_e - u``, after
+``(2/w)(pi - atan(w u/V))``, for any V: the force falls by ``2 (mu_s - mu_k) N``.
+"""
 
 from __future__ import annotations
 
-import numpy as np
+import math
+from dataclasses import dataclass
 
-from tactbench.plugin import FloatArray
+import numpy as np
+import numpy.typing as npt
+
+from tactbench.plugin import FloatArray, RigError
 from tactbench.rigs.twin.effects.memory import ComplexArray, recurrence
-from tactbench.rigs.twin.effects.slip_event import Mode
+
+
+@dataclass(frozen=True)
+class Mode:
+    """A mode of the skin."""
+
+    omega: float
+    """Undamped angular frequency, rad/s."""
+    damping: float
+    """Share of the critical damping, 0 to below 1."""
+
+    def __post_init__(self) -> None:
+        if not (self.omega > 0 and 0 <= self.damping < 1):
+            raise RigError(
+                f"A skin mode of {self.omega:g} rad/s with {self.damping:g} of the critical damping cannot swing.",
+                hint="State skin_mode_frequency above 0 and skin_mode_damping from 0 to below 1 in the sensor's spec.",
+            )
+
+    @property
+    def decay(self) -> float:
+        """Rate at which it dies away, 1/s."""
+        return self.damping * self.omega
+
+    @property
+    def swing(self) -> float:
+        """Damped angular frequency, rad/s."""
+        return self.omega * math.sqrt(1.0 - self.damping**2)
+
+
+def swing(mode: Mode, u: FloatArray, speed: FloatArray, after_s: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return deflection from equilibrium and velocity, (n,) each, `after_s` (n,) letting go at `u` with `speed`."""
+    w, r = mode.swing, mode.decay
+    c, s = np.cos(w * after_s), np.sin(w * after_s)
+    faded = np.exp(-r * after_s)
+    return (
+        faded * (u * c + (speed + r * u) / w * s),
+        faded * (speed * c - (mode.omega**2 * u + r * speed) / w * s),
+    )
+
+
+def deflection_after(mode: Mode, u: float, speed: float, after_s: float) -> float:
+    """Return the deflection of :func:`swing` for one moment, without arrays: it is asked for once a slip."""
+    w, r = mode.swing, mode.decay
+    return math.exp(-r * after_s) * (u * math.cos(w * after_s) + (speed + r * u) / w * math.sin(w * after_s))
+
+
+def _turn(mode: Mode, u: float, speed: float) -> float:
+    """Return the phase at which the velocity is lowest, between 0 and pi; half a turn later it is highest."""
+    w, r = mode.swing, mode.decay
+    back = (mode.omega**2 * u + r * speed) / w
+    return math.atan2(r * speed + back * w, r * back - speed * w)
+
+
+def is_caught(mode: Mode, u: FloatArray, speed: float) -> npt.NDArray[np.bool_]:
+    """Return (n,) whether a slip that begins at `u` (n,) ever reaches the surface's speed again."""
+    w, r = mode.swing, mode.decay
+    back = (mode.omega**2 * u + r * speed) / w
+    highest = np.arctan2(r * speed + back * w, r * back - speed * w) + math.pi
+    _, velocity = swing(mode, u, np.full_like(u, speed), highest / w)
+    return np.asarray((u > 0) & (velocity >= speed))
+
+
+def slip_s(mode: Mode, u: float, speed: float) -> float:
+    """Return how long the slip lasts; infinity if the skin is never caught.
+
+    The velocity rises throughout the half turn after its minimum: one root there, found by Newton steps inside a
+    shrinking bracket to the last digits.
+    """
+    w, r = mode.swing, mode.decay
+    back = (mode.omega**2 * u + r * speed) / w
+    if not u > 0:
+        return math.inf
+    low = _turn(mode, u, speed) / w
+    high = low + math.pi / w
+
+    def excess(t: float) -> tuple[float, float]:
+        c, s, faded = math.cos(w * t), math.sin(w * t), math.exp(-r * t)
+        velocity = faded * (speed * c - back * s)
+        return velocity - speed, -r * velocity - faded * w * (speed * s + back * c)
+
+    if excess(high)[0] < 0:
+        return math.inf
+    t = 2.0 / mode.omega * (math.pi - math.atan2(mode.omega * u, speed))
+    for _ in range(60):
+        if not low < t < high:
+            t = 0.5 * (low + high)
+        value, slope = excess(t)
+        if value < 0:
+            low = t
+        else:
+            high = t
+        step = value / slope if slope > 0 else math.inf
+        if abs(step) <= 1e-15 * t or high - low <= 1e-15 * high:
+            break
+        t -= step
+    return t
 
 
 def shaken(t_s: FloatArray, pushed: FloatArray, mode: Mode) -> FloatArray:

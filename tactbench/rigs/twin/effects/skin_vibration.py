@@ -1,13 +1,13 @@
-"""Vibration of the skin along its normal while something slides over it."""
+"""Vibration of the skin along its normal while a rough surface slides over it."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from tactbench.plugin import FloatArray, Quantity, assumed
+from tactbench.plugin.simulation import Surface
 from tactbench.rigs.twin.contact.stages import READ_FROM_THE_SKIN, round_contact_mm, skin_under_load
 from tactbench.rigs.twin.effects.friction import mode_of
-from tactbench.rigs.twin.effects.roughness import Profile
 from tactbench.rigs.twin.effects.skin_mode import shaken
 from tactbench.rigs.twin.synthesis import Synthesis
 
@@ -15,6 +15,12 @@ LIFT: Quantity = assumed(
     0.03, "1", "a patch of a round finger that moves by x along it moves by x^2/(2 Ro) into it: x/Ro at 0.25 mm"
 )
 """Normal over tangential motion of the skin, for sensors whose parameters state no ``skin_lift``."""
+COMPONENTS = 48
+"""Cosines the profile is made of: enough to be close to Gaussian; they set the effect's cost."""
+LONGEST_MM, SHORTEST_MM = 100.0, 0.02
+"""Of their wavelengths. Assumed: longer ones pass within seconds; shorter ones, at 20 mm/s, above the band of PAC."""
+_RADII = 1025
+"""Radii for which the mean over the contact is computed; straight between them it is right to 1e-4."""
 
 
 def apply(run: Synthesis) -> None:
@@ -48,5 +54,51 @@ def apply(run: Synthesis) -> None:
     force_n = run.load.at(run.t_s)
     stiffness = table.per_mm(lambda force_n: force_n[:, None], force_n)[:, 0]
     run.reference_n += stiffness * rough(run.t_s, force_n, run.sliding(run.t_s).slip_mm)
-    waves = profile.wave_mm
-    run.drawn.update(roughness_shortest_mm=float(waves.min()), roughness_longest_mm=float(waves.max()))
+
+
+class Profile:
+    """A random self-affine profile: a function of the place, the same whenever it is asked.
+
+    Its spectrum over the wave number k is even up to the roll-off and falls as ``k^-(1 + 2 H)`` beyond (Persson et al.
+    2005, J. Phys.: Condens. Matter 17 R1). Of each of equal steps in ln k one cosine, anywhere within it, has the
+    step's share of the variance; phases are uniform.
+
+    Parameters
+    ----------
+    surface
+        Roughness (root mean square), roll-off wavelength and Hurst exponent H.
+    generator
+        Where wavelengths and phases come from.
+    """
+
+    def __init__(self, surface: Surface, generator: np.random.Generator) -> None:
+        edges = np.geomspace(2.0 * np.pi / LONGEST_MM, 2.0 * np.pi / SHORTEST_MM, COMPONENTS + 1)
+        roll_off, twice_hurst = 2.0 * np.pi / surface.roll_off.to("mm"), 2.0 * surface.hurst.to("1")
+        beyond = np.maximum(edges / roll_off, 1.0)
+        below = np.minimum(edges / roll_off, 1.0) + (1.0 - beyond**-twice_hurst) / twice_hurst
+        shares = np.diff(below) / (below[-1] - below[0])
+        self._wave_per_mm = edges[:-1] * (edges[1] / edges[0]) ** generator.uniform(size=COMPONENTS)
+        self._phase = generator.uniform(0.0, 2.0 * np.pi, COMPONENTS)
+        self._amplitude_mm = surface.roughness.to("mm") * np.sqrt(2.0 * shares)
+
+    def felt_mm(self, place_mm: FloatArray, contact_radius_mm: FloatArray) -> FloatArray:
+        """Return (n,) the profile's mean over a contact of (n,) radii around (n,) places."""
+        height = np.zeros(place_mm.size)
+        radii = np.linspace(0.0, float(contact_radius_mm.max(initial=0.0)), _RADII)
+        for wave, phase, amplitude in zip(self._wave_per_mm, self._phase, self._amplitude_mm, strict=True):
+            felt = np.interp(contact_radius_mm, radii, amplitude * patch_mean(wave * radii))
+            height += felt * np.cos(wave * place_mm + phase)
+        return height
+
+
+def patch_mean(turn: FloatArray) -> FloatArray:
+    """Return the mean of a unit cosine over a contact, relative to its middle.
+
+    Weighted with the Hertzian pressure ``sqrt(1 - r^2/a^2)``: ``3 (sin k - k cos k)/k^3`` with
+    ``k = 2 pi a/wavelength`` (the transform of a ball, which that weight is the shadow of).
+    """
+    small = np.abs(turn) < 0.05
+    safe = np.where(small, 1.0, turn)
+    # By its series for small arguments, where the difference loses its digits: next term below 2e-10.
+    series = 1.0 - turn**2 / 10.0 + turn**4 / 280.0
+    return np.where(small, series, 3.0 * (np.sin(safe) - safe * np.cos(safe)) / safe**3)

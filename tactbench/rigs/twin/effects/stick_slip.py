@@ -5,7 +5,7 @@ nodes of a grid. Nothing is stepped through: a phase ends where its closed form 
 
 - **stick**: the skin moves with the surface, until elastic and viscous force reach ``mu_s N``. The force follows
   Cattaneo and Mindlin.
-- **slip**: see :mod:`slip_event`; kinetic friction is that at the slip's mean speed, held at its beginning.
+- **slip**: see :mod:`skin_mode`; kinetic friction is that at the slip's mean speed, held at its beginning.
 - **slide**: if the skin is not caught; the force follows the LuGre bristle. It ends where sliding is no longer
   stable (friction weakens faster than the skin is damped) and a slip would be caught.
 - **held**: after the motion, the skin stays, and slides back as far as a falling load no longer holds it. Its partial
@@ -22,7 +22,7 @@ import numpy.typing as npt
 
 from tactbench.plugin import FloatArray
 from tactbench.rigs.twin.effects.bristle import COULOMB_MM_S, NOTHING_MM, bristle_below, coefficient
-from tactbench.rigs.twin.effects.slip_event import Mode, deflection_after, is_caught, slip_s, swing
+from tactbench.rigs.twin.effects.skin_mode import Mode, deflection_after, is_caught, slip_s, swing
 from tactbench.rigs.twin.partial_slip import share_of_force, stick_ratio
 from tactbench.rigs.twin.synthesis import Tangential
 

@@ -29,37 +29,32 @@ def sensor(name):
     )  # fmt: skip
 
 
-def record(folder, name, noise, seed, kept, *, simulated=True, tasks=("force", "curvature"), dead=()):
-    """Write every scene of the tasks: taxels see force and radius through noise, one of them is dead in `dead`."""
+def record(folder, name, noise, seed, kept, *, simulated=True, tasks=("force", "curvature")):
+    """Write every scene of the tasks: taxels see force and radius through noise."""
     rng = np.random.default_rng(seed)
     for planned in (planned for task in tasks for planned in REGISTRY.tasks[task].spec.scenes):
         radius = planned.scene.labels.get("cap_radius_mm", 20.0)
         force = np.concatenate([np.zeros(DISCARDED), np.linspace(0.0, 5.0, kept)])
         seen = np.column_stack([force, force * radius / 20, force / radius, np.sqrt(np.maximum(force, 0)) * radius])
         X = 1000 + 10 * seen + rng.normal(0, noise, seen.shape)
-        if planned.scene.name in dead:
-            X[:, 0] = np.nan
         about = RecordingMeta(
             name=planned.scene.name, sensor=sensor(name), reference=(FORCE,), rig="made", simulated=simulated,
             role=planned.role, session=planned.scene.session, scene=planned.scene, labels=planned.scene.labels,
         )  # fmt: skip
         path = folder / name / f"{planned.scene.name}.h5"
         path.parent.mkdir(parents=True, exist_ok=True)
-        t_ns = (
-            np.arange(len(X), dtype=np.int64) * 100_000_000
-        )  # ten rows a second: a mean over one second is one of eleven
+        t_ns = np.arange(len(X), dtype=np.int64) * 100_000_000  # a mean over one second is one of eleven rows
         with RecordingWriter(path, about) as writer:
             writer.append(Block("taxels", t_ns, X, None))
             writer.append(Block("force_torque", t_ns, (force + rng.normal(0, 0.1, len(force)))[:, None]))
 
 
 def results(folder, *, sensors=("alpha", "beta"), kept=KEPT, simulated=True, protocol="karl2016", split=None,
-            tasks=("force", "curvature"), dead=()):  # fmt: skip
-    """Record, run, and return the result folder; scenes of the last sensor in `dead` have a dead channel."""
+            tasks=("force", "curvature")):  # fmt: skip
+    """Record, run, and return the result folder."""
     recordings = folder / "recordings"
     for place, name in enumerate(sensors):
-        record(recordings, name, 2.0 + 6.0 * place, place, kept, simulated=simulated, tasks=tasks,
-               dead=dead if name == sensors[-1] else ())  # fmt: skip
+        record(recordings, name, 2.0 + 6.0 * place, place, kept, simulated=simulated, tasks=tasks)
     asked = {"force": ("lasso",), "curvature": (TREES,)}
     matrix = MatrixSpec(
         rig="replay",

@@ -1,6 +1,5 @@
 """The embedding: which rows, which features."""
 
-import shutil
 from collections import Counter
 from dataclasses import replace
 
@@ -30,15 +29,6 @@ def the_first(folder):
     return opened(folder), panel.row, panel.answers["test"]
 
 
-def test_it_is_of_every_nth_row_and_the_same_each_time(finished, monkeypatch):
-    monkeypatch.setattr(embedding_map, "AT_MOST", 100)
-    material, row, test = the_first(finished)
-    rows, xy = embed(material, row, test)
-    np.testing.assert_array_equal(rows, np.arange(0, len(test), 3))
-    assert xy.shape == (len(rows), 2)
-    np.testing.assert_array_equal(embed(material, row, test)[1], xy)
-
-
 def test_the_features_are_those_the_estimator_answered_from(finished):
     """A forest grown again on the training set gives, on these features, the very answers of the cell."""
     material, row, test = the_first(finished)
@@ -54,14 +44,17 @@ def test_the_features_are_those_the_estimator_answered_from(finished):
     np.testing.assert_array_equal(model.fit(learnt.X, learnt.y).predict(X), test.y_pred)
 
 
-def test_other_recordings_folds_and_tiny_sets_have_no_embedding(finished, tmp_path):
-    folder = results(tmp_path, sensors=("alpha",), tasks=("curvature",))
-    material, row, test = the_first(folder)
-    shutil.rmtree(tmp_path / "recordings" / "alpha")
+def test_it_is_of_every_nth_row_and_not_of_other_recordings_or_folds(finished, tmp_path, monkeypatch):
+    monkeypatch.setattr(embedding_map, "AT_MOST", 100)
+    material, row, test = the_first(finished)
+    rows, xy = embed(material, row, test)
+    np.testing.assert_array_equal(rows, np.arange(0, len(test), 3))
+    assert xy.shape == (len(rows), 2)
+    with pytest.raises(NotApplicable, match="a test set a fold"):
+        embed(material, row, replace(test, fold=np.arange(len(test))))
+    material, row, test = the_first(results(tmp_path, sensors=("alpha",), tasks=("curvature",)))
+    for path in (tmp_path / "recordings" / "alpha").glob("*.h5"):
+        path.unlink()
     record(tmp_path / "recordings", "alpha", 2.0, 0, 40)
     with pytest.raises(DataError, match="other test rows than were answered"):
         embed(material, row, test)
-    with pytest.raises(NotApplicable, match="a test set a fold"):
-        embed(material, row, replace(test, fold=np.arange(len(test))))
-    with pytest.raises(NotApplicable, match="no neighbourhoods"):
-        embed(material, row, type(test)(*(getattr(test, name)[:3] for name in test.__dataclass_fields__)))

@@ -32,9 +32,3 @@ def test_each_number_stands_at_its_place_in_its_sensor_s_colour(finished):
     spans = [bar.get_segments()[0][:, 0] for bar in axes.collections]
     # The bar is drawn from two differences.
     np.testing.assert_allclose(spans, [(line.row["ci_low"], line.row["ci_high"]) for line in lines], rtol=1e-12)
-
-
-def test_nothing_is_drawn_where_no_row_stands_beside_a_published_number(finished):
-    material = opened(finished)
-    rows = tuple(row for row in material.rows if row["task"] == "curvature")
-    assert draw_published(Results(material.store, REGISTRY, rows)) is None

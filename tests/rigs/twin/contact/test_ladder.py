@@ -11,9 +11,8 @@ from tactbench.core.spec.scene import Simulation
 from tactbench.plugin import ForceRamp, Indenter, RigContext, RigError, Scene, SensorDescriptor, UsageError, assumed
 from tactbench.plugin.simulation import Environment
 from tactbench.rigs.twin import tactbench_effects, tactbench_rigs
-from tactbench.rigs.twin.contact.elements import ElementsPress
 from tactbench.rigs.twin.contact.local import LocalPress
-from tactbench.rigs.twin.contact.skins import medium_of
+from tactbench.rigs.twin.contact.pressing import medium_of
 from tactbench.rigs.twin.fidelity import RUNGS, Fidelity, rung
 from tactbench.rigs.twin.geometry import Contact, gap_mm, skin_grid
 from tactbench.rigs.twin.rig import build
@@ -39,7 +38,7 @@ def _recorded(sensor, simulation, radius=10.0):
 @pytest.fixture
 def local(layer):
     def make(poisson, thickness=0.2, penalty=1e6):
-        skin, _ = layer(poisson, thickness=thickness, penalty=penalty, cells=192)
+        skin, _ = layer(poisson, thickness_mm=thickness, penalty=penalty, cells=192)
         grid = skin_grid(skin.sheet)
         contact = Contact(10.0, 0.0, 0.0)
         return LocalPress(skin, medium_of(skin, grid), gap_mm(grid, contact), contact), skin
@@ -124,19 +123,6 @@ def test_a_tolerance_nobody_can_keep_is_refused_with_the_best_there_is(sensors):
     with pytest.raises(RigError, match="finest is off by about") as refused:
         _recorded(sensors["icub"], Simulation(tolerance=1e-9))
     assert "larger tolerance" in refused.value.hint
-
-
-def test_a_layer_is_held_against_boundary_elements(layer):
-    skin, solver = layer(0.3, cells=64, penalty=300.0)
-    grid, contact = skin_grid(skin.sheet), Contact(10.0, 0.0, 0.0)
-    press = ElementsPress(skin, medium_of(skin, grid), gap_mm(grid, contact), contact)
-    state, default = press(1.0), solver.solve(1.0)
-    assert state.residual < 1e-6
-    assert float(state.pressure_mpa.sum()) * np.prod(grid.cell_mm) == pytest.approx(1.0, rel=1e-9)
-    # The default's penalty gives way by its mean pressure over its stiffness, about 0.1 MPa / 300 MPa/mm, beside the
-    # 0.3 mm of the layer; cells of 0.375 mm on a contact of 2 mm leave a percent.
-    assert state.depth_mm == pytest.approx(default.depth_mm, rel=0.02)
-    assert press(0.0).depth_mm == 0.0
 
 
 def test_the_fluid_backed_sensor_starts_at_the_default(sensors):

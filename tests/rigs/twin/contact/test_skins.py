@@ -7,7 +7,7 @@ import math
 import pytest
 
 from tactbench.plugin import RigError
-from tactbench.rigs.twin.contact.skins import medium_of
+from tactbench.rigs.twin.contact.pressing import medium_of
 from tactbench.rigs.twin.geometry import skin_grid
 
 

@@ -24,7 +24,7 @@ from tactbench.plugin.simulation import BondedLayer, SkinSheet, Slide
 from tactbench.rigs.twin import tactbench_effects
 from tactbench.rigs.twin.contact.load_table import build_table
 from tactbench.rigs.twin.contact.press import Press
-from tactbench.rigs.twin.contact.skins import medium_of
+from tactbench.rigs.twin.contact.pressing import medium_of
 from tactbench.rigs.twin.contact.slide_table import build_slide_table, dragged_state, traction_shares
 from tactbench.rigs.twin.contact.stages import forget_tables
 from tactbench.rigs.twin.contact.tangential import pressed_state, tangential_of

@@ -10,28 +10,20 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tactbench.plugin import assumed
-from tactbench.plugin.simulation import BondedLayer, SkinSheet
+from tactbench.rigs.twin.contact.layer import shear_shapes
 from tactbench.rigs.twin.contact.press import Press, at_rest
-from tactbench.rigs.twin.contact.skins import medium_of
+from tactbench.rigs.twin.contact.pressing import medium_of
 from tactbench.rigs.twin.contact.slide_table import dragged_state, traction_shares
 from tactbench.rigs.twin.contact.tangential import pressed_state, tangential_of
 from tactbench.rigs.twin.geometry import Contact, gap_mm, outer_radius_mm, skin_grid
-from tactbench.rigs.twin.layer_kernel import shear_shapes
 from tactbench.rigs.twin.partial_slip import sliding_stiffness
+from tests.oracles.layers import bonded_layer
 
 YOUNG, SIDE_MM, FORCE_N, RADIUS_MM, MU = 1.0, 12.0, 0.3, 1.0, 0.6
 
 
-def _q(value, unit):
-    return assumed(value, unit, "test")
-
-
 def _layer(poisson, *, cells=64, thickness_mm=20.0):
-    sheet = SkinSheet(x_min=_q(-SIDE_MM / 2, "mm"), x_max=_q(SIDE_MM / 2, "mm"), arc=_q(SIDE_MM, "mm"),
-                      cells=(cells, cells))  # fmt: skip
-    return BondedLayer(sheet=sheet, young=_q(YOUNG, "MPa"), poisson=_q(poisson, "1"), thickness=_q(thickness_mm, "mm"),
-                       contact_stiffness=_q(1000, "MPa/mm"))  # fmt: skip
+    return bonded_layer(poisson, thickness_mm=thickness_mm, side_mm=SIDE_MM, cells=cells, penalty=1000.0)
 
 
 def _r(grid):
@@ -179,14 +171,16 @@ def test_columns_are_pressed_straight_down(presses):
     assert not pressed_state(press(1.0), along).tangential_displacement_mm.any()
 
 
-def test_a_shells_membrane_is_in_balance_along_itself(specs):
-    """Donnell's membrane forces have no divergence: nothing pulls the sheet along itself without friction."""
+@pytest.mark.parametrize("x_mm", [-4.0, 8.0])
+def test_a_shells_membrane_is_in_balance_along_itself(specs, x_mm):
+    """Donnell's membrane forces have no divergence: nothing pulls the sheet along itself, nor across its mirrors."""
     skin = specs["biotac"].skin
     grid = skin_grid(skin.sheet)
-    bell = np.exp(-((grid.x_mm[:, None] - grid.x_mm.mean()) ** 2 + grid.s_mm[None, :] ** 2) / 2 / 2.0**2)
-    deflection = bell - bell.mean()
+    bell = np.exp(-((grid.x_mm[:, None] - x_mm) ** 2 + grid.s_mm[None, :] ** 2) / 2 / 2.0**2)
+    bell -= bell.mean()
+    deflection = np.concatenate([bell, bell[::-1]])
     dx, ds = grid.cell_mm
-    kx = 2 * np.pi * np.fft.fftfreq(grid.x_mm.size, dx)[:, None]
+    kx = 2 * np.pi * np.fft.fftfreq(len(deflection), dx)[:, None]
     ks = 2 * np.pi * np.fft.fftfreq(grid.s_mm.size, ds)[None, :]
 
     def along_x(field):
@@ -196,7 +190,8 @@ def test_a_shells_membrane_is_in_balance_along_itself(specs):
         return np.real(np.fft.ifft2(1j * ks * np.fft.fft2(field)))
 
     rest = at_rest(medium_of(skin, grid))
-    moved = tangential_of(skin, grid).pressed(dataclasses.replace(rest, deflection_mm=deflection))
+    own_u, own_v = tangential_of(skin, grid).pressed(dataclasses.replace(rest, deflection_mm=bell))
+    moved = np.concatenate([own_u, -own_u[::-1]]), np.concatenate([own_v, own_v[::-1]])
     half, nu = skin.thickness.to("mm") / 2, skin.poisson.to("1")
     u, v = moved[0] - half * along_x(deflection), moved[1] - half * along_s(deflection)
     hoop = along_s(v) - deflection / skin.mid_radius.to("mm")

@@ -25,6 +25,14 @@ def press(medium, specs):
     return make
 
 
+def test_a_contact_on_the_dome_says_that_nothing_real_was_held_against_it(press, specs):
+    for x, told in ((-5.0, False), (6.0, True)):
+        made, outer, _ = press("biotac", 10.0, x)
+        sheet = specs["biotac"].skin.sheet
+        found = remarks(made, [1.0], outer, dome=sheet.dome, relief=sheet.relief)
+        assert ("remark dome" in found) == told
+
+
 def _texts(found):
     return {name for name in found if name.startswith("remark")}
 

@@ -7,7 +7,8 @@ import pytest
 
 from tactbench.plugin import Scene
 from tactbench.plugin.simulation import Environment
-from tactbench.rigs.twin.effects import creep, gain, offset
+from tactbench.rigs.twin.effects import creep
+from tactbench.rigs.twin.effects.channels import gain, offset
 from tactbench.rigs.twin.effects.memory import lag
 from tactbench.rigs.twin.geometry import Contact
 from tactbench.rigs.twin.synthesis import Load, Synthesis, Track
@@ -39,12 +40,12 @@ def _run(sensor, *, seed=1, name="a", session="1", wanted=None, kinds=("taxel",)
 
 def _after(effect, *args, **kwargs):
     run = _run(*args, **kwargs)
-    effect.apply(run)
+    effect(run)
     return run
 
 
 def test_creep_shares_the_load_among_now_and_later(sensors):
-    run = _after(creep, sensors["biotac"], kinds=("taxel", "dc_pressure"))
+    run = _after(creep.apply, sensors["biotac"], kinds=("taxel", "dc_pressure"))
     terms = sensors["biotac"].spec.nuisances["taxel"].creep
     expected = run.tracks[0].force_n * (1 - sum(t.fraction.value for t in terms))
     for term in terms:
@@ -72,7 +73,7 @@ def test_a_stated_scale_of_offsets_takes_over_from_that_of_drift(sensors, drift,
     plain.scene = plain.scene.model_copy(update={"environment": Environment()})
     scaled.scene = scaled.scene.model_copy(update={"environment": Environment(drift_scale=drift, offset_scale=own)})
     for run in (plain, scaled):
-        offset.apply(run)
+        offset(run)
     assert np.abs(plain.tracks[0].readings).max() > 1
     np.testing.assert_allclose(scaled.tracks[0].readings, factor * plain.tracks[0].readings, rtol=1e-13)
 

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tactbench.plugin import ForceLoop, ForceRamp, Indenter, RigContext, RigError, Scene, assumed
+from tactbench.core.spec.drive import ForceLoop
+from tactbench.plugin import ForceRamp, Indenter, RigContext, RigError, Scene, assumed
 from tactbench.plugin.devices import LoopModel
 from tactbench.plugin.simulation import Environment
 from tactbench.rigs.twin import tactbench_effects

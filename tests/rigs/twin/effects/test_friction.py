@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from tactbench.plugin import RigError
 from tactbench.rigs.twin.effects.bristle import bristle
-from tactbench.rigs.twin.effects.slip_event import Mode, is_caught, slip_s, swing
+from tactbench.rigs.twin.effects.skin_mode import Mode, is_caught, slip_s, swing
 from tactbench.rigs.twin.effects.stick_slip import Dragged, Drive
 from tactbench.rigs.twin.partial_slip import share_of_force, shear_modulus_mpa, stick_ratio
 

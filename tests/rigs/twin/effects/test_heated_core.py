@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -7,7 +9,12 @@ from hypothesis import strategies as st
 
 from tactbench.plugin import Scene, assumed
 from tactbench.plugin.simulation import Environment
-from tactbench.rigs.twin.effects.heated_core import HeatedCore, disc_conductance_w_per_k, relative_conductivity
+from tactbench.rigs.twin.effects.heated_core import (
+    HeatedCore,
+    Thermistor,
+    disc_conductance_w_per_k,
+    relative_conductivity,
+)
 
 CORE = HeatedCore(room_c=23.0, power_w=0.25, resistance_k_per_w=136.0, capacity_j_per_k=3.7)
 SCENE = Scene(name="s")
@@ -104,3 +111,38 @@ def test_a_disc_of_one_millimetre_in_silicone():
 def test_conductivity_is_that_of_25_degrees_there_and_never_negative():
     found = relative_conductivity(np.array([25.0, 35.0, -200.0]), 0.02)
     assert found == pytest.approx([1.0, 1.2, 0.1])
+
+
+MAKERS = Thermistor(b_k=4025.0, p=155183.0, q=46555.0, full_scale=4095.0)
+
+
+def by_the_maker(reading: float) -> float:
+    x = reading / 4095
+    return 4025 / math.log((155183 - 46555 * x) / x) - 273.15
+
+
+@given(st.floats(-40, 120))
+def test_the_makers_formula_leads_back(degc):
+    assert by_the_maker(float(MAKERS.reading(np.array([degc]))[0])) == pytest.approx(degc, abs=1e-9)
+
+
+def test_the_makers_formula_at_rest():
+    by_hand = by_the_maker(2576)
+    assert by_hand == pytest.approx(56.59, abs=0.005)
+    assert MAKERS.reading(np.array([by_hand]))[0] == pytest.approx(2576, abs=1e-8)
+
+
+def test_counts_rise_with_temperature_and_stay_on_the_converter():
+    readings = MAKERS.reading(np.linspace(-300, 1000, 500))
+    assert np.all(np.diff(readings) >= 0)
+    assert readings.min() >= 0
+    assert np.all(np.isfinite(readings))
+
+
+def test_the_biotacs_rest_is_its_warm_core(specs):
+    biotac = specs["biotac"]
+    (channel,) = biotac.channels("dc_temperature")
+    thermistor = Thermistor.of(biotac, channel.upper)
+    rise = biotac.parameters["heater_power"].to("W") * biotac.parameters["heat_resistance"].to("K/W")
+    assert thermistor.reading(np.array([23.0 + rise]))[0] == pytest.approx(channel.rest.value, abs=1e-6)
+    assert Thermistor.of(specs["icub"], 255.0) is None

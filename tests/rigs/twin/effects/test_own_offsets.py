@@ -8,11 +8,10 @@ import pytest
 from tactbench.core.spec.scene import Simulation
 from tactbench.plugin import NotApplicable, Scene, load_registry
 from tactbench.plugin.simulation import Environment
-from tactbench.rigs.twin import draws
-from tactbench.rigs.twin.effects import offset
+from tactbench.rigs.twin.effects.channels import offset, smooth_basis
 from tactbench.rigs.twin.geometry import Contact
 from tactbench.rigs.twin.preparation import handled
-from tactbench.rigs.twin.synthesis import Load, Synthesis, Track
+from tactbench.rigs.twin.synthesis import Load, Synthesis, Track, generator
 from tactbench.sensors.biotac.electrodes import ELECTRODES
 
 SEEDS = 400
@@ -31,7 +30,7 @@ def _levels(sensor, seed, scene=REST, kind="taxel"):
         load=Load(np.array([0.0, 1.0]), np.zeros(2)), tracks=(track,), contact=Contact(1.0, 0.0, 0.0),
         reference_n=np.zeros(1),
     )  # fmt: skip
-    offset.apply(run)
+    offset(run)
     return track.readings[0]
 
 
@@ -105,7 +104,7 @@ def test_they_scale(own, sensors, scale):
 
 def test_the_space_of_fields_does_not_depend_on_how_places_are_written(sensors):
     spec = sensors["biotac"].spec
-    basis = offset.smooth_basis(spec, "taxel")
+    basis = smooth_basis(spec, "taxel")
     assert basis.shape == (19, 5)
     np.testing.assert_allclose(basis.T @ basis, np.eye(5), atol=1e-12)
     np.testing.assert_allclose(basis.sum(axis=0), 0.0, atol=1e-12)
@@ -122,7 +121,7 @@ def test_the_space_of_fields_does_not_depend_on_how_places_are_written(sensors):
         for channel in spec.streams[0].channels
     )
     moved = spec.model_copy(update={"streams": (spec.streams[0].model_copy(update={"channels": channels}),)})
-    other = offset.smooth_basis(moved, "taxel")
+    other = smooth_basis(moved, "taxel")
     np.testing.assert_allclose(basis @ basis.T, other @ other.T, atol=1e-10)
 
 
@@ -138,10 +137,10 @@ def test_few_places_or_none_leave_fewer_fields_or_none(sensors):
         return spec.model_copy(update={"streams": (stream.model_copy(update={"channels": channels}),)})
 
     on_a_line = with_places(*((1e-3 * number, 0.0, -5e-3) for number in range(6)))
-    assert offset.smooth_basis(on_a_line, "taxel").shape == (6, 2)  # straight and bent
-    assert offset.smooth_basis(with_places((0.0, 0.0, -5e-3)), "taxel").shape == (1, 0)
-    assert offset.smooth_basis(with_places((0.0, 0.0, -5e-3), None), "taxel") is None
-    assert offset.smooth_basis(load_registry().sensors["ideal"].spec, "taxel").shape == (16, 5)
+    assert smooth_basis(on_a_line, "taxel").shape == (6, 2)  # straight and bent
+    assert smooth_basis(with_places((0.0, 0.0, -5e-3)), "taxel").shape == (1, 0)
+    assert smooth_basis(with_places((0.0, 0.0, -5e-3), None), "taxel") is None
+    assert smooth_basis(load_registry().sensors["ideal"].spec, "taxel").shape == (16, 5)
     lone = sensors["biotac"].model_copy(update={"spec": with_places((0.0, 0.0, -5e-3))})
     found = [_levels(_without_shared(lone), seed)[0] for seed in range(SEEDS)]
     # A single channel has no field: its whole offset is its own. 2 counts, uncertain by 3.5 %.
@@ -156,9 +155,7 @@ def test_hard_handled_draws_what_was_the_default_once(sensors):
         15.0, 5.0, 0.5, 5.0,
     ]  # fmt: skip
     assert biotac.spec.handled("hard-handled").nuisances["dc_pressure"].warm_up.value == 100.0
-    shared, own = (
-        draws.generator(7, "biotac", "recording", "1", "a", "offset", what, "taxel") for what in ("shared", "own")
-    )
+    shared, own = (generator(7, "biotac", "recording", "1", "a", "offset", what, "taxel") for what in ("shared", "own"))
     expected = 15.0 * float(shared.standard_normal()) + 5.0 * own.standard_normal(19)
     np.testing.assert_array_equal(_levels(biotac, 7, scene), expected)
 

@@ -9,10 +9,9 @@ from tactbench.core.spec.scene import Simulation
 from tactbench.plugin import ForceRamp, Indenter, NotApplicable, RigContext, Scene, assumed
 from tactbench.plugin.simulation import Environment
 from tactbench.rigs.twin import tactbench_effects
-from tactbench.rigs.twin.effects.heated_core import HeatedCore
+from tactbench.rigs.twin.effects.called_for import contact_heat
+from tactbench.rigs.twin.effects.heated_core import HeatedCore, Thermistor
 from tactbench.rigs.twin.effects.memory import time_constant_s
-from tactbench.rigs.twin.effects.thermal_called_for import contact_heat
-from tactbench.rigs.twin.effects.thermistor import Thermistor
 from tactbench.rigs.twin.planner import plan_scene
 from tactbench.rigs.twin.preparation import prepare
 from tactbench.rigs.twin.rig import build
@@ -74,10 +73,10 @@ def test_a_colder_indenter_cools_the_core_and_a_hotter_one_warms_it(carried):
 def test_a_sensor_that_warms_up_shows_it_in_tdc(carried, specs):
     track = carried(_scene(since_power_on=_q(100, "s"), drift_scale=1.0, end_n=0.0))
     core = HeatedCore.of(_scene(), specs["biotac"])
-    degc = Thermistor.of(specs["biotac"], 4095.0).degc(track.readings[:, 0])
     left = np.exp(-(100 + track.t_s) / core.tau_s)
-    # The low-pass of 22.6 Hz is 7 ms behind a rate of 0.06 K/s.
-    np.testing.assert_allclose(degc, 23.0 + core.rise_k * (1 - left), atol=1e-3)
+    counts = Thermistor.of(specs["biotac"], 4095.0).reading(23.0 + core.rise_k * (1 - left))
+    # The low-pass of 22.6 Hz is 7 ms behind a rate of 0.06 K/s, a kelvin 45 counts.
+    np.testing.assert_allclose(track.readings[:, 0], counts, atol=0.045)
 
 
 def test_tac_is_the_amplified_high_pass_of_tdc(carried):

@@ -9,8 +9,8 @@ from tactbench.core.spec.scene import Simulation
 from tactbench.plugin import ForceRamp, Indenter, RigContext, Scene, assumed
 from tactbench.plugin.simulation import Environment
 from tactbench.rigs.twin import tactbench_effects
+from tactbench.rigs.twin.effects.heat import largest_stretch, through_divider
 from tactbench.rigs.twin.effects.heated_core import HeatedCore, relative_conductivity
-from tactbench.rigs.twin.effects.thermal_drift import largest_stretch, through_divider
 from tactbench.rigs.twin.preparation import carried_out, prepare
 from tactbench.rigs.twin.rig import build
 
@@ -61,7 +61,7 @@ def test_ends_of_the_range_stay():
 
 def test_one_divider_per_electrode_is_what_a_warmer_fluid_gives(specs):
     from tactbench.rigs.twin.contact.press import at_rest
-    from tactbench.rigs.twin.contact.skins import medium_of
+    from tactbench.rigs.twin.contact.pressing import medium_of
     from tactbench.rigs.twin.geometry import skin_grid
     from tactbench.sensors.biotac.transduction import build
 

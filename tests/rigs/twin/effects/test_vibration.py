@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import itertools
 import math
 
 import numpy as np
@@ -10,18 +11,15 @@ from hypothesis import strategies as st
 from tactbench.plugin import RigError, assumed
 from tactbench.plugin.simulation import Surface
 from tactbench.rigs.twin.effects.ac_pressure import within_band
-from tactbench.rigs.twin.effects.hum import band_noise
-from tactbench.rigs.twin.effects.roughness import Profile, patch_mean
-from tactbench.rigs.twin.effects.skin_mode import shaken
-from tactbench.rigs.twin.effects.slip_event import Mode
+from tactbench.rigs.twin.effects.channels import band_noise
+from tactbench.rigs.twin.effects.skin_mode import Mode, shaken
+from tactbench.rigs.twin.effects.skin_vibration import Profile, patch_mean
 
 RATE_HZ = 2200.0
 
 
 def _surface(**more):
-    return Surface(**{
-        name: value if name == "spread" else assumed(*value, "test") for name, value in more.items()
-    })  # fmt: skip
+    return Surface(**{name: assumed(*value, "test") for name, value in more.items()})
 
 
 def _density(values):
@@ -75,16 +73,26 @@ def test_a_patch_feels_the_mean_under_it(turn):
     assert patch_mean(np.array([turn]))[0] == pytest.approx(mean, abs=2e-5)
 
 
-def test_a_profile_has_its_roughness_and_its_wavelength():
-    surface = _surface(roughness=(20.0, "um"), wavelength=(2.0, "mm"), spread=0.4)
-    place = np.linspace(0.0, 4000.0, 200001)
-    heights = [Profile(surface, np.random.default_rng(seed)).felt_mm(place, np.zeros(1)) for seed in range(3)]
-    for height in heights:
-        assert height.std() == pytest.approx(0.02, rel=0.02)
-    grating = Profile(_surface(wavelength=(2.0, "mm"), roughness=(20.0, "um"), spread=0.0), np.random.default_rng(0))
-    one = grating.felt_mm(place, np.zeros(1))
-    assert one.max() == pytest.approx(0.02 * math.sqrt(2), rel=1e-3)  # 100 places a wave
-    np.testing.assert_allclose(one[100:], one[:-100], atol=1e-12)
+@pytest.mark.parametrize("hurst", [0.5, 0.8])
+def test_a_profile_has_its_roughness_and_is_self_affine_below_its_roll_off(hurst):
+    surface = _surface(roughness=(20.0, "um"), roll_off=(1.0, "mm"), hurst=(hurst, "1"))
+    step_mm = 0.008
+    place = step_mm * np.arange(50000)
+    profiles = [Profile(surface, np.random.default_rng(seed)) for seed in range(12)]
+    heights = np.stack([profile.felt_mm(place, np.zeros(1)) for profile in profiles])
+    # 400 mm hold four of the longest waves.
+    np.testing.assert_allclose(heights.std(axis=1), 0.02, rtol=0.03)
+    power = (np.abs(np.fft.rfft(heights * np.hanning(place.size), axis=1)) ** 2).mean(axis=0)
+    per_mm = np.fft.rfftfreq(place.size, step_mm)
+
+    def slope(longest_mm, shortest_mm):
+        edges = np.geomspace(1 / longest_mm, 1 / shortest_mm, 9)
+        density = [power[(per_mm >= low) & (per_mm < high)].mean() for low, high in itertools.pairwise(edges)]
+        return np.polyfit(np.log(np.sqrt(edges[:-1] * edges[1:])), np.log(density), 1)[0]
+
+    # Twelve profiles have some thirty waves in each of eight bands: a fifth of its density, 0.1 of a slope over e^3.
+    assert slope(40.0, 1.2) == pytest.approx(0.0, abs=0.2)
+    assert slope(0.8, 0.04) == pytest.approx(-1 - 2 * hurst, abs=0.2)
 
 
 @pytest.mark.parametrize("frequency", [2.0, 10.0, 60.0, 200.0])

@@ -3,7 +3,7 @@
 from tactbench.plugin import ChannelSpec, SensorDescriptor, SensorSpec, Source, StreamSpec, assumed, hookimpl
 from tactbench.plugin.simulation import BondedLayer, Nuisances, SkinSheet
 
-TACTBENCH_API = 1
+TACTBENCH_API = 2
 MINE = "its maker"
 PLACES_MM = ((-1.5, -1.5), (-1.5, 1.5), (1.5, -1.5), (1.5, 1.5))
 

@@ -2,7 +2,7 @@
 
 from tactbench.plugin import EstimatorDescriptor, hookimpl
 
-TACTBENCH_API = 1
+TACTBENCH_API = 2
 KINDS = ("regression", "classification")
 
 

@@ -4,7 +4,7 @@ from flawed_tactile import line
 from tactbench.plugin import Block, ChannelSpec, Quality, StreamSpec, hookimpl
 from tactbench.plugin.devices import DeviceDescriptor
 
-TACTBENCH_API = 1
+TACTBENCH_API = 2
 AXES = ("fx", "fy", "fz")
 LARGEST_N = 50.0
 NANOMETRES = 1e-9

@@ -2,7 +2,7 @@
 
 from tactbench.plugin import EstimatorDescriptor, hookimpl
 
-TACTBENCH_API = 1
+TACTBENCH_API = 2
 FLAWS = {
     "of-no-kind": {"kinds": ()},
     "without-its-argument": {"params": {"alpha": 1.0, "beta": 2.0}},

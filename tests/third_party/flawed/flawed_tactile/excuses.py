@@ -3,7 +3,7 @@
 from flawed_tactile.sensors import PAD, channel, with_
 from tactbench.plugin import SensorDescriptor, hookimpl
 
-TACTBENCH_API = 1
+TACTBENCH_API = 2
 WHY = "the data sheet has it so"
 EXPECTED_FAILURES = {
     "excuses-its-flaw": {"normals-are-unit": WHY},

@@ -5,7 +5,7 @@ import h5py  # noqa: F401
 from flawed_tactile.sensors import PAD, with_
 from tactbench.plugin import SensorDescriptor, hookimpl
 
-TACTBENCH_API = 1
+TACTBENCH_API = 2
 
 
 @hookimpl

@@ -9,7 +9,7 @@ import numpy as np
 from flawed_tactile.rigs import FORCE, RATE_HZ
 from tactbench.plugin import Block, RigDescriptor, hookimpl
 
-TACTBENCH_API = 1
+TACTBENCH_API = 2
 FLAWS = ("that-breaks-off", "that-pulls", "that-overshoots", "that-stays-pressed", "that-does-not-stop")
 BLOCK = 20
 STOPPED = []

@@ -6,7 +6,7 @@ import numpy as np
 
 from tactbench.plugin import Block, ChannelSpec, PlanEntry, RigDescriptor, StreamSpec, hookimpl
 
-TACTBENCH_API = 1
+TACTBENCH_API = 2
 RATE_HZ = 100.0
 FORCE = StreamSpec(
     name="force_torque", rate_hz=RATE_HZ, channels=(ChannelSpec(name="fz", kind="force", unit="N", sign=1),)

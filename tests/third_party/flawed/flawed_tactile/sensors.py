@@ -17,7 +17,7 @@ from tactbench.plugin import (
 )
 from tactbench.plugin.simulation import BondedLayer, Nuisances, SkinSheet
 
-TACTBENCH_API = 1
+TACTBENCH_API = 2
 MINE = "its maker"
 SOURCE = Source(tag="assumed", reference=MINE)
 PLACES_MM = ((-3.0, -1.5), (-3.0, 1.5), (2.0, -1.5), (2.0, 1.5))

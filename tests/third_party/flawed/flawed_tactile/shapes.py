@@ -4,7 +4,7 @@ import numpy as np
 
 from tactbench.plugin import ForcePath, IndenterDescriptor, Parameter, ProfileDescriptor, Source, hookimpl
 
-TACTBENCH_API = 1
+TACTBENCH_API = 2
 SIZE = Parameter(default=20.0, unit="mm", least=1.0, text="radius of curvature at its tip")
 PEAK = Parameter(default=2.0, unit="N", text="the largest force")
 SHAPES = (

@@ -17,7 +17,7 @@ from tactbench.plugin import (
     hookimpl,
 )
 
-TACTBENCH_API = 1
+TACTBENCH_API = 2
 
 
 def planned(role, shape, **changes):

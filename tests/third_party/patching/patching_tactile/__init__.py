@@ -5,7 +5,7 @@ import numpy as np
 from tactbench.plugin import hookimpl
 from tactbench.plugin.simulation import EffectDescriptor, Reason
 
-TACTBENCH_API = 1
+TACTBENCH_API = 2
 
 np.round = np.floor
 

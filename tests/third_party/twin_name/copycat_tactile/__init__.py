@@ -4,7 +4,7 @@ from acme_tactile import SPEC
 
 from tactbench.plugin import SensorDescriptor, hookimpl
 
-TACTBENCH_API = 1
+TACTBENCH_API = 2
 
 
 @hookimpl

@@ -2,7 +2,7 @@
 
 from tactbench.plugin import LabelTarget, Summary, TaskDescriptor, TaskSpec, hookimpl
 
-TACTBENCH_API = 1
+TACTBENCH_API = 2
 
 SHAKEN = TaskSpec(
     name="shaken",

@@ -3,7 +3,7 @@
 from tactbench.plugin import ChannelSpec, RigDescriptor, SensorDescriptor, SensorSpec, Source, StreamSpec, hookimpl
 from tactbench.plugin.devices import DeviceDescriptor
 
-TACTBENCH_API = 1
+TACTBENCH_API = 2
 
 PAD = StreamSpec(
     name="taxels",

@@ -1,0 +1,1 @@
+"""How like real fingers the simulated ones are; see README.md."""

@@ -1,1 +1,0 @@
-"""Boundary elements: the rung of the contact ladder that the others are held against (see ``docs/contact.md``)."""

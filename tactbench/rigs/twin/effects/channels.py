@@ -1,0 +1,241 @@
+"""What stands between the skin's reading and the stored number: gains, levels, drift, noise, the converter."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+import numpy as np
+
+from tactbench.plugin import ChannelKind, FloatArray, Quality, RigError, SensorSpec
+from tactbench.plugin.simulation import Nuisances
+from tactbench.rigs.twin.effects.memory import recurrence, wandering
+from tactbench.rigs.twin.synthesis import Synthesis, Track
+
+_INDEPENDENT = 1e-9
+"""Singular values below this share of the largest one are rounding: those columns repeat others."""
+
+
+def _stated(run: Synthesis) -> Iterator[tuple[Track, ChannelKind, list[int], Nuisances]]:
+    """Yield every track's kinds of channels whose nuisances the spec states, with their columns."""
+    for track in run.tracks:
+        for kind, columns in track.by_kind().items():
+            nuisances = run.nuisances(kind)
+            if nuisances is not None:
+                yield track, kind, columns, nuisances
+
+
+def gain(run: Synthesis) -> None:
+    """Draw one factor per channel, the same in every recording of a unit, and one that a unit's channels share.
+
+    The first unit's shared factor is 1: its gain is the one that the spec describes. A factor is never below zero.
+    """
+    for track in run.tracks:
+        track.gain = np.ones(len(track.channels))
+    for track, kind, columns, nuisances in _stated(run):
+        assert track.gain is not None
+        numbers = run.of_every_channel(track, kind, run.of_unit("gain", kind))
+        track.gain[columns] += nuisances.gain_scatter.to("1") * numbers
+        if nuisances.unit_gain is not None and not run.scene.first_unit:
+            shared = float(run.of_unit("shared gain", kind).standard_normal())
+            stated = f"{nuisances.unit_gain.to('%'):g} % (sd, {nuisances.unit_gain.source.tag})"
+            run.drawn["remark unit gain"] = f"units beside 1 are drawn: gains of {kind} channels differ by {stated}"
+            track.gain[columns] *= max(1.0 + nuisances.unit_gain.to("1") * shared, 0.0)
+
+
+def rest_spread(run: Synthesis) -> None:
+    """Move each taxel's rest level by the sensor parameter ``rest_spread`` (sd), the same in every recording."""
+    stated = run.sensor.spec.parameters.get("rest_spread")
+    for track in run.tracks if stated is not None else ():
+        columns = track.by_kind().get("taxel")
+        if columns and stated is not None:
+            numbers = run.of_every_channel(track, "taxel", run.of_unit("rest", "taxel"))
+            track.readings[:, columns] += stated.value * numbers
+
+
+def unit_rest(run: Synthesis) -> None:
+    """Move the rest levels by what the channels of a unit share and by what is each one's own; the first unit stays."""
+    if run.scene.first_unit:
+        return
+    for track, kind, columns, nuisances in _stated(run):
+        stated = []
+        if nuisances.unit_rest_shared is not None:
+            shared = float(run.of_unit("shared rest", kind).standard_normal())
+            track.readings[:, columns] += nuisances.unit_rest_shared.value * shared
+            stated.append(f"{nuisances.unit_rest_shared} together ({nuisances.unit_rest_shared.source.tag})")
+        if nuisances.unit_rest_own is not None:
+            own = run.of_every_channel(track, kind, run.of_unit("own rest", kind))
+            track.readings[:, columns] += nuisances.unit_rest_own.value * own
+            stated.append(f"{nuisances.unit_rest_own} each ({nuisances.unit_rest_own.source.tag})")
+        if stated:
+            run.drawn["remark unit rest"] = (
+                f"units beside 1 are drawn: rest levels of {kind} channels differ by {' and '.join(stated)}, sd"
+            )
+
+
+def offset(run: Synthesis) -> None:
+    """Add what all channels of a recording share, what is each one's own, and what a new session changes."""
+    environment = run.scene.environment
+    for track, kind, columns, nuisances in _stated(run):
+        shared = nuisances.offset_shared.value * float(run.of_recording("offset", "shared", kind).standard_normal())
+        own = nuisances.offset_own.value * _own_offsets(run, track, kind, nuisances)
+        session = run.of_every_channel(track, kind, run.of_session("offset", kind))
+        track.readings[:, columns] += environment.scale_of_offsets * (shared + own)
+        scale = environment.session_offset_scale * nuisances.offset_session.value
+        track.readings[:, columns] += scale * session
+
+
+def _own_offsets(run: Synthesis, track: Track, kind: ChannelKind, nuisances: Nuisances) -> FloatArray:
+    """Return (recorded channels,) the own offsets, their mean square over channels and recordings 1.
+
+    Where the spec states a smooth share ``f`` of a field over ``n`` places: ``sqrt(1 - f) e + sqrt(f n / r) P g`` with
+    white ``e`` and ``g`` and the projection P on the r-dimensional space of quadratics of mean 0 over the places, whose
+    ``P g`` has the mean square r / n. No quadratic is preferred, whatever axes the places are written in.
+    """
+    alone = run.of_every_channel(track, kind, run.of_recording("offset", "own", kind))
+    share = 0.0 if nuisances.offset_smooth is None else nuisances.offset_smooth.to("1")
+    basis = smooth_basis(run.sensor.spec, kind) if share else None
+    if basis is None or not basis.size:
+        return alone
+    channels, dimensions = basis.shape
+    white = run.of_recording("offset", "smooth", kind).standard_normal(channels)
+    field = math.sqrt(share * channels / dimensions) * (basis @ (basis.T @ white))
+    names = [channel.name for channel in run.sensor.spec.channels(kind)]
+    recorded = [names.index(channel.name) for channel in track.channels if channel.kind == kind]
+    return np.asarray(math.sqrt(1.0 - share) * alone + field[recorded])
+
+
+def smooth_basis(spec: SensorSpec, kind: ChannelKind) -> FloatArray | None:
+    """Return (n, r) orthonormal columns: the quadratics over the n channels' places less their means, r at most 5.
+
+    Places are (x, angle about x) on a sheet with a radius, else (x, y). None if a channel has no place.
+    """
+    places = [channel.position_m for channel in spec.channels(kind)]
+    if not places or any(place is None for place in places):
+        return None
+    x, y, z = np.array(places, dtype=np.float64).T
+    round_finger = spec.skin is not None and spec.skin.sheet.outer_radius is not None
+    across = np.arctan2(y, -z) if round_finger else y
+    u, v = (_scaled(one) for one in (x, across))
+    columns = np.stack([u, v, u * u, u * v, v * v], axis=1)
+    columns -= columns.mean(axis=0)
+    left, singular, _ = np.linalg.svd(columns, full_matrices=False)
+    return np.asarray(left[:, singular > _INDEPENDENT * max(float(singular[0]), 1.0)])
+
+
+def _scaled(values: FloatArray) -> FloatArray:
+    """Return values about 0 and within 1, so that squares of metres do not drown; all 0 where they are all alike."""
+    about = values - (values.max() + values.min()) / 2
+    return np.asarray(about / (np.abs(about).max() or 1.0))
+
+
+def warm_up(run: Synthesis) -> None:
+    """Add ``-W f_i exp(-t / tau)``: the spec's rest is the warm level, less what is still to come.
+
+    ``t`` counts from power-on; the factors ``f_i = 1 + scatter n_i`` belong to the unit.
+    """
+    environment, scene = run.scene.environment, run.scene
+    before = environment.since_power_on.to("s") + scene.starts_after_s
+    for track, kind, columns, nuisances in _stated(run):
+        if not nuisances.warm_up.value:
+            continue
+        numbers = run.of_every_channel(track, kind, run.of_unit("warm-up", kind))
+        factors = 1.0 + nuisances.warm_up_scatter.to("1") * numbers
+        still_to_come = nuisances.warm_up.value * np.exp(-(before + track.t_s) / nuisances.warm_up_tau.to("s"))
+        track.readings[:, columns] -= environment.drift_scale * still_to_come[:, None] * factors
+
+
+def wander(run: Synthesis) -> None:
+    """Add one independent Ornstein-Uhlenbeck path per channel."""
+    scale = run.scene.environment.drift_scale
+    for track, kind, columns, nuisances in _stated(run):
+        if nuisances.wander.value:
+            tau_s, draws = nuisances.wander_tau.to("s"), run.of_recording("wander", kind, *track.scope)
+            track.readings[:, columns] += wandering(
+                track.t_s, scale * nuisances.wander.value, tau_s, len(columns), draws
+            )
+
+
+def white_noise(run: Synthesis) -> None:
+    """Add independent normal numbers to every sample, before the converter rounds."""
+    scale = run.scene.environment.noise_scale
+    for track, kind, columns, nuisances in _stated(run):
+        if nuisances.white.value:
+            noise = run.of_recording("white", kind, *track.scope).standard_normal((track.t_s.size, len(columns)))
+            noise *= scale * nuisances.white.value
+            track.readings[:, columns] += noise
+
+
+def hum(run: Synthesis) -> None:
+    """Add the sensor's ``hum`` (rms, counts) between ``hum_low`` and ``hum_high`` to its dynamic pressure."""
+    stated = run.sensor.spec.parameters
+    if "hum" not in stated:
+        return
+    size = run.scene.environment.noise_scale * stated["hum"].value
+    low_hz, high_hz = stated["hum_low"].to("Hz"), stated["hum_high"].to("Hz")
+    for track in run.tracks:
+        for column in track.by_kind().get("ac_pressure", []):
+            draws = run.of_recording("hum", track.channels[column].name)
+            track.readings[:, column] += band_noise(track.t_s, size, low_hz, high_hz, draws)
+
+
+def band_noise(
+    t_s: FloatArray, spread: float, low_hz: float, high_hz: float, generator: np.random.Generator
+) -> FloatArray:
+    """Return (n,) Gaussian noise within a band, stationary from the first sample on, exact for any step.
+
+    White noise through a first-order high-pass and a first-order low-pass, scaled to the standard deviation `spread`.
+    Its density is ``f^2/((f^2 + l^2)(f^2 + h^2))`` up to a factor, with the corners ``l h = low high`` and
+    ``l + h = high - low``: so that half of the peak is left at `low_hz` and at `high_hz`.
+
+    Raises
+    ------
+    RigError
+        If the band is narrower than ``high/low = 3 + 2 sqrt(2)``: first-order filters have none narrower.
+
+    Notes
+    -----
+    The filter ``s/((s + p)(s + r))`` is the difference of two Ornstein-Uhlenbeck paths with rates p < r that one white
+    noise drives: ``(r e_r - p e_p)/(r - p)``. Their increments over a step are normal with covariances
+    ``(1 - a_i a_j)/(p_i + p_j)``, drawn by Cholesky's factor.
+    """
+    apart = (high_hz - low_hz) ** 2 - 4.0 * low_hz * high_hz
+    if not (0 < low_hz < high_hz and apart > 0):
+        raise RigError(
+            f"A hum between {low_hz:g} and {high_hz:g} Hz cannot be made.",
+            hint="hum_high must be at least 5.9 times hum_low, and both above 0.",
+        )
+    rates = math.pi * np.array([high_hz - low_hz - math.sqrt(apart), high_hz - low_hz + math.sqrt(apart)])
+    weights = np.array([-rates[0], rates[1]]) / (rates[1] - rates[0])
+    sums = rates[:, None] + rates[None, :]
+    weights = weights / math.sqrt(float(weights @ (1.0 / sums) @ weights))
+    dt = np.diff(t_s, prepend=t_s[:1])
+    faded = np.exp(-dt[:, None] * rates)
+    fresh = -np.expm1(-dt[:, None, None] * sums) / sums
+    fresh[0] = 1.0 / sums
+    first = np.sqrt(fresh[:, 0, 0])
+    across = np.divide(fresh[:, 0, 1], first, out=np.zeros_like(first), where=first > 0)
+    second = np.sqrt(np.maximum(fresh[:, 1, 1] - across**2, 0.0))
+    numbers = generator.standard_normal((t_s.size, 2))
+    paths = (first * numbers[:, 0], across * numbers[:, 0] + second * numbers[:, 1])
+    return np.asarray(
+        spread * sum(w * recurrence(faded[:, n], path) for n, (w, path) in enumerate(zip(weights, paths, strict=True)))
+    )
+
+
+def converter(run: Synthesis) -> None:
+    """Round readings to the converter's step and clip them to each channel's range; the last stage.
+
+    A sample is flagged SATURATED when the converter stands at its end, as the reader of a real one would see it.
+    """
+    for track in run.tracks:
+        for column, channel in enumerate(track.channels):
+            nuisances = run.nuisances(channel.kind)
+            reading = track.readings[:, column]
+            if nuisances is not None and nuisances.step.value > 0:
+                reading = np.round(reading / nuisances.step.value) * nuisances.step.value
+            lower = -np.inf if channel.lower is None else channel.lower
+            upper = np.inf if channel.upper is None else channel.upper
+            reading = np.clip(reading, lower, upper)
+            track.quality[(reading <= lower) | (reading >= upper), column] |= np.uint8(Quality.SATURATED)
+            track.readings[:, column] = reading

@@ -1,0 +1,115 @@
+"""Heat through the contact: what it does to the core, to the channels of temperature and to resistive channels."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from tactbench.plugin import FloatArray
+from tactbench.rigs.twin.contact.stages import round_contact_mm
+from tactbench.rigs.twin.effects.heated_core import (
+    HeatedCore,
+    Thermistor,
+    disc_conductance_w_per_k,
+    relative_conductivity,
+)
+from tactbench.rigs.twin.effects.memory import lag, time_constant_s
+from tactbench.rigs.twin.synthesis import Synthesis, Track
+
+
+def contact_heat(run: Synthesis) -> None:
+    """Let heat flow between the core and an indenter of known temperature, through the contact's own radius."""
+    core = HeatedCore.of(run.scene, run.sensor.spec)
+    indenter = run.scene.environment.indenter_temperature
+    conductivity = run.sensor.spec.parameters.get("contact_conductivity")
+    if core is None or indenter is None or conductivity is None:
+        return
+    for track in run.tracks:
+        conductance = disc_conductance_w_per_k(round_contact_mm(run, track.force_n), conductivity.to("W/m/K"))
+        track.warmth_k = core.warmth(run.scene, track.t_s, conductance, indenter.to("degC"))
+
+
+def dc_temperature(run: Synthesis) -> None:
+    """Let the channels of steady temperature say what the thermistor does, behind its low-pass."""
+    for track in run.tracks:
+        for column in track.by_kind().get("dc_temperature", []):
+            reading = _thermistor(run, track, column)
+            rest = track.channels[column].rest
+            if reading is not None:
+                # Tracks start at rest; the thermistor's own formula says where this core stands instead.
+                track.readings[:, column] += reading - (0.0 if rest is None else rest.value)
+
+
+def ac_temperature(run: Synthesis) -> None:
+    """Let the channels of changing temperature add the thermistor's reading, high-passed and amplified."""
+    stated = run.sensor.spec.parameters
+    if "thermal_high_pass" not in stated or "thermal_gain" not in stated:
+        return
+    tau_s, gain = time_constant_s(stated["thermal_high_pass"].to("Hz")), stated["thermal_gain"].to("1")
+    for track in run.tracks:
+        for column in track.by_kind().get("ac_temperature", []):
+            reading = _thermistor(run, track, column)
+            if reading is not None:
+                track.readings[:, column] += gain * (reading - lag(track.t_s, reading, tau_s))
+
+
+def _thermistor(run: Synthesis, track: Track, column: int) -> FloatArray | None:
+    """Return the (n,) readings of the thermistor in counts of the channel; None if the spec declares none."""
+    core = HeatedCore.of(run.scene, run.sensor.spec)
+    thermistor = Thermistor.of(run.sensor.spec, track.channels[column].upper or 1.0)
+    if core is None or thermistor is None:
+        return None
+    degc = core.untouched(run.scene, track.t_s)
+    if track.warmth_k is not None:
+        degc = degc + track.warmth_k
+    reading = thermistor.reading(degc)
+    low_pass = run.sensor.spec.parameters.get("thermal_low_pass")
+    return reading if low_pass is None else lag(track.t_s, reading, time_constant_s(low_pass.to("Hz")))
+
+
+def thermal_drift(run: Synthesis) -> None:
+    """Scale the resistance behind each reading by the fluid's conductivity without the contact over that with it.
+
+    Only the change by the contact: how readings rise while the core warms up is measured, and the effect "warm-up"
+    holds it.
+    """
+    core = HeatedCore.of(run.scene, run.sensor.spec)
+    coefficient = run.sensor.spec.parameters.get("conductivity_coefficient")
+    if core is None or coefficient is None:
+        return
+    per_k = coefficient.to("1/K")
+    for track in run.tracks:
+        if track.warmth_k is None:
+            continue
+        alone = core.untouched(run.scene, track.t_s)
+        gained = relative_conductivity(alone + track.warmth_k, per_k) / relative_conductivity(alone, per_k)
+        for column in track.by_kind().get("taxel", []):
+            upper = track.channels[column].upper
+            if upper is not None:
+                track.readings[:, column] = through_divider(track.readings[:, column], gained, upper)
+
+
+def largest_stretch(run: Synthesis) -> float:
+    """Return by what factor a difference between two readings may grow on its way through this drift, at least 1.
+
+    A divider's reading behind a resistance divided by g has the slope ``g / (1 + (g - 1) E/top)²`` against the reading
+    E before, which is at most g or 1/g. The core is never warmer or colder than its untouched self and the indenter.
+    """
+    core = HeatedCore.of(run.scene, run.sensor.spec)
+    coefficient = run.sensor.spec.parameters.get("conductivity_coefficient")
+    indenter = run.scene.environment.indenter_temperature
+    if core is None or coefficient is None or indenter is None:
+        return 1.0
+    ends = core.untouched(run.scene, run.t_s[[0, -1]])  # it moves one way only
+    untouched = relative_conductivity(ends, coefficient.to("1/K"))
+    reached = relative_conductivity(np.append(ends, indenter.to("degC")), coefficient.to("1/K"))
+    return float(max(reached.max() / untouched.min(), untouched.max() / reached.min()))
+
+
+def through_divider(reading: FloatArray, gained: FloatArray, full_scale: float) -> FloatArray:
+    """Return what a divider reads when its resistance falls by the factor `gained`: ``E = top/(1 + R/R_ref)``.
+
+    Readings at or beyond the ends (no resistance, or no conductance) stay as they are.
+    """
+    inside = (reading > 0) & (reading < full_scale)
+    share = np.where(inside, reading, 0.0) / full_scale
+    return np.where(inside, gained * reading / (1.0 + (gained - 1.0) * share), reading)

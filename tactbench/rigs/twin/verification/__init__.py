@@ -1,1 +1,0 @@
-"""The simulation held against what must be true."""

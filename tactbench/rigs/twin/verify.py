@@ -1,0 +1,165 @@
+"""The simulation held against laws and closed forms: what ``tactbench twin verify`` prints, a line each.
+
+The references of the solvers (boundary elements, finite elements, fine grids) are tests: ``pytest tests/oracles``.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+
+from tactbench.plugin import FloatArray, PlanEntry, Scene, SensorDescriptor, assumed, load_registry
+from tactbench.plugin.simulation import BondedLayer, SkinSheet, SkinState, Verdict, rig_context
+from tactbench.rigs.twin.contact.press import Press
+from tactbench.rigs.twin.contact.pressing import medium_of, press_of
+from tactbench.rigs.twin.effects.heated_core import HeatedCore
+from tactbench.rigs.twin.effects.memory import lag, wandering
+from tactbench.rigs.twin.effects.skin_mode import Mode
+from tactbench.rigs.twin.effects.stick_slip import Dragged, Drive
+from tactbench.rigs.twin.fidelity import DEFAULT
+from tactbench.rigs.twin.geometry import Contact, skin_grid
+from tactbench.rigs.twin.preparation import carried_out, prepare
+from tactbench.rigs.twin.rig import Twin, build
+
+RADIUS_MM = 10.0
+_TASK = "force"
+"""Its first scene is planned for every sensor that is looked at."""
+
+
+def verdicts() -> Iterator[Verdict]:
+    """Yield the verdicts, each computed when it is asked for."""
+    yield from _contact()
+    registry = load_registry()
+    twin = build(rig_context(registry))
+    for name in ("biotac", "icub"):
+        if name in registry.sensors:
+            scene = registry.tasks[_TASK].spec.scenes[0].scene
+            yield from _skin(twin, registry.sensors[name], scene)
+            yield _left_out(twin, registry.sensors[name], scene)
+    yield from _memory()
+    yield _stick_slip()
+
+
+def omitted(twin: Twin, sensor: SensorDescriptor, scene: Scene) -> tuple[float, float, float]:
+    """Return what the effects left out of `scene` change, what they may, and what noise hides: counts.
+
+    Returns
+    -------
+    largest difference of any observed reading, before it is rounded, between a run with every effect and one with the
+    plan's; the sum of the bounds that the plan states; the least standard deviation of noise and rounding of an
+    observed kind, infinite without any stated noise.
+    """
+    every = tuple(f"+{effect.name}" for effect in twin.effects if effect.name != "converter")
+    simulation = scene.simulation.model_copy(update={"effects": (*scene.simulation.effects, *every)})
+    planned, entries = _unrounded(twin, sensor, scene)
+    whole, _ = _unrounded(twin, sensor, scene.model_copy(update={"simulation": simulation}))
+    largest = max(float(np.abs(a - b).max()) for a, b in zip(planned, whole, strict=True))
+    bounds = [math.inf if entry.change is None else entry.change for entry in entries if not entry.included]
+    stated = [sensor.spec.nuisances[kind] for kind in scene.observe if kind in sensor.spec.nuisances]
+    floors = [nuisances.hidden(scene.environment.noise_scale) for nuisances in stated]
+    return largest, sum(bounds), min((floor for floor in floors if floor > 0), default=math.inf)
+
+
+def _unrounded(twin: Twin, sensor: SensorDescriptor, scene: Scene) -> tuple[list[FloatArray], tuple[PlanEntry, ...]]:
+    plan = twin.plan(sensor, scene)
+    stages = tuple(effect for effect in plan.stages if effect.name != "converter")
+    run = carried_out(sensor, scene, 1, replace(plan, stages=stages), DEFAULT, twin.indenters)
+    return [track.readings for track in run.tracks], plan.settled(run.settled)
+
+
+def _skin(twin: Twin, sensor: SensorDescriptor, scene: Scene) -> Iterator[Verdict]:
+    """Yield the balances that a sensor's own skin keeps under 2 N."""
+    press = press_of(prepare(sensor, scene, 1, twin.plan(sensor, scene)), DEFAULT)
+    state = press(2.0)
+    carried = float(state.pressure_mpa.sum() * np.prod(state.grid.cell_mm))
+    yield Verdict(f"{sensor.name}, {scene.name}: sum of the pressures under 2 N", carried, 2.0, 2e-9, "N",
+                  "equilibrium; bound: rounding")  # fmt: skip
+    if press.medium.zero_mean:
+        yield Verdict(f"{sensor.name}, {scene.name}: mean sinking of the skin", float(state.deflection_mm.mean()), 0.0,
+                      1e-14, "mm", "the volume of what it holds stays; bound: rounding")  # fmt: skip
+
+
+def _left_out(twin: Twin, sensor: SensorDescriptor, scene: Scene) -> Verdict:
+    largest, bound, _ = omitted(twin, sensor, scene)
+    # Rounding in the last digits of readings of thousands of counts.
+    source = "0: the plan leaves out what changes nothing; bound: the sum of those that it states"
+    return Verdict(f"{sensor.name}, {scene.name}: change by all effects that are left out", largest, 0.0, bound + 1e-9,
+                   "count", source)  # fmt: skip
+
+
+def _pressed(
+    poisson: float, thickness_mm: float, side_mm: float, cells: int, penalty: float, force_n: float
+) -> SkinState:
+    """Return a bonded layer of E = 1 MPa under a paraboloid, solved as every recording is; its depth from the apex."""
+    why = "an exercise"
+    half, arc = assumed(side_mm / 2, "mm", why), assumed(side_mm, "mm", why)
+    skin = BondedLayer(
+        sheet=SkinSheet(x_min=assumed(-side_mm / 2, "mm", why), x_max=half, arc=arc, cells=(cells, cells)),
+        young=assumed(1.0, "MPa", why),
+        poisson=assumed(poisson, "1", why),
+        thickness=assumed(thickness_mm, "mm", why),
+        contact_stiffness=assumed(penalty, "MPa/mm", why),
+    )
+    grid = skin_grid(skin.sheet)
+    gap = (grid.x_mm[:, None] ** 2 + grid.s_mm[None, :] ** 2) / (2 * RADIUS_MM)
+    state = Press(medium_of(skin, grid), gap, Contact(RADIUS_MM, 0.0, 0.0))(force_n)
+    return replace(state, depth_mm=state.depth_mm + float(gap.min()))
+
+
+def _contact() -> Iterator[Verdict]:
+    force_n = 0.05
+    state = _pressed(0.5, 20.0, 12.0, 128, 1e4, force_n)
+    hertz = math.cbrt(0.75 * force_n * RADIUS_MM * (1 - 0.5**2))
+    yield Verdict("contact radius on a layer of 30 such radii", state.contact_radius_mm, hertz, 0.01 * hertz, "mm",
+                  "Hertz 1882; bound: cells of a seventh of it")  # fmt: skip
+    poisson, thickness = 0.3, 0.05
+    springs = (1 - poisson) / ((1 + poisson) * (1 - 2 * poisson)) / thickness
+    force_n = math.pi * springs * RADIUS_MM * 0.05**2
+    state = _pressed(poisson, thickness, 4.0, 128, 1e5, force_n)
+    yield Verdict("depth on a layer of a twentieth of the contact's radius", state.depth_mm, 0.05, 0.05 * 0.01, "mm",
+                  "springs: Johnson 1985, section 5.8; bound: four of its next terms, (h/a)²")  # fmt: skip
+    penalty = 300.0
+    state = _pressed(0.45, 2.0, 24.0, 96, penalty, 8.5248)
+    pressure = state.pressure_mpa
+    given_way = float((pressure**2).sum() / pressure.sum()) / penalty
+    yield Verdict("depth on a layer of 2 mm, nu .45, less what its penalty lets in", state.depth_mm - given_way, 0.5,
+                  1.5e-3, "mm", "finite elements (tests/oracles); bound: the rim moves in cells of a twelfth of the "
+                  "contact's radius")  # fmt: skip
+
+
+def _memory() -> Iterator[Verdict]:
+    tau = 7.0
+    t_s = np.array([0.0, 0.0, 0.3, 40.0, 47.0])  # a repeated time stamp is a step
+    late = float(lag(t_s, np.array([0.0, 1.0, 1.0, 1.0, 0.0]), tau)[-1])
+    ramp = (1.0 - math.exp(-40.0 / tau) - 1.0) * math.exp(-1.0) + (1.0 - math.exp(-1.0))
+    yield Verdict("creep: lag of a step that falls again", late, ramp, 1e-12, source="closed form; bound: rounding")
+    paths = 4000
+    drawn = wandering(np.cumsum(np.tile([0.5, 1.5], 20), dtype=np.float64), 1.0, 10.0, paths, np.random.default_rng(5))
+    law = f"stationary; bound: four standard errors of {paths} paths"
+    bound = 4 * math.sqrt(2 / paths)
+    yield Verdict("drift: variance of the last sample over that stated", float(drawn[-1].var()), 1.0, bound, source=law)
+    core = HeatedCore(room_c=23.0, power_w=0.25, resistance_k_per_w=136.0, capacity_j_per_k=3.7)
+    loss = 1 / 136.0 + 4e-3
+    goal = (0.25 + 23.0 / 136.0 + 4e-3 * 5.0) / loss
+    expected = goal + (57.0 - goal) * math.exp(-60.0 * loss / 3.7)
+    t_s = np.array([0.0, 0.01, 59.0, 60.0])
+    found = float(core.carried(t_s, np.full(4, 4e-3), 5.0, 57.0)[-1])
+    yield Verdict("heated core a minute after it is touched", found, expected, 1e-10, "K",
+                  "one lump, closed form; bound: rounding")  # fmt: skip
+
+
+def _stick_slip() -> Verdict:
+    static, kinetic, load_n, stiffness, speed, omega = 0.8, 0.5, 2.0, 3.0, 5.0, 600.0 * math.pi
+    u = (static - kinetic) * load_n / stiffness
+    period = 2 * u / speed + 2 / omega * (math.pi - math.atan(omega * u / speed))
+    grid = np.linspace(0.0, 20 * period, 101)
+    drive = Drive(
+        speed_mm_s=speed, start_s=0.0, end_s=math.inf, static=static, kinetic=kinetic, stribeck_mm_s=0.0,
+        mode=Mode(omega, 0.0), t_s=grid, load_n=np.full(101, load_n), stiffness=np.full(101, stiffness),
+    )  # fmt: skip
+    found = float(np.diff(Dragged(drive).let_go_s)[-1])
+    law = "two coefficients, no damping: 2u/V + 2/w (pi - atan(w u/V)); bound: instants of 20 periods"
+    return Verdict("period of stick-slip", found, period, 1e-7 * period, "s", law)

@@ -1,0 +1,124 @@
+"""Everything with memory against closed forms: lags, drift, the heated core, low-passes."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from tactbench.rigs.twin.effects.heated_core import HeatedCore
+from tactbench.rigs.twin.effects.memory import lag, time_constant_s, wandering
+
+ROUNDING = 1e-12
+"""Relative errors of exact filters: some thousand operations, each off by 1e-16."""
+CORE = HeatedCore(room_c=23.0, power_w=0.25, resistance_k_per_w=136.0, capacity_j_per_k=3.7)
+
+
+def order(errors: list[float]) -> float:
+    """Return the order seen between the two finest of halved steps."""
+    return math.log2(errors[-2] / errors[-1])
+
+
+def test_a_standard_linear_solid_under_a_step_of_stress():
+    """``e(t) = s (1/E0 + (1 - exp(-t/tau))/E1)``."""
+    stress, first, second, tau = 0.3, 0.8, 2.5, 7.0
+    steps = np.random.default_rng(1).choice([1e-3, 0.1, 3.0, 40.0], 200)
+    # A repeated time stamp makes the step: stress jumps while no time passes.
+    t_s = np.concatenate([[0.0, 0.0], np.cumsum(steps)])
+    load = np.full(t_s.size, stress)
+    load[0] = 0.0
+    found = load / first + lag(t_s, load, tau) / second
+    expected = stress * (1 / first - np.expm1(-t_s / tau) / second)
+    np.testing.assert_allclose(found[1:], expected[1:], rtol=ROUNDING)
+
+
+@pytest.mark.parametrize("steps_per_tau", [1000.0, 1.0, 0.01])
+def test_the_lag_behind_a_ramp(steps_per_tau):
+    tau, rate = 3.0, 0.4
+    t_s = np.arange(200.0) * (tau / steps_per_tau)
+    expected = rate * (t_s + tau * np.expm1(-t_s / tau))
+    np.testing.assert_allclose(lag(t_s, rate * t_s, tau), expected, atol=ROUNDING * expected.max())
+
+
+def test_the_lag_behind_a_curve_is_of_second_order():
+    """Straight pieces under ``sin(w t)``."""
+    omega, tau, errors = 1.0, 2.0, []
+    for n in (200, 400, 800):
+        t_s, x = np.linspace(0, 60, n + 1), omega * tau
+        expected = (np.sin(omega * t_s) - x * np.cos(omega * t_s) + x * np.exp(-t_s / tau)) / (1 + x * x)
+        errors.append(float(np.abs(lag(t_s, np.sin(omega * t_s), tau) - expected).max()))
+    assert 1.9 <= order(errors) <= 2.1
+
+
+def test_drift_has_the_moments_of_ornstein_and_uhlenbeck():
+    spread, tau, paths = 2.0, 10.0, 4000
+    t_s = np.cumsum(np.tile([0.5, 1.5], 150))
+    drawn = wandering(t_s, spread, tau, paths, np.random.default_rng(5)) / spread
+    # Four standard errors: one in 16 000 is further off by chance, and the draws are fixed.
+    error = 4 / math.sqrt(paths)
+    for sample in (drawn[0], drawn[-1]):
+        assert abs(sample.mean()) <= error
+        assert abs(sample.var() - 1) <= math.sqrt(2) * error
+    rho = math.exp(-(t_s[30] - t_s[20]) / tau)
+    assert abs((drawn[20] * drawn[30]).mean() - rho) <= math.sqrt(1 + rho**2) * error
+    # The variance of a mean over T, exact for the trapezoid's weights.
+    weights = np.gradient(t_s)
+    weights[[0, -1]] = 0.5 * np.diff(t_s)[[0, -1]]
+    weights /= weights.sum()
+    expected = float(weights @ np.exp(-np.abs(t_s[:, None] - t_s[None, :]) / tau) @ weights)
+    assert abs((weights @ drawn).var() / expected - 1) <= math.sqrt(2) * error
+    share = tau / (t_s[-1] - t_s[0])
+    # Steps of up to 0.15 tau: the trapezoid errs by dt²/(12 tau²) of the peak.
+    assert expected == pytest.approx(2 * share * (1 + share * math.expm1(-1 / share)), rel=0.01)
+
+
+def test_a_heated_core_touched_all_at_once():
+    through, indenter_c, start_c = 4e-3, 5.0, 57.0
+    steps = np.random.default_rng(2).choice([1e-2, 1.0, 60.0, 900.0], 300)
+    t_s = np.concatenate([[0.0], np.cumsum(steps)])
+    loss = 1 / CORE.resistance_k_per_w + through
+    goal = (CORE.power_w + CORE.room_c / CORE.resistance_k_per_w + through * indenter_c) / loss
+    expected = goal + (start_c - goal) * np.exp(-t_s * loss / CORE.capacity_j_per_k)
+    found = CORE.carried(t_s, np.full(t_s.size, through), indenter_c, start_c)
+    np.testing.assert_allclose(found, expected, atol=1e-10)  # rounding
+    # The first law over ten minutes, the temperature's integral by Simpson's rule.
+    fine = np.linspace(0.0, 600.0, 4001)
+    cooled = CORE.carried(fine, np.full(fine.size, through), indenter_c, start_c)
+    area = float(cooled[0] + np.tile([4.0, 2.0], 2000)[:-1] @ cooled[1:-1] + cooled[-1]) * (fine[1] - fine[0]) / 3.0
+    given = CORE.power_w * 600.0 + (CORE.room_c * 600.0 - area) / CORE.resistance_k_per_w
+    given += through * (indenter_c * 600.0 - area)
+    kept = CORE.capacity_j_per_k * (cooled[-1] - start_c)
+    # Simpson's rule at 1/1500 tau errs by 1e-14, sums of 4001 by rounding.
+    assert given == pytest.approx(kept, abs=1e-11 * CORE.power_w * 600.0)
+    np.testing.assert_array_equal(CORE.carried(np.zeros(5), np.full(5, through), indenter_c, start_c), start_c)
+
+
+def test_a_heated_core_under_a_growing_contact_is_of_second_order():
+    """Against its solution as an integral, taken by Gauss's rule."""
+    rate, indenter_c, start_c, end_s = 2e-4, 5.0, 57.0, 60.0
+    points, weights = np.polynomial.legendre.leggauss(60)
+    s = 0.5 * end_s * (points + 1)
+
+    def decay(t):
+        return np.exp(-(t / CORE.resistance_k_per_w + 0.5 * rate * t**2) / CORE.capacity_j_per_k)
+
+    source = CORE.power_w + CORE.room_c / CORE.resistance_k_per_w + rate * s * indenter_c
+    gained = 0.5 * end_s * np.sum(weights * source / decay(s)) / CORE.capacity_j_per_k
+    true, errors = float(decay(end_s) * (start_c + gained)), []
+    for n in (15, 30, 60):
+        t_s = np.linspace(0, end_s, n + 1)
+        errors.append(abs(float(CORE.carried(t_s, rate * t_s, indenter_c, start_c)[-1]) - true))
+    assert 1.9 <= order(errors) <= 2.1
+    assert errors[-1] <= 1e-3  # a tenth of a count of the BioTac's temperature
+
+
+def test_a_low_pass_at_its_cut_off():
+    cutoff = 2.0
+    t_s = np.linspace(0, 6, 60_001)
+    found = lag(t_s, np.sin(2 * math.pi * cutoff * t_s), time_constant_s(cutoff))[30_000:]
+    turn = 2 * math.pi * cutoff * t_s[30_000:]
+    (inside, beside), *_ = np.linalg.lstsq(np.stack([np.sin(turn), np.cos(turn)], axis=1), found, rcond=None)
+    # 1/(1 + i f/f_c) at f = f_c; straight pieces of 1e-4 s cost (w dt)²/12 = 1e-7.
+    assert np.hypot(inside, beside) * math.sqrt(2) == pytest.approx(1.0, abs=1e-6)
+    assert -np.arctan2(beside, inside) / math.pi == pytest.approx(0.25, abs=1e-6)

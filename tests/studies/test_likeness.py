@@ -1,0 +1,66 @@
+"""Statistics of the comparison with real fingers, on arrays whose answer is known."""
+
+import numpy as np
+import pytest
+
+from studies.likeness.figures import BIOTAC, ICUB, STATISTICS, States, band_rms, crossing, participation
+from studies.likeness.patterns import Trial, compare_plates, correlations, explained, predicted
+
+
+def test_every_figure_has_a_statistic_and_a_range_around_its_value():
+    for figure in (*BIOTAC, *ICUB):
+        assert figure.statistic in STATISTICS
+        assert figure.low <= figure.typical <= figure.high
+
+
+def test_explained_variance_is_one_of_itself_nothing_of_the_mean_and_less_of_noise():
+    rng = np.random.default_rng(1)
+    real = rng.standard_normal((200, 19))
+    assert explained(real, real) == 1.0
+    assert explained(real, np.tile(real.mean(axis=0), (200, 1))) == pytest.approx(0.0, abs=1e-12)
+    # Half of the variance as noise: 3800 numbers, known to 2 %.
+    assert explained(real, real + np.sqrt(0.5) * rng.standard_normal(real.shape)) == pytest.approx(0.5, abs=0.05)
+    assert correlations(real, 3 * real + 5) == pytest.approx(1.0)
+
+
+def test_a_trial_is_predicted_by_one_of_the_same_finger_whichever_way_its_axes_point():
+    rng = np.random.default_rng(2)
+    normals = rng.standard_normal((19, 3))
+
+    def trial(n, turn):
+        ways = rng.standard_normal((n, 3)) * [0.4, 0.4, 0.0] - [0, 0, 1.0]
+        ways /= np.linalg.norm(ways, axis=1, keepdims=True)
+        size = rng.uniform(20, 200, (n, 1))
+        return Trial(size * (ways @ normals.T) + rng.standard_normal((n, 19)), ways @ turn)
+
+    swapped = np.array([[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
+    twin = trial(4000, np.eye(3))
+    found = compare_plates((trial(1500, swapped), trial(300, swapped)), twin)
+    assert found["ceiling: by the other trial"] > 0.95
+    assert found["by the simulation"] > 0.95
+    other = trial(300, np.eye(3))
+    assert explained(other.change, predicted(other, Trial(twin.change[::-1], twin.direction), 1)) < 0.5
+
+
+def test_as_many_channels_take_part_as_change():
+    assert participation(np.full((1, 7), -5.0)) == pytest.approx(7.0)
+    assert participation(np.array([[40.0, 40.0, 2.9]])) == pytest.approx(2.0)
+
+
+def test_the_crossing_is_where_falling_turns_into_rising():
+    angle = np.linspace(0.0, 90.0, 1801)
+    # Linear in the angle: exact up to the fill of the bins.
+    assert crossing(angle, angle - 37.0) == pytest.approx(37.0, abs=0.1)
+    assert np.isnan(crossing(angle, angle + 1.0))
+
+
+def test_a_tone_lives_in_its_band_with_its_rms():
+    tone = 5.0 + 3.0 * np.sin(2 * np.pi * 40.0 * np.arange(2200) / 2200.0)
+    assert band_rms(tone, 2200.0, (30.0, 100.0)) == pytest.approx(3.0 / np.sqrt(2), rel=1e-9)
+    assert band_rms(tone, 2200.0, (100.0, 1000.0)) == pytest.approx(0.0, abs=1e-9)
+
+
+def test_states_are_those_within_a_band_of_pressure():
+    states = States(("a", "b"), change=np.array([[1.0, -9.0], [50.0, 7.0]]), pressure=np.array([10.0, 300.0]))
+    figure = next(one for one in BIOTAC if one.statistic == "largest rise" and one.band == (200.0, 350.0))
+    assert STATISTICS["largest rise"](states.of(figure), figure) == 50.0
