@@ -24,6 +24,7 @@ from tactbench.core.spec.task import TaskSpec
 
 if TYPE_CHECKING:
     from tactbench.core.evaluation.dataset import Dataset
+    from tactbench.core.plugins.interfaces import Estimator
     from tactbench.core.samples import Answers
 
 Row = dict[str, Any]
@@ -71,37 +72,43 @@ def dataset(task: TaskSpec, recordings: tuple[Path, ...]) -> Dataset:
     """Return `recordings` as a task needs them; cells in a row that need the same share what is read."""
     from tactbench.core.evaluation.dataset import load_dataset
 
-    if _last[:2] != [task, recordings]:
-        _last[:] = [task, recordings, load_dataset(task, recordings)]
-    found: Dataset = _last[2]
+    states = [(one.st_ino, one.st_mtime_ns, one.st_size) for one in map(os.stat, filter(os.path.exists, recordings))]
+    asked = [task, recordings, states]
+    if _last[:3] != asked:
+        _last[:] = [*asked, load_dataset(task, recordings)]
+    found: Dataset = _last[3]
     return found
 
 
 _last: list[Any] = []
-"""Task and recordings that were read last, and what came of them."""
+"""Task and recordings that were read last, the state of their files, and what came of them."""
 
 
 Solved = tuple[Row, "dict[str, Answers]"]
 """A row of plain data, and the answers by role."""
 
 
-def solve(job: Job, concurrency: int = 1) -> Solved:
+def solve(job: Job, concurrency: int = 1, given: Estimator | None = None) -> Solved:
     """Evaluate one cell; raises whatever its plugins and recordings raise.
 
     Parameters
     ----------
     concurrency
         Pieces of work of the run that may be at work beside this one, itself included.
+    given
+        An object with ``fit`` and ``predict`` that answers in place of the job's estimator, of which only the name is
+        used.
     """
     cell, task, estimator, recordings, *_ = job
-    folder = Path.cwd()
-    try:
-        prepare(estimator, task.kind)
-    finally:
-        os.chdir(folder)  # recordings lie relative to it, wherever a constructor has gone
+    if given is None:
+        folder = Path.cwd()
+        try:
+            prepare(estimator, task.kind)
+        finally:
+            os.chdir(folder)  # recordings lie relative to it, wherever a constructor has gone
     import numpy as np
 
-    from tactbench.core.evaluation.cell import CellContext, evaluate_cell
+    from tactbench.core.evaluation.cell import CellContext, evaluate, evaluate_cell, load_task
     from tactbench.core.evaluation.result import row_of
 
     began = time.perf_counter()
@@ -109,11 +116,15 @@ def solve(job: Job, concurrency: int = 1) -> Solved:
     random.seed(cell.seed)
     np.random.seed(cell.seed % 2**32)  # noqa: NPY002  (it is this old generator that libraries draw from)
     data = dataset(task, recordings)
-    context = CellContext(
-        task, estimator, dict(cell.params), cell.protocol, cell.split, seed=cell.seed, clock=time.perf_counter,
-        latency=cell.timed,
-    )  # fmt: skip
-    result = evaluate_cell(context, data)
+    if given is None:
+        context = CellContext(
+            task, estimator, dict(cell.params), cell.protocol, cell.split, seed=cell.seed, clock=time.perf_counter,
+            latency=cell.timed,
+        )  # fmt: skip
+        result = evaluate_cell(context, data)
+    else:
+        folds = load_task(task, data, cell.protocol, cell.split, seed=cell.seed)
+        result = evaluate(given, folds, clock=time.perf_counter, seed=cell.seed, latency=cell.timed)
     row = {
         **opening(cell, task),
         **row_of(result),
