@@ -23,6 +23,7 @@ import numpy.typing as npt
 
 from tactbench.core.cli.config import default_matrix
 from tactbench.core.cli.results import opened, over_all, shown_rows, table_of
+from tactbench.core.cli.threads import keep_threads
 from tactbench.core.errors import FormatError, MissingRecordingError, UnknownNameError, UsageError
 from tactbench.core.evaluation.cell import PLAIN, TaskData
 from tactbench.core.evaluation.cell import load_task as folds_of
@@ -60,9 +61,6 @@ if TYPE_CHECKING:
 
 Row = dict[str, Any]
 AnyPath = str | os.PathLike[str]
-
-
-# --- Recordings -------------------------------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True, repr=False)
@@ -147,8 +145,7 @@ class Recording:
     def _stream(self, name: str | None) -> Stream:
         found = self.streams.get(next(iter(self.streams), "") if name is None else name)
         if found is None:
-            have = ", ".join(self.streams) or "none"
-            raise FormatError(f"{self.path} has no stream {name!r}.", hint=f"It has: {have}.")
+            raise FormatError(f"{self.path} has no stream {name!r}.", hint=f"It has: {', '.join(self.streams)}.")
         return found
 
 
@@ -181,8 +178,7 @@ def open_recordings(path_or_paths: Recordings) -> list[Recording]:
     if isinstance(path_or_paths, Recording):
         return [path_or_paths]
     if not isinstance(path_or_paths, str | os.PathLike):
-        found = {one.path: one for each in path_or_paths for one in open_recordings(each)}
-        return list(found.values())
+        return list({one.path: one for each in path_or_paths for one in open_recordings(each)}.values())
     path = Path(path_or_paths).expanduser()
     if path.is_dir():
         replay: Any = rig_of("replay", installed(), path)
@@ -250,9 +246,6 @@ def load_task(
     return folds_of(spec, dataset(spec, paths), protocol, split, seed=seed)
 
 
-# --- Tables -----------------------------------------------------------------------------------------------------------
-
-
 class Rows(list[dict[str, Any]]):
     """Rows as mappings, shown as the `tables` that a terminal shows."""
 
@@ -275,18 +268,16 @@ class Rows(list[dict[str, Any]]):
 class Results(Rows):
     """The rows of cells, one a cell over its replicates, in the order of the leaderboard.
 
-    A row has the keys of ``tactbench leaderboard --format json`` (docs/results.md). `table` is the leaderboard,
-    `folder` the result folder (None: there is none).
+    A row has the keys of ``tactbench leaderboard --format json`` (docs/results.md).
     """
 
-    def __init__(self, table: Table, folder: Path | None = None) -> None:
+    def __init__(self, table: Table) -> None:
         super().__init__((row for row, _ in records(table)), [*grids(table), *table.sections])
         self.table = table
-        self.folder = folder
 
     def best(self, count: int = 1) -> Results:
         """Return the first `count` answers of each sensor to each question; places stay those among all."""
-        return Results(best(self.table, count), self.folder)
+        return Results(best(self.table, count))
 
     def compare(self, a: str, b: str, task: str | None = None) -> Rows:
         """Compare two sensors, estimators, protocols or splits replicate by replicate, as ``tactbench compare`` does.
@@ -343,14 +334,12 @@ class Result(Results):
         recording, row (its place in the recording), time_s, fold, y_true and y_pred: class labels, numbers, or a column
         for each component of a vector.
         """
-        one, labels = self.answers, np.asarray(self.row["classes"])
-        found = {"recording": np.asarray(self._names)[one.recording], "row": one.row, "time_s": one.time_s}
-        found["fold"] = one.fold
+        one, labels, target = self.answers, np.asarray(self.row["classes"]), self._task.target
+        found = {"recording": np.asarray(self._names)[one.recording]}
+        found |= {"row": one.row, "time_s": one.time_s, "fold": one.fold}
         for name, values in (("y_true", one.y_true), ("y_pred", one.y_pred)):
-            if isinstance(self._task.target, VectorTarget):
-                found |= {
-                    f"{name}_{part}": column for part, column in zip(self._task.target.names, values.T, strict=True)
-                }
+            if isinstance(target, VectorTarget):
+                found |= {f"{name}_{part}": column for part, column in zip(target.names, values.T, strict=True)}
             else:
                 found[name] = labels[values] if len(labels) else values
         return found
@@ -392,10 +381,8 @@ def evaluate(
         estimator=name_of(estimator), params=(), baseline=False, repeat=1, repeats=1, seed=seed, declared_task=declared,
     )  # fmt: skip
     row, answers = _answered(cell, spec, paths, estimator)
-    rows = [row]
-    for name in spec.baselines:
-        if name != cell.estimator:
-            rows.append(_ended(replace(cell, estimator=name, baseline=True), spec, paths, name, row["simulated"]))
+    trivial = [replace(cell, estimator=name, baseline=True) for name in spec.baselines if name != cell.estimator]
+    rows = [row, *(_ended(one, spec, paths, one.estimator, row["simulated"]) for one in trivial)]
     fill_baselines(rows)
     counts = Counter(one.name for one in data.metas)
     names = [one.name if counts[one.name] == 1 else str(path) for one, path in zip(data.metas, data.paths, strict=True)]
@@ -437,8 +424,6 @@ def _ended(cell: Cell, task: TaskSpec, paths: Sequence[Path], estimator: str | E
     except Exception as error:
         return unanswered(cell, task, error, simulated=simulated)
 
-
-# --- Runs -------------------------------------------------------------------------------------------------------------
 
 Estimators = str | Estimator | list[str | Estimator] | tuple[str | Estimator, ...] | Mapping[str, str | Estimator]
 
@@ -484,19 +469,25 @@ def run(
         return matrix.model_copy(update={"tasks": tuple(alone)}) if objects and not names else matrix
 
     asked = {"sensor": sensor, "task": task, "estimator": names, "recordings": recordings, "out": out} | options
-    store, outcome = carry_out(**_as_read_by_the_verb(asked), changed=trivial_beside_objects)
+    before = set(os.environ)
+    keep_threads()  # of child processes; this one's libraries have read the environment already
+    try:
+        store, outcome = carry_out(**_as_read_by_the_verb(asked), changed=trivial_beside_objects)
+    finally:
+        for name in set(os.environ) - before:
+            del os.environ[name]
     table = table_of(store, over_all(store, outcome.rows))
     write_tables(table.rows, store.folder, table.provenance, table)
     alike = ("sensor", "task", "rig", "protocol", "split", "repeat")
     each = {tuple(row[name] for name in alike): row for row in outcome.rows if row["status"] == "done"}
     beside = [_beside(row, name, given, store.folder) for name, given in objects.items() for row in each.values()]
-    return Results(table_of(store, over_all(store, [*outcome.rows, *beside])) if beside else table, store.folder)
+    return Results(table_of(store, over_all(store, [*outcome.rows, *beside])) if beside else table)
 
 
 def results(folder: AnyPath = "tactbench-results") -> Results:
     """Return the rows of a result folder, what ``tactbench leaderboard FOLDER`` shows; UsageError if there are none."""
     store = opened(Path(folder))
-    return Results(table_of(store, shown_rows(store)), store.folder)
+    return Results(table_of(store, shown_rows(store)))
 
 
 def _named(estimator: Estimators) -> tuple[list[str], dict[str, Estimator]]:

@@ -96,8 +96,7 @@ def solve(job: Job, concurrency: int = 1, given: Estimator | None = None) -> Sol
     concurrency
         Pieces of work of the run that may be at work beside this one, itself included.
     given
-        An object with ``fit`` and ``predict`` that answers in place of the job's estimator, of which only the name is
-        used.
+        An object with ``fit`` and ``predict`` that answers in place of the job's estimator.
     """
     cell, task, estimator, recordings, *_ = job
     if given is None:

@@ -261,9 +261,8 @@ def _attach_scales(group: Any, spec: StreamSpec) -> None:
         _create(group, rows, numbers, len(numbers))
         group[rows][:] = numbers
     names = [channel.name for channel in spec.channels]
-    group.create_dataset(layout.CHANNELS, data=names, dtype=h5py.string_dtype("utf-8"))
-    for name in (rows, layout.CHANNELS):
-        group[name].make_scale(name)
+    group.create_dataset(layout.CHANNELS, data=names, dtype=h5py.string_dtype("utf-8")).make_scale(layout.CHANNELS)
+    group[rows].make_scale(rows)
     for column in columns:
         if column != group[rows]:
             column.dims[0].attach_scale(group[rows])

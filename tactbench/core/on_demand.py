@@ -1,4 +1,4 @@
-"""Names of a door that are imported when they are first used."""
+"""Names of a module that are imported when they are first used."""
 
 import ast
 import sys
@@ -12,7 +12,8 @@ from typing import Any
 def on_demand(door: str) -> Callable[[str], Any]:
     """Return the ``__getattr__`` of module `door`: it imports what the module imports under ``if TYPE_CHECKING``.
 
-    What stands on numpy, and links, are imported so: a plugin that is only listed need not have them.
+    What stands on numpy, and links, are imported so: a plugin that is only listed need not have them, nor a command
+    that shows its help.
     """
 
     def imported(name: str) -> Any:
