@@ -1,7 +1,6 @@
 """What ``import tactbench`` gives: recordings, tasks, scores and results in Python.
 
-The command line goes through the same functions: ``tactbench run`` and :func:`run` differ in who reads the options,
-:func:`evaluate` computes the row that a cell of a run has.
+The command line goes through the same functions, and :func:`evaluate` computes the row that a cell of a run has.
 """
 
 from __future__ import annotations
@@ -140,7 +139,9 @@ class Recording:
         if one.quality is not None:
             found["quality"] = ((rows, "channel"), one.quality)
         names, units = zip(*((channel.name, channel.unit) for channel in one.channels), strict=True)
-        return xr.Dataset(found, coords={rows: times, "channel": list(names), "unit": ("channel", list(units))})
+        coordinates = {rows: times, "channel": list(names), "unit": ("channel", list(units))}
+        made: xarray.Dataset = xr.Dataset(found, coordinates)
+        return made
 
     def _stream(self, name: str | None) -> Stream:
         found = self.streams.get(next(iter(self.streams), "") if name is None else name)

@@ -25,8 +25,7 @@ COMPLETING = ".completing"
 """Ending of the finished file until it has been read back and is renamed."""
 
 ROWS, CHANNELS = "row", "channel"
-"""Dimension scales of a stream: numbers of its rows, where it has no clock, and names of its channels. They repeat what
-is there, are not read, and are not part of the digest."""
+"""Dimension scales of a stream: of its rows where it has no clock, of its channels. No part of the digest."""
 CHUNK_ROWS = 1024
 MAX_LISTED_CHANNELS = 1000
 """Streams with more channels have no channel attributes: an attribute of HDF5 holds 64 KiB. The meta has them all."""
