@@ -35,7 +35,7 @@ from tactbench.core.leaderboard.table import Table, build_table
 from tactbench.core.leaderboard.view import best, grids
 from tactbench.core.matrix.installed import rig_of
 from tactbench.core.matrix.plan import Cell, task_of
-from tactbench.core.matrix.solve import Job, dataset, solve, unanswered
+from tactbench.core.matrix.solve import Job, read_dataset, solve, unanswered
 from tactbench.core.matrix.summary import fill_baselines
 from tactbench.core.plugins.declared import declared_in
 from tactbench.core.plugins.declared import with_declared as with_declared_tasks
@@ -244,7 +244,7 @@ def load_task(
         If nothing is left to evaluate; its kind NotApplicable if the question cannot be asked of these recordings.
     """
     spec, _, paths = _question(task, recordings, protocol)
-    return folds_of(spec, dataset(spec, paths), protocol, split, seed=seed)
+    return folds_of(spec, read_dataset(spec, paths), protocol, split, seed=seed)
 
 
 class Rows(list[dict[str, Any]]):
@@ -376,7 +376,7 @@ def evaluate(
         If the estimator answers with something else than a finite number, or a class, a row.
     """
     spec, declared, paths = _question(task, recordings, protocol)
-    data = dataset(spec, paths)
+    data = read_dataset(spec, paths)
     cell = Cell(
         sensor=data.metas[0].sensor.name, task=spec.name, rig="replay", protocol=protocol, split=split,
         estimator=name_of(estimator), params=(), baseline=False, repeat=1, repeats=1, seed=seed, declared_task=declared,

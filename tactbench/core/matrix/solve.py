@@ -68,7 +68,7 @@ _prepared: set[tuple[int, str, str]] = set()
 """By process: after a fork, memory pages are copied at first use, which a clock would count."""
 
 
-def dataset(task: TaskSpec, recordings: tuple[Path, ...]) -> Dataset:
+def read_dataset(task: TaskSpec, recordings: tuple[Path, ...]) -> Dataset:
     """Return `recordings` as a task needs them; cells in a row that need the same share what is read."""
     from tactbench.core.evaluation.dataset import load_dataset
 
@@ -114,7 +114,7 @@ def solve(job: Job, concurrency: int = 1, given: Estimator | None = None) -> Sol
     # The global generators get the cell's seed: what is drawn from them does not depend on the cells before.
     random.seed(cell.seed)
     np.random.seed(cell.seed % 2**32)  # noqa: NPY002  (it is this old generator that libraries draw from)
-    data = dataset(task, recordings)
+    data = read_dataset(task, recordings)
     if given is None:
         context = CellContext(
             task, estimator, dict(cell.params), cell.protocol, cell.split, seed=cell.seed, clock=time.perf_counter,
