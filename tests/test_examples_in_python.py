@@ -58,8 +58,8 @@ def test_the_notebook_runs(here, monkeypatch, request, tmp_path, real):
 def test_a_forest_on_several_data_sets_is_a_short_script(here, monkeypatch, shared_data, tmp_path, capsys):
     pytest.importorskip("pandas")
     path = ROOT / "examples" / "extra_trees.py"
-    monkeypatch.setattr(tactbench, "dataset", lambda name, root: imported(name, shared_data, tmp_path), raising=False)
-    monkeypatch.setattr(sys, "argv", [str(path), *COPIES])
+    monkeypatch.setattr(tactbench, "dataset", lambda name: imported(name, shared_data, tmp_path), raising=False)
+    monkeypatch.setattr(sys, "argv", [str(path), "eflesh-normal:force", "eflesh-shear:shear-force"])
     frame = runpy.run_path(str(path))["lines"]
     assert [line["data set"] for line in frame] == list(COPIES)
     assert all(line["ci_low"] < line["score"] < line["ci_high"] < line["baseline"] for line in frame)
