@@ -16,6 +16,7 @@ from tactbench.core.errors import (
     TactbenchError,
     UsageError,
 )
+from tactbench.core.on_demand import on_demand
 from tactbench.core.plugins.hookspecs import API_VERSION, hookimpl
 from tactbench.core.plugins.interfaces import Acquisition, Estimator, ReplayRig, Rig, RigContext
 from tactbench.core.plugins.registry import load_object, load_registry
@@ -46,7 +47,6 @@ from tactbench.core.spec.sensor import (
 )
 from tactbench.core.spec.summary import Summary
 from tactbench.core.spec.task import ChannelTarget, LabelTarget, PlannedScene, Published, TaskSpec, VectorTarget
-from tactbench.plugin.on_demand import on_demand
 
 if TYPE_CHECKING:
     from tactbench.core.samples import FloatArray

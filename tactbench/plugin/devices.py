@@ -7,12 +7,12 @@ the device.
 from typing import TYPE_CHECKING
 
 from tactbench.core.errors import LinkEnded, LinkError, LinkTimeout, LinkUnplugged
+from tactbench.core.on_demand import on_demand
 from tactbench.core.plugins.checks import CheckTable, RigCheck
 from tactbench.core.plugins.interfaces import DeviceAcquisition, Operator
 from tactbench.core.spec.recording import Emulation, StreamClock, StreamCounts
 from tactbench.core.spec.rig import DeviceDescriptor
 from tactbench.core.spec.rig_file import FORCE, ForceEntry, NamedDevice, RigFile
-from tactbench.plugin.on_demand import on_demand
 
 if TYPE_CHECKING:
     from tactbench.core.plugins.emulators import RigEmulators

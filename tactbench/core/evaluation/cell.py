@@ -158,6 +158,16 @@ class TaskData:
         return self._joined([table.groups[name] for table in tables])
 
     @property
+    def feature_names(self) -> tuple[str, ...]:
+        """Return what the columns of `X` are called."""
+        return self.data.features
+
+    @property
+    def classes(self) -> tuple[Any, ...]:
+        """Return the labels that class indices in `y` stand for; nothing of a regression."""
+        return self.data.classes
+
+    @property
     def folds(self) -> list[tuple[IntArray, IntArray]]:
         """Return the rows of each fold that train and those that test: a `cv` for scikit-learn."""
         return [

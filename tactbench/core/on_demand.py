@@ -1,6 +1,5 @@
-"""Names of a door that are imported when they are first used."""
+"""Names of a module that are imported when they are first used."""
 
-import ast
 import sys
 from collections.abc import Callable, Mapping
 from functools import cache
@@ -12,7 +11,8 @@ from typing import Any
 def on_demand(door: str) -> Callable[[str], Any]:
     """Return the ``__getattr__`` of module `door`: it imports what the module imports under ``if TYPE_CHECKING``.
 
-    What stands on numpy, and links, are imported so: a plugin that is only listed need not have them.
+    What stands on numpy, and links, are imported so: a plugin that is only listed need not have them, nor a command
+    that shows its help.
     """
 
     def imported(name: str) -> Any:
@@ -28,6 +28,8 @@ def on_demand(door: str) -> Callable[[str], Any]:
 @cache
 def _modules(door: str) -> Mapping[str, str]:
     """Return the modules that a door's source imports names from under a condition."""
+    import ast
+
     tree = ast.parse(Path(sys.modules[door].__file__ or "").read_text(encoding="utf-8"))
     conditions = [node for node in tree.body if isinstance(node, ast.If)]
     imports = [node for one in conditions for node in one.body if isinstance(node, ast.ImportFrom)]
