@@ -29,6 +29,8 @@ _REASON_CHARACTERS = 200
 
 @click.command(name="run")
 @options(*SELECTING, *ENGINE)
+@click.option("--root", type=click.Path(path_type=Path), metavar="DIR",
+              help="Folder of a copy of the data sets; what is not there is fetched.")  # fmt: skip
 @RESULTS
 @YES
 @format_option(*TABLE_FORMATS)
@@ -39,6 +41,7 @@ def command(
     out: Path,
     yes: bool,
     shape: str,
+    root: Path | None,
     engine: EngineName,
     jobs: int | None,
     timeout: float | None,
@@ -76,7 +79,7 @@ def command(
     store = Store(out)
     with progress() as display:
         outcome = run_matrix(
-            matrix, store, choice=choice, recordings=folder, progress=display,
+            matrix, store, choice=choice, recordings=folder, root=root, progress=display,
             operator=TerminalOperator(yes=yes, paused=display.paused) if matrix.rig_file else None,
             shown=lambda rows: display.show(lambda: _so_far(rows)),
         )  # fmt: skip
