@@ -95,6 +95,13 @@ class Mat(Arrays):
     format: Literal["mat"] = "mat"
 
 
+class Bag(Frozen):
+    """A topic of an MCAP bag, a row a message; columns are paths of fields: ``wrench.force.z``, ``data.0..63``."""
+
+    format: Literal["mcap"] = "mcap"
+    topic: str
+
+
 class Time(Frozen):
     """The clock of a table: a column, never `row / rate`."""
 
@@ -117,7 +124,7 @@ class TableSource(Frozen):
     """Which: a pattern below the root, with ``*`` within a folder and ``**`` across folders."""
     path: str = ""
     """Regular expression searched in each path; its named groups become words."""
-    read: Annotated[Csv | Text | Records | Xlsx | Npz | Mat, Field(discriminator="format")]
+    read: Annotated[Csv | Text | Records | Xlsx | Npz | Mat | Bag, Field(discriminator="format")]
     time: Time | None = None
 
     @field_validator("files")
