@@ -98,6 +98,8 @@ def requested_matrix(
         "estimators": tuple(EstimatorChoice(name=name) for name in dict.fromkeys(estimators)),
     }
     over |= {name: value for name, value in several.items() if value}
+    if recordings:
+        over["dataset"] = None
     chosen = [choice.model_copy(update=over) for choice in chosen or matrix.tasks]
     change["tasks"] = tuple(_with_those_beside(chosen, registry))
     matrix = matrix.model_copy(update=change)

@@ -11,6 +11,7 @@ import pytest
 import yaml
 
 import tactbench
+from tactbench.core.cli.config import matrix_called
 from tactbench.core.errors import ConfigError, MissingRecordingError, NotApplicable, UnknownNameError
 from tactbench.core.recording.datasets import DataSet, dataset_called, datasets
 from tests.conftest import ROOT, Verbs
@@ -183,6 +184,12 @@ def test_a_plugin_brings_data_sets_as_files(tmp_path, monkeypatch):
     assert dataset_called("pad").source.citation == "nobody"
 
 
+def test_the_board_asks_data_sets_that_there_are():
+    named = {choice.dataset for choice in matrix_called("real").tasks}
+    assert len(named) == 5
+    assert named <= datasets().keys()
+
+
 def test_the_shipped_ones_are_those_of_the_copies(shared_data):
     assert len(datasets()) >= 6
     for name, one in datasets().items():
@@ -210,5 +217,9 @@ def test_from_an_empty_cache_to_the_table_of_a_run(tmp_path, server, shared_data
     status = {(row["sensor"], row["status"]) for row in json.loads(done.stdout)}
     assert status == {("eflesh", "done"), ("pad", "skipped")}
     assert "no public address" in verbs("run", "--dataset", "pad.yaml", code=1).stderr
+    # Recordings that are named take the place of a matrix's data sets.
+    (recordings,) = (tmp_path / "cache" / "eflesh-normal").glob("recordings-*")
+    own = ("run", "--config", "real", "--recordings", str(recordings), "--task", "force", "--split", "session")
+    assert {row["status"] for row in json.loads(verbs(*own, "--format", "json").stdout)} == {"done"}
     listed = json.loads(verbs("datasets", "--format", "json").stdout)
     assert not any(one["cached"] for one in listed if one["name"] != "eflesh-normal")
