@@ -192,6 +192,28 @@ def open_recordings(path_or_paths: Recordings) -> list[Recording]:
     return open_recordings(paths)
 
 
+def dataset(name: str, root: AnyPath | None = None) -> list[Recording]:
+    """Return the recordings of a public data set; what is missing is fetched, checked, imported and kept.
+
+    Parameters
+    ----------
+    name
+        As ``tactbench datasets`` lists them, or a mapping file that states its source.
+    root
+        A folder that holds a copy, or whose sub-folder does.
+
+    Raises
+    ------
+    UnknownNameError
+        If there is no data set of that name.
+    MissingRecordingError, NotApplicable
+        If a file cannot be had, is not the one that is meant, or lies at no public address.
+    """
+    from tactbench.core.recording.datasets import dataset_called
+
+    return open_recordings(dataset_called(name).recordings(None if root is None else Path(root)))
+
+
 def _question(task: str | TaskSpec, recordings: Recordings, protocol: str) -> tuple[TaskSpec, str, tuple[Path, ...]]:
     """Return a task, the JSON that declares it beside the recordings (empty: it is installed), and the files."""
     paths = tuple(one.path for one in open_recordings(recordings))

@@ -25,6 +25,8 @@ _REASON_CHARACTERS = 200
 
 @click.command(name="run")
 @options(*SELECTING, *ENGINE)
+@click.option("--root", type=click.Path(path_type=Path), metavar="DIR",
+              help="Folder of a copy of the data sets; what is not there is fetched.")  # fmt: skip
 @RESULTS
 @YES
 @format_option(*TABLE_FORMATS)
@@ -59,6 +61,7 @@ def carry_out(
     jobs: int | None,
     timeout: float | None,
     memory: int | None,
+    root: Path | None = None,
     changed: Callable[[MatrixSpec, Path | None], MatrixSpec] = lambda matrix, _: matrix,
     **selection: Any,
 ) -> tuple[Store, Outcome]:
@@ -84,7 +87,7 @@ def carry_out(
     store = Store(out)
     with progress() as display:
         outcome = run_matrix(
-            matrix, store, choice=choice, recordings=recordings, progress=display,
+            matrix, store, choice=choice, recordings=recordings, root=root, progress=display,
             operator=TerminalOperator(yes=yes, paused=display.paused) if matrix.rig_file else None,
             shown=lambda rows: display.show(lambda: _so_far(rows)),
         )  # fmt: skip

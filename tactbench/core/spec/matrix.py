@@ -48,6 +48,8 @@ class TaskChoice(Frozen):
     `few-shot` stands for all of the task's splits `few-shot-N`."""
     estimators: tuple[Annotated[EstimatorChoice, BeforeValidator(_by_name)], ...] = ()
     """Empty: the task's own. Its baselines are always run."""
+    dataset: str | None = None
+    """Name, or mapping file, of a public data set that is asked, whatever the matrix says of recordings."""
 
 
 class ComparisonChoice(Frozen):
