@@ -10,9 +10,7 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import ClassVar
-from xml.sax.saxutils import escape
 
-from tactbench.plugin import UsageError
 from tactbench.plugin.devices import (
     CanFrame,
     DeviceEmulator,
@@ -20,7 +18,6 @@ from tactbench.plugin.devices import (
     Fault,
     Sent,
     fault_concerns,
-    read_file,
     read_options,
 )
 from tactbench.rigs.parallel_manipulator.force_torque.net_ft.codec import (
@@ -84,13 +81,9 @@ class RdtEmulator(DeviceEmulator):
         first_sequence: int = 1,
         faults: Iterable[DatagramFault] = (),
     ) -> None:
-        if not 0.0 < rate_hz <= SENSOR_RATE_HZ:
-            raise UsageError(f"A Net F/T box sends up to {SENSOR_RATE_HZ} records a second, not {rate_hz:g}.")
         self.scale = scale or CountScale(per_newton=1e6, per_newton_metre=1e6, product="EMULATED Net F/T")
         self.every = max(1, int(SENSOR_RATE_HZ // rate_hz))
         """Samples of the sensor from one record to the next."""
-        self.rejected = 0
-        """Datagrams that were no request."""
         self._wrench = wrench
         self._largest = tuple(largest)
         self._first_sequence = first_sequence
@@ -108,15 +101,6 @@ class RdtEmulator(DeviceEmulator):
         """Records a second as the box sends them."""
         return SENSOR_RATE_HZ / self.every
 
-    def configuration(self) -> bytes:
-        """Return what the box answers to a GET of ``/netftapi2.xml``."""
-        return (
-            '<?xml version="1.0" encoding="UTF-8"?>\n<netft>'
-            f"<prodname>{escape(self.scale.product)}</prodname>"
-            f"<cfgcpf>{self.scale.per_newton!r}</cfgcpf><cfgcpt>{self.scale.per_newton_metre!r}</cfgcpt>"
-            "<scfgfu>N</scfgfu><scfgtu>Nm</scfgtu></netft>\n"
-        ).encode()
-
     def feed(self, piece: bytes | CanFrame, now_s: float) -> list[Sent]:
         """Take one datagram of the host; return what `poll` returns.
 
@@ -127,7 +111,6 @@ class RdtEmulator(DeviceEmulator):
         try:
             request = decode_request(piece)
         except DatagramError:
-            self.rejected += 1
             return sent
         return sent + self._carry_out(request)
 
@@ -217,18 +200,12 @@ def build(settings: EmulatorSettings) -> RdtEmulator:
     Raises
     ------
     UsageError
-        For options or faults that are not known, or if the box is to be asked by HTTP.
+        For options or faults that are not known.
     """
     options = read_options(NetFtOptions, settings.options, "net-ft")
-    if options.configuration.startswith("http"):
-        raise UsageError(
-            "An emulated net-ft has no web page.",
-            hint="Give counts_per_newton and counts_per_newton_metre, or a file.",
-        )
-    configuration = read_file(options.configuration, "The box's configuration") if options.configuration else b""
     return RdtEmulator(
         lambda at_s: wrench_of(settings.senses(at_s)),
-        scale=options.scale(configuration),
+        scale=options.scale(),
         rate_hz=options.rate_hz,
         faults=[DatagramFault.parse(text) for text in settings.faults],
     )
