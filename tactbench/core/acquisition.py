@@ -275,9 +275,8 @@ def _says_emulated(name: str, drawn: Mapping[str, Any]) -> bool:
 def _emulation(file: RigFile | None, sensor: str, acquisition: Acquisition, factor: float | None) -> Emulation | None:
     """Return which devices are emulated, by the rig file and by what they say of themselves; None: none is.
 
-    `factor` is how much faster than the clock it went, unless the rig says that.
+    `factor` is how much faster than the clock it went.
     """
-    said: Emulation | None = getattr(acquisition, "emulation", None)
     names = [] if file is None else [
         name
         for name, entry in file.entries().items()
@@ -285,8 +284,7 @@ def _emulation(file: RigFile | None, sensor: str, acquisition: Acquisition, fact
         and (entry.emulated or entry.emulator or _says_emulated(name, acquisition.drawn))
     ]  # fmt: skip
     if file is None or not names:
-        return said
-    factor = factor if said is None or said.factor is None else said.factor
+        return None
     ours = Emulation(time="real", factor=factor, devices=tuple(names))
     if file.emulated or file.emulation.control:
         how = file.emulation

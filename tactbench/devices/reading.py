@@ -25,21 +25,18 @@ STEP_S = 0.02
 datagrams of a UDP socket are 37 ms at 7 kHz, the fastest stream of a Net F/T)."""
 STOP_S = 5.0
 """How long readers are waited for (assumed: a read, a stop and what they send, each within a link's time-outs)."""
-UNRATED_ROWS = 4096
-"""The most rows of a block of a stream whose rate nobody states."""
 
 
 class _Stream:
     """One stream on its way from driver to caller."""
 
-    def __init__(self, device: str, spec: StreamSpec, queue_s: float, block_s: float) -> None:
+    def __init__(self, device: str, spec: StreamSpec, queue_s: float) -> None:
         self.device = device
         self.rated = spec.rate_hz is not None
         self.came_ns = 0
         self.check = SequenceCheck()
         self.queue = BlockQueue(spec, queue_s)
         self.written = 0
-        self.most_rows = UNRATED_ROWS if spec.rate_hz is None else math.ceil(2 * block_s * spec.rate_hz)
 
     def put(self, block: Block, now_ns: int) -> None:
         kept = self.check(block)
@@ -48,12 +45,11 @@ class _Stream:
             self.queue.put(kept)
 
     def take(self) -> Iterator[Block]:
-        """Yield what is in the queue now; what comes meanwhile is left for the next call."""
-        for _ in range(-(-self.queue.rows // self.most_rows)):
-            block = self.queue.take(self.most_rows)
-            if block is not None:
-                self.written += len(block.data)
-                yield block
+        """Yield what is in the queue now."""
+        block = self.queue.take()
+        if block is not None:
+            self.written += len(block.data)
+            yield block
 
 
 class Reading:
@@ -78,7 +74,7 @@ class Reading:
     queue_s
         Seconds of data that a caller may be behind.
     block_s
-        Seconds of data in a block, about: never more than twice as much.
+        Seconds between two blocks of a stream, about; one of a caller who takes them too slowly holds all since.
     silent_s
         A stream with a rate of which nothing came for longer ends the reading.
     """
@@ -124,7 +120,7 @@ class Reading:
                             f"The stream {spec.name!r} of {name} is there already, of another device.",
                             hint="Streams of one recording have different names.",
                         )
-                    self._streams[spec.name] = _Stream(name, spec, self._queue_s, self._block_s)
+                    self._streams[spec.name] = _Stream(name, spec, self._queue_s)
                 if self._advance is None:
                     # It is read at once: the next device may take longer to start than the link's buffers last.
                     threading.Thread(

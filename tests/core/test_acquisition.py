@@ -206,6 +206,11 @@ def test_what_is_emulated_is_marked_by_the_rig_file_whatever_the_rig_says(tmp_pa
     )
     meta, _ = run(tmp_path / "r.h5", Devices(tmp_path / "r.h5"), simulated=False, rig_file=file)
     assert (meta.simulated, meta.emulation.devices) == (True, (SENSOR.name,))
+    late = {SENSOR.name: DeviceEntry(link="emulated", faults=("late",))}
+    virtual = RigFile(rig="weights", sensors=late, devices={"motor": {"device": "faulhaber", "link": "emulated"}})
+    made, _ = run(tmp_path / "virtual.h5", Devices(tmp_path / "r.h5"), simulated=False, rig_file=virtual)
+    assert (made.emulation.time, set(made.emulation.devices)) == ("virtual", {SENSOR.name, "motor"})
+    assert (made.emulation.faults, made.emulation.factor > 0) == ((f"{SENSOR.name}: late",), True)
     plain = file.model_copy(update={"sensors": {SENSOR.name: DeviceEntry(link=link)}})
     real, _ = run(tmp_path / "real.h5", Devices(tmp_path / "r.h5"), simulated=False, rig_file=plain)
     assert (real.simulated, real.emulation) == (False, None)

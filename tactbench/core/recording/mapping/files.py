@@ -9,9 +9,8 @@ from pathlib import Path
 
 from tactbench.core.errors import MappingError
 from tactbench.core.recording.mapping.arrays import read_arrays
-from tactbench.core.recording.mapping.model import Arrays, Mapping, TableSource, Xlsx
+from tactbench.core.recording.mapping.model import Arrays, Mapping, TableSource
 from tactbench.core.recording.mapping.samples import check_join
-from tactbench.core.recording.mapping.sheets import read_sheet
 from tactbench.core.recording.mapping.table import Table
 from tactbench.core.recording.mapping.text import read_text
 
@@ -90,10 +89,7 @@ def read(mapping: Mapping, files: FileSet) -> Iterator[RawRecording]:
     for name, file in files.files.items():
         how = mapping.tables[name].read
         assert not isinstance(how, Arrays)  # the model refuses an archive beside other tables
-        if isinstance(how, Xlsx):
-            tables[name] = read_sheet(file.path, file.shown, how)
-        else:
-            tables[name] = read_text(file.path, file.shown, how)
+        tables[name] = read_text(file.path, file.shown, how)
     check_join(mapping, tables)
     yield from _split(mapping, RawRecording(tables, files.words, shown))
 

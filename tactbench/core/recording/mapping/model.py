@@ -54,17 +54,6 @@ class Records(Frozen):
     no_sample: tuple[str, ...] = ()
 
 
-class Xlsx(Frozen):
-    """A sheet of an Excel workbook; the extra ``[xlsx]``."""
-
-    format: Literal["xlsx"] = "xlsx"
-    sheet: str | None = None
-    """None: the only one."""
-    header: bool
-    skip_lines: int = Field(default=0, ge=0)
-    no_sample: tuple[str, ...] = ()
-
-
 class Arrays(Frozen):
     """Arrays in one file."""
 
@@ -117,7 +106,7 @@ class TableSource(Frozen):
     """Which: a pattern below the root, with ``*`` within a folder and ``**`` across folders."""
     path: str = ""
     """Regular expression searched in each path; its named groups become words."""
-    read: Annotated[Csv | Text | Records | Xlsx | Npz | Mat, Field(discriminator="format")]
+    read: Annotated[Csv | Text | Records | Npz | Mat, Field(discriminator="format")]
     time: Time | None = None
 
     @field_validator("files")

@@ -5,7 +5,6 @@ import functools
 import os
 
 import numpy as np
-import openpyxl
 import pytest
 import scipy.io
 import yaml
@@ -156,22 +155,6 @@ def test_an_archive_of_arrays(tables, name):
     meta, streams = read(report, 7)
     assert np.array_equal(streams["taxels"].data, X[7])
     assert meta.labels == {"slip": "yes", "block": "1"}
-
-
-def test_a_sheet_of_an_excel_workbook_and_words_for_no_sample(tables):
-    book = openpyxl.Workbook()
-    lines = [[row * 0.01, row, row / 3, {3: None, 4: "NA", 5: "nan"}.get(row, 1), row * 1.5] for row in range(20)]
-    for line in (["measured on a Monday"], [], ["t", "a", "b", "c", "f"], *lines):
-        book.active.append(line)
-    book.save(tables.data / "press.xlsx")
-    report = tables.run(
-        tables__table__files="*.xlsx", streams__taxels__channels=[{**TAXELS, "columns": ["a", "b", "c"]}],
-        tables__table__read={"format": "xlsx", "header": True, "skip_lines": 2, "no_sample": ["", "NA"]},
-    )  # fmt: skip
-    taxels = read(report)[1]["taxels"].data
-    assert np.array_equal(taxels[:, 0], np.arange(20))
-    np.testing.assert_allclose(taxels[:, 1], np.arange(20) / 3, rtol=1e-14)  # openpyxl writes 15 digits
-    assert report.missing == {"tc": 3}
 
 
 def test_one_mapping_covers_several_devices(tables):
