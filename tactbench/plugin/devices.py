@@ -15,7 +15,7 @@ from tactbench.core.spec.rig_file import FORCE, ForceEntry, NamedDevice, RigFile
 from tactbench.plugin.on_demand import on_demand
 
 if TYPE_CHECKING:
-    from tactbench.core.plugins.emulators import RigEmulators
+    from tactbench.core.plugins.emulators import RigEmulators, SceneEmulators
     from tactbench.core.plugins.rig_devices import (
         PressingForce,
         ask_operator,
@@ -127,6 +127,7 @@ __all__ = [
     "RowDriver",
     "RowEmulator",
     "Sample",
+    "SceneEmulators",
     "SceneSamples",
     "Senses",
     "Sent",
