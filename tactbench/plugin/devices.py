@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from tactbench.core.errors import LinkError, LinkTimeout, LinkUnplugged
 from tactbench.core.plugins.checks import CheckTable, RigCheck
 from tactbench.core.plugins.interfaces import DeviceAcquisition, Operator
-from tactbench.core.spec.recording import StreamClock, StreamCounts
+from tactbench.core.spec.recording import StreamCounts
 from tactbench.core.spec.rig import DeviceDescriptor
 from tactbench.core.spec.rig_file import FORCE, ForceEntry, NamedDevice, RigFile
 from tactbench.plugin.on_demand import on_demand
@@ -136,7 +136,6 @@ __all__ = [
     "SpiLink",
     "SpiReply",
     "SpiStep",
-    "StreamClock",
     "StreamCounts",
     "Unwrap",
     "ask_operator",

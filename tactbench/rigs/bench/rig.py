@@ -36,7 +36,6 @@ from tactbench.plugin.devices import (
     Reading,
     RigFile,
     SceneEmulators,
-    StreamClock,
     StreamCounts,
     ask_operator,
     drivers_of,
@@ -58,7 +57,6 @@ class BenchAcquisition:
     plan: tuple[PlanEntry, ...]
     assumptions: Mapping[str, Scalar]
     drawn: Mapping[str, Scalar]
-    clocks: Mapping[str, StreamClock]
     reading: Reading = field(repr=False)
     duration_s: float
     force: PressingForce | None
@@ -152,7 +150,6 @@ class Bench:
                     **{f"{name} {key}": value for name, about in identity.items() for key, value in about.items()},
                     **({} if force is None else force.about(zero)),
                 },
-                clocks={},
                 reading=reading,
                 duration_s=scene.profile.duration.to("s"),
                 force=force,

@@ -43,7 +43,6 @@ from tactbench.plugin.devices import (
     PressingForce,
     Reading,
     RigFile,
-    StreamClock,
     StreamCounts,
     ask_operator,
     physics_of,
@@ -74,7 +73,6 @@ class PressAcquisition:
     plan: tuple[PlanEntry, ...]
     assumptions: Mapping[str, Scalar]
     about: Mapping[str, Scalar]
-    clocks: Mapping[str, StreamClock]
     force: PressingForce = field(repr=False)
     zero: Mapping[str, FloatArray] = field(repr=False)
     control: Control = field(repr=False)
@@ -313,7 +311,6 @@ class ParallelManipulator:
                 **({} if platform_m is None else {"platform mm": ", ".join(f"{1e3 * x:.4f}" for x in platform_m)}),
                 **({} if senses is None else {"skin mm": 1e3 * senses[1].skin_m}),
             },
-            clocks={},
             force=force,
             zero=zero,
             control=control,
