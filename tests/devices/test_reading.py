@@ -229,7 +229,7 @@ def test_ctrl_c(when, clock):
             return blocks
 
     with numbered(WIDE, clock, Interrupting) as (far, driver):
-        reading = Reading({"wide": driver}, clock=clock, block_s=1.0)
+        reading = Reading({"wide": driver}, clock=clock)
         if when == "starting":
             far.send(0, 100)
         with pytest.raises(KeyboardInterrupt):

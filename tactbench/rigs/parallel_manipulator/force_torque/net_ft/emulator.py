@@ -51,6 +51,10 @@ class DatagramFault(Fault):
     }
 
 
+LARGEST = (25.0, 25.0, 35.0, 0.25, 0.25, 0.25)
+"""Where the sensor saturates [N, N*m]: a Nano17 SI-25-0.25 (sourced: calibration file FT8577)."""
+
+
 class RdtEmulator(DeviceEmulator):
     """A box and its sensor.
 
@@ -62,9 +66,6 @@ class RdtEmulator(DeviceEmulator):
         Counts per unit; the default is usual (sourced: pyNetFT).
     rate_hz
         Records a second; the box takes the next rate above that divides 7000.
-    largest
-        (6,) where the sensor saturates [N, N*m]; the default is that of a Nano17 SI-25-0.25 (sourced: calibration file
-        FT8577, quoted in a public script).
     first_sequence
         Of records and samples, to begin near the wrap of the counters.
     faults
@@ -77,7 +78,6 @@ class RdtEmulator(DeviceEmulator):
         *,
         scale: CountScale | None = None,
         rate_hz: float = 1000.0,
-        largest: Sequence[float] = (25.0, 25.0, 35.0, 0.25, 0.25, 0.25),
         first_sequence: int = 1,
         faults: Iterable[DatagramFault] = (),
     ) -> None:
@@ -85,7 +85,6 @@ class RdtEmulator(DeviceEmulator):
         self.every = max(1, int(SENSOR_RATE_HZ // rate_hz))
         """Samples of the sensor from one record to the next."""
         self._wrench = wrench
-        self._largest = tuple(largest)
         self._first_sequence = first_sequence
         self.faults = list(faults)
         self._seen: Counter[Fault] = Counter()
@@ -144,7 +143,7 @@ class RdtEmulator(DeviceEmulator):
     def _sensed(self, at_s: float) -> tuple[list[float], bool]:
         """Return what the sensor can read of the wrench, and whether it is at an end of its range."""
         # Number by number: numpy would take longer for six, and this is done a thousand times a second.
-        wrench = list(zip(self._wrench(at_s), self._largest, strict=True))
+        wrench = list(zip(self._wrench(at_s), LARGEST, strict=True))
         beyond = any(abs(value) >= end for value, end in wrench) or any(
             fault.name == "saturated" and fault.active(at_s) for fault in self.faults
         )
