@@ -182,14 +182,6 @@ class SpiBridge(SpiLink):
     def abandon(self) -> None:  # noqa: D102
         self._waiting.clear()
 
-    def transfer(self, data: bytes, *, select: int = 1, pause_us: int = 0, timeout_s: float = 1.0) -> bytes:  # noqa: D102
-        try:
-            return super().transfer(data, select=select, pause_us=pause_us, timeout_s=timeout_s)
-        except LinkTimeout:
-            # Given up: its reply, should it come late, is unexpected.
-            self._waiting.pop(self._number, None)
-            raise
-
     def _refused(self, frame: Frame) -> LinkError:
         reason = frame.payload.decode("ascii", "replace") or "it gives no reason"
         return LinkError(
