@@ -18,7 +18,7 @@ from tactbench.core.plugins.interfaces import Acquisition, Rig
 from tactbench.core.recording.completeness import INCOMPLETE, Completeness
 from tactbench.core.recording.writer import RecordingWriter
 from tactbench.core.samples import Block
-from tactbench.core.spec.recording import Emulation, PlanEntry, RecordingMeta, StreamClock, StreamCounts
+from tactbench.core.spec.recording import Emulation, PlanEntry, RecordingMeta, StreamCounts
 from tactbench.core.spec.rig import RigDescriptor, SensorDescriptor
 from tactbench.core.spec.rig_file import Allowed, RigFile
 from tactbench.core.spec.scene import Role, Scene
@@ -58,7 +58,7 @@ def acquire(
     ----------
     rig, descriptor
         The rig, and what it says about itself. If its acquisition is one of devices (DeviceAcquisition), what it says
-        of clocks, counts and emulation is recorded too. If something moves in it (MovingAcquisition), it is stopped
+        of its counts is recorded too. If something moves in it (MovingAcquisition), it is stopped
         before an interrupted recording is completed.
     role
         What the recording is for, or None.
@@ -253,15 +253,12 @@ def _of_devices(
 ) -> dict[str, Any]:
     """Return the fields of the meta that an acquisition of devices knows; of another one, whose clock it is."""
     emulation = _emulation(rig_file, sensor, acquisition, factor)
-    clocks: Mapping[str, StreamClock] = getattr(acquisition, "clocks", {})
     counts: Mapping[str, StreamCounts] = getattr(acquisition, "stream_counts", {})
-    sources = {one.source for one in clocks.values()}
     simulated = descriptor.simulated or (emulation is not None and emulation.time == "virtual")
     return {
         "simulated": descriptor.simulated or emulation is not None,
         "emulation": emulation,
-        "clock": "simulated" if simulated else "device" if sources == {"device"} else "host",
-        "clocks": dict(clocks),
+        "clock": "simulated" if simulated else "host",
         "streams": {name: _settled(one, rows.get(name, 0), cut_short) for name, one in counts.items()},
         "counts": dict(getattr(acquisition, "counts", {})),
     }
@@ -275,9 +272,8 @@ def _says_emulated(name: str, drawn: Mapping[str, Any]) -> bool:
 def _emulation(file: RigFile | None, sensor: str, acquisition: Acquisition, factor: float | None) -> Emulation | None:
     """Return which devices are emulated, by the rig file and by what they say of themselves; None: none is.
 
-    `factor` is how much faster than the clock it went, unless the rig says that.
+    `factor` is how much faster than the clock it went.
     """
-    said: Emulation | None = getattr(acquisition, "emulation", None)
     names = [] if file is None else [
         name
         for name, entry in file.entries().items()
@@ -285,8 +281,7 @@ def _emulation(file: RigFile | None, sensor: str, acquisition: Acquisition, fact
         and (entry.emulated or entry.emulator or _says_emulated(name, acquisition.drawn))
     ]  # fmt: skip
     if file is None or not names:
-        return said
-    factor = factor if said is None or said.factor is None else said.factor
+        return None
     ours = Emulation(time="real", factor=factor, devices=tuple(names))
     if file.emulated or file.emulation.control:
         how = file.emulation

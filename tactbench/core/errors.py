@@ -18,7 +18,6 @@
     ├── RigError                      a rig cannot carry out a scene
     ├── LinkError                     a link to a device cannot be opened, or cannot do what it was asked for
     │   ├── LinkClosed                it was closed
-    │   │   └── LinkEnded             a log is over
     │   ├── LinkTimeout               nothing came, or nothing could be sent, within the time given
     │   └── LinkUnplugged             the device, its cable or the other end is gone
     ├── DataError                     (also ValueError) recordings cannot become X and y
@@ -171,10 +170,6 @@ class LinkError(TactbenchError):
 
 class LinkClosed(LinkError):  # noqa: N818  (names what happened to the link, as its siblings do)
     """The link was closed."""
-
-
-class LinkEnded(LinkClosed):
-    """A log is over: nothing more can come from it."""
 
 
 class LinkTimeout(LinkError):  # noqa: N818

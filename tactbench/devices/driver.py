@@ -7,7 +7,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from types import TracebackType
-from typing import Any, Protocol, Self
+from typing import Any, Self
 
 from tactbench.core.samples import Block
 from tactbench.core.spec.sensor import StreamSpec
@@ -101,10 +101,3 @@ class Driver(ABC):
         self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
     ) -> None:
         self.close()
-
-
-class DriverFactory(Protocol):
-    """What ``SensorDescriptor.driver`` and ``DeviceDescriptor.driver`` name."""
-
-    def __call__(self, settings: DriverSettings) -> Driver:
-        """Open the link; raises UsageError for options that are not known, LinkError if it cannot be opened."""

@@ -52,10 +52,3 @@ class EmulatorSettings:
     """Those of the rig file's entry, which the driver gets as well: board numbers, periods, rates."""
     faults: Sequence[str] = ()
     """Faults, as :meth:`~tactbench.devices.fault.Fault.parse` reads them."""
-
-
-class EmulatorFactory(Protocol):
-    """What ``SensorDescriptor.emulator`` and ``DeviceDescriptor.emulator`` name."""
-
-    def __call__(self, settings: EmulatorSettings) -> DeviceEmulator | SpiDeviceEmulator:
-        """Build the model; raises UsageError for options or faults that are not known."""

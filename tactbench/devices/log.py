@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from pathlib import Path
-from typing import Any, Literal, Protocol
+from typing import Literal
 
 from tactbench.core.samples import Block
 from tactbench.core.spec.sensor import StreamSpec
@@ -27,10 +26,3 @@ class DeviceLog:
     """What a reader of a score from it must know."""
     counts: Mapping[str, int] = field(default_factory=dict)
     """What was counted on the way in, by name."""
-
-
-class LogReader(Protocol):
-    """What ``SensorDescriptor.log_reader`` names."""
-
-    def __call__(self, path: Path, options: Mapping[str, Any]) -> DeviceLog:
-        """Read it; UsageError for options that are not known, another TactbenchError for a file that is no such log."""

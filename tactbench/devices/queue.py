@@ -83,26 +83,19 @@ class BlockQueue:
                 self._blocks.append(block)
                 self.rows += n
 
-    def take(self, most: int) -> Block | None:
-        """Remove and return the oldest rows as one block, at most `most`; None if there are none."""
-        found: list[Block] = []
+    def take(self) -> Block | None:
+        """Remove what is in it and return it as one block; None if there is nothing."""
         with self._lock:
-            while most and self._blocks:
-                block = self._blocks.popleft()
-                if len(block.data) > most:
-                    self._blocks.appendleft(block.rows(slice(most, None)))
-                    block = block.rows(slice(most))
-                most -= len(block.data)
-                self.rows -= len(block.data)
-                found.append(block)
+            found = list(self._blocks)
+            self._blocks.clear()
+            self.rows = 0
         if not found:
             return None
-        whole = found[0]
-        columns = {name: [getattr(one, name) for one in found] for name in _COLUMNS if name in self._layout}
+        columns = {name: [getattr(one, name) for one in found] for name in self._layout}
         joined: dict[str, Any] = {name: np.concatenate(parts) for name, parts in columns.items()}
         if not joined["quality"].any():
             joined["quality"] = None
-        return replace(whole, **joined)
+        return replace(found[0], **joined)
 
     def discard(self) -> None:
         """Drop what is in it: nobody will take it."""

@@ -18,6 +18,10 @@ from tactbench.devices.queue import BlockQueue
 from tactbench.devices.sequence import SequenceCheck
 from tactbench.links.link import Clock
 
+QUEUE_S = 5.0
+"""Of data that a caller may be behind [s]."""
+BLOCK_S = 0.05
+"""Between two blocks of a stream, about [s]; one of a caller who takes them too slowly holds all since."""
 READ_S = 0.05
 """Longest wait of one read: after this time at the latest a reader sees that it is to stop."""
 STEP_S = 0.02
@@ -25,21 +29,18 @@ STEP_S = 0.02
 datagrams of a UDP socket are 37 ms at 7 kHz, the fastest stream of a Net F/T)."""
 STOP_S = 5.0
 """How long readers are waited for (assumed: a read, a stop and what they send, each within a link's time-outs)."""
-UNRATED_ROWS = 4096
-"""The most rows of a block of a stream whose rate nobody states."""
 
 
 class _Stream:
     """One stream on its way from driver to caller."""
 
-    def __init__(self, device: str, spec: StreamSpec, queue_s: float, block_s: float) -> None:
+    def __init__(self, device: str, spec: StreamSpec) -> None:
         self.device = device
         self.rated = spec.rate_hz is not None
         self.came_ns = 0
         self.check = SequenceCheck()
-        self.queue = BlockQueue(spec, queue_s)
+        self.queue = BlockQueue(spec, QUEUE_S)
         self.written = 0
-        self.most_rows = UNRATED_ROWS if spec.rate_hz is None else math.ceil(2 * block_s * spec.rate_hz)
 
     def put(self, block: Block, now_ns: int) -> None:
         kept = self.check(block)
@@ -48,12 +49,11 @@ class _Stream:
             self.queue.put(kept)
 
     def take(self) -> Iterator[Block]:
-        """Yield what is in the queue now; what comes meanwhile is left for the next call."""
-        for _ in range(-(-self.queue.rows // self.most_rows)):
-            block = self.queue.take(self.most_rows)
-            if block is not None:
-                self.written += len(block.data)
-                yield block
+        """Yield what is in the queue now."""
+        block = self.queue.take()
+        if block is not None:
+            self.written += len(block.data)
+            yield block
 
 
 class Reading:
@@ -75,10 +75,6 @@ class Reading:
     advance
         For virtual time: carries `clock` forward to the given nanosecond, and emulated devices with it. None: real
         time.
-    queue_s
-        Seconds of data that a caller may be behind.
-    block_s
-        Seconds of data in a block, about: never more than twice as much.
     silent_s
         A stream with a rate of which nothing came for longer ends the reading.
     """
@@ -89,20 +85,11 @@ class Reading:
         *,
         clock: Clock,
         advance: Callable[[int], None] | None = None,
-        queue_s: float = 5.0,
-        block_s: float = 0.05,
         silent_s: float = math.inf,
     ) -> None:
-        if not (0 < block_s < queue_s < math.inf):
-            raise UsageError(
-                f"Blocks of {block_s} s and queues of {queue_s} s were given.",
-                hint="Both are finite, above 0, and a queue holds more than a block.",
-            )
         self._drivers = dict(drivers)
         self._clock = clock
         self._advance = advance
-        self._queue_s = queue_s
-        self._block_s = block_s
         self._silent_ns = 1e9 * silent_s
         self._streams: dict[str, _Stream] = {}
         self._counts: dict[str, Mapping[str, int]] = {name: {} for name in self._drivers}
@@ -124,7 +111,7 @@ class Reading:
                             f"The stream {spec.name!r} of {name} is there already, of another device.",
                             hint="Streams of one recording have different names.",
                         )
-                    self._streams[spec.name] = _Stream(name, spec, self._queue_s, self._block_s)
+                    self._streams[spec.name] = _Stream(name, spec)
                 if self._advance is None:
                     # It is read at once: the next device may take longer to start than the link's buffers last.
                     threading.Thread(
@@ -189,7 +176,7 @@ class Reading:
         now_ns = began_ns = self._clock()
         end_ns = now_ns + (math.inf if duration_s == math.inf else round(1e9 * duration_s))
         while not (self._over.is_set() or is_over()) and now_ns < end_ns:
-            until_ns = int(min(now_ns + round(1e9 * self._block_s), end_ns))
+            until_ns = int(min(now_ns + round(1e9 * BLOCK_S), end_ns))
             if self._advance is None:
                 self._over.wait((until_ns - now_ns) / 1e9)
                 now_ns = self._clock()

@@ -3,72 +3,62 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
-from pathlib import Path
 from types import MappingProxyType
-from typing import Any, NamedTuple, Self
+from typing import Any, Literal, NamedTuple, Self
 from urllib.parse import parse_qsl, unquote
+
+from pydantic import BaseModel, ConfigDict, Field, PositiveInt, ValidationError
 
 from tactbench.core.errors import UnknownNameError, UsageError
 from tactbench.links.link import Clock, Link
 
-Reader = Callable[[str], object]
-"""Turns a value's text into the value; raises ValueError with what was expected."""
+
+class _None(BaseModel):
+    pass
 
 
-def _whole(text: str, most: float = float("inf"), what: str = "a positive whole number") -> int:
-    if not (text.isascii() and text.isdigit() and 0 < int(text) <= most):
-        raise ValueError(what)
-    return int(text)
+class _Line(BaseModel):
+    baud: PositiveInt
+    parity: Literal["none", "even", "odd"] = "none"
+    stop_bits: Literal[1, 2] = 1
 
 
-def _port(text: str) -> int:
-    return _whole(text, 65535, "a port, 1 to 65535")
+class _Udp(BaseModel):
+    local_port: int = Field(default=0, gt=0, lt=65536)
+    buffer_bytes: PositiveInt = 1
 
 
-def _one_of(*values: str | int) -> Reader:
-    named = {str(value): value for value in values}
-
-    def read(text: str) -> object:
-        if text not in named:
-            raise ValueError(f"one of {', '.join(named)}")
-        return named[text]
-
-    return read
+class _Spi(BaseModel):
+    speed_hz: PositiveInt
+    mode: Literal[0, 1, 2, 3] = 0
 
 
-def _plain(text: str) -> int | float | str:
-    """Return an option of python-can: a number if it is one."""
-    for kind in (int, float):
-        try:
-            return kind(text)
-        except ValueError:
-            continue
-    return text
+class _Bridge(_Spi):
+    baud: PositiveInt = 1
+
+
+class _Can(BaseModel):
+    model_config = ConfigDict(extra="allow")
 
 
 class _Kind(NamedTuple):
     example: str
-    keys: Mapping[str, Reader] = {}
-    """Which there are, and how their values are read."""
-    needed: tuple[str, ...] = ()
+    options: type[BaseModel] = _None
 
-
-_LINE = {"baud": _whole, "parity": _one_of("none", "even", "odd"), "stop_bits": _one_of(1, 2)}
-_SPI = {"speed_hz": _whole, "mode": _one_of(0, 1, 2, 3)}
 
 KINDS = MappingProxyType(
     {
-        "serial": _Kind("serial:///dev/ttyUSB0?baud=115200", _LINE, ("baud",)),
-        "spy": _Kind("spy:///dev/ttyUSB0?baud=115200", _LINE, ("baud",)),
-        "rfc2217": _Kind("rfc2217://192.168.1.5:2217?baud=115200", _LINE, ("baud",)),
+        "serial": _Kind("serial:///dev/ttyUSB0?baud=115200", _Line),
+        "spy": _Kind("spy:///dev/ttyUSB0?baud=115200", _Line),
+        "rfc2217": _Kind("rfc2217://192.168.1.5:2217?baud=115200", _Line),
         "socket": _Kind("socket://192.168.1.5:4001"),
         "loop": _Kind("loop://"),
-        "can": _Kind("can://socketcan/can0"),
-        "udp": _Kind("udp://192.168.1.1:49152", {"local_port": _port, "buffer_bytes": _whole}),
-        "spi/spidev": _Kind("spi://spidev/0.0?speed_hz=4400000", _SPI, ("speed_hz",)),
-        "spi/bridge": _Kind("spi://bridge//dev/ttyACM0?speed_hz=4400000", {**_SPI, "baud": _whole}, ("speed_hz",)),
+        "can": _Kind("can://socketcan/can0", _Can),
+        "udp": _Kind("udp://192.168.1.1:49152", _Udp),
+        "spi/spidev": _Kind("spi://spidev/0.0?speed_hz=4400000", _Spi),
+        "spi/bridge": _Kind("spi://bridge//dev/ttyACM0?speed_hz=4400000", _Bridge),
     }
 )
 """Kind of link -> how its address looks and which keys it has; those of ``can`` are python-can's."""
@@ -145,17 +135,15 @@ class LinkAddress:
 
                 return UdpLink(*self._host_and_port(), clock=clock, **self.options)
             case "can":
-                from tactbench.links.can_link import CanBus, CanLog
+                from tactbench.links.can_link import CanBus
 
                 interface, _, channel = self.target.partition("/")
-                if interface == "log":
-                    return CanLog(Path(channel))
                 return CanBus(interface, channel, clock=clock, **self.options)
             case "spi/bridge":
                 from tactbench.links.spi_bridge import SpiBridge
 
-                line = {key: value for key, value in self.options.items() if key not in _SPI}
-                bus = {key: value for key, value in self.options.items() if key in _SPI}
+                line = {key: value for key, value in self.options.items() if key == "baud"}
+                bus = {key: value for key, value in self.options.items() if key != "baud"}
                 return SpiBridge(SerialLink(self.target, clock=clock, **line), **bus)
             case "spi/spidev":
                 from tactbench.links.spi_link import SpidevLink
@@ -166,14 +154,12 @@ class LinkAddress:
 
     def _host_and_port(self) -> tuple[str, int]:
         host, _, port = self.target.rpartition(":")
-        try:
-            number = _port(port)
-        except ValueError:
-            raise _wrong(self.text, self.kind, "does not end in a port, 1 to 65535") from None
+        if not (port.isascii() and port.isdecimal() and 0 < int(port[:6]) < 65536):
+            raise _wrong(self.text, self.kind, "does not end in a port, 1 to 65535")
         host = host.removeprefix("[").removesuffix("]")
         if not host:
             raise _wrong(self.text, self.kind, "names no host")
-        return host, number
+        return host, int(port)
 
 
 def open_link(address: str, clock: Clock = time.monotonic_ns) -> Link:
@@ -199,30 +185,40 @@ def open_link(address: str, clock: Clock = time.monotonic_ns) -> Link:
 def _check_interface(name: str) -> None:
     import can
 
-    if name not in can.VALID_INTERFACES and name != "log":
-        raise UnknownNameError("kind of can:// link", name, (*sorted(can.VALID_INTERFACES), "log"))
+    if name not in can.VALID_INTERFACES:
+        raise UnknownNameError("kind of can:// link", name, sorted(can.VALID_INTERFACES))
 
 
 def _options(text: str, kind: str, query: str) -> dict[str, object]:
-    what = KINDS[kind]
     try:
         pairs = parse_qsl(query, keep_blank_values=True, strict_parsing=bool(query))
     except ValueError:
         raise _wrong(text, kind, f"has {query!r} where key=value was expected") from None
-    options: dict[str, object] = {}
-    for key, value in pairs:
-        if kind != "can" and key not in what.keys:
-            raise UnknownNameError(f"key of a {kind} link", key, what.keys)
-        if key in options:
-            raise _wrong(text, kind, f"gives {key} twice")
+    given = dict(pairs)
+    if len(given) < len(pairs):
+        raise _wrong(text, kind, "gives a key twice")
+    model = KINDS[kind].options
+    for key in given.keys() - model.model_fields.keys():
+        if kind != "can":
+            raise UnknownNameError(f"key of a {kind} link", key, model.model_fields)
+    try:
+        found = model.model_validate({key: _plain(value) for key, value in pairs})
+    except ValidationError as error:
+        first = error.errors(include_url=False)[0]
+        key = str(first["loc"][0])
+        problem = f"does not give {key}" if first["type"] == "missing" else f"gives {key}={given[key]}: {first['msg']}"
+        raise _wrong(text, kind, problem) from None
+    return found.model_dump(exclude_unset=True)
+
+
+def _plain(text: str) -> int | float | str:
+    """Return a value as a number if it is one."""
+    for kind in (int, float):
         try:
-            options[key] = what.keys.get(key, _plain)(value)
-        except ValueError as expected:
-            raise _wrong(text, kind, f"gives {key}={value}, expected is {expected}") from None
-    for key in what.needed:
-        if key not in options:
-            raise _wrong(text, kind, f"does not give {key}")
-    return options
+            return kind(text)
+        except ValueError:
+            continue
+    return text
 
 
 def _wrong(text: str, kind: str, problem: str) -> UsageError:

@@ -42,8 +42,6 @@ class BridgeEmulator:
     ----------
     faults
         What goes wrong now; may be changed at any time.
-    damaged
-        How many frames came damaged so far; they are not answered.
     """
 
     def __init__(
@@ -65,11 +63,6 @@ class BridgeEmulator:
         self._free_s = 0.0
         self._decoder = FrameDecoder()
         self._due: deque[tuple[float, bytes]] = deque()
-
-    @property
-    def damaged(self) -> int:
-        """How many frames came damaged so far."""
-        return self._decoder.damaged
 
     def feed(self, data: bytes, now_s: float) -> list[tuple[float, bytes]]:
         """Take bytes from the host and return what is sent by now, each piece with its second."""

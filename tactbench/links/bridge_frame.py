@@ -1,7 +1,5 @@
 """Frames of our own for byte streams: version, kind, number, length, payload and CRC, between zero bytes.
 
-The SPI bridge and the gauge stream speak them.
-
 The format is this project's own, version 1; ``docs/links.md`` specifies it. Zero bytes stand between frames and nowhere
 else (consistent overhead byte stuffing, S. Cheshire and M. Baker, IEEE/ACM Transactions on Networking 7(2), 1999), so
 that a reader is in step again with the first frame after a fault.

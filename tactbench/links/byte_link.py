@@ -21,8 +21,8 @@ class ByteLink(Link):
         return self.read(timeout_s)
 
     @abstractmethod
-    def read(self, timeout_s: float, *, size: int = 65536) -> Received:
-        """Return what has come, at most `size` bytes, as soon as that is one; raises as every :class:`Link`."""
+    def read(self, timeout_s: float) -> Received:
+        """Return what has come, as soon as that is one byte; raises as every :class:`Link`."""
 
     @abstractmethod
     def write(self, data: bytes) -> None:
@@ -84,7 +84,7 @@ class SerialLink(ByteLink):
         self._ready = selectors.DefaultSelector()
         self._ready.register(descriptor, selectors.EVENT_READ)
 
-    def read(self, timeout_s: float, *, size: int = 65536) -> Received:  # noqa: D102  (inherited)
+    def read(self, timeout_s: float) -> Received:  # noqa: D102  (inherited)
         deadline = self._usable(timeout_s)
         left_s = timeout_s
         try:
@@ -94,11 +94,11 @@ class SerialLink(ByteLink):
                     data = self._port.read(1)
                     t_ns = self._clock()
                     if data:
-                        data += self._port.read(min(size - 1, self._port.in_waiting))
+                        data += self._port.read(self._port.in_waiting)
                 else:
                     self._ready.select(left_s)
                     t_ns = self._clock()
-                    data = self._port.read(size)
+                    data = self._port.read(65536)
                 if data:
                     return Received(data, t_ns)
                 left_s = deadline - self.timer()

@@ -9,15 +9,16 @@ import struct
 import time
 import zlib
 from abc import abstractmethod
+from collections import Counter
 from collections.abc import Iterable, Iterator
 from contextlib import ExitStack
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from itertools import islice
 from pathlib import Path
-from typing import Any
+from typing import Any, Self
 
-from tactbench.core.errors import LinkEnded, LinkError, UnknownNameError
+from tactbench.core.errors import LinkError, UnknownNameError
 from tactbench.links.link import WRITE_TIMEOUT_S, Clock, Link, cannot_open, os_error_in
 
 OWN_TIME_S = 60.0
@@ -39,26 +40,24 @@ class CanFrame:
 
 
 class CanLink(Link):
-    """Frames to and from a CAN bus: a :class:`CanBus` or a :class:`CanLog`.
+    """Frames to and from a CAN bus: a :class:`CanBus`, or an emulated device's.
 
     Attributes
     ----------
-    error_frames, other_frames, damaged
-        How many error frames, remote and FD frames, and unreadable ones were left out so far.
+    counts
+        How many were left out so far: ``error frames``, ``remote and FD frames``, ``unreadable frames``.
     """
 
     def __init__(self, address: str, clock: Clock = time.monotonic_ns) -> None:
         super().__init__(address, clock)
-        self.error_frames = 0
-        self.other_frames = 0
-        self.damaged = 0
+        self.counts: Counter[str] = Counter()
 
     def _take(self, timeout_s: float) -> CanFrame:
         return self.receive(timeout_s)
 
     @abstractmethod
     def receive(self, timeout_s: float) -> CanFrame:
-        """Return the next data frame; raises as every :class:`Link`, LinkEnded if a log is over."""
+        """Return the next data frame; raises as every :class:`Link`."""
 
     @abstractmethod
     def send(self, frame: CanFrame) -> None:
@@ -73,17 +72,18 @@ class CanLink(Link):
                 hint="An identifier has 11 bits (29 if extended), the data at most 8 bytes.",
             )
 
-    def _data_frame(self, message: Any, t_ns: int) -> CanFrame | None:
-        """Return python-can's `message` as a frame, or count it and return None."""
-        if message.is_error_frame:
-            self.error_frames += 1
-        elif message.is_remote_frame or message.is_fd:
-            self.other_frames += 1
-        elif message.dlc != len(message.data):
-            self.damaged += 1
-        else:
-            return CanFrame(message.arbitration_id, bytes(message.data), message.is_extended_id, t_ns)
-        return None
+
+def _data_frame(message: Any, t_ns: int, counts: Counter[str]) -> CanFrame | None:
+    """Return python-can's `message` as a frame, or count it and return None."""
+    if message.is_error_frame:
+        counts["error frames"] += 1
+    elif message.is_remote_frame or message.is_fd:
+        counts["remote and FD frames"] += 1
+    elif message.dlc != len(message.data):
+        counts["unreadable frames"] += 1
+    else:
+        return CanFrame(message.arbitration_id, bytes(message.data), message.is_extended_id, t_ns)
+    return None
 
 
 class CanBus(CanLink):
@@ -132,13 +132,13 @@ class CanBus(CanLink):
         while True:
             try:
                 message = self._bus.recv(left_s)
-                frame = None if message is None else self._data_frame(message, self._stamp(message.timestamp))
+                frame = None if message is None else _data_frame(message, self._stamp(message.timestamp), self.counts)
             except (can.CanError, OSError, ValueError, IndexError) as error:
                 if os_error_in(error) is not None:
                     raise self._unplugged(error) from error
                 # Bytes that are no frame. python-can's slcan would try those that are not ASCII again and again; its
                 # own flush() would drop the frames behind them as well.
-                self.damaged += 1
+                self.counts["unreadable frames"] += 1
                 getattr(self._bus, "_buffer", bytearray()).clear()
                 message = frame = None
             if frame is not None:
@@ -182,8 +182,8 @@ class CanBus(CanLink):
             self._bus.serialPortOrig.close()
 
 
-class CanLog(CanLink):
-    """A log: its frames one after the other, without waiting, stamped with the log's own times.
+class CanLog:
+    """The frames of a log, one after the other; use it in a ``with`` block.
 
     Stamps count from the log's start, which both formats keep: an ASC file's date has no time zone, a BLF file that was
     written with times before 1990 has no date. BLF stamps come within 0.25 us, since python-can returns float64.
@@ -198,32 +198,31 @@ class CanLog(CanLink):
     started
         The log's start as the file states it: ASC in the writer's local time, BLF in ISO 8601 as UTC; empty if it
         does not.
-    backward
-        How many frames so far have an earlier stamp than the one before them; they are returned as they are.
+    counts
+        What was left out so far (:class:`CanLink`), and how many frames have an earlier stamp than the one before;
+        these are returned as they are.
 
     Raises
     ------
     LinkError
-        If the file cannot be read, is of another kind, or is an ASC file with times relative to the event before:
-        events that are no frames carry part of the time, and python-can leaves them out.
+        If the file cannot be read, is damaged, of another kind, or is an ASC file with times relative to the event
+        before: events that are no frames carry part of the time, and python-can leaves them out.
     """
 
     def __init__(self, file: Path) -> None:
         import can
         from can.io.blf import BLFParseError
 
-        super().__init__(f"can://log/{file}")
-        self.backward = 0
-        self._last_ns = 0
-        self._count = 0
+        self._name = str(file)
         self._start_s = 0.0
+        self.counts: Counter[str] = Counter()
         if file.suffix.lower() not in (".asc", ".blf"):
             raise LinkError(f"{file} is not a log that can be read.", hint="Give a file that ends in .asc or .blf.")
         with ExitStack() as opened:
             try:
                 if file.suffix.lower() == ".asc":
                     text = opened.enter_context(file.open(encoding="utf-8", errors="replace"))
-                    self.started = _asc_start(self.address, text)
+                    self.started = _asc_start(self._name, text)
                     text.seek(0)
                     self._reader: Any = can.ASCReader(text, relative_timestamp=True)
                 else:
@@ -231,40 +230,32 @@ class CanLog(CanLink):
                     self._start_s = self._reader.start_timestamp
                     self.started = datetime.fromtimestamp(self._start_s, UTC).isoformat() if self._start_s else ""
             except (OSError, ValueError, BLFParseError, struct.error) as error:
-                raise cannot_open(self.address, error) from error
+                raise cannot_open(self._name, error) from error
             self._file = opened.pop_all()
-        self._messages: Iterator[Any] = iter(self._reader)
 
-    def receive(self, timeout_s: float) -> CanFrame:
-        """Return the next data frame at once; raises LinkEnded if the log is over, LinkError if it is damaged."""
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._file.close()
+
+    def __iter__(self) -> Iterator[CanFrame]:
         from can.io.blf import BLFParseError
 
-        self._usable(timeout_s)
-        while True:
-            try:
-                message = next(self._messages)
-            except StopIteration:
-                raise LinkEnded(f"The log {self.address} is over after {self._count} frames.") from None
-            except (ValueError, LookupError, OSError, BLFParseError, struct.error, zlib.error) as error:
-                raise LinkError(
-                    f"The log {self.address} is damaged after {self._count} frames: {error}.",
-                    hint="Use the frames before, or export the log anew.",
-                ) from error
-            self._count += 1
-            t_ns = round((message.timestamp - self._start_s) * 1e9)
-            self.backward += t_ns < self._last_ns
-            self._last_ns = t_ns
-            frame = self._data_frame(message, t_ns)
-            if frame is not None:
-                return frame
-
-    def send(self, frame: CanFrame) -> None:
-        """Raise LinkError: a log takes nothing."""
-        self._usable()
-        raise LinkError(f"{self.address} is a log: nothing can be sent to it.", hint="Read it, or open a bus.")
-
-    def _release(self) -> None:
-        self._file.close()
+        number = last_ns = 0
+        try:
+            for number, message in enumerate(self._reader, 1):  # noqa: B007  (said where it is damaged)
+                t_ns = round((message.timestamp - self._start_s) * 1e9)
+                self.counts["times that go back"] += t_ns < last_ns
+                last_ns = t_ns
+                frame = _data_frame(message, t_ns, self.counts)
+                if frame is not None:
+                    yield frame
+        except (ValueError, LookupError, OSError, BLFParseError, struct.error, zlib.error) as error:
+            raise LinkError(
+                f"The log {self._name} is damaged after {number} frames: {error}.",
+                hint="Use the frames before, or export the log anew.",
+            ) from error
 
 
 def _asc_start(address: str, lines: Iterable[str]) -> str:

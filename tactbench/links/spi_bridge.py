@@ -51,9 +51,6 @@ class SpiBridge(SpiLink):
         The SPI clock it runs, hertz.
     holds
         Batches it holds, the running one included.
-    lost, unexpected
-        Replies that never came though later ones did, or until they were abandoned; and replies to no batch that waits
-        for one: doubled or late.
 
     Raises
     ------
@@ -70,8 +67,6 @@ class SpiBridge(SpiLink):
         wake_s: float = 3.0,
     ) -> None:
         super().__init__(f"spi://bridge/{port.address}")
-        self.lost = 0
-        self.unexpected = 0
         self._decoder = FrameDecoder()
         self._frames: deque[tuple[Frame, int]] = deque()
         self._waiting: dict[int, tuple[int, ...]] = {}
@@ -82,11 +77,6 @@ class SpiBridge(SpiLink):
         except BaseException:
             self._bytes.close()
             raise
-
-    @property
-    def damaged(self) -> int:
-        """How many frames came damaged so far."""
-        return self._decoder.damaged
 
     def timer(self) -> float:
         """Return the seconds by which the port's waits are counted."""
@@ -170,19 +160,16 @@ class SpiBridge(SpiLink):
         while True:
             frame, t_ns = self._next(timeout_s, deadline)
             if frame.kind not in (Kind.BATCH.reply, Kind.ERROR.reply) or frame.number not in self._waiting:
-                self.unexpected += 1
-                continue
+                continue  # doubled or late
             if frame.kind == Kind.ERROR.reply:  # may come before the replies to earlier batches, which still run
                 del self._waiting[frame.number]
                 if frame.payload == FULL:  # it still has batches that were given up here: this one is lost, too
-                    self.lost += 1
                     continue
                 raise self._refused(frame)
             for number in list(self._waiting):
                 lengths = self._waiting.pop(number)
                 if number == frame.number:
                     break
-                self.lost += 1
             if len(frame.payload) != BEGIN.size + sum(lengths):
                 raise self._nonsense(frame)
             data = []
@@ -193,16 +180,7 @@ class SpiBridge(SpiLink):
             return SpiReply(frame.number, tuple(data), t_ns, BEGIN.unpack_from(frame.payload)[0])
 
     def abandon(self) -> None:  # noqa: D102
-        self.lost += len(self._waiting)
         self._waiting.clear()
-
-    def transfer(self, data: bytes, *, select: int = 1, pause_us: int = 0, timeout_s: float = 1.0) -> bytes:  # noqa: D102
-        try:
-            return super().transfer(data, select=select, pause_us=pause_us, timeout_s=timeout_s)
-        except LinkTimeout:
-            # Given up: its reply, should it come late, is unexpected.
-            self._waiting.pop(self._number, None)
-            raise
 
     def _refused(self, frame: Frame) -> LinkError:
         reason = frame.payload.decode("ascii", "replace") or "it gives no reason"

@@ -91,15 +91,6 @@ class SpiLink(Link):
     def abandon(self) -> None:
         """Wait no longer for replies to what was sent; those that come late are dropped. Raises nothing."""
 
-    def transfer(self, data: bytes, *, select: int = 1, pause_us: int = 0, timeout_s: float = 1.0) -> bytes:
-        """Exchange `data` at once and return what came in; replies to earlier batches are dropped."""
-        number = self.send([SpiStep(data, select, pause_us)])
-        deadline = self.timer() + timeout_s
-        while True:
-            reply = self.receive(max(0.0, deadline - self.timer()))
-            if reply.number == number:
-                return reply.data[0]
-
 
 class SpidevLink(SpiLink):
     """A device ``/dev/spidevBUS.SELECT``.

@@ -6,21 +6,20 @@ the device.
 
 from typing import TYPE_CHECKING
 
-from tactbench.core.errors import LinkEnded, LinkError, LinkTimeout, LinkUnplugged
+from tactbench.core.errors import LinkError, LinkTimeout, LinkUnplugged
 from tactbench.core.on_demand import on_demand
 from tactbench.core.plugins.checks import CheckTable, RigCheck
 from tactbench.core.plugins.interfaces import DeviceAcquisition, Operator
-from tactbench.core.spec.recording import Emulation, StreamClock, StreamCounts
+from tactbench.core.spec.recording import StreamCounts
 from tactbench.core.spec.rig import DeviceDescriptor
 from tactbench.core.spec.rig_file import FORCE, ForceEntry, NamedDevice, RigFile
 
 if TYPE_CHECKING:
-    from tactbench.core.plugins.emulators import RigEmulators
+    from tactbench.core.plugins.emulators import RigEmulators, SceneEmulators
     from tactbench.core.plugins.rig_devices import (
         PressingForce,
         ask_operator,
         drivers_of,
-        emulation_of,
         emulators_of,
         physics_of,
         with_sensor,
@@ -89,7 +88,6 @@ __all__ = [
     "DriverSettings",
     "EmulatedDevice",
     "EmulatedDevices",
-    "Emulation",
     "EmulatorSettings",
     "Event",
     "Fault",
@@ -101,7 +99,6 @@ __all__ = [
     "GuardState",
     "Limits",
     "Link",
-    "LinkEnded",
     "LinkError",
     "LinkTimeout",
     "LinkUnplugged",
@@ -130,6 +127,7 @@ __all__ = [
     "RowDriver",
     "RowEmulator",
     "Sample",
+    "SceneEmulators",
     "SceneSamples",
     "Senses",
     "Sent",
@@ -138,12 +136,10 @@ __all__ = [
     "SpiLink",
     "SpiReply",
     "SpiStep",
-    "StreamClock",
     "StreamCounts",
     "Unwrap",
     "ask_operator",
     "drivers_of",
-    "emulation_of",
     "emulators_of",
     "fault_concerns",
     "largest_force_n",

@@ -14,7 +14,7 @@ from tactbench.core.errors import LinkUnplugged, RigError
 from tactbench.core.recording.reader import content_digest, open_recording
 from tactbench.core.recording.salvage import rescue
 from tactbench.core.samples import Block
-from tactbench.core.spec.recording import PlanEntry, StreamClock, StreamCounts
+from tactbench.core.spec.recording import PlanEntry, StreamCounts
 from tactbench.core.spec.rig import RigDescriptor, SensorDescriptor
 from tactbench.core.spec.rig_file import DeviceEntry, RigFile
 from tactbench.core.spec.scene import Scene
@@ -103,12 +103,7 @@ class Devices(Weights):
     When it is told to stop it notes whether `kept` is there already, and says what is `left` to do.
     """
 
-    clocks = {  # noqa: RUF012
-        "taxels": StreamClock(source="device", delay_ns=(200_000, 300_000), wraps=2),
-        "force_torque": StreamClock(source="host"),
-    }
     counts = {"pad crc errors": 1}  # noqa: RUF012
-    emulation = None
     ended = ""
     identity = {}  # noqa: RUF012
 
@@ -144,7 +139,7 @@ def test_what_devices_say_is_recorded_and_times_are_the_hosts(tmp_path):
     assert meta.streams == {"taxels": StreamCounts(received=202, written=200, dropped=2)}
     assert meta.counts == {"pad crc errors": 1}
     clock = meta.clocks["taxels"]
-    assert (clock.source, clock.method, clock.delay_ns, clock.wraps) == ("device", "hull-1way", (200_000, 300_000), 2)
+    assert (clock.source, clock.method, set(meta.clocks)) == ("device", "hull-1way", {"taxels"})
     true = np.arange(200) * 1_000_000 + 1_800_000_000_000
     # 200 delays up to 0.5 ms: the two lowest on either side of the middle are some microseconds.
     assert np.abs(taxels.t_ns - true).max() < 100_000 <= np.abs(taxels.host_ns - true).max()
@@ -206,6 +201,11 @@ def test_what_is_emulated_is_marked_by_the_rig_file_whatever_the_rig_says(tmp_pa
     )
     meta, _ = run(tmp_path / "r.h5", Devices(tmp_path / "r.h5"), simulated=False, rig_file=file)
     assert (meta.simulated, meta.emulation.devices) == (True, (SENSOR.name,))
+    late = {SENSOR.name: DeviceEntry(link="emulated", faults=("late",))}
+    virtual = RigFile(rig="weights", sensors=late, devices={"motor": {"device": "faulhaber", "link": "emulated"}})
+    made, _ = run(tmp_path / "virtual.h5", Devices(tmp_path / "r.h5"), simulated=False, rig_file=virtual)
+    assert (made.emulation.time, set(made.emulation.devices)) == ("virtual", {SENSOR.name, "motor"})
+    assert (made.emulation.faults, made.emulation.factor > 0) == ((f"{SENSOR.name}: late",), True)
     plain = file.model_copy(update={"sensors": {SENSOR.name: DeviceEntry(link=link)}})
     real, _ = run(tmp_path / "real.h5", Devices(tmp_path / "r.h5"), simulated=False, rig_file=plain)
     assert (real.simulated, real.emulation) == (False, None)

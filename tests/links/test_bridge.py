@@ -93,6 +93,11 @@ def batch(*steps):
     return b"".join(head + step.data for head, step in zip(parts, steps, strict=True))
 
 
+def transfer(link, data):
+    link.send([SpiStep(data)])
+    return link.receive(2.0).data[0]
+
+
 def ready(**options):
     bus = Told()
     emulator = BridgeEmulator(bus, **options)
@@ -197,7 +202,7 @@ def test_batches_are_answered_in_order(link):
 def test_impossible_batches_are_refused_before_they_are_sent(link, steps, said):
     with pytest.raises(LinkError, match=said):
         link.send(steps)
-    assert link.transfer(b"\xff") == b"\x00"
+    assert transfer(link, b"\xff") == b"\x00"
 
 
 @needs_pty
@@ -208,7 +213,7 @@ def test_more_than_the_bridge_holds_is_refused(link):
         link.send([SpiStep(b"a")])
     for _ in range(3):
         link.receive(2.0)
-    assert link.transfer(b"\xff") == b"\x00"
+    assert transfer(link, b"\xff") == b"\x00"
 
 
 @needs_pty
@@ -222,21 +227,10 @@ def test_a_reply_that_does_not_come_is_a_timeout_and_then_a_gap(link, emulator, 
     second = link.send([SpiStep(b"\x01")])
     reply = link.receive(2.0)
     assert (reply.number, reply.data) == (second, (b"\xfe",)) == (first + 1, (b"\xfe",))
-    assert (link.lost, link.damaged) == (1, 1 if fault == "damaged" else 0)
 
 
 @needs_pty
-def test_a_transfer_given_up_leaves_room(link, emulator):
-    emulator.faults.add("dropped")
-    for _ in range(5):
-        with pytest.raises(LinkTimeout):
-            link.transfer(b"a", timeout_s=0.02)
-    emulator.faults.clear()
-    assert link.transfer(b"\xff") == b"\x00"
-
-
-@needs_pty
-def test_batches_that_are_abandoned_leave_room_and_count_as_lost(link, emulator):
+def test_batches_that_are_abandoned_leave_room(link, emulator):
     emulator.faults.add("dropped")
     assert link.holds == 3
     for _ in range(3):
@@ -247,17 +241,15 @@ def test_batches_that_are_abandoned_leave_room_and_count_as_lost(link, emulator)
         link.receive(0.1)
     link.abandon()
     emulator.faults.clear()
-    assert link.transfer(b"\xff") == b"\x00"
-    assert link.lost == 3
+    assert transfer(link, b"\xff") == b"\x00"
 
 
 @needs_pty
 def test_a_doubled_reply_is_counted_once(link, emulator):
     emulator.faults.add("doubled")
-    assert [link.transfer(bytes([n])) for n in range(3)] == [b"\xff", b"\xfe", b"\xfd"]
+    assert [transfer(link, bytes([n])) for n in range(3)] == [b"\xff", b"\xfe", b"\xfd"]
     with pytest.raises(LinkTimeout):
         link.receive(0.1)
-    assert link.unexpected == 3
 
 
 @needs_pty

@@ -33,11 +33,10 @@ def test_every_byte_passes_unchanged_both_ways(far):
         assert data == ALL_BYTES
 
 
-def test_what_has_come_is_returned_at_once_and_no_more_than_asked(far):
+def test_what_has_come_is_returned_at_once(far):
     with SerialLink(far.name) as link:
         far.write(b"abcdef")
-        assert link.read(2.0, size=4).data == b"abcd"
-        assert link.read(0).data == b"ef"
+        assert link.read(2.0).data == b"abcdef"
 
 
 def test_stamp_is_taken_when_the_first_byte_is_there(far):

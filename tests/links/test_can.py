@@ -40,7 +40,7 @@ def test_other_frames_are_counted_and_left_out():
         far.send(can.Message(arbitration_id=1, is_fd=True, data=bytes(12)))
         far.send(can.Message(arbitration_id=2, is_extended_id=False, data=b"x"))
         assert content(link.receive(0)) == (2, b"x", False)
-        assert (link.error_frames, link.other_frames, link.damaged) == (1, 2, 0)
+        assert link.counts == {"error frames": 1, "remote and FD frames": 2}
 
 
 @pytest.mark.parametrize("frame", [CanFrame(0x800, b""), CanFrame(1, bytes(9)), CanFrame(1 << 29, b"", extended=True)])
@@ -85,7 +85,7 @@ def test_noise_on_slcan_costs_what_it_hit(noise):
     with pty() as far, open_link(f"can://slcan/{far.name}?bitrate=1000000&sleep_after_open=0") as link:
         far.write(noise + b"\rt4E024001\r")
         assert content(link.receive(2.0)) == (0x4E0, b"\x40\x01", False)
-        assert link.damaged == 1
+        assert link.counts["unreadable frames"] == 1
 
 
 CHILD = """

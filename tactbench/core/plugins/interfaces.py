@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
 from tactbench.core.samples import Block, SkinGrid, SkinState
-from tactbench.core.spec.recording import PlanEntry, Scalar, StreamClock, StreamCounts
+from tactbench.core.spec.recording import PlanEntry, Scalar, StreamCounts
 from tactbench.core.spec.rig import EffectDescriptor, IndenterDescriptor, SensorDescriptor
 from tactbench.core.spec.rig_file import RigFile
 from tactbench.core.spec.scene import Scene
@@ -63,10 +63,6 @@ class SimulatedPress(Acquisition, Protocol):
 
 class DeviceAcquisition(Acquisition, Protocol):
     """An acquisition from devices says more, once it is over."""
-
-    @property
-    def clocks(self) -> Mapping[str, StreamClock]:
-        """By stream: where its times come from; without the lines, which are fitted to the blocks."""
 
     @property
     def stream_counts(self) -> Mapping[str, StreamCounts]:

@@ -39,14 +39,20 @@ class _Track:
 class _Stillness:
     """Since when nothing changes in a stream of the force sensor, or in all streams of the sensor together."""
 
-    same_ns: tuple[int, int] | None = None
-    """From the last change to the last row."""
-    long: list[tuple[int, int]] = field(default_factory=list)
+    same: tuple[int, int, int] | None = None
+    """From the last change to the last row, and how many rows since."""
+    long: list[tuple[int, int, int]] = field(default_factory=list)
     """Former ones, longer than is allowed."""
+    rows: int = 0
+    changes: int = 0
 
 
 class Completeness:
     """What is missing in a recording, from its blocks as they are written.
+
+    The force sensor is frozen where it stands still for longer than is allowed and most of its other rows differ from
+    the one before; or if it never changes while the sensor does. One with a coarse display, which repeats rows also
+    while it is loaded, may stand still without load.
 
     Parameters
     ----------
@@ -97,13 +103,17 @@ class Completeness:
 
     def _stillness(self, track: _Track, still: _Stillness, t_ns: npt.NDArray[np.int64], data: npt.NDArray[Any]) -> None:
         row = data[0] if track.row is None else track.row
-        since_ns, seen_ns = still.same_ns or (int(t_ns[0]), int(t_ns[0]))
-        changed = (data != np.concatenate((row[None], data[:-1]))).any(axis=1)
-        begins = np.concatenate(([since_ns], t_ns[changed]))
-        ends = np.concatenate((np.concatenate(([seen_ns], t_ns[:-1]))[changed], t_ns[-1:]))
-        for place in np.flatnonzero(ends[:-1] - begins[:-1] > 1e9 * self._allowed.frozen_s).tolist():
-            still.long.append((int(begins[place]), int(ends[place])))
-        track.row, still.same_ns = data[-1].copy(), (int(begins.max()), int(max(ends[-1], seen_ns)))
+        changed = np.flatnonzero((data != np.concatenate((row[None], data[:-1]))).any(axis=1)).tolist()
+        since_ns, seen_ns, rows = still.same or (int(t_ns[0]), int(t_ns[0]), 0)
+        begin = 0
+        for place in changed:
+            seen_ns = max(seen_ns, int(t_ns[place - 1])) if place else seen_ns
+            if seen_ns - since_ns > 1e9 * self._allowed.frozen_s:
+                still.long.append((since_ns, seen_ns, rows + place - begin))
+            since_ns, rows, begin = max(since_ns, int(t_ns[place])), 0, place
+        track.row, still.same = data[-1].copy(), (since_ns, max(seen_ns, int(t_ns[-1])), rows + len(data) - begin)
+        still.rows += len(data)
+        still.changes += len(changed)
 
     @property
     def seconds(self) -> float:
@@ -121,16 +131,22 @@ class Completeness:
         if name in self._rated and silent_ns > 1e9 * self._allowed.silent_s:
             yield f"{name}: nothing for {1e-9 * silent_ns:.3g} s from {1e-9 * (from_ns - begin_ns):.3g} s on"
         still = self._still[name]
-        for from_ns, to_ns in (*still.long, *([still.same_ns] if still.same_ns else [])):
+        for from_ns, to_ns, rows in (*still.long, *([still.same] if still.same else [])):
             if to_ns - from_ns <= 1e9 * self._allowed.frozen_s:
                 continue
-            if name in self._reference or self._pressed(from_ns, to_ns):
+            if self._dead(still, rows) if name in self._reference else self._pressed(from_ns, to_ns):
                 yield f"{name}: frozen for {1e-9 * (to_ns - from_ns):.3g} s from {1e-9 * (from_ns - begin_ns):.3g} s on"
                 break
         if counts is not None:
             lost, due = counts.gaps - counts.late + counts.dropped, counts.received + counts.gaps - counts.late
             if due and lost / due > 0.01 * self._allowed.lost_percent:
                 yield f"{name}: {lost} of {due} rows lost"
+
+    def _dead(self, still: _Stillness, rows: int) -> bool:
+        """Return whether `rows` of a force sensor that are the same are too many, by its other rows."""
+        if not still.changes:
+            return any(one.changes for name, one in self._still.items() if name not in self._reference)
+        return still.changes > (still.rows - rows) / 2
 
     def _pressed(self, from_ns: int, to_ns: int) -> bool:
         """Return whether the force changed within a time."""

@@ -68,7 +68,8 @@ class Allowed(Frozen):
     lost_percent: float = Field(default=2.0, ge=0, le=100)
     """Rows of a stream that never came, or were dropped since writing was behind."""
     frozen_s: float = Field(default=2.0, gt=0)
-    """Longest time in which no channel of the force sensor changes; or of a sensor's stream, while the force does."""
+    """Longest time in which no channel of the force sensor changes, though most of its other rows differ from the one
+    before; or of the sensor, while the force does. A force that never changes while the sensor does is frozen, too."""
 
 
 class NamedDevice(DeviceEntry):

@@ -15,13 +15,6 @@ LOWER_IS_BETTER = frozenset({"rmse", "mae", "mean_euclidean_error"})
 MEDIAN_ERROR, HIGH_ERROR = "median error", "95th percentile of the error"
 """Keys of `scores` that stand beside the mean error of a vector: percentiles over the test rows."""
 
-INTERVALS = (
-    ("score", "ci_low", "ci_high"),
-    ("score_beyond_floor", "beyond_floor_ci_low", "beyond_floor_ci_high"),
-    ("true_score", "true_ci_low", "true_ci_high"),
-)
-"""Numbers of a row and the intervals that hold them: each is built around its number."""
-
 Numbers = dict[str, float]
 
 

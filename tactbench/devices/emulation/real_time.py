@@ -8,7 +8,6 @@ import re
 import selectors
 import socket
 import threading
-from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from contextlib import ExitStack, suppress
 
@@ -20,30 +19,7 @@ from tactbench.links.datagram_link import LARGEST_DATAGRAM
 from tactbench.links.link import Clock
 
 
-class End(ABC):
-    """A link of the system, as the emulated device holds it: it has a file descriptor, and never waits."""
-
-    address: str
-    """What the host opens."""
-
-    @abstractmethod
-    def fileno(self) -> int:
-        """Return what becomes readable when something comes."""
-
-    @abstractmethod
-    def received(self) -> list[Piece]:
-        """Return what has come."""
-
-    @abstractmethod
-    def send(self, t_s: float, piece: Piece) -> None:
-        """Send to the host; what the system does not take at once is lost, as on a line that nobody reads."""
-
-    @abstractmethod
-    def close(self) -> None:
-        """Give the link back to the system; the host sees it gone, where its kind of link can show that."""
-
-
-class PseudoTerminal(End):
+class PseudoTerminal:
     """A serial line: its address is that of the terminal, which stays while hosts open and close it.
 
     Parameters
@@ -66,25 +42,29 @@ class PseudoTerminal(End):
         os.set_blocking(self._master, False)
         self.address = pattern.format(os.ttyname(self._slave))
 
-    def fileno(self) -> int:  # noqa: D102  (inherited)
+    def fileno(self) -> int:
+        """Return what becomes readable when something comes."""
         return self._master
 
-    def received(self) -> list[Piece]:  # noqa: D102  (inherited)
+    def received(self) -> list[Piece]:
+        """Return what has come."""
         with suppress(BlockingIOError):
             return [os.read(self._master, 65536)]
         return []
 
-    def send(self, t_s: float, piece: Piece) -> None:  # noqa: D102  (inherited)
+    def send(self, t_s: float, piece: Piece) -> None:
+        """Send to the host; what the system does not take at once is lost, as on a line that nobody reads."""
         assert isinstance(piece, bytes)
         with suppress(BlockingIOError):
             os.write(self._master, piece)
 
-    def close(self) -> None:  # noqa: D102  (inherited)
+    def close(self) -> None:
+        """Give the link back to the system."""
         os.close(self._master)
         os.close(self._slave)
 
 
-class UdpEnd(End):
+class UdpEnd:
     """A UDP port on loopback; datagrams go to whom the last one came from."""
 
     def __init__(self) -> None:
@@ -94,23 +74,31 @@ class UdpEnd(End):
         self._host: tuple[str, int] | None = None
         self.address = f"udp://127.0.0.1:{self._socket.getsockname()[1]}"
 
-    def fileno(self) -> int:  # noqa: D102  (inherited)
+    def fileno(self) -> int:
+        """Return what becomes readable when something comes."""
         return self._socket.fileno()
 
-    def received(self) -> list[Piece]:  # noqa: D102  (inherited)
+    def received(self) -> list[Piece]:
+        """Return what has come."""
         with suppress(OSError):  # nothing there, or the host's port is gone
             data, self._host = self._socket.recvfrom(LARGEST_DATAGRAM)
             return [data]
         return []
 
-    def send(self, t_s: float, piece: Piece) -> None:  # noqa: D102  (inherited)
+    def send(self, t_s: float, piece: Piece) -> None:
+        """Send to the host; what the system does not take at once is lost, as on a line that nobody reads."""
         assert isinstance(piece, bytes)
         if self._host is not None:
             with suppress(OSError):
                 self._socket.sendto(piece, self._host)
 
-    def close(self) -> None:  # noqa: D102  (inherited)
+    def close(self) -> None:
+        """Give the link back to the system."""
         self._socket.close()
+
+
+End = PseudoTerminal | UdpEnd
+"""A link of the system, as the emulated device holds it; it never waits."""
 
 
 class SlcanAdapter:

@@ -60,11 +60,6 @@ class SceneSamples:
         """Let the scene begin at `at_s` on the devices' clock; it may begin again."""
         self._start_s = at_s
 
-    @property
-    def over_s(self) -> float:
-        """When it is over, on the devices' clock; minus infinity: it has not begun."""
-        return float("-inf") if self._start_s is None else self._start_s + self.duration_s
-
     def __call__(self, t_s: float) -> Mapping[str, float]:
         """Return the value of every channel at `t_s`, seconds of the devices' clock, in the channels' units."""
         since_ns = round(1e9 * (t_s - (self._start_s or 0.0)))

@@ -129,17 +129,14 @@ class VirtualByteLink(_VirtualLink, ByteLink):
     A read returns what came at one moment, so that every piece keeps its time.
     """
 
-    def read(self, timeout_s: float, *, size: int = 65536) -> Received:  # noqa: D102  (inherited)
+    def read(self, timeout_s: float) -> Received:  # noqa: D102  (inherited)
         self._wait(timeout_s)
-        t_ns, data = self._arrived[0][0], bytearray()
-        while self._arrived and len(data) < size and self._arrived[0][0] == t_ns:
-            came_ns, piece = self._arrived.popleft()
+        t_ns, data = self._arrived[0][0], b""
+        while self._arrived and self._arrived[0][0] == t_ns:
+            _, piece = self._arrived.popleft()
             assert isinstance(piece, bytes)
-            left = size - len(data)
-            if len(piece) > left:
-                self._arrived.appendleft((came_ns, piece[left:]))
-            data += piece[:left]
-        return Received(bytes(data), t_ns)
+            data += piece
+        return Received(data, t_ns)
 
     def write(self, data: bytes) -> None:  # noqa: D102  (inherited)
         self._usable()

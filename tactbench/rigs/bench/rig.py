@@ -11,7 +11,6 @@ import time
 from collections.abc import Iterator, Mapping
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field
-from functools import partial
 from typing import TYPE_CHECKING
 
 from tactbench.plugin import (
@@ -36,12 +35,10 @@ from tactbench.plugin.devices import (
     PressingForce,
     Reading,
     RigFile,
-    SceneSamples,
-    StreamClock,
+    SceneEmulators,
     StreamCounts,
     ask_operator,
     drivers_of,
-    emulators_of,
     physics_of,
     with_sensor,
 )
@@ -60,7 +57,6 @@ class BenchAcquisition:
     plan: tuple[PlanEntry, ...]
     assumptions: Mapping[str, Scalar]
     drawn: Mapping[str, Scalar]
-    clocks: Mapping[str, StreamClock]
     reading: Reading = field(repr=False)
     duration_s: float
     force: PressingForce | None
@@ -122,14 +118,15 @@ class Bench:
         """
         file = with_sensor(self._file, sensor.name).checked_for_one_clock()
         with ExitStack() as stack:
-            simulated = stack.enter_context(self._simulated(file, sensor, scene, seed))
-            profile = scene.profile
-            duration_s = profile.duration.to("s")
-            senses = None if simulated is None else SceneSamples(simulated, duration_s, rest_s=profile.hold_s)
-            emulators = {} if senses is None else emulators_of(file, self._registry, sensor.name, senses)
-            emulated = stack.enter_context(EmulatedDevices(emulators)) if emulators else None
+            simulated: Acquisition | None = None
+            emulators = SceneEmulators(file, self._registry)
+            emulated: EmulatedDevices | None = None
+            if self._physics is not None and file.emulated and file.emulation.time == "virtual":
+                simulated = stack.enter_context(self._physics.open(sensor, scene, seed=seed))
+                emulators.prepare(simulated, sensor, scene, seed)
+                emulated = stack.enter_context(EmulatedDevices(emulators.devices))
             clock = time.monotonic_ns if emulated is None else emulated.clock
-            links = {} if emulated is None else {name: partial(emulated.open_link, name) for name in emulators}
+            links = {} if emulated is None else {name: emulated.opener(name) for name in emulators.devices}
             drivers = drivers_of(file, self._registry, sensor.name, links, clock)
             for driver in drivers.values():
                 stack.callback(driver.close)
@@ -142,8 +139,7 @@ class Bench:
                 Reading(drivers, clock=clock, advance=advance, silent_s=file.allowed.silent_s)
             )
             own = drivers[sensor.name].streams
-            if senses is not None:
-                senses.start(clock() * 1e-9)
+            emulators.begin(clock() * 1e-9)
             yield BenchAcquisition(
                 streams=own,
                 reference=() if force is None else force.streams,
@@ -154,23 +150,11 @@ class Bench:
                     **{f"{name} {key}": value for name, about in identity.items() for key, value in about.items()},
                     **({} if force is None else force.about(zero)),
                 },
-                clocks={},
                 reading=reading,
-                duration_s=duration_s,
+                duration_s=scene.profile.duration.to("s"),
                 force=force,
                 zero=zero,
             )
-
-    @contextmanager
-    def _simulated(
-        self, file: RigFile, sensor: SensorDescriptor, scene: Scene, seed: int
-    ) -> Iterator[Acquisition | None]:
-        """Give the scene as the simulated rig carries it out; None where no device is emulated."""
-        if self._physics is None or not file.emulated or file.emulation.time == "real":
-            yield None
-            return
-        with self._physics.open(sensor, scene, seed=seed) as acquisition:
-            yield acquisition
 
     def _zero(self, force: PressingForce, file: RigFile, driver: Driver, clock: Clock) -> dict[str, FloatArray]:
         """Return what the force sensor reads without load, by stream; raises RigError if it is not at rest."""

@@ -7,7 +7,6 @@ process and one thread, a control period at a time.
 from __future__ import annotations
 
 import math
-import time
 from collections.abc import Collection, Iterator, Mapping
 from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass, field, replace
@@ -37,7 +36,6 @@ from tactbench.plugin.devices import (
     Control,
     Course,
     DeviceAcquisition,
-    Emulation,
     Event,
     GuardLostError,
     Operator,
@@ -45,10 +43,8 @@ from tactbench.plugin.devices import (
     PressingForce,
     Reading,
     RigFile,
-    StreamClock,
     StreamCounts,
     ask_operator,
-    emulation_of,
     physics_of,
     read_options,
     with_sensor,
@@ -77,8 +73,6 @@ class PressAcquisition:
     plan: tuple[PlanEntry, ...]
     assumptions: Mapping[str, Scalar]
     about: Mapping[str, Scalar]
-    clocks: Mapping[str, StreamClock]
-    emulation: Emulation | None
     force: PressingForce = field(repr=False)
     zero: Mapping[str, FloatArray] = field(repr=False)
     control: Control = field(repr=False)
@@ -98,7 +92,6 @@ class PressAcquisition:
 
     def __iter__(self) -> Iterator[Block]:
         """Yield blocks of sensor, force sensor and motor until the scene is over; then unload, and retreat."""
-        began_s = time.perf_counter()
         press = self.control.press
         end_ns = self.begin_ns + round(1e9 * self.duration_s)
         for block in self.blocks:
@@ -107,10 +100,6 @@ class PressAcquisition:
                 break
         yield from self._within(self.control.blocks(), end_ns)
         self.said += self.control.events()
-        spent_s = time.perf_counter() - began_s
-        if self.emulation is not None and spent_s > 0:
-            factor = 1e-9 * (self.clock() - self.begin_ns) / spent_s
-            self.emulation = self.emulation.model_copy(update={"factor": factor})
 
     def _within(self, blocks: Iterator[Block], end_ns: int) -> Iterator[Block]:
         """Yield the rows that belong to the scene."""
@@ -322,8 +311,6 @@ class ParallelManipulator:
                 **({} if platform_m is None else {"platform mm": ", ".join(f"{1e3 * x:.4f}" for x in platform_m)}),
                 **({} if senses is None else {"skin mm": 1e3 * senses[1].skin_m}),
             },
-            clocks={},
-            emulation=emulation_of(file, identity),
             force=force,
             zero=zero,
             control=control,

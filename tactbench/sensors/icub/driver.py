@@ -85,13 +85,7 @@ class FingertipDriver(Driver):
     @property
     def counts(self) -> Mapping[str, int]:
         """See :meth:`~tactbench.sensors.icub.codec.Counts.named`; beside them what was not ours, or no data frame."""
-        link = {
-            "frames of others": self._others,
-            "error frames": self._link.error_frames,
-            "remote and FD frames": self._link.other_frames,
-            "unreadable frames": self._link.damaged,
-        }
-        return self._earlier + self._counted() + Counter(link)
+        return self._earlier + self._counted() + Counter({"frames of others": self._others}) + self._link.counts
 
     def identify(self) -> Mapping[str, str]:
         """Return board, triangle, and the firmware's version; a board that does not answer may be of old firmware.

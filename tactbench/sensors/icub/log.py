@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from tactbench.plugin import DataError, Source, UsageError
-from tactbench.plugin.devices import CanFrame, CanLog, DeviceLog, LinkEnded, read_options
+from tactbench.plugin.devices import CanFrame, CanLog, DeviceLog, read_options
 from tactbench.sensors.icub.channels import STREAMS
 from tactbench.sensors.icub.codec import (
     BROADCAST,
@@ -54,11 +54,7 @@ def read_log(path: Path, options: Mapping[str, Any]) -> DeviceLog:
     commands = []
     frames = 0
     with CanLog(path) as log:
-        while True:
-            try:
-                frame = log.receive(0.0)
-            except LinkEnded:
-                break
+        for frame in log:
             frames += 1
             if not frame.extended and frame.id >> 8 in classes and frame.data[:1] in (bytes([HEAD]), bytes([TAIL])):
                 halves.setdefault((frame.id >> 4 & 0xF, frame.id & 0xF), []).append(frame)
@@ -79,10 +75,7 @@ def read_log(path: Path, options: Mapping[str, Any]) -> DeviceLog:
     counts = {
         **decoder.counts[board, triangle].named(),
         "frames of others": frames - len(half) - len(commands),
-        "error frames": log.error_frames,
-        "remote and FD frames": log.other_frames,
-        "unreadable frames": log.damaged,
-        "times that go back": log.backward,
+        **log.counts,
         "samples kept out, not after the one before": len(samples) - len(kept),
         "baselines taken": sum(isinstance(command, TriangleSetup) for command in sent),
     }

@@ -78,6 +78,17 @@ def test_a_force_that_stands_still_is_frozen_and_a_sensor_if_the_force_moves_mea
     assert lacking(taxels=pressed_last, force=at_rest) == []
 
 
+def test_a_force_of_coarse_steps_may_stand_still_without_load_and_one_that_never_changes_is_frozen():
+    coarse = lambda t_s: np.round(np.clip(t_s - 3.0, 0.0, 4.0), 1)[:, None]  # noqa: E731
+    assert lacking(force=coarse) == []
+    assert lacking(force=coarse, frozen_s=1.0) == []
+    noisy = np.random.default_rng(2).normal(size=(SECONDS * HZ, 1))
+    hung = lambda t_s: np.where((t_s[:, None] >= 4.0) & (t_s[:, None] < 7.0), 4.0, noisy)  # noqa: E731
+    assert lacking(force=hung) == ["force: frozen for 2.99 s from 4 s on"]
+    dead = lambda t_s: np.zeros((len(t_s), 1))  # noqa: E731
+    assert lacking(force=dead) == ["force: frozen for 9.99 s from 0 s on"]
+
+
 def test_rows_lost_are_missing_beyond_the_percentage_that_is_allowed():
     counts = {"force": StreamCounts(received=970, written=960, dropped=10, gaps=30)}
     assert lacking(counts=counts) == ["force: 40 of 1000 rows lost"]

@@ -16,7 +16,7 @@ from tactbench.devices.emulation.emulated_devices import EmulatedDevice, Emulate
 from tactbench.devices.emulation.line import Line, LinkFault
 from tactbench.devices.emulation.real_time import PseudoTerminal, RealTimeServer, SlcanAdapter, UdpEnd
 from tactbench.plugin import ChannelSpec, StreamSpec
-from tactbench.plugin.devices import CanFrame, EmulatorSettings, RowEmulator, open_link
+from tactbench.plugin.devices import CanFrame, EmulatorSettings, RowEmulator, SpiStep, open_link
 from tests.core.pool.patience import until
 from tests.devices.emulation.models import Answerer, Complement, Recorder
 
@@ -68,7 +68,8 @@ def test_requests_are_answered_by_the_wall_clock(kind):
     emulator = Complement() if kind == "spi" else Answerer(after_s=0.05)
     with EmulatedDevices({"a": on(kind, emulator)}, time="real") as devices, devices.open_link("a") as link:
         if kind == "spi":
-            assert link.transfer(b"\x01\x02", pause_us=1000) == b"\xfe\xfd"
+            link.send([SpiStep(b"\x01\x02", pause_us=1000)])
+            assert link.receive(5.0).data == (b"\xfe\xfd",)
             return
         before_ns = devices.clock()
         if kind == "can":

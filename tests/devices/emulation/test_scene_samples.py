@@ -62,9 +62,7 @@ def test_outside_the_scene_nothing_is_pressed_and_the_noise_goes_on(samples, t_s
 
 def test_until_it_is_started_nothing_is_pressed(samples):
     assert {samples(t_s)["fz"] for t_s in np.linspace(0.0, 2.0, 200)} == {0}
-    assert samples.over_s == -np.inf
     samples.start(3.0)
-    assert samples.over_s == 4.0
 
 
 def test_without_an_unloaded_stretch_the_first_sample_is_held():

@@ -83,8 +83,6 @@ def test_the_recording_says_what_happened(five_newtons):
     assert drawn["press state"] == "done"
     events = [text for name, text in drawn.items() if name.startswith("event")]
     assert any("touch: the axis holds" in text for text in events)
-    assert five_newtons.acquisition.emulation.time == "virtual"
-    assert set(five_newtons.acquisition.emulation.devices) == {"icub", "force", "motor"}
     assert abs(five_newtons.press.contact_m - 1e-3 * drawn["skin mm"]) < 30e-6  # 0.05 N on 5 N/mm, and its noise
 
 

@@ -1,9 +1,7 @@
 """ATI's files: units, and the calibration file (``.cal``) of a sensor that is read by its six gauge voltages.
 
-``F = U (V - V_bias)``, V six gauge voltages, V_bias those of the unloaded sensor. Newer files state U ready-made
-(``UserAxis``); for older ones it is rebuilt from ``Axis`` rows, their scales and the ``BasicTransform`` to the tool's
-origin: ``T <- T - D x F`` (sourced: a public MATLAB script that quotes the files of a Nano17 FT8577 and a Nano43 FT9439
-and builds both matrices so; it agrees with the UserAxis rows of FT8577 to the digits printed).
+``F = U (V - V_bias)``, V six gauge voltages, V_bias those of the unloaded sensor, U the ``UserAxis`` rows (sourced: a
+public MATLAB script that quotes the file of a Nano17 FT8577).
 """
 
 from __future__ import annotations
@@ -51,8 +49,6 @@ TORQUE_UNITS = {
     "kgfcm": _KGF_N * 1e-2,
 }
 """Name without hyphens -> newton metres (sourced and assumed as above)."""
-DISTANCE_UNITS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "in": _INCH_M, "ft": 12 * _INCH_M}
-"""Name -> metres (sourced as above)."""
 
 
 class AtiFileError(UsageError):
@@ -94,9 +90,6 @@ class GaugeCalibration(BaseModel):
     """(6,) rated range of each axis, to both sides: N and N*m."""
     voltages: tuple[float, float]
     """Ends of a gauge's output, V."""
-    rebuilt_difference: float | None
-    """Largest difference of the stated matrix from the one rebuilt, in the file's own units per volt; None: the file
-    has only one of them. Printed digits explain about 1e-5."""
 
     def wrench(self, volts: npt.ArrayLike, bias: npt.ArrayLike = 0.0) -> FloatArray:
         """Return forces and torques.
@@ -142,14 +135,7 @@ def _calibration(found: list[Element]) -> GaugeCalibration:
     force_n = unit(FORCE_UNITS, calibration["ForceUnits"], "force")
     torque_nm = unit(TORQUE_UNITS, calibration["TorqueUnits"], "torque")
     si = np.array([force_n] * 3 + [torque_nm] * 3)
-    stated = _rows(found, "UserAxis")
-    # The file's torque per force, in its own units: mm with N and N-mm.
-    lever = unit(DISTANCE_UNITS, calibration.get("DistUnits", "mm"), "distance") * force_n / torque_nm
-    rebuilt = _rebuilt(found, lever)
-    either = stated or rebuilt
-    if either is None:
-        raise ValueError("it has neither six UserAxis rows nor six Axis rows with their transform")
-    matrix, largest = either
+    matrix, largest = _rows(found)
     rows = matrix * si[:, None]
     if np.linalg.matrix_rank(rows / np.abs(rows).max(axis=1, keepdims=True).clip(min=1e-300)) < len(AXES):
         raise ValueError("its matrix is singular")
@@ -162,7 +148,6 @@ def _calibration(found: list[Element]) -> GaugeCalibration:
         matrix=tuple(map(tuple, rows.tolist())),
         largest=tuple((largest * si).tolist()),
         voltages=(-span / 2, span / 2) if bipolar else (0.0, span),
-        rebuilt_difference=None if stated is None or rebuilt is None else float(np.abs(stated[0] - rebuilt[0]).max()),
     )
 
 
@@ -174,30 +159,12 @@ def _one(found: list[Element], name: str) -> dict[str, str]:
     return those[0]
 
 
-def _rows(found: list[Element], name: str) -> tuple[FloatArray, FloatArray] | None:
-    """Return the (6, 6) values and (6,) ranges of the six elements of a name; None: there is none."""
-    by_axis = {element.attrib["Name"]: element.attrib for element in found if element.tag == name}
+def _rows(found: list[Element]) -> tuple[FloatArray, FloatArray]:
+    """Return the (6, 6) values and (6,) ranges of the six UserAxis rows."""
+    by_axis = {element.attrib["Name"]: element.attrib for element in found if element.tag == "UserAxis"}
     if not by_axis:
-        return None
+        raise ValueError("it has no UserAxis rows; ask ATI for a newer one")
     values = [[float(value) for value in by_axis[axis]["values"].split()] for axis in AXES]
     if {len(row) for row in values} != {GAUGES} or not np.isfinite(values).all():
-        raise ValueError(f"each {name} row needs {GAUGES} numbers")
+        raise ValueError(f"each UserAxis row needs {GAUGES} numbers")
     return np.array(values), np.array([float(by_axis[axis]["max"]) for axis in AXES])
-
-
-def _rebuilt(found: list[Element], lever: float) -> tuple[FloatArray, FloatArray] | None:
-    """Return the matrix from Axis rows, scales and transform, in the file's units; None: it is not to be had."""
-    axes = _rows(found, "Axis")
-    transforms = [element.attrib for element in found if element.tag == "BasicTransform"]
-    if axes is None or len(transforms) != 1:
-        return None
-    move = {key: float(transforms[0].get(key, "0")) for key in ("Dx", "Dy", "Dz", "Rx", "Ry", "Rz")}
-    if any(move[key] != 0.0 for key in ("Rx", "Ry", "Rz")):
-        return None  # In which order the angles turn is in no source.
-    scales = {element.attrib["Name"]: float(element.attrib["scale"]) for element in found if element.tag == "Axis"}
-    if 0.0 in scales.values():
-        raise ValueError("an Axis row has the scale 0")
-    matrix = axes[0] / np.array([scales[axis] for axis in AXES])[:, None]
-    dx, dy, dz = (move[key] * lever for key in ("Dx", "Dy", "Dz"))
-    matrix[3:] -= np.array([[0.0, -dz, dy], [dz, 0.0, -dx], [-dy, dx, 0.0]]) @ matrix[:3]
-    return matrix, axes[1]

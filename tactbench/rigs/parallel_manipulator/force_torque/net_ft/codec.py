@@ -16,7 +16,7 @@ import numpy.typing as npt
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from tactbench.plugin import Quality, RigError
-from tactbench.plugin.devices import Options
+from tactbench.plugin.devices import Options, read_file
 from tactbench.rigs.parallel_manipulator.force_torque.ati import (
     FORCE_UNITS,
     TORQUE_UNITS,
@@ -29,8 +29,6 @@ if TYPE_CHECKING:
     from tactbench.plugin import FloatArray
 
 PORT = 49152
-CONFIGURATION_PATH = "/netftapi2.xml"
-"""What HTTP GET asks the sensor for: counts per unit, and the units."""
 
 _REQUEST = struct.Struct(">HHI")
 _RECORD = struct.Struct(">III6i")
@@ -54,8 +52,7 @@ class NetFtOptions(Options):
     counts_per_newton: float | None = Field(default=None, gt=0.0)
     counts_per_newton_metre: float | None = Field(default=None, gt=0.0)
     configuration: str = ""
-    """In place of the counts: ``http`` asks the box that the link goes to, ``http://…`` another address; anything else
-    is a file that holds the box's ``netftapi2.xml``."""
+    """In place of the counts: a file that holds the box's ``netftapi2.xml``."""
     bias: bool = False
     """Whether starting takes the present reading as zero: the sensor must be unloaded then."""
 
@@ -64,8 +61,8 @@ class NetFtOptions(Options):
         counts = [self.counts_per_newton, self.counts_per_newton_metre]
         if (None in counts) if not self.configuration else (counts != [None, None]):
             raise ValueError(
-                "give counts_per_newton and counts_per_newton_metre, or else configuration: http or a file; the box's "
-                "web page shows them"
+                "give counts_per_newton and counts_per_newton_metre, or else configuration, a file; the box's web page "
+                "shows them"
             )
         return self
 
@@ -74,10 +71,10 @@ class NetFtOptions(Options):
         """Samples of the sensor from one record to the next."""
         return max(1, int(SENSOR_RATE_HZ // self.rate_hz))
 
-    def scale(self, configuration: bytes) -> CountScale:
-        """Return counts per unit; `configuration` is what the file or the box says, if one is asked for."""
+    def scale(self) -> CountScale:
+        """Return counts per unit."""
         if self.counts_per_newton is None or self.counts_per_newton_metre is None:
-            return read_configuration(configuration)
+            return read_configuration(read_file(self.configuration, "The box's configuration"))
         return CountScale(per_newton=self.counts_per_newton, per_newton_metre=self.counts_per_newton_metre)
 
 

@@ -5,13 +5,10 @@ from __future__ import annotations
 from collections import Counter as Tally
 from collections.abc import Mapping
 from contextlib import suppress
-from http.client import HTTPException
-from urllib.parse import urlsplit
-from urllib.request import ProxyHandler, build_opener
 
 import numpy as np
 
-from tactbench.plugin import Block, Quality, RigError, StreamSpec, UsageError
+from tactbench.plugin import Block, Quality, RigError, StreamSpec
 from tactbench.plugin.devices import (
     DatagramLink,
     Driver,
@@ -22,11 +19,9 @@ from tactbench.plugin.devices import (
     Received,
     Unwrap,
     open_for,
-    read_file,
     read_options,
 )
 from tactbench.rigs.parallel_manipulator.force_torque.net_ft.codec import (
-    CONFIGURATION_PATH,
     RECORD_BYTES,
     SENSOR_RATE_HZ,
     SEQUENCE_MODULUS,
@@ -46,10 +41,6 @@ ANSWER_S = 0.5
 """Within which a box answers, over the time its records take (assumed: a network of one cable)."""
 RESTARTED = 1000
 """A number so far behind the highest is of a counter begun anew (assumed: no datagram is late by more)."""
-LARGEST_BYTES = 1 << 20
-"""Of the box's configuration (assumed: it has a few thousand)."""
-HTTP_S = 3.0
-"""Of each wait for the box's web page (assumed)."""
 MOST_DATAGRAMS = 4096
 """In one block: 4 s at 1 kHz."""
 
@@ -75,24 +66,10 @@ class NetFtDriver(Driver):
         self._numbers, self._ticks, self._newest = Unwrap(32), Unwrap(32), 0
         self._link = open_for(settings, "net-ft", DatagramLink, "udp://192.168.1.1:49152")  # type: ignore[type-abstract]
         try:
-            self._scale = options.scale(self._configuration())
+            self._scale = options.scale()
         except BaseException:
             self._link.close()
             raise
-
-    def _configuration(self) -> bytes:
-        given = self._options.configuration
-        if given == "http":
-            host = urlsplit(self._link.address).hostname
-            if host is None:
-                raise UsageError(
-                    f"{self._link.address} names no host to ask for the box's web page.",
-                    hint="Give its whole address, configuration: http://192.168.1.1/netftapi2.xml.",
-                )
-            given = f"http://{f'[{host}]' if ':' in host else host}{CONFIGURATION_PATH}"
-        if not given:
-            return b""
-        return fetched(given) if given.startswith("http://") else read_file(given, "The box's configuration")
 
     @property
     def streams(self) -> tuple[StreamSpec, ...]:
@@ -243,7 +220,7 @@ class NetFtDriver(Driver):
 
 
 def build(settings: DriverSettings) -> NetFtDriver:
-    """Open the link, and read the scale where it is to be read.
+    """Open the link.
 
     Raises
     ------
@@ -251,26 +228,5 @@ def build(settings: DriverSettings) -> NetFtDriver:
         For options that are not known or contradict each other, or a link that carries no datagrams.
     LinkError
         If the link does not open.
-    RigError
-        If the box's web page cannot be read.
     """
     return NetFtDriver(settings)
-
-
-def fetched(url: str) -> bytes:
-    """Return a page of a box; it is asked directly, whatever proxies are set.
-
-    Raises
-    ------
-    RigError
-        If it does not come, or is larger than a mebibyte.
-    """
-    hint = "Open it in a browser; or save it as a file and name that as configuration."
-    try:
-        with build_opener(ProxyHandler({})).open(url, timeout=HTTP_S) as page:
-            data: bytes = page.read(LARGEST_BYTES + 1)
-    except (OSError, HTTPException, ValueError) as error:
-        raise RigError(f"{url} cannot be read: {error}.", hint=hint) from error
-    if len(data) > LARGEST_BYTES:
-        raise RigError(f"{url} is larger than {LARGEST_BYTES} bytes.", hint=hint)
-    return data

@@ -10,9 +10,7 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import ClassVar
-from xml.sax.saxutils import escape
 
-from tactbench.plugin import UsageError
 from tactbench.plugin.devices import (
     CanFrame,
     DeviceEmulator,
@@ -20,7 +18,6 @@ from tactbench.plugin.devices import (
     Fault,
     Sent,
     fault_concerns,
-    read_file,
     read_options,
 )
 from tactbench.rigs.parallel_manipulator.force_torque.net_ft.codec import (
@@ -54,6 +51,10 @@ class DatagramFault(Fault):
     }
 
 
+LARGEST = (25.0, 25.0, 35.0, 0.25, 0.25, 0.25)
+"""Where the sensor saturates [N, N*m]: a Nano17 SI-25-0.25 (sourced: calibration file FT8577)."""
+
+
 class RdtEmulator(DeviceEmulator):
     """A box and its sensor.
 
@@ -65,9 +66,6 @@ class RdtEmulator(DeviceEmulator):
         Counts per unit; the default is usual (sourced: pyNetFT).
     rate_hz
         Records a second; the box takes the next rate above that divides 7000.
-    largest
-        (6,) where the sensor saturates [N, N*m]; the default is that of a Nano17 SI-25-0.25 (sourced: calibration file
-        FT8577, quoted in a public script).
     first_sequence
         Of records and samples, to begin near the wrap of the counters.
     faults
@@ -80,19 +78,13 @@ class RdtEmulator(DeviceEmulator):
         *,
         scale: CountScale | None = None,
         rate_hz: float = 1000.0,
-        largest: Sequence[float] = (25.0, 25.0, 35.0, 0.25, 0.25, 0.25),
         first_sequence: int = 1,
         faults: Iterable[DatagramFault] = (),
     ) -> None:
-        if not 0.0 < rate_hz <= SENSOR_RATE_HZ:
-            raise UsageError(f"A Net F/T box sends up to {SENSOR_RATE_HZ} records a second, not {rate_hz:g}.")
         self.scale = scale or CountScale(per_newton=1e6, per_newton_metre=1e6, product="EMULATED Net F/T")
         self.every = max(1, int(SENSOR_RATE_HZ // rate_hz))
         """Samples of the sensor from one record to the next."""
-        self.rejected = 0
-        """Datagrams that were no request."""
         self._wrench = wrench
-        self._largest = tuple(largest)
         self._first_sequence = first_sequence
         self.faults = list(faults)
         self._seen: Counter[Fault] = Counter()
@@ -108,15 +100,6 @@ class RdtEmulator(DeviceEmulator):
         """Records a second as the box sends them."""
         return SENSOR_RATE_HZ / self.every
 
-    def configuration(self) -> bytes:
-        """Return what the box answers to a GET of ``/netftapi2.xml``."""
-        return (
-            '<?xml version="1.0" encoding="UTF-8"?>\n<netft>'
-            f"<prodname>{escape(self.scale.product)}</prodname>"
-            f"<cfgcpf>{self.scale.per_newton!r}</cfgcpf><cfgcpt>{self.scale.per_newton_metre!r}</cfgcpt>"
-            "<scfgfu>N</scfgfu><scfgtu>Nm</scfgtu></netft>\n"
-        ).encode()
-
     def feed(self, piece: bytes | CanFrame, now_s: float) -> list[Sent]:
         """Take one datagram of the host; return what `poll` returns.
 
@@ -127,7 +110,6 @@ class RdtEmulator(DeviceEmulator):
         try:
             request = decode_request(piece)
         except DatagramError:
-            self.rejected += 1
             return sent
         return sent + self._carry_out(request)
 
@@ -161,7 +143,7 @@ class RdtEmulator(DeviceEmulator):
     def _sensed(self, at_s: float) -> tuple[list[float], bool]:
         """Return what the sensor can read of the wrench, and whether it is at an end of its range."""
         # Number by number: numpy would take longer for six, and this is done a thousand times a second.
-        wrench = list(zip(self._wrench(at_s), self._largest, strict=True))
+        wrench = list(zip(self._wrench(at_s), LARGEST, strict=True))
         beyond = any(abs(value) >= end for value, end in wrench) or any(
             fault.name == "saturated" and fault.active(at_s) for fault in self.faults
         )
@@ -217,18 +199,12 @@ def build(settings: EmulatorSettings) -> RdtEmulator:
     Raises
     ------
     UsageError
-        For options or faults that are not known, or if the box is to be asked by HTTP.
+        For options or faults that are not known.
     """
     options = read_options(NetFtOptions, settings.options, "net-ft")
-    if options.configuration.startswith("http"):
-        raise UsageError(
-            "An emulated net-ft has no web page.",
-            hint="Give counts_per_newton and counts_per_newton_metre, or a file.",
-        )
-    configuration = read_file(options.configuration, "The box's configuration") if options.configuration else b""
     return RdtEmulator(
         lambda at_s: wrench_of(settings.senses(at_s)),
-        scale=options.scale(configuration),
+        scale=options.scale(),
         rate_hz=options.rate_hz,
         faults=[DatagramFault.parse(text) for text in settings.faults],
     )
