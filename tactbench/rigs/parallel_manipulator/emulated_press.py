@@ -10,16 +10,12 @@ between motor and force sensor, what a quicker press would do to a skin with mem
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from tactbench.plugin import NotApplicable, Scene
 from tactbench.plugin.devices import SceneSamples
 from tactbench.plugin.simulation import SimulatedPress
-
-if TYPE_CHECKING:
-    pass
 
 FORCE = "fz"
 """Name under which a simulated rig gives the pressing force, and emulated force sensors are given it."""

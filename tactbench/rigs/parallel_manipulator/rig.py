@@ -10,7 +10,7 @@ import math
 import time
 from collections.abc import Collection, Iterator, Mapping
 from contextlib import ExitStack, contextmanager, suppress
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from itertools import chain
 from typing import TYPE_CHECKING, Any
 from weakref import finalize
@@ -119,7 +119,7 @@ class PressAcquisition:
             first, last = np.searchsorted(block.t_ns, (self.begin_ns, end_ns)).tolist()
             if last > first:
                 self.rows[block.stream] = self.rows.get(block.stream, 0) + last - first
-                yield self.force.turned(_rows(block, slice(first, last)), self.zero)
+                yield self.force.turned(block.rows(slice(first, last)), self.zero)
 
     def stop(self, why: str) -> str:
         """Let the motor retreat at once, and wait for it; return what is to be done where it is not out.
@@ -418,18 +418,6 @@ class ParallelManipulator:
                 hint="Look at the rig: sensor, cap, heights in the rig file.",
             )
         return events
-
-
-def _rows(block: Block, rows: slice) -> Block:
-    """Return some rows of a block."""
-    return replace(
-        block,
-        **{
-            name: value[rows]
-            for name in ("t_ns", "data", "quality", "sequence", "device_ns")
-            if (value := getattr(block, name)) is not None
-        },
-    )
 
 
 def _received(reading: Reading) -> int:

@@ -295,6 +295,12 @@ class RigSettings(_Part):
         return self
 
     @property
+    def speeds_mm_s(self) -> tuple[float, ...]:
+        """All speeds of the motor."""
+        touch = self.touch
+        return (touch.speed_mm_s, touch.touch_speed_mm_s, self.press.unload_speed_mm_s, self.limits.retreat_speed_mm_s)
+
+    @property
     def surface_m(self) -> float:
         """Position of the motor at which the indenter is expected to touch [m]."""
         return 1e-3 * (self.limits.retreat_mm + self.heights.stand_off_mm)

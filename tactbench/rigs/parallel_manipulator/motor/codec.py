@@ -251,23 +251,3 @@ class Configuration(IntFlag):
 def line_time_s(n_bytes: int, baud: int) -> float:
     """Return the seconds that `n_bytes` take on the line (derived: 10 bits a byte)."""
     return n_bytes * BITS_PER_BYTE / baud
-
-
-def newer_generation(data: bytes) -> bool:
-    """Return whether `data` begins with a frame of the newer, binary Faulhaber drives, which this codec cannot speak.
-
-    Such a frame is ``53 length node command data… crc 45``, length the number of bytes but two; the crc goes over all
-    bytes from the length to the last datum, shifts right, starts with FF and has the polynomial D5 (sourced:
-    tonygoldman/faulhaber-rs232, MsgHandler.cpp).
-    """
-    if len(data) < 2 or data[0] != 0x53:
-        return False
-    frame = data[: data[1] + 2]
-    if data[1] < 4 or len(frame) < data[1] + 2 or frame[-1] != 0x45:
-        return False
-    crc = 0xFF
-    for byte in frame[1:-2]:
-        crc ^= byte
-        for _ in range(8):
-            crc = (crc >> 1) ^ 0xD5 if crc & 1 else crc >> 1
-    return crc == frame[-2]

@@ -64,11 +64,10 @@ def retreat_command(options: FaulhaberOptions) -> bytes:
 
     Raises PositionerError if the drive does not have the speed.
     """
-    node = options.node
     if options.retreat_m is None or options.retreat_speed_m_s is None:
-        return encode("V", 0, node=node)
+        return encode("V", 0)
     speed, place = options.speed(options.retreat_speed_m_s), options.increments(options.retreat_m)
-    return encode("SP", speed, node=node) + encode("LA", place, node=node) + encode("M", node=node)
+    return encode("SP", speed) + encode("LA", place) + encode("M")
 
 
 def _latency_s(options: FaulhaberOptions) -> float:
@@ -118,7 +117,7 @@ class FaulhaberDriver(Positioner):
         self._home = options.increments(options.home_m)
         self._settings, self._limits = _required_settings(options), _required_limits(options)
         self._version = ""
-        self._exchange = Exchange(self.link, settings.clock, baud=options.baud, node=options.node)
+        self._exchange = Exchange(self.link, settings.clock, options.baud)
         self._counts: Counter[str] = Counter()
         self._queue: deque[tuple[str, int | None]] = deque()
         self._watching = self._in_fault = self._noticed = False
@@ -409,14 +408,14 @@ class FaulhaberDriver(Positioner):
         """
         command, target_m = b"\r" + retreat_command(self.options), self.facts.retreat
         if within_s is None or math.isnan(target_m):
-            self.link.write(b"\r" + encode("V", 0, node=self.options.node))
+            self.link.write(b"\r" + encode("V", 0))
             return math.nan
         self.link.write(command)
         reader, there, place_m, nearest_m = LineReader(), 0, math.nan, math.inf
         sent_ns = self.clock()
         deadline = sent_ns + round(1e9 * within_s)
         while self.clock() < deadline:
-            self.link.write(encode("POS", node=self.options.node))
+            self.link.write(encode("POS"))
             requested_ns, place_m = self.clock(), math.nan
             while math.isnan(place_m) and self.clock() - requested_ns < 1e9 * self._exchange.answer_s:
                 with suppress(LinkTimeout):
