@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from tactbench.core.errors import LinkEnded, LinkError, LinkTimeout, LinkUnplugged
 from tactbench.core.plugins.checks import CheckTable, RigCheck
 from tactbench.core.plugins.interfaces import DeviceAcquisition, Operator
-from tactbench.core.spec.recording import Emulation, StreamClock, StreamCounts
+from tactbench.core.spec.recording import StreamClock, StreamCounts
 from tactbench.core.spec.rig import DeviceDescriptor
 from tactbench.core.spec.rig_file import FORCE, ForceEntry, NamedDevice, RigFile
 from tactbench.plugin.on_demand import on_demand
@@ -20,7 +20,6 @@ if TYPE_CHECKING:
         PressingForce,
         ask_operator,
         drivers_of,
-        emulation_of,
         emulators_of,
         physics_of,
         with_sensor,
@@ -89,7 +88,6 @@ __all__ = [
     "DriverSettings",
     "EmulatedDevice",
     "EmulatedDevices",
-    "Emulation",
     "EmulatorSettings",
     "Event",
     "Fault",
@@ -143,7 +141,6 @@ __all__ = [
     "Unwrap",
     "ask_operator",
     "drivers_of",
-    "emulation_of",
     "emulators_of",
     "fault_concerns",
     "largest_force_n",

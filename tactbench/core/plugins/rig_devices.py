@@ -12,7 +12,7 @@ from tactbench.core.errors import RigError, TactbenchError, UsageError
 from tactbench.core.plugins.interfaces import Operator, Rig
 from tactbench.core.plugins.registry import Registry, load_object
 from tactbench.core.plugins.taking_part import rig_context
-from tactbench.core.spec.recording import Emulation, Scalar
+from tactbench.core.spec.recording import Scalar
 from tactbench.core.spec.rig import DeviceDescriptor, SensorDescriptor
 from tactbench.core.spec.rig_file import FORCE, DeviceEntry, ForceEntry, NamedDevice, RigFile
 from tactbench.core.spec.sensor import ChannelSpec, StreamSpec
@@ -183,30 +183,6 @@ def ask_operator(file: RigFile, operator: Operator | None, doing: str, text: str
             hint="Start it at a terminal, or use a rig file with emulated devices.",
         )
     operator.prompt(text)
-
-
-def emulation_of(file: RigFile, identity: Mapping[str, Mapping[str, str]]) -> Emulation | None:
-    """Return what a recording says of a rig's emulated devices; None: there are none.
-
-    `identity` is what each device says of itself: an emulator says that it is one where a rig file forgets to.
-    """
-    entries = file.entries()
-    names = tuple(
-        name
-        for name, entry in entries.items()
-        if entry.emulated or entry.emulator or any("emulat" in text.lower() for text in identity.get(name, {}).values())
-    )
-    if not names:
-        return None
-    if not file.emulated:  # they were there before, and run by the clock
-        return Emulation(time="real", devices=names)
-    return Emulation(
-        time=file.emulation.time,
-        seed=file.emulation.seed,
-        physics=file.emulation.physics,
-        devices=names,
-        faults=tuple(f"{name}: {fault}" for name in names for fault in entries[name].faults),
-    )
 
 
 def emulators_of(file: RigFile, registry: Registry, sensor: str, senses: Senses) -> dict[str, EmulatedDevice]:

@@ -254,16 +254,3 @@ def measures(delta: LinearDelta, p_m: FloatArray, q: FloatArray) -> Measures:
         sideways_rad=np.arcsin(np.minimum(np.abs(_dot(unit, delta.sideways)), 1.0)),
         det=np.linalg.det(unit),
     )
-
-
-def example_linear() -> LinearDelta:
-    """Return an example with vertical rails: nobody's machine, and not the paper's, which is not known."""
-    return LinearDelta(
-        title="example of a linear delta",
-        source=Source(tag="assumed", reference="an example to try the software with; no machine was measured"),
-        base_radius_mm=150.0,
-        platform_radius_mm=30.0,
-        link_mm=250.0,
-        joint_lowest_mm=-50.0,
-        joint_highest_mm=250.0,
-    )

@@ -2,7 +2,7 @@
 
 Along a straight line (derived) reach, s and the sideways angle are concave or affine, so the ends decide; a joint value
 turns at one place at most, and abs(du/dx) <= 1/(s L), so sigma_U and sigma_W change by at most sqrt(3)/(s L) per
-length. A move is sampled every `SAMPLE_M`, and must keep at its samples what this bound permits to be lost between them.
+length. A move is sampled every `SAMPLE_M`, and must keep at its samples what this bound permits to be lost between.
 """
 
 from __future__ import annotations
@@ -81,10 +81,6 @@ class Workspace:
                 (found.constraint - limits.constraint)[:, None], math.radians(limits.sideways_deg) - found.sideways_rad,
             ], axis=1,
         )  # fmt: skip
-
-    def check_place(self, p_m: FloatArray) -> None:
-        """Raise PlaceRefusedError unless the place (3,) [m] is permitted."""
-        self.check_move(p_m, p_m)
 
     def check_move(self, start_m: FloatArray, end_m: FloatArray) -> None:
         """Raise PlaceRefusedError unless the straight move between places (3,) [m] is permitted.

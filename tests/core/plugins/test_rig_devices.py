@@ -10,7 +10,6 @@ import pytest
 
 from tactbench.core.errors import LinkError, RigError, UnknownNameError, UsageError
 from tactbench.core.plugins.registry import load_registry
-from tactbench.core.spec.rig_file import DeviceEntry
 from tactbench.plugin import Block, ChannelSpec, Quality, StreamSpec
 from tactbench.plugin.devices import (
     EmulatedDevices,
@@ -18,7 +17,6 @@ from tactbench.plugin.devices import (
     PressingForce,
     RigFile,
     drivers_of,
-    emulation_of,
     emulators_of,
 )
 from tests.core.plugins import talking
@@ -118,17 +116,6 @@ def test_what_was_opened_is_closed_when_a_later_device_fails():
         with pytest.raises(LinkError, match="entry 'force': no cable"):
             drivers_of(rig_file(), REGISTRY, "pad", links, devices.clock)
         devices.open_link("pad").close()  # it can be opened only if it was closed
-
-
-@pytest.mark.parametrize(
-    ("entry", "said", "marked"),
-    [({}, {}, False), ({"emulator": True}, {}, True), ({}, {"adapter": "tactbench EMULATOR"}, True),
-     ({}, {"serial": "7"}, False)],
-)  # fmt: skip
-def test_emulators_that_run_elsewhere_are_marked_by_the_file_or_by_what_they_say(entry, said, marked):
-    file = RigFile(rig="bench", sensors={"pad": DeviceEntry(link="udp://127.0.0.1:9", **entry)})
-    emulation = emulation_of(file, {"pad": said})
-    assert (emulation and (emulation.time, emulation.devices)) == (("real", ("pad",)) if marked else None)
 
 
 SCALE = StreamSpec(

@@ -11,7 +11,6 @@ from tactbench.rigs.parallel_manipulator.kinematics import (
     ClosureError,
     LinearDelta,
     UnreachableError,
-    example_linear,
     forward,
     inverse,
     measures,
@@ -19,7 +18,10 @@ from tactbench.rigs.parallel_manipulator.kinematics import (
 )
 
 FREE = Source(tag="assumed", reference="to compute with")
-LV = example_linear()
+LV = LinearDelta(
+    title="vertical rails", source=FREE, base_radius_mm=150.0, platform_radius_mm=30.0, link_mm=250.0,
+    joint_lowest_mm=-50.0, joint_highest_mm=250.0,
+)  # fmt: skip
 LI = LinearDelta(
     title="rails at 60 deg", source=FREE, base_radius_mm=130.0, platform_radius_mm=30.0, link_mm=220.0,
     inclination_deg=60.0, joint_lowest_mm=-190.0, joint_highest_mm=200.0,

@@ -222,21 +222,14 @@ def answers(line: Line, name: str) -> bool:
 
 
 class OperationStatus(IntFlag):
-    """The integer that OST answers (sourced: the manual, page 68)."""
+    """Bits of what OST answers (sourced: the manual, page 68); it has more, of programs and further inputs."""
 
     HOMING = 1 << 0
-    PROGRAM_RUNNING = 1 << 1
-    STOPPED_BY_DELAY = 1 << 2
-    STOPPED_BY_NOTIFY = 1 << 3
     CURRENT_LIMITATION = 1 << 4
     DEVIATION_ERROR = 1 << 5
     OVERVOLTAGE = 1 << 6
     OVERTEMPERATURE = 1 << 7
     INPUT_1 = 1 << 8
-    INPUT_2 = 1 << 9
-    INPUT_3 = 1 << 10
-    INPUT_4 = 1 << 11
-    INPUT_5 = 1 << 12
     POSITION_ATTAINED = 1 << 16
 
 

@@ -52,9 +52,7 @@ class MotorSilentError(MotorError, PositionerSilentError):
 
 
 class MotorRefusalError(MotorError):
-    """The drive refuses a command; `text` is its own."""
-
-    text = ""
+    """The drive refuses a command."""
 
 
 class Answer(NamedTuple):
@@ -83,11 +81,9 @@ class Answer(NamedTuple):
                 hint="Check the cable; read the position before the next move.",
             )
         if self.line.kind is Kind.REFUSAL:
-            error = MotorRefusalError(
+            raise MotorRefusalError(
                 f"The motor's drive answers {text} with: {self.line.text}.", hint=_HINTS[self.line.text]
             )
-            error.text = self.line.text
-            raise error
         return self.line
 
 
@@ -105,15 +101,15 @@ class Exchange:
 
     Attributes
     ----------
-    notices
-        Letters that the drive sent by itself and nobody has taken yet.
+    fault
+        Whether the drive has sent the notice of a fault since this was last set back.
     counts
         ``time_outs``, ``late`` answers, ``garbled`` and ``unexpected`` lines, ``refusals``.
     """
 
     def __init__(self, link: ByteLink, clock: Clock, baud: int) -> None:
         self.answer_s = 3.0 * line_time_s(LONGEST_ANSWER, baud) + HOST_S
-        self.notices: deque[str] = deque(maxlen=100)
+        self.fault = False
         self.counts: Counter[str] = Counter()
         self._link, self._clock = link, clock
         self._reader = LineReader()
@@ -202,7 +198,7 @@ class Exchange:
 
     def _routed(self, line: Line, t_ns: int) -> list[Answer]:
         if line.kind is Kind.NOTICE:
-            self.notices.append(line.text)
+            self.fault |= line.text in "fr"
         elif line.kind is Kind.GARBLED:
             self.counts["garbled"] += 1
         elif self._marking:
