@@ -84,7 +84,7 @@ class Machine(faults.Pressed):
     def force_n(self) -> float:
         """On the sensor now: of the skin, and of what is in the way."""
         rail = self.rails.get("joint-1")
-        beyond_m = 0.0 if rail is None else max(0.0, rail.drive.servo.position_m - self.obstacle_m)
+        beyond_m = 0.0 if rail is None else max(0.0, rail.drive.position_m - self.obstacle_m)
         force = self.setting.stiffness_n_m * (max(0.0, self.position_m - faults.SKIN_M) + beyond_m)
         self.largest_n = max(self.largest_n, force)
         return float(force)
@@ -199,7 +199,7 @@ def schedule(setting: Any, drawn: tuple[tuple[str, float], ...], obstacle_m: flo
     wrong += [f"{phase}: {largest[phase]:.3f} N above {bounds[phase]:.3f} N" for phase in bounds
               if largest[phase] > bounds[phase]]  # fmt: skip
     guard.close()
-    servos = [emulator.drive.servo for emulator in machine.rails.values()]
+    servos = [emulator.drive for emulator in machine.rails.values()]
     before = [servo.position_m for servo in servos]
     machine.devices.advance(machine.clock() + round(0.5e9))
     # A rail that answers nothing ends its way point by itself; the others stand.

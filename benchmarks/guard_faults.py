@@ -20,7 +20,6 @@ from typing import Any, Literal
 import numpy as np
 
 from tactbench.devices.guard_messages import GuardRefusesError, Trigger
-from tactbench.plugin import assumed
 from tactbench.plugin.devices import (
     Beat,
     CommandKind,
@@ -35,9 +34,9 @@ from tactbench.plugin.devices import (
 )
 from tactbench.rigs.parallel_manipulator.force_torque.net_ft.driver import build as build_force
 from tactbench.rigs.parallel_manipulator.force_torque.net_ft.emulator import DatagramFault, RdtEmulator
+from tactbench.rigs.parallel_manipulator.motor.drive import MotorModel
 from tactbench.rigs.parallel_manipulator.motor.driver import FaulhaberDriver
 from tactbench.rigs.parallel_manipulator.motor.emulator import MotorEmulator, MotorFault
-from tactbench.rigs.parallel_manipulator.motor.servo import MotorModel
 
 RETREAT_M, SKIN_M = -5e-3, 0.0
 """The motor stands at the first when it is switched on; the spring begins at the second."""
@@ -128,7 +127,7 @@ class Pressed:
             self._load,
             np.random.default_rng(setting.seed + 1),
             profile=build_profile(),
-            model=MotorModel() if tick is None else MotorModel(tick=assumed(tick, "ms", "a press in real time")),
+            model=MotorModel() if tick is None else MotorModel(tick_s=1e-3 * tick),
             baud=setting.baud,
             faults=faults.get("motor", []),
         )
@@ -156,7 +155,7 @@ class Pressed:
     @property
     def position_m(self) -> float:
         """Of the motor, as its drive counts it."""
-        return float(self.motor.drive.servo.position_m) + RETREAT_M
+        return float(self.motor.drive.position_m) + RETREAT_M
 
     @property
     def force_n(self) -> float:
@@ -169,7 +168,7 @@ class Pressed:
         """Return the deepest place of the motor at any force sample since a second of the clock."""
         return max((place for at_s, place in self._places if at_s >= since_s), default=-math.inf)
 
-    def _load(self, place_m: float, at_s: float) -> float:
+    def _load(self, place_m: float) -> float:
         return self.setting.stiffness_n_m * max(0.0, place_m + RETREAT_M - SKIN_M)
 
     def settings(self) -> dict[str, dict[str, Any]]:

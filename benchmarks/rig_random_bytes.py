@@ -26,7 +26,7 @@ from tactbench.rigs.parallel_manipulator.force_torque.net_ft.codec import (
     read_configuration,
 )
 from tactbench.rigs.parallel_manipulator.force_torque.net_ft.emulator import RdtEmulator
-from tactbench.rigs.parallel_manipulator.motor.codec import CommandReader, Kind, Line, LineReader, newer_generation
+from tactbench.rigs.parallel_manipulator.motor.codec import CommandReader, Kind, Line, LineReader
 from tactbench.rigs.parallel_manipulator.motor.emulator import MotorEmulator
 
 CHUNK = 1000
@@ -50,13 +50,12 @@ def main(count: int, seed: int) -> None:
     reader, drive, commands = LineReader(), CommandReader(), 0
     for piece in pieces:
         reader.feed(piece)
-        newer_generation(piece)
         commands += len(drive.feed(piece))
         assert reader.feed(b"\r\n98956\r\n")[-1] == Line(Kind.VALUE, "98956")
         assert drive.feed(b"\rLA1000\r")[-1].argument == 1000
-    print(f"motor, codec: {reader.counts}; {commands} commands")
+    print(f"motor, codec: {commands} commands")
 
-    motor, now_s = MotorEmulator(lambda _x, _t: 0.0, rng), 0.0
+    motor, now_s = MotorEmulator(lambda _x: 0.0, rng), 0.0
     for piece in pieces[: len(pieces) // 20 + 1]:
         motor.feed(piece, now_s)
         now_s += 1.1

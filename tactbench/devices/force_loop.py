@@ -120,15 +120,15 @@ class ForceController:
         The filtered force [N].
     target
         The position commanded last.
-    limited, late
-        Whether a limit acted in the last step, and whether its sample was late.
+    limited
+        Whether a limit acted in the last step.
     """
 
     def __init__(self, law: ForceLaw, force_n: float, position: float) -> None:
         _check_known(force_n, position)
         self.law = law
         self.filtered_n, self.target = force_n, position
-        self.limited = self.late = False
+        self.limited = False
         self._integral = position
 
     def step(
@@ -161,8 +161,8 @@ class ForceController:
         law = self.law
         kept = law.kept(passed_s)
         self.filtered_n = kept * self.filtered_n + (1 - kept) * force_n
-        self.late, self.limited = passed_s > LATE * law.period_s, False
-        if self.late:
+        self.limited = False
+        if passed_s > LATE * law.period_s:
             return self.target
         missing = setpoint_n - self.filtered_n
         growth = law.integral * passed_s * missing + passed_s * slope_n_s / law.feed_forward

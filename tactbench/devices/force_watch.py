@@ -43,8 +43,8 @@ class ForceWatch:
 
     Attributes
     ----------
-    force_n, norm_n
-        Pressing force and norm of the force, less the zero, of the newest sample; NaN: none yet, or no limits.
+    force_n
+        Pressing force, less the zero, of the newest sample; NaN: none yet, or no limits.
     sequence, t_ns
         Number and receipt of that sample; -1 and 0: none yet.
     changed
@@ -57,7 +57,7 @@ class ForceWatch:
         kinds = [channel.kind for channel in stream.channels]
         self._forces = [n for n, kind in enumerate(kinds) if kind == "force"]
         self._torques = [n for n, kind in enumerate(kinds) if kind == "torque"]
-        self.force_n = self.norm_n = math.nan
+        self.force_n = math.nan
         self.sequence, self.t_ns, self.changed, self.received = -1, 0, -1, 0
         self._delay_ns = 0
         self._offsets: deque[tuple[int, int]] = deque(maxlen=2)
@@ -104,7 +104,6 @@ class ForceWatch:
             own = wrenches if newer is block else _without_zero(newer, limits)
             self._pressing.extend([limits.sign * wrench[limits.channel] for wrench in own[-_LOOKED_AT:]])
             self.force_n = self._pressing[-1]
-            self.norm_n = _norm(own[-1], self._forces)
         return (
             self._unknown(wrenches, block.quality)
             or self._too_large(wrenches, limits, travelling)

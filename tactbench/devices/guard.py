@@ -22,7 +22,7 @@ import math
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
-from typing import NamedTuple, NoReturn
+from typing import NoReturn
 
 from tactbench.core.errors import (
     LinkClosed,
@@ -77,12 +77,6 @@ def largest_force_n(
     With a threshold of touch for F_c it is the largest force of a first touch. k is the largest stiffness up to there.
     """
     return ceiling_n + stiffness_n_m * speed_m_s * (reaction + speed_m_s / (2 * acceleration_m_s2))
-
-
-class _Verdict(NamedTuple):
-    accepted: bool
-    reason: str = ""
-    early: bool = False
 
 
 class LocalGuard:
@@ -178,13 +172,9 @@ class LocalGuard:
             If something is not as it must be; nothing was moved, or what was begun has ended. The state is IDLE, or
             FAULT if force or an axis went wrong while homing.
         """
-        again = self.state is GuardState.ARMED
-        if not (again or self.state is GuardState.IDLE):
+        if self.state is not GuardState.IDLE:
             raise GuardRefusesError(f"The guard is in state {self.state}.", hint="Disarm it first.")
-        if again and (self._moving or not self._retracted):
-            raise GuardRefusesError("The guard is armed, and the pressing axis is not at rest where it retreats to.")
         self._check(limits)
-        self.state, self._limits, self.trigger = GuardState.IDLE, None, None
         self._wait_for_force(limits)
         for name, axis in self._axes.items():
             try:
@@ -199,7 +189,7 @@ class LocalGuard:
         self._end_sequence = self._seen_force.sequence
         self._beat_ns = self._clock()
         self._tell(None, "armed")
-        return self._report(0, _Verdict(True))
+        return self._report(0)
 
     def beat(self, beat: Beat) -> Report:
         """Say that the rig is there, and what shall be done; return at once."""
@@ -215,19 +205,19 @@ class LocalGuard:
         self.look(0.0)
         # What this look has found stands before the command.
         if self.state is not GuardState.ARMED or limits is None:
-            return self._report(beat.sequence, _Verdict(False, f"the guard is in state {self.state}"))
-        verdict = self._command(beat, limits)
-        if verdict.accepted and beat.command is not CommandKind.NONE:
-            self._refused = 0
-        elif verdict.early:
+            return self._report(beat.sequence, f"the guard is in state {self.state}")
+        reason, early = self._command(beat, limits)
+        if early:
             self._counts["early"] += 1
-        elif not verdict.accepted:
+        elif reason:
             self._counts["refused"] += 1
             self._refused += 1
-            self._tell(None, f"refused in {beat.state or 'no state'}: {verdict.reason}")
+            self._tell(None, f"refused in {beat.state or 'no state'}: {reason}")
             if self._refused >= REFUSED:
-                self._retreat(Trigger.COMMANDS_REFUSED, f"{REFUSED} in a row, the last because {verdict.reason}")
-        return self._report(beat.sequence, verdict)
+                self._retreat(Trigger.COMMANDS_REFUSED, f"{REFUSED} in a row, the last because {reason}")
+        elif beat.command is not CommandKind.NONE:
+            self._refused = 0
+        return self._report(beat.sequence, reason, early=early)
 
     def advance(self, until_ns: int) -> None:
         """Look until the clock says so much."""
@@ -270,7 +260,7 @@ class LocalGuard:
             self.state = GuardState.IDLE
             self._tell(None, "disarmed")
         self._limits, self.trigger = None, None
-        report, self._not_out = self._report(0, _Verdict(True)), ""
+        report, self._not_out = self._report(0), ""
         return report
 
     def abandon(self) -> None:
@@ -393,29 +383,29 @@ class LocalGuard:
 
     # Commands ---------------------------------------------------------------------------------------------------------
 
-    def _command(self, beat: Beat, limits: Limits) -> _Verdict:
-        """Carry out what a beat asks for, or say why not."""
+    def _command(self, beat: Beat, limits: Limits) -> tuple[str, bool]:
+        """Carry out what a beat asks for; else return why not, and whether it only is too early."""
         match beat.command:
             case CommandKind.NONE:
-                return _Verdict(True)
+                return "", False
             case CommandKind.RETREAT:
                 self._retreat(Trigger.COMMANDED, "the rig has commanded it")
-                return _Verdict(True)
+                return "", False
             case CommandKind.STOP:
                 self._into_skin = False
                 for axis in self._axes.values():
                     if axis.moving:
                         self._halt(axis)
-                return _Verdict(True)
+                return "", False
         if beat.force_sequence > self._seen_force.sequence:
-            return _Verdict(False, f"force sample {beat.force_sequence} has not come")
+            return f"force sample {beat.force_sequence} has not come", False
         reason = self._travel_reason(beat) if beat.command is CommandKind.TRAVEL else self._press_reason(beat, limits)
         if reason:
-            return _Verdict(False, reason)
+            return reason, False
         if self._moving:
-            return _Verdict(False, "an axis is moving", early=True)
+            return "an axis is moving", True
         if min(beat.force_sequence, self._seen_force.changed) <= self._end_sequence:
-            return _Verdict(False, "no force sample is known from after the last move", early=True)
+            return "no force sample is known from after the last move", True
         press = self._press
         before = press.state
         try:
@@ -427,10 +417,10 @@ class LocalGuard:
             else:
                 press.move_to(beat.position_m, beat.speed_m_s)
         except RigError as error:
-            return _Verdict(False, error.message)
+            return error.message, False
         into_skin = before is not None and beat.position_m > before.target
         self._into_skin, self._touched = into_skin and beat.command is CommandKind.MOVE_TO, False
-        return _Verdict(True)
+        return "", False
 
     def _travel_reason(self, beat: Beat) -> str:
         """Return why other axes may not travel; empty: they may."""
@@ -650,15 +640,15 @@ class LocalGuard:
         self._events.append(event)
         self._on_event(event)
 
-    def _report(self, sequence: int, verdict: _Verdict) -> Report:
+    def _report(self, sequence: int, reason: str = "", *, early: bool = False) -> Report:
         watch, state = self._seen_force, self._press.state
         return Report(
             sequence=sequence,
             t_ns=self._clock(),
             state=self.state,
-            accepted=verdict.accepted,
-            reason=verdict.reason,
-            early=verdict.early,
+            accepted=not reason,
+            reason=reason,
+            early=early,
             moving=self._moving,
             position_m=self._press.position,
             target_m=math.nan if state is None else state.target,

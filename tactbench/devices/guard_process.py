@@ -29,9 +29,9 @@ import sys
 import time
 import traceback
 from collections import deque
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from contextlib import suppress
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import asdict, dataclass, field
 from functools import partial
 from importlib import import_module
 from pathlib import Path
@@ -509,8 +509,12 @@ class _Server:
 
     def _forward(self, guard: LocalGuard) -> None:
         guard.events()
-        for kind, blocks in (("force", guard.force_blocks()), ("motor", guard.motor_blocks())):
-            for piece in (piece for block in blocks for piece in _pieces(block)):
+        blocks = [("force", block) for block in guard.force_blocks()]
+        blocks += [("motor", block) for block in guard.motor_blocks()]
+        # In pieces that fit into a packet.
+        for kind, block in blocks:
+            for first in range(0, len(block.data), ROWS):
+                piece = block.rows(slice(first, first + ROWS))
                 if len(self._blocks) < MOST_BLOCKS:
                     self._blocks.append(pickle.dumps((kind, piece)))
                 else:
@@ -527,17 +531,6 @@ class _Server:
         if self._log is not None:
             with suppress(OSError):
                 self._log.write(json.dumps(entry) + "\n")
-
-
-def _pieces(block: Block) -> Iterator[Block]:
-    """Yield a block in pieces that fit into a packet."""
-    if len(block.data) <= ROWS:
-        yield block
-        return
-    for start in range(0, len(block.data), ROWS):
-        rows = slice(start, start + ROWS)
-        columns = ("t_ns", "data", "quality", "sequence", "device_ns")
-        yield replace(block, **{name: v[rows] for name in columns if (v := getattr(block, name)) is not None})
 
 
 def main() -> int:

@@ -2,7 +2,7 @@
 
 ::
 
-    standoff -> approach -> contact -> lift -> unloaded -> return -> ramp -> hold -> unload -> done
+    standoff -> approach -> contact -> lift -> unloaded -> return -> ramp -> unload -> done
     any of them -> retreat -> failed
 
 The surface is found first: a quick way to where it cannot be yet, a slow one until the raw force says that it is
@@ -43,16 +43,12 @@ class PressState(StrEnum):
     """Just above the skin, for the scene's unloaded hold."""
     RETURN = "return"
     RAMP = "ramp"
-    HOLD = "hold"
     UNLOAD = "unload"
     DONE = "done"
     """Just above the skin again."""
     RETREAT = "retreat"
     FAILED = "failed"
     """The motor is out, and :attr:`Press.ended` says why."""
-
-
-_REGULATED = (PressState.CONTACT, PressState.RAMP, PressState.HOLD)
 
 
 def _command(kind: CommandKind = CommandKind.NONE, **more: float) -> Beat:
@@ -95,8 +91,6 @@ class PressPlan:
     lost_s: float
     """Contact is lost, which ends the press, if the force is in the band for so long while more than twice the band is
     wanted."""
-    hold_s: float = 0.0
-    """How long the largest force is held after the course."""
 
 
 @dataclass(frozen=True)
@@ -222,7 +216,7 @@ class Press:
                 if self._began_s is not None and now_s - self._began_s >= self._course.ramp_s:
                     self._enter(PressState.RETURN, now_s)
                     self._move(self.contact_m, self._plan.touch_speed_m_s)
-            case PressState.CONTACT | PressState.RAMP | PressState.HOLD:
+            case PressState.CONTACT | PressState.RAMP:
                 return self._regulated(report, now_s)
             case PressState.RETREAT:
                 return _command(CommandKind.RETREAT)
@@ -296,7 +290,7 @@ class Press:
         plan = self._plan
         if self._goal is None:  # standing after a touch
             if not report.moving:
-                self._close_loop(report, now_s)
+                self._begin_loop(PressState.CONTACT, report, now_s)
             return
         slowly = self._goal.position_m == plan.deepest_m
         if slowly and self._requested_s is not None and (report.touched or self.mean_n > plan.mean_n):
@@ -329,17 +323,13 @@ class Press:
                 elif now_s > self._due_s + SLACK_S:
                     self.fail(f"{self.mean_n:.2f} N are left after unloading")
             case _:
-                self._enter(PressState.RAMP, now_s)
-                self._begin_loop(report, now_s)
+                self._begin_loop(PressState.RAMP, report, now_s)
 
     # Under force ------------------------------------------------------------------------------------------------------
 
-    def _close_loop(self, report: Report, now_s: float) -> None:
-        """Begin to regulate the small force after a touch."""
-        self._enter(PressState.CONTACT, now_s)
-        self._begin_loop(report, now_s)
-
-    def _begin_loop(self, report: Report, now_s: float) -> None:
+    def _begin_loop(self, state: PressState, report: Report, now_s: float) -> None:
+        """Begin to regulate the force."""
+        self._enter(state, now_s)
         self._controller, self._stepped_s = ForceController(self._plan.law, self._force_n, report.position_m), now_s
 
     def _setpoint(self, now_s: float) -> tuple[float, float]:
@@ -349,7 +339,7 @@ class Press:
             return least, 0.0
         scene_s = now_s - self._began_s
         setpoint = self._course.setpoint_n(scene_s)
-        rising = self.state is PressState.RAMP and setpoint > least and scene_s < self._course.end_s
+        rising = setpoint > least and scene_s < self._course.end_s
         return max(least, setpoint), self._course.slope_n_s if rising else 0.0
 
     def _regulated(self, report: Report, now_s: float) -> Beat:
@@ -365,28 +355,18 @@ class Press:
                 self._enter(PressState.LIFT, now_s)
                 self._move(self.contact_m - self._plan.lift_m, self._plan.touch_speed_m_s)
                 return self._asking(report, now_s)
-        elif self._kept(controller, now_s):
-            self._end_of(now_s)
-        if self.state not in _REGULATED:
-            return (
-                self._asking(report, now_s) if self.state is not PressState.RETREAT else _command(CommandKind.RETREAT)
-            )
+        elif not self._kept(controller, now_s):
+            return _command(CommandKind.RETREAT)
+        elif self._began_s is not None and now_s - self._began_s >= self._course.end_s:
+            self._enter(PressState.UNLOAD, now_s)
+            self._move(self.contact_m - self._plan.lift_m, self._plan.unload_speed_m_s)
+            return self._asking(report, now_s)
         if report.moving:
             return _command()
         way = controller.target - report.target_m
         if abs(way) < 0.5 * self._plan.resolution_m:
             return _command()
         return _command(CommandKind.STEP, distance_m=min(max(way, -self._plan.step_m), self._plan.step_m))
-
-    def _end_of(self, now_s: float) -> None:
-        """Go over from ramp to hold, and from hold to unloading."""
-        assert self._began_s is not None
-        scene_s = now_s - self._began_s
-        if self.state is PressState.RAMP and scene_s >= self._course.end_s:
-            self._enter(PressState.HOLD, now_s)
-        if self.state is PressState.HOLD and scene_s >= self._course.end_s + self._plan.hold_s:
-            self._enter(PressState.UNLOAD, now_s)
-            self._move(self.contact_m - self._plan.lift_m, self._plan.unload_speed_m_s)
 
     def _kept(self, controller: ForceController, now_s: float) -> bool:
         """Return whether force and contact are as they should be; else see to what follows."""

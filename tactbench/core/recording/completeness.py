@@ -65,6 +65,8 @@ class Completeness:
     def __init__(self, allowed: Allowed, sensor: Sequence[StreamSpec], reference: Sequence[StreamSpec]) -> None:
         self._allowed = allowed
         self._reference = {stream.name: [one.name for one in stream.channels] for stream in reference}
+        # An axis may stand; a force that nothing changes is none.
+        self._forces = {one.name for one in reference if any(channel.kind == "force" for channel in one.channels)}
         self._rated = {stream.name for stream in (*sensor, *reference) if stream.rate_hz is not None}
         self._tracks = {stream.name: _Track() for stream in (*sensor, *reference)}
         of_sensor = _Stillness()  # a microphone may have nothing to say of a slow press
@@ -134,7 +136,8 @@ class Completeness:
         for from_ns, to_ns, rows in (*still.long, *([still.same] if still.same else [])):
             if to_ns - from_ns <= 1e9 * self._allowed.frozen_s:
                 continue
-            if self._dead(still, rows) if name in self._reference else self._pressed(from_ns, to_ns):
+            dead = name in self._forces and self._dead(still, rows)
+            if dead or (name not in self._reference and self._pressed(from_ns, to_ns)):
                 yield f"{name}: frozen for {1e-9 * (to_ns - from_ns):.3g} s from {1e-9 * (from_ns - begin_ns):.3g} s on"
                 break
         if counts is not None:

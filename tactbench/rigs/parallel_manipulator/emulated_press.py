@@ -10,16 +10,14 @@ between motor and force sensor, what a quicker press would do to a skin with mem
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING
+from typing import Any
 
 import numpy as np
 
-from tactbench.plugin import NotApplicable, Scene
-from tactbench.plugin.devices import SceneSamples
+from tactbench.plugin import NotApplicable, PluginContractError, Scene
+from tactbench.plugin.devices import RigFile, SceneSamples
 from tactbench.plugin.simulation import SimulatedPress
-
-if TYPE_CHECKING:
-    pass
+from tactbench.rigs.parallel_manipulator.settings import RigSettings
 
 FORCE = "fz"
 """Name under which a simulated rig gives the pressing force, and emulated force sensors are given it."""
@@ -117,3 +115,17 @@ class EmulatedPress:
             at_s = since_s % self._hold_s if self._hold_s else 0.0
         floor = self._floor_n[int(t_s * _FLOOR_HZ) % _FLOOR_DRAWS]
         return {**self._sensor(at_s), FORCE: force_n + noise_n + floor}
+
+
+def emulated_press(file: RigFile, settings: RigSettings, simulated: Any, scene: Scene, seed: int) -> EmulatedPress:
+    """Return what emulated devices of a rig file sense of a scene that was simulated; the skin's height is drawn."""
+    if not hasattr(simulated, "press_curve"):
+        raise PluginContractError(
+            f"The simulated rig {file.emulation.physics!r} has no press curves.",
+            hint="Its acquisition needs press_curve: see SimulatedPress in tactbench.plugin.simulation.",
+        )
+    heights = settings.heights
+    rng = np.random.default_rng([file.emulation.seed, seed, *b"skin", *scene.name.encode()])
+    off_mm = heights.surface_spread_mm * rng.standard_normal() + heights.cap_tolerance_mm * rng.uniform(-1, 1)
+    skin_m = settings.surface_m + 1e-3 * float(np.clip(off_mm, -heights.stand_off_mm / 2, heights.depth_mm / 2))
+    return EmulatedPress(simulated, scene, skin_m=skin_m, largest_n=1.5 * settings.limits.force_ceiling_n, rng=rng)

@@ -41,8 +41,6 @@ if TYPE_CHECKING:
 ROUNDING = 1e-12
 """Part of a link's length by which it may miss: distances of metres carry errors of a few 1e-16 of themselves, and
 geometry files a few more; three digits are left over."""
-LARGEST = 1e6
-"""Largest coordinate or joint value [m]: fourth powers stay finite, and no machine is a thousandth of it."""
 
 Length = Annotated[FiniteFloat, Field(gt=0, le=1e5)]
 
@@ -147,8 +145,8 @@ def _finite(values: FloatArray, what: str) -> FloatArray:
     found = np.asarray(values, dtype=np.float64)
     if found.shape[-1:] != (3,):
         raise UsageError(f"{what} has shape {found.shape}; expected (..., 3).")
-    if not (np.abs(found) <= LARGEST).all():  # false for NaN
-        raise UsageError(f"{what} is not a finite number of at most {LARGEST:g}.", hint="Lengths are metres here.")
+    if not np.isfinite(found).all():
+        raise UsageError(f"{what} is not a finite number.", hint="Lengths are metres here.")
     return found
 
 
@@ -195,31 +193,6 @@ def inverse(delta: LinearDelta, p_m: FloatArray) -> FloatArray:
     return q
 
 
-def solve_forward(delta: LinearDelta, q: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return (..., 3) places [m] of joint values (..., 3) [m], what the first link lacks [m], and centres in line.
-
-    Never a NaN: where there is no place, that of the nearest tangent spheres or the first joint centre is given.
-    """
-    centre = delta.centre_m(_finite(q, "A joint value"))
-    L, c1 = delta.link_m, centre[..., 0, :]
-    a, b = centre[..., 1, :] - c1, centre[..., 2, :] - c1
-    n = np.cross(a, b)
-    aa, bb, nn = _dot(a, a), _dot(b, b), _dot(n, n)
-    longest = np.maximum(aa, bb)
-    # Two centres in one place are in line with the third; three in one place are so to rounding only.
-    in_line = (nn <= 1e-24 * longest**2) | (longest <= (ROUNDING * L[0]) ** 2)
-    safe = np.where(in_line, 1.0, nn)
-    along_a, along_b = 0.5 * (aa + (L[0] - L[1]) * (L[0] + L[1])), 0.5 * (bb + (L[0] - L[2]) * (L[0] + L[2]))
-    to_a, to_b = np.cross(b, n) / safe[..., None], np.cross(n, a) / safe[..., None]
-    x = along_a[..., None] * to_a + along_b[..., None] * to_b
-    # Once more for what rounding left of x.a = A', x.b = B', x.n = 0: two centres near each other magnify it.
-    x = x + (along_a - _dot(x, a))[..., None] * to_a + (along_b - _dot(x, b))[..., None] * to_b
-    x = np.where(in_line[..., None], 0.0, x - (_dot(x, n) / safe)[..., None] * n)
-    far = np.linalg.norm(x, axis=-1)
-    height = delta.mode * np.where(in_line, 0.0, _root((L[0] - far) * (L[0] + far)))
-    return c1 + x + (height / np.sqrt(safe))[..., None] * n, np.where(in_line, 0.0, far - L[0]), in_line
-
-
 def forward(delta: LinearDelta, q: FloatArray) -> FloatArray:
     """Return the (..., 3) places [m] of joint values (..., 3) [m].
 
@@ -231,16 +204,28 @@ def forward(delta: LinearDelta, q: FloatArray) -> FloatArray:
     UsageError
         If a joint value is not finite.
     """
-    p, gap, in_line = solve_forward(delta, q)
-    if in_line.any():
+    centre = delta.centre_m(_finite(q, "A joint value"))
+    L, c1 = delta.link_m, centre[..., 0, :]
+    a, b = centre[..., 1, :] - c1, centre[..., 2, :] - c1
+    n = np.cross(a, b)
+    aa, bb, nn = _dot(a, a), _dot(b, b), _dot(n, n)
+    if (nn <= 1e-24 * np.maximum(aa, bb) ** 2).any():
         raise ClosureError(f"The joint centres of {delta.title} lie in one line: its joints fix no place.")
-    if (gap > ROUNDING * delta.link_m[0]).any():
+    along_a, along_b = 0.5 * (aa + (L[0] - L[1]) * (L[0] + L[1])), 0.5 * (bb + (L[0] - L[2]) * (L[0] + L[2]))
+    to_a, to_b = np.cross(b, n) / nn[..., None], np.cross(n, a) / nn[..., None]
+    x = along_a[..., None] * to_a + along_b[..., None] * to_b
+    # Once more for what rounding left of x.a = A', x.b = B', x.n = 0: two centres near each other magnify it.
+    x = x + (along_a - _dot(x, a))[..., None] * to_a + (along_b - _dot(x, b))[..., None] * to_b
+    x = x - (_dot(x, n) / nn)[..., None] * n
+    far = np.linalg.norm(x, axis=-1)
+    if (far - L[0] > ROUNDING * L[0]).any():
         raise ClosureError(
-            f"The links of {delta.title} do not meet at these joint values: {1e3 * float(gap.max()):.3g} mm are "
-            "missing.",
+            f"The links of {delta.title} do not meet at these joint values: {1e3 * float((far - L[0]).max()):.3g} mm "
+            "are missing.",
             hint="A step was lost or the geometry is wrong: home again, then check the geometry.",
         )
-    return p
+    height = delta.mode * _root((L[0] - far) * (L[0] + far))
+    return np.asarray(c1 + x + (height / np.sqrt(nn))[..., None] * n)
 
 
 class Measures(NamedTuple):
@@ -268,17 +253,4 @@ def measures(delta: LinearDelta, p_m: FloatArray, q: FloatArray) -> Measures:
         constraint=np.asarray(np.linalg.svd(across, compute_uv=False)[..., -1]),
         sideways_rad=np.arcsin(np.minimum(np.abs(_dot(unit, delta.sideways)), 1.0)),
         det=np.linalg.det(unit),
-    )
-
-
-def example_linear() -> LinearDelta:
-    """Return an example with vertical rails: nobody's machine, and not the paper's, which is not known."""
-    return LinearDelta(
-        title="example of a linear delta",
-        source=Source(tag="assumed", reference="an example to try the software with; no machine was measured"),
-        base_radius_mm=150.0,
-        platform_radius_mm=30.0,
-        link_mm=250.0,
-        joint_lowest_mm=-50.0,
-        joint_highest_mm=250.0,
     )

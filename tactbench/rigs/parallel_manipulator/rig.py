@@ -9,9 +9,9 @@ from __future__ import annotations
 import math
 from collections.abc import Collection, Iterator, Mapping
 from contextlib import ExitStack, contextmanager, suppress
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from itertools import chain
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 from weakref import finalize
 
 import numpy as np
@@ -21,7 +21,6 @@ from tactbench.plugin import (
     Block,
     NotApplicable,
     PlanEntry,
-    PluginContractError,
     Rig,
     RigContext,
     RigError,
@@ -49,7 +48,7 @@ from tactbench.plugin.devices import (
     read_options,
     with_sensor,
 )
-from tactbench.rigs.parallel_manipulator.emulated_press import EmulatedPress, quiet
+from tactbench.rigs.parallel_manipulator.emulated_press import EmulatedPress, emulated_press, quiet
 from tactbench.rigs.parallel_manipulator.rig_check import refuse
 from tactbench.rigs.parallel_manipulator.session import Session
 from tactbench.rigs.parallel_manipulator.settings import MOTOR, positioner_of, settings_of, with_limits
@@ -60,8 +59,6 @@ if TYPE_CHECKING:
 
 STOP_S = 10.0
 """Added to the time of a retreat (assumed: a control period, and what a guard in another process takes to answer)."""
-MOST_EVENTS = 40
-"""That are written into a recording; further ones are counted."""
 
 
 @dataclass
@@ -108,7 +105,7 @@ class PressAcquisition:
             first, last = np.searchsorted(block.t_ns, (self.begin_ns, end_ns)).tolist()
             if last > first:
                 self.rows[block.stream] = self.rows.get(block.stream, 0) + last - first
-                yield self.force.turned(_rows(block, slice(first, last)), self.zero)
+                yield self.force.turned(block.rows(slice(first, last)), self.zero)
 
     def stop(self, why: str) -> str:
         """Let the motor retreat at once, and wait for it; return what is to be done where it is not out.
@@ -134,11 +131,9 @@ class PressAcquisition:
             "contact mm": 1e3 * press.contact_m,
             "late control periods": self.control.late,
         }
-        for number, event in enumerate(self.said[:MOST_EVENTS], start=1):
+        for number, event in enumerate(self.said, start=1):
             at_s = 1e-9 * (event.t_ns - self.begin_ns)
             found[f"event {number}"] = f"{at_s:.3f} s, {event.state}: {event.text}"
-        if len(self.said) > MOST_EVENTS:
-            found["events left out"] = len(self.said) - MOST_EVENTS
         return found
 
     @property
@@ -241,11 +236,11 @@ class ParallelManipulator:
         """
         scene = quiet(scene)
         with_sensor(self._file, sensor.name)
-        place = self._place(scene, seed)
+        xy_m = self._place_m(scene)
         try:
             with ExitStack() as stack:
                 senses = self._senses(stack, sensor, scene, seed)
-                yield self._opened(stack, self._current_session(sensor.name), sensor, scene, senses, place)
+                yield self._opened(stack, self._current_session(sensor.name), sensor, scene, senses, xy_m)
         except BaseException:
             self._end_session()
             raise
@@ -259,11 +254,11 @@ class ParallelManipulator:
         sensor: SensorDescriptor,
         scene: Scene,
         senses: tuple[Acquisition, EmulatedPress] | None,
-        place: tuple[tuple[float, float], dict[str, Scalar]],
+        xy_m: tuple[float, float],
     ) -> PressAcquisition:
         """Return the scene, ready to begin; `stack` closes what is its own."""
         settings, guard, clock = self.settings, session.guard, session.clock
-        file, (xy_m, drawn) = with_sensor(self._file, sensor.name), place
+        file, placement = with_sensor(self._file, sensor.name), scene.placement
         session.senses.press = None if senses is None else senses[1]
         guard.disarm()  # of the scene before, if that ended in a fault
         platform_m = session.travel(xy_m)
@@ -307,7 +302,8 @@ class ParallelManipulator:
                 **({} if simulated is None else simulated.drawn),
                 **{f"{name} {key}": value for name, about in identity.items() for key, value in about.items()},
                 **force.about(zero),
-                **drawn,
+                "place x mm": placement.x.to("mm"),
+                "place s mm": placement.s.to("mm"),
                 **({} if platform_m is None else {"platform mm": ", ".join(f"{1e3 * x:.4f}" for x in platform_m)}),
                 **({} if senses is None else {"skin mm": 1e3 * senses[1].skin_m}),
             },
@@ -327,8 +323,8 @@ class ParallelManipulator:
 
     # Before the press -------------------------------------------------------------------------------------------------
 
-    def _place(self, scene: Scene, seed: int) -> tuple[tuple[float, float], dict[str, Scalar]]:
-        """Return the manipulator's x and y [m] for a scene, scatter included, and what to record of them."""
+    def _place_m(self, scene: Scene) -> tuple[float, float]:
+        """Return the manipulator's x and y [m] for a scene."""
         places = self.settings.places
         x_mm, s_mm = scene.placement.x.to("mm"), scene.placement.s.to("mm")
         for name, value, (low, high) in (("x", x_mm, places.reach_x_mm), ("s", s_mm, places.reach_s_mm)):
@@ -338,36 +334,16 @@ class ParallelManipulator:
                     f"{high:g} mm.",
                     hint="Widen `settings: places:`, or put the sensor elsewhere.",
                 )
-        radius, angle = np.random.default_rng([seed, *scene.name.encode()]).random(2)
-        off = places.scatter_mm * math.sqrt(radius)  # even over the disc
-        dx, ds = off * math.cos(math.tau * angle), off * math.sin(math.tau * angle)
-        drawn: dict[str, Scalar] = {"place x mm": x_mm, "place s mm": s_mm}
-        if places.scatter_mm:
-            drawn |= {"scatter x mm": dx, "scatter s mm": ds}
-        return places.place_m(x_mm + dx, s_mm + ds), drawn
+        return places.place_m(x_mm, s_mm)
 
     def _senses(
         self, stack: ExitStack, sensor: SensorDescriptor, scene: Scene, seed: int
     ) -> tuple[Acquisition, EmulatedPress] | None:
         """Return the scene as the simulated rig carries it out, and what emulated devices sense of it."""
-        file = self._file
-        if self._physics is None or not file.emulated:
+        if self._physics is None or not self._file.emulated:
             return None
-        simulated: Any = stack.enter_context(self._physics.open(sensor, scene, seed=seed))
-        if not hasattr(simulated, "press_curve"):
-            raise PluginContractError(
-                f"The simulated rig {file.emulation.physics!r} has no press curves.",
-                hint="Its acquisition needs press_curve: see SimulatedPress in tactbench.plugin.simulation.",
-            )
-        heights, limits = self.settings.heights, self.settings.limits
-        rng = np.random.default_rng([file.emulation.seed, seed, *b"skin", *scene.name.encode()])
-        off_mm = heights.surface_spread_mm * rng.standard_normal() + heights.cap_tolerance_mm * rng.uniform(-1, 1)
-        skin_m = self.settings.surface_m + 1e-3 * float(
-            np.clip(off_mm, -heights.stand_off_mm / 2, heights.depth_mm / 2)
-        )
-        return simulated, EmulatedPress(
-            simulated, scene, skin_m=skin_m, largest_n=1.5 * limits.force_ceiling_n, rng=rng
-        )
+        simulated = stack.enter_context(self._physics.open(sensor, scene, seed=seed))
+        return simulated, emulated_press(self._file, self.settings, simulated, scene, seed)
 
     def _prompt(self, file: RigFile, sensor: SensorDescriptor, scene: Scene) -> None:
         profile = scene.profile
@@ -405,18 +381,6 @@ class ParallelManipulator:
                 hint="Look at the rig: sensor, cap, heights in the rig file.",
             )
         return events
-
-
-def _rows(block: Block, rows: slice) -> Block:
-    """Return some rows of a block."""
-    return replace(
-        block,
-        **{
-            name: value[rows]
-            for name in ("t_ns", "data", "quality", "sequence", "device_ns")
-            if (value := getattr(block, name)) is not None
-        },
-    )
 
 
 def _received(reading: Reading) -> int:

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from typing import Annotated, Any, Literal, Self
 
-from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, field_validator, model_validator
+from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, model_validator
 
 from tactbench.plugin import UsageError, load_object
 from tactbench.plugin.devices import ForceLaw, LoopModel, NamedDevice, Positioner, PressPlan, RigFile, read_options
@@ -172,7 +172,6 @@ class PressRules(_Part):
     error_band_n: Positive
     band_n: Positive
     lost_s: Positive
-    hold_s: NotNegative = 0.0
     unload_speed_mm_s: Positive
     stale_ms: Positive = 100.0
     """The sensor's rows may be this old, as received; older: retreat."""
@@ -229,8 +228,6 @@ class Places(_Part):
     """Offsets that scenes may ask for along the sensor; all of the rectangle is tested beforehand."""
     reach_s_mm: Range = (0.0, 0.0)
     """Offsets along its arc; laid out flat."""
-    scatter_mm: NotNegative = 0.0
-    """Radius of the disc in which each press's place is drawn, evenly, about the one asked for."""
     way_point_mm: Positive = 1.0
     """The manipulator's line is kept by points at most so far apart, at each of which all rails come to rest."""
 
@@ -249,9 +246,8 @@ class Places(_Part):
         return 1e-3 * x, 1e-3 * y
 
     def corners_m(self) -> list[tuple[float, float]]:
-        """Return the four corners of all that may be asked for, scatter included, in turn [m]."""
-        (x0, x1), (s0, s1), more = self.reach_x_mm, self.reach_s_mm, self.scatter_mm
-        x0, x1, s0, s1 = x0 - more, x1 + more, s0 - more, s1 + more
+        """Return the four corners of all that may be asked for, in turn [m]."""
+        (x0, x1), (s0, s1) = self.reach_x_mm, self.reach_s_mm
         return [self.place_m(*at) for at in ((x0, s0), (x1, s0), (x1, s1), (x0, s1))]
 
 
@@ -295,6 +291,12 @@ class RigSettings(_Part):
         return self
 
     @property
+    def speeds_mm_s(self) -> tuple[float, ...]:
+        """All speeds of the motor."""
+        touch = self.touch
+        return (touch.speed_mm_s, touch.touch_speed_mm_s, self.press.unload_speed_mm_s, self.limits.retreat_speed_mm_s)
+
+    @property
     def surface_m(self) -> float:
         """Position of the motor at which the indenter is expected to touch [m]."""
         return 1e-3 * (self.limits.retreat_mm + self.heights.stand_off_mm)
@@ -325,7 +327,6 @@ class RigSettings(_Part):
             error_band_n=press.error_band_n,
             band_n=press.band_n,
             lost_s=press.lost_s,
-            hold_s=press.hold_s,
         )
 
 
@@ -333,13 +334,6 @@ class ManipulatorFile(RigFile):
     """A rig file of this rig: complaints about its settings name their line."""
 
     settings: RigSettings  # type: ignore[assignment]
-
-    @field_validator("devices")
-    @classmethod
-    def _has_a_motor(cls, devices: dict[str, NamedDevice]) -> dict[str, NamedDevice]:
-        if MOTOR not in devices:
-            raise ValueError(f"the rig presses with its {MOTOR!r}")
-        return devices
 
 
 def settings_of(file: RigFile) -> RigSettings:

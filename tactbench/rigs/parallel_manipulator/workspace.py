@@ -2,7 +2,7 @@
 
 Along a straight line (derived) reach, s and the sideways angle are concave or affine, so the ends decide; a joint value
 turns at one place at most, and abs(du/dx) <= 1/(s L), so sigma_U and sigma_W change by at most sqrt(3)/(s L) per
-length. A move is sampled every `SAMPLE_M`, and must keep between its samples what this bound permits to be lost there.
+length. A move is sampled every `SAMPLE_M`, and must keep at its samples what this bound permits to be lost between.
 """
 
 from __future__ import annotations
@@ -32,7 +32,6 @@ _COLUMNS = (
     "sigma_W",
     *(f"sideways angle of leg {leg}" for leg in (1, 2, 3)),
 )
-_LEAVABLE = np.array([not name.startswith(("reach", "assembly")) for name in _COLUMNS])
 _Measure = Annotated[FiniteFloat, Field(ge=0.01, lt=1)]
 
 
@@ -83,45 +82,25 @@ class Workspace:
             ], axis=1,
         )  # fmt: skip
 
-    def check_place(self, p_m: FloatArray) -> None:
-        """Raise PlaceRefusedError unless the place (3,) [m] is permitted."""
-        self.check_move(p_m, p_m)
-
     def check_move(self, start_m: FloatArray, end_m: FloatArray) -> None:
         """Raise PlaceRefusedError unless the straight move between places (3,) [m] is permitted.
 
-        A move that begins where a joint, a singularity measure or an angle is beyond its limit is a way out: it is
-        permitted if that measure never falls further and ends nearer to its limit than it began.
+        Where it begins is not looked at: the platform stands there already.
         """
         start, end = np.asarray(start_m, dtype=np.float64), np.asarray(end_m, dtype=np.float64)
-        length = float(np.linalg.norm(end - start))
-        count = math.ceil(length / SAMPLE_M) + 1
-        places = start + np.linspace(0.0, 1.0, max(count, 1))[:, None] * (end - start)
-        margin = self.margins(places)
+        count = max(1, math.ceil(float(np.linalg.norm(end - start)) / SAMPLE_M))
+        places = start + np.arange(1, count + 1)[:, None] / count * (end - start)
         # The turning point of a joint value lies within half a sample; s L bounds how far it goes there.
-        slack = np.zeros(len(_COLUMNS))
-        if length > 0:
-            half = 0.5 * length / (count - 1)
-            least = max(float(margin[:, 10:13].min()) + self.postures.serial, self.postures.serial)
-            shortest = float(self.delta.link_m.min())
-            slack[3:9] = half**2 / (2 * least**3 * shortest)
-            slack[13:15] = math.sqrt(3.0) * half / (least * shortest)
-        leaving = (margin[0] < slack) & _LEAVABLE
-        worse = np.diff(margin, axis=0, prepend=margin[:1]) < -ROUNDING
-        worse[-1] |= margin[-1] <= margin[0] + ROUNDING
-        bad = np.where(leaving, worse, margin < np.where(_LEAVABLE, slack, 0.0))
+        slack, half = np.zeros(len(_COLUMNS)), 0.5 * SAMPLE_M
+        if not np.array_equal(start, end):
+            s, shortest = self.postures.serial, float(self.delta.link_m.min())
+            slack[3:9] = half**2 / (2 * s**3 * shortest)
+            slack[13:15] = math.sqrt(3.0) * half / (s * shortest)
+        bad = self.margins(places) < slack
         if bad.any():
-            row = int(np.argmax(bad.any(axis=1)))
-            column = int(np.argmax(bad[row]))
+            row, column = np.argwhere(bad)[0]
             place = ", ".join(f"{1e3 * x:.2f}" for x in places[row])
             raise PlaceRefusedError(
-                f"({place}) mm is not permitted: the {_COLUMNS[column]} is beyond its limit by "
-                f"{_shown(column, -float(margin[:, column].min()))}.",
+                f"({place}) mm is not permitted: the {_COLUMNS[column]} is beyond its limit.",
                 hint="Nothing was moved. Choose another place or another way.",
             )
-
-
-def _shown(column: int, value: float) -> str:
-    if column < 9:
-        return f"{1e3 * value:.3g} mm"
-    return f"{math.degrees(value):.3g} deg" if column >= 15 else f"{value:.3g}"

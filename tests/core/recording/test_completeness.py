@@ -59,6 +59,17 @@ def test_rows_without_a_number_are_silence():
     assert lacking(quality=lambda *one: missing(*one).astype(np.uint8)) == ["taxels: nothing for 4.99 s from 5 s on"]
 
 
+def test_an_axis_that_stands_is_not_frozen():
+    place = StreamSpec(name="motor", channels=(ChannelSpec(name="position", kind="position", unit="m"),))
+    t_s = np.arange(SECONDS * HZ) / HZ
+    found = Completeness(Allowed(), (TAXELS,), (FORCE, place))
+    t_ns = np.round(1e9 * t_s).astype(np.int64)
+    found.add(Block("taxels", t_ns, np.column_stack([t_s, t_s])))
+    found.add(Block("force", t_ns, t_s[:, None]))
+    found.add(Block("motor", t_ns, np.full((len(t_s), 1), 1e-3)))
+    assert found.lacking({}) == []
+
+
 def test_a_force_that_stands_still_is_frozen_and_a_sensor_if_the_force_moves_meanwhile():
     stuck = lambda t_s: np.where(t_s < 4.0, t_s, 4.0)[:, None]  # noqa: E731
     assert lacking(force=stuck) == ["force: frozen for 5.99 s from 4 s on"]

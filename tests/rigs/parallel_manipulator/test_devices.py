@@ -40,7 +40,7 @@ def test_driver_and_emulator_take_the_same_options(name):
     options = descriptor.emulated_options | own[name]
 
     def senses(time_s):
-        return {} if time_s < 100.5 else {"fz": -2.0, "load": 1.0}
+        return {} if time_s < 100.5 else {"fz": -2.0}
 
     def block_of_a_second():
         emulator = load_object(descriptor.emulator)(EmulatorSettings(senses, np.random.default_rng(3), options))

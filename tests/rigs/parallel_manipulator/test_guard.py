@@ -334,7 +334,7 @@ def test_a_force_that_does_not_change_lets_no_step_pass(tmp_path):
 def test_a_drive_that_has_forgotten_its_limits_is_not_armed(made):
     made.press()
     made.guard.disarm()
-    made.world.motor.drive.settings.positive_limit = 9999
+    made.world.motor.drive.settings["GPL"] = 9999
     with pytest.raises(GuardRefusesError, match="GPL 9999 where LL3000 was set"):
         made.guard.arm(made.setting.limits)
 
@@ -342,8 +342,8 @@ def test_a_drive_that_has_forgotten_its_limits_is_not_armed(made):
 def test_a_motor_that_cannot_come_out_loses_its_power_loudly(made):
     def block(beat):
         # Something holds it where it is.
-        here = made.world.motor.drive.servo.position_m
-        made.world.motor.drive.servo.stops = (here - 1e-9, here + 1e-9)
+        here = made.world.motor.drive.position_m
+        made.world.motor.drive.stops = (here - 1e-9, here + 1e-9)
         return replace(beat, sequence=0)
 
     made.press(in_phase("ramp", block))
@@ -361,8 +361,8 @@ def test_a_motor_that_would_fall_keeps_its_power(tmp_path, monkeypatch):
     with rig("local", tmp_path) as made:
 
         def block(beat):
-            here = made.world.motor.drive.servo.position_m
-            made.world.motor.drive.servo.stops = (here - 1e-9, here + 1e-9)
+            here = made.world.motor.drive.position_m
+            made.world.motor.drive.stops = (here - 1e-9, here + 1e-9)
             return replace(beat, sequence=0)
 
         made.press(in_phase("ramp", block))

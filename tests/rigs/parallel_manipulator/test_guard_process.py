@@ -216,7 +216,7 @@ def test_a_motor_that_is_let_stand_blind(half):
     world.devices.advance(world.clock() + 10**9)
     link.write(half)
     link.close()
-    assert world.motor.drive.servo.speed_m_s == pytest.approx(5e-3, rel=0.01)
+    assert world.motor.drive.speed_m_s == pytest.approx(5e-3, rel=0.01)
     with nobody_at(world) as motor:
         motor.rescue(None)
     world.devices.advance(world.clock() + 10**8)

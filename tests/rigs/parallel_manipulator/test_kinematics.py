@@ -11,16 +11,17 @@ from tactbench.rigs.parallel_manipulator.kinematics import (
     ClosureError,
     LinearDelta,
     UnreachableError,
-    example_linear,
     forward,
     inverse,
     measures,
-    solve_forward,
     solve_inverse,
 )
 
 FREE = Source(tag="assumed", reference="to compute with")
-LV = example_linear()
+LV = LinearDelta(
+    title="vertical rails", source=FREE, base_radius_mm=150.0, platform_radius_mm=30.0, link_mm=250.0,
+    joint_lowest_mm=-50.0, joint_highest_mm=250.0,
+)  # fmt: skip
 LI = LinearDelta(
     title="rails at 60 deg", source=FREE, base_radius_mm=130.0, platform_radius_mm=30.0, link_mm=220.0,
     inclination_deg=60.0, joint_lowest_mm=-190.0, joint_highest_mm=200.0,
@@ -80,11 +81,12 @@ def test_whatever_is_asked_nothing_is_nan_and_links_keep_their_length(a, b, c, d
     if (shortfall < 0).all():
         away = np.linalg.norm(np.array([a, b, c]) - delta.centre_m(q), axis=-1)
         assert np.abs(away - delta.link_m).max() <= 1e-14 * max(1.0, abs(a), abs(b), abs(c))
-    p, gap, _ = solve_forward(delta, np.array([a, b, c]))
-    assert np.isfinite(p).all()
-    if gap < 0:
-        away = np.linalg.norm(p - delta.centre_m(np.array([a, b, c])), axis=-1)
-        assert np.abs(away - delta.link_m).max() <= 2e-14
+    try:
+        p = forward(delta, np.array([a, b, c]))
+    except ClosureError:
+        return
+    away = np.linalg.norm(p - delta.centre_m(np.array([a, b, c])), axis=-1)
+    assert np.abs(away - delta.link_m).max() <= 2e-14
 
 
 def test_a_place_out_of_reach_names_leg_and_shortfall():
@@ -100,7 +102,7 @@ def test_joint_values_without_a_place_are_refused():
         forward(LinearDelta.model_validate(coincident.model_dump()), np.zeros(3))
 
 
-@pytest.mark.parametrize("bad", [np.full(3, np.nan), np.array([1e7, 0, 0]), np.zeros(2)])
+@pytest.mark.parametrize("bad", [np.full(3, np.nan), np.zeros(2)])
 def test_what_is_not_a_place_is_refused(bad):
     for ask in (inverse, forward):
         with pytest.raises(UsageError):

@@ -17,7 +17,6 @@ from tactbench.rigs.parallel_manipulator.motor.codec import (
     answers,
     encode,
     line_time_s,
-    newer_generation,
 )
 from tactbench.rigs.parallel_manipulator.motor.profile import FaulhaberOptions
 
@@ -149,20 +148,6 @@ def test_status_words_of_the_vectors():
 )
 def test_line_times(n, baud, ms):
     assert 1e3 * line_time_s(n, baud) == pytest.approx(ms, abs=5e-4)  # Digits printed.
-
-
-def test_binary_frames_of_newer_drives_are_recognised():
-    frame = bytes.fromhex("53 07 01 01 41 60 00 73 45")
-    assert newer_generation(frame)
-    assert newer_generation(frame + b"more")
-    for cut in range(len(frame)):
-        assert not newer_generation(frame[:cut])
-    for place in range(len(frame)):
-        damaged = bytearray(frame)
-        damaged[place] ^= 0x10
-        assert not newer_generation(bytes(damaged))
-    assert not newer_generation(b"SP50\r")
-    assert not newer_generation(b"S\x00E")
 
 
 @given(st.lists(st.binary(max_size=40), max_size=12))

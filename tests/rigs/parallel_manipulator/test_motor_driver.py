@@ -23,7 +23,6 @@ from tactbench.rigs.parallel_manipulator.motor.exchange import (
     MotorError,
     MotorRefusalError,
     MotorSilentError,
-    WrongGenerationError,
 )
 from tactbench.rigs.parallel_manipulator.motor.profile import FaulhaberOptions
 from tests.rigs.parallel_manipulator.pumps import VirtualLink
@@ -32,13 +31,13 @@ STEP_M = 6e-6
 LIMITS = {"lower_m": -9e-3, "upper_m": 9e-3, "speed_m_s": 0.05, "acceleration_m_s2": 1.0, "corridor_m": 12e-6}
 
 
-def nothing(position_m, time_s):
+def nothing(position_m):
     return 0.0
 
 
 def wall(at_m, stiffness):
     """Return a spring [N/m] that begins at a position."""
-    return lambda position_m, time_s: stiffness * max(0.0, position_m - at_m)
+    return lambda position_m: stiffness * max(0.0, position_m - at_m)
 
 
 def motor(load=nothing, **more):
@@ -84,7 +83,7 @@ def read_on(driver):
 
 
 def place(link):
-    return link.emulator.drive.servo.position_m
+    return link.emulator.drive.position_m
 
 
 # As a device of a rig -------------------------------------------------------------------------------------------------
@@ -170,11 +169,11 @@ def test_homing_on_the_end_stop_with_little_current():
     driver, link = driver_on(motor(), **LIMITS, homing="end-stop", homing_speed_m_s=-0.02, home_m=-10e-3)
     largest = []
     driver.start()
-    driver.home(lambda: largest.append(abs(link.emulator.drive.servo.current_a)) or False)
+    driver.home(lambda: largest.append(abs(link.emulator.drive.current_a)) or False)
     # The stop is beyond the ends of travel, so it has come back to them; its current is what it was.
     assert place(link) == pytest.approx(-9e-3, abs=2 * STEP_M)
     assert max(largest) <= 0.2 * (1 + 1e-9)
-    assert link.emulator.drive.settings.peak_current == 1600
+    assert link.emulator.drive.settings["LPC"] == 1600
     driver.move_to(0.0)
     finish(driver, link)
     assert place(link) == pytest.approx(0.0, abs=2 * STEP_M)
@@ -198,7 +197,7 @@ def test_a_retreat_takes_the_place_of_any_move():
     # The next move has the speed of moves again.
     driver.move_by(STEP_M)
     finish(driver, link)
-    assert link.emulator.drive.settings.speed == 50
+    assert link.emulator.drive.settings["SP"] == 50
 
 
 @pytest.mark.parametrize("bytes_on_the_way", range(0, 40, 3))
@@ -376,31 +375,6 @@ def test_unplugged_at_any_time():
             to_and_fro(driver, link)
         driver.stop()
         driver.close()
-
-
-class NewerDrive:
-    """It answers anything with a frame of the binary protocol."""
-
-    def __init__(self):
-        self.sent = []
-
-    def feed(self, piece, now_s):
-        self.sent.append((now_s + 1e-3, bytes.fromhex("5307010141600073 45")))
-        return []
-
-    def poll(self, now_s):
-        found = [piece for piece in self.sent if piece[0] <= now_s]
-        del self.sent[: len(found)]
-        return found
-
-    def next_s(self):
-        return self.sent[0][0] if self.sent else math.inf
-
-
-def test_the_newer_generation_is_refused():
-    driver, _ = driver_on(NewerDrive())
-    with pytest.raises(WrongGenerationError, match="newer Faulhaber generation"):
-        driver.identify()
 
 
 @given(st.lists(st.binary(max_size=30), max_size=12), st.integers(0, 2**31))

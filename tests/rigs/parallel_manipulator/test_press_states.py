@@ -11,7 +11,7 @@ from tactbench.rigs.parallel_manipulator.settings import settings_of
 from tests.rigs.parallel_manipulator.spring import file_of
 
 PERIOD_S = 0.02
-SETTINGS = settings_of(file_of(settings__force_loop__integral_mm_n_s=1.0, settings__press__hold_s=0.5))
+SETTINGS = settings_of(file_of(settings__force_loop__integral_mm_n_s=1.0))
 COURSE = Course(setpoint_n=lambda s: min(max(0.0, s - 0.5), 3.0), slope_n_s=1.0, ramp_s=0.5, end_s=3.5)
 
 
@@ -81,11 +81,15 @@ def test_the_states_of_a_press():
     plant = Plant().begun().until(PressState.DONE)
     assert plant.seen == [
         PressState.APPROACH, PressState.CONTACT, PressState.LIFT, PressState.UNLOADED, PressState.RETURN,
-        PressState.RAMP, PressState.HOLD, PressState.UNLOAD, PressState.DONE,
+        PressState.RAMP, PressState.UNLOAD, PressState.DONE,
     ]  # fmt: skip
     assert plant.press.ended == ""
     assert plant.force_n == 0
-    assert plant.largest_n == pytest.approx(3.0, abs=0.1)
+    law = SETTINGS.force_loop.law((-1.0, 1.0))
+    kept = law.kept(PERIOD_S)
+    # The ramp of 1 N/s is behind by r/(k ki) of the integral, less what the filter is (derived); a control period.
+    behind_n = 1 / (5e3 * law.integral) - PERIOD_S * kept / (1 - kept)
+    assert plant.largest_n == pytest.approx(3.0 - behind_n, abs=PERIOD_S)
     assert max(map(abs, plant.steps)) <= SETTINGS.force_loop.step_m * (1 + 1e-9)
     assert plant.press.contact_m == pytest.approx(plant.skin_m + 0.05 / 5e3, abs=3e-6)
 
@@ -128,10 +132,10 @@ def test_no_contact_down_to_the_depth_ends_the_press():
     assert plant.position_m <= SETTINGS.deepest_m
 
 
-@pytest.mark.parametrize("state", [PressState.APPROACH, PressState.CONTACT, PressState.RAMP, PressState.HOLD])
+@pytest.mark.parametrize("state", [PressState.APPROACH, PressState.CONTACT, PressState.RAMP])
 def test_a_guard_that_retreats_ends_the_press(state):
     plant = Plant()
-    if state in (PressState.RAMP, PressState.HOLD):
+    if state is PressState.RAMP:
         plant.begun()
     plant.until(state)
     plant.state, plant.trigger = GuardState.RETREATING, Trigger.FORCE_CEILING

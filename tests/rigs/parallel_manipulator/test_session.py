@@ -31,7 +31,7 @@ def drives(session):
 def true_place_m(session):
     """Return where the platform stands, whatever its drives count: they were switched on at the home place."""
     delta = session.platform.workspace.delta
-    away = [drives(session)[name].servo.position_m for name in JOINTS]
+    away = [drives(session)[name].position_m for name in JOINTS]
     return forward(delta, inverse(delta, HOME_M) + away)
 
 
@@ -53,7 +53,7 @@ class Force:
 
     def obstacle(self, session, after_m):
         """Let the rail run into the spring after a way from where it stands."""
-        self.servo = drives(session)["joint-1"].servo
+        self.servo = drives(session)["joint-1"]
         self.from_m = self.servo.position_m + after_m
 
 
@@ -153,7 +153,7 @@ def test_force_while_the_platform_moves_stops_every_rail(session):
     # The ceiling of travel, 0.2 N, and the way of the rail at 50 mm/s in the guard's reaction and while it brakes.
     reaction_s = 8e-3 + 24 * 10 / 115200 + 10e-3
     assert 0.2 < session.senses.press.largest_n < 0.2 + 20e3 * 0.05 * (reaction_s + 0.05 / (2 * 0.5))
-    servos = [drives(session)[name].servo for name in JOINTS]
+    servos = [drives(session)[name] for name in JOINTS]
     before = [servo.position_m for servo in servos]
     session.emulated.advance(session.clock() + 500_000_000)
     # They hold within the corridor of their drives.
@@ -173,13 +173,13 @@ def test_force_while_a_rail_is_homed_stops_it():
             session.travel((0.0, 0.0))
         # The ceiling, and 10 mm/s for an answer of the drive and while it brakes.
         assert 0.2 < session.senses.press.largest_n < 0.2 + 20e3 * 0.01 * 0.04
-        servo = drives(session)["joint-1"].servo
+        servo = drives(session)["joint-1"]
         session.emulated.advance(session.clock() + 100_000_000)
         here_m = servo.position_m
         session.emulated.advance(session.clock() + 500_000_000)
         assert servo.position_m == pytest.approx(here_m, abs=1e-5)
         # The others were not begun.
-        assert [drives(session)[name].servo.position_m for name in JOINTS[1:]] == [0.0, 0.0]
+        assert [drives(session)[name].position_m for name in JOINTS[1:]] == [0.0, 0.0]
     finally:
         session.close()
 

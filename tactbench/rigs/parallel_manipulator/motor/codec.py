@@ -222,21 +222,14 @@ def answers(line: Line, name: str) -> bool:
 
 
 class OperationStatus(IntFlag):
-    """The integer that OST answers (sourced: the manual, page 68)."""
+    """Bits of what OST answers (sourced: the manual, page 68); it has more, of programs and further inputs."""
 
     HOMING = 1 << 0
-    PROGRAM_RUNNING = 1 << 1
-    STOPPED_BY_DELAY = 1 << 2
-    STOPPED_BY_NOTIFY = 1 << 3
     CURRENT_LIMITATION = 1 << 4
     DEVIATION_ERROR = 1 << 5
     OVERVOLTAGE = 1 << 6
     OVERTEMPERATURE = 1 << 7
     INPUT_1 = 1 << 8
-    INPUT_2 = 1 << 9
-    INPUT_3 = 1 << 10
-    INPUT_4 = 1 << 11
-    INPUT_5 = 1 << 12
     POSITION_ATTAINED = 1 << 16
 
 
@@ -251,23 +244,3 @@ class Configuration(IntFlag):
 def line_time_s(n_bytes: int, baud: int) -> float:
     """Return the seconds that `n_bytes` take on the line (derived: 10 bits a byte)."""
     return n_bytes * BITS_PER_BYTE / baud
-
-
-def newer_generation(data: bytes) -> bool:
-    """Return whether `data` begins with a frame of the newer, binary Faulhaber drives, which this codec cannot speak.
-
-    Such a frame is ``53 length node command data… crc 45``, length the number of bytes but two; the crc goes over all
-    bytes from the length to the last datum, shifts right, starts with FF and has the polynomial D5 (sourced:
-    tonygoldman/faulhaber-rs232, MsgHandler.cpp).
-    """
-    if len(data) < 2 or data[0] != 0x53:
-        return False
-    frame = data[: data[1] + 2]
-    if data[1] < 4 or len(frame) < data[1] + 2 or frame[-1] != 0x45:
-        return False
-    crc = 0xFF
-    for byte in frame[1:-2]:
-        crc ^= byte
-        for _ in range(8):
-            crc = (crc >> 1) ^ 0xD5 if crc & 1 else crc >> 1
-    return crc == frame[-2]

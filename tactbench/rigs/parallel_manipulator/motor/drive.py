@@ -1,22 +1,21 @@
-"""The drive as a model: commands in, answers out, a tick at a time; no bytes and no line.
+"""The drive and its motor as a model: commands in, answers out, a tick at a time; no bytes and no line.
 
-What the drive does where no public document says so is assumed, and marked so beside the code. Commands that it has and
-this model does not (loop gains, programs, inputs) are refused as "Command not available".
+What the drive does where no public document says so is assumed, and marked so beside the code. The commands are those
+that a driver sends. Quasi-static (assumed): the motor follows the reference with a first-order lag, as far as the load
+permits at the current limit. Mass, friction and heat are left out; without power it stands.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 from tactbench.rigs.parallel_manipulator.motor.codec import (
-    BAUDS,
     INVALID_PARAMETER,
     NOT_AVAILABLE,
     OK,
     OVERTEMPERATURE,
-    QUERIES,
-    SAVED,
     UNKNOWN_COMMAND,
     Command,
     Configuration,
@@ -29,57 +28,83 @@ from tactbench.rigs.parallel_manipulator.motor.profile import (
     LARGEST_SPEED,
     FaulhaberOptions,
 )
-from tactbench.rigs.parallel_manipulator.motor.servo import Load, MotorModel, Profile, Servo
 
-_REFUSED = "POR I PP PD SR CI NV NVOFF CAHOSEQ HA HL HN HP SHA SHL SHN GOIX LOADHO"
-_NOT_MODELLED = QUERIES.union(_REFUSED.split())
-"""Commands of the drive that are refused here, but for the queries that `_query` knows."""
+Load = Callable[[float], float]
+"""Force on the motor [N], positive against positive motion, at a position [m]; it does not fall with position."""
+REST_M, REST_M_S = 1e-9, 1e-8
+"""A thousandth of an increment of 1 um, and ten times the resolution of the speed."""
 
-
-_SETTINGS = {
-    "SP": ("speed", LARGEST_SPEED, 0),
-    "AC": ("acceleration", LARGEST_ACCELERATION, 1),
-    "DEC": ("braking", LARGEST_ACCELERATION, 1),
-    "CORRIDOR": ("corridor", 32767, 0),
-    "DEV": ("deviation", 32767, 0),
-    "LPC": ("peak_current", LARGEST_CURRENT, 0),
-    "LCC": ("continuous_current", LARGEST_CURRENT, 0),
-    "HOSP": ("homing_speed", LARGEST_SPEED, 0),
-    "NODEADR": ("node", 255, 0),
-    "ANSW": ("answer_mode", 2, 0),
-}
-"""Commands that set a number: its field, its largest value, and its least."""
-_READ_BACK = {
-    "GSP": "SP", "GAC": "AC", "GDEC": "DEC", "GPC": "LPC", "GCC": "LCC", "GCORRIDOR": "CORRIDOR", "GDEV": "DEV",
+_LARGEST = {
+    "SP": LARGEST_SPEED, "AC": LARGEST_ACCELERATION, "DEC": LARGEST_ACCELERATION, "CORRIDOR": 32767,
+    "LPC": LARGEST_CURRENT, "LCC": LARGEST_CURRENT, "HOSP": LARGEST_SPEED, "APL": 1, "ANSW": 2, "SOR": 0,
 }  # fmt: skip
+"""Commands that set a number, and its largest value."""
+_READ_BACK = {"GSP": "SP", "GAC": "AC", "GDEC": "DEC", "GPC": "LPC", "GCC": "LCC", "GCORRIDOR": "CORRIDOR"}
+_ABOUT = {"VER": "EMULATOR", "GTYP": "linear motor, Faulhaber ASCII", "GSER": "0"}
+
+
+@dataclass(frozen=True)
+class MotorModel:
+    """The mechanics of the emulated motor (all assumed: of the order of small tubular linear motors)."""
+
+    force_constant_n_a: float = 6.5
+    peak_current_a: float = 1.6
+    """LPC at power-on."""
+    continuous_current_a: float = 1.0
+    """LCC at power-on; read back, and otherwise without effect."""
+    stops_m: tuple[float, float] = (-10e-3, 10e-3)
+    """Mechanical end stops, from the place at power-on."""
+    lag_s: float = 5e-3
+    """Time constant of the closed position loop."""
+    tick_s: float = 1e-3
+    """Coarser than a real drive's, for speed; without a load the lag is exact for every tick."""
+    answer_s: float = 1e-3
+    """From the end of a command to the start of its answer."""
 
 
 class Refused(Exception):  # noqa: N818  (an answer, not a failure of ours)
     """The drive's text for a command that it does not carry out."""
 
 
-@dataclass
-class Settings:
-    """What SAVE keeps, in the drive's units."""
+class Profile:
+    """The reference: a trapezoid of speed, recomputed every tick, that ends on its target."""
 
-    speed: int
-    acceleration: int
-    braking: int
-    positive_limit: int
-    negative_limit: int
-    limits_on: bool
-    peak_current: int
-    continuous_current: int
-    corridor: int = 20
-    """Increments around the target within which it is reached (assumed)."""
-    deviation: int = 2000
-    """Increments from the reference at which OST says so (assumed)."""
-    homing_speed: int = 5
-    node: int = 0
-    """Sourced: as the drive ships."""
-    answer_mode: int = 2
-    baud: int = 9600
-    """Sourced: as the drive ships."""
+    def __init__(self, position_m: float) -> None:
+        self.position_m = position_m
+        self.speed_m_s = 0.0
+
+    def to_position(self, target_m: float, tick_s: float, speed: float, acceleration: float, braking: float) -> None:
+        """Go one tick towards a target [m]; speed [m/s], acceleration and braking [m/s^2], all positive."""
+        slow = braking * tick_s * (1 + 1e-9)
+        if self.position_m == target_m and abs(self.speed_m_s) <= slow:
+            self.speed_m_s = 0.0
+            return
+        away = target_m - self.position_m
+        commanded = math.copysign(min(speed, self._braking_speed(away, tick_s, braking)), away)
+        self.to_speed(commanded, tick_s, acceleration, braking)
+        # The last tick ends within rounding of its target.
+        if abs(target_m - self.position_m) < 1e-12 and abs(self.speed_m_s) <= slow:
+            self.position_m = target_m
+
+    def to_speed(self, commanded: float, tick_s: float, acceleration: float, braking: float) -> None:
+        """Go one tick towards a speed [m/s]; backwards goes through rest."""
+        now = self.speed_m_s
+        if now * commanded < 0.0:
+            commanded = 0.0
+        largest = (acceleration if abs(commanded) > abs(now) else braking) * tick_s
+        self.speed_m_s = now + min(max(commanded - now, -largest), largest)
+        self.position_m += self.speed_m_s * tick_s
+
+    @staticmethod
+    def _braking_speed(away_m: float, tick_s: float, braking: float) -> float:
+        """Return the speed of the next tick from which whole ticks of braking end on the target, `away_m` from here.
+
+        n ticks of speed v, v - a h, ..., v - (n - 1) a h cover h (n v - a h n (n - 1) / 2), n the least number of ticks
+        that reaches (derived).
+        """
+        step = braking * tick_s
+        n = max(1, math.ceil(math.sqrt(0.25 + 2.0 * abs(away_m) / (step * tick_s)) - 0.5))
+        return abs(away_m) / (n * tick_s) + step * (n - 1) / 2.0
 
 
 class Drive:
@@ -88,123 +113,122 @@ class Drive:
     Parameters
     ----------
     load
-        Force on the motor [N] at a position [m] and a time [s], positive against positive motion; None: none, ever.
+        Force on the motor; None: none, ever.
     profile, model
         Units of the drive; mechanics of the motor.
     reference_switch_m
         Where GOHOSEQ finds its switch [m]; None: there is none, and GOHOSEQ is refused.
+
+    Attributes
+    ----------
+    settings
+        Numbers by the command that sets them; LL has two, GPL and GNL.
+    position_m, speed_m_s, current_a
+        Of the motor.
+    stops
+        Mechanical ends [m].
+    standing
+        Whether further ticks change nothing, to the motor's resolution, before a command.
+    hot
+        Too hot: without power, and without any until it is switched on again.
     """
 
     def __init__(
         self, load: Load | None, profile: FaulhaberOptions, model: MotorModel, reference_switch_m: float | None
     ) -> None:
-        self.profile = profile
-        self.servo = Servo(model, load)
-        self.standing = False
-        """Whether further ticks change nothing, to the servo's resolution, before a command."""
-        self.hot = False
-        """Too hot: without power, and without any until it is switched on again."""
+        self.profile, self.model, self.load, self.stops = profile, model, load, model.stops_m
+        self.position_m = self.speed_m_s = self.current_a = 0.0
+        self.standing = self.hot = self._limited = False
         self._reference_switch_m = reference_switch_m
-        # Speeds and limits at power-on are assumed.
-        travel = [profile.increments(stop.to("m")) for stop in model.travel]
-        self._saved = Settings(
-            speed=profile.speed(0.05),
-            acceleration=profile.acceleration(1.0),
-            braking=profile.acceleration(1.0),
-            positive_limit=travel[1],
-            negative_limit=travel[0],
-            limits_on=False,
-            peak_current=profile.current(model.peak_current.to("A")),
-            continuous_current=profile.current(model.continuous_current.to("A")),
-        )
+        self._kept = math.exp(-model.tick_s / model.lag_s)
         self._power_on()
 
     def _power_on(self) -> None:
-        self.settings = replace(self._saved)
-        self._enabled = False
-        self.origin_m = self.servo.position_m
-        """Where the drive counts from, as the servo does [m]."""
-        # Positions are lost without power (assumed: incremental).
-        self._reference = Profile(self.servo.position_m)
+        """Begin with settings that are assumed, and without a place (assumed: incremental)."""
+        profile, model = self.profile, self.model
+        self.settings = {
+            "SP": profile.speed(0.05), "AC": profile.acceleration(1.0), "DEC": profile.acceleration(1.0),
+            "LPC": profile.current(model.peak_current_a), "LCC": profile.current(model.continuous_current_a),
+            "GNL": profile.increments(model.stops_m[0]), "GPL": profile.increments(model.stops_m[1]),
+            "CORRIDOR": 20, "HOSP": 5, "APL": 0, "ANSW": 2,
+        }  # fmt: skip
+        self._origin_m = self._target_m = self.position_m
+        self._reference = Profile(self.position_m)
         self._loaded_m: float | None = None
-        self._target_m = self.servo.position_m
         self._velocity: int | None = None
-        self._homing = False
+        self._enabled = self._homing = False
         self._attained = True
-        self._notify_end = False
 
     def overheat(self) -> None:
         """Take the power off until `hot` is set back and the drive is enabled again."""
-        self.hot, self._enabled, self._homing = True, False, False
-        self.standing = False
+        self.hot, self._enabled, self._homing, self.standing = True, False, False, False
 
-    def tick(self, at_s: float) -> list[str]:
-        """Go one tick, to `at_s`; return the notices it causes."""
+    def tick(self) -> None:
+        """Go one tick."""
         profile, settings, reference = self.profile, self.settings, self._reference
-        reference_before_m = reference.position_m
-        if not self._enabled:
-            self.servo.step(at_s, None, 0.0)
-            reference.stop_at(self.servo.position_m)
-        else:
-            speed = settings.speed * profile.speed_unit_m_s
-            acceleration = settings.acceleration * profile.acceleration_unit_m_s2
-            braking = settings.braking * profile.acceleration_unit_m_s2
-            if self._velocity is not None:
-                commanded = min(max(self._velocity * profile.speed_unit_m_s, -speed), speed)
-                reference.to_speed(self._at_limits(commanded, braking), self.servo.tick_s, acceleration, braking)
+        before_m = reference.position_m
+        if self._enabled:
+            rates = [profile.acceleration_unit_m_s2 * settings[name] for name in ("AC", "DEC")]
+            speed = profile.speed_unit_m_s * settings["HOSP" if self._homing else "SP"]
+            if self._velocity is None:
+                reference.to_position(self._target_m, self.model.tick_s, speed, *rates)
             else:
-                if self._homing:
-                    speed = settings.homing_speed * profile.speed_unit_m_s
-                reference.to_position(self._target_m, self.servo.tick_s, speed, acceleration, braking)
-            self.servo.step(at_s, reference, self._limit_a())
-        notices = self._notify()
-        # A load may change with time.
-        self.standing = (
-            self.servo.load is None
-            and not notices
-            and not self.servo.limited
-            and reference.position_m == reference_before_m
-            and reference.speed_m_s == 0.0
-            and self.servo.settled(reference)
-        )
-        return notices
-
-    def _at_limits(self, commanded: float, braking: float) -> float:
-        if not self.settings.limits_on:
-            return commanded
-        lower, upper = self._limits_m()
-        end_m = upper if commanded > 0.0 else lower
-        room_m = max((end_m - self._reference.position_m) * (1.0 if commanded > 0.0 else -1.0), 0.0)
-        largest = Profile.braking_speed(room_m, self.servo.tick_s, braking)
-        return min(max(commanded, -largest), largest)
-
-    def _limits_m(self) -> tuple[float, float]:
-        settings = self.settings
-        return self._place_m(settings.negative_limit), self._place_m(settings.positive_limit)
-
-    def _limit_a(self) -> float:
-        return self.settings.peak_current * self.profile.current_unit_a
-
-    def _place_m(self, increments: float) -> float:
-        return self.origin_m + self.profile.position_m(increments)
-
-    def _increments(self, position_m: float) -> int:
-        return round((position_m - self.origin_m) / self.profile.increment_m)
-
-    def _notify(self) -> list[str]:
-        notices = []
-        near = abs(self.servo.position_m - self._target_m) <= self.profile.position_m(self.settings.corridor)
-        attained = self._velocity is None and self._reference.position_m == self._target_m and near and self._enabled
+                commanded = min(max(self._velocity * profile.speed_unit_m_s, -speed), speed)
+                reference.to_speed(commanded, self.model.tick_s, *rates)
+            self._follow(reference.position_m)
+        else:
+            self._reference = reference = Profile(self.position_m)
+            self.speed_m_s, self.current_a, self._limited = 0.0, 0.0, False
+        near = abs(self.position_m - self._target_m) <= profile.position_m(settings["CORRIDOR"])
+        attained = self._enabled and self._velocity is None and reference.position_m == self._target_m and near
         if attained and self._homing:
             # The switch defines zero (assumed: GOHOSEQ as its programming by the maker's tools has it).
-            self._homing = False
-            self.origin_m = self._target_m
-        if self._notify_end and attained and not self._attained:
-            self._notify_end = False
-            notices.append("p")
+            self._homing, self._origin_m = False, self._target_m
         # A target once reached stays reached until the next motion (assumed).
         self._attained = self._velocity is None and (self._attained or attained)
-        return notices
+        self.standing = (
+            self.load is None
+            and not self._limited
+            and reference.position_m == before_m
+            and reference.speed_m_s == 0.0
+            and abs(self.position_m - before_m) <= REST_M
+            and abs(self.speed_m_s) <= REST_M_S
+        )
+
+    def _follow(self, reference_m: float) -> None:
+        """Let the motor go one tick towards the reference."""
+        low, high = self.stops
+        wish = reference_m + self._kept * (self.position_m - reference_m)
+        moved = min(max(wish, low), high)
+        self._limited = moved != wish
+        force_n = self._force_n(moved)
+        most_n = self.model.force_constant_n_a * self.settings["LPC"] * self.profile.current_unit_a
+        if abs(force_n) > most_n:
+            self._limited = True
+            # Where the load is as large as the limit: further out for a load against positive motion.
+            between_m = (low, moved) if force_n > 0 else (moved, high)
+            moved = self._balance(math.copysign(most_n, force_n), between_m)
+        if self._limited:
+            force_n = math.copysign(most_n, reference_m - moved)
+        self.speed_m_s = (moved - self.position_m) / self.model.tick_s
+        self.position_m, self.current_a = moved, force_n / self.model.force_constant_n_a
+
+    def _force_n(self, position_m: float) -> float:
+        return 0.0 if self.load is None else self.load(position_m)
+
+    def _balance(self, force_n: float, between_m: tuple[float, float]) -> float:
+        """Return the place between two at which the load is a force."""
+        low, high = between_m
+        for _ in range(50):
+            middle = 0.5 * (low + high)
+            low, high = (middle, high) if self._force_n(middle) < force_n else (low, middle)
+        return 0.5 * (low + high)
+
+    def _place_m(self, increments: int) -> float:
+        return self._origin_m + self.profile.position_m(increments)
+
+    def _increments(self, position_m: float) -> int:
+        return round((position_m - self._origin_m) / self.profile.increment_m)
 
     def answer(self, command: Command) -> str:
         """Carry a command out; return its answer, empty if it has none.
@@ -216,17 +240,10 @@ class Drive:
         """
         self.standing = False
         name, argument = command.name, command.argument
-        query = self._query(name)
-        if query is not None:
-            if argument is not None:
-                raise Refused(INVALID_PARAMETER)
-            return query()
-        if name in _NOT_MODELLED:
-            raise Refused(NOT_AVAILABLE)
-        settings = self.settings
-        if name in _SETTINGS:
-            field, most, least = _SETTINGS[name]
-            setattr(settings, field, self._number(argument, most, least=least))
+        if argument is None and (found := self._queried(name)) is not None:
+            return found
+        if name in _LARGEST:
+            self.settings[name] = self._number(argument, _LARGEST[name], least=0)
             return OK
         match name:
             case "EN":
@@ -235,57 +252,31 @@ class Drive:
                 if not self._enabled:
                     # A motor switched on stays where it is.
                     self._enabled, self._attained, self._velocity = True, True, None
-                    self._target_m = self.servo.position_m
-                    self._reference.stop_at(self._target_m)
+                    self._target_m = self.position_m
             case "DI":
                 self._enabled = self._homing = False
             case "LA":
-                self._loaded_m = self._place_m(self._number(argument, LARGEST_POSITION, signed=True))
-            case "LR":
-                # Relative to the target before (assumed), so that steps do not add up errors of control.
-                steps = self._number(argument, LARGEST_POSITION, signed=True)
-                base_m = self._target_m if self._velocity is None else self.servo.position_m
-                self._loaded_m = base_m + self.profile.position_m(steps)
+                self._loaded_m = self._place_m(self._number(argument, LARGEST_POSITION))
             case "M":
                 self._move()
             case "V":
                 self._need_power()
-                self._velocity = self._number(argument, LARGEST_SPEED, signed=True)
+                self._velocity = self._number(argument, LARGEST_SPEED)
                 self._attained = self._homing = False
             case "HO":
-                commanded = 0 if argument is None else self._number(argument, LARGEST_POSITION, signed=True)
-                self.origin_m = self.servo.position_m - self.profile.position_m(commanded)
+                called = 0 if argument is None else self._number(argument, LARGEST_POSITION)
+                self._origin_m = self.position_m - self.profile.position_m(called)
             case "GOHOSEQ":
                 if self._reference_switch_m is None:
                     raise Refused(NOT_AVAILABLE)
                 self._need_power()
                 self._loaded_m, self._velocity = None, None
                 self._homing, self._attained, self._target_m = True, False, self._reference_switch_m
-            case "NP":
-                self._notify_end = argument is None  # a place to be told of is taken, and never told of
-            case "NPOFF":
-                self._notify_end = False
             case "LL":
-                limit = self._number(argument, LARGEST_POSITION, signed=True)
-                if limit > 0:
-                    settings.positive_limit = limit
-                elif limit < 0:
-                    settings.negative_limit = limit
-                else:
+                limit = self._number(argument, LARGEST_POSITION)
+                if limit == 0:
                     raise Refused(INVALID_PARAMETER)  # Assumed: zero has no sign that picks a limit.
-            case "APL":
-                settings.limits_on = bool(self._number(argument, 1))
-            case "SOR":
-                if self._number(argument, 4) != 0:
-                    raise Refused(NOT_AVAILABLE)  # Only speeds from RS232 are modelled.
-            case "BAUD":
-                if argument not in BAUDS:
-                    raise Refused(INVALID_PARAMETER)
-                settings.baud = argument
-                return ""  # The answer at the new rate is in no source.
-            case "SAVE" | "EEPSAV":
-                self._saved = replace(settings)
-                return SAVED
+                self.settings["GPL" if limit > 0 else "GNL"] = limit
             case "RESET":
                 self._power_on()
                 return ""  # Assumed.
@@ -296,10 +287,11 @@ class Drive:
     def _move(self) -> None:
         self._need_power()
         if self._loaded_m is not None:
-            lower, upper = self._limits_m()
-            # Assumed: a target beyond the limits is approached as far as they allow.
-            target_m = min(max(self._loaded_m, lower), upper) if self.settings.limits_on else self._loaded_m
-            self._loaded_m, self._target_m = None, target_m
+            self._target_m, self._loaded_m = self._loaded_m, None
+            if self.settings["APL"]:
+                # Assumed: a target beyond the limits is approached as far as they allow.
+                lower, upper = (self._place_m(self.settings[end]) for end in ("GNL", "GPL"))
+                self._target_m = min(max(self._target_m, lower), upper)
         # Assumed: without a target loaded since, the last one counts, also after motion at a speed.
         self._velocity, self._attained, self._homing = None, False, False
 
@@ -308,54 +300,45 @@ class Drive:
             raise Refused(OVERTEMPERATURE if self.hot else NOT_AVAILABLE)  # Assumed.
 
     @staticmethod
-    def _number(argument: int | None, largest: int, *, signed: bool = False, least: int = 0) -> int:
-        if argument is None or not (-largest if signed else least) <= argument <= largest:
+    def _number(argument: int | None, largest: int, *, least: int | None = None) -> int:
+        if argument is None or not (-largest if least is None else least) <= argument <= largest:
             raise Refused(INVALID_PARAMETER)
         return argument
 
-    def _query(self, name: str) -> Callable[[], str] | None:
-        settings, profile, servo = self.settings, self.profile, self.servo
+    def _queried(self, name: str) -> str | None:
+        """Return the answer to a query; None: it is none."""
+        if name in _ABOUT:
+            return _ABOUT[name]
+        match name:
+            case "POS":
+                found = self._increments(self.position_m)
+            case "TPOS":
+                found = self._increments(self._target_m)
+            case "GN":
+                found = round(self.speed_m_s / self.profile.speed_unit_m_s)
+            case "GRC":
+                found = round(abs(self.current_a) / self.profile.current_unit_a)  # Without sign (assumed).
+            case "OST":
+                found = self._bits(
+                    (self._homing, OperationStatus.HOMING),
+                    (self._limited, OperationStatus.CURRENT_LIMITATION),
+                    (self.hot, OperationStatus.OVERTEMPERATURE),
+                    (self._attained, OperationStatus.POSITION_ATTAINED),
+                )
+            case "CST":
+                found = self._bits(
+                    (self.settings["ANSW"] == 2, Configuration.ACKNOWLEDGES),
+                    (self._enabled, Configuration.POWER_STAGE),
+                    (self.settings["APL"] == 1, Configuration.POSITION_LIMITS),
+                )
+            case "GPL" | "GNL":
+                found = self.settings[name]
+            case _ if name in _READ_BACK:
+                found = self.settings[_READ_BACK[name]]
+            case _:
+                return None
+        return str(found)
 
-        def ost() -> str:
-            away = abs(self._reference.position_m - servo.position_m)
-            status = OperationStatus(0)
-            for on, bit in (
-                (self._homing, OperationStatus.HOMING),
-                (servo.limited, OperationStatus.CURRENT_LIMITATION),
-                (away > profile.position_m(settings.deviation), OperationStatus.DEVIATION_ERROR),
-                (self.hot, OperationStatus.OVERTEMPERATURE),
-                (self._attained, OperationStatus.POSITION_ATTAINED),
-            ):
-                status |= bit if on else OperationStatus(0)
-            return str(int(status))
-
-        def cst() -> str:
-            bits = (
-                (settings.answer_mode == 2, Configuration.ACKNOWLEDGES),
-                (self._enabled, Configuration.POWER_STAGE),
-                (settings.limits_on, Configuration.POSITION_LIMITS),
-            )
-            return str(sum(int(bit) for on, bit in bits if on))
-
-        found: dict[str, Callable[[], str]] = {
-            "POS": lambda: str(self._increments(servo.position_m)),
-            "TPOS": lambda: str(self._increments(self._target_m)),
-            "GV": lambda: str(self._velocity or 0),
-            "GN": lambda: str(round(servo.speed_m_s / profile.speed_unit_m_s)),
-            # Without sign (assumed).
-            "GRC": lambda: str(round(abs(servo.current_a) / profile.current_unit_a)),
-            "GCL": lambda: str(round(self._limit_a() / profile.current_unit_a)),
-            "TEM": lambda: "25",
-            "VER": lambda: "EMULATOR",
-            "GTYP": lambda: "linear motor, Faulhaber ASCII",
-            "GSER": lambda: "0",
-            "OST": ost,
-            "CST": cst,
-            "GST": lambda: f"{int(self._velocity is None)}00{int(self._enabled)}{int(self._attained)}00",
-            "GFS": lambda: f"{int(self.hot)}{int(servo.limited)}00",
-            "GPL": lambda: str(settings.positive_limit),
-            "GNL": lambda: str(settings.negative_limit),
-        }
-        if name in _READ_BACK:
-            return lambda: str(getattr(settings, _SETTINGS[_READ_BACK[name]][0]))
-        return found.get(name)
+    @staticmethod
+    def _bits(*bits: tuple[bool, int]) -> int:
+        return sum(int(bit) for on, bit in bits if on)

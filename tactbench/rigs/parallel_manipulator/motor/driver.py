@@ -64,11 +64,10 @@ def retreat_command(options: FaulhaberOptions) -> bytes:
 
     Raises PositionerError if the drive does not have the speed.
     """
-    node = options.node
     if options.retreat_m is None or options.retreat_speed_m_s is None:
-        return encode("V", 0, node=node)
+        return encode("V", 0)
     speed, place = options.speed(options.retreat_speed_m_s), options.increments(options.retreat_m)
-    return encode("SP", speed, node=node) + encode("LA", place, node=node) + encode("M", node=node)
+    return encode("SP", speed) + encode("LA", place) + encode("M")
 
 
 def _latency_s(options: FaulhaberOptions) -> float:
@@ -78,19 +77,15 @@ def _latency_s(options: FaulhaberOptions) -> float:
 
 def _required_settings(options: FaulhaberOptions) -> list[tuple[str, int, str]]:
     """Return command, argument and the query that reads it back, of what the options state."""
-    found: list[tuple[str, int, str]] = []
-    if options.speed_m_s is not None:
-        found.append(("SP", options.speed(options.speed_m_s), "GSP"))
-    if options.acceleration_m_s2 is not None:
-        argument = options.acceleration(options.acceleration_m_s2)
-        found += [("AC", argument, "GAC"), ("DEC", argument, "GDEC")]
-    if options.corridor_m is not None:
-        found.append(("CORRIDOR", max(1, options.increments(options.corridor_m)), "GCORRIDOR"))
-    if options.peak_current_a is not None:
-        found.append(("LPC", options.current(options.peak_current_a), "GPC"))
-    if options.continuous_current_a is not None:
-        found.append(("LCC", options.current(options.continuous_current_a), "GCC"))
-    return found
+    stated = (
+        ("SP", options.speed, options.speed_m_s, "GSP"),
+        ("AC", options.acceleration, options.acceleration_m_s2, "GAC"),
+        ("DEC", options.acceleration, options.acceleration_m_s2, "GDEC"),
+        ("CORRIDOR", lambda corridor_m: max(1, options.increments(corridor_m)), options.corridor_m, "GCORRIDOR"),
+        ("LPC", options.current, options.peak_current_a, "GPC"),
+        ("LCC", options.current, options.continuous_current_a, "GCC"),
+    )
+    return [(command, of(value), query) for command, of, value, query in stated if value is not None]
 
 
 def _required_limits(options: FaulhaberOptions) -> list[tuple[str, int, str]]:
@@ -118,10 +113,10 @@ class FaulhaberDriver(Positioner):
         self._home = options.increments(options.home_m)
         self._settings, self._limits = _required_settings(options), _required_limits(options)
         self._version = ""
-        self._exchange = Exchange(self.link, settings.clock, baud=options.baud, node=options.node)
+        self._exchange = Exchange(self.link, settings.clock, options.baud)
         self._counts: Counter[str] = Counter()
         self._queue: deque[tuple[str, int | None]] = deque()
-        self._watching = self._in_fault = self._noticed = False
+        self._watching = self._in_fault = False
         self._turn = 0
         self._latest: dict[str, Answer] = {}
         self._move: _Move | None = None
@@ -266,11 +261,7 @@ class FaulhaberDriver(Positioner):
         """Read back every setting and the ends of travel that the options state; raises MotorError if one differs."""
         speed = ("SP", self._speed_now, "GSP")
         for command, argument, query in [speed, *(one for one in self._settings if one[0] != "SP"), *self._limits]:
-            if (found := self._sure(query)) != argument:
-                raise MotorError(
-                    f"The motor's drive has {query} {found} where {command}{argument} was set.",
-                    hint="Was it without power, or set by another program? Start it anew and home it.",
-                )
+            self._same(command, argument, query)
         if self._limits and not self._configuration() & Configuration.POSITION_LIMITS:
             raise MotorError("The motor's drive does not hold the ends of travel any more.")
 
@@ -409,14 +400,14 @@ class FaulhaberDriver(Positioner):
         """
         command, target_m = b"\r" + retreat_command(self.options), self.facts.retreat
         if within_s is None or math.isnan(target_m):
-            self.link.write(b"\r" + encode("V", 0, node=self.options.node))
+            self.link.write(b"\r" + encode("V", 0))
             return math.nan
         self.link.write(command)
         reader, there, place_m, nearest_m = LineReader(), 0, math.nan, math.inf
         sent_ns = self.clock()
         deadline = sent_ns + round(1e9 * within_s)
         while self.clock() < deadline:
-            self.link.write(encode("POS", node=self.options.node))
+            self.link.write(encode("POS"))
             requested_ns, place_m = self.clock(), math.nan
             while math.isnan(place_m) and self.clock() - requested_ns < 1e9 * self._exchange.answer_s:
                 with suppress(LinkTimeout):
@@ -469,14 +460,18 @@ class FaulhaberDriver(Positioner):
 
     def _keep(self, command: str, argument: int, query: str) -> None:
         """Set something and read it back."""
-        for _ in range(2):
+        self._ask(command, argument)
+        if self._sure(query) != argument:  # a digit may have been damaged on its way
             self._ask(command, argument)
-            if (found := self._sure(query)) == argument:
-                return
-        raise MotorError(
-            f"The motor's drive has {query} {found} where {command}{argument} was set.",
-            hint="Check the option against the drive's manual, and the cable.",
-        )
+            self._same(command, argument, query)
+
+    def _same(self, command: str, argument: int, query: str) -> None:
+        """Raise MotorError unless a setting is what was set."""
+        if (found := self._sure(query)) != argument:
+            raise MotorError(
+                f"The motor's drive has {query} {found} where {command}{argument} was set.",
+                hint="Was it without power, or set by another program? Check the option against the drive's manual.",
+            )
 
     # What comes and goes ----------------------------------------------------------------------------------------------
 
@@ -490,8 +485,6 @@ class FaulhaberDriver(Positioner):
             self._abort()
             raise
         self._next()
-        self._noticed |= bool(set(self._exchange.notices) & set("fr"))
-        self._exchange.notices.clear()
         if self._problem is not None:
             problem, self._problem = self._problem, None
             raise problem
@@ -562,11 +555,11 @@ class FaulhaberDriver(Positioner):
                 problem=", ".join(_name(bit) for bit in _PROBLEMS if status & bit),
             )
         )
-        if status & _FAULTS or self._noticed:
+        if status & _FAULTS or self._exchange.fault:
             self._fault(status)
         else:
             self._in_fault = False
-        self._noticed = False
+        self._exchange.fault = False
         move = self._move
         if move is None or not move.started:
             return

@@ -8,12 +8,11 @@ from __future__ import annotations
 import math
 from collections import Counter, deque
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import ClassVar
 
 import numpy as np
 
-from tactbench.plugin import sourced
 from tactbench.plugin.devices import (
     CanFrame,
     DeviceEmulator,
@@ -23,10 +22,9 @@ from tactbench.plugin.devices import (
     fault_concerns,
     read_options,
 )
-from tactbench.rigs.parallel_manipulator.motor.codec import OK, Command, CommandReader, line_time_s
-from tactbench.rigs.parallel_manipulator.motor.drive import Drive, Refused
+from tactbench.rigs.parallel_manipulator.motor.codec import Command, CommandReader, line_time_s
+from tactbench.rigs.parallel_manipulator.motor.drive import Drive, Load, MotorModel, Refused
 from tactbench.rigs.parallel_manipulator.motor.profile import FaulhaberOptions
-from tactbench.rigs.parallel_manipulator.motor.servo import Load, MotorModel
 
 
 @dataclass(frozen=True)
@@ -54,7 +52,7 @@ class MotorEmulator(DeviceEmulator):
     Parameters
     ----------
     load
-        Force on the motor [N] at a position [m] and a time [s], positive against positive motion; None: none, ever.
+        Force on the motor; None: none, ever.
     rng
         Draws the bytes of garbled lines.
     profile, model
@@ -62,13 +60,13 @@ class MotorEmulator(DeviceEmulator):
     reference_switch_m
         Where GOHOSEQ finds its switch [m]; None: there is none, and GOHOSEQ is answered "Command not available".
     baud
-        Of its line, as it was set before.
+        Of its line.
     faults
         What is wrong with it; may be changed at any time.
     """
 
     keeps_pace = True
-    """Bytes take their time here, at the rate that the drive is set to."""
+    """Bytes take their time here."""
 
     def __init__(
         self,
@@ -86,8 +84,7 @@ class MotorEmulator(DeviceEmulator):
         self.faults = list(faults)
         self.begins_m = 0.0
         """Where the motor stands at power-on, as its driver counts once it has homed it."""
-        self.drive.settings.baud = baud
-        self._answer_time_s = model.answer_time.to("s")
+        self._byte_s, self._tick_long_s, self._answer_time_s = line_time_s(1, baud), model.tick_s, model.answer_s
         self._rng = rng
         self._seen: Counter[Fault] = Counter()
         self._reader = CommandReader()
@@ -101,11 +98,11 @@ class MotorEmulator(DeviceEmulator):
     @property
     def position_m(self) -> float:
         """Where the motor is, as its driver counts once it has homed it [m]."""
-        return self.drive.servo.position_m + self.begins_m
+        return self.drive.position_m + self.begins_m
 
     def press_against(self, force_n: Callable[[float], float] | None) -> None:
         """Let a force [N] at such a position act on the motor; None: none, ever."""
-        self.drive.servo.load = None if force_n is None else lambda at_m, _: force_n(at_m + self.begins_m)
+        self.drive.load = None if force_n is None else lambda at_m: force_n(at_m + self.begins_m)
 
     def feed(self, piece: bytes | CanFrame, now_s: float) -> list[Sent]:
         """Take bytes that the host sends from `now_s` on, at the line's rate; return what `poll` returns.
@@ -114,10 +111,9 @@ class MotorEmulator(DeviceEmulator):
         """
         assert isinstance(piece, bytes)
         now_s = max(now_s, self._now_s)
-        byte_s = line_time_s(1, self.drive.settings.baud)
         self._in_free_s = max(self._in_free_s, now_s)
         for part in piece.splitlines(keepends=True):
-            self._in_free_s += len(part) * byte_s
+            self._in_free_s += len(part) * self._byte_s
             self._in.append((self._in_free_s, part))
         return self.poll(now_s)
 
@@ -155,7 +151,7 @@ class MotorEmulator(DeviceEmulator):
     def _tick_s(self) -> float:
         """Return the time of the next tick."""
         assert self._start_s is not None
-        return self._start_s + (self._ticks + 1) * self.drive.servo.tick_s
+        return self._start_s + (self._ticks + 1) * self._tick_long_s
 
     def _go_to(self, now_s: float) -> None:
         # Ticks stand on a grid of their own, and answers have their times: when it is asked for changes nothing.
@@ -164,7 +160,7 @@ class MotorEmulator(DeviceEmulator):
             if tick_s <= now_s and self._standing:
                 assert self._start_s is not None
                 # One tick is left to be made: rounding then decides nothing.
-                self._ticks += max(0, math.floor((now_s - self._start_s) / self.drive.servo.tick_s) - 1 - self._ticks)
+                self._ticks += max(0, math.floor((now_s - self._start_s) / self._tick_long_s) - 1 - self._ticks)
                 tick_s = self._tick_s()
             if self._answers and self._answers[0][0] <= min(tick_s, now_s):
                 due_s, text = self._answers.popleft()
@@ -172,8 +168,7 @@ class MotorEmulator(DeviceEmulator):
             elif tick_s <= now_s:
                 self._ticks += 1
                 self._heat(tick_s)
-                for letter in self.drive.tick(tick_s):
-                    self._notice(letter, tick_s)
+                self.drive.tick()
             else:
                 break
         self._now_s = now_s
@@ -185,59 +180,41 @@ class MotorEmulator(DeviceEmulator):
         hot = self._active("motor-fault", at_s) is not None
         if hot and not self.drive.hot:
             self.drive.overheat()
-            self._notice("f", at_s)
+            self._send("f", at_s)
         self.drive.hot = hot
 
     def _carry_out(self, command: Command, at_s: float) -> None:
-        if command.node not in (None, self.drive.settings.node):
-            return
         try:
             answer = self.drive.answer(command)
-            refused = False
         except Refused as refusal:
-            answer, refused = str(refusal), True
-        # Without ANSW2 queries and SAVE are answered, and nothing else (assumed).
-        silent = self.drive.settings.answer_mode < 2 and (refused or answer == OK)
-        if answer and not silent:
+            answer = str(refusal)
+        if answer:
             late = self._active("late-answers", at_s)
             due_s = at_s + self._answer_time_s + (late.delay_s if late else 0.0)
             # Answers keep the order of their commands, also when the fault ends between two of them.
             self._answers.append((max(due_s, self._answers[-1][0]) if self._answers else due_s, answer))
-
-    def _notice(self, letter: str, at_s: float) -> None:
-        if self.drive.settings.answer_mode:
-            self._send(letter, at_s)
 
     def _send(self, text: str, at_s: float) -> None:
         line = bytearray(text.encode("ascii") + b"\r\n")
         if fault_concerns(self.faults, "garbled-line", at_s, self._seen):
             # Any other byte than the right one: also a digit for a digit, which no host can notice.
             line[int(self._rng.integers(len(line)))] ^= int(self._rng.integers(1, 256))
-        byte_s = line_time_s(1, self.drive.settings.baud)
-        first_s = max(self._out_free_s, at_s) + byte_s
-        self._out_free_s = first_s + (len(line) - 1) * byte_s
+        first_s = max(self._out_free_s, at_s) + self._byte_s
+        self._out_free_s = first_s + (len(line) - 1) * self._byte_s
         # A host stamps a line at its first byte, and has it at its last.
         self._out += [(first_s, bytes(line[:1])), (self._out_free_s, bytes(line[1:]))]
 
 
 def build(settings: EmulatorSettings) -> MotorEmulator:
-    """Return an emulated drive; `settings.senses` may give the ``load`` on its motor, N against positive motion.
-
-    Raises
-    ------
-    UsageError
-        For options or faults that are not known.
-    """
+    """Return an emulated drive; raises UsageError for options or faults that are not known."""
     options = read_options(FaulhaberOptions, settings.options, "faulhaber")
     model = MotorModel()
     if options.homing == "here" and options.lower_m is not None and options.upper_m is not None:
         # It has the travel that is stated, counted from where it stands now, and a little more.
-        ends_m = (options.lower_m - options.home_m - BEYOND_M, options.upper_m - options.home_m + BEYOND_M)
-        first, last = (end.to("m") for end in model.travel)
-        travel = (sourced(min(ends_m[0], first), "m", "its options"), sourced(max(ends_m[1], last), "m", "its options"))
-        model = model.model_copy(update={"travel": travel})
+        low, high = options.lower_m - options.home_m - BEYOND_M, options.upper_m - options.home_m + BEYOND_M
+        model = replace(model, stops_m=(min(low, model.stops_m[0]), max(high, model.stops_m[1])))
     found = MotorEmulator(
-        lambda _position_m, at_s: settings.senses(at_s).get("load", 0.0),
+        None,
         settings.rng,
         profile=options,
         model=model,
@@ -245,7 +222,6 @@ def build(settings: EmulatorSettings) -> MotorEmulator:
         baud=options.baud,
         faults=[MotorFault.parse(text) for text in settings.faults],
     )
-    ends = found.drive.servo.stops
-    homed_at_m = {"here": 0.0, "switch": SWITCH_M, "end-stop": ends[options.homes_towards() > 0]}[options.homing]
-    found.begins_m = options.home_m - homed_at_m
+    homed_at_m = {"here": 0.0, "switch": SWITCH_M, "end-stop": model.stops_m[options.homes_towards() > 0]}
+    found.begins_m = options.home_m - homed_at_m[options.homing]
     return found

@@ -16,7 +16,6 @@ from tactbench.rigs.parallel_manipulator.motor.codec import (
     FLASH_DEFECT,
     INVALID_PARAMETER,
     LONGEST_ANSWER,
-    LONGEST_LINE,
     NOT_AVAILABLE,
     OVERTEMPERATURE,
     UNKNOWN_COMMAND,
@@ -26,7 +25,6 @@ from tactbench.rigs.parallel_manipulator.motor.codec import (
     answers,
     encode,
     line_time_s,
-    newer_generation,
 )
 
 MARK = "VER"
@@ -54,13 +52,7 @@ class MotorSilentError(MotorError, PositionerSilentError):
 
 
 class MotorRefusalError(MotorError):
-    """The drive refuses a command; `text` is its own."""
-
-    text = ""
-
-
-class WrongGenerationError(MotorError):
-    """The drive speaks the newer, binary protocol."""
+    """The drive refuses a command."""
 
 
 class Answer(NamedTuple):
@@ -89,11 +81,9 @@ class Answer(NamedTuple):
                 hint="Check the cable; read the position before the next move.",
             )
         if self.line.kind is Kind.REFUSAL:
-            error = MotorRefusalError(
+            raise MotorRefusalError(
                 f"The motor's drive answers {text} with: {self.line.text}.", hint=_HINTS[self.line.text]
             )
-            error.text = self.line.text
-            raise error
         return self.line
 
 
@@ -108,22 +98,20 @@ class Exchange:
         Of the link.
     baud
         Of the line: time-outs go by it.
-    node
-        Address of the drive; None: the only one.
 
     Attributes
     ----------
-    notices
-        Letters that the drive sent by itself and nobody has taken yet.
+    fault
+        Whether the drive has sent the notice of a fault since this was last set back.
     counts
         ``time_outs``, ``late`` answers, ``garbled`` and ``unexpected`` lines, ``refusals``.
     """
 
-    def __init__(self, link: ByteLink, clock: Clock, *, baud: int, node: int | None = None) -> None:
+    def __init__(self, link: ByteLink, clock: Clock, baud: int) -> None:
         self.answer_s = 3.0 * line_time_s(LONGEST_ANSWER, baud) + HOST_S
-        self.notices: deque[str] = deque(maxlen=100)
+        self.fault = False
         self.counts: Counter[str] = Counter()
-        self._link, self._clock, self._node = link, clock, node
+        self._link, self._clock = link, clock
         self._reader = LineReader()
         self._out: deque[tuple[str, int | None, object]] = deque()
         self._since_ns = 0
@@ -140,7 +128,7 @@ class Exchange:
         """Send a command now, also while others are out: the drive keeps their order. `of` comes with the answer."""
         if not self._out:
             self._since_ns = self._clock()
-        self._link.write(encode(name, argument, node=self._node))
+        self._link.write(encode(name, argument))
         self._out.append((name, argument, of))
 
     def pump(self, timeout_s: float) -> list[Answer]:
@@ -168,8 +156,6 @@ class Exchange:
         ------
         LinkTimeout
             If it does not answer.
-        WrongGenerationError
-            If it is of the newer generation.
         """
         self._link.write(b"\r")
         self.quiet()
@@ -190,17 +176,16 @@ class Exchange:
                 before = line.text
         raise LinkTimeout(
             f"No drive on {self._link.address} answers {MARK} twice with the same.",
-            hint="Check power, cable (crossed or not), node and baud: a drive that was never set up has 9600.",
+            hint="Check power, cable (crossed or not) and baud: a drive that was never set up has 9600. Drives of the "
+            "newer, binary generation cannot be used.",
         )
 
     def quiet(self) -> None:
         """Drop what comes until nothing has come for the time of an answer; at most ten times that."""
-        seen = bytearray()
         deadline = self._clock() + round(1e10 * self.answer_s)
         with suppress(LinkTimeout):
             while self._clock() < deadline:
-                seen += self._link.read(self.answer_s).data
-                self._refuse_newer(seen[-LONGEST_LINE:])
+                self._link.read(self.answer_s)
         self._reader.clear()
         self._out.clear()
         self._marking, self._missed = False, 0
@@ -208,21 +193,12 @@ class Exchange:
     def _due_ns(self) -> int:
         return self._since_ns + round(1e9 * self.answer_s * (3 if self._marking else 1))
 
-    def _refuse_newer(self, data: bytes | bytearray) -> None:
-        if any(newer_generation(bytes(data[start:])) for start, byte in enumerate(data) if byte == 0x53):
-            raise WrongGenerationError(
-                "The motor's drive speaks the binary protocol of the newer Faulhaber generation.",
-                hint="Only drives of the 300x RS generation, with ASCII commands, can be used.",
-            )
-
     def _taken(self, received: Received) -> list[Answer]:
-        if not self._known:
-            self._refuse_newer(received.data)
         return [answer for line in self._reader.stamped(received) for answer in self._routed(*line)]
 
     def _routed(self, line: Line, t_ns: int) -> list[Answer]:
         if line.kind is Kind.NOTICE:
-            self.notices.append(line.text)
+            self.fault |= line.text in "fr"
         elif line.kind is Kind.GARBLED:
             self.counts["garbled"] += 1
         elif self._marking:
@@ -257,5 +233,5 @@ class Exchange:
             )
         self._marking, self._since_ns = True, now_ns
         self._reader.clear()
-        self._link.write(encode(MARK, node=self._node))
+        self._link.write(encode(MARK))
         return lost

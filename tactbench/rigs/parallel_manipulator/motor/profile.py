@@ -22,8 +22,6 @@ LARGEST_POSITION, LARGEST_SPEED, LARGEST_ACCELERATION, LARGEST_CURRENT = 1_800_0
 class FaulhaberOptions(PositionerOptions):
     """What a rig file says of a motor and its drive; what it leaves out is as the drive has it."""
 
-    node: int | None = Field(default=None, ge=1, le=255)
-    """Address on a line with several drives."""
     baud: int = 9600
     """As in the link's address: time-outs go by it."""
     increment_m: float = Field(default=6e-6, gt=0.0)
