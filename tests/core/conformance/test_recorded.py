@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tactbench.core.conformance.kit import checks_of
-from tactbench.core.conformance.run import run_checks, subjects_named
+from tactbench.core.conformance.run import checks_of, run_checks, subjects_named
 from tactbench.core.plugins.registry import installed
 from tactbench.core.recording.writer import RecordingWriter
 from tactbench.core.samples import Block
@@ -20,13 +19,13 @@ FORCE = StreamSpec(
 VARIANTS = {
     "sound": None,
     "of another sensor": "recording-is-of-this-sensor",
-    "with a dead channel": "recording-is-healthy",
-    "with a clock that goes back": "recording-clock-goes-forward",
-    "at another rate": "recording-has-the-rate",
-    "beyond the limits": "recording-keeps-the-limits",
-    "in grams": "recording-force-is-in-newtons",
+    "with a dead channel": "recording-is-of-this-sensor",
+    "with a clock that goes back": "recording-is-of-this-sensor",
+    "at another rate": "recording-fits-the-spec",
+    "beyond the limits": "recording-fits-the-spec",
+    "in grams": "recording-shows-a-response",
     "of nothing": "recording-shows-a-response",
-    "with the sign turned": "recording-has-the-sign",
+    "with the sign turned": "recording-shows-a-response",
 }
 
 

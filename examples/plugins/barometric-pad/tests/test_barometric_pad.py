@@ -7,13 +7,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from tactbench.testing import sensor_checks
+from tactbench.testing import plugin_checks
 
 MAPPING = Path(__file__).parents[1] / "mapping.yaml"
 NAMES = [f"p{number}" for number in range(1, 9)]
 
 
-@pytest.mark.parametrize("check", sensor_checks("barometric-pad"), ids=str)
+@pytest.mark.parametrize("check", plugin_checks("barometric-pad"), ids=str)
 def test_conforms(check):
     check()
 
