@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import inspect
 from collections import Counter
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any
@@ -72,28 +71,6 @@ def _usual(subject: Subject, kind: str) -> npt.NDArray[Any]:
 
 
 @check("estimator", needs=("code-names-resolve",))
-def arguments_are_taken(subject: Subject) -> None:
-    """The factory is called with kind, seed, threads and every parameter by name; an unknown one stops a cell.
-
-    Make every name in params, grid and rehearsal an argument of the factory, and put each into params.
-    """
-    descriptor = subject.descriptor
-    if not descriptor.kinds:
-        fail("kinds", "at least one of regression, classification and events is needed")
-    taken = inspect.signature(subject.code("where")).parameters
-    anything = any(one.kind is one.VAR_KEYWORD for one in taken.values())
-    for field, names in (
-        ("where", ("kind", "seed", "threads")), ("params", descriptor.params), ("grid", descriptor.grid),
-        ("rehearsal", descriptor.rehearsal or ()),
-    ):  # fmt: skip
-        for name in names:
-            if name not in taken and not anything:
-                fail(f"{field}[{name}]", f"{descriptor.where} has no argument {name!r}")
-            if field in ("grid", "rehearsal") and name not in descriptor.params:
-                fail(f"{field}[{name}]", "it is not among params, where every name that may be set stands")
-
-
-@check("estimator", needs=("arguments-are-taken",))
 def candidates_are_accepted(subject: Subject) -> None:
     """A candidate that cannot be fitted shows after minutes, when its turn comes.
 
@@ -108,7 +85,7 @@ def candidates_are_accepted(subject: Subject) -> None:
                 raise CheckFailed(f"grid[{name}] = {candidate!r}: {failure.where}", failure.text) from failure
 
 
-@check("estimator", needs=("arguments-are-taken",), carries_out=True)
+@check("estimator", needs=("code-names-resolve",), carries_out=True)
 def answers_have_the_shape(subject: Subject) -> None:
     """Each row gets one finite answer, also where a column is constant: a dead taxel, whose deviation is 0.
 

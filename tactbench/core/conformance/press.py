@@ -6,12 +6,10 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
-from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
 from tactbench.core.conformance.check import CheckFailed, Subject, check, code_of, fail, skip
-from tactbench.core.errors import NotApplicable, TactbenchError, UsageError
+from tactbench.core.errors import NotApplicable
 from tactbench.core.plugins.registry import load_object
 from tactbench.core.plugins.taking_part import rig_context
 from tactbench.core.samples import Block, Quality
@@ -161,24 +159,7 @@ def _built(subject: Subject) -> Any:
         return subject.code("where")(rig_context(subject.registry))
 
 
-@check("rig", needs=("code-names-resolve",))
-def rig_builds(subject: Subject) -> None:
-    """A rig is built once a session, and opened for each scene.
-
-    Return an object with ``open(sensor, scene, *, seed)``, or one with `recordings` for a rig that replays.
-    """
-    try:
-        rig = subject.code("where")(rig_context(subject.registry))
-    except UsageError as error:
-        skip(f"it needs more than the check gives: {error.message}")
-    except Exception as error:
-        with code_of("where", subject):
-            raise error
-    if not (hasattr(rig, "open") or hasattr(rig, "recordings")):
-        fail("where", f"it returned a {type(rig).__name__} with neither open() nor recordings()")
-
-
-@check("sensor", "rig", needs=("transducer-reads", "rest-is-as-stated", "rig-builds"))
+@check("sensor", "rig", needs=("transducer-reads", "rest-is-as-stated", "code-names-resolve"))
 def blocks_fit_their_streams(subject: Subject) -> None:
     """A recording has a column a channel, and only numbers; one press runs all that a campaign would.
 
@@ -244,7 +225,7 @@ def named_unit(where: str, share: float) -> None:
             fail(where, f"it is in {unit}, and nanoseconds are needed")
 
 
-@check("sensor", "rig", needs=("blocks-fit-their-streams",))
+@check("sensor", "rig", needs=("clocks-are-in-nanoseconds",), carries_out=True)
 def limits_are_kept(subject: Subject) -> None:
     """A converter gives nothing beyond its ends, and what stands at an end is marked as saturated.
 
@@ -342,34 +323,3 @@ def pressing_channel(reference: Sequence[StreamSpec]) -> tuple[StreamSpec, int] 
             if channel.kind == "force" and channel.name in ("fz", "normal"):
                 return stream, column
     return None
-
-
-@check("sensor", "rig", needs=("clocks-are-in-nanoseconds", "limits-are-kept"), carries_out=True)
-def press_is_recorded(subject: Subject) -> None:
-    """What a rig gives is written to a file and read back before anybody computes with it.
-
-    Correct what the message names; `tactbench inspect FILE` shows the same findings.
-    """
-    from tactbench.core.recording.health import examine
-    from tactbench.core.recording.reader import open_recording
-    from tactbench.core.recording.writer import RecordingWriter
-    from tactbench.core.spec.recording import RecordingMeta
-
-    made = pressed(subject)
-    with TemporaryDirectory() as folder:
-        path = Path(folder) / "tiny.h5"
-        try:
-            spec = made.sensor.spec.model_copy(update={"streams": made.streams})
-            meta = RecordingMeta(
-                name="tiny", sensor=spec, reference=made.reference, rig=made.rig.name, simulated=True,
-                clock="simulated", scene=made.scene, seed=1, **made.about,
-            )  # fmt: skip
-            with RecordingWriter(path, meta) as writer:
-                for block in made.blocks:
-                    writer.append(block)
-            with open_recording(path) as recording:
-                wrong = [finding for finding in examine(recording) if finding.severity == "error"]
-        except (TactbenchError, ValueError) as error:
-            fail("recording", str(error))
-    if wrong:
-        fail(f"streams[{wrong[0].stream}]", f"the recording is not healthy: {wrong[0].message}")

@@ -128,34 +128,6 @@ def answers_are_in_the_scenes(subject: Subject) -> None:
                 fail("spec.scenes", f"role {role} has {strange}; role train teaches {', '.join(map(str, taught))}")
 
 
-@check("task", needs=("code-names-resolve",))
-def features_by_gives_features(subject: Subject) -> None:
-    """A task's own features are computed from recordings, when all of them have been made.
-
-    Return a mapping of names to finite numbers, the same names for every recording.
-    """
-    import numpy as np
-
-    from tactbench.core.samples import StreamReadings
-
-    spec = subject.spec
-    if spec.features_by is None:
-        skip("it has no features of its own")
-    given = []
-    for rows in (200, 150):
-        data = 100.0 + np.random.default_rng(rows).normal(size=(rows, 3))
-        data[:, 2] = 100.0  # a channel that never changes
-        kinds = (spec.features[0],) * 3
-        readings = StreamReadings("taxels", ("t1", "t2", "t3"), kinds, data, np.arange(rows) / 100.0, 100.0)
-        with code_of("spec.features_by", subject), np.errstate(all="ignore"):
-            given.append(dict(subject.code("features_by")((readings,))))
-            bad = [name for name, value in given[-1].items() if not math.isfinite(value)]
-        if bad or not given[-1]:
-            fail("spec.features_by", f"{bad[0]} is not finite" if bad else "it gave no feature")
-    if list(given[0]) != list(given[1]):
-        fail("spec.features_by", "it gave other names, or in another order, for another recording")
-
-
 @check("task", needs=("answers-are-in-the-scenes",), carries_out=True)
 def its_scene_is_carried_out(subject: Subject) -> None:
     """A scene that no rig can carry out, or whose target no rig records, is found out after those before it.

@@ -216,12 +216,14 @@ def response_is_where_it_is_pressed(subject: Subject) -> None:
                 f"pressed at {sites[at_mm][0]} (x {at_mm[0]:.3g} mm, arc {at_mm[1]:.3g} mm), {sites[most][0]} at "
                 f"(x {most[0]:.3g}, arc {most[1]:.3g}) answers most: are axes swapped or mirrored?",
             )
-        for name in sites[at_mm]:
-            felt = {there: abs(_response(subject, GENTLE_N, there)[name]) for there in _pressed_places(subject)}
-            most = max(felt, key=felt.__getitem__)
-            if felt[at_mm] < AS_STRONG * felt[most] and math.dist(most, at_mm) > near_mm:
-                text = f"{name} answers most to a press at {sites[most][0]}: is position_m read in another unit?"
-                fail("transducer", text)
+        felt = {
+            there: max(abs(_response(subject, GENTLE_N, there)[one]) for one in sites[at_mm])
+            for there in _pressed_places(subject)
+        }
+        most = max(felt, key=felt.__getitem__)
+        if felt[at_mm] < AS_STRONG * felt[most] and math.dist(most, at_mm) > near_mm:
+            text = f"{sites[at_mm][0]} answers most to a press at {sites[most][0]}: is position_m read in another unit?"
+            fail("transducer", text)
 
 
 @check("sensor", needs=("it-answers-to-a-press",))
