@@ -470,12 +470,13 @@ def driver_starts_afresh(subject: Subject) -> None:
             sensed.update(old)
             opened.go_on(BEFORE_S)
             sensed.update(new)
+            opened.go_on(SHORT_S)
             began_ns = opened.now_ns()
             opened.start()
             for stream, rows in opened.read().items():
                 names = [one.name for one in next(s for s in opened.driver.streams if s.name == stream).channels]
                 for data, t_ns in zip(rows.data, rows.t_ns, strict=False):
-                    stale = (data < [(old[name] + new[name]) / 2 for name in names]).all(axis=1) & (t_ns > began_ns)
+                    stale = (data < [(old[name] + new[name]) / 2 for name in names]).all(axis=1) & (t_ns >= began_ns)
                     if stale.any():
                         fail("driver.start", f"a row of {stream} that was sensed before it has a time after it")
             opened.driver.stop()
