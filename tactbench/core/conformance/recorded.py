@@ -120,8 +120,6 @@ def recording_shows_a_response(subject: Subject) -> None:
         for column, channel in enumerate(stream.spec.channels)
         if channel.kind == "taxel"
     ]
-    if taxels and not any(np.nanmax(values) > np.nanmin(values) for _, _, values in taxels):
-        fail("streams", "no taxel changes in the whole recording")
     for stream, name, values in taxels:
         if not signs.get(name) or force is None or stream.t_ns is None or pressing is None or pressing.t_ns is None:
             continue

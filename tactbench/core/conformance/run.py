@@ -219,10 +219,7 @@ class _Carrier:
 
 def _stopped(name: str, error: BaseException, subject: Subject) -> CheckOutcome:
     """Return the failure of a check that hung or crashed."""
-    text = str(error) if isinstance(error, CellStopped) else said(error)
-    lines = [line.strip() for line in getattr(error, "traceback_text", "").splitlines() if subject.package in line]
-    where = lines[0].replace('File "', "").replace('"', "") if lines else subject.module
-    return CheckOutcome(name, "failed", where, text)
+    return CheckOutcome(name, "failed", subject.module, str(error) if isinstance(error, CellStopped) else said(error))
 
 
 def expected_of(subject: Subject) -> dict[str, str]:

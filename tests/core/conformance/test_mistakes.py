@@ -35,7 +35,7 @@ MISTAKES = [
     ("pad", "TACTBENCH_API = 2", "TACTBENCH_API = 99", "", "TACTBENCH_API"),
     ("pad", "def tactbench_sensors", "def tactbench_sensor", "", "tactbench_sensor"),
     ("pad", "transduction:build", "transducer:build", "code-names-resolve", "transducer"),
-    ("pad", '"""A pad of', 'import h5py\n"""A pad of', "import-is-light", "line 1"),
+    ("pad", '"""A pad of', 'import h5py\n"""A pad of', "import-is-light", "h5py"),
     ("pad", "lower=-2048", 'lower=float("nan")', "numbers-are-finite", "channels[t1].lower: it is nan"),
     ("pad", "upper=2047, ", "", "limits-are-in-order", "channels[t1].upper"),
     ("pad", "upper=2047", "upper=70000", "limits-are-in-order", "does not fit int16"),

@@ -24,7 +24,6 @@ VARIANTS = {
     "at another rate": "recording-fits-the-spec",
     "beyond the limits": "recording-fits-the-spec",
     "in grams": "recording-shows-a-response",
-    "of nothing": "recording-shows-a-response",
     "with the sign turned": "recording-shows-a-response",
 }
 
@@ -37,7 +36,7 @@ def written(path, variant, *, simulated=False):
     if variant == "with a clock that goes back":
         t_ns[120:] -= 1_000_000_000
     force = np.interp(np.arange(n), [0, 50, n], [0.0, 0.0, 5.0])
-    sign = {"of nothing": 0.0, "with the sign turned": -1.0}.get(variant, 1.0)
+    sign = {"with the sign turned": -1.0}.get(variant, 1.0)
     level = 120.0 if variant == "with the sign turned" else 200.0
     spread = np.linspace(0.5, 1.0, 12)
     data = np.round(level - sign * 20.0 * np.outer(force, spread))
