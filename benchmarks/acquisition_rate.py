@@ -269,19 +269,16 @@ def record(
     return reading, time.monotonic() - began
 
 
-def compared(reading: Reading, path: Path, rates: Mapping[str, float | None]) -> list[str]:
+def compared(reading: Reading, path: Path) -> list[str]:
     """Print what became of the rows; return what contradicts: counts each other, or the file."""
     import h5py
 
     wrong = []
-    print(f"{'stream':14} {'received':>10} {'written':>10} {'dropped':>8} {'dupl.':>6} {'late':>5} {'gaps':>6} queue")
+    print(f"{'stream':14} {'received':>10} {'written':>10} {'dropped':>8} {'dupl.':>6} {'late':>5} {'gaps':>6}")
     with h5py.File(path) as file:
         for name, counts in reading.stream_counts.items():
-            rate = rates[name]
-            high = reading.high_water[name]
-            filled = f"{high} rows" + (f" = {high / rate:.3f} s" if rate else "")
             print(f"{name:14} {counts.received:10} {counts.written:10} {counts.dropped:8} {counts.duplicates:6} "
-                  f"{counts.late:5} {counts.gaps:6} {filled}")  # fmt: skip
+                  f"{counts.late:5} {counts.gaps:6}")  # fmt: skip
             if counts.received != counts.written + counts.dropped + counts.duplicates + counts.late:
                 wrong.append(f"{name}: received is not written + dropped + duplicates + late")
             group = file["streams"][name]
@@ -297,8 +294,6 @@ def compared(reading: Reading, path: Path, rates: Mapping[str, float | None]) ->
                 marked = (marks & Quality.GAP).any(axis=1)[1:]
                 if not np.array_equal(marked, steps > 1):
                     wrong.append(f"{name}: rows marked with a gap are not those after one")
-            if reading.losses[name].rows:
-                print(f"{'':14} dropped here: {reading.losses[name]}")
     for name, count in reading.counts.items():
         print(f"{name}: {count}")
     return wrong
@@ -332,8 +327,7 @@ def main() -> None:
         print(f"load after {os.getloadavg()[0]:.2f}")
         print(f"file complete after {completing_s:.2f} s more, {path.stat().st_size / 1e6:.1f} MB, "
               f"at most {memory_mb('VmHWM'):.1f} MB of memory")  # fmt: skip
-        rates = {spec.name: spec.rate_hz for driver in drivers.values() for spec in driver.streams}
-        wrong = compared(reading, path, rates)
+        wrong = compared(reading, path)
         if sender is not None and sender.stdout is not None:
             for line in sender.stdout:
                 print("sent until they were stopped:", line.strip())

@@ -19,22 +19,23 @@ from typing import Any, Literal
 
 import numpy as np
 
+from tactbench.devices.guard_messages import GuardRefusesError, Trigger
 from tactbench.plugin import assumed
-from tactbench.plugin.devices import DriverSettings, EmulatedDevice, EmulatedDevices
-from tactbench.rigs.parallel_manipulator.force_torque.net_ft.driver import build as build_force
-from tactbench.rigs.parallel_manipulator.force_torque.net_ft.emulator import DatagramFault, RdtEmulator
-from tactbench.rigs.parallel_manipulator.guard import LocalGuard
-from tactbench.rigs.parallel_manipulator.guard_interface import (
+from tactbench.plugin.devices import (
     Beat,
     CommandKind,
+    DriverSettings,
+    EmulatedDevice,
+    EmulatedDevices,
     Guard,
-    GuardRefusesError,
     GuardState,
     Limits,
+    LocalGuard,
     Report,
-    Trigger,
 )
-from tactbench.rigs.parallel_manipulator.motor.driver import build as build_motor
+from tactbench.rigs.parallel_manipulator.force_torque.net_ft.driver import build as build_force
+from tactbench.rigs.parallel_manipulator.force_torque.net_ft.emulator import DatagramFault, RdtEmulator
+from tactbench.rigs.parallel_manipulator.motor.driver import FaulhaberDriver
 from tactbench.rigs.parallel_manipulator.motor.emulator import MotorEmulator, MotorFault
 from tactbench.rigs.parallel_manipulator.motor.servo import MotorModel
 
@@ -55,6 +56,7 @@ STATED: dict[str, Any] = {
     "home_m": RETREAT_M,
     "retreat_m": RETREAT_M,
     "retreat_speed_m_s": 0.05,
+    "orientation": "horizontal",
 }
 
 
@@ -79,13 +81,12 @@ class Setting:
         """Of its guard."""
         return Limits(
             force_ceiling_n=self.ceiling_n,
+            travel_ceiling_n=0.2,
             torque_ceiling_nm=0.2,
             touch_n=0.1,
             travel_m=(-5.5e-3, 2e-3),
             step_m=0.25 / self.stiffness_n_m,
             speed_m_s=0.02,
-            retreat_m=RETREAT_M,
-            retreat_speed_m_s=0.05,
             heartbeat_s=self.heartbeat_s or max(3 * self.period_s, 30e-3),
             force_age_s=self.force_age_s,
             same_samples=self.same_samples,
@@ -178,16 +179,18 @@ class Pressed:
     def guard(self, force_driver: Callable[[DriverSettings], Any] = build_force) -> LocalGuard:
         """Return a guard over drivers of both, in this process."""
         options = self.settings()
-        motor = build_motor(DriverSettings(self.devices.opener("motor"), options=options["motor"], clock=self.clock))
+        motor = FaulhaberDriver(
+            DriverSettings(self.devices.opener("motor"), options=options["motor"], clock=self.clock)
+        )
         force = force_driver(DriverSettings(self.devices.opener("force"), options=options["force"], clock=self.clock))
-        return LocalGuard(motor, force, self.clock, self.devices.advance)
+        return LocalGuard({"motor": motor}, force, self.clock, self.devices.advance)
 
 
 def build_profile() -> Any:
     """Return the units of the drive that the options state."""
     from tactbench.rigs.parallel_manipulator.motor.profile import FaulhaberOptions
 
-    return FaulhaberOptions(**STATED).profile()
+    return FaulhaberOptions(**STATED)
 
 
 @dataclass
@@ -264,7 +267,7 @@ class Press:
 # Faults ---------------------------------------------------------------------------------------------------------------
 
 FORCE_UNKNOWN = {Trigger.FORCE_OLD, Trigger.FORCE_GAP, Trigger.FORCE_LOST}
-SILENT = {Trigger.MOTOR_SILENT, Trigger.MOTOR_LOST, Trigger.MOTOR_FAULT}
+SILENT = {Trigger.AXIS_SILENT, Trigger.AXIS_LOST, Trigger.AXIS_FAULT}
 
 
 @dataclass(frozen=True)
@@ -296,11 +299,11 @@ KINDS: dict[str, Kind] = {
     "samples doubled": Kind("force", set(), "doubled:start_s={start},every=5"),
     "force unplugged": Kind("force_link", FORCE_UNKNOWN, "unplug:start_s={start}"),
     "force held up": Kind("force_link", FORCE_UNKNOWN, "late:start_s={start},delay_s=0.05"),
-    "motor hot": Kind("motor", {Trigger.MOTOR_FAULT}, "motor-fault:start_s={start}", out=False),
-    "motor hot for a while": Kind("motor", {Trigger.MOTOR_FAULT}, "motor-fault:start_s={start},end_s={end}", out=False),
+    "motor hot": Kind("motor", {Trigger.AXIS_FAULT}, "motor-fault:start_s={start}", out=False),
+    "motor hot for a while": Kind("motor", {Trigger.AXIS_FAULT}, "motor-fault:start_s={start},end_s={end}", out=False),
     "motor answers late": Kind("motor", SILENT, "late-answers:start_s={start}"),
     "motor's lines garbled": Kind(
-        "motor", SILENT | {Trigger.CURRENT_LIMIT, Trigger.DEVIATION, Trigger.COMMANDS_REFUSED},
+        "motor", SILENT | {Trigger.COMMANDS_REFUSED},
         "garbled-line:start_s={start},every=11",
     ),
     "motor unplugged": Kind("motor_link", SILENT, "unplug:start_s={start}", out=False),

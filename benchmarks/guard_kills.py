@@ -26,12 +26,9 @@ from pathlib import Path
 from typing import IO, TYPE_CHECKING, Any
 
 from tactbench.plugin import TactbenchError
-from tactbench.rigs.parallel_manipulator.guard import reaction
-from tactbench.rigs.parallel_manipulator.guard_interface import GuardLostError
-from tactbench.rigs.parallel_manipulator.guard_messages import DeviceSettings, ProcessSettings
-from tactbench.rigs.parallel_manipulator.guard_process import GuardProcess
+from tactbench.plugin.devices import DeviceSettings, GuardLostError, GuardProcess, ProcessSettings
+from tactbench.rigs.parallel_manipulator.motor.driver import FaulhaberDriver, retreat_command
 from tactbench.rigs.parallel_manipulator.motor.profile import FaulhaberOptions
-from tactbench.rigs.parallel_manipulator.motor.retreat import retreat_command
 
 if TYPE_CHECKING:
     import guard_faults as faults
@@ -44,6 +41,8 @@ else:
 
 PACKAGE = "tactbench.rigs.parallel_manipulator"
 PERIODS_S = {115200: 10e-3, 9600: 30e-3}
+REACTION_S = 8e-3
+"""Age of the force, a look of the guard and its scheduling, as in `reaction_s`."""
 FORCE_AGE_S = 0.2
 """Longer than a rig's: emulators in Python are late by tens of milliseconds on a busy machine."""
 
@@ -55,7 +54,9 @@ def rig(text: str) -> None:
     """Press and hold until something ends it; say on stdout what happens."""
     given = json.loads(text)
     setting = faults.Setting(**given["setting"])
-    guard = GuardProcess(ProcessSettings.of(given["process"]))
+    process = given["process"]
+    axes = {name: DeviceSettings(**device) for name, device in process["axes"].items()}
+    guard = GuardProcess(ProcessSettings(**{**process, "axes": axes, "force": DeviceSettings(**process["force"])}))
     sibling = 0
     if given["sibling"]:
         # It has a copy of every socket, and no idea of it.
@@ -157,12 +158,12 @@ def run(name: str, baud: int, seed: int, heartbeat_s: float | None = None) -> Re
     with world.devices, tempfile.TemporaryDirectory() as folder:
         log = Path(folder) / "guard.log"
         settings = ProcessSettings(
-            DeviceSettings(f"{PACKAGE}.motor.driver:build", addresses["motor"], options["motor"]),
+            {"motor": DeviceSettings(f"{PACKAGE}.motor.driver:FaulhaberDriver", addresses["motor"], options["motor"])},
             DeviceSettings(f"{PACKAGE}.force_torque.net_ft.driver:build", addresses["force"], options["force"]),
             str(log),
             zero_ns,
         )
-        given = {"setting": asdict(setting), "process": settings.body(), "sibling": scenario.sibling}
+        given = {"setting": asdict(setting), "process": asdict(settings), "sibling": scenario.sibling}
         process = subprocess.Popen(
             [sys.executable, __file__, "--rig", json.dumps(given)], stdout=subprocess.PIPE, text=True
         )
@@ -197,7 +198,8 @@ def run(name: str, baud: int, seed: int, heartbeat_s: float | None = None) -> Re
             process.wait()
             process.stdout.close()
     dead_s = limits.heartbeat_s
-    allowed_s = scenario.within(dead_s, reaction(FaulhaberOptions(**options["motor"])).time_s)
+    facts = FaulhaberDriver.facts_of(FaulhaberOptions(**options["motor"]))
+    allowed_s = scenario.within(dead_s, REACTION_S + facts.stop_latency_s)
     entries = tuple(json.loads(line) for line in lines if line.startswith("{"))
     return Result(
         late_s, allowed_s, host_late_s, out, deepest_m - target_m, limits.step_m, world.largest_n, entries, tuple(said)

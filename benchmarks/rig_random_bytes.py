@@ -14,14 +14,8 @@ from contextlib import suppress
 
 import numpy as np
 
-from tactbench.plugin import RigError
-from tactbench.plugin.devices import Received
-from tactbench.rigs.parallel_manipulator.force_torque.ati_xml import AtiFileError
-from tactbench.rigs.parallel_manipulator.force_torque.nano17.codec import read_calibration
-from tactbench.rigs.parallel_manipulator.force_torque.nano17.emulator import EMULATED_CALIBRATION, GaugeEmulator
-from tactbench.rigs.parallel_manipulator.force_torque.nano17.gauges import GaugeReader, encode_sample
+from tactbench.rigs.parallel_manipulator.force_torque.ati import AtiFileError, read_calibration
 from tactbench.rigs.parallel_manipulator.force_torque.net_ft.codec import (
-    MOST_BUFFERED,
     Command,
     DatagramError,
     Record,
@@ -74,21 +68,11 @@ def main(count: int, seed: int) -> None:
         for start, end in zip([0, *cuts, 0], [*cuts, len(piece), 36], strict=True):
             box.feed(piece[start:end], 0.0)
             try:
-                whole += len(decode_records(piece[start:end], most=MOST_BUFFERED))
+                whole += len(decode_records(piece[start:end]))
             except DatagramError:
                 rejected += 1
         assert decode_records(encode_record(Record(5, 0, 0, (0,) * 6)))["rdt_sequence"] == 5
     print(f"force-torque, codec: {whole} records, {rejected} datagrams rejected; {box.rejected} requests refused")
-
-    gauges, samples = GaugeReader(), 0
-    for piece in pieces:
-        with suppress(RigError):
-            gauges.feed(Received(piece, 0))
-        gauges.feed(Received(b"\0" + encode_sample(7, 8, (9,) * 6), 0))
-        found, _ = gauges.taken()
-        samples += len(found.counter) - 1
-        assert found.counter[-1] == 7
-    print(f"gauges: {samples} samples, {gauges.unknown} unknown and {gauges.damaged} damaged frames")
 
     files = 0
     for piece in pieces:
@@ -110,14 +94,8 @@ def main(count: int, seed: int) -> None:
         box.feed(encode_request(Request(Command.START_REALTIME)), 0.0)
         begin = time.perf_counter()
         sent = box.poll(1.0)
-        decode_records(b"".join(datagram for _, datagram in sent), most=len(sent))
+        decode_records(b"".join(datagram for _, datagram in sent))
         print(f"force-torque, {rate_hz:.0f} Hz: {time.perf_counter() - begin:.3f} s for {len(sent)} records")
-    sensor = GaugeEmulator(lambda _t: (0.0,) * 6, read_calibration(EMULATED_CALIBRATION.read_bytes()))
-    begin = time.perf_counter()
-    sent = [*sensor.poll(0.0), *sensor.poll(1.0)]
-    gauges = GaugeReader()
-    gauges.feed(Received(b"".join(frame for _, frame in sent), 0))
-    print(f"gauges, 1000 Hz: {time.perf_counter() - begin:.3f} s for {len(gauges)} samples")
 
 
 if __name__ == "__main__":

@@ -19,7 +19,7 @@ myst_heading_anchors = 4
 pygments_style = "friendly"
 
 CONTENTS = {
-    "Start": ("tutorial", "glossary", "choosing", "tables", "statistics"),
+    "Start": ("tutorial", "python", "glossary", "choosing", "tables", "statistics"),
     "Devices and recordings": ("hardware", "links", "emulation", "mappings", "real-recordings", "format"),
     "Plugins": ("plugins", "hooks", "plugin-reference", "conformance", "stability"),
     "Reference": ("commands", "sensors", "estimators", "protocols", "events", "parameters", "*"),

@@ -1,3 +1,19 @@
-"""Tactbench: benchmark tactile sensors, and show what each score costs in time."""
+"""Tactbench: benchmark tactile sensors, and show what each score costs in time.
 
+In Python: what `__all__` names, described in docs/python.md; each is imported when it is first used.
+"""
+
+from typing import TYPE_CHECKING
+
+from tactbench.core.on_demand import on_demand
+
+if TYPE_CHECKING:
+    from tactbench.notebook import dataset, evaluate, load_task, open_recordings, results, run
+
+__all__ = ["dataset", "evaluate", "load_task", "open_recordings", "results", "run"]
 __version__ = "0.1.0"
+__getattr__ = on_demand(__name__)
+
+
+def __dir__() -> list[str]:
+    return [*__all__, "__version__"]

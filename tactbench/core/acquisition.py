@@ -5,6 +5,7 @@ from __future__ import annotations
 import importlib
 import signal
 import threading
+import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import AbstractContextManager, contextmanager, nullcontext
 from pathlib import Path
@@ -12,11 +13,14 @@ from types import FrameType
 from typing import Any, NamedTuple
 
 from tactbench.core.errors import RigError
+from tactbench.core.plugins.emulators import EmulatorControl, running
 from tactbench.core.plugins.interfaces import Acquisition, Rig
+from tactbench.core.recording.completeness import INCOMPLETE, Completeness
 from tactbench.core.recording.writer import RecordingWriter
 from tactbench.core.samples import Block
-from tactbench.core.spec.recording import Emulation, RecordingMeta, StreamClock, StreamCounts
+from tactbench.core.spec.recording import Emulation, PlanEntry, RecordingMeta, StreamClock, StreamCounts
 from tactbench.core.spec.rig import RigDescriptor, SensorDescriptor
+from tactbench.core.spec.rig_file import Allowed, RigFile
 from tactbench.core.spec.scene import Role, Scene
 from tactbench.core.thread_limit import thread_limit
 
@@ -43,8 +47,12 @@ def acquire(
     name: str = "",
     replace: bool = False,
     complete_interrupted: bool = False,
+    rig_file: RigFile | None = None,
 ) -> Acquired:
     """Carry out `scene` and write what the rig yields to `path`.
+
+    A recording of devices that ended before its time, or that lacks more than the rig file allows, is kept as an
+    incomplete one: `excluded` begins with ``incomplete: `` and says why.
 
     Parameters
     ----------
@@ -67,27 +75,43 @@ def acquire(
         Whether a recording that was cut short on a real rig is completed, excluded from every evaluation, before the
         error goes on. Otherwise its journal stays, and the error names the command that makes a recording of it. Of a
         simulation nothing is left behind.
+    rig_file
+        The devices: what is emulated is marked so, whatever the rig says of it, and begins with the recording.
 
     Raises
     ------
     RigError, NotApplicable, LinkError
-        If the rig cannot carry out the scene, or ended before its time, or a device sent nothing.
+        If the rig cannot carry out the scene, a device sent nothing in all of it, or what moves cannot be stopped.
     KeyboardInterrupt
         If it was interrupted.
     RecordingError
         If the file cannot be written.
     """
+    live = None if rig_file is None else running(rig_file)
+    control = EmulatorControl(live.emulation.control) if live is not None and live.emulation.control else None
+    emulated = {} if control is None else control.prepare(sensor.name, scene, seed)
     began = clock()
     with (
         _one_thread(descriptor),
         _one_interrupt() as ignore_interrupts,
         rig.open(sensor, scene, seed=seed) as acquisition,
     ):
-        meta = _meta(acquisition, sensor, descriptor, scene, role, seed, name or scene.name)
+        meta = _meta(acquisition, sensor, descriptor, scene, role, seed, name or scene.name, rig_file)
         spent = clock() - began
+        allowed = Allowed() if rig_file is None else rig_file.allowed
+        whole = Completeness(allowed, acquisition.streams, acquisition.reference)
+        has_devices = hasattr(acquisition, "stream_counts")
+        began_s = time.perf_counter()
+
+        def of_devices(rows: Mapping[str, int], *, cut_short: bool) -> dict[str, Any]:
+            factor = whole.seconds / (time.perf_counter() - began_s)
+            return _of_devices(acquisition, descriptor, sensor.name, rig_file, rows, cut_short=cut_short, factor=factor)
+
         key = "sim_s" if descriptor.simulated else "acquisition_s"
         with RecordingWriter(path, meta, replace=replace) as writer:
             try:
+                if control is not None:
+                    control.begin()
                 blocks = iter(acquisition)
                 while True:
                     began = clock()
@@ -96,27 +120,39 @@ def acquire(
                     if block is None:
                         break
                     writer.append(block)
+                    if has_devices:
+                        whole.add(block)
                     if watch is not None:
                         watch(block)
-                ended = str(getattr(acquisition, "ended", ""))
-                if ended:
-                    raise RigError(
-                        f"The scene {scene.name!r} ended before its time: {ended}.",
-                        hint="Look at the rig, and record it again.",
-                    )
                 _check_not_silent(acquisition, writer.rows)
+                lacking = _lacking(acquisition, whole)
             except BaseException as error:
                 ignore_interrupts()
                 alarm = _stopped(acquisition, error)
                 if not descriptor.simulated and any(writer.rows.values()):
-                    _conclude(writer, acquisition, descriptor, {**provenance, key: spent}, _why(error))
+                    why = f"interrupted: {_why(error)}"
+                    _conclude(writer, acquisition, emulated, of_devices, {**provenance, key: spent}, why)
                     if complete_interrupted:
                         writer.complete()
                 if alarm and isinstance(error, KeyboardInterrupt):
                     raise RigError(f"It was interrupted, and the rig is not as it should be: {alarm}.") from error
                 raise
-            _conclude(writer, acquisition, descriptor, {**provenance, key: spent})
+            alarm = _stopped(acquisition, RigError(lacking)) if lacking else ""
+            _conclude(
+                writer, acquisition, emulated, of_devices, {**provenance, key: spent}, lacking and INCOMPLETE + lacking
+            )
+    if alarm:
+        raise RigError(f"The scene {scene.name!r} ended, and the rig is not as it should be: {alarm}.")
     return Acquired(writer.meta, writer.content_digest)
+
+
+def _lacking(acquisition: Acquisition, whole: Completeness) -> str:
+    """Return why a recording of devices is incomplete, in one line; empty: it is not."""
+    if not hasattr(acquisition, "stream_counts"):
+        return ""
+    ended = str(getattr(acquisition, "ended", ""))
+    found = [f"ended before its time: {ended}"] if ended else []
+    return "; ".join([*found, *whole.lacking(acquisition.stream_counts)])
 
 
 def _check_not_silent(acquisition: Acquisition, rows: Mapping[str, int]) -> None:
@@ -168,20 +204,23 @@ def _one_interrupt() -> Iterator[Callable[[], None]]:
 def _conclude(
     writer: RecordingWriter,
     acquisition: Acquisition,
-    descriptor: RigDescriptor,
+    emulated: Mapping[str, Any],
+    of_devices: Callable[..., dict[str, Any]],
     provenance: dict[str, Any],
     why: str = "",
 ) -> None:
-    """Write down what is known at the end; `why` it was cut short, if it was."""
-    remarks = tuple(str(text) for name, text in acquisition.drawn.items() if name.startswith("remark "))
+    """Write down what is known at the end; `why` it is not to be evaluated, if it is not."""
+    drawn = {**emulated.get("drawn", {}), **acquisition.drawn}
+    remarks = tuple(str(text) for name, text in drawn.items() if name.startswith("remark "))
+    plan = acquisition.plan or [PlanEntry.model_validate(entry) for entry in emulated.get("plan", ())]
     writer.revise(
-        plan=tuple(acquisition.plan),
-        assumptions=dict(acquisition.assumptions),
-        drawn=dict(acquisition.drawn),
-        remarks=(*remarks, f"Interrupted, and not whole: {why}") if why else remarks,
-        excluded=f"interrupted: {why}" if why else "",
+        plan=tuple(plan),
+        assumptions={**emulated.get("assumptions", {}), **acquisition.assumptions},
+        drawn=drawn,
+        remarks=(*remarks, why) if why else remarks,
+        excluded=why,
         provenance=provenance,
-        **_of_devices(acquisition, descriptor, writer.rows, cut_short=bool(why)),
+        **of_devices(writer.rows, cut_short=bool(why)),
     )
 
 
@@ -203,10 +242,17 @@ def _settled(counts: StreamCounts, written: int, cut_short: bool) -> StreamCount
 
 
 def _of_devices(
-    acquisition: Acquisition, descriptor: RigDescriptor, rows: Mapping[str, int], *, cut_short: bool = False
+    acquisition: Acquisition,
+    descriptor: RigDescriptor,
+    sensor: str,
+    rig_file: RigFile | None,
+    rows: Mapping[str, int],
+    *,
+    cut_short: bool = False,
+    factor: float | None = None,
 ) -> dict[str, Any]:
     """Return the fields of the meta that an acquisition of devices knows; of another one, whose clock it is."""
-    emulation: Emulation | None = getattr(acquisition, "emulation", None)
+    emulation = _emulation(rig_file, sensor, acquisition, factor)
     clocks: Mapping[str, StreamClock] = getattr(acquisition, "clocks", {})
     counts: Mapping[str, StreamCounts] = getattr(acquisition, "stream_counts", {})
     sources = {one.source for one in clocks.values()}
@@ -221,6 +267,36 @@ def _of_devices(
     }
 
 
+def _says_emulated(name: str, drawn: Mapping[str, Any]) -> bool:
+    """Whether a device says of itself that it is emulated, where a rig file forgets to."""
+    return any(key.startswith(f"{name} ") and "emulat" in str(value).lower() for key, value in drawn.items())
+
+
+def _emulation(file: RigFile | None, sensor: str, acquisition: Acquisition, factor: float | None) -> Emulation | None:
+    """Return which devices are emulated, by the rig file and by what they say of themselves; None: none is.
+
+    `factor` is how much faster than the clock it went, unless the rig says that.
+    """
+    said: Emulation | None = getattr(acquisition, "emulation", None)
+    names = [] if file is None else [
+        name
+        for name, entry in file.entries().items()
+        if (name == sensor or name not in file.sensors)
+        and (entry.emulated or entry.emulator or _says_emulated(name, acquisition.drawn))
+    ]  # fmt: skip
+    if file is None or not names:
+        return said
+    factor = factor if said is None or said.factor is None else said.factor
+    ours = Emulation(time="real", factor=factor, devices=tuple(names))
+    if file.emulated or file.emulation.control:
+        how = file.emulation
+        faults = [f"{name}: {fault}" for name in names for fault in file.entries()[name].faults]
+        ours = ours.model_copy(
+            update={"time": how.time, "seed": how.seed, "physics": how.physics, "faults": tuple(faults)}
+        )
+    return ours
+
+
 def _meta(
     acquisition: Acquisition,
     sensor: SensorDescriptor,
@@ -229,6 +305,7 @@ def _meta(
     role: Role | None,
     seed: int,
     name: str,
+    rig_file: RigFile | None,
 ) -> RecordingMeta:
     recorded_hz = {stream.name: stream.rate_hz for stream in acquisition.streams}
     own_hz = {stream.name: stream.rate_hz for stream in sensor.spec.streams if stream.rate_hz is not None}
@@ -243,5 +320,5 @@ def _meta(
         scene=scene,
         labels=dict(scene.labels),
         seed=seed,
-        **_of_devices(acquisition, descriptor, {}),
+        **_of_devices(acquisition, descriptor, sensor.name, rig_file, {}),
     )

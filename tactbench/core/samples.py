@@ -7,7 +7,7 @@ of one role) → ``Fold`` → predictions → score.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import IntFlag
 from typing import TYPE_CHECKING, Any
 
@@ -65,6 +65,11 @@ class Block:
     device_ns: IntArray | None = None
     """(n,) nanoseconds of the device's own clock, if it has one, counted on over its wraps. Where the count is lost, it
     begins again with a lower number: that is how a break is told."""
+
+    def rows(self, which: slice | npt.NDArray[np.bool_]) -> Block:
+        """Return some of its rows, by a slice or a mask."""
+        columns = ("t_ns", "data", "quality", "sequence", "device_ns")
+        return replace(self, **{name: one[which] for name in columns if (one := getattr(self, name)) is not None})
 
 
 @dataclass(frozen=True)

@@ -59,7 +59,11 @@ class Driver(ABC):
 
     @abstractmethod
     def start(self) -> None:
-        """Set the device up and let it sample; raises as :meth:`identify`."""
+        """Set the device up and let it sample; raises as :meth:`identify`.
+
+        What it sent before is discarded (:meth:`~tactbench.links.link.Link.discard`): the first row is of the first
+        whole frame after this call.
+        """
 
     @abstractmethod
     def read(self, timeout_s: float) -> list[Block]:

@@ -21,8 +21,7 @@ Sent: TypeAlias = tuple[float, "bytes | CanFrame"]
 class DeviceEmulator(Protocol):
     """A device on a byte stream, a CAN bus or datagrams. Times are seconds of one clock and never go back.
 
-    One that has an attribute ``keeps_pace = True`` gives the bytes of a serial line their time itself, in both
-    directions; for others their link does, where their options state a `baud`.
+    It gives the bytes of a serial line their time itself. One that has a `bytes_per_s` says what a line must carry.
     """
 
     def feed(self, piece: bytes | CanFrame, now_s: float) -> Sequence[Sent]:

@@ -5,9 +5,9 @@ from __future__ import annotations
 import dataclasses
 import math
 from collections import Counter
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
-from typing import ClassVar, Self
+from typing import Any, ClassVar, Self
 
 from tactbench.core.errors import UnknownNameError, UsageError
 
@@ -51,39 +51,33 @@ class Fault:
             If name or key is unknown, or a value is not what the field holds.
         """
         name, _, rest = text.partition(":")
-        fields = {field.name: field for field in dataclasses.fields(cls) if field.name != "name"}
-        given: dict[str, object] = {}
-        for part in filter(None, rest.split(",")):
-            key, _, value = part.partition("=")
+        fields = {one.name: str(one.type) for one in dataclasses.fields(cls) if one.name != "name"}
+        given: dict[str, Any] = {}
+        for key, _, value in (part.partition("=") for part in rest.split(",") if part):
             if key not in fields:
                 raise UnknownNameError(f"key of the fault {name!r}", key, fields)
+            kind = fields[key].partition("[")[0]
             try:
-                given[key] = _value(str(fields[key].type), value)
+                given[key] = _READERS.get(kind.partition(" ")[0], str)(value)
             except ValueError:
-                raise UsageError(
-                    f"The fault {text!r} has {value!r} for {key}.", hint=f"{key} is {fields[key].type}."
-                ) from None
-        return cls(name, **given)  # type: ignore[arg-type]
+                raise UsageError(f"The fault {text!r} has {value!r} for {key}.", hint=f"{key} is {kind}.") from None
+        return cls(name, **given)
 
     def active(self, now_s: float) -> bool:
         """Return whether it is on."""
         return self.start_s <= now_s < self.end_s
 
 
-def _value(annotation: str, text: str) -> object:
-    """Return a field's value from text, by the field's annotation; ValueError if it is none."""
-    if annotation.startswith("frozenset"):
-        return frozenset(text.split("+"))
-    if annotation.startswith("float"):
-        return float(text)
-    return int(text, 0) if annotation.startswith("int") else text
+_READERS: Mapping[str, Callable[[str], Any]] = {
+    "frozenset": lambda text: frozenset(text.split("+")),
+    "float": float,
+    "int": lambda text: int(text, 0),
+}
+"""By the annotation of a field: what reads its text."""
 
 
 def fault_concerns(faults: Iterable[Fault], name: str, now_s: float, seen: Counter[Fault]) -> bool:
     """Return whether a fault `name` concerns the next word, line or datagram; `seen` counts those it could concern."""
-    hit = False
-    for fault in faults:
-        if fault.name == name and fault.active(now_s):
-            seen[fault] += 1
-            hit |= seen[fault] % fault.every == 0
-    return hit
+    concerned = [fault for fault in faults if fault.name == name and fault.active(now_s)]
+    seen.update(concerned)
+    return any(seen[fault] % fault.every == 0 for fault in concerned)

@@ -14,7 +14,7 @@ from tactbench.core.samples import Block
 from tactbench.core.spec.recording import StreamCounts
 from tactbench.core.spec.sensor import StreamSpec
 from tactbench.devices.driver import Driver
-from tactbench.devices.queue import BlockQueue, Loss
+from tactbench.devices.queue import BlockQueue
 from tactbench.devices.sequence import SequenceCheck
 from tactbench.links.link import Clock
 
@@ -25,8 +25,6 @@ STEP_S = 0.02
 datagrams of a UDP socket are 37 ms at 7 kHz, the fastest stream of a Net F/T)."""
 STOP_S = 5.0
 """How long readers are waited for (assumed: a read, a stop and what they send, each within a link's time-outs)."""
-COUNTS_S = 0.25
-"""How old `counts` may be while devices are read."""
 UNRATED_ROWS = 4096
 """The most rows of a block of a stream whose rate nobody states."""
 
@@ -34,15 +32,19 @@ UNRATED_ROWS = 4096
 class _Stream:
     """One stream on its way from driver to caller."""
 
-    def __init__(self, spec: StreamSpec, queue_s: float, block_s: float) -> None:
+    def __init__(self, device: str, spec: StreamSpec, queue_s: float, block_s: float) -> None:
+        self.device = device
+        self.rated = spec.rate_hz is not None
+        self.came_ns = 0
         self.check = SequenceCheck()
         self.queue = BlockQueue(spec, queue_s)
         self.written = 0
         self.most_rows = UNRATED_ROWS if spec.rate_hz is None else math.ceil(2 * block_s * spec.rate_hz)
 
-    def put(self, block: Block) -> None:
+    def put(self, block: Block, now_ns: int) -> None:
         kept = self.check(block)
         if kept is not None:
+            self.came_ns = now_ns
             self.queue.put(kept)
 
     def take(self) -> Iterator[Block]:
@@ -77,6 +79,8 @@ class Reading:
         Seconds of data that a caller may be behind.
     block_s
         Seconds of data in a block, about: never more than twice as much.
+    silent_s
+        A stream with a rate of which nothing came for longer ends the reading.
     """
 
     def __init__(
@@ -87,6 +91,7 @@ class Reading:
         advance: Callable[[int], None] | None = None,
         queue_s: float = 5.0,
         block_s: float = 0.05,
+        silent_s: float = math.inf,
     ) -> None:
         if not (0 < block_s < queue_s < math.inf):
             raise UsageError(
@@ -98,6 +103,7 @@ class Reading:
         self._advance = advance
         self._queue_s = queue_s
         self._block_s = block_s
+        self._silent_ns = 1e9 * silent_s
         self._streams: dict[str, _Stream] = {}
         self._counts: dict[str, Mapping[str, int]] = {name: {} for name in self._drivers}
         self._to_stop: list[str] = []
@@ -118,7 +124,7 @@ class Reading:
                             f"The stream {spec.name!r} of {name} is there already, of another device.",
                             hint="Streams of one recording have different names.",
                         )
-                    self._streams[spec.name] = _Stream(spec, self._queue_s, self._block_s)
+                    self._streams[spec.name] = _Stream(name, spec, self._queue_s, self._block_s)
                 if self._advance is None:
                     # It is read at once: the next device may take longer to start than the link's buffers last.
                     threading.Thread(
@@ -157,7 +163,7 @@ class Reading:
             name: StreamCounts(
                 received=stream.check.received,
                 written=stream.written,
-                dropped=stream.queue.loss.rows,
+                dropped=stream.queue.dropped,
                 duplicates=stream.check.duplicates,
                 late=stream.check.late,
                 gaps=stream.check.gaps,
@@ -167,18 +173,8 @@ class Reading:
 
     @property
     def counts(self) -> Mapping[str, int]:
-        """What the drivers counted, as ``device: name``; at most 0.25 s old, and whole once the reading is over."""
+        """What the drivers counted, as ``device: name``, once the reading is over."""
         return {f"{name}: {what}": n for name, counts in self._counts.items() for what, n in counts.items()}
-
-    @property
-    def high_water(self) -> Mapping[str, int]:
-        """By stream: the most rows that waited to be taken."""
-        return {name: stream.queue.high_water for name, stream in self._streams.items()}
-
-    @property
-    def losses(self) -> Mapping[str, Loss]:
-        """By stream: what was dropped because the caller was behind."""
-        return {name: stream.queue.loss for name, stream in self._streams.items()}
 
     def blocks(self, duration_s: float, is_over: Callable[[], bool] = lambda: False) -> Iterator[Block]:
         """Yield blocks of all streams until the time is over or a device has ended the reading; then stop the devices.
@@ -190,7 +186,7 @@ class Reading:
         is_over
             Asked at every block's time, whether or not a device has sent anything: true ends the reading too.
         """
-        now_ns = self._clock()
+        now_ns = began_ns = self._clock()
         end_ns = now_ns + (math.inf if duration_s == math.inf else round(1e9 * duration_s))
         while not (self._over.is_set() or is_over()) and now_ns < end_ns:
             until_ns = int(min(now_ns + round(1e9 * self._block_s), end_ns))
@@ -200,8 +196,16 @@ class Reading:
             else:
                 now_ns = self._carry(self._advance, now_ns, until_ns)
             yield from self._waiting()
+            self._listen(now_ns, began_ns)
         self._finish()
         yield from self._waiting()
+
+    def _listen(self, now_ns: int, began_ns: int) -> None:
+        """End the reading if a stream has been silent for too long."""
+        for name, stream in self._streams.items():
+            silent_ns = now_ns - max(began_ns, stream.came_ns)
+            if stream.rated and silent_ns > self._silent_ns:
+                self._fail(stream.device, RigError(f"Nothing came of {name} for {1e-9 * silent_ns:.3g} s."))
 
     def _waiting(self) -> Iterator[Block]:
         for stream in self._streams.values():
@@ -216,7 +220,7 @@ class Reading:
                     f"A block of stream {block.stream!r} came, which {name} did not announce.",
                     hint="Correct the driver: its streams are fixed once it is started.",
                 )
-            self._streams[block.stream].put(block)
+            self._streams[block.stream].put(block, self._clock())
         return bool(blocks)
 
     def _carry(self, advance: Callable[[int], None], now_ns: int, until_ns: int) -> int:
@@ -244,13 +248,9 @@ class Reading:
                 return
             self._to_stop.remove(name)
             self._readers[name] = threading.current_thread()
-        counted_ns = self._clock()
         try:
             while not self._over.is_set():
                 self._take_over(name, driver, READ_S)
-                if self._clock() - counted_ns > 1e9 * COUNTS_S:
-                    counted_ns = self._clock()
-                    self._counts[name] = dict(driver.counts)
             self._exhaust(name, driver, self._clock() + round(1e9 * READ_S))
         except Exception as error:
             self._fail(name, error)

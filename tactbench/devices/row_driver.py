@@ -88,7 +88,12 @@ class RowDriver(Driver, Generic[L]):
         return {}
 
     def start(self) -> None:
-        """Nothing, unless a subclass has something to send."""
+        """Drop what came before, and :meth:`begin`."""
+        self.link.discard()
+        self.begin()
+
+    def begin(self) -> None:
+        """Nothing, unless a subclass has a part of a frame to forget, or something to send."""
 
     def ask(self) -> None:
         """Nothing, unless a device is to be asked before its answer is read."""

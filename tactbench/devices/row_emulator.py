@@ -57,6 +57,11 @@ class RowEmulator(ABC):
         felt = self.settings.senses(now_s)
         return [felt.get(one.name, 0.0 if one.rest is None else one.rest.to(one.unit)) for one in self.stream.channels]
 
+    @property
+    def bytes_per_s(self) -> float:
+        """What it sends while it samples, by its rate and the length of a row: a baud rate must carry that."""
+        return self.rate_hz * sum(len(piece) for piece in self.sent(self.sensed(0.0)) if isinstance(piece, bytes))
+
     def feed(self, piece: bytes | CanFrame, now_s: float) -> Sequence[Sent]:
         """Take what came from the host."""
         before = self.poll(now_s)

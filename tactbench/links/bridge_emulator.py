@@ -12,7 +12,7 @@ from collections.abc import Callable
 from typing import Literal
 
 from tactbench.links.bridge_frame import VERSION, Frame, FrameDecoder, Kind, encode_frame
-from tactbench.links.spi_bridge import BEGIN, HELLO, SETUP, STEP
+from tactbench.links.spi_bridge import BEGIN, FULL, HELLO, SETUP, STEP
 
 Exchange = Callable[[int, bytes, float], bytes]
 """What hangs on the bus: select mask, bytes out, second at which they begin -> as many bytes in."""
@@ -117,7 +117,7 @@ class BridgeEmulator:
         if not self._speed_hz:
             return self._refusal(frame, "not set up")
         if len(self._due) >= self._holds:
-            return self._refusal(frame, "full")
+            return self._refusal(frame, FULL.decode())
         steps = _steps(frame.payload)
         if steps is None or any(select & ~self._lines for select, _, _ in steps):
             return self._refusal(frame, "malformed payload")

@@ -17,38 +17,16 @@ _PARITY = {"none": "N", "even": "E", "odd": "O"}
 class ByteLink(Link):
     """A byte stream in both directions: a :class:`SerialLink`, or an emulated device's."""
 
+    def _take(self, timeout_s: float) -> Received:
+        return self.read(timeout_s)
+
     @abstractmethod
     def read(self, timeout_s: float, *, size: int = 65536) -> Received:
-        """Return what has come, as soon as that is at least one byte.
-
-        Parameters
-        ----------
-        timeout_s
-            Seconds to wait; 0 asks without waiting.
-        size
-            The most bytes to return.
-
-        Raises
-        ------
-        LinkTimeout
-            If nothing came.
-        LinkUnplugged
-            If the device is gone, or the other end of a socket or pseudo-terminal.
-        LinkClosed
-            If the link was closed.
-        """
+        """Return what has come, at most `size` bytes, as soon as that is one; raises as every :class:`Link`."""
 
     @abstractmethod
     def write(self, data: bytes) -> None:
-        """Hand `data` over to be sent.
-
-        Raises
-        ------
-        LinkTimeout
-            If the other end does not take it within :data:`~tactbench.links.link.WRITE_TIMEOUT_S`.
-        LinkUnplugged, LinkClosed
-            As of :meth:`read`.
-        """
+        """Hand `data` over to be sent; raises as every :class:`Link`."""
 
 
 class SerialLink(ByteLink):

@@ -1,17 +1,28 @@
-"""CAN: buses of python-can."""
+"""CAN: buses of python-can, and logs (Vector's ASC and BLF) that are read like one."""
 
 from __future__ import annotations
 
 import errno
+import importlib
+import inspect
+import struct
 import time
+import zlib
 from abc import abstractmethod
+from collections.abc import Iterable, Iterator
+from contextlib import ExitStack
 from dataclasses import dataclass
-from typing import Any, Literal
+from datetime import UTC, datetime
+from itertools import islice
+from pathlib import Path
+from typing import Any
 
-from tactbench.core.errors import LinkError
+from tactbench.core.errors import LinkEnded, LinkError, UnknownNameError
 from tactbench.links.link import WRITE_TIMEOUT_S, Clock, Link, cannot_open, os_error_in
 
-Interface = Literal["socketcan", "slcan", "udp_multicast", "virtual"]
+OWN_TIME_S = 60.0
+"""A stamp of python-can no older than this is of the system's clock; other stamps (of an adapter that counts from its
+own start) are not taken. Assumed: nothing waits longer in a kernel's queue."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -24,11 +35,11 @@ class CanFrame:
     """At most 8 bytes."""
     extended: bool = False
     t_ns: int = 0
-    """When it was in the host, nanoseconds of the link's clock; of a log: since the log's start. Not sent."""
+    """When the kernel or the adapter had it, nanoseconds of the link's clock; of a log: since its start. Not sent."""
 
 
 class CanLink(Link):
-    """Frames to and from a CAN bus: a :class:`CanBus` or a :class:`~tactbench.links.can_log.CanLog`.
+    """Frames to and from a CAN bus: a :class:`CanBus` or a :class:`CanLog`.
 
     Attributes
     ----------
@@ -42,39 +53,16 @@ class CanLink(Link):
         self.other_frames = 0
         self.damaged = 0
 
+    def _take(self, timeout_s: float) -> CanFrame:
+        return self.receive(timeout_s)
+
     @abstractmethod
     def receive(self, timeout_s: float) -> CanFrame:
-        """Return the next data frame.
-
-        Parameters
-        ----------
-        timeout_s
-            Seconds to wait; 0 asks without waiting.
-
-        Raises
-        ------
-        LinkTimeout
-            If none came.
-        LinkUnplugged
-            If the adapter or the network is gone.
-        LinkClosed
-            If the link was closed; :class:`LinkEnded` if a log is over.
-        """
+        """Return the next data frame; raises as every :class:`Link`, LinkEnded if a log is over."""
 
     @abstractmethod
     def send(self, frame: CanFrame) -> None:
-        """Send a data frame.
-
-        Raises
-        ------
-        LinkError
-            If it is not a CAN frame, or a log would have to take it.
-        LinkTimeout
-            If the adapter does not take it within :data:`~tactbench.links.link.WRITE_TIMEOUT_S`, or the queue is full
-            since no node acknowledges.
-        LinkUnplugged, LinkClosed
-            As of :meth:`receive`.
-        """
+        """Send a data frame; raises as every :class:`Link`, LinkTimeout also where no node acknowledges."""
 
     def _sendable(self, frame: CanFrame) -> None:
         """Raise what `send` raises of a link that is closed or unplugged, and of what is no CAN frame."""
@@ -101,22 +89,17 @@ class CanLink(Link):
 class CanBus(CanLink):
     """A bus behind an interface of python-can.
 
+    A frame's time is that of its ``Message.timestamp`` (of socketcan the kernel's) put on the link's clock, or that of
+    its receipt where the interface gives none by the system's clock.
+
     Parameters
     ----------
     interface, channel
-        ``socketcan`` with the network's name (``can0``); ``slcan`` with the adapter's port; ``udp_multicast`` with a
-        multicast address, between processes and machines; ``virtual`` with any name, within one process.
-    bitrate
-        Bits per second. An slcan adapter is set to it. Of socketcan it is only a statement: ``ip link set can0 type
-        can bitrate 1000000`` sets it.
-    baud
-        Of the slcan adapter's port, bits per second.
-    settle_s
-        Seconds that an slcan adapter needs after its port was opened: many start anew then.
-    port
-        UDP port of udp_multicast.
+        As python-can names them: ``socketcan`` with ``can0``, ``pcan`` with ``PCAN_USBBUS1``, ``slcan`` with a port …
     clock
         Stamps what is received.
+    options
+        Of the interface, by python-can's names: ``bitrate``, ``tty_baudrate``, ``port`` …
 
     Raises
     ------
@@ -124,28 +107,21 @@ class CanBus(CanLink):
         If the interface cannot be opened.
     """
 
-    def __init__(
-        self,
-        interface: Interface,
-        channel: str,
-        *,
-        bitrate: int | None = None,
-        baud: int = 115200,
-        settle_s: float = 2.0,
-        port: int = 43113,
-        clock: Clock = time.monotonic_ns,
-    ) -> None:
+    def __init__(self, interface: str, channel: str, *, clock: Clock = time.monotonic_ns, **options: Any) -> None:
         import can
 
         super().__init__(f"can://{interface}/{channel}", clock)
-        options: dict[str, Any] = {}
-        if interface == "slcan":
-            options = {"bitrate": bitrate, "tty_baudrate": baud, "sleep_after_open": settle_s}
-        elif interface == "udp_multicast":
-            options = {"port": port, "fd": False}
+        if interface == "udp_multicast":
+            options.setdefault("fd", False)
+        if interface == "socketcan":
+            options.pop("bitrate", None)  # a statement: `ip link set` sets it
         try:
+            module, name = can.interfaces.BACKENDS[interface]
+            known = inspect.signature(getattr(importlib.import_module(module), name).__init__).parameters
+            for option in options.keys() - known.keys() - {"bitrate"}:
+                raise UnknownNameError(f"option of a can://{interface} link", option, list(known)[2:])
             self._bus: Any = can.Bus(channel, interface, ignore_config=True, **options)
-        except (can.CanError, OSError, ValueError) as error:
+        except (can.CanError, OSError, ValueError, TypeError, ImportError) as error:
             raise cannot_open(self.address, error, hint=_hint(interface, channel, error)) from error
 
     def receive(self, timeout_s: float) -> CanFrame:  # noqa: D102  (inherited)
@@ -156,16 +132,14 @@ class CanBus(CanLink):
         while True:
             try:
                 message = self._bus.recv(left_s)
-                t_ns = self._clock()
-                frame = None if message is None else self._data_frame(message, t_ns)
+                frame = None if message is None else self._data_frame(message, self._stamp(message.timestamp))
             except (can.CanError, OSError, ValueError, IndexError) as error:
                 if os_error_in(error) is not None:
                     raise self._unplugged(error) from error
                 # Bytes that are no frame. python-can's slcan would try those that are not ASCII again and again; its
                 # own flush() would drop the frames behind them as well.
                 self.damaged += 1
-                if hasattr(self._bus, "_buffer"):
-                    self._bus._buffer.clear()
+                getattr(self._bus, "_buffer", bytearray()).clear()
                 message = frame = None
             if frame is not None:
                 return frame
@@ -174,6 +148,11 @@ class CanBus(CanLink):
                 if message is None:
                     raise self._nothing_came(timeout_s)
                 left_s = 0.0  # it was a frame of another kind: what lies behind it has come as well
+
+    def _stamp(self, timestamp: float) -> int:
+        """Return when a message came by the link's clock, of python-can's seconds since 1970."""
+        now_ns, age_s = self._clock(), time.time() - timestamp
+        return now_ns - round(1e9 * age_s) if 0 <= age_s < OWN_TIME_S else now_ns
 
     def send(self, frame: CanFrame) -> None:  # noqa: D102  (inherited)
         import can
@@ -203,9 +182,113 @@ class CanBus(CanLink):
             self._bus.serialPortOrig.close()
 
 
+class CanLog(CanLink):
+    """A log: its frames one after the other, without waiting, stamped with the log's own times.
+
+    Stamps count from the log's start, which both formats keep: an ASC file's date has no time zone, a BLF file that was
+    written with times before 1990 has no date. BLF stamps come within 0.25 us, since python-can returns float64.
+
+    Parameters
+    ----------
+    file
+        Ends in ``.asc`` or ``.blf``.
+
+    Attributes
+    ----------
+    started
+        The log's start as the file states it: ASC in the writer's local time, BLF in ISO 8601 as UTC; empty if it
+        does not.
+    backward
+        How many frames so far have an earlier stamp than the one before them; they are returned as they are.
+
+    Raises
+    ------
+    LinkError
+        If the file cannot be read, is of another kind, or is an ASC file with times relative to the event before:
+        events that are no frames carry part of the time, and python-can leaves them out.
+    """
+
+    def __init__(self, file: Path) -> None:
+        import can
+        from can.io.blf import BLFParseError
+
+        super().__init__(f"can://log/{file}")
+        self.backward = 0
+        self._last_ns = 0
+        self._count = 0
+        self._start_s = 0.0
+        if file.suffix.lower() not in (".asc", ".blf"):
+            raise LinkError(f"{file} is not a log that can be read.", hint="Give a file that ends in .asc or .blf.")
+        with ExitStack() as opened:
+            try:
+                if file.suffix.lower() == ".asc":
+                    text = opened.enter_context(file.open(encoding="utf-8", errors="replace"))
+                    self.started = _asc_start(self.address, text)
+                    text.seek(0)
+                    self._reader: Any = can.ASCReader(text, relative_timestamp=True)
+                else:
+                    self._reader = can.BLFReader(opened.enter_context(file.open("rb")))
+                    self._start_s = self._reader.start_timestamp
+                    self.started = datetime.fromtimestamp(self._start_s, UTC).isoformat() if self._start_s else ""
+            except (OSError, ValueError, BLFParseError, struct.error) as error:
+                raise cannot_open(self.address, error) from error
+            self._file = opened.pop_all()
+        self._messages: Iterator[Any] = iter(self._reader)
+
+    def receive(self, timeout_s: float) -> CanFrame:
+        """Return the next data frame at once; raises LinkEnded if the log is over, LinkError if it is damaged."""
+        from can.io.blf import BLFParseError
+
+        self._usable(timeout_s)
+        while True:
+            try:
+                message = next(self._messages)
+            except StopIteration:
+                raise LinkEnded(f"The log {self.address} is over after {self._count} frames.") from None
+            except (ValueError, LookupError, OSError, BLFParseError, struct.error, zlib.error) as error:
+                raise LinkError(
+                    f"The log {self.address} is damaged after {self._count} frames: {error}.",
+                    hint="Use the frames before, or export the log anew.",
+                ) from error
+            self._count += 1
+            t_ns = round((message.timestamp - self._start_s) * 1e9)
+            self.backward += t_ns < self._last_ns
+            self._last_ns = t_ns
+            frame = self._data_frame(message, t_ns)
+            if frame is not None:
+                return frame
+
+    def send(self, frame: CanFrame) -> None:
+        """Raise LinkError: a log takes nothing."""
+        self._usable()
+        raise LinkError(f"{self.address} is a log: nothing can be sent to it.", hint="Read it, or open a bus.")
+
+    def _release(self) -> None:
+        self._file.close()
+
+
+def _asc_start(address: str, lines: Iterable[str]) -> str:
+    """Return the start that the head of an ASC file states."""
+    started = ""
+    for line in islice(lines, 50):
+        words = line.split()
+        if [word.lower() for word in words[:1]] == ["date"]:
+            started = " ".join(words[1:])
+        elif [word.lower() for word in words[:2]] == ["begin", "triggerblock"]:
+            return " ".join(words[2:])
+        elif [word.lower() for word in words[2:4]] == ["timestamps", "relative"]:
+            raise LinkError(
+                f"The times in {address} are relative to the event before, absolute ones were expected.",
+                hint="Export the log with absolute time stamps.",
+            )
+    return started
+
+
 def _hint(interface: str, channel: str, error: BaseException) -> str:
     if "msgpack" in str(error):
         return "Install it: pip install 'tactbench[multicast]'."
     if interface == "slcan" and not channel.startswith("/"):
         return "A port begins with a slash of its own: can://slcan//dev/ttyACM0."
-    return ""
+    if os_error_in(error) is not None:
+        return ""
+    return f"See python-can's page of the interface {interface} for its channels and options."

@@ -16,38 +16,19 @@ LARGEST_DATAGRAM = 65507
 class DatagramLink(Link):
     """Datagrams to and from one peer: a :class:`UdpLink`, or an emulated device's."""
 
+    def _take(self, timeout_s: float) -> Received:
+        return self.receive(timeout_s)
+
     @abstractmethod
     def receive(self, timeout_s: float) -> Received:
-        """Return the next datagram, whole.
+        """Return the next datagram, whole; raises as every :class:`Link`.
 
-        Parameters
-        ----------
-        timeout_s
-            Seconds to wait; 0 asks without waiting.
-
-        Raises
-        ------
-        LinkTimeout
-            If none came.
-        LinkUnplugged
-            If the peer's host says that nobody listens there, or the network is gone.
-        LinkClosed
-            If the link was closed.
+        It is unplugged where the peer's host says that nobody listens there.
         """
 
     @abstractmethod
     def send(self, data: bytes) -> None:
-        """Send one datagram.
-
-        Raises
-        ------
-        LinkError
-            If it is longer than UDP carries.
-        LinkTimeout
-            If the system does not take it within :data:`~tactbench.links.link.WRITE_TIMEOUT_S`.
-        LinkUnplugged, LinkClosed
-            As of :meth:`receive`.
-        """
+        """Send one datagram; raises as every :class:`Link`, LinkError if it is longer than UDP carries."""
 
     def _sendable(self, data: bytes) -> None:
         """Raise what `send` raises of a link that is closed or unplugged, and of data that is too long."""
@@ -73,11 +54,6 @@ class UdpLink(DatagramLink):
         bytes, a quarter of a second at 1 kHz (measured on Linux); what does not fit is lost without an error.
     clock
         Stamps what is received.
-
-    Attributes
-    ----------
-    granted_bytes
-        The buffer the system gave. Linux answers twice what was asked for, its own overhead included.
 
     Raises
     ------
@@ -108,7 +84,6 @@ class UdpLink(DatagramLink):
         except OSError as error:
             self._socket.close()
             raise cannot_open(self.address, error) from error
-        self.granted_bytes: int = self._socket.getsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF)
 
     @property
     def local_port(self) -> int:

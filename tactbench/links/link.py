@@ -19,6 +19,9 @@ Clock = Callable[[], int]
 WRITE_TIMEOUT_S = 1.0
 """Assumed: the other end takes what is sent within this time, or is stuck. 9600 baud carry 960 bytes in it."""
 
+MOST_DISCARDED = 4096
+"""Pieces that one :meth:`Link.discard` drops: a bus that never rests does not keep it for ever."""
+
 
 @dataclass(frozen=True, slots=True)
 class Received:
@@ -32,7 +35,10 @@ class Received:
 class Link(ABC):
     """A connection to a device: open when it is made, until :meth:`close` or the end of its ``with`` block.
 
-    One thread uses a link. Time-outs are waits by :meth:`timer`, whatever the clock.
+    One thread uses a link. Time-outs are waits by :meth:`timer`, whatever the clock; 0 asks without waiting. Every read
+    and write raises LinkTimeout if nothing came or the other end took nothing in time (:data:`WRITE_TIMEOUT_S` for what
+    is sent), LinkUnplugged if device or other end is gone, LinkClosed once it was closed, and LinkError for what is not
+    possible.
 
     Parameters
     ----------
@@ -65,6 +71,18 @@ class Link(ABC):
     def timer(self) -> float:
         """Return the seconds by which its waits are counted: real ones, or virtual ones where time is virtual."""
         return time.monotonic()
+
+    def discard(self) -> None:
+        """Drop what has come and was not read; what is still under way comes later. Raises as a read does."""
+        for _ in range(MOST_DISCARDED):
+            try:
+                self._take(0.0)
+            except LinkTimeout:
+                return
+
+    def _take(self, timeout_s: float) -> object:
+        """Return what a read would, whatever it is called; a link of which nothing waits has nothing to take."""
+        raise self._nothing_came(timeout_s)
 
     @abstractmethod
     def _release(self) -> None:

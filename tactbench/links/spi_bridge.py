@@ -19,6 +19,8 @@ STEP = struct.Struct("<BHH")
 """Head of a step in BATCH: select, pause in us, number of bytes."""
 BEGIN = struct.Struct("<I")
 """Head of the reply to BATCH: when it began, us."""
+FULL = b"full"
+"""Why a bridge refuses a batch that it cannot hold."""
 
 _ASK_S = 0.2
 """Assumed: a bridge that runs answers HELLO within this time, else it is asked again."""
@@ -172,6 +174,9 @@ class SpiBridge(SpiLink):
                 continue
             if frame.kind == Kind.ERROR.reply:  # may come before the replies to earlier batches, which still run
                 del self._waiting[frame.number]
+                if frame.payload == FULL:  # it still has batches that were given up here: this one is lost, too
+                    self.lost += 1
+                    continue
                 raise self._refused(frame)
             for number in list(self._waiting):
                 lengths = self._waiting.pop(number)

@@ -1,14 +1,15 @@
-"""SPI: batches of transfers to devices behind an adapter."""
+"""SPI: batches of transfers to devices behind an adapter, or on a Linux machine's own bus."""
 
 from __future__ import annotations
 
 import time
 from abc import abstractmethod
+from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 from tactbench.core.errors import LinkError
-from tactbench.links.link import Clock, Link
+from tactbench.links.link import Clock, Link, cannot_open
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,12 +72,7 @@ class SpiLink(Link):
     def send(self, steps: Sequence[SpiStep]) -> int:
         """Hand over a batch and return its number: 0, 1, 2, …, after 65535 again 0.
 
-        Raises
-        ------
-        LinkError
-            If it is empty, a step is not possible, or the adapter cannot hold one more: receive first.
-        LinkTimeout, LinkUnplugged, LinkClosed
-            As of every link.
+        Raises as every :class:`Link`, LinkError if it is empty, a step is not possible, or the adapter holds no more.
         """
         self._usable()
         if not steps:
@@ -89,38 +85,91 @@ class SpiLink(Link):
         return self._number
 
     def receive(self, timeout_s: float) -> SpiReply:
-        """Return the next reply. Where one was lost on its way, its number is left out.
-
-        Parameters
-        ----------
-        timeout_s
-            Seconds to wait; 0 asks without waiting.
-
-        Raises
-        ------
-        LinkTimeout
-            If none came.
-        LinkError
-            If the adapter refuses the batch.
-        LinkUnplugged, LinkClosed
-            As of every link.
-        """
+        """Return the next reply, raising as every :class:`Link`; where one was lost, its number is left out."""
         return self._collect(timeout_s, self._usable(timeout_s))
 
     def abandon(self) -> None:
         """Wait no longer for replies to what was sent; those that come late are dropped. Raises nothing."""
 
     def transfer(self, data: bytes, *, select: int = 1, pause_us: int = 0, timeout_s: float = 1.0) -> bytes:
-        """Exchange `data` at once and return what came in; replies to earlier batches are dropped.
-
-        Raises
-        ------
-        LinkTimeout, LinkError, LinkUnplugged, LinkClosed
-            As of :meth:`receive`.
-        """
+        """Exchange `data` at once and return what came in; replies to earlier batches are dropped."""
         number = self.send([SpiStep(data, select, pause_us)])
         deadline = self.timer() + timeout_s
         while True:
             reply = self.receive(max(0.0, deadline - self.timer()))
             if reply.number == number:
                 return reply.data[0]
+
+
+class SpidevLink(SpiLink):
+    """A device ``/dev/spidevBUS.SELECT``.
+
+    A batch is carried out by this process when it is sent: pauses are at least as long as asked for, and longer when
+    the system has other work. Never run on a real device.
+
+    Parameters
+    ----------
+    device
+        Bus and select line, ``0.0``. Linux activates one line at a time: `select` of a step is 1.
+    speed_hz
+        Clock of the bus, hertz.
+    mode
+        SPI mode, 0 to 3.
+    clock
+        Stamps what is received.
+
+    Raises
+    ------
+    LinkError
+        If spidev is not installed, or the device cannot be opened.
+    """
+
+    def __init__(self, device: str, *, speed_hz: int, mode: int = 0, clock: Clock = time.monotonic_ns) -> None:
+        super().__init__(f"spi://spidev/{device}", clock)
+        self.speed_hz = speed_hz
+        self.holds = 1
+        bus, _, line = device.partition(".")
+        if not (bus.isdigit() and line.isdigit()):
+            raise LinkError(f"{self.address} does not name a bus and a line.", hint="Write spi://spidev/0.0.")
+        try:
+            import spidev
+        except ImportError as error:
+            raise LinkError(
+                f"{self.address} needs the package spidev, which is not installed.",
+                hint="Install it: pip install 'tactbench[spi]' (Linux only; it is compiled).",
+            ) from error
+        self._replies: deque[SpiReply] = deque()
+        self._device = spidev.SpiDev()
+        try:
+            self._device.open(int(bus), int(line))
+            self._device.max_speed_hz = speed_hz
+            self._device.mode = mode
+        except OSError as error:
+            self._device.close()
+            raise cannot_open(self.address, error) from error
+
+    def _submit(self, number: int, steps: Sequence[SpiStep]) -> None:
+        if any(step.select != 1 for step in steps):
+            raise LinkError(f"{self.address} has one select line.", hint="Give every step select=1.")
+        data = []
+        try:
+            for step in steps:
+                data.append(bytes(self._device.xfer2(list(step.data))) if step.data else b"")
+                released = time.perf_counter_ns()
+                # Shorter than a sleep can be: waits for tens of microseconds are spent here.
+                while time.perf_counter_ns() - released < 1000 * step.pause_us:
+                    pass
+        except OSError as error:
+            raise self._unplugged(error) from error
+        self._replies.append(SpiReply(number, tuple(data), self._clock()))
+
+    def _collect(self, timeout_s: float, deadline: float) -> SpiReply:
+        if not self._replies:
+            raise self._nothing_came(timeout_s)
+        return self._replies.popleft()
+
+    def abandon(self) -> None:  # noqa: D102
+        self._replies.clear()
+
+    def _release(self) -> None:
+        self._device.close()

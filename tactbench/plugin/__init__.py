@@ -14,14 +14,13 @@ from tactbench.core.errors import (
     PluginContractError,
     RigError,
     TactbenchError,
-    UnknownNameError,
     UsageError,
 )
+from tactbench.core.on_demand import on_demand
 from tactbench.core.plugins.hookspecs import API_VERSION, hookimpl
 from tactbench.core.plugins.interfaces import Acquisition, Estimator, ReplayRig, Rig, RigContext
 from tactbench.core.plugins.registry import load_object, load_registry
 from tactbench.core.samples import Block, Quality, StreamReadings
-from tactbench.core.spec.drive import ForceLoop
 from tactbench.core.spec.events import AlarmPolicy, SlipTarget
 from tactbench.core.spec.force_profiles import press_hold_release, sine, staircase
 from tactbench.core.spec.parameter import Parameter
@@ -48,7 +47,6 @@ from tactbench.core.spec.sensor import (
 )
 from tactbench.core.spec.summary import Summary
 from tactbench.core.spec.task import ChannelTarget, LabelTarget, PlannedScene, Published, TaskSpec, VectorTarget
-from tactbench.plugin.on_demand import on_demand
 
 if TYPE_CHECKING:
     from tactbench.core.samples import FloatArray
@@ -66,7 +64,6 @@ __all__ = [
     "Estimator",
     "EstimatorDescriptor",
     "FloatArray",
-    "ForceLoop",
     "ForcePath",
     "ForceRamp",
     "Indenter",
@@ -103,7 +100,6 @@ __all__ = [
     "TactbenchError",
     "TaskDescriptor",
     "TaskSpec",
-    "UnknownNameError",
     "UsageError",
     "VectorTarget",
     "assumed",

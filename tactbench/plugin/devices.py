@@ -6,15 +6,16 @@ the device.
 
 from typing import TYPE_CHECKING
 
-from tactbench.core.errors import LinkClosed, LinkEnded, LinkError, LinkTimeout, LinkUnplugged
+from tactbench.core.errors import LinkEnded, LinkError, LinkTimeout, LinkUnplugged
+from tactbench.core.on_demand import on_demand
 from tactbench.core.plugins.checks import CheckTable, RigCheck
 from tactbench.core.plugins.interfaces import DeviceAcquisition, Operator
 from tactbench.core.spec.recording import Emulation, StreamClock, StreamCounts
 from tactbench.core.spec.rig import DeviceDescriptor
-from tactbench.core.spec.rig_file import FORCE, DeviceEntry, ForceEntry, NamedDevice, RigFile
-from tactbench.plugin.on_demand import on_demand
+from tactbench.core.spec.rig_file import FORCE, ForceEntry, NamedDevice, RigFile
 
 if TYPE_CHECKING:
+    from tactbench.core.plugins.emulators import RigEmulators
     from tactbench.core.plugins.rig_devices import (
         PressingForce,
         ask_operator,
@@ -24,21 +25,43 @@ if TYPE_CHECKING:
         physics_of,
         with_sensor,
     )
+    from tactbench.devices.control import Control
     from tactbench.devices.driver import Driver, DriverSettings
     from tactbench.devices.emulation.emulated_devices import EmulatedDevice, EmulatedDevices
     from tactbench.devices.emulation.scene_samples import SceneSamples
     from tactbench.devices.emulator import DeviceEmulator, EmulatorSettings, Senses, Sent, SpiDeviceEmulator
     from tactbench.devices.fault import Fault, fault_concerns
+    from tactbench.devices.force_loop import ForceLaw, LoopModel
+    from tactbench.devices.guard import LocalGuard, largest_force_n
+    from tactbench.devices.guard_messages import (
+        Beat,
+        CommandKind,
+        Event,
+        GuardLostError,
+        GuardState,
+        Limits,
+        Report,
+    )
+    from tactbench.devices.guard_process import DeviceSettings, Guard, GuardProcess, ProcessSettings
     from tactbench.devices.log import DeviceLog
+    from tactbench.devices.options import Options, open_for, read_file, read_options
+    from tactbench.devices.positioner import (
+        NotReadyError,
+        Positioner,
+        PositionerError,
+        PositionerFacts,
+        PositionerOptions,
+        PositionerSilentError,
+        PositionerState,
+    )
+    from tactbench.devices.press import Course, Press, PressPlan
     from tactbench.devices.reading import Reading
     from tactbench.devices.row_driver import RowDriver, Sample
     from tactbench.devices.row_emulator import RowEmulator
-    from tactbench.devices.sequence import SequenceCheck, Unwrap
+    from tactbench.devices.sequence import Unwrap
     from tactbench.links.address import open_link
-    from tactbench.links.bridge_frame import Frame, FrameDecoder, encode_frame
     from tactbench.links.byte_link import ByteLink
-    from tactbench.links.can_link import CanFrame, CanLink
-    from tactbench.links.can_log import CanLog
+    from tactbench.links.can_link import CanFrame, CanLink, CanLog
     from tactbench.links.datagram_link import DatagramLink
     from tactbench.links.link import Clock, Link, Received
     from tactbench.links.spi_bridge import SpiBridge
@@ -46,40 +69,63 @@ if TYPE_CHECKING:
 
 __all__ = [
     "FORCE",
+    "Beat",
     "ByteLink",
     "CanFrame",
     "CanLink",
     "CanLog",
     "CheckTable",
     "Clock",
+    "CommandKind",
+    "Control",
+    "Course",
     "DatagramLink",
     "DeviceAcquisition",
     "DeviceDescriptor",
     "DeviceEmulator",
-    "DeviceEntry",
     "DeviceLog",
+    "DeviceSettings",
     "Driver",
     "DriverSettings",
     "EmulatedDevice",
     "EmulatedDevices",
     "Emulation",
     "EmulatorSettings",
+    "Event",
     "Fault",
     "ForceEntry",
-    "Frame",
-    "FrameDecoder",
+    "ForceLaw",
+    "Guard",
+    "GuardLostError",
+    "GuardProcess",
+    "GuardState",
+    "Limits",
     "Link",
-    "LinkClosed",
     "LinkEnded",
     "LinkError",
     "LinkTimeout",
     "LinkUnplugged",
+    "LocalGuard",
+    "LoopModel",
     "NamedDevice",
+    "NotReadyError",
     "Operator",
+    "Options",
+    "Positioner",
+    "PositionerError",
+    "PositionerFacts",
+    "PositionerOptions",
+    "PositionerSilentError",
+    "PositionerState",
+    "Press",
+    "PressPlan",
     "PressingForce",
+    "ProcessSettings",
     "Reading",
     "Received",
+    "Report",
     "RigCheck",
+    "RigEmulators",
     "RigFile",
     "RowDriver",
     "RowEmulator",
@@ -87,7 +133,6 @@ __all__ = [
     "SceneSamples",
     "Senses",
     "Sent",
-    "SequenceCheck",
     "SpiBridge",
     "SpiDeviceEmulator",
     "SpiLink",
@@ -100,10 +145,13 @@ __all__ = [
     "drivers_of",
     "emulation_of",
     "emulators_of",
-    "encode_frame",
     "fault_concerns",
+    "largest_force_n",
+    "open_for",
     "open_link",
     "physics_of",
+    "read_file",
+    "read_options",
     "with_sensor",
 ]
 

@@ -16,6 +16,7 @@ from tactbench.core.recording.salvage import rescue
 from tactbench.core.samples import Block
 from tactbench.core.spec.recording import PlanEntry, StreamClock, StreamCounts
 from tactbench.core.spec.rig import RigDescriptor, SensorDescriptor
+from tactbench.core.spec.rig_file import DeviceEntry, RigFile
 from tactbench.core.spec.scene import Scene
 from tactbench.core.spec.sensor import ChannelSpec, StreamSpec
 from tests.core.evaluation.made import FORCE, ticking
@@ -109,6 +110,7 @@ class Devices(Weights):
     counts = {"pad crc errors": 1}  # noqa: RUF012
     emulation = None
     ended = ""
+    identity = {}  # noqa: RUF012
 
     def __init__(self, kept, stops=None, left=""):
         super().__init__()
@@ -122,6 +124,7 @@ class Devices(Weights):
             yield Block("taxels", device + 1_800_000_000_000 + late, np.full((10, 1), number), device_ns=device)
             yield Block("force_torque", device + 1_800_000_000_000, np.full((10, 1), 0.5 * number))
             self.stream_counts = {"taxels": StreamCounts(received=10 * number + 12, dropped=2)}
+            self.drawn = dict(self.identity)
             if number == 15 and isinstance(self.stops, str):
                 self.ended = self.stops
                 return
@@ -156,7 +159,6 @@ def test_what_devices_say_is_recorded_and_times_are_the_hosts(tmp_path):
         (KeyboardInterrupt(), "stand clear", RigError, "stopped by hand"),  # it still moves
         (LinkUnplugged("the cable is gone"), "", LinkUnplugged, "the cable is gone"),
         (ValueError("a bug of the driver"), "", ValueError, "a bug of the driver"),
-        ("the force sensor is unplugged", "", RigError, "the force sensor is unplugged"),
     ],
 )
 def test_a_real_rig_is_stopped_and_then_what_it_had_recorded_is_kept(tmp_path, stops, left, raised, says, complete):
@@ -180,6 +182,37 @@ def test_a_real_rig_is_stopped_and_then_what_it_had_recorded_is_kept(tmp_path, s
     assert meta.clocks["taxels"].segments
     assert meta.streams["taxels"] == StreamCounts(received=162, written=160, dropped=2)
     assert meta.provenance["acquisition_s"] > 0
+
+
+def test_a_scene_that_a_device_ended_is_kept_as_incomplete(tmp_path):
+    path = tmp_path / "r.h5"
+    rig = Devices(path, "the force sensor is unplugged")
+    made, _ = run(path, rig, simulated=False)
+    assert made.excluded == "incomplete: ended before its time: the force sensor is unplugged"
+    assert rig.told == [("ended before its time: the force sensor is unplugged", False)]  # stopped before it is written
+    meta, taxels, _ = opened(path)
+    assert (meta, len(taxels.data)) == (made, 160)
+    with pytest.raises(RigError, match="stand clear"):
+        run(tmp_path / "moving.h5", Devices(path, "the force sensor is unplugged", "stand clear"), simulated=False)
+    assert (tmp_path / "moving.h5").exists()
+
+
+def test_what_is_emulated_is_marked_by_the_rig_file_whatever_the_rig_says(tmp_path):
+    """A rig of others says nothing of emulation: over emulators its recordings were taken for real ones."""
+    link = "can://virtual/there"
+    file = RigFile(
+        rig="weights",
+        sensors={SENSOR.name: DeviceEntry(link=link, emulator=True), "other": DeviceEntry(link="emulated")},
+    )
+    meta, _ = run(tmp_path / "r.h5", Devices(tmp_path / "r.h5"), simulated=False, rig_file=file)
+    assert (meta.simulated, meta.emulation.devices) == (True, (SENSOR.name,))
+    plain = file.model_copy(update={"sensors": {SENSOR.name: DeviceEntry(link=link)}})
+    real, _ = run(tmp_path / "real.h5", Devices(tmp_path / "r.h5"), simulated=False, rig_file=plain)
+    assert (real.simulated, real.emulation) == (False, None)
+    rig = Devices(tmp_path / "r.h5")
+    rig.identity = {f"{SENSOR.name} adapter": "tactbench emulator"}
+    said, _ = run(tmp_path / "said.h5", rig, simulated=False, rig_file=plain)
+    assert said.emulation.devices == (SENSOR.name,)
 
 
 class Impatient(Devices):

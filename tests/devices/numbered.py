@@ -88,7 +88,7 @@ class NumberedDriver(Driver):
         data = data.reshape(-1, len(self._stream.channels))
         counts = HEAD.unpack_from(received.data)[0] + np.arange(len(data))
         times = np.full(len(data), received.t_ns)
-        return [Block(self._stream.name, times, data, sequence=self._unwrap(counts, times))]
+        return [Block(self._stream.name, times, data, sequence=self._unwrap(counts))]
 
     def stop(self) -> None:
         self.sampling = False

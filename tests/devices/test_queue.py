@@ -49,14 +49,11 @@ def test_received_is_written_plus_dropped_plus_duplicates_plus_late(case, turns)
     left = queue.rows
     queue.discard()
     written = [number for block in taken for number in block.sequence.tolist()]
-    loss = queue.loss
-    assert check.received == min(at, len(came)) == len(written) + loss.rows + check.duplicates + check.late
-    assert loss.rows >= left
+    assert check.received == min(at, len(came)) == len(written) + queue.dropped + check.duplicates + check.late
+    assert queue.dropped >= left
     assert queue.rows == 0
-    assert queue.high_water <= 50
     missing = sorted(set(passed) - set(written))
-    assert len(missing) == loss.rows
-    assert (loss.first_sequence, loss.last_sequence) == ((missing[0], missing[-1]) if missing else (None, None))
+    assert len(missing) == queue.dropped
     marked = [
         number
         for block in taken
@@ -75,23 +72,15 @@ def test_a_full_queue_drops_the_newest_block_and_marks_the_next_row():
     queue = BlockQueue(STREAM, 0.1)
     for first in (0, 4, 8):
         queue.put(rows_of(first, 4))
-    assert (queue.loss.rows, queue.loss.blocks, queue.loss.first_sequence, queue.loss.last_sequence) == (4, 1, 8, 11)
+    assert queue.dropped == 4
     assert queue.take(3).sequence.tolist() == [0, 1, 2]
     queue.put(rows_of(12, 4, quality=np.full((4, 2), Quality.SUSPECT, dtype=np.uint8)))
-    assert queue.rows == queue.high_water == 9
+    assert queue.rows == 9
     assert queue.take(5).quality is None
     last = queue.take(100)
     assert last.sequence.tolist() == [12, 13, 14, 15]
     assert last.quality[:, 0].tolist() == [Quality.SUSPECT | Quality.GAP, *[Quality.SUSPECT] * 3]
     assert queue.take(100) is None
-
-
-def test_losses_are_merged_and_cannot_fill_up():
-    queue = BlockQueue(STREAM, 0.1)
-    for first in range(0, 10_000, 10):
-        queue.put(rows_of(first, 10))
-    assert (queue.loss.rows, queue.loss.blocks) == (9990, 999)
-    assert (queue.loss.first_sequence, queue.loss.last_sequence) == (10, 9999)
 
 
 def test_rows_without_numbers_times_or_marks():
@@ -101,7 +90,7 @@ def test_rows_without_numbers_times_or_marks():
     block = queue.take(5)
     assert (block.t_ns, block.sequence, block.device_ns) == (None, None, None)
     assert block.quality.tolist() == [[Quality.GAP] * 2, [0, 0]]
-    assert (queue.loss.rows, queue.loss.first_sequence) == (11, None)
+    assert queue.dropped == 11
 
 
 def test_a_stream_without_a_rate_is_bounded_by_bytes():
@@ -110,8 +99,8 @@ def test_a_stream_without_a_rate_is_bounded_by_bytes():
     for _ in range(100):
         queue.put(block)
     assert queue.rows * (4 + 2) <= MOST_BYTES
-    assert queue.rows + queue.loss.rows == 10_000_000
-    assert queue.loss.rows > 0
+    assert queue.rows + queue.dropped == 10_000_000
+    assert queue.dropped > 0
 
 
 @pytest.mark.parametrize(

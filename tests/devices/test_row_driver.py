@@ -34,7 +34,7 @@ STREAM = StreamSpec(
 class ByteDriver(RowDriver[ByteLink]):
     stream, link_kind, defaults = STREAM, ByteLink, {"unit": 1}
 
-    def start(self):
+    def begin(self):
         self.link.write(b"+")
 
     def quiet(self):
@@ -136,11 +136,6 @@ def test_a_link_of_another_kind_is_refused_and_closed():
         on(devices, CanDriver).close()
 
 
-def test_faults_are_refused():
-    with pytest.raises(UsageError, match="late-frames"):
-        CanModel(settings(faults=("late-frames",)))
-
-
 class AskedDriver(ByteDriver):
     def ask(self):
         self.link.write(b"?")
@@ -175,17 +170,3 @@ def test_the_driver_that_the_page_shows(monkeypatch):
         devices.advance(35_000_000)
         (block,) = driver.read(0)
     assert block.data.tolist() == [[0, 300, 0, 0]] * 3
-
-
-def test_it_reads_a_line_of_the_system():
-    model = ByteModel(settings())
-    with (
-        EmulatedDevices({"pad": EmulatedDevice("bytes", model)}, time="real") as devices,
-        on(devices, ByteDriver) as driver,
-    ):
-        driver.start()
-        blocks = []
-        while sum(len(block.data) for block in blocks) < 3:
-            blocks += driver.read(5.0)  # 10 ms are enough on an idle machine
-    assert {tuple(row) for block in blocks for row in block.data.tolist()} == {(0, 1, 2)}
-    assert all(np.diff(np.concatenate([block.t_ns for block in blocks])) >= 0)

@@ -1,6 +1,6 @@
 """Freeze the scores of result folders, or compare result folders with what was frozen.
 
-Made with commit ec0567c6, in an environment of constraints.txt::
+Made with commit ec0567c6 (recordings made elsewhere) and 694290cd (simulated), in an environment of constraints.txt::
 
     tactbench run --out default
     tactbench run --config beyond --repeats 2 --out beyond
@@ -8,8 +8,8 @@ Made with commit ec0567c6, in an environment of constraints.txt::
     tactbench import examples/mappings/eflesh-normal-raw.yaml --root DATA/eflesh --out recordings/eflesh/normal-raw
     tactbench import examples/mappings/eflesh-shear.yaml --root DATA/eflesh --out recordings/eflesh/shear
     tactbench import examples/mappings/eflesh-slip.yaml --root DATA/eflesh --out recordings/slip
-    tactbench run --config real-eflesh --recordings recordings/eflesh --out eflesh
-    tactbench run --config real-eflesh-slip --recordings recordings/slip --out eflesh-slip
+    tactbench run --config tests/frozen/eflesh.yaml --recordings recordings/eflesh --out eflesh
+    tactbench run --config tests/frozen/eflesh-slip.yaml --recordings recordings/slip --out eflesh-slip
     tactbench run --task slip --task contact-location --sensor biotac --repeats 1 --out kinds
     python tests/frozen/make.py freeze default beyond eflesh eflesh-slip kinds
 

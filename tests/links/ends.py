@@ -168,7 +168,7 @@ def virtual_can(clock: Callable[[], int]) -> Iterator[End]:
 def slcan(clock: Callable[[], int]) -> Iterator[End]:
     with (
         pty() as far,
-        open_link(f"can://slcan/{far.name}?bitrate=1000000&settle_s=0", clock) as link,
+        open_link(f"can://slcan/{far.name}?bitrate=1000000&sleep_after_open=0", clock) as link,
     ):
         frame = CanFrame(0x20E, b"\x4d")
         yield End(link, lambda: far.write(b"t4E0140\r"), link.receive, lambda: link.send(frame), far.unplug)

@@ -30,31 +30,6 @@ FRAMES = st.builds(
 )
 
 
-@pytest.mark.parametrize(
-    ("frame", "sent"),
-    [
-        (Frame(Kind.HELLO, 0), "03 01 01 01 01 01 05 {crc} 00"),
-        (Frame(Kind.SETUP, 7, SETUP.pack(4_400_000, 0)), "04 01 02 07 02 05 04 80 23 43 01 05 {crc} 00"),
-    ],
-    ids=["hello", "setup"],
-)
-def test_bytes_of_a_frame(frame, sent):
-    body = bytes([1, frame.kind]) + frame.number.to_bytes(2, "little") + len(frame.payload).to_bytes(2, "little")
-    crc = crc32(body + frame.payload)
-    assert 0 not in crc, "the stuffing above is written for a CRC without a zero"
-    assert encode_frame(frame) == bytes.fromhex(sent.format(crc=crc.hex()))
-
-
-def crc32(data: bytes) -> bytes:
-    """CRC-32 of IEEE 802.3, bit by bit, as a microcontroller would."""
-    register = 0xFFFFFFFF
-    for byte in data:
-        register ^= byte
-        for _ in range(8):
-            register = (register >> 1) ^ (0xEDB88320 if register & 1 else 0)
-    return (register ^ 0xFFFFFFFF).to_bytes(4, "little")
-
-
 def test_vectors_of_the_document():
     """A bus that answers each byte's complement; requests at 1 s, replies by 2 s."""
     block = (ROOT / "docs" / "links.md").read_text(encoding="utf-8").split("```text\n")[1].split("```")[0]
@@ -83,19 +58,6 @@ def test_after_any_bytes_the_next_frame_but_one_is_whole(noise, frame):
     decoder = FrameDecoder()
     decoder.feed(noise)
     assert decoder.feed(encode_frame(frame) + encode_frame(frame))[-1] == frame
-
-
-@settings(max_examples=100)
-@given(st.lists(FRAMES, min_size=3, max_size=3), st.data())
-def test_one_turned_bit_costs_at_most_the_frame_it_hit_and_the_next(frames, data):
-    sent = [encode_frame(frame) for frame in frames]
-    place = data.draw(st.integers(0, len(sent[0]) - 1))
-    sent[0] = bytearray(sent[0])
-    sent[0][place] ^= 1 << data.draw(st.integers(0, 7))
-    decoder = FrameDecoder()
-    found = decoder.feed(b"".join(sent))
-    assert found in (frames[1:], frames[2:])
-    assert decoder.damaged
 
 
 def test_an_endless_frame_does_not_fill_the_memory():
@@ -180,11 +142,6 @@ def test_the_bridge_says_why_it_refuses(frame, reason):
     assert replies(emulator.feed(encode_frame(frame), 0.0)) == [Frame(0xFF, 9, reason.encode())]
 
 
-def test_a_bridge_that_was_not_set_up_refuses_batches():
-    data = BridgeEmulator(loopback).feed(encode_frame(Frame(Kind.BATCH, 1, batch(SpiStep(b"a")))), 0.0)
-    assert replies(data) == [Frame(0xFF, 1, b"not set up")]
-
-
 def test_the_bridge_holds_so_many_batches():
     emulator, _ = ready(holds=2)
     data = emulator.feed(
@@ -214,16 +171,6 @@ def emulator():
 def link(emulator):
     with serving(emulator) as far, SpiBridge(SerialLink(far.name), speed_hz=4_400_000) as link:
         yield link
-
-
-@needs_pty
-def test_the_bridge_introduces_itself(link):
-    assert (link.name, link.firmware, link.select_lines, link.speed_hz) == ("tactbench emulator", 1, 7, 4_000_000)
-
-
-@needs_pty
-def test_a_transfer(link):
-    assert link.transfer(b"\x00\x01\xff", select=2) == b"\xff\xfe\x00"
 
 
 @needs_pty
@@ -328,26 +275,6 @@ def test_a_bridge_of_another_version_is_refused():
 
     with serving(Newer(loopback)) as far, pytest.raises(LinkError, match="speaks version 2"):
         SpiBridge(SerialLink(far.name), speed_hz=1000)
-
-
-@needs_pty
-def test_a_mode_that_the_bridge_cannot_do_is_refused():
-    with serving(BridgeEmulator(loopback)) as far, pytest.raises(LinkError, match="clock or mode"):
-        SpiBridge(SerialLink(far.name), speed_hz=1000, mode=7)
-
-
-@needs_pty
-def test_biotac_frames_at_full_rate_lose_nothing(link):
-    """Ten frames of 44 samples, three of them ahead: two bytes, 50 us, two bytes each (4400 samples a second)."""
-    steps = [step for n in range(44) for step in (SpiStep(bytes([n, 0]), 7, 50), SpiStep(b"\0\1", 1, 150))]
-    for number in range(12):
-        if number >= 2:
-            reply = link.receive(5.0)
-            assert reply.number == number - 2
-            assert reply.data[::2] == tuple(bytes([255 - n, 255]) for n in range(44))
-        if number < 10:
-            link.send(steps)
-    assert (link.lost, link.damaged, link.unexpected) == (0, 0, 0)
 
 
 def test_stamp_of_a_reply_is_that_of_its_first_byte():

@@ -5,7 +5,8 @@ from __future__ import annotations
 import can
 import pytest
 
-from tactbench.plugin.devices import LinkClosed, LinkEnded, LinkError, open_link
+from tactbench.core.errors import LinkClosed
+from tactbench.plugin.devices import LinkEnded, LinkError, open_link
 
 EPOCH_S = 1_700_000_000.25
 OFFSETS_S = [0.0, 0.0000015, 0.02, 0.04, 3600.5]

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from tactbench.links.spidev import SpidevLink
+from tactbench.links.spi_link import SpidevLink
 from tactbench.plugin.devices import LinkError
 
 

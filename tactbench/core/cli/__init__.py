@@ -21,6 +21,7 @@ VERBS = {
     "record": ("record", "Record one scene into one file."),
     "inspect": ("inspect", "Show what is in a recording, and whether it is healthy."),
     "import": ("import_", "Convert foreign tables, or a sensor's log, into recordings."),
+    "datasets": ("datasets", "List public data sets that can be asked by name."),
     "leaderboard": ("leaderboard", "Print the table of all results in a folder, in any format."),
     "report": ("report", "Write one HTML page of all results, with figures and published numbers."),
     "compare": ("compare", "Compare two sensors, estimators or result folders, replicate by replicate."),

@@ -9,8 +9,8 @@ from typing import Any
 
 import click
 
-from tactbench.core.cli.results import opened, provenance_of, shown_rows
-from tactbench.core.cli.tables import DEFAULT_FOLDER, TABLE_FORMATS, format_of, print_table, questions_of, view_of
+from tactbench.core.cli.results import opened, shown_rows, table_of
+from tactbench.core.cli.tables import DEFAULT_FOLDER, TABLE_FORMATS, format_of, print_table, view_of
 
 _FILTERS = ("sensor", "task", "protocol", "split", "estimator")
 
@@ -41,7 +41,6 @@ def command(
 ) -> None:  # fmt: skip
     """Show the table of all results in a folder, in any format. FOLDER is what `run --out` wrote."""
     from tactbench.core.cli.tables import check_destination
-    from tactbench.core.leaderboard.table import build_table
     from tactbench.core.leaderboard.view import best as best_of
 
     shape = format_of(shape, to)
@@ -50,7 +49,7 @@ def command(
     store = opened(folder)
     every = shown_rows(store)
     rows = _only(every, filters)
-    table = build_table(rows, provenance_of(store, rows), times=times, questions=questions_of(rows))
+    table = table_of(store, rows, times=times)
     view = replace(view, all_rows=len(rows) == len(every))
     print_table(best_of(table, best) if best else table, shape, view, to=to)
 

@@ -90,6 +90,7 @@ def command(
             made = acquire(
                 built, descriptor, registry.rigs[rig], scene, role=None, seed=seed, path=out, clock=time.perf_counter,
                 provenance=provenance, watch=watch, name=out.stem, complete_interrupted=True,
+                rig_file=devices,
             )  # fmt: skip
     except (KeyboardInterrupt, TactbenchError) as error:
         if _interrupted(out):
@@ -103,6 +104,9 @@ def command(
     for name, value in meta.assumptions.items():
         remark(f"  assumed: {name} = {value}")
     remark(f"See what is in it:  {command_line('tactbench', 'inspect', str(out))}")
+    if meta.excluded:
+        remark(f"It takes no part in a score unless --include-incomplete is given: {meta.excluded}.")
+        click.get_current_context().exit(1)
 
 
 def _interrupted(path: Path) -> bool:

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from tactbench.core.leaderboard.table import Table
     from tactbench.core.matrix.store import Store
 
 
@@ -35,15 +36,29 @@ def shown_rows(store: Store) -> list[dict[str, Any]]:
     """
     from tactbench.core.cli.screen import remark
     from tactbench.core.errors import UsageError
-    from tactbench.core.leaderboard.levels import with_levels
-    from tactbench.core.statistics.replicates import over_replicates
 
     rows = store.rows()
     for one in store.troubles:
         remark(f"Left out: {one}")
     if not rows:
         raise UsageError(f"{store.folder} has no row that can be shown.", hint="Run `tactbench run` again.")
+    return over_all(store, rows)
+
+
+def over_all(store: Store, rows: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
+    """Return one row a cell over its replicates, with the level of its sensor."""
+    from tactbench.core.leaderboard.levels import with_levels
+    from tactbench.core.statistics.replicates import over_replicates
+
     return with_levels(over_replicates(rows), store.folder, store.provenance)
+
+
+def table_of(store: Store, rows: Sequence[Mapping[str, Any]], *, times: bool = True) -> Table:
+    """Return the leaderboard of rows, one a cell; `times` as of `build_table`."""
+    from tactbench.core.cli.tables import questions_of
+    from tactbench.core.leaderboard.table import build_table
+
+    return build_table(rows, provenance_of(store, rows), times=times, questions=questions_of(rows))
 
 
 def provenance_of(store: Store, rows: Iterable[Mapping[str, Any]]) -> list[dict[str, Any]]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -11,17 +11,13 @@ import click
 
 from tactbench.core.cli.options import ENGINE, RESULTS, YES, format_option, options
 from tactbench.core.cli.selection import SELECTING, requested_matrix
-from tactbench.core.cli.tables import (
-    TABLE_FORMATS,
-    check_destination,
-    print_table,
-    questions_of,
-    view_of,
-)
+from tactbench.core.cli.tables import TABLE_FORMATS, check_destination, print_table, view_of
 from tactbench.core.cli.threads import keep_threads
 
 if TYPE_CHECKING:
     from tactbench.core.matrix.run import EngineName, Outcome
+    from tactbench.core.matrix.store import Store
+    from tactbench.core.spec.matrix import MatrixSpec
 
 _REASON_CHARACTERS = 200
 """Of a reason that are shown; the whole of it is in the row."""
@@ -29,22 +25,13 @@ _REASON_CHARACTERS = 200
 
 @click.command(name="run")
 @options(*SELECTING, *ENGINE)
+@click.option("--root", type=click.Path(path_type=Path), metavar="DIR",
+              help="Folder of a copy of the data sets; what is not there is fetched.")  # fmt: skip
 @RESULTS
 @YES
 @format_option(*TABLE_FORMATS)
 @click.pass_context
-def command(
-    ctx: click.Context,
-    /,
-    out: Path,
-    yes: bool,
-    shape: str,
-    engine: EngineName,
-    jobs: int | None,
-    timeout: float | None,
-    memory: int | None,
-    **selection: Any,
-) -> None:
+def command(ctx: click.Context, /, shape: str, **asked: Any) -> None:
     """Acquire, evaluate, rank.
 
     Without options: the whole of benchmarks.yaml. Options select from it or replace its choices. What the result folder
@@ -53,20 +40,44 @@ def command(
     check_destination(shape)
     keep_threads()
     from tactbench.core.cli.listing import tell_failed
+    from tactbench.core.cli.results import over_all, table_of
+    from tactbench.core.leaderboard.formats import write_tables
+    from tactbench.core.plugins.registry import installed
+
+    tell_failed(installed())
+    store, outcome = carry_out(**asked)
+    table = table_of(store, over_all(store, outcome.rows))
+    print_table(table, shape, view_of(store.folder))
+    write_tables(table.rows, store.folder, table.provenance, table)
+    _farewell(outcome, store.folder)
+    ctx.exit(1 if outcome.failures else 0)
+
+
+def carry_out(
+    *,
+    out: Path,
+    yes: bool,
+    engine: EngineName,
+    jobs: int | None,
+    timeout: float | None,
+    memory: int | None,
+    root: Path | None = None,
+    changed: Callable[[MatrixSpec, Path | None], MatrixSpec] = lambda matrix, _: matrix,
+    **selection: Any,
+) -> tuple[Store, Outcome]:
+    """Run what the verb's options ask for, and show the progress; return the result folder and how cells ended.
+
+    `changed` is given the matrix and the folder of recordings that were asked for, and returns the matrix that is run.
+    """
     from tactbench.core.cli.operator import TerminalOperator
     from tactbench.core.cli.progress import progress
-    from tactbench.core.cli.results import provenance_of
-    from tactbench.core.leaderboard.formats import write_tables
-    from tactbench.core.leaderboard.levels import with_levels
-    from tactbench.core.leaderboard.table import build_table
     from tactbench.core.matrix.run import EngineChoice, run_matrix
     from tactbench.core.matrix.store import Store
     from tactbench.core.plugins.registry import installed
     from tactbench.core.pool import Limits
-    from tactbench.core.statistics.replicates import over_replicates
 
-    tell_failed(installed())
-    matrix, folder = requested_matrix(installed(), **selection)
+    matrix, recordings = requested_matrix(installed(), **selection)
+    matrix = changed(matrix, recordings)
     limits = Limits(  # what the options leave open, the matrix file says
         timeout_s=matrix.timeout_s if timeout is None else timeout,
         memory_mb=matrix.memory_mb if memory is None else memory,
@@ -76,17 +87,11 @@ def command(
     store = Store(out)
     with progress() as display:
         outcome = run_matrix(
-            matrix, store, choice=choice, recordings=folder, progress=display,
+            matrix, store, choice=choice, recordings=recordings, root=root, progress=display,
             operator=TerminalOperator(yes=yes, paused=display.paused) if matrix.rig_file else None,
             shown=lambda rows: display.show(lambda: _so_far(rows)),
         )  # fmt: skip
-    provenance = provenance_of(store, outcome.rows)
-    rows = with_levels(over_replicates(outcome.rows), store.folder, store.provenance)
-    table = build_table(rows, provenance, questions=questions_of(rows))
-    print_table(table, shape, view_of(store.folder))
-    write_tables(rows, store.folder, provenance, table)
-    _farewell(outcome, store.folder)
-    ctx.exit(1 if outcome.failures else 0)
+    return store, outcome
 
 
 def _so_far(rows: Sequence[Mapping[str, Any]]) -> str:

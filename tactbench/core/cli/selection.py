@@ -12,13 +12,15 @@ from tactbench.core.spec.bounds import MOST_REPEATS
 
 if TYPE_CHECKING:
     from tactbench.core.plugins.registry import Registry
-    from tactbench.core.spec.matrix import MatrixSpec
+    from tactbench.core.spec.matrix import MatrixSpec, TaskChoice
 
 SELECTING = (
     click.option("--sensor", "sensors", multiple=True, metavar="NAME", help="Sensor; repeatable."),
     click.option("--task", "tasks", multiple=True, metavar="NAME", help="Task; repeatable."),
     click.option("--rig", metavar="NAME", help="Rig: twin (default), replay, or one of a rig file."),
     click.option("--recordings", type=click.Path(path_type=Path), metavar="DIR", help="Recordings to replay."),
+    click.option("--dataset", "datasets", multiple=True, metavar="NAME",
+                 help="Public data set (see `tactbench datasets`) or its mapping file; fetched once; repeatable."),
     click.option("--rig-file", metavar="FILE", help="Devices and links of a rig of real or emulated devices."),
     click.option("--protocol", "protocols", multiple=True, metavar="NAME",
                  help="Evaluation protocol; repeatable. Default: the task's first."),
@@ -31,6 +33,8 @@ SELECTING = (
                  help="Number of replicates, each with its own seed. Default: 8 if simulated, else 1."),
     click.option("--seed", type=click.IntRange(min=0), metavar="N", help="Seed of the first replicate."),
     click.option("--probe", is_flag=True, help="Add leakage probes: first frame only, shuffled rows."),
+    click.option("--include-incomplete", is_flag=True,
+                 help="Let recordings take part that lack more than their rig file allows."),
     *SIMULATION,
 )  # fmt: skip
 """Given to `requested_matrix`."""
@@ -43,6 +47,7 @@ def requested_matrix(
     tasks: tuple[str, ...],
     rig: str | None,
     recordings: Path | None,
+    datasets: tuple[str, ...],
     rig_file: str | None,
     protocols: tuple[str, ...],
     splits: tuple[str, ...],
@@ -51,6 +56,7 @@ def requested_matrix(
     repeats: int | None,
     seed: int | None,
     probe: bool,
+    include_incomplete: bool,
     effects: str | None,
     settings: tuple[str, ...],
 ) -> tuple[MatrixSpec, Path | None]:
@@ -62,12 +68,16 @@ def requested_matrix(
         If a file, a name or a combination of options is wrong.
     """
     from tactbench.core.cli.config import default_matrix, matrix_called
+    from tactbench.core.errors import UsageError
     from tactbench.core.spec.matrix import EstimatorChoice, TaskChoice
 
-    matrix = matrix_called(config) if config else default_matrix()
+    base = config or ("real" if datasets else None)
+    matrix = matrix_called(base) if base else default_matrix()
     change: dict[str, Any] = {}
     over: dict[str, Any] = {}
-    if rig or recordings or rig_file:
+    if datasets and (recordings or rig_file or rig not in (None, "replay")):
+        raise UsageError("--dataset brings its own recordings.", hint="Leave out --rig, --recordings and --rig-file.")
+    if rig or recordings or rig_file or datasets:
         change["rig"] = rig or (_rig_of(rig_file) if rig_file else "replay")
         change["rig_file"] = rig_file
         if change["rig"] != matrix.rig:
@@ -78,10 +88,13 @@ def requested_matrix(
         "repeats": repeats,
         "seed": seed,
         "probe": probe or None,
+        "include_incomplete": include_incomplete or None,
     }
     change |= {name: value for name, value in stated.items() if value is not None}
     chosen: list[TaskChoice] = []
-    for name in dict.fromkeys(tasks):
+    if datasets:
+        matrix = matrix.model_copy(update={"tasks": _of_datasets(datasets, tasks, matrix)})
+    for name in dict.fromkeys(() if datasets else tasks):
         chosen += [choice for choice in matrix.tasks if choice.name == name] or [TaskChoice(name=name)]
     several = {
         "protocol": tuple(dict.fromkeys(protocols)),
@@ -89,6 +102,8 @@ def requested_matrix(
         "estimators": tuple(EstimatorChoice(name=name) for name in dict.fromkeys(estimators)),
     }
     over |= {name: value for name, value in several.items() if value}
+    if recordings:
+        over["dataset"] = None
     chosen = [choice.model_copy(update=over) for choice in chosen or matrix.tasks]
     change["tasks"] = tuple(_with_those_beside(chosen, registry))
     matrix = matrix.model_copy(update=change)
@@ -98,6 +113,20 @@ def requested_matrix(
     if simulation is not None:
         matrix = matrix.model_copy(update={"simulation": simulation})
     return matrix, recordings or (Path(matrix.recordings) if matrix.recordings else None)
+
+
+def _of_datasets(datasets: tuple[str, ...], tasks: tuple[str, ...], matrix: MatrixSpec) -> tuple[TaskChoice, ...]:
+    """Return what each data set is asked: `tasks`, as the matrix asks them, or else what the data set is for."""
+    from tactbench.core.recording.datasets import dataset_called
+    from tactbench.core.spec.matrix import TaskChoice
+
+    found = []
+    for given, dataset in {given: dataset_called(given) for given in datasets}.items():
+        for name in dict.fromkeys(tasks or dataset.source.tasks):
+            asked = TaskChoice(name=name, protocol=("deployable",))
+            stated = [one for one in matrix.tasks if one.name == name and one.dataset in (None, given, dataset.name)]
+            found += [one.model_copy(update={"dataset": given}) for one in stated or [asked]]
+    return tuple(found)
 
 
 def _with_those_beside(choices: list[Any], registry: Registry) -> list[Any]:

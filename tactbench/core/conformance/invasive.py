@@ -16,7 +16,8 @@ from typing import Any
 from tactbench.core.conformance.check import Subject, check, code_of, fail, skip
 from tactbench.core.conformance.driver import Line, Opened, look_at
 from tactbench.core.conformance.press import FORCE_SHARE, WHY, force_is, pressing_channel, tiny_scene
-from tactbench.core.errors import TactbenchError
+from tactbench.core.errors import RigError, TactbenchError
+from tactbench.core.plugins.emulators import running
 from tactbench.core.plugins.rig_files import load_rig_file
 from tactbench.core.plugins.taking_part import rig_context
 from tactbench.core.spec.profile import ForceRamp
@@ -95,7 +96,7 @@ def _built(subject: Subject) -> tuple[_Kept, SensorDescriptor, Any]:
     ramp = ForceRamp(
         end=assumed(FORCE_N, "N", WHY), hold=assumed(HOLD_S, "s", WHY), duration=assumed(SECONDS, "s", WHY), samples=100
     )
-    context = rig_context(subject.registry, rig_file=file, operator=subject.operator)
+    context = rig_context(subject.registry, rig_file=running(file), operator=subject.operator)
     rig = _Kept(subject.code("where")(context))
     return rig, subject.registry.sensors[next(iter(file.sensors))], tiny_scene("check", profile=ramp)
 
@@ -119,9 +120,12 @@ def _first_zero_n(subject: Subject) -> float | None:
     with TemporaryDirectory() as folder, code_of("where", subject):
         rig, sensor, scene = _built(subject)
         path = Path(folder) / "check.h5"
-        acquire(
-            rig, sensor, subject.descriptor, scene, role=None, seed=1, path=path, clock=time.perf_counter, provenance={}
-        )
+        made = acquire(
+            rig, sensor, subject.descriptor, scene, role=None, seed=1, path=path,
+            clock=time.perf_counter, provenance={}, rig_file=_file(subject),
+        )  # fmt: skip
+        if made.meta.excluded:
+            raise RigError(f"Its recording is {made.meta.excluded}.")
         with open_recording(path) as recording:
             wrong = [f"streams[{one.stream}]: {one.message}" for one in examine(recording) if one.severity == "error"]
             read = {name: recording.read(name) for name in recording.stream_names}

@@ -65,6 +65,7 @@ from tactbench.core.evaluation.splits import (
 )
 from tactbench.core.evaluation.summaries import summarised, without_windows
 from tactbench.core.plugins.interfaces import Estimator
+from tactbench.core.recording.completeness import INCOMPLETE
 from tactbench.core.samples import Answers, FloatArray, Fold, IntArray, Part
 from tactbench.core.spec.recording import RecordingMeta
 from tactbench.core.spec.rig import EstimatorDescriptor
@@ -155,6 +156,16 @@ class TaskData:
         """Return (n,) labels that the split keeps apart; those of the session where it keeps no group apart."""
         tables, name = self.data.tables, self.assignments[0].groups
         return self._joined([table.groups[name] for table in tables])
+
+    @property
+    def feature_names(self) -> tuple[str, ...]:
+        """Return what the columns of `X` are called."""
+        return self.data.features
+
+    @property
+    def classes(self) -> tuple[Any, ...]:
+        """Return the labels that class indices in `y` stand for; nothing of a regression."""
+        return self.data.classes
 
     @property
     def folds(self) -> list[tuple[IntArray, IntArray]]:
@@ -552,7 +563,7 @@ def _refuse(estimator: str, metric: Metric, tested: Answers) -> None:
 
 
 def _part_taken(data: TaskData) -> tuple[list[RecordingMeta], dict[str, int], tuple[str, ...]]:
-    """Return the recordings that some fold uses, what no fold uses, and stamps of folds that leak."""
+    """Return the recordings that some fold uses, what no fold uses, and stamps: of leaks, of incomplete ones."""
     recorded = data.recorded
     folds = [over_rows(one, recorded) for one in data.assignments]
     used = used_rows(folds)
@@ -561,7 +572,8 @@ def _part_taken(data: TaskData) -> tuple[list[RecordingMeta], dict[str, int], tu
         stamps = leak_stamps(recorded, folds)
     else:
         stamps = (SHUFFLED_WHOLE_STAMP if recorded.whole else SHUFFLED_STAMP,)
-    return took_part, without_part(recorded, data.split, used), (*copied_channels(recorded), *stamps)
+    stamps = (*copied_channels(recorded), *stamps, *_incomplete(recorded))
+    return took_part, without_part(recorded, data.split, used), stamps
 
 
 def _of_answers(data: TaskData, descriptor: EstimatorDescriptor, answered: Sequence[AnsweredFold]) -> list[str]:
@@ -581,6 +593,20 @@ def _of_answers(data: TaskData, descriptor: EstimatorDescriptor, answered: Seque
             "raises an alarm"
         )
     return remarks
+
+
+def _incomplete(recorded: Dataset) -> list[str]:
+    """Return how many incomplete recordings were left out or taken, and why they are incomplete."""
+    out = {name: n for name, n in recorded.counts.items() if name.startswith(f"recordings left out ({INCOMPLETE}")}
+    taken = [meta.excluded for meta in recorded.metas if meta.excluded]
+    every = sum(out.values()) + len(recorded.metas)
+    texts = (
+        [f"{sum(out.values())} of {every} recordings left out: {'; '.join(sorted(name[21:-1] for name in out))}"]
+        if out
+        else []
+    )
+    texts += [f"{len(taken)} of {every} recordings take part although {'; '.join(sorted(set(taken)))}"] if taken else []
+    return texts
 
 
 def _untrained(answered: Sequence[AnsweredFold]) -> str:

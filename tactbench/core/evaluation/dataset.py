@@ -22,6 +22,7 @@ from tactbench.core.evaluation.channels import (
     require_forward,
 )
 from tactbench.core.evaluation.slip_reference import SlipReference, slip_reference
+from tactbench.core.recording.completeness import INCOMPLETE
 from tactbench.core.recording.reader import Recording, open_recording
 from tactbench.core.samples import FloatArray, IntArray, Quality, StreamData, StreamReadings
 from tactbench.core.spec.events import SlipTarget
@@ -87,8 +88,13 @@ class Dataset:
         return tuple(table.meta for table in self.tables)
 
 
-def load_dataset(task: TaskSpec, recordings: Sequence[Path]) -> Dataset:
+def load_dataset(task: TaskSpec, recordings: Sequence[Path], *, include_incomplete: bool = False) -> Dataset:
     """Read `recordings` as `task` needs them.
+
+    Parameters
+    ----------
+    include_incomplete
+        Whether those of which more is missing than their rig file allows take part.
 
     Raises
     ------
@@ -103,8 +109,9 @@ def load_dataset(task: TaskSpec, recordings: Sequence[Path]) -> Dataset:
     features: tuple[str, ...] = ()
     for path in recordings:
         with open_recording(path) as recording:
-            if recording.meta.excluded:
-                counts[f"recordings left out ({recording.meta.excluded})"] += 1
+            excluded = recording.meta.excluded
+            if excluded and not (include_incomplete and excluded.startswith(INCOMPLETE)):
+                counts[f"recordings left out ({excluded})"] += 1
                 continue
             names, table = _read(recording, task, counts)
         if tables and names != features:
@@ -116,7 +123,11 @@ def load_dataset(task: TaskSpec, recordings: Sequence[Path]) -> Dataset:
         tables.append(table)
         paths.append(path)
     if not tables:
-        raise DataError("No recording is left to evaluate.", hint="See what was left out with `tactbench inspect`.")
+        why = ", ".join(f"{number} {what}" for what, number in counts.items())
+        raise DataError(
+            f"No recording is left to evaluate{f': {why}' if why else ''}.",
+            hint="See what was left out with `tactbench inspect`; --include-incomplete takes incomplete ones.",
+        )
     target = _target_name(task)
     if not any(table.labelled.any() for table in tables):
         raise NotApplicable(

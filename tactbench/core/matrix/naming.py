@@ -77,6 +77,7 @@ def cell_of(row: Mapping[str, Any]) -> Cell:
         timed=row["status"] != "done" or row["latency_n"] is not None,
         simulation=Simulation.model_validate(row["simulation"]),
         declared_task=row["declared_task"],
+        include_incomplete=row.get("include_incomplete", False),
     )
     # A row says which split was taken; its name, whether that one was asked for or found.
     found = replace(cell, split=None)

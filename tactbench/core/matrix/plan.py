@@ -45,6 +45,8 @@ class Cell:
     """How a simulated rig is asked to carry out its scenes."""
     rig_file: str = ""
     """What the rig file says, as canonical JSON; empty: there is none."""
+    include_incomplete: bool = False
+    """Whether incomplete recordings take part."""
     declared_task: str = ""
     """What the recordings declare of the task, as JSON; empty: it is an installed one."""
 
@@ -122,6 +124,7 @@ def plan_cells(
                         timed=matrix.latency and repeat == 1,
                         simulation=matrix.simulation,
                         rig_file=rig_file_text,
+                        include_incomplete=matrix.include_incomplete,
                         declared_task=owned.declared.model_dump_json() if owned.declared else "",
                     )
                     cells[cell] = None  # once, in the order in which they were asked for

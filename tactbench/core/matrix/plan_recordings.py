@@ -6,6 +6,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from tactbench.core.errors import (
     MissingRecordingError,
@@ -19,6 +20,7 @@ from tactbench.core.evaluation.protocols import shots
 from tactbench.core.matrix.installed import failing_as, rig_of
 from tactbench.core.matrix.keys import Keys
 from tactbench.core.matrix.plan import FEW_SHOT, Cell, plan_cells, serves, task_of
+from tactbench.core.matrix.progress import Progress
 from tactbench.core.matrix.store import Store
 from tactbench.core.plugins.registry import Registry
 from tactbench.core.plugins.rig_files import load_rig_file
@@ -27,6 +29,9 @@ from tactbench.core.spec.matrix import MatrixSpec
 from tactbench.core.spec.rig_file import RigFile
 from tactbench.core.spec.scene import Role, Scene, Simulation
 from tactbench.core.spec.task import TaskSpec, in_drawn_order
+
+if TYPE_CHECKING:
+    from tactbench.core.recording.datasets import DataSet
 
 RequestKey = tuple[str, str, str | None, int]
 """Sensor, task, split and seed: what decides which recordings a cell needs."""
@@ -89,6 +94,85 @@ class RecordingPlan:
     """Where the recordings lie, or will lie."""
     troubles: dict[RequestKey, BaseException] = field(default_factory=dict)
     """Why there are no recordings, or not all of them."""
+
+
+@dataclass(frozen=True)
+class Part:
+    """The tasks of a matrix that are asked of one place of recordings."""
+
+    matrix: MatrixSpec
+    recordings: Path | None
+    trouble: TactbenchError | None = None
+    """Why the data set is not there"""
+
+
+def parts_of(
+    matrix: MatrixSpec, recordings: Path | None, root: Path | None, progress: Progress | None = None
+) -> list[Part]:
+    """Return `matrix` in parts, one for each data set that its tasks name; what is missing is fetched and imported.
+
+    A data set that cannot be had costs its own cells only.
+
+    Raises
+    ------
+    TactbenchError
+        If that is so of all of them.
+    UnknownNameError
+        If there is no data set of that name.
+    """
+    names = dict.fromkeys(choice.dataset for choice in matrix.tasks)
+    if not any(names):
+        return [Part(matrix, recordings)]
+    from tactbench.core.recording.datasets import dataset_called
+
+    known = {name: dataset_called(name) for name in names if name is not None}
+    parts = []
+    for name in names:
+        tasks = tuple(choice for choice in matrix.tasks if choice.dataset == name)
+        part = matrix.model_copy(update={"tasks": tasks})
+        parts.append(Part(part, recordings) if name is None else _from_dataset(part, known[name], root, progress))
+    troubles = [part.trouble for part in parts if part.trouble is not None]
+    if troubles and len(troubles) == len(parts):
+        raise troubles[0]
+    return parts
+
+
+def _from_dataset(matrix: MatrixSpec, dataset: DataSet, root: Path | None, progress: Progress | None) -> Part:
+    sensors = matrix.sensors or (dataset.mapping.sensor.name,)
+    try:
+        return Part(matrix.model_copy(update={"rig": "replay"}), dataset.recordings(root, progress))
+    except TactbenchError as error:
+        return Part(matrix.model_copy(update={"rig": "replay", "sensors": sensors}), None, error)
+
+
+def plan_parts(
+    parts: Sequence[Part], registry: Registry, keys: Keys, store: Store, limits: Limits
+) -> tuple[list[Cell], RecordingPlan]:
+    """Return the cells of all parts, and where their recordings come from; see :func:`plan_run`.
+
+    Raises
+    ------
+    UsageError
+        If two parts ask one sensor the same question, beside what `plan_run` raises.
+    """
+    cells: dict[str, Cell] = {}
+    plan = RecordingPlan()
+    for part in parts:
+        if part.trouble is None:
+            some, own = plan_run(part.matrix, registry, keys, store, part.recordings, limits)
+        else:
+            some, own = plan_cells(part.matrix, part.matrix.sensors, registry), RecordingPlan()
+            own.troubles = {request_key(cell): part.trouble for cell in some}
+        for cell in some:
+            if cells.setdefault(cell.name, cell) is not cell:
+                raise UsageError(
+                    f"{cell.name} is asked of two places of recordings.",
+                    hint="Run one of them at a time, each with --out.",
+                )
+        plan.requests |= own.requests
+        plan.paths |= own.paths
+        plan.troubles |= own.troubles
+    return list(cells.values()), plan
 
 
 def plan_run(

@@ -53,10 +53,11 @@ class Recorder:
         made = request.rig, request.rig_file
         if made not in self._rigs:
             devices = RigFile.model_validate_json(request.rig_file) if request.rig_file else None
-            self._rigs[made] = rig_of(request.rig, self._registry, rig_file=devices, operator=self._operator)
+            self._rigs[made] = devices, rig_of(request.rig, self._registry, rig_file=devices, operator=self._operator)
+        devices, built = self._rigs[made]
         rig = self._registry.rigs[request.rig]
         acquired = acquire(
-            self._rigs[made],
+            built,
             self._registry.sensors[request.sensor],
             rig,
             request.scene,
@@ -66,6 +67,7 @@ class Recorder:
             # Simulations run side by side: what they cost is the processor's time. A real rig is waited for.
             clock=time.process_time if rig.simulated else time.perf_counter,
             provenance={},
+            rig_file=devices,
         )
         return acquired.content_digest
 

@@ -13,7 +13,14 @@ from typing import Any, Literal
 from tactbench.core.errors import UnwritableError, UsageError
 from tactbench.core.matrix.keys import Keys, Sections
 from tactbench.core.matrix.plan import Cell, task_of
-from tactbench.core.matrix.plan_recordings import RecordingPlan, RecordingRequest, RequestKey, plan_run, request_key
+from tactbench.core.matrix.plan_recordings import (
+    RecordingPlan,
+    RecordingRequest,
+    RequestKey,
+    parts_of,
+    plan_parts,
+    request_key,
+)
 from tactbench.core.matrix.progress import Progress
 from tactbench.core.matrix.record import GRACE_S, Recorder, is_computed
 from tactbench.core.matrix.solve import Job, published, solve, unanswered
@@ -96,6 +103,7 @@ def run_matrix(
     *,
     choice: EngineChoice | None = None,
     recordings: Path | None = None,
+    root: Path | None = None,
     operator: Operator | None = None,
     progress: Progress | None = None,
     shown: Callable[[Sequence[Row]], None] | None = None,
@@ -112,6 +120,9 @@ def run_matrix(
         Where the work is done, how much of it at once and within which limits; scores do not depend on it.
     recordings
         Folder for rigs that replay.
+    root
+        Folder of a copy of the data sets that `matrix` names; see
+        :meth:`~tactbench.core.recording.datasets.DataSet.recordings`.
     operator
         Who mounts caps and presses, at a rig of real devices.
     progress
@@ -132,9 +143,11 @@ def run_matrix(
         matrix = matrix.model_copy(update={"latency": False})  # a cluster's cells are never alone on their machine
     with store.hold():
         preload("tactbench.core.matrix.preloaded")
-        registry = with_declared(installed(), declared_in(recordings))
+        parts = parts_of(matrix, recordings, root, progress)
+        declared = chain.from_iterable(declared_in(part.recordings) for part in parts)
+        registry = with_declared(installed(), declared)
         keys = Keys(registry)
-        cells, plan = plan_run(matrix, registry, keys, store, recordings, choice.limits)
+        cells, plan = plan_parts(parts, registry, keys, store, choice.limits)
         provenance = gather(registry, seed=matrix.seed, engine=choice.name)
         store.begin(provenance)
         run = Run(store, registry, keys, plan, choice, operator, progress or Progress(), shown, cells)

@@ -24,6 +24,7 @@ from tactbench.core.spec.task import TaskSpec
 
 if TYPE_CHECKING:
     from tactbench.core.evaluation.dataset import Dataset
+    from tactbench.core.plugins.interfaces import Estimator
     from tactbench.core.samples import Answers
 
 Row = dict[str, Any]
@@ -67,53 +68,62 @@ _prepared: set[tuple[int, str, str]] = set()
 """By process: after a fork, memory pages are copied at first use, which a clock would count."""
 
 
-def dataset(task: TaskSpec, recordings: tuple[Path, ...]) -> Dataset:
+def read_dataset(task: TaskSpec, recordings: tuple[Path, ...], include_incomplete: bool = False) -> Dataset:
     """Return `recordings` as a task needs them; cells in a row that need the same share what is read."""
     from tactbench.core.evaluation.dataset import load_dataset
 
-    if _last[:2] != [task, recordings]:
-        _last[:] = [task, recordings, load_dataset(task, recordings)]
-    found: Dataset = _last[2]
+    states = [(one.st_ino, one.st_mtime_ns, one.st_size) for one in map(os.stat, filter(os.path.exists, recordings))]
+    asked = [task, recordings, states, include_incomplete]
+    if _last[:4] != asked:
+        _last[:] = [*asked, load_dataset(task, recordings, include_incomplete=include_incomplete)]
+    found: Dataset = _last[4]
     return found
 
 
 _last: list[Any] = []
-"""Task and recordings that were read last, and what came of them."""
+"""What was read last: task, recordings, the state of their files, whether incomplete ones take part, and the rows."""
 
 
 Solved = tuple[Row, "dict[str, Answers]"]
 """A row of plain data, and the answers by role."""
 
 
-def solve(job: Job, concurrency: int = 1) -> Solved:
+def solve(job: Job, concurrency: int = 1, given: Estimator | None = None) -> Solved:
     """Evaluate one cell; raises whatever its plugins and recordings raise.
 
     Parameters
     ----------
     concurrency
         Pieces of work of the run that may be at work beside this one, itself included.
+    given
+        An object with ``fit`` and ``predict`` that answers in place of the job's estimator.
     """
     cell, task, estimator, recordings, *_ = job
-    folder = Path.cwd()
-    try:
-        prepare(estimator, task.kind)
-    finally:
-        os.chdir(folder)  # recordings lie relative to it, wherever a constructor has gone
+    if given is None:
+        folder = Path.cwd()
+        try:
+            prepare(estimator, task.kind)
+        finally:
+            os.chdir(folder)  # recordings lie relative to it, wherever a constructor has gone
     import numpy as np
 
-    from tactbench.core.evaluation.cell import CellContext, evaluate_cell
+    from tactbench.core.evaluation.cell import CellContext, evaluate, evaluate_cell, load_task
     from tactbench.core.evaluation.result import row_of
 
     began = time.perf_counter()
     # The global generators get the cell's seed: what is drawn from them does not depend on the cells before.
     random.seed(cell.seed)
     np.random.seed(cell.seed % 2**32)  # noqa: NPY002  (it is this old generator that libraries draw from)
-    data = dataset(task, recordings)
-    context = CellContext(
-        task, estimator, dict(cell.params), cell.protocol, cell.split, seed=cell.seed, clock=time.perf_counter,
-        latency=cell.timed,
-    )  # fmt: skip
-    result = evaluate_cell(context, data)
+    data = read_dataset(task, recordings, cell.include_incomplete)
+    if given is None:
+        context = CellContext(
+            task, estimator, dict(cell.params), cell.protocol, cell.split, seed=cell.seed, clock=time.perf_counter,
+            latency=cell.timed,
+        )  # fmt: skip
+        result = evaluate_cell(context, data)
+    else:
+        folds = load_task(task, data, cell.protocol, cell.split, seed=cell.seed)
+        result = evaluate(given, folds, clock=time.perf_counter, seed=cell.seed, latency=cell.timed)
     row = {
         **opening(cell, task),
         **row_of(result),
@@ -147,7 +157,10 @@ def check_content(job: Job) -> None:
 def opening(cell: Cell, task: TaskSpec, *, simulated: bool = False) -> Row:
     """Return a row with what is known before anything is computed; every key of the format is there."""
     unknown = {name: field.get_default(call_default_factory=True) for name, field in RowModel.model_fields.items()}
-    alike = ("sensor", "task", "rig", "protocol", "split", "estimator", "repeat", "repeats", "seed", "declared_task")
+    alike = (
+        "sensor", "task", "rig", "protocol", "split", "estimator", "repeat", "repeats", "seed", "declared_task",
+        "include_incomplete",
+    )  # fmt: skip
     asked = ("answer_per", "answer_from", "metric", "unit", "equivalence")
     return {
         **unknown,

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
 from tactbench.core.samples import Block, SkinGrid, SkinState
-from tactbench.core.spec.recording import Emulation, PlanEntry, Scalar, StreamClock, StreamCounts
+from tactbench.core.spec.recording import PlanEntry, Scalar, StreamClock, StreamCounts
 from tactbench.core.spec.rig import EffectDescriptor, IndenterDescriptor, SensorDescriptor
 from tactbench.core.spec.rig_file import RigFile
 from tactbench.core.spec.scene import Scene
@@ -77,12 +77,8 @@ class DeviceAcquisition(Acquisition, Protocol):
         """What its drivers counted, by device and name."""
 
     @property
-    def emulation(self) -> Emulation | None:
-        """None: all devices were real."""
-
-    @property
     def ended(self) -> str:
-        """Why it ended before its time; empty: it did not."""
+        """Why it ended before its time; empty: it did not. Its recording is then incomplete."""
 
 
 class MovingAcquisition(DeviceAcquisition, Protocol):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from contextlib import ExitStack, contextmanager
 from dataclasses import replace
 from functools import partial
@@ -24,6 +24,10 @@ if TYPE_CHECKING:
     from tactbench.devices.emulator import Senses
     from tactbench.links.link import Clock, Link
 
+LEAST_ROWS = 10
+"""From which a zero is taken."""
+MOST_BAD = 0.1
+"""Of the rows that a zero is taken from, the share that may be no numbers (assumed)."""
 _PRESSED = "normal"
 """What the channel along which the sensor is pressed is called where it is not plain `fz`; tasks look for either."""
 
@@ -46,6 +50,7 @@ class PressingForce:
 
     def __init__(self, entry: ForceEntry, streams: tuple[StreamSpec, ...]) -> None:
         self._entry, self.sign = entry, entry.sign
+        self._zeroed: dict[str, Scalar] = {}
         self._plain = (entry.channel, entry.sign) == ("fz", 1)
         names = {stream.name: [channel.name for channel in stream.channels] for stream in streams}
         having = [stream for stream in streams if entry.channel in names[stream.name]]
@@ -63,12 +68,64 @@ class PressingForce:
         pressed = stream.model_copy(update={"channels": tuple(channels)})
         self.streams = tuple(pressed if one is stream else one for one in streams)
 
+    def zero(self, blocks: Iterable[Block]) -> dict[str, FloatArray]:
+        """Return what every channel reads without load, by stream: the mean of `blocks`, if nothing speaks against it.
+
+        Every channel of unit N is tested: the size of its mean, its spread, its drift (the last third's mean less the
+        first's). Rows that are no numbers or are marked are counted and left out.
+
+        Raises
+        ------
+        RigError
+            If the sensor is not at rest, or a tenth of its rows are no numbers, or fewer than ten come.
+        """
+        import numpy as np
+
+        entry, came = self._entry, list(blocks)
+        found = {stream.name: np.zeros(len(stream.channels)) for stream in self.streams}
+        for stream in self.streams if entry.zero_s > 0 else ():
+            own = [block for block in came if block.stream == stream.name]
+            rows = np.concatenate([np.empty((0, len(stream.channels))), *(block.data for block in own)])
+            marks = [block.quality if block.quality is not None else np.zeros(block.data.shape) for block in own]
+            good = np.isfinite(rows).all(axis=1) & ~np.concatenate([np.empty((0, rows.shape[1])), *marks]).any(axis=1)
+            counted = f"{len(rows)} rows in {entry.zero_s:g} s, {int((~good).sum())} of them no numbers or marked"
+            if good.sum() < LEAST_ROWS or good.mean() < 1 - MOST_BAD:
+                raise RigError(
+                    f"The force has no zero: {counted}.", hint="Look at the force sensor: `tactbench doctor` reads it."
+                )
+            rows = rows[good]
+            forces = [place for place, channel in enumerate(stream.channels) if channel.unit == "N"]
+            wrong = [text for place in forces for text in self._at_rest(stream.channels[place].name, rows[:, place])]
+            if wrong:
+                raise RigError(
+                    f"The force sensor is not at rest, and its zero is refused: {'; '.join(wrong)} ({counted}).",
+                    hint="Take hands and loads off and start again; else bias the sensor, or state its range_n, "
+                    "noise_n and largest_zero_n under `force:`.",
+                )
+            found[stream.name] = rows.mean(axis=0)
+            self._zeroed[f"zero rows of {stream.name}"] = counted
+        return found
+
+    def _at_rest(self, name: str, values: FloatArray) -> Iterator[str]:
+        """Yield what is wrong with the readings of one channel without load."""
+        entry, third = self._entry, len(values) // 3
+        mean, spread = float(values.mean()), float(values.std())
+        drift = float(values[-third:].mean() - values[:third].mean())
+        # Readings that are the same again are not new ones: an emulated sensor holds what it reads.
+        changes = 1 + int((values[1:] != values[:-1]).sum())
+        largest = entry.largest_zero_n or 0.1 * entry.range_n
+        widest = 2 * entry.noise_n if entry.noise_n else 0.05 * entry.range_n
+        farthest = max(0.01 * entry.range_n, 4 * spread * (6 / changes) ** 0.5)
+        for what, value, most in (("mean", mean, largest), ("spread", spread, widest), ("drift", drift, farthest)):
+            if abs(value) > most:
+                yield f"{name} has a {what} of {value:.3g} N, allowed are {most:.3g} N"
+
     def about(self, zero: Mapping[str, FloatArray]) -> dict[str, Scalar]:
         """Return what a recording says of the mounting and of the `zero` taken off, by stream."""
         said = {f"zero of {name}": ", ".join(f"{value:.6g}" for value in values) for name, values in zero.items()}
         if not self._plain:
             said["normal force"] = f"{'-' if self.sign < 0 else ''}{self._entry.channel} of {self._entry.device}"
-        return dict(said)
+        return {**said, **self._zeroed}
 
     def turned(self, block: Block, zero: Mapping[str, FloatArray]) -> Block:
         """Return a block with forces from the unloaded sensor's `zero`, by stream, and positive when pressing."""
@@ -110,14 +167,15 @@ def physics_of(file: RigFile, registry: Registry) -> Rig | None:
 
 
 def ask_operator(file: RigFile, operator: Operator | None, doing: str, text: str) -> None:
-    """Let somebody do at the rig what `text` says, in a word `doing`; emulated devices need nobody.
+    """Let somebody do at the rig what `text` says, in a word `doing`; devices that are all emulated need nobody.
 
     Raises
     ------
     RigError
         If nobody is there.
     """
-    if all(entry.emulated for entry in file.entries().values()):
+    told = bool(file.emulation.control)
+    if all(entry.emulated or (entry.emulator and told) for entry in file.entries().values()):
         return
     if operator is None:
         raise RigError(

@@ -24,6 +24,8 @@ PARTIAL = ".partial"
 COMPLETING = ".completing"
 """Ending of the finished file until it has been read back and is renamed."""
 
+ROWS, CHANNELS = "row", "channel"
+"""Dimension scales of a stream: of its rows where it has no clock, of its channels. No part of the digest."""
 CHUNK_ROWS = 1024
 MAX_LISTED_CHANNELS = 1000
 """Streams with more channels have no channel attributes: an attribute of HDF5 holds 64 KiB. The meta has them all."""

@@ -244,3 +244,27 @@ def _describe(group: Any, spec: StreamSpec) -> None:
     group["data"].attrs["units"] = units.pop() if len(units) == 1 else "mixed: see channel_units"
     for name, values in layout.channel_attributes(spec):
         group.attrs[name] = values
+    _attach_scales(group, spec)
+
+
+def _attach_scales(group: Any, spec: StreamSpec) -> None:
+    """Make times (rows, where there is no clock) and names of channels the HDF5 dimension scales of every column.
+
+    Libraries of the netCDF world then read a stream with its coordinates.
+    """
+    import h5py
+
+    columns = [*(group[name] for name in group if name != "annotations"), *group.get("annotations", {}).values()]
+    rows = "t_ns" if "t_ns" in group else layout.ROWS
+    if rows not in group:
+        numbers = np.arange(len(group["data"]), dtype=np.int64)
+        _create(group, rows, numbers, len(numbers))
+        group[rows][:] = numbers
+    names = [channel.name for channel in spec.channels]
+    group.create_dataset(layout.CHANNELS, data=names, dtype=h5py.string_dtype("utf-8")).make_scale(layout.CHANNELS)
+    group[rows].make_scale(rows)
+    for column in columns:
+        if column != group[rows]:
+            column.dims[0].attach_scale(group[rows])
+        if column.ndim == 2:
+            column.dims[1].attach_scale(group[layout.CHANNELS])

@@ -48,6 +48,8 @@ class TaskChoice(Frozen):
     `few-shot` stands for all of the task's splits `few-shot-N`."""
     estimators: tuple[Annotated[EstimatorChoice, BeforeValidator(_by_name)], ...] = ()
     """Empty: the task's own. Its baselines are always run."""
+    dataset: str | None = None
+    """Name, or mapping file, of a public data set that is asked, whatever the matrix says of recordings."""
 
 
 class ComparisonChoice(Frozen):
@@ -89,6 +91,8 @@ class MatrixSpec(Frozen):
     """Also run the cells that show what recordings give away; see docs/real-recordings.md."""
     latency: bool = True
     """Measure how long one row takes, up to 0.3 s a cell; False: rows say nothing about it."""
+    include_incomplete: bool = False
+    """Let recordings of which more is missing than their rig file allows take part."""
     simulation: Simulation = Simulation()
     """How a simulated rig is asked to carry out every scene."""
     sensors: tuple[str, ...] = ()

@@ -96,6 +96,9 @@ class RigDescriptor(Frozen):
     line."""
     check: str | None = Field(default=None, pattern=WHERE)
     """``module:callable``, called with a RigFile: a RigCheck of what the rig would do, with nothing opened or moved."""
+    emulators: str | None = Field(default=None, pattern=WHERE)
+    """``module:callable``, called with a RigFile and a registry: RigEmulators, whose motors move and forces answer, for
+    real time. None: devices sense what a simulated rig has recorded."""
 
 
 class EstimatorDescriptor(Frozen):

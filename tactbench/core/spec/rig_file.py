@@ -51,6 +51,24 @@ class ForceEntry(DeviceEntry):
     """-1: pressing makes that channel fall."""
     zero_s: float = Field(default=2.0, ge=0)
     """Seconds without load before each scene whose mean becomes zero on every channel; 0: the device keeps its own."""
+    range_n: float = Field(default=25.0, gt=0)
+    """Rated range of its forces; by default that of a Nano17 SI-25-0.25. A zero of more than a tenth of it is refused,
+    and while it is taken a spread of more than a twentieth and a drift of more than a hundredth."""
+    noise_n: float | None = Field(default=None, gt=0)
+    """Standard deviation of its forces without load; a spread of twice that is refused. None: not known."""
+    largest_zero_n: float | None = Field(default=None, gt=0)
+    """In place of a tenth of the range: for a heavy indenter, or a sensor that was never biased."""
+
+
+class Allowed(Frozen):
+    """What a recording may lack; one that lacks more is incomplete, and takes no part in a score unless asked for."""
+
+    silent_s: float = Field(default=2.0, gt=0)
+    """Longest time without a row of a stream that has a rate. A longer one ends the scene."""
+    lost_percent: float = Field(default=2.0, ge=0, le=100)
+    """Rows of a stream that never came, or were dropped since writing was behind."""
+    frozen_s: float = Field(default=2.0, gt=0)
+    """Longest time in which no channel of the force sensor changes; or of a sensor's stream, while the force does."""
 
 
 class NamedDevice(DeviceEntry):
@@ -69,6 +87,8 @@ class EmulationSettings(Frozen):
     """The simulated rig whose samples the emulated devices read."""
     seed: int = Field(default=1, ge=0)
     """Of what is drawn in emulators; the scene's own seed is the run's."""
+    control: str = ""
+    """``host:port`` of emulators that run already (`tactbench emulate` writes it): a recording tells them its scene."""
 
 
 class RigFile(Frozen):
@@ -85,6 +105,7 @@ class RigFile(Frozen):
     devices: dict[str, NamedDevice] = Field(default_factory=dict)
     """Further devices by their part in the rig, such as `motor`."""
     emulation: EmulationSettings = EmulationSettings()
+    allowed: Allowed = Allowed()
     settings: dict[str, Any] = Field(default_factory=dict)
     """The rig's own, which it checks itself."""
 

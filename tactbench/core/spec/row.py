@@ -49,6 +49,7 @@ class RowModel(BaseModel):
     answer_per: str = "sample"
     answer_from: str = ""
     declared_task: str = ""
+    include_incomplete: bool = False
     repeat: int = 1
     repeats: int = 1
     seed: int = 0

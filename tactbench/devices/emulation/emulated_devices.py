@@ -12,11 +12,14 @@ from typing import Any, Literal, Self
 
 from tactbench.core.errors import UnknownNameError
 from tactbench.core.spec.rig import EmulatedLink
-from tactbench.devices.emulation.lawicel_adapter import LawicelAdapter
 from tactbench.devices.emulation.line import Line, LinkFault, Passed
-from tactbench.devices.emulation.real_time import BusEnd, CanTransport, End, PseudoTerminal, RealTimeServer, UdpEnd
-from tactbench.devices.emulation.virtual_links import VirtualByteLink, VirtualCanLink, VirtualDatagramLink
-from tactbench.devices.emulation.virtual_time import VirtualTime
+from tactbench.devices.emulation.real_time import End, PseudoTerminal, RealTimeServer, SlcanAdapter, UdpEnd
+from tactbench.devices.emulation.virtual_time import (
+    VirtualByteLink,
+    VirtualCanLink,
+    VirtualDatagramLink,
+    VirtualTime,
+)
 from tactbench.devices.emulator import DeviceEmulator, SpiDeviceEmulator
 from tactbench.links.address import open_link
 from tactbench.links.bridge_emulator import BridgeEmulator
@@ -26,8 +29,10 @@ from tactbench.links.spi_bridge import SpiBridge
 SPI_HZ = 4_400_000
 """Clock of an emulated SPI bus: what the BioTac's maker's tools use [sourced: docs/links.md]; the bus takes any up to
 10 MHz."""
-ANY_BAUD = 115200
-"""Stands in an address where the line has no pace of its own."""
+HELD = 8
+"""Batches that an emulated bridge holds, as the firmware of docs/links.md does."""
+BAUDS = (115200, 230400, 460800, 921600, 1_000_000, 2_000_000, 3_000_000)
+"""Usual rates of serial lines [bit/s]."""
 
 
 @dataclass(frozen=True)
@@ -40,7 +45,7 @@ class EmulatedDevice:
     faults: tuple[LinkFault, ...] = ()
     """Of the link; the device's own are in its emulator."""
     baud: int | None = None
-    """Of a serial line that has a pace, bits per second; None: what is sent is there at once."""
+    """Of a serial line, bits per second, for its address; None: derived from what the device sends."""
 
 
 class EmulatedDevices:
@@ -54,8 +59,6 @@ class EmulatedDevices:
         `virtual`: time stands until a link's wait or :meth:`advance` lets it go on; one thread, no link of the system,
         and the same bytes each time. `real`: by the wall clock, in a thread of its own, on links of the system that
         other processes may open, too.
-    can
-        How CAN devices are reached in real time.
     keep_log
         Whether :meth:`log_of` has what passed.
 
@@ -76,18 +79,15 @@ class EmulatedDevices:
         devices: Mapping[str, EmulatedDevice],
         *,
         time: Literal["virtual", "real"] = "virtual",
-        can: CanTransport = "slcan",
         keep_log: bool = False,
     ) -> None:
         self._devices = dict(devices)
         self._virtual = VirtualTime() if time == "virtual" else None
         self.clock: Clock = self._virtual if self._virtual is not None else _since_now()
-        serial_can = self._virtual is None and can == "slcan"
         self._lines = {
             name: Line(
-                _on_its_line(device, serial_can),
+                _on_its_line(device, real=self._virtual is None),
                 faults=device.faults,
-                baud=None if getattr(device.emulator, "keeps_pace", False) else device.baud,
                 keep_log=keep_log,
             )
             for name, device in self._devices.items()
@@ -101,7 +101,7 @@ class EmulatedDevices:
         with ExitStack() as opened:
             ends: dict[str, tuple[Line, End]] = {}
             for name, device in self._devices.items():
-                end = _end_of(device, can)
+                end = _end_of(device)
                 opened.callback(end.close)
                 ends[name] = self._lines[name], end
                 self._addresses[name] = end.address
@@ -176,11 +176,6 @@ class EmulatedDevices:
         """Return what passed on a device's line so far, in both directions; empty without `keep_log`."""
         return self._lines[name].log
 
-    @property
-    def passed_bytes(self) -> Mapping[str, tuple[int, int]]:
-        """By device: bytes so far from the host and to it; of CAN frames their data."""
-        return {name: (line.bytes_from_host, line.bytes_to_host) for name, line in self._lines.items()}
-
     def _whole(self) -> None:
         if self._server is not None and self._server.error is not None:
             raise self._server.error
@@ -191,25 +186,29 @@ def _since_now() -> Clock:
     return lambda: wall.monotonic_ns() - began_ns
 
 
-def _on_its_line(device: EmulatedDevice, serial_can: bool) -> DeviceEmulator:
-    """Return the device as its line sees it: an SPI bus behind a bridge, a CAN bus perhaps behind an adapter."""
+def _on_its_line(device: EmulatedDevice, *, real: bool) -> DeviceEmulator:
+    """Return the device as its line sees it: an SPI bus behind a bridge, in real time a CAN bus behind an adapter."""
     emulator: Any = device.emulator  # which of the two protocols it has, the kind of link says
     if device.link == "spi":
-        emulator = BridgeEmulator(emulator.exchange)
-    elif device.link == "can" and serial_can:
-        emulator = LawicelAdapter(emulator)
+        emulator = BridgeEmulator(emulator.exchange, holds=HELD)
+    elif device.link == "can" and real:
+        emulator = SlcanAdapter(emulator)
     return emulator  # type: ignore[no-any-return]
 
 
-def _end_of(device: EmulatedDevice, can: CanTransport) -> End:
+def _baud_for(emulator: Any) -> int:
+    """Return the least usual baud rate that carries what a device sends, and a quarter more."""
+    needed = 1.25 * 10 * getattr(emulator, "bytes_per_s", 0.0)
+    return next((baud for baud in BAUDS if baud >= needed), BAUDS[-1])
+
+
+def _end_of(device: EmulatedDevice) -> End:
     match device.link:
         case "bytes":
-            return PseudoTerminal(f"serial://{{}}?baud={device.baud or ANY_BAUD}")
+            return PseudoTerminal(f"serial://{{}}?baud={device.baud or _baud_for(device.emulator)}")
         case "spi":
             return PseudoTerminal(f"spi://bridge/{{}}?speed_hz={SPI_HZ}")
         case "datagram":
             return UdpEnd()
-    if can == "slcan":
-        # The bit rate is a statement; nothing here starts anew when its port is opened.
-        return PseudoTerminal("can://slcan/{}?bitrate=1000000&settle_s=0")
-    return BusEnd(can)
+    # The bit rate is a statement; nothing here starts anew when its port is opened.
+    return PseudoTerminal("can://slcan/{}?bitrate=1000000&sleep_after_open=0")

@@ -1,4 +1,4 @@
-"""The far end of one emulated link: the device as a model, the pace of its line, and what is wrong with the link."""
+"""The far end of one emulated link: the device as a model, and what is wrong with the link."""
 
 from __future__ import annotations
 
@@ -14,9 +14,6 @@ from tactbench.links.can_link import CanFrame
 
 Piece: TypeAlias = bytes | CanFrame
 """Bytes of a stream, a CAN frame, a datagram."""
-
-BITS_PER_BYTE = 10
-"""On a serial line: a start bit, eight data bits, a stop bit."""
 
 _AGAIN_S = 1e-6
 """Assumed: no emulated device does two things within this time that could not be one. An emulator that has something to
@@ -70,10 +67,6 @@ class Line:
         The device.
     faults
         Of the link.
-    baud
-        Bits per second of a serial line: byte n of what is sent in one piece passes n * 10 / `baud` seconds after it
-        was sent, in each direction, and never before the byte ahead of it. A device that keeps this pace itself is not
-        delayed. None: pieces pass at once.
     keep_log
         Whether :attr:`log` holds what passed.
 
@@ -84,8 +77,6 @@ class Line:
         that open, and it is dropped.
     gone
         Whether the link was unplugged by a fault.
-    bytes_from_host, bytes_to_host
-        How many passed; of a CAN frame its data.
     log
         What passed in both directions, in order.
     """
@@ -95,38 +86,27 @@ class Line:
         emulator: DeviceEmulator,
         *,
         faults: Sequence[LinkFault] = (),
-        baud: int | None = None,
         keep_log: bool = False,
     ) -> None:
         self.deliver: Callable[[float, Piece], None] | None = None
         self.gone = False
-        self.bytes_from_host = self.bytes_to_host = 0
         self.log: list[Passed] = []
         self._emulator = emulator
         self._faults = tuple(faults)
         self._seen: Counter[Fault] = Counter()
-        self._byte_s = BITS_PER_BYTE / baud if baud else 0.0
         self._keep_log = keep_log
         self._unplugged_s = min((fault.start_s for fault in faults if fault.name == "unplug"), default=math.inf)
         self._next_s: float | None = None
-        self._in: deque[tuple[float, Piece]] = deque()
         self._out: deque[tuple[float, Piece]] = deque()
-        self._in_free_s = self._out_free_s = -math.inf
-
-    @property
-    def paced(self) -> bool:
-        """Whether bytes pass one at a time."""
-        return self._byte_s > 0.0
 
     def feed(self, piece: Piece, now_s: float) -> None:
         """Take what the host sends at `now_s`; deliver what is due by then."""
         self.poll(now_s)
         if self.gone:
             return
-        self.bytes_from_host += _size(piece)
         if self._keep_log:
             self.log.append(Passed(now_s, "host", piece))
-        self._in_free_s = self._paced(self._in, piece, now_s, self._in_free_s)
+        self._send(self._emulator.feed(piece, now_s))
         self.poll(now_s)
 
     def poll(self, now_s: float) -> None:
@@ -134,14 +114,10 @@ class Line:
         if self.gone:
             return
         until_s = min(now_s, self._unplugged_s)
-        while self._in and self._in[0][0] <= until_s:
-            t_s, piece = self._in.popleft()
-            self._send(self._emulator.feed(piece, t_s))
         if self._emulator.next_s() <= until_s:
             self._send(self._emulator.poll(until_s))
         while self._out and self._out[0][0] <= now_s and self._out[0][0] < self._unplugged_s:
             t_s, piece = self._out.popleft()
-            self.bytes_to_host += _size(piece)
             if self._keep_log:
                 self.log.append(Passed(t_s, "device", piece))
             if self.deliver is not None:
@@ -158,7 +134,6 @@ class Line:
     def _due_s(self, polled_s: float) -> float:
         due_s = min(
             self._emulator.next_s(),
-            self._in[0][0] if self._in else math.inf,
             self._out[0][0] if self._out else math.inf,
             self._unplugged_s,
         )
@@ -166,22 +141,6 @@ class Line:
 
     def _send(self, sent: Sequence[Sent]) -> None:
         for left_s, piece in sent:
-            due_s = left_s
-            for fault in self._faults:
-                if fault_concerns((fault,), "late", left_s, self._seen):
-                    due_s += fault.delay_s
-            self._out_free_s = self._paced(self._out, piece, due_s, self._out_free_s)
-
-    def _paced(self, queue: deque[tuple[float, Piece]], piece: Piece, t_s: float, free_s: float) -> float:
-        """Queue a piece that is sent at `t_s` on a line that is free from `free_s` on; return when it is free again."""
-        t_s = max(t_s, free_s)
-        if not self._byte_s or not isinstance(piece, bytes):
-            queue.append((t_s, piece))
-            return t_s
-        for number in range(len(piece)):
-            queue.append((t_s + number * self._byte_s, piece[number : number + 1]))
-        return t_s + len(piece) * self._byte_s
-
-
-def _size(piece: Piece) -> int:
-    return len(piece if isinstance(piece, bytes) else piece.data)
+            late = [one for one in self._faults if fault_concerns((one,), "late", left_s, self._seen)]
+            due_s = left_s + sum(one.delay_s for one in late)
+            self._out.append((max(due_s, self._out[-1][0]) if self._out else due_s, piece))

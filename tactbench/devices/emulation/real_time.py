@@ -1,46 +1,38 @@
-"""Emulated devices on links of the system, in real time: pseudo-terminals, UDP on loopback, buses of python-can."""
+"""Emulated devices on links of the system, in real time: pseudo-terminals, and UDP on loopback."""
 
 from __future__ import annotations
 
 import math
 import os
+import re
 import selectors
 import socket
 import threading
-import uuid
 from abc import ABC, abstractmethod
-from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from contextlib import ExitStack, suppress
-from typing import Literal
 
-from tactbench.core.errors import LinkError, LinkTimeout, UsageError
+from tactbench.core.errors import UsageError
 from tactbench.devices.emulation.line import Line, Piece
-from tactbench.links.can_link import CanFrame, CanLink
+from tactbench.devices.emulator import DeviceEmulator, Sent
+from tactbench.links.can_link import CanFrame
 from tactbench.links.datagram_link import LARGEST_DATAGRAM
 from tactbench.links.link import Clock
 
-CanTransport = Literal["slcan", "virtual", "udp_multicast"]
-"""How an emulated CAN device is reached: an emulated adapter on a pseudo-terminal, python-can's bus within the process,
-or its bus between processes."""
-
-_LOOK_S = 1e-3
-"""How often a bus without a file descriptor is looked at; a bus at 1 Mbit/s carries eight frames meanwhile."""
-
 
 class End(ABC):
-    """A link of the system, as the emulated device holds it."""
+    """A link of the system, as the emulated device holds it: it has a file descriptor, and never waits."""
 
     address: str
     """What the host opens."""
 
-    def fileno(self) -> int | None:
-        """Return what becomes readable when something comes; None: it has to be asked."""
-        return None
+    @abstractmethod
+    def fileno(self) -> int:
+        """Return what becomes readable when something comes."""
 
     @abstractmethod
     def received(self) -> list[Piece]:
-        """Return what has come, without waiting."""
+        """Return what has come."""
 
     @abstractmethod
     def send(self, t_s: float, piece: Piece) -> None:
@@ -121,51 +113,57 @@ class UdpEnd(End):
         self._socket.close()
 
 
-class BusEnd(End):
-    """A bus of python-can: a pulled device leaves it silent.
+class SlcanAdapter:
+    """A CAN device behind a serial adapter as python-can's ``slcan`` speaks to it: a line of text for each data frame.
+
+    Of the adapter's commands, ``O`` and ``L`` open it and ``C`` closes it; the others are taken, and none is answered
+    [sourced: LAWICEL AB, CANUSB manual; python-can waits for no answer].
 
     Parameters
     ----------
-    transport
-        ``virtual`` or ``udp_multicast``.
+    device
+        What hangs on the bus.
     """
 
-    def __init__(self, transport: CanTransport) -> None:
-        from tactbench.links.address import open_link
+    _FRAME = re.compile(rb"(?:t([0-9A-Fa-f]{3})|T([0-9A-Fa-f]{8}))[0-8]((?:[0-9A-Fa-f]{2}){0,8})")
+    _LONGEST = 32
 
-        if transport == "virtual":
-            self.address = f"can://virtual/emulated-{uuid.uuid4().hex[:8]}"
-        else:
-            with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as free:
-                free.bind(("", 0))
-                self.address = f"can://udp_multicast/239.74.163.2?port={free.getsockname()[1]}"
-        link = open_link(self.address)
-        assert isinstance(link, CanLink)
-        self._link = link
-        # udp_multicast gives a sender its own frames back.
-        self._echoes: Counter[tuple[int, bytes, bool]] | None = None if transport == "virtual" else Counter()
+    def __init__(self, device: DeviceEmulator) -> None:
+        self._device = device
+        self._line = b""
+        self._open = False
 
-    def received(self) -> list[Piece]:  # noqa: D102  (inherited)
-        frames: list[Piece] = []
-        with suppress(LinkTimeout):
-            while True:
-                frame = self._link.receive(0)
-                same = frame.id, frame.data, frame.extended
-                if self._echoes is not None and self._echoes[same] > 0:
-                    self._echoes[same] -= 1
-                else:
-                    frames.append(frame)
-        return frames
+    def feed(self, piece: bytes | CanFrame, now_s: float) -> Sequence[Sent]:
+        """Take bytes of the host; return what the host gets by `now_s`."""
+        assert isinstance(piece, bytes)
+        sent = list(self._device.poll(now_s))
+        *lines, rest = (self._line + piece).split(b"\r")
+        self._line = rest[-self._LONGEST :]
+        for line in lines:
+            found = self._FRAME.fullmatch(line)
+            if line in (b"O", b"L", b"C"):
+                self._open = line != b"C"
+            elif self._open and found is not None:
+                short, extended, data = found.groups()
+                frame = CanFrame(int(short or extended, 16), bytes.fromhex(data.decode()), short is None)
+                sent += self._device.feed(frame, now_s)
+        return self._texts(sent)
 
-    def send(self, t_s: float, piece: Piece) -> None:  # noqa: D102  (inherited)
-        assert isinstance(piece, CanFrame)
-        if self._echoes is not None:
-            self._echoes[piece.id, piece.data, piece.extended] += 1
-        with suppress(LinkError):
-            self._link.send(piece)
+    def poll(self, now_s: float) -> Sequence[Sent]:
+        """Return what the device has put on the bus by `now_s`; nothing while the adapter is closed."""
+        return self._texts(self._device.poll(now_s))
 
-    def close(self) -> None:  # noqa: D102  (inherited)
-        self._link.close()
+    def next_s(self) -> float:
+        """Return when the device has something to do next."""
+        return self._device.next_s()
+
+    def _texts(self, sent: Sequence[Sent]) -> list[Sent]:
+        frames = [(t_s, frame) for t_s, frame in sent if isinstance(frame, CanFrame) and self._open]
+        heads = [f"T{frame.id:08X}" if frame.extended else f"t{frame.id:03X}" for _, frame in frames]
+        return [
+            (t_s, f"{head}{len(frame.data)}{frame.data.hex().upper()}\r".encode())
+            for head, (t_s, frame) in zip(heads, frames, strict=True)
+        ]
 
 
 class RealTimeServer:
@@ -187,15 +185,12 @@ class RealTimeServer:
         self._open: dict[str, tuple[Line, End]] = {}
         # Waits to the microsecond; epoll's are rounded up to whole milliseconds.
         self._selector = self._ends.enter_context(selectors.SelectSelector())
-        self._wake, self._woken = socket.socketpair()
-        self._ends.enter_context(self._wake)
-        self._ends.enter_context(self._woken)
+        self._wake, self._woken = (self._ends.enter_context(end) for end in socket.socketpair())
         self._selector.register(self._woken, selectors.EVENT_READ)
         for name, (line, end) in served.items():
             line.deliver = end.send
             self._open[name] = line, end
-            if (descriptor := end.fileno()) is not None:
-                self._selector.register(descriptor, selectors.EVENT_READ)
+            self._selector.register(end.fileno(), selectors.EVENT_READ)
         self._thread = threading.Thread(target=self._run, name="emulated devices", daemon=True)
         self._stop = False
         self.error: BaseException | None = None
@@ -215,30 +210,28 @@ class RealTimeServer:
             self._unplug(name)
         self._ends.close()
 
-    def serve(self, now_s: float) -> float:
-        """Carry what has come and what is due at `now_s`; return when something is due next, infinite if nothing is."""
-        for line, end in self._open.values():
-            for piece in end.received():
+    def serve(self, at_s: float | None = None) -> float:
+        """Carry what has come and what is due at `at_s` or now; return when something is due next, or infinity."""
+        for name, (line, end) in list(self._open.items()):
+            pieces = end.received()
+            now_s = self._clock() * 1e-9 if at_s is None else at_s  # after what it is the time of
+            for piece in pieces:
                 line.feed(piece, now_s)
             line.poll(now_s)
-        for name in [name for name, (line, _) in self._open.items() if line.gone]:
-            self._unplug(name)
+            if line.gone:
+                self._unplug(name)
         return min((line.next_s() for line, _ in self._open.values()), default=math.inf)
 
     def _unplug(self, name: str) -> None:
         line, end = self._open.pop(name)
         line.deliver = None
-        if (descriptor := end.fileno()) is not None:
-            self._selector.unregister(descriptor)
+        self._selector.unregister(end.fileno())
         end.close()
 
     def _run(self) -> None:
         try:
             while not self._stop:
-                due_s = self.serve(self._clock() * 1e-9)
-                wait_s = max(0.0, due_s - self._clock() * 1e-9)
-                if any(end.fileno() is None for _, end in self._open.values()):
-                    wait_s = min(wait_s, _LOOK_S)
+                wait_s = max(0.0, self.serve() - self._clock() * 1e-9)
                 self._selector.select(None if wait_s == math.inf else wait_s)
         except BaseException as error:  # shown to whoever waits for the device
             self.error = error

@@ -1,10 +1,16 @@
-"""Virtual time: a clock that stands until somebody waits, and then goes on to what happens next."""
+"""Virtual time: a clock that stands until somebody waits, and the host's end of links to emulated devices in it."""
 
 from __future__ import annotations
 
 import math
+from collections import deque
 
-from tactbench.devices.emulation.line import Line
+from tactbench.core.errors import LinkError
+from tactbench.devices.emulation.line import Line, Piece
+from tactbench.links.byte_link import ByteLink
+from tactbench.links.can_link import CanFrame, CanLink
+from tactbench.links.datagram_link import DatagramLink
+from tactbench.links.link import Link, Received
 
 
 class VirtualTime:
@@ -54,3 +60,115 @@ class VirtualTime:
         self.now_s = max(self.now_s, due_s)
         line.poll(self.now_s)
         return True
+
+
+class _VirtualLink(Link):
+    """The host's end of a line: what is written is with the device at once, waits let time go on.
+
+    Parameters
+    ----------
+    name
+        Of the device.
+    time
+        The clock of stamps and waits.
+    line
+        The device's end. What it delivered before this link was made is not seen.
+
+    Raises
+    ------
+    LinkError
+        If another link to the device is open.
+    """
+
+    def __init__(self, name: str, time: VirtualTime, line: Line) -> None:
+        super().__init__(f"emulated {name}", time)
+        if line.deliver is not None:
+            raise LinkError(f"The link {self.address} is open already.", hint="Close the other one first.")
+        self._time = time
+        self._line = line
+        self._arrived: deque[tuple[int, Piece]] = deque()
+        line.deliver = self._arrive
+
+    def timer(self) -> float:
+        """Return virtual seconds."""
+        return self._time.now_s
+
+    def _arrive(self, t_s: float, piece: Piece) -> None:
+        self._arrived.append((round(t_s * 1e9), piece))
+
+    def _wait(self, timeout_s: float) -> None:
+        """Let time go on until something has arrived, by `timeout_s` at most.
+
+        Raises
+        ------
+        LinkTimeout, LinkUnplugged, LinkClosed
+            As of every link.
+        """
+        until_s = self._usable(timeout_s)
+        while not self._arrived:
+            self._plugged()
+            if not self._time.step(until_s):
+                raise self._nothing_came(timeout_s)
+
+    def _send(self, piece: Piece) -> None:
+        """Hand a piece to the device; raises LinkUnplugged."""
+        self._plugged()
+        self._line.feed(piece, self._time.now_s)
+
+    def _plugged(self) -> None:
+        if self._line.gone:
+            raise self._unplugged(ConnectionError("unplugged, a fault of the emulated link"))
+
+    def _release(self) -> None:
+        self._line.deliver = None
+
+
+class VirtualByteLink(_VirtualLink, ByteLink):
+    """A byte stream.
+
+    A read returns what came at one moment, so that every piece keeps its time.
+    """
+
+    def read(self, timeout_s: float, *, size: int = 65536) -> Received:  # noqa: D102  (inherited)
+        self._wait(timeout_s)
+        t_ns, data = self._arrived[0][0], bytearray()
+        while self._arrived and len(data) < size and self._arrived[0][0] == t_ns:
+            came_ns, piece = self._arrived.popleft()
+            assert isinstance(piece, bytes)
+            left = size - len(data)
+            if len(piece) > left:
+                self._arrived.appendleft((came_ns, piece[left:]))
+            data += piece[:left]
+        return Received(bytes(data), t_ns)
+
+    def write(self, data: bytes) -> None:  # noqa: D102  (inherited)
+        self._usable()
+        self._send(bytes(data))
+
+
+class VirtualCanLink(_VirtualLink, CanLink):
+    """A CAN bus."""
+
+    def receive(self, timeout_s: float) -> CanFrame:  # noqa: D102  (inherited)
+        self._wait(timeout_s)
+        t_ns, frame = self._arrived.popleft()
+        assert isinstance(frame, CanFrame)
+        return CanFrame(frame.id, frame.data, frame.extended, t_ns)
+
+    def send(self, frame: CanFrame) -> None:  # noqa: D102  (inherited)
+        self._sendable(frame)
+        self._send(frame)
+
+
+class VirtualDatagramLink(_VirtualLink, DatagramLink):
+    """Datagrams."""
+
+    def receive(self, timeout_s: float) -> Received:  # noqa: D102  (inherited)
+        self._wait(timeout_s)
+        t_ns, data = self._arrived.popleft()
+        assert isinstance(data, bytes)
+        return Received(data, t_ns)
+
+    def send(self, data: bytes) -> None:  # noqa: D102  (inherited)
+        self._sendable(data)
+        self._send(bytes(data))

@@ -1,7 +1,8 @@
 """The bench as a rig: a sensor and a reference force sensor are read while somebody presses, and nothing moves.
 
 Devices that the rig file calls emulated are moved by a simulated rig, which carries out the same scene; whatever they
-sense then comes through their links and drivers as from real ones.
+sense then comes through their links and drivers as from real ones. Those of real time run in a process of their own,
+and are real ones here.
 """
 
 from __future__ import annotations
@@ -11,9 +12,7 @@ from collections.abc import Iterator, Mapping
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field
 from functools import partial
-from typing import TYPE_CHECKING, Any
-
-import numpy as np
+from typing import TYPE_CHECKING
 
 from tactbench.plugin import (
     Acquisition,
@@ -33,7 +32,6 @@ from tactbench.plugin.devices import (
     DeviceAcquisition,
     Driver,
     EmulatedDevices,
-    Emulation,
     Operator,
     PressingForce,
     Reading,
@@ -43,15 +41,12 @@ from tactbench.plugin.devices import (
     StreamCounts,
     ask_operator,
     drivers_of,
-    emulation_of,
     emulators_of,
     physics_of,
     with_sensor,
 )
 
 if TYPE_CHECKING:
-    import numpy.typing as npt
-
     from tactbench.plugin import FloatArray
     from tactbench.plugin.devices import Clock
 
@@ -66,7 +61,6 @@ class BenchAcquisition:
     assumptions: Mapping[str, Scalar]
     drawn: Mapping[str, Scalar]
     clocks: Mapping[str, StreamClock]
-    emulation: Emulation | None
     reading: Reading = field(repr=False)
     duration_s: float
     force: PressingForce | None
@@ -75,12 +69,8 @@ class BenchAcquisition:
 
     def __iter__(self) -> Iterator[Block]:
         """Yield blocks until the scene is over, or a device is gone."""
-        began_s = time.perf_counter()
         for block in self.reading.blocks(self.duration_s):
             yield block if self.force is None else self.force.turned(block, self.zero)
-        spent_s = time.perf_counter() - began_s
-        if self.emulation is not None and spent_s > 0:
-            self.emulation = self.emulation.model_copy(update={"factor": self.duration_s / spent_s})
 
     @property
     def stream_counts(self) -> Mapping[str, StreamCounts]:
@@ -137,19 +127,21 @@ class Bench:
             duration_s = profile.duration.to("s")
             senses = None if simulated is None else SceneSamples(simulated, duration_s, rest_s=profile.hold_s)
             emulators = {} if senses is None else emulators_of(file, self._registry, sensor.name, senses)
-            emulated = stack.enter_context(EmulatedDevices(emulators, time=file.emulation.time)) if emulators else None
+            emulated = stack.enter_context(EmulatedDevices(emulators)) if emulators else None
             clock = time.monotonic_ns if emulated is None else emulated.clock
             links = {} if emulated is None else {name: partial(emulated.open_link, name) for name in emulators}
             drivers = drivers_of(file, self._registry, sensor.name, links, clock)
             for driver in drivers.values():
                 stack.callback(driver.close)
             identity = {name: driver.identify() for name, driver in drivers.items()}
-            self._prompt(file, sensor, scene)
-            advance = emulated.advance if emulated is not None and file.emulation.time == "virtual" else None
-            zero = _zero_of(drivers[FORCE], file.force.zero_s, clock) if file.force is not None else {}
-            reading = stack.enter_context(Reading(drivers, clock=clock, advance=advance))
-            own = drivers[sensor.name].streams
             force = None if file.force is None else PressingForce(file.force, drivers[FORCE].streams)
+            zero = {} if force is None else self._zero(force, file, drivers[FORCE], clock)
+            self._prompt(force, zero, file, sensor, scene)
+            advance = None if emulated is None else emulated.advance
+            reading = stack.enter_context(
+                Reading(drivers, clock=clock, advance=advance, silent_s=file.allowed.silent_s)
+            )
+            own = drivers[sensor.name].streams
             if senses is not None:
                 senses.start(clock() * 1e-9)
             yield BenchAcquisition(
@@ -163,7 +155,6 @@ class Bench:
                     **({} if force is None else force.about(zero)),
                 },
                 clocks={},
-                emulation=emulation_of(file, identity),
                 reading=reading,
                 duration_s=duration_s,
                 force=force,
@@ -175,33 +166,43 @@ class Bench:
         self, file: RigFile, sensor: SensorDescriptor, scene: Scene, seed: int
     ) -> Iterator[Acquisition | None]:
         """Give the scene as the simulated rig carries it out; None where no device is emulated."""
-        if self._physics is None or not file.emulated:
+        if self._physics is None or not file.emulated or file.emulation.time == "real":
             yield None
             return
         with self._physics.open(sensor, scene, seed=seed) as acquisition:
             yield acquisition
 
-    def _prompt(self, file: RigFile, sensor: SensorDescriptor, scene: Scene) -> None:
+    def _zero(self, force: PressingForce, file: RigFile, driver: Driver, clock: Clock) -> dict[str, FloatArray]:
+        """Return what the force sensor reads without load, by stream; raises RigError if it is not at rest."""
+        assert file.force is not None
+        seconds = file.force.zero_s
+        blocks: list[Block] = []
+        if seconds > 0:
+            text = f"Take your hands off: nothing may touch the sensor while the force is zeroed, {seconds:g} s."
+            ask_operator(file, self._operator, "take the hands off", text)
+            driver.start()
+            until_ns = clock() + round(1e9 * seconds)
+            while clock() < until_ns:
+                blocks += driver.read(min(0.1, max(0.0, (until_ns - clock()) * 1e-9)))
+            driver.stop()
+        return force.zero(blocks)
+
+    def _prompt(
+        self,
+        force: PressingForce | None,
+        zero: Mapping[str, FloatArray],
+        file: RigFile,
+        sensor: SensorDescriptor,
+        scene: Scene,
+    ) -> None:
         profile = scene.profile
+        taken = "" if force is None else f"Zero of the force: {zero[force.stream][force.column]:.3g} N. "
         text = (
-            f"{scene.name}: {sensor.spec.title}, {scene.indenter}. Touch nothing for {profile.hold_s:.0f} s, then "
-            f"press slowly to {profile.largest_n:g} N and back, within {profile.duration.to('s'):.0f} s in all."
+            f"{scene.name}: {sensor.spec.title}, {scene.indenter}. {taken}Press now: touch nothing for the first "
+            f"{profile.hold_s:.0f} s, then press slowly to {profile.largest_n:g} N and back, within "
+            f"{profile.duration.to('s'):.0f} s in all."
         )
         ask_operator(file, self._operator, "press", text)
-
-
-def _zero_of(driver: Driver, seconds: float, clock: Clock) -> dict[str, FloatArray]:
-    """Return the mean of every channel of an unloaded force sensor over so many seconds, by stream; 0 without any."""
-    rows: dict[str, list[npt.NDArray[Any]]] = {}
-    if seconds > 0:
-        driver.start()
-        until_ns = clock() + round(1e9 * seconds)
-        while clock() < until_ns:
-            for block in driver.read(min(0.1, max(0.0, (until_ns - clock()) * 1e-9))):
-                rows.setdefault(block.stream, []).append(block.data)
-        driver.stop()
-    found = {stream.name: np.zeros(len(stream.channels)) for stream in driver.streams}
-    return found | {name: np.concatenate(blocks).mean(axis=0) for name, blocks in rows.items()}
 
 
 def build(context: RigContext) -> Bench:
@@ -210,12 +211,17 @@ def build(context: RigContext) -> Bench:
     Raises
     ------
     UsageError
-        If there is no rig file, or it names a simulation that is none.
+        If there is no rig file, or it names a simulation that is none, or devices that nobody would open.
     """
     if context.rig_file is None:
         raise UsageError(
             "The rig 'bench' needs to know its devices.",
             hint="Name a rig file with --rig-file FILE; `tactbench emulate biotac net-ft > FILE` makes one.",
+        )
+    if context.rig_file.devices:
+        raise UsageError(
+            f"The bench opens no {', '.join(context.rig_file.devices)}: a hand presses, and nothing moves.",
+            hint="Leave it out under `devices:`, or use the rig parallel-manipulator.",
         )
     physics = physics_of(context.rig_file, load_registry())
     return Bench(context.rig_file, context.operator, physics)

@@ -6,8 +6,6 @@ beside it.
 
 from __future__ import annotations
 
-from pathlib import Path
-
 from tactbench.plugin import RigDescriptor, hookimpl
 from tactbench.plugin.devices import DeviceDescriptor
 
@@ -30,19 +28,10 @@ def tactbench_devices() -> list[DeviceDescriptor]:
             emulated_options={"counts_per_newton": 1e6, "counts_per_newton_metre": 1e6},
         ),
         DeviceDescriptor(
-            name="nano17",
-            title="ATI Nano17 by its gauge voltages, from a microcontroller of one's own",
-            kind="force",
-            driver=f"{here}.force_torque.nano17.driver:build",
-            emulator=f"{here}.force_torque.nano17.emulator:build",
-            emulated_link="bytes",
-            emulated_options={"calibration": str(Path(__file__).parent / "force_torque" / "nano17" / "FT8577.cal")},
-        ),
-        DeviceDescriptor(
             name="faulhaber",
             title="linear motor on a Faulhaber drive, ASCII by RS232",
             kind="motor",
-            driver=f"{here}.motor.driver:build",
+            driver=f"{here}.motor.driver:FaulhaberDriver",
             emulator=f"{here}.motor.emulator:build",
             emulated_link="bytes",
         ),
@@ -60,5 +49,6 @@ def tactbench_rigs() -> list[RigDescriptor]:
             where=f"{here}.rig:build",
             file=f"{here}.settings:ManipulatorFile",
             check=f"{here}.rig_check:check",
+            emulators=f"{here}.emulation:PressEmulators",
         )
     ]

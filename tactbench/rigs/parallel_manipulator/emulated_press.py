@@ -9,18 +9,17 @@ between motor and force sensor, what a quicker press would do to a skin with mem
 
 from __future__ import annotations
 
-from bisect import bisect_right
 from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from tactbench.plugin import Block, NotApplicable, Scene
+from tactbench.plugin import NotApplicable, Scene
+from tactbench.plugin.devices import SceneSamples
 from tactbench.plugin.simulation import SimulatedPress
 
 if TYPE_CHECKING:
-    from tactbench.plugin import FloatArray
-    from tactbench.rigs.parallel_manipulator.motor.drive import Drive
+    pass
 
 FORCE = "fz"
 """Name under which a simulated rig gives the pressing force, and emulated force sensors are given it."""
@@ -54,7 +53,7 @@ def quiet(scene: Scene) -> Scene:
 
 
 class EmulatedPress:
-    """A simulated scene under an emulated motor, as :data:`~tactbench.plugin.Senses`.
+    """A simulated scene under an emulated motor.
 
     Without load the sensor reads the unloaded hold of the recording, by the time since :meth:`start`, again and again.
 
@@ -77,27 +76,21 @@ class EmulatedPress:
     ) -> None:
         profile = scene.profile
         self.skin_m = skin_m
-        self._drive: Drive | None = None
         self._start_s = 0.0
-        self._hold_ns = round(1e9 * profile.hold_s)
-        self._duration_ns = round(1e9 * profile.duration.to("s"))
-        self._ns_per_n = (self._duration_ns - self._hold_ns) / profile.end.to("N")
+        self._hold_s, self._duration_s = profile.hold_s, profile.duration.to("s")
+        self._s_per_n = (self._duration_s - self._hold_s) / profile.end.to("N")
+        self._corners = profile.corners
         depths_m, forces_n = simulated.press_curve(largest_n)
         even_m = np.linspace(0.0, float(depths_m[-1]), TABULATED)
         self._spacing_m = float(even_m[1])
         forces = np.interp(even_m, depths_m, forces_n)
         forces[0] = 0.0
         self._forces_n: list[float] = forces.tolist()
-        self._tracks = _tracks(simulated)
-        self._last: tuple[int, ...] = ()
-        self._values: dict[str, float] = {}
-        self._noise_ns, self._noise_n = _force_noise(simulated, scene)
+        # One for what the sensor reads, one for the noise of the force.
+        self._sensor, self._force = (SceneSamples(simulated, self._duration_s, rest_s=self._hold_s) for _ in range(2))
+        for samples in (self._sensor, self._force):
+            samples.start(0.0)
         self._floor_n: list[float] = (FLOOR_N * rng.standard_normal(_FLOOR_DRAWS)).tolist()
-
-    def pressed_by(self, drive: Drive) -> None:
-        """Let a drive's motor press, and feel the skin."""
-        self._drive = drive
-        drive.servo.load = lambda position_m, _: self.force_n(position_m - drive.origin_m)
 
     def start(self, at_s: float) -> None:
         """Let the scene's time begin, on the devices' clock."""
@@ -112,55 +105,15 @@ class EmulatedPress:
         here, there = self._forces_n[before : before + 2]
         return here + (place - before) * (there - here)
 
-    def __call__(self, t_s: float) -> Mapping[str, float]:
-        """Return the value of every channel at a second of the devices' clock, in the channels' units."""
-        drive = self._drive
-        force_n = 0.0 if drive is None else self.force_n(drive.servo.position_m - drive.origin_m)
-        since_ns = round(1e9 * (t_s - self._start_s))
+    def sensed(self, t_s: float, position_m: float) -> Mapping[str, float]:
+        """Return the value of every channel, in its unit, at a second of the devices' clock and a motor's position."""
+        force_n = self.force_n(position_m)
+        since_s = (t_s - self._start_s) % self._duration_s
+        load_n = float(np.interp(since_s, *self._corners))
+        noise_n = self._force(since_s).get(FORCE, load_n) - load_n
         if force_n > 0.0:
-            at_ns = self._hold_ns + round(force_n * self._ns_per_n)
+            at_s = min(self._hold_s + force_n * self._s_per_n, self._duration_s - 1e-9)
         else:
-            at_ns = since_ns % self._hold_ns if self._hold_ns else 0
-        rows = tuple([max(bisect_right(times, at_ns) - 1, 0) for times, _, _ in self._tracks])
-        if rows != self._last:
-            self._last = rows
-            self._values = {}
-            for row, (_, names, samples) in zip(rows, self._tracks, strict=True):
-                self._values.update(zip(names, samples[row], strict=True))
-        noise = self._noise_n[max(bisect_right(self._noise_ns, since_ns % self._duration_ns) - 1, 0)]
+            at_s = since_s % self._hold_s if self._hold_s else 0.0
         floor = self._floor_n[int(t_s * _FLOOR_HZ) % _FLOOR_DRAWS]
-        self._values[FORCE] = force_n + noise + floor
-        return self._values
-
-
-_Track = tuple[list[int], tuple[str, ...], list[list[float]]]
-
-
-def _tracks(simulated: SimulatedPress) -> list[_Track]:
-    """Return times [ns], channels and rows of samples of each of the sensor's streams."""
-    blocks: dict[str, list[Block]] = {stream.name: [] for stream in simulated.streams}
-    for block in simulated:
-        if block.stream in blocks and block.t_ns is not None:
-            blocks[block.stream].append(block)
-    return [
-        (
-            np.concatenate([block.t_ns for block in blocks[stream.name]]).tolist(),
-            tuple(channel.name for channel in stream.channels),
-            np.concatenate([block.data for block in blocks[stream.name]]).tolist(),
-        )
-        for stream in simulated.streams
-        if blocks[stream.name]
-    ]
-
-
-def _force_noise(simulated: SimulatedPress, scene: Scene) -> tuple[list[int], list[float]]:
-    """Return times [ns] of the simulated force, and by how much it is off the load [N]."""
-    for stream in simulated.reference:
-        names = [channel.name for channel in stream.channels]
-        if FORCE in names:
-            own = [block for block in simulated if block.stream == stream.name and block.t_ns is not None]
-            t_ns = np.concatenate([block.t_ns for block in own])
-            measured: FloatArray = np.concatenate([block.data[:, names.index(FORCE)] for block in own])
-            load = np.interp(1e-9 * t_ns, *scene.profile.corners)
-            return t_ns.tolist(), (measured - load).tolist()
-    return [0], [0.0]
+        return {**self._sensor(at_s), FORCE: force_n + noise_n + floor}

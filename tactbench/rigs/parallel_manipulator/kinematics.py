@@ -1,29 +1,39 @@
-"""Joint values of a place and the place of joint values, for both deltas, many at a time, without ever a NaN.
+"""A linear delta: its geometry as data, joint values of places and back, and how near it is to singularities.
 
-Inverse, closed form. Rails: w = p - A, s = d.w, n = |w - s d|, q = s + b sqrt((L - n)(L + n)). Arms: u = e.w, v = -w_z,
-h = t.w, rho = hypot(u, v), m = sqrt((L - |h|)(L + |h|)), q = atan2(v, u) - 2 b atan2(sqrt N, sqrt D) with
-N = (m - l_a + rho)(m + l_a - rho) and D = (l_a + rho - m)(l_a + rho + m).
+Leg i stands at azimuth phi_i, with e = (cos phi, sin phi, 0), t = (-sin phi, cos phi, 0), z up. Parallelograms keep the
+platform parallel to its base, so the platform's radius is subtracted from the base's and each leg is one link of length
+L from its joint centre to the point p of the platform (derived; the same folding in R. L. Williams II, The Delta
+Parallel Robot: Kinematics Solutions, 2015):
 
-Forward, three spheres. a = c2 - c1, b = c3 - c1, n = a x b, x = (A'(b x n) + B'(n x a))/|n|^2 with
+    c(q) = A + q d,  A = (R_b - r_p) e + offset,  d = cos(alpha) e + sin(alpha) z,  |p - c_i(q_i)| = L_i
+
+Inverse: w = p - A, s = d.w, n = |w - s d|, q = s + b sqrt((L - n)(L + n)).
+
+Forward, three spheres: a = c2 - c1, b = c3 - c1, n = a x b, x = (A'(b x n) + B'(n x a))/|n|^2 with
 A' = (|a|^2 + L1^2 - L2^2)/2 and B' = (|b|^2 + L1^2 - L3^2)/2, h = sqrt((L1 - |x|)(L1 + |x|)),
-p = c1 + x + mode h n/|n|.
+p = c1 + x + mode h n/|n|. `mode` is kept from homing: the lower of both solutions is the wrong one at some places.
 
-x is corrected once for what rounding left of x.a = A', x.b = B', x.n = 0, so that the links keep their lengths to
-1.1e-15 of them also where two centres are near each other (without it 4e-14; measured over six million).
+Near a singularity, with unit links u_i = (p - c_i)/L_i, all measures without units, 1 is best:
 
-Both derived. Square roots are of products of sums and differences, cut at 0; a mask says where they were cut. `mode` is
-kept from homing and not chosen by the lower z, which is the wrong solution at some permitted places of a rotary delta.
+| kind | when | measure |
+|---|---|---|
+| serial | a link perpendicular to its rail | s = least abs(u_i.d_i): a joint's speed is the platform's/s |
+| parallel | links coplanar, or two centres coincide | sigma_U of rows u_i: errors are the joints'/sigma_U |
+| constraint | parallelograms flat, or all links in a plane with z | sigma_W of rows t_i x u_i: the platform can turn |
+
+All derived. Files state mm and deg: this is the border where they become m and rad. Karl et al. 2016 name neither a
+mechanism nor a geometry: that it is a delta is this project's assumption, and so is every number that is shipped.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from functools import cached_property
+from typing import TYPE_CHECKING, Annotated, Any, Literal, NamedTuple, Self
 
 import numpy as np
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, FiniteFloat, model_validator
 
-from tactbench.plugin import RigError, UsageError
-from tactbench.rigs.parallel_manipulator.geometry import Delta, LinearDelta
+from tactbench.plugin import RigError, Source, UsageError
 
 if TYPE_CHECKING:
     from tactbench.plugin import FloatArray
@@ -32,62 +42,105 @@ ROUNDING = 1e-12
 """Part of a link's length by which it may miss: distances of metres carry errors of a few 1e-16 of themselves, and
 geometry files a few more; three digits are left over."""
 LARGEST = 1e6
-"""Largest coordinate [m] or joint value [m, rad]: fourth powers stay finite, and no machine is a thousandth of it."""
+"""Largest coordinate or joint value [m]: fourth powers stay finite, and no machine is a thousandth of it."""
+
+Length = Annotated[FiniteFloat, Field(gt=0, le=1e5)]
+
+
+def _for_each_leg(value: Any) -> Any:
+    return (value,) * 3 if isinstance(value, int | float) else value
+
+
+PerLeg = Annotated[tuple[FiniteFloat, FiniteFloat, FiniteFloat], BeforeValidator(_for_each_leg)]
+"""Three numbers, or one for all legs."""
+PositivePerLeg = Annotated[tuple[Length, Length, Length], BeforeValidator(_for_each_leg)]
 
 
 class UnreachableError(RigError):
-    """A place that a leg does not reach.
-
-    Attributes
-    ----------
-    leg
-        Number of the leg, from 1.
-    shortfall_m
-        Length by which its link is too short, or too long [m].
-    """
-
-    leg: int | None = None
-    shortfall_m: float | None = None
+    """A place that a leg does not reach."""
 
 
-class NoClosureError(RigError):
-    """Joint values at which the three links do not meet.
-
-    Attributes
-    ----------
-    gap_m
-        What the first link lacks [m].
-    """
-
-    gap_m: float | None = None
+class ClosureError(RigError):
+    """Joint values at which the three links do not meet, or that fix no place."""
 
 
-class SingularError(RigError):
-    """Joint values that fix no place: the joint centres lie in one line."""
+class LinearDelta(BaseModel):
+    """Three carriages on straight rails, vertical or inclined; q is the carriage's way along its rail from A [m]."""
 
+    model_config = ConfigDict(frozen=True, extra="forbid")
 
-@dataclass(frozen=True)
-class JointSolution:
-    """What the inverse found for places (..., 3)."""
+    kind: Literal["linear-delta"] = "linear-delta"
+    title: str
+    """Shown with what is computed from it; what is shipped is called an example."""
+    source: Source
+    """Where these numbers come from: `measured` on the machine, `sourced` from its drawings, or `assumed`."""
+    azimuth_deg: PerLeg = (0.0, 120.0, 240.0)
+    """Direction of each leg about z."""
+    base_radius_mm: PositivePerLeg
+    """From the axis to each joint's zero."""
+    platform_radius_mm: PositivePerLeg
+    """From the platform's axis to the joint of each link."""
+    offset_mm: tuple[PerLeg, PerLeg, PerLeg] = ((0.0,) * 3,) * 3
+    """Measured deviation of each leg's zero from its nominal place: x, y, z."""
+    link_mm: PositivePerLeg
+    """Length of each link between its joints."""
+    inclination_deg: PerLeg = (90.0, 90.0, 90.0)
+    """Angle of each rail above the horizontal, outwards; 90: vertical."""
+    joint_lowest_mm: PerLeg
+    """Least permitted position of each carriage."""
+    joint_highest_mm: PerLeg
+    branch: Literal[-1, 1] = 1
+    """1: carriage ahead of the platform along its rail; -1: the other solution of each leg."""
+    mode: Literal[-1, 1] = -1
+    """Sign of det(p - c1, p - c2, p - c3): which way the machine is assembled; kept along every permitted move."""
 
-    q: FloatArray
-    """(..., 3 legs) joint values, m or rad; where a leg does not reach, those of the stretched or folded leg."""
-    shortfall_m: FloatArray
-    """(..., 3 legs) length by which a link is too short or too long [m]; 0 or less: it reaches."""
+    @model_validator(mode="after")
+    def _sound(self) -> Self:
+        apart = np.abs(np.diff([*self.azimuth_deg, self.azimuth_deg[0] + 360.0]) % 360.0)
+        if apart.min() < 1.0 or apart.max() > 359.0:
+            raise ValueError("two legs stand at the same azimuth")
+        if (self.joint_range[0] >= self.joint_range[1]).any():
+            raise ValueError("a joint's lowest value is not below its highest")
+        return self
 
+    @cached_property
+    def radial(self) -> FloatArray:
+        """The (3, 3) unit vectors e, a row per leg."""
+        phi = np.radians(self.azimuth_deg)
+        return np.stack([np.cos(phi), np.sin(phi), np.zeros(3)], axis=1)
 
-@dataclass(frozen=True)
-class PlaceSolution:
-    """What the forward solution found for joint values (..., 3)."""
+    @cached_property
+    def sideways(self) -> FloatArray:
+        """The (3, 3) unit vectors t, a row per leg."""
+        return np.stack([-self.radial[:, 1], self.radial[:, 0], np.zeros(3)], axis=1)
 
-    p_m: FloatArray
-    """(..., 3) places; where there is none, that of the nearest tangent spheres, or the first joint centre."""
-    det: FloatArray
-    """(...) determinant of the links' unit vectors: mode |n| h / (L1 L2 L3)."""
-    gap_m: FloatArray
-    """(...) what the first link lacks [m]; 0 or less: the links meet."""
-    in_line: FloatArray
-    """(...) 1 where the joint centres lie in one line or coincide, else 0."""
+    @cached_property
+    def anchor_m(self) -> FloatArray:
+        """The (3, 3) folded zeros A [m], a row per leg."""
+        folded = np.subtract(self.base_radius_mm, self.platform_radius_mm)
+        return np.asarray(1e-3 * (folded[:, None] * self.radial + np.asarray(self.offset_mm)))
+
+    @cached_property
+    def link_m(self) -> FloatArray:
+        """The (3,) lengths of the links [m]."""
+        return 1e-3 * np.asarray(self.link_mm)
+
+    @cached_property
+    def rail(self) -> FloatArray:
+        """The (3, 3) unit vectors d along the rails, a row per leg."""
+        alpha = np.radians(self.inclination_deg)
+        # Of a right angle, cos is to be 0 and not 6e-17: vertical rails are parallel.
+        along = np.where(np.abs(np.asarray(self.inclination_deg)) == 90.0, 0.0, np.cos(alpha))
+        return np.asarray(along[:, None] * self.radial + np.sin(alpha)[:, None] * np.array([0.0, 0.0, 1.0]))
+
+    @cached_property
+    def joint_range(self) -> FloatArray:
+        """The (2, 3) least and greatest permitted joint values [m]."""
+        return 1e-3 * np.array([self.joint_lowest_mm, self.joint_highest_mm])
+
+    def centre_m(self, q: FloatArray) -> FloatArray:
+        """Return the (..., 3 legs, 3) joint centres [m] of (..., 3) joint values."""
+        return self.anchor_m + q[..., None] * self.rail
 
 
 def _finite(values: FloatArray, what: str) -> FloatArray:
@@ -107,30 +160,20 @@ def _root(product: FloatArray) -> FloatArray:
     return np.sqrt(np.maximum(product, 0.0))
 
 
-def solve_inverse(delta: Delta, p_m: FloatArray) -> JointSolution:
-    """Return joint values for places (..., 3) [m], and by how much each leg misses; raises UsageError if not finite."""
+def solve_inverse(delta: LinearDelta, p_m: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return (..., 3) joint values [m] of places (..., 3) [m], and the length by which each link is too short [m].
+
+    Where a leg does not reach, its joint value is that of the stretched leg; never a NaN.
+    """
     w = _finite(p_m, "A place")[..., None, :] - delta.anchor_m
-    L, b = delta.link_m, delta.branch
-    if isinstance(delta, LinearDelta):
-        along = _dot(w, delta.rail)
-        beside = np.linalg.norm(w - along[..., None] * delta.rail, axis=-1)
-        return JointSolution(along + b * _root((L - beside) * (L + beside)), beside - L)
-    arm = delta.gear_m
-    u, v, h = _dot(w, delta.radial), -w[..., 2], np.abs(_dot(w, delta.sideways))
-    rho, m = np.hypot(u, v), _root((L - h) * (L + h))
-    psi = 2 * np.arctan2(
-        _root((m - (arm - rho)) * (m + (arm - rho))),
-        _root((arm + rho - m) * (arm + rho + m)),
-    )
-    q = np.arctan2(v, u) - b * psi
-    # One turn more or less is the same arm: the value nearest to horizontal.
-    q = q - 2 * np.pi * np.round(q / (2 * np.pi))
-    # Too far sideways, too far, or too near to the shaft.
-    return JointSolution(q, np.maximum(np.maximum(h - L, rho - (arm + m)), np.abs(arm - m) - rho))
+    along = _dot(w, delta.rail)
+    beside = np.linalg.norm(w - along[..., None] * delta.rail, axis=-1)
+    L = delta.link_m
+    return along + delta.branch * _root((L - beside) * (L + beside)), beside - L
 
 
-def inverse(delta: Delta, p_m: FloatArray) -> FloatArray:
-    """Return the (..., 3) joint values, m or rad, of places (..., 3) [m].
+def inverse(delta: LinearDelta, p_m: FloatArray) -> FloatArray:
+    """Return the (..., 3) joint values [m] of places (..., 3) [m].
 
     Raises
     ------
@@ -139,26 +182,26 @@ def inverse(delta: Delta, p_m: FloatArray) -> FloatArray:
     UsageError
         If a place is not finite.
     """
-    found = solve_inverse(delta, p_m)
-    missing = found.shortfall_m - ROUNDING * delta.link_m
+    q, shortfall = solve_inverse(delta, p_m)
+    missing = shortfall - ROUNDING * delta.link_m
     if (missing > 0).any():
         where = np.unravel_index(int(np.argmax(missing)), missing.shape)
-        leg, shortfall = int(where[-1]) + 1, float(found.shortfall_m[where])
         place = ", ".join(f"{1e3 * x:.3f}" for x in np.asarray(p_m)[where[:-1]])
-        error = UnreachableError(
-            f"Leg {leg} of {delta.title} misses the place ({place}) mm by {1e3 * shortfall:.3g} mm.",
+        raise UnreachableError(
+            f"Leg {int(where[-1]) + 1} of {delta.title} misses the place ({place}) mm by "
+            f"{1e3 * float(shortfall[where]):.3g} mm.",
             hint="Choose a place inside its workspace.",
         )
-        error.leg, error.shortfall_m = leg, shortfall
-        raise error
-    return found.q
+    return q
 
 
-def solve_forward(delta: Delta, q: FloatArray, mode: int | None = None) -> PlaceSolution:
-    """Return the place of joint values (..., 3); `mode` +-1, None: that of the geometry."""
+def solve_forward(delta: LinearDelta, q: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return (..., 3) places [m] of joint values (..., 3) [m], what the first link lacks [m], and centres in line.
+
+    Never a NaN: where there is no place, that of the nearest tangent spheres or the first joint centre is given.
+    """
     centre = delta.centre_m(_finite(q, "A joint value"))
-    L = delta.link_m
-    c1 = centre[..., 0, :]
+    L, c1 = delta.link_m, centre[..., 0, :]
     a, b = centre[..., 1, :] - c1, centre[..., 2, :] - c1
     n = np.cross(a, b)
     aa, bb, nn = _dot(a, a), _dot(b, b), _dot(n, n)
@@ -171,46 +214,71 @@ def solve_forward(delta: Delta, q: FloatArray, mode: int | None = None) -> Place
     x = along_a[..., None] * to_a + along_b[..., None] * to_b
     # Once more for what rounding left of x.a = A', x.b = B', x.n = 0: two centres near each other magnify it.
     x = x + (along_a - _dot(x, a))[..., None] * to_a + (along_b - _dot(x, b))[..., None] * to_b
-    x = x - (_dot(x, n) / safe)[..., None] * n
-    x = np.where(in_line[..., None], 0.0, x)
+    x = np.where(in_line[..., None], 0.0, x - (_dot(x, n) / safe)[..., None] * n)
     far = np.linalg.norm(x, axis=-1)
-    normal = np.sqrt(safe)
-    height = (mode or delta.mode) * np.where(in_line, 0.0, _root((L[0] - far) * (L[0] + far)))
-    p = c1 + x + (height / normal)[..., None] * n
-    return PlaceSolution(
-        p, normal * height / np.prod(L), np.where(in_line, 0.0, far - L[0]), in_line.astype(np.float64)
-    )
+    height = delta.mode * np.where(in_line, 0.0, _root((L[0] - far) * (L[0] + far)))
+    return c1 + x + (height / np.sqrt(safe))[..., None] * n, np.where(in_line, 0.0, far - L[0]), in_line
 
 
-def forward(delta: Delta, q: FloatArray, mode: int | None = None) -> FloatArray:
-    """Return the (..., 3) places [m] of joint values (..., 3), m or rad.
+def forward(delta: LinearDelta, q: FloatArray) -> FloatArray:
+    """Return the (..., 3) places [m] of joint values (..., 3) [m].
 
     Raises
     ------
-    NoClosureError
-        If the links do not meet: with measured joints, a lost step or a wrong geometry.
-    SingularError
-        If the joint centres lie in one line.
+    ClosureError
+        If the links do not meet (with measured joints, a lost step or a wrong geometry), or the joint centres lie in
+        one line.
     UsageError
         If a joint value is not finite.
     """
-    found = solve_forward(delta, q, mode)
-    if found.in_line.any():
-        raise SingularError(
-            f"The joint centres of {delta.title} lie in one line: its joints fix no place.",
-            hint="Measure the joints again; no permitted move leads there.",
-        )
-    if (found.gap_m > ROUNDING * delta.link_m[0]).any():
-        gap = float(found.gap_m.max())
-        error = NoClosureError(
-            f"The links of {delta.title} do not meet at these joint values: {1e3 * gap:.3g} mm are missing.",
+    p, gap, in_line = solve_forward(delta, q)
+    if in_line.any():
+        raise ClosureError(f"The joint centres of {delta.title} lie in one line: its joints fix no place.")
+    if (gap > ROUNDING * delta.link_m[0]).any():
+        raise ClosureError(
+            f"The links of {delta.title} do not meet at these joint values: {1e3 * float(gap.max()):.3g} mm are "
+            "missing.",
             hint="A step was lost or the geometry is wrong: home again, then check the geometry.",
         )
-        error.gap_m = gap
-        raise error
-    return found.p_m
+    return p
 
 
-def mode_of(delta: Delta, p_m: FloatArray, q: FloatArray) -> FloatArray:
-    """Return +-1, or 0 at a parallel singularity, for places (..., 3) with joint values (..., 3)."""
-    return np.asarray(np.sign(np.linalg.det(p_m[..., None, :] - delta.centre_m(q))))
+class Measures(NamedTuple):
+    """Nearness to singularities at places (..., 3)."""
+
+    serial: FloatArray
+    """(..., 3 legs) abs(u_i.d_i)."""
+    parallel: FloatArray
+    """(...) sigma_U."""
+    constraint: FloatArray
+    """(...) sigma_W."""
+    sideways_rad: FloatArray
+    """(..., 3 legs) asin abs(u_i.t_i)."""
+    det: FloatArray
+    """(...) det U; its sign is the assembly mode."""
+
+
+def measures(delta: LinearDelta, p_m: FloatArray, q: FloatArray) -> Measures:
+    """Return the measures at places (..., 3) [m] with their joint values (..., 3)."""
+    unit = (p_m[..., None, :] - delta.centre_m(q)) / delta.link_m[:, None]
+    across = np.cross(delta.sideways, unit)
+    return Measures(
+        serial=np.abs(_dot(unit, delta.rail)),
+        parallel=np.asarray(np.linalg.svd(unit, compute_uv=False)[..., -1]),
+        constraint=np.asarray(np.linalg.svd(across, compute_uv=False)[..., -1]),
+        sideways_rad=np.arcsin(np.minimum(np.abs(_dot(unit, delta.sideways)), 1.0)),
+        det=np.linalg.det(unit),
+    )
+
+
+def example_linear() -> LinearDelta:
+    """Return an example with vertical rails: nobody's machine, and not the paper's, which is not known."""
+    return LinearDelta(
+        title="example of a linear delta",
+        source=Source(tag="assumed", reference="an example to try the software with; no machine was measured"),
+        base_radius_mm=150.0,
+        platform_radius_mm=30.0,
+        link_mm=250.0,
+        joint_lowest_mm=-50.0,
+        joint_highest_mm=250.0,
+    )

@@ -1,6 +1,6 @@
 """The rig: a linear motor on a parallel manipulator presses a sensor under force control, while both are read.
 
-Real devices: force sensor and motor are held by a guard in a process of its own. Emulated in virtual time: all in one
+Real devices: force sensor and axes are held by a guard in a process of its own. Emulated in virtual time: all in one
 process and one thread, a control period at a time.
 """
 
@@ -8,13 +8,12 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from contextlib import ExitStack, contextmanager, suppress
-from dataclasses import dataclass, field
-from functools import partial
+from dataclasses import dataclass, field, replace
 from itertools import chain
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
+from weakref import finalize
 
 import numpy as np
 
@@ -35,47 +34,36 @@ from tactbench.plugin import (
     load_registry,
 )
 from tactbench.plugin.devices import (
-    FORCE,
+    Control,
+    Course,
     DeviceAcquisition,
-    Driver,
-    EmulatedDevices,
     Emulation,
-    ForceEntry,
-    NamedDevice,
+    Event,
+    GuardLostError,
     Operator,
+    Press,
     PressingForce,
     Reading,
     RigFile,
     StreamClock,
     StreamCounts,
     ask_operator,
-    drivers_of,
     emulation_of,
-    emulators_of,
     physics_of,
+    read_options,
     with_sensor,
 )
-from tactbench.rigs.parallel_manipulator.control import STOP_S, Control, WatchedDriver
 from tactbench.rigs.parallel_manipulator.emulated_press import EmulatedPress, quiet
-from tactbench.rigs.parallel_manipulator.guard import LocalGuard
-from tactbench.rigs.parallel_manipulator.guard_interface import Event, Guard, GuardState, Limits, Report
-from tactbench.rigs.parallel_manipulator.guard_messages import DeviceSettings, ProcessSettings
-from tactbench.rigs.parallel_manipulator.guard_process import GuardProcess
-from tactbench.rigs.parallel_manipulator.joints import Joints
-from tactbench.rigs.parallel_manipulator.motor.driver import FaulhaberDriver
-from tactbench.rigs.parallel_manipulator.motor.emulator import MotorEmulator
-from tactbench.rigs.parallel_manipulator.motor.profile import FaulhaberOptions
-from tactbench.rigs.parallel_manipulator.options import read_options
-from tactbench.rigs.parallel_manipulator.press import Course, Press
 from tactbench.rigs.parallel_manipulator.rig_check import refuse
-from tactbench.rigs.parallel_manipulator.settings import JOINTS, MOTOR, settings_of, with_limits
+from tactbench.rigs.parallel_manipulator.session import Session
+from tactbench.rigs.parallel_manipulator.settings import MOTOR, positioner_of, settings_of, with_limits
 
 if TYPE_CHECKING:
     from tactbench.plugin import FloatArray
-    from tactbench.plugin.devices import Clock, EmulatedDevice
+    from tactbench.plugin.devices import Clock
 
-FORCE_AGE_S = 0.010
-"""Added to three sampling periods of the force sensor: how old a sample may be."""
+STOP_S = 10.0
+"""Added to the time of a retreat (assumed: a control period, and what a guard in another process takes to answer)."""
 MOST_EVENTS = 40
 """That are written into a recording; further ones are counted."""
 
@@ -162,8 +150,6 @@ class PressAcquisition:
             found[f"event {number}"] = f"{at_s:.3f} s, {event.state}: {event.text}"
         if len(self.said) > MOST_EVENTS:
             found["events left out"] = len(self.said) - MOST_EVENTS
-        for remark in press.remarks:
-            found["remark press"] = remark
         return found
 
     @property
@@ -197,6 +183,10 @@ class PressAcquisition:
 class ParallelManipulator:
     """Devices of a rig file, and what presses them together.
 
+    What outlives a scene (guard, homes, emulated devices) is kept in a session: that of :meth:`session`; else, by the
+    clock, one that begins with the first scene and ends with this object, and in virtual time one for each scene, so
+    that a recording does not depend on those before it. An error ends it; the next scene begins another one.
+
     Parameters
     ----------
     file
@@ -215,12 +205,39 @@ class ParallelManipulator:
     def __init__(self, file: RigFile, operator: Operator | None, physics: Rig | None) -> None:
         self.settings = settings_of(file)
         self._registry = load_registry()
-        self._file = with_limits(file, self.settings)
+        self._file = with_limits(file, self.settings, self._registry)
         self._operator, self._physics = operator, physics
+        self._session: Session | None = None
+        self._kept = not (file.emulated and file.emulation.time == "virtual")
+        kind, options = positioner_of(self._registry, MOTOR, self._file.devices[MOTOR])
+        self._facts = kind.facts_of(read_options(kind.options_kind, options, MOTOR))
+
+    @contextmanager
+    def session(self) -> Iterator[None]:
+        """Keep devices and homes for all scenes that are opened inside."""
+        kept, self._kept = self._kept, True
+        try:
+            yield
+        finally:
+            self._kept = kept
+            self._end_session()
+
+    def _current_session(self, sensor: str) -> Session:
+        if self._session is None:
+            sensors: Collection[str] = self._file.sensors if self._kept else (sensor,)
+            self._session = session = Session(self._file, self.settings, self._registry, sensors)
+            # For a program that forgets this object, or ends.
+            self._finish = finalize(self, session.close)
+        return self._session
+
+    def _end_session(self) -> None:
+        if self._session is not None:
+            self._session = None
+            self._finish()
 
     @contextmanager
     def open(self, sensor: SensorDescriptor, scene: Scene, *, seed: int) -> Iterator[DeviceAcquisition]:
-        """Open the devices, go to the scene's place, find the surface, and wait just above it.
+        """Go to the scene's place, open the sensor, find the surface, and wait just above it.
 
         Raises
         ------
@@ -233,90 +250,98 @@ class ParallelManipulator:
         LinkError
             If a link cannot be opened, or a device does not answer.
         """
-        settings, scene = self.settings, quiet(scene)
-        file = with_sensor(self._file, sensor.name).checked_for_one_clock()
-        xy_m, place = self._place(scene, seed)
-        with ExitStack() as stack:
-            senses = self._senses(stack, file, sensor, scene, seed)
-            emulators = {} if senses is None else self._emulators(file, sensor, senses[1])
-            emulated = stack.enter_context(EmulatedDevices(emulators, time=file.emulation.time)) if emulators else None
-            clock: Clock = time.monotonic_ns if emulated is None else emulated.clock
-            links = {} if emulated is None else {name: partial(emulated.open_link, name) for name in emulators}
+        scene = quiet(scene)
+        with_sensor(self._file, sensor.name)
+        place = self._place(scene, seed)
+        try:
+            with ExitStack() as stack:
+                senses = self._senses(stack, sensor, scene, seed)
+                yield self._opened(stack, self._current_session(sensor.name), sensor, scene, senses, place)
+        except BaseException:
+            self._end_session()
+            raise
+        if not self._kept:
+            self._end_session()
 
-            def opened(*names: str) -> list[Driver]:
-                drivers = drivers_of(file, self._registry, sensor.name, links, clock, names)
-                for driver in drivers.values():
-                    stack.callback(driver.close)
-                return [drivers[name] for name in names]
+    def _opened(
+        self,
+        stack: ExitStack,
+        session: Session,
+        sensor: SensorDescriptor,
+        scene: Scene,
+        senses: tuple[Acquisition, EmulatedPress] | None,
+        place: tuple[tuple[float, float], dict[str, Scalar]],
+    ) -> PressAcquisition:
+        """Return the scene, ready to begin; `stack` closes what is its own."""
+        settings, guard, clock = self.settings, session.guard, session.clock
+        file, (xy_m, drawn) = with_sensor(self._file, sensor.name), place
+        session.senses.press = None if senses is None else senses[1]
+        guard.disarm()  # of the scene before, if that ended in a fault
+        platform_m = session.travel(xy_m)
+        self._prompt(file, sensor, scene)
+        (driver,) = session.opened(sensor.name, sensor.name)
+        stack.callback(driver.close)
+        identity = {**session.identity, sensor.name: driver.identify()}
+        force, zero, limits = session.measured_limits()
+        press = Press(settings.press_plan(self._facts.resolution), self._course(scene))
+        control: Control | None = None
 
-            virtual = emulated is not None and file.emulation.time == "virtual"
-            guard = self._guard(stack, file, opened, clock, emulated)
-            said = guard.start()
-            own, force, zero, limits = self._limits(file, guard, clock)
-            guard.arm(limits)
-            joints = self._go_there(guard, opened, xy_m)
-            self._prompt(file, sensor, scene)
-            (driver,) = opened(sensor.name)
-            watched = WatchedDriver(driver, clock)
-            identity = {**said, sensor.name: watched.identify()}
-            _, _, zero, limits = self._limits(file, guard, clock)
-            press = Press(settings, self._course(scene), own.profile().position_unit.to("m"))
-            control: Control | None = None
+        def carry(until_ns: int) -> None:
+            if control is not None:
+                control.carry(until_ns)
 
-            def carry(until_ns: int) -> None:
-                if control is not None:
-                    control.carry(until_ns)
-
-            reading = stack.enter_context(
-                Reading({sensor.name: watched}, clock=clock, advance=carry if virtual else None)
-            )
-            control = Control(
-                guard, limits, guard.arm(limits), press, watched, clock,
-                period_s=settings.force_loop.period_s, stale_s=1e-3 * settings.press.stale_ms,
-            )  # fmt: skip
-            stack.callback(control.stop)
-            if not virtual:
-                control.start()
-            blocks = reading.blocks(math.inf, lambda: press.over)  # a sensor that is silent sends no block to look at
-            events = self._find_surface(control, blocks)
-            gaps = {name: one.gaps for name, one in reading.stream_counts.items()}
-            begin_ns = clock()
-            if senses is not None:
-                senses[1].start(1e-9 * begin_ns)
-            press.begin(1e-9 * begin_ns)
-            simulated = None if senses is None else senses[0]
-            yield PressAcquisition(
-                streams=watched.streams,
-                reference=(*force.streams, guard.motor_stream),
-                plan=() if simulated is None else simulated.plan,
-                assumptions={} if simulated is None else simulated.assumptions,
-                about={
-                    **({} if simulated is None else simulated.drawn),
-                    **{f"{name} {key}": value for name, about in identity.items() for key, value in about.items()},
-                    **force.about(zero),
-                    **place,
-                    **({} if joints is None else {"platform mm": _millimetres(joints.measured_m())}),
-                    **({} if senses is None else {"skin mm": 1e3 * senses[1].skin_m}),
-                },
-                clocks={},
-                emulation=emulation_of(file, identity),
-                force=force,
-                zero=zero,
-                control=control,
-                reading=reading,
-                blocks=blocks,
-                clock=clock,
-                begin_ns=begin_ns,
-                duration_s=scene.profile.duration.to("s"),
-                retreat_s=limits.retreat_s + STOP_S,
-                gaps=gaps,
-                said=events,
-            )
+        reading = stack.enter_context(
+            Reading({sensor.name: driver}, clock=clock, advance=carry if session.virtual else None)
+        )
+        stack.callback(_disarmed, session)
+        control = Control(
+            guard, limits, guard.arm(limits), press, lambda: _received(reading), clock,
+            period_s=settings.force_loop.period_s, stale_s=1e-3 * settings.press.stale_ms,
+        )  # fmt: skip
+        stack.callback(control.stop)
+        if not session.virtual:
+            control.start()
+        blocks = reading.blocks(math.inf, lambda: press.over)  # a sensor that is silent sends no block to look at
+        events = self._find_surface(control, blocks)
+        gaps = {name: one.gaps for name, one in reading.stream_counts.items()}
+        begin_ns = clock()
+        if senses is not None:
+            senses[1].start(1e-9 * begin_ns)
+        press.begin(1e-9 * begin_ns)
+        simulated = None if senses is None else senses[0]
+        return PressAcquisition(
+            streams=driver.streams,
+            reference=(*force.streams, guard.motor_stream),
+            plan=() if simulated is None else simulated.plan,
+            assumptions={} if simulated is None else simulated.assumptions,
+            about={
+                **({} if simulated is None else simulated.drawn),
+                **{f"{name} {key}": value for name, about in identity.items() for key, value in about.items()},
+                **force.about(zero),
+                **drawn,
+                **({} if platform_m is None else {"platform mm": ", ".join(f"{1e3 * x:.4f}" for x in platform_m)}),
+                **({} if senses is None else {"skin mm": 1e3 * senses[1].skin_m}),
+            },
+            clocks={},
+            emulation=emulation_of(file, identity),
+            force=force,
+            zero=zero,
+            control=control,
+            reading=reading,
+            blocks=blocks,
+            clock=clock,
+            begin_ns=begin_ns,
+            duration_s=scene.profile.duration.to("s"),
+            retreat_s=self._facts.seconds(self._facts.limits[1] - self._facts.limits[0], self._facts.retreat_speed)
+            + STOP_S,
+            gaps=gaps,
+            said=events,
+        )
 
     # Before the press -------------------------------------------------------------------------------------------------
 
     def _place(self, scene: Scene, seed: int) -> tuple[tuple[float, float], dict[str, Scalar]]:
-        """Return the manipulator's x and y for a scene, scatter included, and what to record of them."""
+        """Return the manipulator's x and y [m] for a scene, scatter included, and what to record of them."""
         places = self.settings.places
         x_mm, s_mm = scene.placement.x.to("mm"), scene.placement.s.to("mm")
         for name, value, (low, high) in (("x", x_mm, places.reach_x_mm), ("s", s_mm, places.reach_s_mm)):
@@ -335,9 +360,10 @@ class ParallelManipulator:
         return places.place_m(x_mm + dx, s_mm + ds), drawn
 
     def _senses(
-        self, stack: ExitStack, file: RigFile, sensor: SensorDescriptor, scene: Scene, seed: int
+        self, stack: ExitStack, sensor: SensorDescriptor, scene: Scene, seed: int
     ) -> tuple[Acquisition, EmulatedPress] | None:
         """Return the scene as the simulated rig carries it out, and what emulated devices sense of it."""
+        file = self._file
         if self._physics is None or not file.emulated:
             return None
         simulated: Any = stack.enter_context(self._physics.open(sensor, scene, seed=seed))
@@ -352,101 +378,9 @@ class ParallelManipulator:
         skin_m = self.settings.surface_m + 1e-3 * float(
             np.clip(off_mm, -heights.stand_off_mm / 2, heights.depth_mm / 2)
         )
-        press = EmulatedPress(simulated, scene, skin_m=skin_m, largest_n=1.5 * limits.force_ceiling_n, rng=rng)
-        return simulated, press
-
-    def _emulators(self, file: RigFile, sensor: SensorDescriptor, senses: EmulatedPress) -> dict[str, EmulatedDevice]:
-        found = emulators_of(file, self._registry, sensor.name, senses)
-        if MOTOR in found:
-            emulator = found[MOTOR].emulator
-            if not isinstance(emulator, MotorEmulator):
-                raise UsageError(f"The emulated {MOTOR} is no faulhaber device.", hint="This rig moves one.")
-            senses.pressed_by(emulator.drive)
-        for name in JOINTS:
-            if name in found and isinstance(joint := found[name].emulator, MotorEmulator):
-                joint.drive.servo.load = None  # the platform's weight is not modelled
-        return found
-
-    def _guard(
-        self, stack: ExitStack, file: RigFile, opened: Any, clock: Clock, emulated: EmulatedDevices | None
-    ) -> Guard:
-        """Return the guard of motor and force sensor; it is disarmed and closed at the end."""
-        guard: LocalGuard | GuardProcess
-        if emulated is not None and file.emulation.time == "virtual":
-            motor, force = opened(MOTOR, FORCE)
-            if not isinstance(motor, FaulhaberDriver):
-                raise UsageError(f"The {MOTOR} is no faulhaber device.", hint="This rig moves one.")
-            guard = LocalGuard(motor, force, clock, emulated.advance)
-        else:
-            addresses = {} if emulated is None else emulated.addresses
-            guard = GuardProcess(
-                ProcessSettings(
-                    motor=self._device(file, MOTOR, addresses),
-                    force=self._device(file, FORCE, addresses),
-                    log=str(Path(self.settings.guard_log).expanduser().resolve()),
-                    clock_zero_ns=time.monotonic_ns() - clock(),
-                )
-            )
-        stack.callback(guard.close)
-        return guard
-
-    def _device(self, file: RigFile, name: str, addresses: Mapping[str, str]) -> DeviceSettings:
-        """Return what the guard's process is told of a device."""
-        entry = file.entries()[name]
-        assert isinstance(entry, ForceEntry | NamedDevice)
-        descriptor = self._registry.devices[entry.device]
-        options = {**(descriptor.emulated_options if entry.emulated else {}), **entry.options}
-        return DeviceSettings(driver=descriptor.driver, link=addresses.get(name, entry.link), options=options)
-
-    def _limits(
-        self, file: RigFile, guard: Guard, clock: Clock
-    ) -> tuple[FaulhaberOptions, PressingForce, dict[str, FloatArray], Limits]:
-        """Take the force sensor's zero; return it, and what the guard is to keep."""
-        assert file.force is not None
-        settings, stream = self.settings, guard.force_stream
-        force = PressingForce(file.force, (stream,))
-        guard.force_blocks()  # of before
-        guard.advance(clock() + round(1e9 * file.force.zero_s))
-        rows = [block.data for block in guard.force_blocks()]
-        zero = np.concatenate(rows).mean(axis=0) if rows else np.zeros(len(stream.channels))
-        options = read_options(FaulhaberOptions, file.devices[MOTOR].options, "faulhaber")
-        assert options.retreat_m is not None
-        assert options.retreat_speed_m_s is not None
-        limits, touch, loop = settings.limits, settings.touch, settings.force_loop
-        low, high = limits.travel_mm
-        return (
-            options,
-            force,
-            {stream.name: zero},
-            Limits(
-                force_ceiling_n=limits.force_ceiling_n,
-                torque_ceiling_nm=limits.torque_ceiling_nm,
-                touch_n=touch.single_n,
-                travel_m=(1e-3 * low, 1e-3 * high),
-                step_m=loop.step_m,
-                speed_m_s=1e-3 * max(touch.speed_mm_s, settings.press.unload_speed_mm_s),
-                retreat_m=options.retreat_m,
-                retreat_speed_m_s=options.retreat_speed_m_s,
-                heartbeat_s=1e-3 * limits.heartbeat_ms,
-                force_age_s=FORCE_AGE_S + 3 / (stream.rate_hz or 1000.0),
-                channel=force.column,
-                sign=force.sign,
-                zero=tuple(zero.tolist()),
-                homing_force_n=limits.homing_force_n,
-            ),
+        return simulated, EmulatedPress(
+            simulated, scene, skin_m=skin_m, largest_n=1.5 * limits.force_ceiling_n, rng=rng
         )
-
-    def _go_there(self, guard: Guard, opened: Any, xy_m: tuple[float, float]) -> Joints | None:
-        """Move the manipulator above the place, the motor being retracted; None: it is fixed."""
-        if self.settings.manipulator == "fixed":
-            guard.disarm()
-            return None
-        retracted = guard.disarm()
-        joints = Joints(opened(*JOINTS), self.settings)
-        joints.start()
-        limits = self.settings.limits
-        joints.go(joints.plan(xy_m), lambda: _is_at(retracted, 1e-3 * limits.retreat_mm))
-        return joints
 
     def _prompt(self, file: RigFile, sensor: SensorDescriptor, scene: Scene) -> None:
         profile = scene.profile
@@ -488,8 +422,6 @@ class ParallelManipulator:
 
 def _rows(block: Block, rows: slice) -> Block:
     """Return some rows of a block."""
-    from dataclasses import replace
-
     return replace(
         block,
         **{
@@ -500,12 +432,15 @@ def _rows(block: Block, rows: slice) -> Block:
     )
 
 
-def _is_at(report: Report, position_m: float) -> bool:
-    return report.state is GuardState.IDLE and not report.moving and abs(report.position_m - position_m) < 1e-4
+def _received(reading: Reading) -> int:
+    return sum(one.received for one in reading.stream_counts.values())
 
 
-def _millimetres(place_m: tuple[float, float, float]) -> str:
-    return ", ".join(f"{1e3 * x:.4f}" for x in place_m)
+def _disarmed(session: Session) -> None:
+    """Let the guard expect no more beats; one that is lost has said so, and has retreated."""
+    with suppress(GuardLostError):
+        session.guard.disarm()
+    session.senses.press = None
 
 
 def build(context: RigContext) -> ParallelManipulator:

@@ -1,59 +1,38 @@
-"""What a rig file would let this rig do, and why it would be refused; nothing is opened and nothing moves.
-
-The first bytes are those that the drivers send to emulated devices in the process, in virtual time.
-"""
+"""What a rig file would let this rig do, and why it would be refused; nothing is opened and nothing moves."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from functools import partial
-from typing import TYPE_CHECKING, TypeVar
+from typing import Any
 
-from tactbench.plugin import TactbenchError, UsageError, load_registry
+from tactbench.plugin import RigError, TactbenchError, UsageError, load_registry
 from tactbench.plugin.devices import (
-    CanFrame,
     CheckTable,
-    DeviceEntry,
-    EmulatedDevices,
-    PressingForce,
+    PositionerFacts,
     RigCheck,
     RigFile,
-    drivers_of,
-    emulators_of,
-)
-from tactbench.rigs.parallel_manipulator.guard import LONGEST_COMMAND, MANDATORY, reaction
-from tactbench.rigs.parallel_manipulator.joints import check_places, workspace_of
-from tactbench.rigs.parallel_manipulator.loop_stability import (
-    advised_integral_m_n_s,
-    check_gains,
-    largest_gain_factor,
-    ramp_error_n,
+    largest_force_n,
+    read_options,
 )
 from tactbench.rigs.parallel_manipulator.motor.codec import line_time_s
-from tactbench.rigs.parallel_manipulator.motor.profile import FaulhaberOptions, MotorProfile
-from tactbench.rigs.parallel_manipulator.options import read_options
-from tactbench.rigs.parallel_manipulator.settings import JOINTS, MOTOR, RigSettings, settings_of, with_limits
-from tactbench.rigs.parallel_manipulator.worst_case import (
-    check_largest_force,
-    first_touch_n,
-    largest_force_n,
+from tactbench.rigs.parallel_manipulator.motor.profile import FaulhaberOptions
+from tactbench.rigs.parallel_manipulator.platform import Platform
+from tactbench.rigs.parallel_manipulator.settings import (
+    JOINTS,
+    MOTOR,
+    RigSettings,
+    axes_of,
+    positioner_of,
+    settings_of,
+    with_limits,
 )
 
-if TYPE_CHECKING:
-    from tactbench.plugin.devices import Link
-    from tactbench.rigs.parallel_manipulator.worst_case import Reaction
-
-FIRST = 4
-"""Pieces shown of what is sent to a device."""
-MOST_BYTES = 24
-"""Bytes shown of each."""
-_STEP = ("LR-1234", "OK\n", "M", "OK\n", "TPOS", "-12345\n", "POS", "-12345\n", "GRC", "1234\n", "OST", "65536\n")
+WATCH_S = 8e-3
+"""Age of the force at 1 kHz, a look of the guard, and scheduling: what a reaction has beside the axis' own latency."""
+_STEP = ("LA-12345", "OK\n", "M", "OK\n", "TPOS", "-12345\n", "POS", "-12345\n", "GRC", "1234\n", "OST", "65536\n")
 """Commands of one increment and the look that confirms its end, and their answers, each with a carriage return."""
-_PAPER_RAMP_N_S = 5.0 / 52.8
-"""The default scene's ramp."""
-
-
-_Entry = TypeVar("_Entry", bound=DeviceEntry)
+_MANDATORY = ("lower_m", "upper_m", "speed_m_s", "acceleration_m_s2", "corridor_m")
 
 
 class _Findings:
@@ -73,7 +52,7 @@ class _Findings:
 
 
 def check(file: RigFile) -> RigCheck:
-    """Return limits, units, times, forces and first bytes, and what is refused.
+    """Return what axes, loop, forces and places come to, and what is refused.
 
     Raises
     ------
@@ -81,7 +60,6 @@ def check(file: RigFile) -> RigCheck:
         If the file lacks something, or names what is not installed.
     """
     found = _found(file)
-    _first_bytes(found, with_limits(file, settings_of(file)))
     return RigCheck(tuple(found.tables), tuple(found.problems))
 
 
@@ -96,230 +74,168 @@ def refuse(file: RigFile) -> None:
 
 
 def _found(file: RigFile) -> _Findings:
-    settings = settings_of(file)
-    file = with_limits(file, settings)
-    options = read_options(FaulhaberOptions, file.devices[MOTOR].options, "faulhaber")
+    settings, registry = settings_of(file), load_registry()
+    file = with_limits(file, settings, registry)
     found = _Findings()
-    _limits(found, settings)
-    _units(found, settings, options)
-    react = _times(found, settings, options)
+    facts = {}
+    for name in axes_of(settings):
+        kind, given = positioner_of(registry, name, file.devices[name])
+        options = read_options(kind.options_kind, given, name)
+        try:
+            facts[name] = kind.facts_of(options)
+        except RigError as error:
+            raise UsageError(f"{name}: {error.message}", hint=error.hint) from error
+        _axis(found, settings, name, options)
+    motor = facts[MOTOR]
+    if motor.corridor > settings.force_loop.step_m:
+        found.problems.append(
+            f"The motor calls a move ended within {1e6 * motor.corridor:g} um, and the largest increment is "
+            f"{1e6 * settings.force_loop.step_m:g} um. Lower corridor_m, or raise the loop's speed."
+        )
     _loop(found, settings)
-    _forces(found, settings, react)
+    _forces(found, settings, facts)
     _places(found, settings)
     return found
 
 
-def _limits(found: _Findings, settings: RigSettings) -> None:
-    limits, heights = settings.limits, settings.heights
-    low, high = limits.travel_mm
-    beats = 1e-3 * limits.heartbeat_ms * settings.force_loop.rate_hz
-    torque = "not looked at" if limits.torque_ceiling_nm is None else f"{limits.torque_ceiling_nm:g} N m"
-    found.table(
-        "limits",
-        ("force ceiling", f"{limits.force_ceiling_n:g} N, of the norm of one raw sample"),
-        ("torque ceiling", torque),
-        ("rated force of the weakest part", f"{limits.rated_force_n:g} N"),
-        ("travel of the motor", f"{low:g} to {high:g} mm"),
-        ("retreats to", f"{limits.retreat_mm:g} mm at {limits.retreat_speed_mm_s:g} mm/s"),
-        ("heartbeat", f"{limits.heartbeat_ms:g} ms, {beats:.1f} control periods"),
-        ("skin expected at", f"{1e3 * settings.surface_m:g} mm, standard deviation {heights.surface_spread_mm:g} mm"),
-        ("goes no deeper than", f"{1e3 * settings.deepest_m:g} mm"),
-        ("homing ends at", f"{limits.homing_force_n:g} N"),
-    )  # fmt: skip
-
-
-def _units(found: _Findings, settings: RigSettings, options: FaulhaberOptions) -> None:
-    """Say what the drive's integers mean, and refuse speeds and steps that it does not have."""
-    profile, touch = options.profile(), settings.touch
-    stated = profile.model_fields_set
-
-    def unit(name: str, shown: str) -> str:
-        quantity = getattr(profile, name)
-        by = "the rig file" if name in stated else f"ASSUMED: {quantity.source.reference}"
-        return f"{quantity.to(shown):g} {shown} ({by})"
-
-    found.table(
-        "units of the motor's drive",
-        ("one increment", unit("position_unit", "um")),
-        ("one unit of speed", unit("speed_unit", "mm/s")),
-        ("one unit of acceleration", unit("acceleration_unit", "mm/s/s")),
-        ("one unit of current", unit("current_unit", "mA")),
-    )
-    missing = [name for name in MANDATORY if getattr(options, name) is None]
+def _axis(found: _Findings, settings: RigSettings, name: str, options: Any) -> None:
+    """Say what an axis states, and refuse what would make it unsafe."""
+    limits = settings.limits
+    missing = [option for option in _MANDATORY if getattr(options, option) is None]
+    if options.orientation is None:
+        missing.append("orientation")
+    elif options.orientation == "vertical":
+        missing += [option for option in ("brake", "counterweight") if getattr(options, option) is None]
+    force_n = options.largest_force_n
+    if force_n is None:
+        missing.append("peak_force_n (or peak current and force constant)")
+    elif name == MOTOR and force_n > limits.rated_force_n:
+        found.problems.append(
+            f"The {name}'s drive can exert {force_n:.1f} N, and the weakest part bears {limits.rated_force_n:g} N: "
+            "where the force sensor lies, that is the last bound. Lower the peak current."
+        )
     if missing:
-        found.problems.append(
-            f"The motor's options lack {', '.join(missing)}; the guard does not arm without. Add them under `options:`."
-        )
-    for name, speed in (
-        ("touch speed_mm_s", touch.speed_mm_s),
-        ("touch touch_speed_mm_s", touch.touch_speed_mm_s),
-        ("press unload_speed_mm_s", settings.press.unload_speed_mm_s),
-        ("limits retreat_speed_mm_s", settings.limits.retreat_speed_mm_s),
-    ):
-        found.refusing(partial(_has_speed, profile, name, speed))
-    if options.corridor_m is not None and options.corridor_m > settings.force_loop.step_m:
-        found.problems.append(
-            f"The drive calls a move ended within {1e6 * options.corridor_m:g} um, and the largest increment is "
-            f"{1e6 * settings.force_loop.step_m:g} um. Lower corridor_m, or raise the loop's speed."
-        )
+        found.problems.append(f"The options of {name} lack {', '.join(missing)}; nothing moves without.")
+    if name == MOTOR and options.homes_towards() > 0:
+        found.problems.append(f"The {name} is homed towards the skin. Make homing_speed_m_s negative.")
+    if name in JOINTS and options.homes_towards() < 0:
+        found.problems.append(f"The {name} is homed downwards, towards the skin. Make homing_speed_m_s positive.")
+    without = "holds without power" if options.holds_unpowered else "FALLS without power: it stays powered"
+    rows = [
+        ("stands", f"{options.orientation or 'not stated'}, {without}"),
+        ("largest force of its drive", "not stated" if force_n is None else f"{force_n:.1f} N"),
+    ]
+    if isinstance(options, FaulhaberOptions):
+        rows += _units(found, settings if name == MOTOR else None, options)
+    found.table(name, *rows)
 
 
-def _has_speed(profile: MotorProfile, name: str, speed_mm_s: float) -> None:
-    requested, unit = 1e-3 * speed_mm_s, profile.speed_unit.to("m/s")
-    got = profile.speed_m_s(profile.speed(requested))
-    if got < 0.9 * requested:
+def _units(found: _Findings, settings: RigSettings | None, options: FaulhaberOptions) -> list[tuple[str, str]]:
+    """Return what the drive's integers mean; refuse speeds of a press that it does not have."""
+    rows = []
+    for what, name, factor, unit in (
+        ("increment", "increment_m", 1e6, "um"), ("unit of speed", "speed_unit_m_s", 1e3, "mm/s"),
+        ("unit of acceleration", "acceleration_unit_m_s2", 1e3, "mm/s^2"),
+        ("unit of current", "current_unit_a", 1e3, "mA"),
+    ):  # fmt: skip
+        by = "" if name in options.model_fields_set else " (ASSUMED)"
+        rows.append((what, f"{factor * getattr(options, name):g} {unit}{by}"))
+    if settings is not None:
+        touch = settings.touch
+        for name, speed_mm_s in (
+            ("touch speed_mm_s", touch.speed_mm_s), ("touch touch_speed_mm_s", touch.touch_speed_mm_s),
+            ("press unload_speed_mm_s", settings.press.unload_speed_mm_s),
+            ("limits retreat_speed_mm_s", settings.limits.retreat_speed_mm_s),
+        ):  # fmt: skip
+            found.refusing(partial(_has_speed, options, name, speed_mm_s))
+        # Of each line one end is in the text already, or is a carriage return.
+        exchange_s = sum(line_time_s(len(text) + 1, options.baud) for text in _STEP)
+        loop = settings.force_loop
+        rows.append(("one increment and its look", f"{1e3 * exchange_s:.1f} ms on the line"))
+        if exchange_s > loop.period_s + 1e-3 * loop.delay_ms:
+            found.problems.append(
+                f"One increment takes {1e3 * exchange_s:.1f} ms on the line; control period and declared delay are "
+                f"{1e3 * loop.period_s + loop.delay_ms:g} ms together. Lower rate_hz, state the delay, or raise baud."
+            )
+    return rows
+
+
+def _has_speed(options: FaulhaberOptions, name: str, speed_mm_s: float) -> None:
+    unit_mm_s = 1e3 * options.speed_unit_m_s
+    got_mm_s = unit_mm_s * options.speed(1e-3 * speed_mm_s)
+    if got_mm_s < 0.9 * speed_mm_s:
         raise UsageError(
-            f"{name} of {speed_mm_s:g} mm/s would be {1e3 * got:g} mm/s: the drive's unit is {1e3 * unit:g} mm/s.",
+            f"{name} of {speed_mm_s:g} mm/s would be {got_mm_s:g} mm/s: the drive's unit is {unit_mm_s:g} mm/s.",
             hint="State another speed, or the drive's own unit under `options: speed_unit_m_s`.",
         )
 
 
-def _times(found: _Findings, settings: RigSettings, options: FaulhaberOptions) -> Reaction:
-    """Say how long bytes take, and refuse a control period in which no increment passes."""
-    loop = settings.force_loop
-    # Of each line one end is in the text already, or is a carriage return.
-    exchange_s = sum(line_time_s(len(text) + 1, options.baud) for text in _STEP)
-    react = reaction(options, motor_lag_s=1e-3 * loop.motor_lag_ms)
-    found.table(
-        f"times on the motor's line, {options.baud} baud",
-        ("one increment and its look", f"{1e3 * exchange_s:.1f} ms and six answer times of the drive"),
-        ("control period", f"{1e3 * loop.period_s:g} ms"),
-        ("declared delay, lag of the motor", f"{loop.delay_ms:g}, {loop.motor_lag_ms:g} ms"),
-        ("largest increment", f"{1e6 * loop.step_m:g} um"),
-        ("reaction", f"{1e3 * react.time_s:.1f} ms: force {1e3 * react.force_age_s:g}, scheduling "
-         f"{1e3 * react.scheduling_s:g}, up to {LONGEST_COMMAND} bytes ahead and {react.stop_bytes} of the retreat, "
-         f"lag {1e3 * react.motor_lag_s:g}"),
-        ("a rig that hangs", f"{settings.limits.heartbeat_ms + 1e3 * react.time_s:.1f} ms until the motor brakes"),
-    )  # fmt: skip
-    if exchange_s > loop.period_s + 1e-3 * loop.delay_ms:
-        found.problems.append(
-            f"One increment takes {1e3 * exchange_s:.1f} ms on the line; control period and declared delay are "
-            f"{1e3 * loop.period_s + loop.delay_ms:g} ms together. Lower rate_hz, state the delay, or raise baud."
-        )
-    return react
-
-
 def _loop(found: _Findings, settings: RigSettings) -> None:
     """Say how far the gains are from swinging, and refuse more than half."""
-    loop, stiffness = settings.force_loop.loop(), settings.stiffness
-    if settings.force_loop.integral_mm_n_s == 0 and settings.force_loop.proportional_mm_n == 0:
-        found.problems.append("The force loop has no gain. State integral_mm_n_s.")
-        return
-    greatest, least = 1e3 * stiffness.greatest_n_mm, 1e3 * stiffness.least_n_mm
-    factor = largest_gain_factor(loop, greatest)
-    stated = settings.force_loop.integral_mm_n_s
-    advised = [1e3 * advised_integral_m_n_s(loop, k) for k in (greatest, least)]
-    rows = [
+    stiffness = settings.stiffness
+    model = settings.force_loop.model(settings.force_loop.law(settings.limits.travel_mm))
+    greatest = 1e3 * stiffness.greatest_n_mm
+    found.table(
+        "force loop",
         ("declared stiffness", f"{stiffness.least_n_mm:g} to {stiffness.greatest_n_mm:g} N/mm, "
          f"{stiffness.at_touch_n_mm:g} at a touch, {stiffness.at_ceiling_n_mm:g} at the ceiling"),
-        ("largest stable gains at the stiffest", f"{factor:.2f} times those stated"),
-        ("share used", f"{1 / factor:.2f}, at most 0.50"),
-    ]  # fmt: skip
-    if settings.force_loop.proportional_mm_n == 0:
-        text = f"{advised[0]:.3g} mm/(N s) at the stiffest, {advised[1]:.3g} at the softest; stated {stated:g}"
-        rows.append(("gain that overshoots by 5 %", text))
-    if settings.force_loop.integral_mm_n_s > 0 and settings.force_loop.feed_forward_n_mm is None:
-        errors = [ramp_error_n(loop, _PAPER_RAMP_N_S, k) for k in (least, greatest)]
-        text = f"{1e3 * errors[0]:.0f} mN at the softest, {1e3 * errors[1]:.0f} at the stiffest"
-        rows.append(("force minus wanted on 5 N in 52.8 s", text))
-    found.table("force loop", *rows)
-    found.refusing(lambda: check_gains(loop, greatest))
+        ("share of the largest stable gains", f"{greatest / model.largest_stiffness():.2f}, at most 0.50"),
+    )  # fmt: skip
+    found.refusing(lambda: model.share_used(greatest))
 
 
-def _forces(found: _Findings, settings: RigSettings, react: Reaction) -> None:
+def _forces(found: _Findings, settings: RigSettings, facts: Mapping[str, PositionerFacts]) -> None:
     """Say how large the force may become, and refuse more than what is rated or allowed."""
-    limits, touch, stiffness = settings.limits, settings.touch, settings.stiffness
-    k, acceleration = 1e3 * stiffness.at_ceiling_n_mm, 1e-3 * touch.acceleration_mm_s2
-    by_step = limits.force_ceiling_n + k * settings.force_loop.step_m
-    by_touch = largest_force_n(limits.force_ceiling_n, k, 1e-3 * touch.touch_speed_mm_s, acceleration, react)
-    soft, slow = 1e3 * stiffness.at_touch_n_mm, 1e-3 * touch.touch_speed_mm_s
-    # The mean of a rising force is half its time behind.
-    behind_s = react.time_s + 0.5e-3 * touch.mean_ms
-    first = first_touch_n(touch.mean_n, soft, slow, acceleration, settings.force_loop.period_s, behind_s)
-    single = first_touch_n(touch.single_n, soft, slow, acceleration, react.force_age_s, react.time_s, samples=3)
+    limits, touch, stiffness, motor = settings.limits, settings.touch, settings.stiffness, facts[MOTOR]
+    react_s = WATCH_S + motor.stop_latency_s
+    slow, acceleration = 1e-3 * touch.touch_speed_mm_s, 1e-3 * touch.acceleration_mm_s2
+    k, soft = 1e3 * stiffness.at_ceiling_n_mm, 1e3 * stiffness.at_touch_n_mm
+    by_step = limits.force_ceiling_n + k * (settings.force_loop.step_m + motor.corridor)
+    by_approach = largest_force_n(limits.force_ceiling_n, k, slow, acceleration, react_s)
+    # A control period, and the mean of a rising force is half its time behind.
+    behind_s = settings.force_loop.period_s + 0.5e-3 * touch.mean_ms
+    first = min(
+        largest_force_n(touch.mean_n, soft, slow, acceleration, react_s + behind_s),
+        largest_force_n(touch.single_n, soft, slow, acceleration, react_s + 3e-3),
+    )
     found.table(
         "largest forces",
-        ("under force control", f"{by_step:.2f} N: ceiling, and one increment at {stiffness.at_ceiling_n_mm:g} N/mm"),
-        ("in an approach that misses the touch", f"{by_touch:.2f} N: ceiling, {1e3 * react.time_s:.1f} ms of reaction"),
-        ("first touch, found by the mean", f"{first:.2f} N at {stiffness.at_touch_n_mm:g} N/mm"),
-        ("first touch, found by single samples", f"{single:.2f} N"),
+        ("reaction", f"{1e3 * react_s:.1f} ms, of which {1e3 * motor.stop_latency_s:.1f} of the motor and its line"),
+        ("under force control", f"{by_step:.2f} N: ceiling, one increment and the corridor"),
+        ("in an approach that misses the touch", f"{by_approach:.2f} N: ceiling and reaction"),
+        ("first touch", f"{first:.2f} N, {touch.allowed_n:g} N are allowed"),
     )
-    for what, largest in (("Under force control", by_step), ("In the approach", by_touch)):
-        found.refusing(partial(check_largest_force, largest, limits.rated_force_n, f"{what.lower()}, the weakest part"))
-    largest = min(first, single)
-    if largest > touch.allowed_n:
+    rails = [
+        largest_force_n(limits.travel_ceiling_n, k, one.speed, one.acceleration, WATCH_S + one.stop_latency_s)
+        for name, one in facts.items()
+        if name != MOTOR
+    ]
+    if rails:
+        found.table("largest forces of the rails", ("of a rail that runs down on something", f"{max(rails):.2f} N"))
+    largest = max(by_step, by_approach, *rails)
+    if not largest <= limits.rated_force_n:  # also refuses what is not a number
         found.problems.append(
-            f"The first touch may come to {largest:.2f} N; {touch.allowed_n:g} N are allowed. Lower touch_speed_mm_s, "
+            f"The force may come to {largest:.2f} N; the weakest part is rated for {limits.rated_force_n:.2f} N. Lower "
+            "the speed, the ceiling or the approach's threshold, or quicken the line."
+        )
+    if not first <= touch.allowed_n:
+        found.problems.append(
+            f"The first touch may come to {first:.2f} N; {touch.allowed_n:g} N are allowed. Lower touch_speed_mm_s, "
             "mean_n or mean_ms."
         )
 
 
 def _places(found: _Findings, settings: RigSettings) -> None:
     """Say where the manipulator would go."""
-    try:
-        workspace = workspace_of(settings)
-        check_places(settings)
-    except TactbenchError as error:
-        found.problems.append(str(error))
+    platform = Platform.of(settings)
+    if platform is None:
         return
-    if workspace is None:
-        found.table("places", ("manipulator", "fixed: somebody puts the sensor below the indenter"))
-        return
-    heights = settings.heights.heights()
+    found.refusing(platform.check)
+    heights = settings.heights
     corners = ", ".join(f"({1e3 * x:g}, {1e3 * y:g})" for x, y in settings.places.corners_m())
     found.table(
         "places",
-        ("manipulator", workspace.delta.title),
+        ("manipulator", platform.workspace.delta.title),
         ("corners of what scenes may ask for", f"{corners} mm"),
         ("stand-off, clearance plane", f"{1e3 * heights.stand_off_m:g}, {1e3 * heights.clearance_m:g} mm"),
-        ("all moves between them", "permitted"),
     )
-
-
-def _first_bytes(found: _Findings, file: RigFile) -> None:
-    """Say what each device would be sent first: who it is, and its settings; of motors nothing that moves."""
-    rows: list[tuple[str, ...]] = []
-    for sensor in file.sensors:
-        entries = file.entries()
-        names = [sensor] if rows else [sensor, "force", MOTOR, *(name for name in JOINTS if name in entries)]
-        emulated = file.model_copy(
-            update={
-                "sensors": {sensor: _emulated(file.sensors[sensor])},
-                "force": None if file.force is None else _emulated(file.force),
-                "devices": {name: _emulated(entry) for name, entry in file.devices.items()},
-            }
-        )
-        registry = load_registry()
-        for name in names:
-            try:
-                emulators = emulators_of(emulated, registry, sensor, lambda t_s: {})
-                with EmulatedDevices({name: emulators[name]}, keep_log=True) as devices:
-                    links: dict[str, Callable[[], Link]] = {name: devices.opener(name)}
-                    driver = drivers_of(emulated, registry, sensor, links, devices.clock, (name,))[name]
-                    with driver:
-                        driver.identify()
-                        driver.start()
-                        if name == "force" and file.force is not None:
-                            PressingForce(file.force, driver.streams)
-                    sent = [passed.piece for passed in devices.log_of(name) if passed.sender == "host"]
-            except TactbenchError as error:
-                found.problems.append(str(error))
-                continue
-            rows.append((name, entries[name].link, "  ".join(_shown(piece) for piece in sent[:FIRST])))
-    title = "sent first, by the drivers to emulated devices"
-    found.tables.append(CheckTable(title, ("device", "link", "bytes"), tuple(rows)))
-
-
-def _emulated(entry: _Entry) -> _Entry:
-    return entry.model_copy(update={"link": "emulated", "faults": ()})
-
-
-def _shown(piece: object) -> str:
-    """Return a piece as text where it is text, else its bytes; a CAN frame as number and bytes."""
-    if isinstance(piece, CanFrame):
-        return f"{piece.id:X}#{piece.data.hex(' ').upper()}"
-    assert isinstance(piece, bytes)
-    if piece.endswith(b"\r") and piece.isascii():
-        return repr(piece.decode("ascii")).strip("'")
-    text = piece[:MOST_BYTES].hex(" ").upper()
-    return f"{text} … ({len(piece)} bytes)" if len(piece) > MOST_BYTES else text

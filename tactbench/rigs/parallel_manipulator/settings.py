@@ -7,28 +7,25 @@ positive into the skin.
 from __future__ import annotations
 
 import math
-from typing import Annotated, Literal, Self
+from typing import Annotated, Any, Literal, Self
 
-from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, ValidationError, field_validator, model_validator
+from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, field_validator, model_validator
 
-from tactbench.plugin import ForceLoop, Quantity, UsageError, sourced
-from tactbench.plugin.devices import NamedDevice, RigFile
-from tactbench.rigs.parallel_manipulator.force_law import ForceLaw
-from tactbench.rigs.parallel_manipulator.geometry import Geometry
-from tactbench.rigs.parallel_manipulator.motion_profile import MotionLimits
-from tactbench.rigs.parallel_manipulator.motor.profile import FaulhaberOptions
-from tactbench.rigs.parallel_manipulator.options import read_options
-from tactbench.rigs.parallel_manipulator.press_moves import PressHeights
-from tactbench.rigs.parallel_manipulator.singularity import PostureLimits
+from tactbench.plugin import UsageError, load_object
+from tactbench.plugin.devices import ForceLaw, LoopModel, NamedDevice, Positioner, PressPlan, RigFile, read_options
+from tactbench.rigs.parallel_manipulator.kinematics import LinearDelta
+from tactbench.rigs.parallel_manipulator.workspace import Postures
 
 MOTOR = "motor"
-"""Name of the linear motor's entry under `devices:`."""
+"""Name of the pressing axis' entry under `devices:`."""
 JOINTS = ("joint-1", "joint-2", "joint-3")
-"""Names of the entries of the manipulator's drives, in the order of its legs."""
+"""Names of the entries of the manipulator's rails, in the order of its legs."""
 BEATS = 3
 """Control periods without a beat after which the guard retreats, at least (derived: rig practice of two to three)."""
 LEAST_HEARTBEAT_S = 0.02
 """Shorter limits trip falsely: sleeps on an ordinary kernel are late by up to 9.4 ms (measured)."""
+FORCE_AGE_S = 0.010
+"""Added to three sampling periods of the force sensor: how old a sample may be, unless it is stated."""
 
 Positive = Annotated[FiniteFloat, Field(gt=0)]
 NotNegative = Annotated[FiniteFloat, Field(ge=0)]
@@ -39,23 +36,22 @@ class _Part(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid")
 
 
-def _from_rig_file(value: float, unit: str) -> Quantity:
-    return sourced(value, unit, "the rig file")
-
-
 class SafetyLimits(_Part):
-    """What is never exceeded; all but the torque must be stated."""
+    """What is never exceeded."""
 
     force_ceiling_n: Positive
-    """Norm of the raw force, in one sample, at which the motor retreats."""
+    """Norm of the raw force, in one sample, at which the motor retreats while it presses."""
+    travel_ceiling_n: Positive = 0.2
+    """The same while the manipulator moves, and while anything is homed or retracted: above noise and drift, well below
+    a press (assumed)."""
     torque_ceiling_nm: Positive | None = None
     """Norm of the raw torque; None: torque is not looked at."""
     rated_force_n: Positive
     """What the weakest part bears: skin, sensor, force sensor, cap. By its data sheet."""
+    force_age_ms: Positive | None = None
+    """How old a sample of the force may be; None: three sampling periods and 10 ms."""
     travel_mm: Range
     """Least and greatest position of the motor; 0 lies between them, where the drive keeps them."""
-    homing_force_n: Positive = 0.2
-    """Norm of the raw force that ends homing and retracting: above noise and drift, well below a press (assumed)."""
     heartbeat_ms: Positive
     """The motor retreats if nobody has told it for so long to go on."""
     retreat_mm: FiniteFloat
@@ -69,9 +65,13 @@ class SafetyLimits(_Part):
             raise ValueError("the motor's travel goes from below 0 to above 0")
         if not low <= self.retreat_mm < high:
             raise ValueError("the motor retreats to a place outside its travel")
-        if self.rated_force_n <= self.force_ceiling_n:
-            raise ValueError("the ceiling is not below the rated force")
+        if not self.travel_ceiling_n <= self.force_ceiling_n < self.rated_force_n:
+            raise ValueError("ceiling of travel, ceiling of pressing and rated force do not rise in this order")
         return self
+
+    def force_age_s(self, rate_hz: float | None) -> float:
+        """Return how old a sample of a force sensor with a rate may be [s]."""
+        return FORCE_AGE_S + 3 / (rate_hz or 1000.0) if self.force_age_ms is None else 1e-3 * self.force_age_ms
 
 
 class Stiffness(_Part):
@@ -123,31 +123,26 @@ class ForceControl(_Part):
         """Largest increment in a control period [m]."""
         return 1e-3 * self.speed_mm_s / self.rate_hz
 
-    def loop(self) -> ForceLoop:
-        """Return the loop as scenes state it."""
-        return ForceLoop(
-            proportional=_from_rig_file(self.proportional_mm_n, "mm/N"),
-            integral=_from_rig_file(self.integral_mm_n_s, "mm/N/s"),
-            cutoff=None if self.cutoff_hz is None else _from_rig_file(self.cutoff_hz, "Hz"),
-            rate=_from_rig_file(self.rate_hz, "Hz"),
-            delay=_from_rig_file(self.delay_ms, "ms"),
-            motor_lag=_from_rig_file(self.motor_lag_ms, "ms"),
-            speed=_from_rig_file(self.speed_mm_s, "mm/s"),
-        )
+    def model(self, law: ForceLaw) -> LoopModel:
+        """Return the loop on a linear skin."""
+        return LoopModel.around(law, lag_s=1e-3 * self.motor_lag_ms, delay_s=1e-3 * self.delay_ms)
 
     def law(self, travel_mm: Range) -> ForceLaw:
         """Return the law within a travel of the motor."""
         return ForceLaw(
-            loop=self.loop(),
-            speed=_from_rig_file(self.speed_mm_s, "mm/s"),
-            windup_time=_from_rig_file(self.windup_ms, "ms"),
-            travel=(_from_rig_file(travel_mm[0], "mm"), _from_rig_file(travel_mm[1], "mm")),
-            feed_forward=None if self.feed_forward_n_mm is None else _from_rig_file(self.feed_forward_n_mm, "N/mm"),
+            period_s=self.period_s,
+            proportional=1e-3 * self.proportional_mm_n,
+            integral=1e-3 * self.integral_mm_n_s,
+            cutoff_hz=self.cutoff_hz,
+            speed=1e-3 * self.speed_mm_s,
+            windup_s=1e-3 * self.windup_ms,
+            travel=(1e-3 * travel_mm[0], 1e-3 * travel_mm[1]),
+            feed_forward=math.inf if self.feed_forward_n_mm is None else 1e3 * self.feed_forward_n_mm,
         )
 
 
 class Touch(_Part):
-    """How the surface is found."""
+    """How the surface is found; see :class:`PressPlan`."""
 
     speed_mm_s: Positive
     """On the way to the expected surface, out of its reach."""
@@ -172,23 +167,22 @@ class Touch(_Part):
 
 
 class PressRules(_Part):
-    """What ends a press before its time, and how it ends."""
+    """What ends a press before its time, and how it ends; see :class:`PressPlan`."""
 
     error_band_n: Positive
-    """Filtered force this far from the wanted one for a second: retreat. Also the least height of a growing swing."""
     band_n: Positive
-    """Filtered forces below it count as no force: above the noise of the filtered force."""
     lost_s: Positive
-    """Contact is lost if the force is in the band for so long while more than twice the band is wanted."""
     hold_s: NotNegative = 0.0
-    """How long the largest force is held after the scene's profile."""
     unload_speed_mm_s: Positive
     stale_ms: Positive = 100.0
     """The sensor's rows may be this old, as received; older: retreat."""
 
 
 class Heights(_Part):
-    """Where the sensor's surface is expected below the indenter."""
+    """Where the sensor's surface is expected below the indenter.
+
+    Heights are those of the manipulator's point at which the tip of the retracted indenter would have that height.
+    """
 
     surface_mm: FiniteFloat
     """Height of the manipulator at which the retracted indenter would touch; 0 where it is fixed."""
@@ -203,15 +197,24 @@ class Heights(_Part):
     depth_mm: Positive
     """How far below the expected surface the motor may go."""
 
-    def heights(self) -> PressHeights:
-        """Return them as moves use them."""
-        names = ("surface", "surface_spread", "cap_tolerance", "stand_off", "clearance", "depth")
-        return PressHeights(**{name: _from_rig_file(getattr(self, f"{name}_mm"), "mm") for name in names})
-
     @model_validator(mode="after")
     def _in_order(self) -> Self:
-        self.heights()
+        least_mm = 3 * self.surface_spread_mm + self.cap_tolerance_mm
+        if least_mm > self.stand_off_mm:
+            raise ValueError(f"the stand-off is less than 3 spreads and the cap's tolerance, {least_mm:g} mm")
+        if self.clearance_mm < self.stand_off_mm:
+            raise ValueError("the clearance is less than the stand-off")
         return self
+
+    @property
+    def stand_off_m(self) -> float:
+        """Height of the manipulator while the motor presses [m]."""
+        return 1e-3 * (self.surface_mm + self.stand_off_mm)
+
+    @property
+    def clearance_m(self) -> float:
+        """Height of the manipulator on sideways moves [m]."""
+        return 1e-3 * (self.surface_mm + self.clearance_mm)
 
 
 class Places(_Part):
@@ -228,6 +231,8 @@ class Places(_Part):
     """Offsets along its arc; laid out flat."""
     scatter_mm: NotNegative = 0.0
     """Radius of the disc in which each press's place is drawn, evenly, about the one asked for."""
+    way_point_mm: Positive = 1.0
+    """The manipulator's line is kept by points at most so far apart, at each of which all rails come to rest."""
 
     @model_validator(mode="after")
     def _in_order(self) -> Self:
@@ -250,51 +255,14 @@ class Places(_Part):
         return [self.place_m(*at) for at in ((x0, s0), (x1, s0), (x1, s1), (x0, s1))]
 
 
-class JointMotion(_Part):
-    """How the manipulator's platform moves."""
-
-    speed_mm_s: Positive = 20.0
-    acceleration_mm_s2: Positive = 200.0
-    jerk_mm_s3: Positive = 2000.0
-    way_point_mm: Positive = 1.0
-    """The line is kept by points at most so far apart, at each of which all joints come to rest."""
-
-    def limits(self) -> MotionLimits:
-        """Return the limits of a move."""
-        return MotionLimits(
-            speed=_from_rig_file(self.speed_mm_s, "mm/s"),
-            acceleration=_from_rig_file(self.acceleration_mm_s2, "mm/s/s"),
-            jerk=_from_rig_file(self.jerk_mm_s3, "mm/s/s/s"),
-        )
-
-
-class Postures(_Part):
-    """How near a singularity the manipulator may go."""
-
-    serial: Annotated[FiniteFloat, Field(ge=0.01, lt=1)] = 0.15
-    parallel: Annotated[FiniteFloat, Field(ge=0.01, lt=1)] = 0.15
-    constraint: Annotated[FiniteFloat, Field(ge=0.01, lt=1)] = 0.15
-    sideways_deg: Annotated[FiniteFloat, Field(gt=0, lt=90)] = 30.0
-
-    def limits(self) -> PostureLimits:
-        """Return the limits of the workspace."""
-        return PostureLimits(
-            serial=_from_rig_file(self.serial, "1"),
-            parallel=_from_rig_file(self.parallel, "1"),
-            constraint=_from_rig_file(self.constraint, "1"),
-            sideways=_from_rig_file(self.sideways_deg, "deg"),
-        )
-
-
 class RigSettings(_Part):
     """All that this rig is told beside its devices."""
 
     limits: SafetyLimits
-    manipulator: Literal["fixed"] | Geometry
+    manipulator: Literal["fixed"] | LinearDelta
     """`fixed`: somebody puts the sensor below the indenter, and nothing but the motor moves."""
     heights: Heights
     places: Places = Places()
-    motion: JointMotion = JointMotion()
     postures: Postures = Postures()
     stiffness: Stiffness
     force_loop: ForceControl
@@ -316,11 +284,12 @@ class RigSettings(_Part):
             (touch.touch_speed_mm_s > touch.speed_mm_s, "the touch is quicker than the way to it"),
             (self.press.error_band_n <= self.press.band_n, "the band of errors is not above that of no force"),
             (touch.lift_mm >= self.heights.stand_off_mm, "the lift is not within the stand-off"),
+            (loop.integral_mm_n_s == 0 and loop.proportional_mm_n == 0, "the force loop has no gain"),
             (
                 limits.retreat_mm + self.heights.stand_off_mm + self.heights.depth_mm > highest,
                 "stand-off and depth below the place of retreat are beyond the motor's travel",
             ),
-        ):  # fmt: skip
+        ):
             if wrong:
                 raise ValueError(problem)
         return self
@@ -335,10 +304,29 @@ class RigSettings(_Part):
         """The greatest position that is ever asked for [m]."""
         return self.surface_m + 1e-3 * self.heights.depth_mm
 
-    @property
-    def near_m(self) -> float:
-        """Where the motor goes over to the speed of touching [m]: three spreads and a cap's tolerance above it."""
-        return self.surface_m - 1e-3 * (3 * self.heights.surface_spread_mm + self.heights.cap_tolerance_mm)
+    def press_plan(self, resolution_m: float) -> PressPlan:
+        """Return the numbers of a press by an axis with a least step [m]."""
+        touch, press, heights = self.touch, self.press, self.heights
+        return PressPlan(
+            law=self.force_loop.law(self.limits.travel_mm),
+            resolution_m=resolution_m,
+            step_m=self.force_loop.step_m,
+            # Three spreads and a cap's tolerance above the expected surface.
+            near_m=self.surface_m - 1e-3 * (3 * heights.surface_spread_mm + heights.cap_tolerance_mm),
+            deepest_m=self.deepest_m,
+            speed_m_s=1e-3 * touch.speed_mm_s,
+            touch_speed_m_s=1e-3 * touch.touch_speed_mm_s,
+            unload_speed_m_s=1e-3 * press.unload_speed_mm_s,
+            mean_n=touch.mean_n,
+            mean_s=1e-3 * touch.mean_ms,
+            contact_n=touch.contact_n,
+            settle_s=touch.settle_s,
+            lift_m=1e-3 * touch.lift_mm,
+            error_band_n=press.error_band_n,
+            band_n=press.band_n,
+            lost_s=press.lost_s,
+            hold_s=press.hold_s,
+        )
 
 
 class ManipulatorFile(RigFile):
@@ -355,25 +343,9 @@ class ManipulatorFile(RigFile):
 
 
 def settings_of(file: RigFile) -> RigSettings:
-    """Return the settings of a rig file that was read before.
-
-    Raises
-    ------
-    UsageError
-        If one is missing, not known or contradicts another, or a device is missing.
-    """
-    try:
-        found = RigSettings.model_validate(file.settings)
-    except ValidationError as error:
-        first = error.errors(include_url=False)[0]
-        name = ".".join(map(str, ("settings", *first["loc"])))
-        message = "is missing" if first["type"] == "missing" else first["msg"].removeprefix("Value error, ")
-        raise UsageError(
-            f"{name} in the rig file: {message}.",
-            hint="`tactbench doctor --rig-file FILE --seconds 0` names the line; see docs/hardware.md.",
-        ) from error
-    required = (MOTOR,) if found.manipulator == "fixed" else (MOTOR, *JOINTS)
-    missing = [name for name in required if name not in file.devices]
+    """Return the settings of a rig file; raises UsageError if one is wrong, or a device is missing."""
+    found = read_options(RigSettings, file.settings, "the rig file's settings")
+    missing = [name for name in axes_of(found) if name not in file.devices]
     if missing or file.force is None:
         raise UsageError(
             f"The rig file has no {', '.join([*missing, *(['force'] if file.force is None else [])])}.",
@@ -382,7 +354,23 @@ def settings_of(file: RigFile) -> RigSettings:
     return found
 
 
-def with_limits(file: RigFile, settings: RigSettings) -> RigFile:
+def axes_of(settings: RigSettings) -> tuple[str, ...]:
+    """Return the names of the axes, the pressing one first: it is homed and retracted before the others move."""
+    return (MOTOR,) if settings.manipulator == "fixed" else (MOTOR, *JOINTS)
+
+
+def positioner_of(registry: Any, name: str, entry: NamedDevice) -> tuple[type[Positioner], dict[str, Any]]:
+    """Return the class of an axis, and its options; raises UsageError if it is none."""
+    descriptor = registry.devices[entry.device]
+    kind: Any = load_object(descriptor.driver)
+    if not (isinstance(kind, type) and issubclass(kind, Positioner)):
+        raise UsageError(
+            f"The {name}, {entry.device}, is no Positioner.", hint="Its DeviceDescriptor's driver names the class."
+        )
+    return kind, {**(descriptor.emulated_options if entry.emulated else {}), **entry.options}
+
+
+def with_limits(file: RigFile, settings: RigSettings, registry: Any) -> RigFile:
     """Return the file with the motor told the limits of the settings; raises UsageError if it was told others."""
     limits = settings.limits
     own = {
@@ -394,8 +382,9 @@ def with_limits(file: RigFile, settings: RigSettings) -> RigFile:
         "acceleration_m_s2": 1e-3 * settings.touch.acceleration_mm_s2,
     }
     entry = file.devices[MOTOR]
-    if entry.options.get("homing", "here") == "here":  # it stands at the place to which it retreats
-        own["home_m"] = own["retreat_m"]
+    kind, options = positioner_of(registry, MOTOR, entry)
+    if "homing" in kind.options_kind.model_fields and options.get("homing", "here") == "here":
+        own["home_m"] = own["retreat_m"]  # it stands at the place to which it retreats
     for name, value in own.items():
         if name in entry.options and not math.isclose(float(entry.options[name]), value, rel_tol=1e-9):
             raise UsageError(
@@ -403,5 +392,5 @@ def with_limits(file: RigFile, settings: RigSettings) -> RigFile:
                 hint="State it once, under `settings: limits:` and `touch:`.",
             )
     motor = entry.model_copy(update={"options": {**entry.options, **own}})
-    read_options(FaulhaberOptions, motor.options, "faulhaber")
+    read_options(kind.options_kind, {**options, **own}, entry.device)
     return file.model_copy(update={"devices": {**file.devices, MOTOR: motor}})

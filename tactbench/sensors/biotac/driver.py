@@ -56,6 +56,7 @@ from tactbench.plugin.devices import (
     SpiLink,
     SpiReply,
     SpiStep,
+    read_options,
 )
 from tactbench.sensors.biotac.codec import (
     COMMAND_RATE,
@@ -68,7 +69,7 @@ from tactbench.sensors.biotac.codec import (
     property_text,
 )
 from tactbench.sensors.biotac.frames import FrameBatches, counted, streams_of
-from tactbench.sensors.biotac.options import Options
+from tactbench.sensors.biotac.options import BioTacOptions
 
 if TYPE_CHECKING:
     from tactbench.plugin.devices import Link
@@ -83,7 +84,7 @@ class BioTacDriver(Driver):
     Parameters
     ----------
     settings
-        The link is an SPI link; options are those of :class:`~tactbench.sensors.biotac.options.Options`.
+        The link is an SPI link; options are those of :class:`~tactbench.sensors.biotac.options.BioTacOptions`.
 
     Raises
     ------
@@ -96,7 +97,7 @@ class BioTacDriver(Driver):
     """
 
     def __init__(self, settings: DriverSettings) -> None:
-        self._options = Options.checked(settings.options)
+        self._options = read_options(BioTacOptions, settings.options, "biotac")
         self._clock = settings.clock
         self._counts: Counter[str] = Counter()
         self._running = False

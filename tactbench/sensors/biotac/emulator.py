@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, ClassVar
 
 from tactbench.plugin import UsageError
-from tactbench.plugin.devices import Fault, SpiDeviceEmulator, fault_concerns
+from tactbench.plugin.devices import Fault, SpiDeviceEmulator, fault_concerns, read_options
 from tactbench.sensors.biotac.channels import CONVERTER_TOP, STREAMS
 from tactbench.sensors.biotac.codec import (
     CLOCK,
@@ -29,7 +29,7 @@ from tactbench.sensors.biotac.codec import (
     encoded,
     parity_holds,
 )
-from tactbench.sensors.biotac.options import Options
+from tactbench.sensors.biotac.options import BioTacOptions
 
 if TYPE_CHECKING:
     from tactbench.plugin.devices import EmulatorSettings, Senses
@@ -268,6 +268,6 @@ def build_emulator(settings: EmulatorSettings) -> Emulator:
     UsageError
         For options or faults that are not known.
     """
-    options = Options.checked(settings.options)
+    options = read_options(BioTacOptions, settings.options, "biotac")
     faults = [BioTacFault.parse(text) for text in settings.faults]
     return Emulator(settings.senses, faults=faults, select=options.select, clock_hz=FASTEST_CLOCK.to("Hz"))

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Annotated, Any, Self
+from typing import Annotated
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
+from pydantic import BeforeValidator, Field
 
-from tactbench.plugin import UsageError
+from tactbench.plugin.devices import Options
 from tactbench.sensors.biotac.codec import CHANNELS
 from tactbench.sensors.biotac.frames import DEFAULT_FRAME
 
@@ -20,31 +19,7 @@ def _names(given: object) -> object:
     return names
 
 
-class _Checked(BaseModel):
-    model_config = ConfigDict(frozen=True, extra="forbid", strict=True)
-
-    @classmethod
-    def checked(cls, given: Mapping[str, Any]) -> Self:
-        """Return the options.
-
-        Raises
-        ------
-        UsageError
-            For a key that is not known, or a value that it cannot have.
-        """
-        try:
-            return cls.model_validate(dict(given))
-        except ValidationError as error:
-            wrong = "; ".join(
-                f"{'.'.join(map(str, part['loc']))}: {part['input']!r} was given, {part['msg']}"
-                for part in error.errors()
-            )
-            raise UsageError(
-                f"Options of a biotac: {wrong}.", hint=f"Options are {', '.join(cls.model_fields)}."
-            ) from error
-
-
-class Options(_Checked):
+class BioTacOptions(Options):
     """Of the driver and the emulator."""
 
     select: int = Field(default=1, ge=1, le=0xFF)
@@ -56,11 +31,11 @@ class Options(_Checked):
     """How often every word is asked for again, so that words of bad parity can be replaced."""
     batch_words: int | None = Field(default=None, ge=1, le=1000)
     """Words in a batch; None: a frame. Fewer where a bridge takes only short batches: a word is 14 bytes of payload."""
-    batches_ahead: int = Field(default=4, ge=2, le=16)
+    batches_ahead: int = Field(default=8, ge=2, le=16)
     """Batches under way at once, as far as the adapter holds them: so long may the host be late without a gap."""
 
 
-class LogOptions(_Checked):
+class LogOptions(Options):
     """Of the reader of text logs."""
 
     sensor: int = Field(default=0, ge=0)

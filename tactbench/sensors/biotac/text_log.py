@@ -20,7 +20,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from tactbench.plugin import DataError, Source
-from tactbench.plugin.devices import DeviceLog
+from tactbench.plugin.devices import DeviceLog, read_options
 from tactbench.sensors.biotac.codec import CHANNELS, NAMES, Fault, Reply
 from tactbench.sensors.biotac.frames import FrameRows, quality_of, streams_of
 from tactbench.sensors.biotac.options import LogOptions
@@ -60,7 +60,7 @@ def read_log(path: Path, options: Mapping[str, Any]) -> DeviceLog:
     DataError
         If the file cannot be read, or has no sample of the sensor.
     """
-    settings = LogOptions.checked(options)
+    settings = read_options(LogOptions, options, "a log of biotac")
     try:
         lines = path.read_text(encoding="utf-8", errors="replace").splitlines()
     except OSError as error:

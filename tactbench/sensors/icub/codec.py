@@ -274,6 +274,8 @@ class Counts:
     samples: int = 0
     missing_heads: int = 0
     missing_tails: int = 0
+    far_apart: int = 0
+    """Samples whose halves are half a period apart or more."""
     doubled: int = 0
     """Frames kept out because they came twice."""
     malformed: int = 0
@@ -293,6 +295,7 @@ class Counts:
         found = {
             "heads missing": self.missing_heads,
             "tails missing": self.missing_tails,
+            "halves far apart": self.far_apart,
             "frames doubled": self.doubled,
             "frames of wrong length": self.malformed,
             "samples without error word": self.without_word,
@@ -319,8 +322,9 @@ class _Triangle:
 class SkinDecoder:
     """From frames, as they come from a bus or a log, to samples.
 
-    Head and tail make a sample if the tail comes less than half a period after the head. Two heads or two tails in a
-    row are one frame doubled if they are equal and less than half a period apart; otherwise a half is missing. What
+    A head and the tail behind it make a sample: frames keep their order on the bus. Half a period apart or more, all
+    its taxels are SUSPECT; nine tenths, they are of two samples whose other halves were lost. Two heads or two tails in
+    a row are one frame doubled if they are equal and less than half a period apart; otherwise a half is missing. What
     cannot be known from such frames: a whole sample lost, or doubled; which of two equal heads in a burst was doubled
     and which lost its tail.
 
@@ -391,7 +395,7 @@ class SkinDecoder:
                 triangle.doubled += tuple(range(IN_HEAD, TAXELS))
                 return []
             return [self._sample(key, triangle, None, frame)]
-        if self._near(head, frame):
+        if frame.t_ns - head.t_ns < 0.9 * self._period_ns:
             return [self._sample(key, triangle, head, frame)]
         return [self._sample(key, triangle, head, None), self._sample(key, triangle, None, frame)]
 
@@ -425,7 +429,9 @@ class SkinDecoder:
         for taxel in out_of_range(word or 0):
             marks[taxel] |= Quality.SATURATED | Quality.SUSPECT
             counts.out_of_range[taxel] += 1
-        if tail is None or (word or 0) & (NO_ACK | RESERVED):
+        far_apart = head is not None and tail is not None and not self._near(head, tail)
+        counts.far_apart += far_apart
+        if far_apart or tail is None or (word or 0) & (NO_ACK | RESERVED):
             marks = [mark | Quality.SUSPECT for mark in marks]
         if head is None:
             marks[:IN_HEAD] = [Quality.MISSING] * IN_HEAD

@@ -6,8 +6,18 @@ from collections import Counter
 from collections.abc import Mapping
 from contextlib import suppress
 
-from tactbench.plugin import Block, Source, StreamSpec, UsageError
-from tactbench.plugin.devices import CanFrame, CanLink, Driver, DriverSettings, LinkError, LinkTimeout, LinkUnplugged
+from tactbench.plugin import Block, Source, StreamSpec
+from tactbench.plugin.devices import (
+    CanFrame,
+    CanLink,
+    Driver,
+    DriverSettings,
+    LinkError,
+    LinkTimeout,
+    LinkUnplugged,
+    open_for,
+    read_options,
+)
 from tactbench.sensors.icub.channels import STREAMS
 from tactbench.sensors.icub.codec import (
     Command,
@@ -20,7 +30,7 @@ from tactbench.sensors.icub.codec import (
     skin_id,
     to_block,
 )
-from tactbench.sensors.icub.options import FingertipOptions, checked
+from tactbench.sensors.icub.options import FingertipOptions
 
 SETTLE_S = 0.5
 """From the set-up to the start: the board takes its baseline [sourced: icub-main CanBusSkin.cpp waits as long]."""
@@ -33,9 +43,9 @@ MOST_FRAMES = 4096
 class FingertipDriver(Driver):
     """One fingertip: one triangle of one board.
 
-    Times are the host's at receipt: the board sends no number and no time. A head whose tail does not come within half
-    a period is a sample by itself. Frames of other triangles, boards and hosts are counted and left out; its own
-    commands, which some buses give back, are left out.
+    Times are the frames': the board sends no number and no time. A head without a tail is a sample by itself once the
+    next head has come, or nothing comes for a period. Frames of other triangles, boards and hosts are counted and left
+    out; its own commands, which some buses give back, are left out.
 
     Parameters
     ----------
@@ -51,7 +61,7 @@ class FingertipDriver(Driver):
     """
 
     def __init__(self, settings: DriverSettings) -> None:
-        self._options = options = checked(FingertipOptions, settings.options)
+        self._options = options = read_options(FingertipOptions, settings.options, "icub")
         self._clock = settings.clock
         stream = next((one for one in settings.streams if one.name == STREAMS[0].name), STREAMS[0])
         rate = Source(tag="derived", reference=f"the board is set up for {1e3 * options.period_s:g} ms")
@@ -65,14 +75,7 @@ class FingertipDriver(Driver):
         """Counts of what was read before the last start."""
         self._others = 0
         self._decoder = self._fresh_decoder()
-        link = settings.open_link()
-        if not isinstance(link, CanLink):
-            link.close()
-            raise UsageError(
-                f"An iCub fingertip speaks CAN; {link.address} is none.",
-                hint="Write can://socketcan/can0, for example.",
-            )
-        self._link = link
+        self._link = open_for(settings, "icub", CanLink, "can://socketcan/can0")  # type: ignore[type-abstract]
 
     @property
     def streams(self) -> tuple[StreamSpec, ...]:
@@ -150,7 +153,7 @@ class FingertipDriver(Driver):
             try:
                 frame = self._link.receive(left_s)
             except LinkTimeout:
-                samples += self._decoder.flush(self._clock() - round(5e8 * self._options.period_s))
+                samples += self._decoder.flush(self._clock() - round(1e9 * self._options.period_s))
                 break
             except LinkUnplugged:
                 samples += self._decoder.flush()

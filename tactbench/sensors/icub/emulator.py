@@ -18,7 +18,15 @@ from itertools import count
 from typing import ClassVar, Literal
 
 from tactbench.plugin import UsageError
-from tactbench.plugin.devices import CanFrame, DeviceEmulator, EmulatorSettings, Fault, Senses, fault_concerns
+from tactbench.plugin.devices import (
+    CanFrame,
+    DeviceEmulator,
+    EmulatorSettings,
+    Fault,
+    Senses,
+    fault_concerns,
+    read_options,
+)
 from tactbench.sensors.icub.channels import STREAMS
 from tactbench.sensors.icub.codec import (
     BIT_RATE,
@@ -39,7 +47,7 @@ from tactbench.sensors.icub.codec import (
     skin_frames,
     version_frame,
 )
-from tactbench.sensors.icub.options import FingertipOptions, checked
+from tactbench.sensors.icub.options import FingertipOptions
 
 VERSION = Version(11, (1, 0, 1), (2, 0), True)
 """An MTB4 [sourced: icub-firmware, eobrd_cantype_mtb4] with the numbers of a public application [sourced: IF, vAP and
@@ -271,6 +279,6 @@ def build_emulator(settings: EmulatorSettings) -> Bus:
     UsageError
         If an option or a fault is not known.
     """
-    options = checked(FingertipOptions, settings.options)
+    options = read_options(FingertipOptions, settings.options, "icub")
     faults = [BoardFault.parse(text) for text in settings.faults]
     return Bus(settings.senses, board=options.board, triangle=options.triangle, faults=faults)

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from tactbench.plugin import DataError, Source, UsageError
-from tactbench.plugin.devices import CanFrame, CanLog, DeviceLog, LinkEnded
+from tactbench.plugin.devices import CanFrame, CanLog, DeviceLog, LinkEnded, read_options
 from tactbench.sensors.icub.channels import STREAMS
 from tactbench.sensors.icub.codec import (
     BROADCAST,
@@ -23,7 +23,7 @@ from tactbench.sensors.icub.codec import (
     read_command,
     to_block,
 )
-from tactbench.sensors.icub.options import LogOptions, checked
+from tactbench.sensors.icub.options import LogOptions
 
 
 def read_log(path: Path, options: Mapping[str, Any]) -> DeviceLog:
@@ -48,7 +48,7 @@ def read_log(path: Path, options: Mapping[str, Any]) -> DeviceLog:
     DataError
         If no frames of such a fingertip are in it.
     """
-    settings = checked(LogOptions, options)
+    settings = read_options(LogOptions, options, "a log of icub")
     classes = (OLD_SKIN, SKIN) if settings.old_ids else (SKIN,)
     halves: dict[tuple[int, int], list[CanFrame]] = {}
     commands = []

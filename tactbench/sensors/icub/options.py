@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any, Literal, Self, TypeVar
+from typing import Literal, Self
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+from pydantic import Field, model_validator
 
-from tactbench.plugin import UsageError
+from tactbench.plugin.devices import Options
 from tactbench.sensors.icub.codec import BoardSetup, Command, OldSetup, OldSetup2, Transmit, TriangleSetup
 
 
-class FingertipOptions(BaseModel):
+class FingertipOptions(Options):
     """One fingertip: a triangle of a board, and how the board is set up.
 
     A set-up is the whole board's: its other triangles are disabled by it. The numbers by default are those of two
@@ -19,8 +18,6 @@ class FingertipOptions(BaseModel):
     board 14, type 1, reading at rest 240, shift 0, offset 2000], but for the period: 50 ms there, here that of the
     sensor's spec, which no source shows in use.
     """
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
 
     board: int = Field(default=14, ge=0, le=14)
     triangle: int = Field(default=0, ge=0, le=15)
@@ -66,10 +63,8 @@ class FingertipOptions(BaseModel):
         )
 
 
-class LogOptions(BaseModel):
+class LogOptions(Options):
     """Which triangle of a log is the fingertip, and what the log does not say."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
 
     board: int | None = Field(default=None, ge=0, le=14)
     """None: the only one in the log."""
@@ -79,17 +74,3 @@ class LogOptions(BaseModel):
     """Milliseconds between samples; None: the median interval of the log."""
     old_ids: bool = False
     """Also take frames of class 3, which early firmware sends and other analog sensors share."""
-
-
-Options = TypeVar("Options", bound=BaseModel)
-
-
-def checked(kind: type[Options], given: Mapping[str, Any]) -> Options:
-    """Return `given` as options of that kind; raises UsageError for a name or a value that is not possible."""
-    try:
-        return kind.model_validate(dict(given))
-    except ValidationError as error:
-        first = error.errors(include_url=False)[0]
-        name = ".".join(str(part) for part in first["loc"])
-        what = f"The option {name!r} of icub" if name else "The options of icub"
-        raise UsageError(f"{what}: {first['msg']}.", hint=f"Options: {', '.join(kind.model_fields)}.") from None

@@ -9,8 +9,11 @@ from importlib.metadata import EntryPoint
 import pytest
 
 from tactbench.core.cli import main
+from tactbench.core.plugins.emulators import EmulatorControl
 from tactbench.core.plugins.registry import load_registry
+from tactbench.core.spec.quantity import assumed
 from tactbench.core.spec.yaml_file import load_yaml
+from tactbench.plugin import ForceRamp, Scene
 from tactbench.plugin.devices import EmulatedDevices, RigFile, drivers_of
 from tests.core.plugins import talking
 
@@ -21,18 +24,23 @@ POINTS = [
 ]
 
 
+SCENE = Scene(
+    name="press", profile=ForceRamp(duration=assumed(0.5, "s", "short"), hold=assumed(0.1, "s", "short"), samples=50)
+)
+
+
 @pytest.fixture
 def emulate(monkeypatch, tmp_path, capsys):
-    """The verb with these plugins, in a folder of its own: its exit code, stdout and stderr."""
+    """The verb with these plugins, in a folder of its own, until `over` is set: its exit code, stdout and stderr."""
     monkeypatch.setattr("tactbench.core.plugins.registry.entry_points", lambda group: POINTS)
     monkeypatch.chdir(tmp_path)
 
-    def call(*words, out=None, presses=2):
-        real, left = EmulatedDevices.advance, iter(range(presses - 1))
+    def call(*words, out=None, over=None):
+        real = EmulatedDevices.advance
 
         def advance(self, until_ns):
             real(self, until_ns)
-            if next(left, None) is None:
+            if over is None or over.is_set():
                 raise KeyboardInterrupt
 
         monkeypatch.setattr(EmulatedDevices, "advance", advance)
@@ -45,47 +53,46 @@ def emulate(monkeypatch, tmp_path, capsys):
     return call
 
 
-SHORT = ("--profile", "ramp:duration=0.5")
-
-
-def test_the_rig_file_printed_opens_the_devices(emulate, tmp_path):
-    """While it runs, drivers of that file read the pad and the scale from another thread."""
-    read, not_yet, printed = {}, threading.Event(), io.StringIO()
+def test_the_rig_file_printed_opens_devices_that_are_pressed_when_the_recording_begins(emulate, tmp_path):
+    """They were pressed when they liked, and a recording of the second terminal had an arbitrary part of a press."""
+    rest, pressed, over, not_yet, printed = [], [], threading.Event(), threading.Event(), io.StringIO()
 
     def record():
         registry = load_registry(POINTS)
         while not printed.getvalue():
             not_yet.wait(0.02)
         (tmp_path / "rig.yaml").write_text(printed.getvalue())
-        drivers = drivers_of(load_yaml(tmp_path / "rig.yaml", RigFile), registry, "pad", {}, lambda: 0)
-        for name, driver in drivers.items():
-            with driver:
-                driver.start()
-                read[name] = [driver.read(5.0)[0].data for _ in range(40)]
+        file = load_yaml(tmp_path / "rig.yaml", RigFile)
+        control = EmulatorControl(file.emulation.control)
+        try:
+            with drivers_of(file, registry, "pad", {}, lambda: 0, ["pad"])["pad"] as pad:
+                pad.start()
+                said = control.prepare("pad", SCENE, 1)
+                while pad.read(0.0):
+                    pass
+                rest.extend(pad.read(5.0)[0].data for _ in range(20))
+                control.begin()
+                while pad.read(0.0):
+                    pass
+                pressed.extend(pad.read(5.0)[0].data for _ in range(60))
+            assert said["plan"]
+        finally:
+            over.set()
 
     thread = threading.Thread(target=record)
     thread.start()
-    code, _, err = emulate("pad", "scale", "screw", *SHORT, out=printed)
+    code, _, err = emulate("pad", "scale", "screw", out=printed, over=over)
     thread.join()
     assert code == 130
     file = load_yaml(tmp_path / "rig.yaml", RigFile)
-    assert (file.rig, list(file.entries())) == ("bench", ["pad", "force", "motor"])
-    assert all(entry.link.startswith("udp://127.0.0.1:") for entry in file.entries().values())
+    assert (file.rig, list(file.entries())) == ("bench", ["pad", "force"])
+    assert all(entry.link.startswith("udp://127.0.0.1:") and entry.emulator for entry in file.entries().values())
     assert file.force.options == {"unit": "N"}  # as of a real one, from now on
+    assert "The bench opens no motor; it is at udp://127.0.0.1:" in err
     assert "tactbench record --rig-file rig.yaml --sensor pad --live --out press.h5" in err
-    assert "Press 1: 5 N after 0.5 s" in err
-    assert "Press 2:" in err
-    assert max(abs(data).max() for data in read["pad"]) > 100  # 1000 counts a newton
-    assert all(data.shape == (1, 1) for data in read["force"])
-
-
-def test_a_force_sensor_alone_feels_the_force_alone_and_ctrl_c_leaves_no_thread(emulate):
-    before = threading.active_count()
-    code, out, err = emulate("scale", "--profile", "ramp:duration=0.1", presses=1)
-    assert code == 130
-    assert threading.active_count() == before
-    assert out.startswith("force: udp://127.0.0.1:")
-    assert "A rig file needs a sensor" in err
+    assert "The scene begins" in err
+    # 1000 counts a newton; the ramp rises for 0.4 s.
+    assert max(abs(data).max() for data in rest) < 100 < max(abs(data).max() for data in pressed)
 
 
 def test_a_rig_file_is_started_and_keeps_what_is_real(emulate, tmp_path):
@@ -93,7 +100,7 @@ def test_a_rig_file_is_started_and_keeps_what_is_real(emulate, tmp_path):
         "rig: bench\ntitle: here\nsensors: {pad: {link: emulated, faults: [late, 'unplug:start_s=0.2']}}\n"
         "force: {device: scale, link: 'udp://127.0.0.1:9', channel: fx, sign: -1}\nsettings: {colour: red}\n"
     )
-    code, out, err = emulate("--rig-file", "mine.yaml", *SHORT)
+    code, out, err = emulate("--rig-file", "mine.yaml")
     assert code == 130
     (tmp_path / "out.yaml").write_text(out)
     file = load_yaml(tmp_path / "out.yaml", RigFile)
@@ -109,7 +116,10 @@ def test_a_rig_file_is_started_and_keeps_what_is_real(emulate, tmp_path):
     [
         ((), "Either devices or a rig file"),
         (("pda",), "Did you mean 'pad'"),
-        (("bare-scale",), "bare-scale has no emulator"),
+        (("pad", "scale", "bare-scale"), "A rig has one force"),
+        (("scale",), "A rig has a sensor, and none is named"),
+        (("pad", "bare-scale"), "bare-scale has no emulator"),
+        (("mute",), "mute has no emulator"),
         (("--rig-file", "late.yaml"), "'delay_s'"),
         (("--rig-file", "parity.yaml"), "no fault 'parity'"),
         (("--rig-file", "twni.yaml"), "Did you mean 'twin'"),
@@ -123,3 +133,11 @@ def test_what_cannot_be_is_said_with_the_next_step(emulate, tmp_path, words, sai
     code, out, err = emulate(*words)
     assert (code, out) == (2, "")
     assert said in err
+
+
+def test_ctrl_c_ends_it_with_130(emulate):
+    before = threading.active_count()
+    code, _, err = emulate("pad")
+    assert code == 130
+    assert "The emulated devices and their links are gone" in err
+    assert threading.active_count() == before

@@ -20,6 +20,7 @@ VERBS = {
     "inspect": ("ideal.h5",),
     "check": ("ideal",),
     "doctor": ("--rig-file", str(EXAMPLE), "--seconds", "0"),
+    "datasets": (),
     "leaderboard": (),
     "report": (),
     "compare": ("ols", "mean"),

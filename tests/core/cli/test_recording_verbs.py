@@ -163,7 +163,7 @@ def test_a_log_of_a_sensor_becomes_a_recording_and_is_not_replaced_unasked(logge
     ("given", "said"),
     [
         (("bus.asc", "--sensor", "icub"), "board and triangle"),
-        (("bus.asc", "--sensor", "icub", "--option", "bord=3"), "board, triangle"),
+        (("bus.asc", "--sensor", "icub", "--option", "bord=3"), "board"),
         (("bus.asc", "--sensor", "icub", "--out", "recordings"), ".h5"),
         (("bus.asc", "--sensor", "ideal"), "no reader for logs"),
         (("bus.asc", "--label", "session=a"), "--sensor"),

@@ -117,6 +117,17 @@ def test_a_recording_that_its_source_calls_unreliable_is_left_out_and_counted(tm
     assert result.counts["recordings left out (declared unreliable)"] == 1
 
 
+def test_an_incomplete_recording_takes_no_part_unless_asked_for_and_the_row_says_so(tmp_path):
+    why = "incomplete: force_torque: nothing for 4 s from 2 s on"
+    paths = [*sessions(tmp_path), record(tmp_path / "bad.h5", *ramp(7), session="d", excluded=why)]
+    out = run(paths)
+    assert out.sizes.n_recordings == 3
+    assert f"1 of 4 recordings left out: {why}" in out.stamps
+    taken = run(load_dataset(force_task(), paths, include_incomplete=True))
+    assert taken.sizes.n_recordings == 4
+    assert f"1 of 4 recordings take part although {why}" in taken.stamps
+
+
 @pytest.mark.parametrize(
     ("spoil", "error", "says"),
     [

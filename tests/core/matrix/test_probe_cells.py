@@ -5,10 +5,6 @@ import pytest
 from tactbench.core.matrix.plan import plan_cells
 from tactbench.core.plugins.registry import load_registry
 from tactbench.core.spec.matrix import MatrixSpec
-from tactbench.core.spec.yaml_file import load_yaml
-from tests.conftest import ROOT
-
-MATRICES = sorted((ROOT / "examples" / "matrices").glob("real-*.yaml"))
 
 
 @pytest.fixture(scope="module")
@@ -50,20 +46,3 @@ def test_probes_keep_apart_what_the_cell_keeps_apart(registry, asked, probes):
     protocol, split = asked
     choice = {"protocol": protocol, "split": split}
     assert ways(plan(registry, **choice)) == [*ways(plan(registry, probe=False, **choice)), *probes]
-
-
-@pytest.mark.parametrize("path", MATRICES, ids=lambda path: path.stem)
-def test_a_ready_matrix_of_real_recordings(registry, path):
-    matrix = load_yaml(path, MatrixSpec)
-    cells = plan_cells(matrix, matrix.sensors, registry)
-    assert {cell.rig for cell in cells} == {"replay"}
-    assert len({cell.split for cell in cells}) >= 2
-    # How to get the recordings, and how to run it, stand in the file itself.
-    text = path.read_text()
-    assert f"tactbench run --config examples/matrices/{path.name} --probe" in text
-    assert "tactbench import examples/mappings/" in text
-
-
-def test_there_is_one_for_each_data_set():
-    data_sets = {"biotacsp", "eflesh", "eflesh-shear", "eflesh-slip", "icub"}
-    assert {path.stem for path in MATRICES} == {f"real-{name}" for name in data_sets}

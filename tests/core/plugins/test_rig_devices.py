@@ -8,11 +8,14 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from tactbench.core.errors import LinkError, UnknownNameError, UsageError
+from tactbench.core.errors import LinkError, RigError, UnknownNameError, UsageError
 from tactbench.core.plugins.registry import load_registry
+from tactbench.core.spec.rig_file import DeviceEntry
+from tactbench.plugin import Block, ChannelSpec, Quality, StreamSpec
 from tactbench.plugin.devices import (
-    DeviceEntry,
     EmulatedDevices,
+    ForceEntry,
+    PressingForce,
     RigFile,
     drivers_of,
     emulation_of,
@@ -126,3 +129,60 @@ def test_emulators_that_run_elsewhere_are_marked_by_the_file_or_by_what_they_say
     file = RigFile(rig="bench", sensors={"pad": DeviceEntry(link="udp://127.0.0.1:9", **entry)})
     emulation = emulation_of(file, {"pad": said})
     assert (emulation and (emulation.time, emulation.devices)) == (("real", ("pad",)) if marked else None)
+
+
+SCALE = StreamSpec(
+    name="wrench",
+    rate_hz=1000.0,
+    channels=(ChannelSpec(name="fz", kind="force", unit="N"), ChannelSpec(name="tz", kind="torque", unit="N*m")),
+)
+
+
+def zeroed(fz, tz=0.0, quality=None, **entry):
+    """Return the zero of two seconds of readings, and what a recording says of it."""
+    t_s = np.arange(2000) / 1000
+    data = np.column_stack([fz(t_s), np.broadcast_to(tz, t_s.shape)])
+    force = PressingForce(ForceEntry(device="scale", link="emulated", **entry), (SCALE,))
+    zero = force.zero([Block("wrench", np.round(1e9 * t_s).astype(np.int64), data, quality)])
+    return zero["wrench"], force.about(zero)
+
+
+def noise(sd):
+    return sd * np.random.default_rng(1).standard_normal(2000)
+
+
+def test_a_zero_is_the_mean_of_a_sensor_at_rest_and_its_rows_are_counted():
+    broken = np.zeros((2000, 2), np.uint8)
+    broken[5] = Quality.SATURATED
+
+    def reading(t_s):
+        fz = 0.3 + noise(0.02)
+        fz[:20] = np.nan  # one NaN made the whole zero NaN
+        return fz
+
+    zero, about = zeroed(reading, 0.1, broken)
+    assert zero == pytest.approx([0.3, 0.1], abs=0.005)
+    # The marked row is one of the twenty.
+    assert about["zero rows of wrench"] == "2000 rows in 2 s, 20 of them no numbers or marked"
+
+
+@pytest.mark.parametrize(
+    ("reading", "entry", "says"),
+    [
+        (lambda t_s: 4.09 + noise(0.02), {}, "fz has a mean of 4.09 N, allowed are 2.5 N"),  # a hand on it
+        (lambda t_s: 1.0 * t_s + noise(0.02), {}, "fz has a drift of 1.34 N, allowed are 0.25 N"),
+        (lambda t_s: noise(0.1), {"noise_n": 0.02}, "fz has a spread of 0.101 N, allowed are 0.04 N"),
+        (lambda t_s: noise(2.0), {}, "fz has a spread of 2.01 N, allowed are 1.25 N"),
+        (lambda t_s: np.where(t_s < 0.5, np.nan, 0.0), {}, "has no zero: 2000 rows in 2 s, 500 of them no numbers"),
+    ],
+)
+def test_a_sensor_that_is_not_at_rest_gets_no_zero(reading, entry, says):
+    with pytest.raises(RigError, match=says):
+        zeroed(reading, **entry)
+
+
+def test_what_is_allowed_of_a_zero_is_the_rig_files():
+    assert zeroed(lambda t_s: 4.09 + noise(0.02), largest_zero_n=5.0)[0][0] == pytest.approx(4.09, abs=0.01)
+    assert zeroed(lambda t_s: 4.09 + noise(0.02), range_n=100.0)[0][0] == pytest.approx(4.09, abs=0.01)
+    assert zeroed(lambda t_s: 4.09 + t_s, zero_s=0.0)[0].tolist() == [0.0, 0.0]  # the device keeps its own
+    assert zeroed(lambda t_s: noise(0.1), noise_n=0.1)[0][0] == pytest.approx(0.0, abs=0.01)

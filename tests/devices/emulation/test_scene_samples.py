@@ -67,19 +67,7 @@ def test_until_it_is_started_nothing_is_pressed(samples):
     assert samples.over_s == 4.0
 
 
-def test_it_may_begin_again(samples):
-    for start_s in (1.0, 5.0):
-        samples.start(start_s)
-        assert samples(start_s + 0.95)["a"] == 9
-
-
 def test_without_an_unloaded_stretch_the_first_sample_is_held():
     samples = SceneSamples(Scene(), 1.0)
     samples.start(1.0)
     assert {samples(t_s)["a"] for t_s in (0.0, 0.99, 2.0, 2.15, 9.0)} == {0}
-
-
-def test_a_scene_shorter_than_its_unloaded_stretch_is_all_of_it():
-    samples = SceneSamples(Scene(), 1.0, rest_s=7.2)
-    samples.start(0.0)
-    assert samples(1.95)["a"] == 9

@@ -7,8 +7,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from tactbench.plugin import load_object
-from tactbench.rigs.parallel_manipulator.guard_messages import DeviceSettings, ProcessSettings
-from tactbench.rigs.parallel_manipulator.guard_process import GuardProcess
+from tactbench.plugin.devices import DeviceSettings, GuardProcess, ProcessSettings
 
 
 def load(name):
@@ -43,11 +42,13 @@ class Rig:
             self.log = tmp_path / "guard.log"
             self.guard = GuardProcess(
                 ProcessSettings(
-                    DeviceSettings(
-                        f"{PACKAGE}.motor.driver:build",
-                        address or addresses["motor"],
-                        options["motor"] | SLOW_LINE,
-                    ),
+                    {
+                        "motor": DeviceSettings(
+                            f"{PACKAGE}.motor.driver:FaulhaberDriver",
+                            address or addresses["motor"],
+                            options["motor"] | SLOW_LINE,
+                        )
+                    },
                     DeviceSettings(force_driver, addresses["force"], options["force"]),
                     str(self.log),
                     time.monotonic_ns() - self.clock(),

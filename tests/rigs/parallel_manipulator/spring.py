@@ -58,7 +58,7 @@ def example(**changes):
     quiet = {
         "force__zero_s": 0.3,
         "force__options__rate_hz": 1000.0,
-        "settings__limits__homing_force_n": 0.2,
+        "settings__limits__travel_ceiling_n": 0.2,
         "settings__limits__force_ceiling_n": 8.0,
         "settings__touch__single_n": 0.1,
         "settings__touch__mean_n": 0.1,

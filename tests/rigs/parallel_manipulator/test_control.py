@@ -5,8 +5,7 @@ import threading
 
 import pytest
 
-from tactbench.rigs.parallel_manipulator.control import Control
-from tactbench.rigs.parallel_manipulator.press import Press
+from tactbench.plugin.devices import Control, Press
 from tests.rigs.parallel_manipulator.presses import FAULTS
 from tests.rigs.parallel_manipulator.test_press_states import COURSE, SETTINGS
 
@@ -23,7 +22,10 @@ class Asked:
 
 
 class Sensor:
-    last_ns = 0
+    rows = 0
+
+    def __call__(self):
+        return self.rows
 
 
 def armed(sensor, *, stale_s, asked=lambda guard: guard):
@@ -33,7 +35,7 @@ def armed(sensor, *, stale_s, asked=lambda guard: guard):
     guard = world.guard()
     guard.start()
     report = guard.arm(setting.limits)
-    through, press = asked(guard), Press(SETTINGS, COURSE, 1e-6)
+    through, press = asked(guard), Press(SETTINGS.press_plan(1e-6), COURSE)
     control = Control(through, setting.limits, report, press, sensor, world.clock, period_s=0.02, stale_s=stale_s)
     return control, world, guard, through
 
@@ -59,7 +61,7 @@ def test_a_rig_that_has_hung_does_not_blame_the_sensor():
     sensor = Sensor()
     control, world, guard, _ = armed(sensor, stale_s=0.1)
     for _ in range(10):
-        sensor.last_ns = world.clock()
+        sensor.rows += 1
         control.carry(world.clock() + 20_000_000)
     assert not control.press.over
     guard.advance(world.clock() + 4_000_000_000)

@@ -9,7 +9,7 @@ import pytest
 
 from tactbench.plugin import load_object, load_registry
 from tactbench.plugin.devices import DriverSettings, EmulatorSettings
-from tests.rigs.parallel_manipulator.pumps import VirtualLink, joined, read_for
+from tests.rigs.parallel_manipulator.pumps import VirtualLink, read_for
 
 POINT = EntryPoint("parallel-manipulator", "tactbench.rigs.parallel_manipulator", "tactbench")
 
@@ -20,9 +20,9 @@ def devices():
     return {device.name: device for device in registry.devices}
 
 
-def test_the_package_brings_two_force_sensors_and_a_motor():
+def test_the_package_brings_a_force_sensor_and_a_motor():
     found = {name: (device.kind, device.emulated_link) for name, device in devices().items()}
-    assert found == {"net-ft": ("force", "datagram"), "nano17": ("force", "bytes"), "faulhaber": ("motor", "bytes")}
+    assert found == {"net-ft": ("force", "datagram"), "faulhaber": ("motor", "bytes")}
 
 
 def test_listing_them_imports_neither_numpy_nor_links():
@@ -33,10 +33,10 @@ def test_listing_them_imports_neither_numpy_nor_links():
     assert subprocess.run([sys.executable, "-c", code], check=False, timeout=60).returncode == 0
 
 
-@pytest.mark.parametrize("name", ["net-ft", "nano17", "faulhaber"])
+@pytest.mark.parametrize("name", ["net-ft", "faulhaber"])
 def test_driver_and_emulator_take_the_same_options(name):
     descriptor = devices()[name]
-    own = {"net-ft": {"bias": True}, "nano17": {"bias_samples": 50}, "faulhaber": {"peak_current_a": 0.5}}
+    own = {"net-ft": {"bias": True}, "faulhaber": {"peak_current_a": 0.5}}
     options = descriptor.emulated_options | own[name]
 
     def senses(time_s):
@@ -61,24 +61,3 @@ def test_driver_and_emulator_take_the_same_options(name):
     # Virtual time: the same each time, to the bit.
     for attribute in ("t_ns", "data", "quality"):
         assert np.array_equal(getattr(first, attribute), getattr(again, attribute), equal_nan=attribute == "data")
-
-
-def test_blocks_of_any_size_hold_the_same_samples():
-    descriptor = devices()["nano17"]
-    options = descriptor.emulated_options
-    found = []
-    for wait_s in (0.002, 0.3):
-        emulator = load_object(descriptor.emulator)(
-            EmulatorSettings(lambda t: {"fy": np.sin(t)}, np.random.default_rng(3), options)
-        )
-        link = VirtualLink(emulator)
-        driver = load_object(descriptor.driver)(
-            DriverSettings(lambda link=link: link, options=options, clock=link.clock)
-        )
-        driver.start()
-        blocks = []
-        while link.now_s < 102.0:
-            link.go(wait_s)
-            blocks += driver.read(0.0)
-        found.append(joined(blocks).data[:1500])
-    assert np.array_equal(found[0], found[1])

@@ -6,22 +6,12 @@ import signal
 import threading
 from pathlib import Path
 
-import numpy as np
 import pytest
 
-from tactbench.plugin import Block, Quality
-from tactbench.plugin.devices import LinkError, LinkTimeout
-from tactbench.rigs.parallel_manipulator.guard_interface import Beat, GuardLostError, GuardState, Trigger
-from tactbench.rigs.parallel_manipulator.guard_messages import (
-    FORCE,
-    MOTOR,
-    BlockReader,
-    MessageReader,
-    encode_block,
-    encode_message,
-)
-from tactbench.rigs.parallel_manipulator.motor.profile import FaulhaberOptions
-from tactbench.rigs.parallel_manipulator.motor.retreat import retreat_blind, retreat_command, stand_blind
+from tactbench.devices.guard_messages import Trigger
+from tactbench.plugin.devices import Beat, DriverSettings, GuardLostError, GuardState, LinkError
+from tactbench.rigs.parallel_manipulator.motor.driver import FaulhaberDriver, retreat_command
+from tactbench.rigs.parallel_manipulator.motor.exchange import MotorError
 from tests.rigs.parallel_manipulator.presses import FAULTS, PATIENT, load, rig
 
 KILLS = load("guard_kills")
@@ -59,7 +49,7 @@ def test_who_is_left_lets_the_motor_retreat(name, baud):
     assert triggers == expected
     if name in ("kill guard", "stop guard"):
         (lost,) = [line["lost"] for line in result.said if "lost" in line]
-        where = re.search(r"the motor has retreated to (\S+) m\.", lost)
+        where = re.search(r"motor has retreated to (\S+) m\.", lost)
         # The drive's corridor, or two increments: within it a retreat has arrived.
         assert float(where[1]) == pytest.approx(FAULTS.RETREAT_M, abs=1.01 * FAULTS.STATED["corridor_m"])
     else:
@@ -112,7 +102,8 @@ def test_an_error_within_the_guard_lets_the_motor_retreat(tmp_path, monkeypatch)
         found = entries(made.log)
         (error,) = [entry["internal_error"] for entry in found if "internal_error" in entry]
         assert "a driver's own error" in error
-        (where,) = [entry["retreated_to_m"] for entry in found if "retreated_to_m" in entry]
+        (rescued,) = [entry["rescued"] for entry in found if "rescued" in entry]
+        where = float(re.search(r"motor has retreated to (\S+) m", rescued)[1])
         assert where == pytest.approx(FAULTS.RETREAT_M, abs=1.01 * FAULTS.STATED["corridor_m"])
 
 
@@ -126,9 +117,9 @@ def test_an_error_within_the_guard_while_homing_lets_the_motor_stand(tmp_path, m
     # At 5 mm/s on 2 N/mm, 3 N are 0.3 s after the driver's error: what a busy machine may take.
     with rig("process", tmp_path, FAULTS.Setting(stiffness_n_m=2e3), force_driver=RAISING) as made:
         homed_to_a_switch_behind_the_skin(made)
-        with pytest.raises(GuardLostError, match="told to stand"):
+        with pytest.raises(GuardLostError, match="sent to stand"):
             made.guard.arm(made.setting.limits)
-        assert [entry for entry in entries(made.log) if "stands" in entry]
+        assert [entry for entry in entries(made.log) if "sent to stand" in entry.get("rescued", "")]
         assert stands(made)
         assert 0.1 < made.world.force_n < 3.0
 
@@ -146,7 +137,7 @@ def test_a_guard_that_is_killed_while_homing_leaves_a_motor_that_stands(tmp_path
             return wrench
 
         made.world.sensed = kill
-        with pytest.raises(GuardLostError, match="told to stand"):
+        with pytest.raises(GuardLostError, match="sent to stand"):
             made.guard.arm(made.setting.limits)
         assert stands(made)
         assert told(made, killed[0]).endswith(b"\rV0\r")
@@ -184,13 +175,19 @@ def test_a_force_that_is_not_a_number_and_the_log_says_when_and_what(tmp_path, m
     found = entries(log)
     assert found[0].keys() == {"started", "unix_ns", "pid"}
     texts = [entry["text"] for entry in found if "text" in entry]
-    assert texts[:3] == ["started", "homing", "armed"]
+    assert texts[:3] == ["started", "homing motor", "armed"]
     assert texts[3] == "a sample of the force sensor is not a number"
     assert texts[4].startswith("out after ")
     assert texts[-1] == "disarmed"
 
 
 # The line with nobody at it -------------------------------------------------------------------------------------------
+
+
+def nobody_at(world):
+    """Return a driver of the motor as another process opens it."""
+    options = world.settings()["motor"]
+    return FaulhaberDriver(DriverSettings(world.devices.opener("motor"), options=options, clock=world.clock))
 
 
 @pytest.mark.parametrize("half", [b"", b"LA12", b"TPOS\r", b"POS\rGRC\rOST\r"])
@@ -205,8 +202,8 @@ def test_a_blind_retreat_whatever_stands_on_the_line(half):
     link = world.devices.open_link("motor")
     link.write(half)
     link.close()
-    options = FaulhaberOptions(**world.settings()["motor"])
-    position_m = retreat_blind(world.devices.opener("motor"), options, world.clock, 2.0)
+    with nobody_at(world) as motor:
+        position_m = motor.rescue(2.0)
     assert position_m == pytest.approx(FAULTS.RETREAT_M, abs=5e-6)
     assert world.position_m == pytest.approx(FAULTS.RETREAT_M, abs=20e-6)
 
@@ -214,14 +211,14 @@ def test_a_blind_retreat_whatever_stands_on_the_line(half):
 @pytest.mark.parametrize("half", [b"", b"LA12", b"POS\rGRC\rOST\r"])
 def test_a_motor_that_is_let_stand_blind(half):
     world = FAULTS.Pressed(FAULTS.Setting(baud=9600))
-    options = FaulhaberOptions(**world.settings()["motor"])
     link = world.devices.open_link("motor")
     link.write(b"ANSW2\rEN\rV5\r")
     world.devices.advance(world.clock() + 10**9)
     link.write(half)
     link.close()
     assert world.motor.drive.servo.speed_m_s == pytest.approx(5e-3, rel=0.01)
-    stand_blind(world.devices.opener("motor"), options, world.clock)
+    with nobody_at(world) as motor:
+        motor.rescue(None)
     world.devices.advance(world.clock() + 10**8)
     where_m = world.position_m
     world.devices.advance(world.clock() + 10**9)
@@ -231,41 +228,7 @@ def test_a_motor_that_is_let_stand_blind(half):
 
 def test_a_blind_retreat_that_ends_elsewhere_says_where():
     world = FAULTS.Pressed(FAULTS.Setting())
-    options = FaulhaberOptions(**world.settings()["motor"])
     # Never switched on: it answers, and stays.
-    with pytest.raises(LinkTimeout, match=r"is at 0 m 0.5 s later"):
-        retreat_blind(world.devices.opener("motor"), options, world.clock, 0.5)
-    assert retreat_command(options) == b"SP50\rLA-5000\rM\r"
-
-
-# Messages -------------------------------------------------------------------------------------------------------------
-
-
-def test_blocks_are_what_they_were_however_they_are_cut():
-    rng = np.random.default_rng(3)
-    blocks = [
-        (FORCE, Block("f", rng.integers(0, 9, 4), rng.normal(size=(4, 6)), None, np.arange(4), np.arange(4) * 7)),
-        (MOTOR, Block("m", rng.integers(0, 9, 2), rng.normal(size=(2, 3)), np.full((2, 3), Quality.GAP, np.uint8))),
-        (FORCE, Block("f", None, np.zeros((0, 6)))),
-    ]
-    data = b"".join(encode_block(device, block) for device, block in blocks)
-    reader, found, at = BlockReader(("f", "m")), [], 0
-    while at < len(data):
-        size = int(rng.integers(1, 40))
-        found += reader.feed(data[at : at + size])
-        at += size
-    assert len(found) == len(blocks)
-    for (device, block), (sent_to, sent) in zip(found, blocks, strict=True):
-        assert (device, block.stream) == (sent_to, sent.stream)
-        for name in ("t_ns", "data", "quality", "sequence", "device_ns"):
-            had, has = getattr(sent, name), getattr(block, name)
-            assert (had is None) == (has is None)
-            assert had is None or np.array_equal(had, has)
-
-
-def test_messages_are_what_they_were_however_they_are_cut():
-    sent = [("beat", {"a": 1.5}), ("close", {}), ("event", {"text": "näher\nals"})]
-    data = b"".join(encode_message(kind, body) for kind, body in sent)
-    reader = MessageReader()
-    found = [message for n in range(len(data)) for message in reader.feed(data[n : n + 1])]
-    assert found == sent
+    with nobody_at(world) as motor, pytest.raises(MotorError, match=r"is at 0 m 0.5 s later"):
+        motor.rescue(0.5)
+    assert retreat_command(motor.options) == b"SP50\rLA-5000\rM\r"

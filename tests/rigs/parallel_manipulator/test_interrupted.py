@@ -47,6 +47,7 @@ def test_ctrl_c_in_the_recorded_part(tmp_path, times):
     assert meta.excluded == "interrupted: stopped by hand"
     # It was pressed when it was interrupted.
     assert force_n[-20:].mean() > 0.5
-    events = [text for name, text in meta.drawn.items() if name.startswith("event")]
+    names = sorted((name for name in meta.drawn if name.startswith("event")), key=lambda name: int(name.split()[-1]))
+    events = [meta.drawn[name] for name in names]
     assert "retreating: the rig has commanded it" in events[-2]
     assert re.search(r"retreated: out after 0\.\d+ s$", events[-1])

@@ -6,18 +6,14 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from scipy.linalg import expm
 
-from tactbench.plugin import UsageError, assumed
 from tactbench.rigs.parallel_manipulator.motor.codec import (
     OVERTEMPERATURE,
     Kind,
     Line,
     LineReader,
     OperationStatus,
-    answers,
     encode,
-    general_status,
     line_time_s,
 )
 from tactbench.rigs.parallel_manipulator.motor.emulator import MotorEmulator, MotorFault
@@ -139,19 +135,6 @@ def test_silence_and_changed_rate():
     assert host.emulator.poll(due_s + 25e-6) == [(pytest.approx(due_s), b"\r\n")]
 
 
-def test_lines_leave_at_the_pace_of_the_line():
-    host = Host()
-    host.do("HO98956")
-    start_s = host.now_s
-    assert host.emulator.feed(b"POS\r", start_s) == []
-    began_s = start_s + line_time_s(4, 9600) + 1e-3
-    left_s = began_s + line_time_s(7, 9600)
-    assert host.emulator.poll(left_s + 1e-9) == [
-        (pytest.approx(began_s + line_time_s(1, 9600)), b"9"),
-        (pytest.approx(left_s), b"8956\r\n"),
-    ]
-
-
 @pytest.mark.parametrize("ticks", [1, 7, 1000])
 def test_a_drive_that_stands_without_load_answers_as_if_each_tick_were_made(ticks):
     """Ticks are left out where nothing moves: whether it is looked at between them changes nothing."""
@@ -167,38 +150,11 @@ def test_a_drive_that_stands_without_load_answers_as_if_each_tick_were_made(tick
         host.do("M")
         host.wait(0.013)
         servo = host.emulator.drive.servo
-        made[skipped] = (host.ask("POS"), host.ask("OST"), servo.position_m, servo.mean_square_a2, host.emulator._ticks)
+        made[skipped] = (host.ask("POS"), host.ask("OST"), servo.position_m, host.emulator._ticks)
     assert made[True][:2] == made[False][:2]
     # Positions to what a tick resolves, 1 nm/s for 1 ms and its decay over a second.
     assert made[True][2] == pytest.approx(made[False][2], abs=2e-9)
-    assert made[True][3] == pytest.approx(made[False][3], rel=1e-6)
-    assert made[True][4] == made[False][4]
-
-
-def test_polls_cannot_be_quicker_than_the_line():
-    """87.3 questions for a position of five digits in a second at 9600, the drive's own time left out."""
-    model = MotorModel(answer_time=assumed(0.0, "ms", "test"))
-    host = Host(model=model)
-    host.do("HO98956")
-    start_s = now_s = host.now_s
-    answered = 0
-    while now_s < start_s + 1.0:
-        host.reader.feed(joined_bytes(host.emulator.feed(b"POS\r", now_s)))
-        lines = []
-        while not lines:
-            now_s = host.emulator.next_s()
-            lines = host.reader.feed(joined_bytes(host.emulator.poll(now_s)))
-        answered += 1
-    assert answered == math.ceil(87.3)
-
-
-def test_other_nodes_are_silent():
-    host = Host()
-    assert host.lines("7POS\r") == []
-    host.do("NODEADR7")
-    assert host.ask("7POS") == "0"
-    assert host.lines("8POS\r") == []
-    assert host.ask("POS") == "0"
+    assert made[True][3] == made[False][3]
 
 
 def test_a_move_ends_on_its_target_and_says_so():
@@ -208,7 +164,7 @@ def test_a_move_ends_on_its_target_and_says_so():
     assert host.ask("POS") == "500"
     assert host.ask("TPOS") == "500"
     assert host.status & OperationStatus.POSITION_ATTAINED
-    assert general_status(host.ask("GST")).target_reached
+    assert host.ask("GST")[4] == "1"
     # Relative steps add up exactly.
     for _ in range(5):
         host.do("LR-7", "M")
@@ -216,25 +172,18 @@ def test_a_move_ends_on_its_target_and_says_so():
     assert host.ask("POS") == str(500 - 35)
 
 
-def test_what_was_put_in_comes_back_to_one_step():
-    rng = np.random.default_rng(3)
-    host = Host()
-    host.do("EN", "SP500", "AC5000", "DEC5000")
-    for target_m in rng.uniform(-9e-3, 9e-3, 8):
-        host.go(target_m, 0.8)
-        assert abs(int(host.ask("POS")) * STEP_M - target_m) <= STEP_M / 2 + 1e-12
-        assert abs(host.emulator.drive.servo.position_m - target_m) <= STEP_M / 2 + 1e-7  # The servo's own rest.
-
-
-def test_force_is_current():
-    """Pressing 5 N takes 5 N / 6.5 N/A; the drive says it in whole mA."""
-    host = Host(wall(0.0, 10e3))
-    host.do("EN")
-    host.go(0.5e-3, 1.0)
-    position_m = host.emulator.drive.servo.position_m
-    assert position_m == pytest.approx(0.5e-3, abs=STEP_M)
-    assert int(host.ask("GRC")) == round(1e3 * 10e3 * position_m / 6.5)
-    assert not host.status & OperationStatus.CURRENT_LIMITATION
+def test_the_servo_goes_its_lag_and_is_stable_against_any_spring():
+    servo = Servo(MotorModel(), None)
+    reference = Profile(1e-3)
+    for n in range(1, 20):
+        servo.step(1e-3 * n, reference, 1.6)
+        assert servo.position_m == pytest.approx(1e-3 * (1 - math.exp(-n / 5)), rel=1e-12)
+    stiff = Servo(MotorModel(), lambda position_m, _: 1e9 * max(0.0, position_m))
+    for n in range(100):
+        stiff.step(1e-3 * n, reference, 1.6)
+    # It stands where the spring is as strong as the current limit, 10.4 N.
+    assert stiff.position_m == pytest.approx(10.4e-9, rel=1e-6)
+    assert (stiff.limited, stiff.current_a) == (True, 1.6)
 
 
 def test_the_current_limit_bounds_the_force_and_is_said():
@@ -247,91 +196,6 @@ def test_the_current_limit_bounds_the_force_and_is_said():
     status = host.status
     assert status & OperationStatus.CURRENT_LIMITATION
     assert not status & OperationStatus.POSITION_ATTAINED
-
-
-def test_a_warm_motor_has_its_continuous_current_only():
-    host = Host(wall(0.0, 80e3))
-    host.do("EN", "LPC1600", "LCC800")
-    host.go(2e-3, 0.5)
-    assert host.ask("GRC") == "1600"
-    # 1.6^2 (1 - exp(-t / 10 s)) reaches 0.8^2 after 2.9 s.
-    host.wait(4.0)
-    assert host.ask("GRC") == "800"
-    assert host.ask("GCL") == "800"
-
-
-def test_position_limits_hold_in_both_kinds_of_motion():
-    host = Host()
-    host.do("EN", "LL500", "LL-200", "APL1")
-    host.go(5e-3, 0.8)
-    assert host.ask("POS") == "500"
-    host.do("V-40")
-    host.wait(1.0)
-    assert host.ask("POS") == "-200"
-    host.do("APL0")
-    host.wait(1.0)
-    # Without limits it runs into the end stop of its travel.
-    assert host.emulator.drive.servo.position_m == pytest.approx(-10e-3)
-
-
-def test_homing_on_the_end_stop_by_current():
-    host = Host()
-    host.do("EN", "LPC200", "LCC200", "V-20")
-    for _ in range(40):
-        if host.status & OperationStatus.CURRENT_LIMITATION and host.ask("GN") == "0":
-            break
-    else:
-        pytest.fail("the end stop was not noticed")
-    host.do("HO")
-    assert host.ask("POS") == "0"
-    assert host.emulator.drive.servo.position_m == pytest.approx(-10e-3)
-
-
-def test_homing_on_a_switch():
-    host = Host(reference_switch_m=-2.4e-3)
-    assert host.ask("GOHOSEQ") == "Command not available"  # Without power.
-    host.do("EN", "HO1000", "HOSP5", "GOHOSEQ")
-    assert host.status & OperationStatus.HOMING
-    host.wait(1.0)
-    assert not host.status & OperationStatus.HOMING
-    assert host.ask("POS") == "0"
-    assert host.emulator.drive.servo.position_m == pytest.approx(-2.4e-3, abs=STEP_M)
-
-
-def test_notices_of_place_and_speed():
-    host = Host()
-    host.do("EN", "NP300", "NV30", "LA600")
-    lines = host.lines("M\r", 0.8)
-    assert sorted(line.text for line in lines) == ["OK", "p", "v"]
-    host.do("NP", "NPOFF", "LA0")
-    assert [line.text for line in host.lines("M\r", 0.8)] == ["OK"]
-
-
-def test_limits_can_be_read_back():
-    host = Host()
-    host.do("SP20", "AC300", "DEC200", "LL700", "LL-800", "LPC500", "LCC300", "CORRIDOR9", "DEV77")
-    asked = ("GSP", "GAC", "GDEC", "GPL", "GNL", "GPC", "GCC", "GCORRIDOR", "GDEV")
-    assert [host.ask(name) for name in asked] == ["20", "300", "200", "700", "-800", "500", "300", "9", "77"]
-    assert host.ask("SAVE") == "EEPROM writing done"
-    host.do("SP30")
-    host.lines("RESET\r")
-    assert host.ask("GSP") == "20"
-
-
-def test_without_power_nothing_moves_but_the_load_does():
-    host = Host(lambda position_m, time_s: -0.2)
-    assert host.ask("M") == "Command not available"
-    assert host.ask("V10") == "Command not available"
-    host.wait(0.2)
-    assert int(host.ask("POS")) > 0
-    host.do("EN")
-    host.wait(0.3)
-    assert int(host.ask("POS")) == int(host.ask("TPOS"))
-
-
-@pytest.mark.parametrize("text", ["LA", "SP-1", "AC0", "LL0", "LL", "ANSW9", "BAUD9601", "LA99999999999", "POS5"])
-def test_arguments_that_are_refused(text):
-    assert Host().ask(text) == "Invalid parameter"
 
 
 @pytest.mark.parametrize("text", ["POR8", "GU", "SWS", "SOR1"])
@@ -348,77 +212,8 @@ def test_a_motor_fault_takes_the_power_and_says_so():
     assert host.ask("V10") == OVERTEMPERATURE
     host.wait(1.5)
     assert host.ask("GN") == "0"  # Without power it has run out.
-    assert not general_status(host.ask("GST")).enabled  # The end of the fault alone does not move it.
+    assert host.ask("GST")[3] == "0"  # The end of the fault alone does not move it.
     host.do("EN")
-
-
-def test_late_answers_come_late_and_in_order():
-    host = Host()
-    host.do("HO7")
-    host.emulator.faults = [MotorFault("late-answers", end_s=host.now_s + 0.1, delay_s=0.25)]
-    assert host.lines("POS\r", 0.2) == []
-    # The answer of the next question waits behind the late one.
-    assert [line.text for line in host.lines("OST\r", 0.2)] == ["7", "65536"]
-
-
-def test_late_answers_do_not_hold_notices_back():
-    host = Host()
-    host.do("EN", "NP", "LA20")
-    host.emulator.faults = [MotorFault("late-answers", delay_s=5.0)]
-    assert host.lines("M\r", 1.0) == [Line(Kind.NOTICE, "p")]
-
-
-def test_garbled_lines_are_counted_or_pass_as_another_number():
-    host = Host()
-    host.do("HO98956")
-    host.emulator.faults = [MotorFault("garbled-line")]
-    lines = [line for _ in range(200) for line in host.lines("POS\r", 0.05)]
-    assert Line(Kind.VALUE, "98956") not in lines
-    assert host.reader.counts.garbled > 0
-    # Five of seven bytes are digits: 9 of 255 replacements each are another digit, which no host can notice. Of 200
-    # lines 5 are expected so, with a standard deviation of 2.2.
-    assert 0 < sum(answers(line, "POS") for line in lines) < 16
-    host.emulator.faults.clear()
-    host.lines("\r")
-    assert host.ask("POS") == "98956"
-
-
-def test_every_third_line_is_garbled():
-    host = Host(faults=[MotorFault("garbled-line", every=3)])
-    right = [host.lines("POS\r", 0.05) == [Line(Kind.VALUE, "0")] for _ in range(9)]
-    assert [n for n, good in enumerate(right) if not good and n % 3 == 2] == [2, 5, 8]
-    # A garbled end of a line takes the next one with it, and no other.
-    assert all(good for n, good in enumerate(right) if n % 3 == 1)
-
-
-def test_a_flash_defect():
-    assert Host(faults=[MotorFault("flash-defect")]).ask("SAVE") == "Flash defect"  # FH-2.22
-
-
-def test_faults_that_are_none():
-    with pytest.raises(UsageError, match=r"no fault called .coffee.*late-answers, motor-fault"):
-        MotorFault("coffee")
-    with pytest.raises(UsageError, match="1 or more"):
-        MotorFault("garbled-line", every=0)
-
-
-def test_when_it_is_asked_changes_nothing():
-    """Bytes in and out, and their times, are the same polled every 0.3 ms and every 40 ms."""
-    sent = [(0.0, "EN\r"), (0.02, "LA500\rNP\rM\r"), (0.3, "POS\rOST\r"), (0.5, "V-20\r"), (0.8, "GRC\rPOS\r")]
-    streams = []
-    for period_s in (3e-4, 4e-2):
-        faults = [MotorFault("garbled-line", every=2), MotorFault("motor-fault", 0.71, 0.75)]
-        emulator, out, now_s = MotorEmulator(wall(1e-3, 5e3), np.random.default_rng(1), faults=faults), [], 0.0
-        left = list(sent)
-        while now_s < 1.0:
-            due_s = min(now_s + period_s, left[0][0] if left else math.inf)
-            if left and left[0][0] <= due_s:
-                out += emulator.feed(left.pop(0)[1].encode(), due_s)
-            else:
-                out += emulator.poll(due_s)
-            now_s = due_s
-        streams.append(out)
-    assert streams[0] == streams[1]
 
 
 @given(st.lists(st.binary(max_size=30), max_size=8))
@@ -464,46 +259,3 @@ def test_the_profile_keeps_its_limits_and_does_not_overshoot(target, tick, speed
     assert profile.position_m == target
     profile.to_position(target, tick, speed, acceleration, braking)
     assert (profile.position_m, profile.speed_m_s) == (target, 0.0)
-
-
-@given(
-    tick=st.sampled_from([1e-5, 1e-3, 0.02, 1.0]),
-    stiffness=st.sampled_from([0.0, 1e3, 80e3, 1e9]),
-    mass=st.sampled_from([1e-3, 0.1, 10.0]),
-    bandwidth=st.sampled_from([10.0, 300.0, 5000.0]),
-)
-@settings(max_examples=60)
-def test_the_servo_is_stable_whatever_the_numbers(tick, stiffness, mass, bandwidth):
-    model = MotorModel(
-        tick=assumed(tick, "s", "test"), mass=assumed(mass, "kg", "test"), bandwidth=assumed(bandwidth, "rad/s", "test")
-    )
-    servo, reference = Servo(model, wall(1e-3, stiffness)), Profile(0.0)
-    for n in range(200):
-        reference.to_position(2e-3, tick, 0.05, 1.0, 1.0)
-        servo.step(n * tick, reference, 1.6)
-        assert abs(servo.position_m) <= 10e-3
-        assert abs(servo.current_a) <= 1.6 * (1 + 1e-12)
-    # Energy cannot have grown: the motor is not faster than its force makes it from rest over the whole travel.
-    assert abs(servo.speed_m_s) <= math.sqrt(2 * 1.6 * 6.5 * 20e-3 / mass) + 0.05
-
-
-def test_the_servo_follows_its_closed_form():
-    """Free motion to a step against the matrix exponential: an error of first order in the tick."""
-    w, mass, seconds = 50.0, 0.1, 0.1
-    # Position less reference, speed, integral; within the current limit.
-    system = np.array([[0, 1, 0], [-3 * w**2, -3 * w, 1 / mass], [-mass * w**3, 0, 0]])
-    exact = (expm(system * seconds) @ [-1e-5, 0.0, 0.0])[0] + 1e-5
-    errors = []
-    for tick in (2e-4, 1e-4):
-        model = MotorModel(
-            tick=assumed(tick, "s", "test"),
-            bandwidth=assumed(w, "rad/s", "test"),
-            damping=assumed(0.0, "N*s/m", "test"),
-        )
-        servo, reference = Servo(model, nothing), Profile(1e-5)
-        for n in range(round(seconds / tick)):
-            servo.step(n * tick, reference, 1.6)
-        errors.append(abs(servo.position_m - exact))
-    # A percent of the step, and half the error at half the tick.
-    assert errors[0] < 1e-7
-    assert errors[1] == pytest.approx(errors[0] / 2, rel=0.1)

@@ -1,10 +1,12 @@
 """What a rig file is refused for, with the line or the reason, and what is said of one that is not."""
 
+import re
+
 import pytest
 import yaml
 
 from tactbench.core.cli import main
-from tactbench.plugin import RigContext, UsageError
+from tactbench.plugin import RigContext, UsageError, load_registry
 from tactbench.plugin.devices import RigFile
 from tactbench.rigs.parallel_manipulator.rig import build
 from tactbench.rigs.parallel_manipulator.rig_check import check
@@ -28,9 +30,8 @@ def written(tmp_path, said):
 def test_the_example_is_not_refused_and_nothing_moves(capsys):
     code, out, _ = run(["doctor", "--seconds", "0", "--rig-file", str(EXAMPLE)], capsys)
     assert code == 0
-    for text in ("force ceiling", "Nothing was opened", "share used", "reaction", "sent first", "VER", "ASSUMED"):
+    for text in ("24.7 N", "Nothing was opened", "share of the largest", "reaction", "holds without power", "ASSUMED"):
         assert text in out
-    assert "EN" not in out.split("sent first")[1].split()
 
 
 def test_a_file_without_a_ceiling_is_refused_with_its_line(tmp_path, capsys):
@@ -43,7 +44,7 @@ def test_a_file_without_a_ceiling_is_refused_with_its_line(tmp_path, capsys):
 
 @pytest.mark.parametrize("name", ["travel_mm", "heartbeat_ms", "retreat_mm", "retreat_speed_mm_s", "rated_force_n"])
 def test_every_limit_is_mandatory(name):
-    with pytest.raises(UsageError, match=f"settings.limits.{name} in the rig file: is missing"):
+    with pytest.raises(UsageError, match=f"'limits.{name}' of the rig file's settings is missing"):
         settings_of(RigFile.model_validate(example(**{f"settings__limits__{name}": ...})))
 
 
@@ -63,13 +64,12 @@ def problems(**changes):
 
 def test_gains_above_half_of_the_limit_are_refused(capsys):
     (problem,) = problems(settings__force_loop__integral_mm_n_s=1.2)
-    assert "0.67 of those that no longer settle at 25 N/mm" in problem
+    assert "0.67 of those that no longer settle" in problem
 
 
 def test_forces_above_the_rating_are_refused():
     found = problems(settings__limits__rated_force_n=8.5)
-    assert any("under force control, the weakest part is rated for 8.50 N" in text for text in found)
-    assert any("in the approach, the weakest part is rated for 8.50 N" in text for text in found)
+    assert any("the weakest part is rated for 8.50 N" in text for text in found)
 
 
 def test_a_quick_touch_is_refused():
@@ -92,16 +92,49 @@ def test_a_slow_line_is_refused_for_a_quick_loop():
     assert any("One increment takes" in text for text in found)
 
 
-def test_options_that_the_guard_needs_are_missed():
-    found = problems(devices__motor__options__corridor_m=...)
-    assert any("lack corridor_m" in text for text in found)
+@pytest.mark.parametrize(
+    ("option", "value", "said"),
+    [
+        ("corridor_m", ..., "motor lack corridor_m"),
+        ("force_constant_n_a", ..., "motor lack peak_force_n"),
+        ("orientation", ..., "motor lack orientation"),
+        ("brake", ..., "motor lack brake"),
+        ("counterweight", ..., "motor lack counterweight"),
+        # 12 A at 6.5 N/A on a sensor for 25 N.
+        ("peak_current_a", 12.0, r"78\.0 N, and the weakest part bears 25 N"),
+    ],
+)
+def test_an_axis_says_what_would_make_it_unsafe(option, value, said):
+    (problem,) = problems(**{f"devices__motor__options__{option}": value})
+    assert re.search(said, problem)
+
+
+def test_a_horizontal_axis_needs_no_brake():
+    stated = {"orientation": "horizontal", "brake": ..., "counterweight": ...}
+    assert problems(**{f"devices__motor__options__{name}": value for name, value in stated.items()}) == ()
+
+
+def test_an_axis_that_is_homed_towards_the_skin_is_refused():
+    options = {"homing": "end-stop", "homing_speed_m_s": 0.005}
+    found = problems(**{f"devices__motor__options__{name}": value for name, value in options.items()})
+    assert any("homed towards the skin" in text for text in found)
+    file = with_joints(**{f"devices__joint-2__options__{name}": value for name, value in options.items()})
+    assert check(RigFile.model_validate(file)).problems == ()
+    options["homing_speed_m_s"] = -0.005
+    file = with_joints(**{f"devices__joint-2__options__{name}": value for name, value in options.items()})
+    assert any("joint-2 is homed downwards" in text for text in check(RigFile.model_validate(file)).problems)
+
+
+def test_the_age_of_the_force_is_a_setting():
+    limits = settings_of(file_of()).limits
+    assert limits.force_age_s(1000.0) == pytest.approx(0.013)
+    assert settings_of(file_of(settings__limits__force_age_ms=30.0)).limits.force_age_s(1000.0) == 0.03
 
 
 def test_limits_are_stated_once():
     file = file_of(devices__motor__options__upper_m=0.004)
-    settings = settings_of(file)
     with pytest.raises(UsageError, match=r"upper_m is 0\.004"):
-        with_limits(file, settings)
+        with_limits(file, settings_of(file), load_registry())
 
 
 @pytest.mark.parametrize(
@@ -110,7 +143,7 @@ def test_limits_are_stated_once():
         ({"settings__limits__heartbeat_ms": 30.0}, "heartbeat below 60 ms"),
         ({"settings__limits__travel_mm": [-4.0, 2.0]}, "beyond the motor's travel"),
         ({"settings__limits__retreat_mm": -5.0}, "outside its travel"),
-        ({"settings__limits__rated_force_n": 7.0}, "ceiling is not below the rated force"),
+        ({"settings__limits__rated_force_n": 7.0}, "do not rise in this order"),
         ({"settings__touch__single_n": 9.0}, "a touch is not below the ceiling"),
         ({"settings__heights__stand_off_mm": 0.3}, "stand-off is less than 3 spreads"),
         ({"settings__stiffness__least_n_mm": 30.0}, "rise in this order"),
@@ -129,8 +162,8 @@ def test_a_delta_without_joints_is_refused():
 
 def test_places_out_of_the_workspace_are_refused_before_anything_moves():
     file = RigFile.model_validate(with_joints(settings__places__reach_x_mm=[-200.0, 200.0]))
-    assert any("is refused" in text for text in check(file).problems)
-    with pytest.raises(UsageError, match="is refused"):
+    assert any("is not permitted" in text for text in check(file).problems)
+    with pytest.raises(UsageError, match="is not permitted"):
         build(RigContext(rig_file=file))
 
 
@@ -138,9 +171,7 @@ def test_places_within_it_are_told():
     found = check(RigFile.model_validate(with_joints(settings__places__reach_x_mm=[-5.0, 5.0])))
     assert found.problems == ()
     (places,) = (table for table in found.tables if table.title == "places")
-    assert ("all moves between them", "permitted") in places.rows
-    (first,) = (table for table in found.tables if table.title.startswith("sent first"))
-    assert {"joint-1", "joint-2", "joint-3", "motor", "force", "icub", "biotac"} == {row[0] for row in first.rows}
+    assert ("manipulator", "example of a linear delta") in places.rows
 
 
 def test_rigs_that_move_nothing_have_nothing_to_check(capsys):

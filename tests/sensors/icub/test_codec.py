@@ -264,6 +264,15 @@ def test_a_tail_without_its_head_makes_a_sample():
     assert decoder.counts[14, 3].missing_heads == 1
 
 
+def test_halves_pair_in_their_order_on_the_bus():
+    """A host that is late between two frames came to two samples of a half each."""
+    head, tail = pair(0, 240)
+    decoder = SkinDecoder(PERIOD_S)
+    (late,) = fed(decoder, head, replace(tail, t_ns=round(0.8 * PERIOD_NS)))
+    assert (late.taxels, set(late.quality)) == (bytes([240] * 12), {SUSPECT})
+    assert decoder.counts[14, 3].named() == {"halves far apart": 1}
+
+
 def test_halves_of_different_samples_are_never_joined():
     # The tail of the first and the head of the second are lost; values would join without a trace.
     decoder = SkinDecoder(PERIOD_S)

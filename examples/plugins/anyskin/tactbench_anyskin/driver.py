@@ -35,7 +35,7 @@ class AnySkinDriver(RowDriver[ByteLink]):
     stream, link_kind = STREAM, ByteLink
     _left = b""
 
-    def start(self) -> None:
+    def begin(self) -> None:
         """Forget what came before."""
         self._left = b""
 

@@ -30,7 +30,7 @@ class USkinDriver(RowDriver[CanLink]):
 
     stream, link_kind, defaults = STREAM, CanLink, {"board": 1}
 
-    def start(self) -> None:
+    def begin(self) -> None:
         """Let it send."""
         self._heard: dict[int, tuple[int, ...]] = {}
         self.link.send(CanFrame(START + self.options["board"], b"\x07\x00"))

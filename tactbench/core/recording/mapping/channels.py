@@ -116,9 +116,14 @@ def device(sensor: SensorSpec, mapping: MappingFile, words: Mapping[str, Scalar]
     return sensor.model_copy(update={"name": name, "title": fill(mapping.sensor.title, words, "sensor.title")})
 
 
-def _channels(stream: str, group: ChannelGroup) -> Iterator[MappedChannel]:
+def columns_of(group: ChannelGroup) -> list[Column]:
+    """Return the columns of a group, ranges spelled out."""
     given = group.columns if isinstance(group.columns, tuple) else (group.columns,)
-    columns = [_column(column) for text in given for column in expand(text)]
+    return [_column(column) for text in given for column in expand(text)]
+
+
+def _channels(stream: str, group: ChannelGroup) -> Iterator[MappedChannel]:
+    columns = columns_of(group)
     names = list(_names(stream, group, columns))
     if group.positions_m and len(group.positions_m) != len(columns):
         raise MappingError(

@@ -4,15 +4,17 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 from tactbench.core.errors import MappingError
 from tactbench.core.recording.mapping.arrays import read_arrays
-from tactbench.core.recording.mapping.model import Arrays, Mapping, TableSource, Xlsx
+from tactbench.core.recording.mapping.bags import Topic, read_bag
+from tactbench.core.recording.mapping.channels import columns_of
+from tactbench.core.recording.mapping.model import Arrays, Bag, Mapping, TableSource, Xlsx
 from tactbench.core.recording.mapping.samples import check_join
 from tactbench.core.recording.mapping.sheets import read_sheet
-from tactbench.core.recording.mapping.table import Table
+from tactbench.core.recording.mapping.table import BagTable, Table
 from tactbench.core.recording.mapping.text import read_text
 
 Words = dict[str, str]
@@ -24,7 +26,7 @@ class FoundFile:
 
     path: Path
     shown: str
-    words: Words
+    words: Words = field(compare=False)
 
 
 @dataclass(frozen=True)
@@ -87,15 +89,32 @@ def read(mapping: Mapping, files: FileSet) -> Iterator[RawRecording]:
             yield RawRecording({first: array}, {**files.words, **words}, shown)
         return
     tables: dict[str, Table] = {}
+    topics: dict[FoundFile, dict[str, Topic]] = {}
     for name, file in files.files.items():
         how = mapping.tables[name].read
         assert not isinstance(how, Arrays)  # the model refuses an archive beside other tables
-        if isinstance(how, Xlsx):
+        if isinstance(how, Bag):
+            tables[name] = BagTable(file.shown)  # keeps its place; read below, all topics of a bag at once
+            topics.setdefault(file, {})[name] = _asked(mapping, name, how.topic)
+        elif isinstance(how, Xlsx):
             tables[name] = read_sheet(file.path, file.shown, how)
         else:
             tables[name] = read_text(file.path, file.shown, how)
+    for file, asked in topics.items():
+        tables |= read_bag(file.path, file.shown, asked)
     check_join(mapping, tables)
     yield from _split(mapping, RawRecording(tables, files.words, shown))
+
+
+def _asked(mapping: Mapping, name: str, topic: str) -> Topic:
+    """Return which fields of a topic the mapping uses; no others are kept."""
+    source = mapping.tables[name]
+    streams = [stream for stream in mapping.streams.values() if stream.table == name]
+    numbers = [column for one in streams for group in one.channels for column in columns_of(group)]
+    texts = [note.column for one in streams for note in one.annotations.values() if note.column is not None]
+    texts += mapping.split_by.values() if name == next(iter(mapping.tables)) else ()
+    time = source.time.column if source.time is not None else None
+    return Topic(topic, tuple(dict.fromkeys(numbers)), tuple(dict.fromkeys(texts)), time)
 
 
 def _matching(name: str, source: TableSource, root: Path) -> list[FoundFile]:

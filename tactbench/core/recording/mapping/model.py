@@ -95,6 +95,13 @@ class Mat(Arrays):
     format: Literal["mat"] = "mat"
 
 
+class Bag(Frozen):
+    """A topic of an MCAP bag, a row a message; columns are paths of fields: ``wrench.force.z``, ``data.0..63``."""
+
+    format: Literal["mcap"] = "mcap"
+    topic: str
+
+
 class Time(Frozen):
     """The clock of a table: a column, never `row / rate`."""
 
@@ -117,7 +124,7 @@ class TableSource(Frozen):
     """Which: a pattern below the root, with ``*`` within a folder and ``**`` across folders."""
     path: str = ""
     """Regular expression searched in each path; its named groups become words."""
-    read: Annotated[Csv | Text | Records | Xlsx | Npz | Mat, Field(discriminator="format")]
+    read: Annotated[Csv | Text | Records | Xlsx | Npz | Mat | Bag, Field(discriminator="format")]
     time: Time | None = None
 
     @field_validator("files")
@@ -286,6 +293,23 @@ class Exclusion(Frozen):
     reason: str = Field(min_length=1)
 
 
+class DataSource(Frozen):
+    """A public data set: where its files lie, and which they are."""
+
+    address: str = Field(default="", pattern=r"^(https?://.*/)?$")
+    """Of the folder that holds `files`, of one fixed state of it; empty: these files lie at no public address."""
+    licence: str
+    citation: str
+    measured: str
+    """What, in a line."""
+    tasks: tuple[str, ...] = Field(min_length=1)
+    """That the recordings can be asked; those that are asked where nobody names one."""
+    bytes: int = Field(ge=1)
+    """Size of all files."""
+    files: dict[str, Annotated[str, Field(pattern=r"^[0-9a-f]{64}$")]] = Field(min_length=1)
+    """Path below `address` and below the root -> SHA-256."""
+
+
 class Mapping(Frozen):
     """A mapping file."""
 
@@ -307,6 +331,8 @@ class Mapping(Frozen):
     exclude: tuple[Exclusion, ...] = ()
     tasks: tuple[DeclaredTask, ...] = ()
     """Questions that the recordings can be asked, beside the installed ones."""
+    source: DataSource | None = None
+    """None: the tables are no data set that has a name."""
 
     @model_validator(mode="after")
     def _hangs_together(self) -> Mapping:

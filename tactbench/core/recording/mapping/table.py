@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from array import array
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field
 from decimal import Decimal, InvalidOperation
@@ -163,12 +164,68 @@ class ArrayTable:
         return values
 
 
+MESSAGE_TIMES = ("log_time", "publish_time")
+"""Columns that every message of a bag has beside its fields: nanoseconds, when it was written and sent."""
+
+
+@dataclass(frozen=True)
+class BagTable:
+    """The messages of one topic, a row each, in the order of the bag; of their fields those that were asked for."""
+
+    shown: str
+    """Name of file and topic for messages"""
+    found: dict[Column, array[float]] = field(default_factory=dict)
+    words: dict[Column, list[str]] = field(default_factory=dict)
+    stamps: list[Any] = field(default_factory=list)
+    """Of the topic's time: whole nanoseconds, or numbers in the mapping's unit"""
+    rows: list[int] = field(default_factory=list)
+    """Numbers of the messages, from 0"""
+
+    def __len__(self) -> int:
+        return len(self.rows)
+
+    def numbers(self, column: Column) -> FloatArray:
+        """Return a field, (n,), with NaN where there is no sample; MappingError for an infinite number."""
+        values = np.array(self.found[column], dtype=np.float64)
+        if np.isinf(values).any():
+            row = int(np.flatnonzero(np.isinf(values))[0])
+            raise MappingError(f"{self.where(row)}: {column}: infinite.", hint="Leave the field out.")
+        return values
+
+    def texts(self, column: Column) -> list[str]:
+        """Return a field as texts, (n,)."""
+        return self.words[column]
+
+    def nanoseconds(self, column: Column, per_unit: int) -> IntArray:
+        """Return the topic's time, (n,) nanoseconds; MappingError for a stamp whose unit is said to be another."""
+        whole = column in MESSAGE_TIMES or isinstance(self.stamps[0], int)
+        if whole and per_unit != 1:
+            raise MappingError(f"{self.shown}: {column} is in nanoseconds.", hint="Write `unit: ns` under `time`.")
+        if whole:
+            return np.array(self.stamps, dtype=np.int64)
+        return np.array([int((Decimal(one) * per_unit).to_integral_value()) for one in self.stamps], dtype=np.int64)
+
+    def take(self, rows: Sequence[int]) -> BagTable:
+        """Return some of the rows."""
+        return BagTable(
+            self.shown,
+            {column: array("d", (values[row] for row in rows)) for column, values in self.found.items()},
+            {column: [values[row] for row in rows] for column, values in self.words.items()},
+            [self.stamps[row] for row in rows] if self.stamps else [],
+            [self.rows[row] for row in rows],
+        )
+
+    def where(self, row: int) -> str:
+        """Return file, topic and message of a row, for messages."""
+        return f"{self.shown}, message {self.rows[row]}"
+
+
 def plain(value: Any) -> str:
     """Return a number as people write it in a mapping: 1, not 1.0."""
     return str(int(value)) if isinstance(value, float) and value.is_integer() else str(value)
 
 
-Table = TextTable | ArrayTable
+Table = TextTable | ArrayTable | BagTable
 """Rows and columns of one recording."""
 
 

@@ -10,7 +10,6 @@ What the integers mean is in ``profile.py``.
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
 from enum import Enum, IntFlag
 from typing import NamedTuple
 
@@ -37,17 +36,10 @@ SAVED = "EEPROM writing done"
 FLASH_DEFECT = "Flash defect"
 REFUSALS = (UNKNOWN_COMMAND, INVALID_PARAMETER, NOT_AVAILABLE, OVERTEMPERATURE, FLASH_DEFECT)
 
-NOTICES = {
-    "p": "position reached",
-    "v": "velocity reached",
-    "r": "error (older drives)",
-    "f": "fault",
-    "h": "edge at the analog input",
-    "t": "input 3",
-    "w": "input 4",
-    "x": "input 5",
-}
-"""Sourced: KickdriveOliver/docklight, example Faulhaber_RS232; `r` from the manual of the 3564K024B C, page 52."""
+NOTICES = "pvrfhtwx"
+"""Position reached, velocity reached, error (older drives), fault, edge at the analog input, inputs 3, 4 and 5.
+
+Sourced: KickdriveOliver/docklight, example Faulhaber_RS232; `r` from the manual of the 3564K024B C, page 52."""
 
 _QUERIES = """
     POS TPOS GV GN GRC GCL GU GRU TEM VER GTYP GSER OST SWS CST GST GFS GAST GPL GNL GSP GAC GDEC GPC GCC GCORRIDOR
@@ -173,22 +165,10 @@ def read_line(raw: bytes) -> Line:
     return Line(Kind.TEXT, text)
 
 
-@dataclass
-class LineCounts:
-    """How many lines of each kind came in."""
-
-    answers: int = 0
-    """Of kinds OK, VALUE and TEXT."""
-    refusals: int = 0
-    notices: int = 0
-    garbled: int = 0
-
-
 class LineReader:
     """Bytes from the drive into lines; cut anywhere, and in step again after the next LF."""
 
     def __init__(self) -> None:
-        self.counts = LineCounts()
         self._line = bytearray()
         self._began_ns = 0
 
@@ -216,24 +196,12 @@ class LineReader:
             raw = bytes(self._line)
             self._line.clear()
             whole = raw.endswith(b"\r") and len(raw) <= LONGEST_LINE + 1
-            found.append(self._counted(read_line(raw[:-1]) if whole else Line(Kind.GARBLED, raw.decode("latin-1"))))
+            found.append(read_line(raw[:-1]) if whole else Line(Kind.GARBLED, raw.decode("latin-1")))
         return found
 
     def clear(self) -> None:
         """Forget an unfinished line: after a time-out, or a change of rate or answer mode."""
         self._line.clear()
-
-    def _counted(self, line: Line) -> Line:
-        match line.kind:
-            case Kind.GARBLED:
-                self.counts.garbled += 1
-            case Kind.NOTICE:
-                self.counts.notices += 1
-            case Kind.REFUSAL:
-                self.counts.refusals += 1
-            case _:
-                self.counts.answers += 1
-        return line
 
 
 def answers(line: Line, name: str) -> bool:
@@ -278,43 +246,6 @@ class Configuration(IntFlag):
     ACKNOWLEDGES = 1 << 2
     POWER_STAGE = 1 << 10
     POSITION_LIMITS = 1 << 13
-
-
-class GeneralStatus(NamedTuple):
-    """The seven characters of GST, left to right (sourced: the manual)."""
-
-    position_control: bool
-    analog_or_pwm_source: bool
-    pwm_source: bool
-    enabled: bool
-    target_reached: bool
-    limit_edge: bool
-    limit_level: bool
-
-
-class FaultStatus(NamedTuple):
-    """The four characters of GFS, left to right (sourced: the manual)."""
-
-    overtemperature: bool
-    current_limit: bool
-    reserved: bool
-    overvoltage: bool
-
-
-def general_status(text: str) -> GeneralStatus:
-    """Return what GST says; raises ValueError if `text` is not seven 0s and 1s."""
-    return GeneralStatus(*_switches(text, 7))
-
-
-def fault_status(text: str) -> FaultStatus:
-    """Return what GFS says; raises ValueError if `text` is not four 0s and 1s."""
-    return FaultStatus(*_switches(text, 4))
-
-
-def _switches(text: str, n: int) -> list[bool]:
-    if len(text) != n or set(text) - {"0", "1"}:
-        raise ValueError(f"a status of {n} characters 0 and 1 was expected, not {text!r}")
-    return [character == "1" for character in text]
 
 
 def line_time_s(n_bytes: int, baud: int) -> float:

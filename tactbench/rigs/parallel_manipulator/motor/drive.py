@@ -11,7 +11,6 @@ from dataclasses import dataclass, replace
 
 from tactbench.rigs.parallel_manipulator.motor.codec import (
     BAUDS,
-    FLASH_DEFECT,
     INVALID_PARAMETER,
     NOT_AVAILABLE,
     OK,
@@ -23,12 +22,36 @@ from tactbench.rigs.parallel_manipulator.motor.codec import (
     Configuration,
     OperationStatus,
 )
-from tactbench.rigs.parallel_manipulator.motor.profile import MotorProfile
+from tactbench.rigs.parallel_manipulator.motor.profile import (
+    LARGEST_ACCELERATION,
+    LARGEST_CURRENT,
+    LARGEST_POSITION,
+    LARGEST_SPEED,
+    FaulhaberOptions,
+)
 from tactbench.rigs.parallel_manipulator.motor.servo import Load, MotorModel, Profile, Servo
 
-_REFUSED = "POR I PP PD SR CI CAHOSEQ HA HL HN HP SHA SHL SHN GOIX LOADHO"
+_REFUSED = "POR I PP PD SR CI NV NVOFF CAHOSEQ HA HL HN HP SHA SHL SHN GOIX LOADHO"
 _NOT_MODELLED = QUERIES.union(_REFUSED.split())
 """Commands of the drive that are refused here, but for the queries that `_query` knows."""
+
+
+_SETTINGS = {
+    "SP": ("speed", LARGEST_SPEED, 0),
+    "AC": ("acceleration", LARGEST_ACCELERATION, 1),
+    "DEC": ("braking", LARGEST_ACCELERATION, 1),
+    "CORRIDOR": ("corridor", 32767, 0),
+    "DEV": ("deviation", 32767, 0),
+    "LPC": ("peak_current", LARGEST_CURRENT, 0),
+    "LCC": ("continuous_current", LARGEST_CURRENT, 0),
+    "HOSP": ("homing_speed", LARGEST_SPEED, 0),
+    "NODEADR": ("node", 255, 0),
+    "ANSW": ("answer_mode", 2, 0),
+}
+"""Commands that set a number: its field, its largest value, and its least."""
+_READ_BACK = {
+    "GSP": "SP", "GAC": "AC", "GDEC": "DEC", "GPC": "LPC", "GCC": "LCC", "GCORRIDOR": "CORRIDOR", "GDEV": "DEV",
+}  # fmt: skip
 
 
 class Refused(Exception):  # noqa: N818  (an answer, not a failure of ours)
@@ -73,16 +96,14 @@ class Drive:
     """
 
     def __init__(
-        self, load: Load | None, profile: MotorProfile, model: MotorModel, reference_switch_m: float | None
+        self, load: Load | None, profile: FaulhaberOptions, model: MotorModel, reference_switch_m: float | None
     ) -> None:
         self.profile = profile
         self.servo = Servo(model, load)
         self.standing = False
-        """Whether further ticks change nothing but the motor's heat, to the servo's resolution, before a command."""
+        """Whether further ticks change nothing, to the servo's resolution, before a command."""
         self.hot = False
         """Too hot: without power, and without any until it is switched on again."""
-        self.flash_defect = False
-        self.temperature_c = 25.0
         self._reference_switch_m = reference_switch_m
         # Speeds and limits at power-on are assumed.
         travel = [profile.increments(stop.to("m")) for stop in model.travel]
@@ -111,8 +132,6 @@ class Drive:
         self._homing = False
         self._attained = True
         self._notify_end = False
-        self._notify_at_m: float | None = None
-        self._notify_speed_m_s: float | None = None
 
     def overheat(self) -> None:
         """Take the power off until `hot` is set back and the drive is enabled again."""
@@ -122,24 +141,23 @@ class Drive:
     def tick(self, at_s: float) -> list[str]:
         """Go one tick, to `at_s`; return the notices it causes."""
         profile, settings, reference = self.profile, self.settings, self._reference
-        before = self.servo.position_m, self.servo.speed_m_s
         reference_before_m = reference.position_m
         if not self._enabled:
             self.servo.step(at_s, None, 0.0)
             reference.stop_at(self.servo.position_m)
         else:
-            speed = profile.speed_m_s(settings.speed)
-            acceleration = profile.acceleration_m_s2(settings.acceleration)
-            braking = profile.acceleration_m_s2(settings.braking)
+            speed = settings.speed * profile.speed_unit_m_s
+            acceleration = settings.acceleration * profile.acceleration_unit_m_s2
+            braking = settings.braking * profile.acceleration_unit_m_s2
             if self._velocity is not None:
-                commanded = min(max(profile.speed_m_s(self._velocity), -speed), speed)
+                commanded = min(max(self._velocity * profile.speed_unit_m_s, -speed), speed)
                 reference.to_speed(self._at_limits(commanded, braking), self.servo.tick_s, acceleration, braking)
             else:
                 if self._homing:
-                    speed = profile.speed_m_s(settings.homing_speed)
+                    speed = settings.homing_speed * profile.speed_unit_m_s
                 reference.to_position(self._target_m, self.servo.tick_s, speed, acceleration, braking)
             self.servo.step(at_s, reference, self._limit_a())
-        notices = self._notify(*before)
+        notices = self._notify()
         # A load may change with time.
         self.standing = (
             self.servo.load is None
@@ -165,19 +183,17 @@ class Drive:
         return self._place_m(settings.negative_limit), self._place_m(settings.positive_limit)
 
     def _limit_a(self) -> float:
-        peak = self.profile.current_a(self.settings.peak_current)
-        return self.servo.limit_a(peak, self.profile.current_a(self.settings.continuous_current))
+        return self.settings.peak_current * self.profile.current_unit_a
 
     def _place_m(self, increments: float) -> float:
         return self.origin_m + self.profile.position_m(increments)
 
     def _increments(self, position_m: float) -> int:
-        return round((position_m - self.origin_m) / self.profile.position_m(1.0))
+        return round((position_m - self.origin_m) / self.profile.increment_m)
 
-    def _notify(self, before_m: float, before_m_s: float) -> list[str]:
+    def _notify(self) -> list[str]:
         notices = []
-        position_m, speed_m_s = self.servo.position_m, self.servo.speed_m_s
-        near = abs(position_m - self._target_m) <= self.profile.position_m(self.settings.corridor)
+        near = abs(self.servo.position_m - self._target_m) <= self.profile.position_m(self.settings.corridor)
         attained = self._velocity is None and self._reference.position_m == self._target_m and near and self._enabled
         if attained and self._homing:
             # The switch defines zero (assumed: GOHOSEQ as its programming by the maker's tools has it).
@@ -188,18 +204,6 @@ class Drive:
             notices.append("p")
         # A target once reached stays reached until the next motion (assumed).
         self._attained = self._velocity is None and (self._attained or attained)
-        at_m = self._notify_at_m
-        if at_m is not None and (before_m - at_m) * (position_m - at_m) <= 0.0:
-            self._notify_at_m = None
-            notices.append("p")
-        commanded = self._notify_speed_m_s
-        # Passed, or within half of the drive's unit.
-        if commanded is not None and (
-            (before_m_s - commanded) * (speed_m_s - commanded) <= 0.0
-            or abs(speed_m_s - commanded) <= 0.5 * self.profile.speed_m_s(1.0)
-        ):
-            self._notify_speed_m_s = None
-            notices.append("v")
         return notices
 
     def answer(self, command: Command) -> str:
@@ -220,6 +224,10 @@ class Drive:
         if name in _NOT_MODELLED:
             raise Refused(NOT_AVAILABLE)
         settings = self.settings
+        if name in _SETTINGS:
+            field, most, least = _SETTINGS[name]
+            setattr(settings, field, self._number(argument, most, least=least))
+            return OK
         match name:
             case "EN":
                 if self.hot:
@@ -232,22 +240,20 @@ class Drive:
             case "DI":
                 self._enabled = self._homing = False
             case "LA":
-                self._loaded_m = self._place_m(self._number(argument, self.profile.largest_position, signed=True))
+                self._loaded_m = self._place_m(self._number(argument, LARGEST_POSITION, signed=True))
             case "LR":
                 # Relative to the target before (assumed), so that steps do not add up errors of control.
-                steps = self._number(argument, self.profile.largest_position, signed=True)
+                steps = self._number(argument, LARGEST_POSITION, signed=True)
                 base_m = self._target_m if self._velocity is None else self.servo.position_m
                 self._loaded_m = base_m + self.profile.position_m(steps)
             case "M":
                 self._move()
             case "V":
                 self._need_power()
-                self._velocity = self._number(argument, self.profile.largest_speed, signed=True)
+                self._velocity = self._number(argument, LARGEST_SPEED, signed=True)
                 self._attained = self._homing = False
             case "HO":
-                commanded = (
-                    0 if argument is None else self._number(argument, self.profile.largest_position, signed=True)
-                )
+                commanded = 0 if argument is None else self._number(argument, LARGEST_POSITION, signed=True)
                 self.origin_m = self.servo.position_m - self.profile.position_m(commanded)
             case "GOHOSEQ":
                 if self._reference_switch_m is None:
@@ -255,28 +261,12 @@ class Drive:
                 self._need_power()
                 self._loaded_m, self._velocity = None, None
                 self._homing, self._attained, self._target_m = True, False, self._reference_switch_m
-            case "HOSP":
-                settings.homing_speed = self._number(argument, self.profile.largest_speed)
             case "NP":
-                if argument is None:
-                    self._notify_end = True
-                else:
-                    self._notify_at_m = self._place_m(argument)
+                self._notify_end = argument is None  # a place to be told of is taken, and never told of
             case "NPOFF":
-                self._notify_end, self._notify_at_m = False, None
-            case "NV":
-                commanded = (self._velocity or 0) if argument is None else argument
-                self._notify_speed_m_s = self.profile.speed_m_s(commanded)
-            case "NVOFF":
-                self._notify_speed_m_s = None
-            case "SP":
-                settings.speed = self._number(argument, self.profile.largest_speed)
-            case "AC":
-                settings.acceleration = self._number(argument, self.profile.largest_acceleration, least=1)
-            case "DEC":
-                settings.braking = self._number(argument, self.profile.largest_acceleration, least=1)
+                self._notify_end = False
             case "LL":
-                limit = self._number(argument, self.profile.largest_position, signed=True)
+                limit = self._number(argument, LARGEST_POSITION, signed=True)
                 if limit > 0:
                     settings.positive_limit = limit
                 elif limit < 0:
@@ -285,29 +275,15 @@ class Drive:
                     raise Refused(INVALID_PARAMETER)  # Assumed: zero has no sign that picks a limit.
             case "APL":
                 settings.limits_on = bool(self._number(argument, 1))
-            case "CORRIDOR":
-                settings.corridor = self._number(argument, 32767)
-            case "DEV":
-                settings.deviation = self._number(argument, 32767)
-            case "LPC":
-                settings.peak_current = self._number(argument, self.profile.largest_current)
-            case "LCC":
-                settings.continuous_current = self._number(argument, self.profile.largest_current)
             case "SOR":
                 if self._number(argument, 4) != 0:
                     raise Refused(NOT_AVAILABLE)  # Only speeds from RS232 are modelled.
-            case "NODEADR":
-                settings.node = self._number(argument, 255)
-            case "ANSW":
-                settings.answer_mode = self._number(argument, 2)
             case "BAUD":
                 if argument not in BAUDS:
                     raise Refused(INVALID_PARAMETER)
                 settings.baud = argument
                 return ""  # The answer at the new rate is in no source.
             case "SAVE" | "EEPSAV":
-                if self.flash_defect:
-                    return FLASH_DEFECT
                 self._saved = replace(settings)
                 return SAVED
             case "RESET":
@@ -365,13 +341,13 @@ class Drive:
             "POS": lambda: str(self._increments(servo.position_m)),
             "TPOS": lambda: str(self._increments(self._target_m)),
             "GV": lambda: str(self._velocity or 0),
-            "GN": lambda: str(round(servo.speed_m_s / profile.speed_m_s(1.0))),
+            "GN": lambda: str(round(servo.speed_m_s / profile.speed_unit_m_s)),
             # Without sign (assumed).
-            "GRC": lambda: str(round(abs(servo.current_a) / profile.current_a(1.0))),
-            "GCL": lambda: str(round(self._limit_a() / profile.current_a(1.0))),
-            "TEM": lambda: str(round(self.temperature_c)),
+            "GRC": lambda: str(round(abs(servo.current_a) / profile.current_unit_a)),
+            "GCL": lambda: str(round(self._limit_a() / profile.current_unit_a)),
+            "TEM": lambda: "25",
             "VER": lambda: "EMULATOR",
-            "GTYP": lambda: profile.name,
+            "GTYP": lambda: "linear motor, Faulhaber ASCII",
             "GSER": lambda: "0",
             "OST": ost,
             "CST": cst,
@@ -379,12 +355,7 @@ class Drive:
             "GFS": lambda: f"{int(self.hot)}{int(servo.limited)}00",
             "GPL": lambda: str(settings.positive_limit),
             "GNL": lambda: str(settings.negative_limit),
-            "GSP": lambda: str(settings.speed),
-            "GAC": lambda: str(settings.acceleration),
-            "GDEC": lambda: str(settings.braking),
-            "GPC": lambda: str(settings.peak_current),
-            "GCC": lambda: str(settings.continuous_current),
-            "GCORRIDOR": lambda: str(settings.corridor),
-            "GDEV": lambda: str(settings.deviation),
         }
+        if name in _READ_BACK:
+            return lambda: str(getattr(settings, _SETTINGS[_READ_BACK[name]][0]))
         return found.get(name)

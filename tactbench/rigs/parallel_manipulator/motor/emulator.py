@@ -7,19 +7,26 @@ from __future__ import annotations
 
 import math
 from collections import Counter, deque
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
 
 from tactbench.plugin import sourced
-from tactbench.plugin.devices import CanFrame, DeviceEmulator, EmulatorSettings, Fault, Sent, fault_concerns
+from tactbench.plugin.devices import (
+    CanFrame,
+    DeviceEmulator,
+    EmulatorSettings,
+    Fault,
+    Sent,
+    fault_concerns,
+    read_options,
+)
 from tactbench.rigs.parallel_manipulator.motor.codec import OK, Command, CommandReader, line_time_s
 from tactbench.rigs.parallel_manipulator.motor.drive import Drive, Refused
-from tactbench.rigs.parallel_manipulator.motor.profile import FaulhaberOptions, MotorProfile
+from tactbench.rigs.parallel_manipulator.motor.profile import FaulhaberOptions
 from tactbench.rigs.parallel_manipulator.motor.servo import Load, MotorModel
-from tactbench.rigs.parallel_manipulator.options import read_options
 
 
 @dataclass(frozen=True)
@@ -30,7 +37,6 @@ class MotorFault(Fault):
         "motor-fault": "too hot: without power until it is over and the drive is enabled again",
         "late-answers": "answers, not notices, come later by delay_s",
         "garbled-line": "one byte of a line is another one",
-        "flash-defect": "SAVE fails",
     }
     delay_s: float = 0.25
     """Seven times the longest answer at 9600 baud."""
@@ -69,15 +75,17 @@ class MotorEmulator(DeviceEmulator):
         load: Load | None,
         rng: np.random.Generator,
         *,
-        profile: MotorProfile | None = None,
+        profile: FaulhaberOptions | None = None,
         model: MotorModel | None = None,
         reference_switch_m: float | None = None,
         baud: int = 9600,
         faults: Iterable[MotorFault] = (),
     ) -> None:
         model = model or MotorModel()
-        self.drive = Drive(load, profile or MotorProfile(), model, reference_switch_m)
+        self.drive = Drive(load, profile or FaulhaberOptions(), model, reference_switch_m)
         self.faults = list(faults)
+        self.begins_m = 0.0
+        """Where the motor stands at power-on, as its driver counts once it has homed it."""
         self.drive.settings.baud = baud
         self._answer_time_s = model.answer_time.to("s")
         self._rng = rng
@@ -89,6 +97,15 @@ class MotorEmulator(DeviceEmulator):
         self._in: deque[tuple[float, bytes]] = deque()
         self._answers: deque[tuple[float, str]] = deque()
         self._out: deque[tuple[float, bytes]] = deque()
+
+    @property
+    def position_m(self) -> float:
+        """Where the motor is, as its driver counts once it has homed it [m]."""
+        return self.drive.servo.position_m + self.begins_m
+
+    def press_against(self, force_n: Callable[[float], float] | None) -> None:
+        """Let a force [N] at such a position act on the motor; None: none, ever."""
+        self.drive.servo.load = None if force_n is None else lambda at_m, _: force_n(at_m + self.begins_m)
 
     def feed(self, piece: bytes | CanFrame, now_s: float) -> list[Sent]:
         """Take bytes that the host sends from `now_s` on, at the line's rate; return what `poll` returns.
@@ -132,7 +149,7 @@ class MotorEmulator(DeviceEmulator):
 
     @property
     def _standing(self) -> bool:
-        """Whether a tick changes nothing but the motor's heat until a command comes."""
+        """Whether a tick changes nothing until a command comes."""
         return self.drive.standing and not any(fault.name == "motor-fault" for fault in self.faults)
 
     def _tick_s(self) -> float:
@@ -147,9 +164,7 @@ class MotorEmulator(DeviceEmulator):
             if tick_s <= now_s and self._standing:
                 assert self._start_s is not None
                 # One tick is left to be made: rounding then decides nothing.
-                ticks = max(0, math.floor((now_s - self._start_s) / self.drive.servo.tick_s) - 1 - self._ticks)
-                self.drive.servo.cool(ticks)
-                self._ticks += ticks
+                self._ticks += max(0, math.floor((now_s - self._start_s) / self.drive.servo.tick_s) - 1 - self._ticks)
                 tick_s = self._tick_s()
             if self._answers and self._answers[0][0] <= min(tick_s, now_s):
                 due_s, text = self._answers.popleft()
@@ -176,7 +191,6 @@ class MotorEmulator(DeviceEmulator):
     def _carry_out(self, command: Command, at_s: float) -> None:
         if command.node not in (None, self.drive.settings.node):
             return
-        self.drive.flash_defect = self._active("flash-defect", at_s) is not None
         try:
             answer = self.drive.answer(command)
             refused = False
@@ -222,12 +236,16 @@ def build(settings: EmulatorSettings) -> MotorEmulator:
         first, last = (end.to("m") for end in model.travel)
         travel = (sourced(min(ends_m[0], first), "m", "its options"), sourced(max(ends_m[1], last), "m", "its options"))
         model = model.model_copy(update={"travel": travel})
-    return MotorEmulator(
+    found = MotorEmulator(
         lambda _position_m, at_s: settings.senses(at_s).get("load", 0.0),
         settings.rng,
-        profile=options.profile(),
+        profile=options,
         model=model,
         reference_switch_m=SWITCH_M if options.homing == "switch" else None,
         baud=options.baud,
         faults=[MotorFault.parse(text) for text in settings.faults],
     )
+    ends = found.drive.servo.stops
+    homed_at_m = {"here": 0.0, "switch": SWITCH_M, "end-stop": ends[options.homes_towards() > 0]}[options.homing]
+    found.begins_m = options.home_m - homed_at_m
+    return found

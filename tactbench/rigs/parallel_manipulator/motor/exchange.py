@@ -11,10 +11,15 @@ from collections import Counter, deque
 from contextlib import suppress
 from typing import NamedTuple
 
-from tactbench.plugin.devices import ByteLink, Clock, LinkTimeout, Received
+from tactbench.plugin.devices import ByteLink, Clock, LinkTimeout, PositionerError, PositionerSilentError, Received
 from tactbench.rigs.parallel_manipulator.motor.codec import (
+    FLASH_DEFECT,
+    INVALID_PARAMETER,
     LONGEST_ANSWER,
     LONGEST_LINE,
+    NOT_AVAILABLE,
+    OVERTEMPERATURE,
+    UNKNOWN_COMMAND,
     Kind,
     Line,
     LineReader,
@@ -22,12 +27,6 @@ from tactbench.rigs.parallel_manipulator.motor.codec import (
     encode,
     line_time_s,
     newer_generation,
-)
-from tactbench.rigs.parallel_manipulator.motor.errors import (
-    REFUSALS,
-    AnswerMissingError,
-    MotorSilentError,
-    WrongGenerationError,
 )
 
 MARK = "VER"
@@ -37,6 +36,31 @@ IN_A_ROW = 3
 HOST_S = 0.05
 """Added to what the line takes: an adapter may hold bytes for 16 ms, a host may be late by 10 ms (measured elsewhere,
 docs/hardware.md)."""
+_HINTS = {
+    UNKNOWN_COMMAND: "Is it a Faulhaber drive of the 300x RS generation?",
+    INVALID_PARAMETER: "Check the options in the rig file against the drive's manual.",
+    NOT_AVAILABLE: "Is the drive enabled, and does it have this command?",
+    OVERTEMPERATURE: "Let it cool down, then enable it again.",
+    FLASH_DEFECT: "The drive cannot keep settings: ask its maker.",
+}
+
+
+class MotorError(PositionerError):
+    """The motor or its drive does not do what it was asked for."""
+
+
+class MotorSilentError(MotorError, PositionerSilentError):
+    """A command was not answered, or nothing is answered any more."""
+
+
+class MotorRefusalError(MotorError):
+    """The drive refuses a command; `text` is its own."""
+
+    text = ""
+
+
+class WrongGenerationError(MotorError):
+    """The drive speaks the newer, binary protocol."""
 
 
 class Answer(NamedTuple):
@@ -57,59 +81,51 @@ class Answer(NamedTuple):
         return self.checked().value
 
     def checked(self) -> Line:
-        """Return the line.
-
-        Raises
-        ------
-        AnswerMissingError
-            If none came.
-        MotorRefusalError
-            If the drive refuses.
-        """
+        """Return the line; raises MotorSilentError if none came, MotorRefusalError if the drive refuses."""
         text = f"{self.name}{'' if self.argument is None else self.argument}"
         if self.line is None:
-            raise AnswerMissingError(
+            raise MotorSilentError(
                 f"The motor's drive did not answer {text} in time; whether it was carried out is not known.",
-                hint="Check cable and power; ask for position and target before the next move.",
+                hint="Check the cable; read the position before the next move.",
             )
         if self.line.kind is Kind.REFUSAL:
-            kind, hint = REFUSALS[self.line.text]
-            raise kind(f"The motor's drive answers {text} with {self.line.text!r}.", hint=hint)
+            error = MotorRefusalError(
+                f"The motor's drive answers {text} with: {self.line.text}.", hint=_HINTS[self.line.text]
+            )
+            error.text = self.line.text
+            raise error
         return self.line
 
 
 class Exchange:
-    """One drive on a link.
+    """Sends commands and assigns lines to them.
 
     Parameters
     ----------
     link
-        The drive's line.
+        To the drive.
     clock
         Of the link.
     baud
-        Of the line: an answer is waited for three times as long as the longest one takes.
+        Of the line: time-outs go by it.
     node
-        Address on a line with several drives; None: for every drive.
+        Address of the drive; None: the only one.
 
     Attributes
     ----------
-    counts
-        ``time_outs``; ``late`` lines that came before the known answer; ``unexpected`` lines that answer nothing;
-        ``garbled`` ones; ``refusals``.
     notices
-        Letters that the drive sent by itself, with when they came [ns]; for others to take away.
-    answer_s
-        How long an answer is waited for.
+        Letters that the drive sent by itself and nobody has taken yet.
+    counts
+        ``time_outs``, ``late`` answers, ``garbled`` and ``unexpected`` lines, ``refusals``.
     """
 
     def __init__(self, link: ByteLink, clock: Clock, *, baud: int, node: int | None = None) -> None:
-        self.counts: Counter[str] = Counter()
-        self.notices: list[tuple[int, str]] = []
         self.answer_s = 3.0 * line_time_s(LONGEST_ANSWER, baud) + HOST_S
+        self.notices: deque[str] = deque(maxlen=100)
+        self.counts: Counter[str] = Counter()
         self._link, self._clock, self._node = link, clock, node
         self._reader = LineReader()
-        self._pending_commands: deque[tuple[str, int | None, object]] = deque()
+        self._out: deque[tuple[str, int | None, object]] = deque()
         self._since_ns = 0
         self._known = ""
         self._marking = False
@@ -118,22 +134,14 @@ class Exchange:
     @property
     def ready(self) -> bool:
         """Whether no answer is waited for."""
-        return not self._pending_commands and not self._marking
+        return not self._out and not self._marking
 
     def send(self, name: str, argument: int | None = None, of: object = None) -> None:
-        """Send a command now, also while others are out: the drive keeps their order.
-
-        `of` comes back with the answer.
-
-        Raises
-        ------
-        LinkTimeout, LinkUnplugged
-            As the link.
-        """
-        if not self._pending_commands:
+        """Send a command now, also while others are out: the drive keeps their order. `of` comes with the answer."""
+        if not self._out:
             self._since_ns = self._clock()
         self._link.write(encode(name, argument, node=self._node))
-        self._pending_commands.append((name, argument, of))
+        self._out.append((name, argument, of))
 
     def pump(self, timeout_s: float) -> list[Answer]:
         """Take what comes, and wait for the first of it at most so long; return what became of commands.
@@ -143,7 +151,7 @@ class Exchange:
         MotorSilentError
             If three answers in a row did not come.
         LinkUnplugged
-            If it is gone.
+            If the link is gone.
         """
         wait_s = timeout_s
         if not self.ready:
@@ -154,12 +162,7 @@ class Exchange:
         return found if found or self.ready or self._clock() < self._due_ns() else self._overdue()
 
     def greet(self) -> str:
-        """Find the drive: end whatever stands in its line, and ask for its version until two answers are the same.
-
-        Returns
-        -------
-        str
-            The version.
+        """Find the drive: end what stands in its line, and ask for its version until two answers are the same.
 
         Raises
         ------
@@ -174,7 +177,7 @@ class Exchange:
         for _ in range(5):
             self.send(MARK)
             line = None
-            while self._pending_commands:
+            while self._out:
                 for answer in self.pump(self.answer_s):
                     line = answer.line
                 if self._marking:  # Not known yet: ask again instead.
@@ -199,7 +202,7 @@ class Exchange:
                 seen += self._link.read(self.answer_s).data
                 self._refuse_newer(seen[-LONGEST_LINE:])
         self._reader.clear()
-        self._pending_commands.clear()
+        self._out.clear()
         self._marking, self._missed = False, 0
 
     def _due_ns(self) -> int:
@@ -219,7 +222,7 @@ class Exchange:
 
     def _routed(self, line: Line, t_ns: int) -> list[Answer]:
         if line.kind is Kind.NOTICE:
-            self.notices.append((t_ns, line.text))
+            self.notices.append(line.text)
         elif line.kind is Kind.GARBLED:
             self.counts["garbled"] += 1
         elif self._marking:
@@ -228,11 +231,11 @@ class Exchange:
                 self._since_ns = self._clock()
             else:
                 self.counts["late"] += 1
-        elif self._pending_commands and answers(line, self._pending_commands[0][0]):
+        elif self._out and answers(line, self._out[0][0]):
             self.counts["refusals"] += int(line.kind is Kind.REFUSAL)
             self._missed = 0
             self._since_ns = self._clock()
-            name, argument, of = self._pending_commands.popleft()
+            name, argument, of = self._out.popleft()
             return [Answer(name, argument, line, t_ns, of)]
         else:
             self.counts["unexpected"] += 1
@@ -241,8 +244,8 @@ class Exchange:
     def _overdue(self) -> list[Answer]:
         """Give up what is out, and ask what is known; raises MotorSilentError."""
         now_ns = self._clock()
-        lost = [Answer(name, argument, None, now_ns, of) for name, argument, of in self._pending_commands]
-        self._pending_commands.clear()
+        lost = [Answer(name, argument, None, now_ns, of) for name, argument, of in self._out]
+        self._out.clear()
         self.counts["time_outs"] += len(lost)
         self._missed += 1
         if self._missed >= IN_A_ROW:
@@ -252,8 +255,7 @@ class Exchange:
                 f"{self.answer_s:.2f} s.",
                 hint="Check its power and cable. The motor, if it moves, ends its last move and holds.",
             )
-        self._marking = True
-        self._since_ns = now_ns
+        self._marking, self._since_ns = True, now_ns
         self._reader.clear()
         self._link.write(encode(MARK, node=self._node))
         return lost

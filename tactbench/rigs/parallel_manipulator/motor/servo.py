@@ -1,14 +1,7 @@
-"""A linear motor under its drive's position control: profile, controller, current limit, mass, load and end stops.
+"""A linear motor under its drive's position control: a profile, followed with a lag, the largest force, end stops.
 
-The drive steps at a fixed tick. In each tick
-
-    m (v' - v) / h = clip(u', +-k_F i_max) - b v' - F(x'),    x' = x + h v'
-    u' = k_p (r - x') + k_d (s - v') + z + h k_i (r - x')
-
-with reference position r and speed s from a trapezoidal profile, and z the controller's integral. Backward Euler: every
-term on the right falls with v' as long as the load F does not fall with x faster than m / h^2, so there is one root,
-and the step is stable for every tick, stiffness and saturation. The gains put the three poles of the free motor at one
-place w: k_p = 3 m w^2, k_d = 3 m w, k_i = m w^3 (derived).
+Quasi-static (assumed): the motor goes the first-order way of its lag towards the profile, as far as the load permits at
+the current limit. Mass, friction and heat are left out; without power it stands.
 """
 
 from __future__ import annotations
@@ -21,8 +14,7 @@ from pydantic import BaseModel, ConfigDict
 from tactbench.plugin import Quantity, assumed
 
 Load = Callable[[float, float], float]
-"""Force on the motor [N], positive against positive motion, at a position [m] and a time [s]; the same answer to the
-same question, and no fall with position."""
+"""Force on the motor [N], positive against positive motion, at a position [m] and a time [s]; no fall with position."""
 
 _GUESS = "no document names the motor of the rig; of the order of small tubular linear motors"
 
@@ -32,23 +24,18 @@ class MotorModel(BaseModel):
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
-    mass: Quantity = assumed(0.1, "kg", _GUESS)
-    """What moves: rod and indenter."""
     force_constant: Quantity = assumed(6.5, "N/A", _GUESS)
-    damping: Quantity = assumed(0.5, "N*s/m", _GUESS)
-    """Viscous friction."""
     peak_current: Quantity = assumed(1.6, "A", _GUESS)
     """LPC at power-on."""
     continuous_current: Quantity = assumed(1.0, "A", _GUESS)
-    """LCC at power-on."""
-    heating_time: Quantity = assumed(10.0, "s", "of the current's mean square, above which the limit falls to LCC")
+    """LCC at power-on; read back, and otherwise without effect."""
     travel: tuple[Quantity, Quantity] = (
         assumed(-10.0, "mm", "middle of 20 mm of travel"),
         assumed(10.0, "mm", "middle of 20 mm of travel"),
     )
     """Mechanical end stops, from the place at power-on."""
-    bandwidth: Quantity = assumed(300.0, "rad/s", "closed position loop; a lag of 10 ms")
-    tick: Quantity = assumed(1.0, "ms", "coarser than a real drive's, for speed; the model is stable for every tick")
+    lag: Quantity = assumed(5.0, "ms", "closed position loop of a small motor")
+    tick: Quantity = assumed(1.0, "ms", "coarser than a real drive's, for speed; exact for every tick without a load")
     answer_time: Quantity = assumed(1.0, "ms", "from the end of a command to the start of its answer; not documented")
 
 
@@ -118,85 +105,45 @@ class Servo:
     def __init__(self, model: MotorModel, load: Load | None) -> None:
         self.load = load
         self.tick_s = model.tick.to("s")
-        self.mass = model.mass.to("kg")
         self.force_constant = model.force_constant.to("N/A")
-        self.damping = model.damping.to("N*s/m")
-        self.heating_s = model.heating_time.to("s")
         self.stops = (model.travel[0].to("m"), model.travel[1].to("m"))
-        w = model.bandwidth.to("rad/s")
-        self.gains = (3.0 * self.mass * w * w, 3.0 * self.mass * w, self.mass * w**3)
-        self.position_m = 0.0
-        self.speed_m_s = 0.0
-        self.current_a = 0.0
-        self.mean_square_a2 = 0.0
-        """Of the current, over the heating time."""
-        self.integral_n = 0.0
+        self._kept = math.exp(-self.tick_s / model.lag.to("s"))
+        self.position_m = self.speed_m_s = self.current_a = 0.0
         self.limited = False
         """Whether the current stands at its limit."""
-
-    def limit_a(self, peak_a: float, continuous_a: float) -> float:
-        """Return the current that is allowed now: the peak, or the continuous one while the motor is warm."""
-        return peak_a if self.mean_square_a2 < continuous_a**2 else min(peak_a, continuous_a)
 
     def settled(self, reference: Profile) -> bool:
         """Whether the motor is at rest where the reference is, within what :meth:`step` resolves."""
         return abs(self.position_m - reference.position_m) <= REST_M and abs(self.speed_m_s) <= REST_M_S
 
-    def cool(self, ticks: int) -> None:
-        """Let the mean square of a constant current go on by some ticks."""
-        keep = math.exp(-ticks * self.tick_s / self.heating_s)
-        self.mean_square_a2 = keep * self.mean_square_a2 + (1.0 - keep) * self.current_a**2
-
     def step(self, time_s: float, reference: Profile | None, limit_a: float) -> None:
-        """Go one tick, to `time_s`; `reference` None: the power stage is off."""
-        h, (kp, kd, ki) = self.tick_s, self.gains
-        largest = self.force_constant * limit_a
-
-        def force(v: float) -> float:
-            if reference is None:
-                return 0.0
-            missing = reference.position_m - (self.position_m + h * v)
-            commanded = kp * missing + kd * (reference.speed_m_s - v) + self.integral_n + h * ki * missing
-            return min(max(commanded, -largest), largest)
-
-        def residual(v: float) -> float:
-            load = 0.0 if self.load is None else self.load(self.position_m + h * v, time_s)
-            return self.mass * (v - self.speed_m_s) / h - force(v) + self.damping * v + load
-
-        v = _root(residual, self.speed_m_s, self.mass / h)
-        moved = self.position_m + h * v
-        if not self.stops[0] <= moved <= self.stops[1]:
-            moved = min(max(moved, self.stops[0]), self.stops[1])
-            v = (moved - self.position_m) / h
-        applied = force(v)
+        """Go one tick, to `time_s`; `reference` None: the power stage is off, and it stands."""
         if reference is None:
-            self.integral_n, self.limited = 0.0, False
-        else:
-            missing = reference.position_m - moved
-            self.limited = abs(applied) >= largest
-            # Held while the limit acts in its direction, so that it does not wind up.
-            if not (self.limited and missing * applied > 0.0):
-                self.integral_n += h * ki * missing
-        at_stop = moved in self.stops
-        self.position_m, self.speed_m_s = moved, 0.0 if at_stop else v
-        self.current_a = applied / self.force_constant
-        self.cool(1)
+            self.speed_m_s, self.current_a, self.limited = 0.0, 0.0, False
+            return
+        low, high = self.stops
+        wish = reference.position_m + self._kept * (self.position_m - reference.position_m)
+        moved = min(max(wish, low), high)
+        self.limited = moved != wish
+        force_n, most_n = self._force_n(moved, time_s), self.force_constant * limit_a
+        if abs(force_n) > most_n:
+            self.limited = True
+            # Where the load is as large as the limit: further out for a load against positive motion.
+            moved = self._balance(
+                math.copysign(most_n, force_n), (low, moved) if force_n > 0 else (moved, high), time_s
+            )
+        if self.limited:
+            force_n = math.copysign(most_n, reference.position_m - moved)
+        self.speed_m_s = (moved - self.position_m) / self.tick_s
+        self.position_m, self.current_a = moved, force_n / self.force_constant
 
+    def _force_n(self, position_m: float, time_s: float) -> float:
+        return 0.0 if self.load is None else self.load(position_m, time_s)
 
-def _root(residual: Callable[[float], float], guess: float, slope: float) -> float:
-    """Return where `residual`, which rises at least by `slope`, is zero."""
-    from scipy.optimize import brentq
-
-    here = residual(guess)
-    # The root is at most residual / slope away. 1 nm/s is a millionth of a micrometre per tick.
-    if abs(here) <= 1e-9 * slope:
-        return guess
-    reach = -here / slope
-    other = guess + reach
-    # A load that falls with position may take the root a little further.
-    for _ in range(60):
-        if residual(other) * here <= 0.0:
-            break
-        reach *= 2.0
-        other = guess + reach
-    return float(brentq(residual, guess, other, xtol=1e-9, rtol=1e-12))
+    def _balance(self, force_n: float, between_m: tuple[float, float], time_s: float) -> float:
+        """Return the place between two at which the load, which does not fall with position, is a force."""
+        low, high = between_m
+        for _ in range(50):
+            middle = 0.5 * (low + high)
+            low, high = (middle, high) if self._force_n(middle, time_s) < force_n else (low, middle)
+        return 0.5 * (low + high)

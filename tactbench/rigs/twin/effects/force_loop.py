@@ -8,9 +8,9 @@ from collections.abc import Callable
 import numpy as np
 
 from tactbench.plugin import FloatArray
+from tactbench.plugin.devices import LoopModel
 from tactbench.rigs.twin.contact.load_table import LoadTable
 from tactbench.rigs.twin.contact.stages import bare_skin
-from tactbench.rigs.twin.effects.loop_dynamics import Dynamics
 from tactbench.rigs.twin.synthesis import Load, Synthesis
 
 BEYOND = 3.0
@@ -42,12 +42,12 @@ def apply(run: Synthesis) -> None:
     table = bare_skin(run, BEYOND * run.load.largest_n)
     force_n, deepest = force_at_depth(table)
     start = depth_of(table, float(setpoint[0]))
-    dynamics = Dynamics.of(drive, step_s)
-    depths = dynamics.carried(force_n, setpoint, noise, (-RETRACT_MM, deepest), start)
+    model = LoopModel.of(drive, "mm", period_s=step_s, travel=(-RETRACT_MM, deepest))
+    depths = model.simulate(force_n, setpoint, noise, start)
     forces = np.array([force_n(depth) for depth in depths.tolist()])
     run.follow(Load(t_s, forces))
     run.drawn.update(
-        loop_delay_steps=dynamics.delay_steps,
+        loop_delay_steps=model.delay_steps,
         loop_error_rms_n=float(np.sqrt(np.mean((forces - setpoint) ** 2))),
         loop_largest_n=float(forces.max()),
         loop_steps_at_end=int(np.count_nonzero(depths >= deepest)),

@@ -56,6 +56,17 @@ def test_eflesh_normal(imported, name):
     assert "irregular" in {finding.check for finding in report.recordings[0].findings}
 
 
+def test_eflesh_location(imported):
+    for recording in opened(imported("eflesh-location")):
+        place, taxels = recording.read("probe"), recording.read("magnetometers")
+        assert taxels.data.shape == (4805, 15)
+        assert np.array_equal(np.bincount(taxels.annotations["visit"]), np.full(5, 961))
+        points = np.rint(place.data[:, :2] * 1e3).astype(int)
+        for visit in range(5):
+            assert len(np.unique(points[taxels.annotations["visit"] == visit], axis=0)) == 31 * 31
+        assert np.ptp(points, axis=0).tolist() == [30, 30]
+
+
 def test_biotacsp_stability(imported):
     report = imported("biotacsp-stability")
     assert report.rows == 5193

@@ -3,7 +3,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tactbench.plugin import ForceLoop, ForceRamp, RigContext, Scene, assumed
+from tactbench.core.spec.drive import ForceLoop
+from tactbench.plugin import ForceRamp, RigContext, Scene, assumed
 from tactbench.plugin.simulation import Environment
 from tactbench.rigs.twin import tactbench_effects
 from tactbench.rigs.twin.planner import plan_scene

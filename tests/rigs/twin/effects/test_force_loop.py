@@ -5,12 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tactbench.plugin import ForceLoop, ForceRamp, Indenter, RigContext, RigError, Scene, assumed
+from tactbench.core.spec.drive import ForceLoop
+from tactbench.plugin import ForceRamp, Indenter, RigContext, RigError, Scene, assumed
+from tactbench.plugin.devices import LoopModel
 from tactbench.plugin.simulation import Environment
 from tactbench.rigs.twin import tactbench_effects
 from tactbench.rigs.twin.contact.stages import bare_skin
 from tactbench.rigs.twin.effects.force_loop import BEYOND, depth_of, force_at_depth
-from tactbench.rigs.twin.effects.loop_dynamics import Dynamics
 from tactbench.rigs.twin.planner import plan_scene
 from tactbench.rigs.twin.preparation import prepare
 from tactbench.rigs.twin.rig import build
@@ -68,7 +69,7 @@ def test_without_the_filter_the_loop_oscillates_and_with_it_it_settles(pressed):
 
 def test_the_swing_begins_where_the_skin_becomes_too_stiff_for_the_loop(pressed):
     run = pressed(_scene(_unfiltered()), "force-loop")
-    limit = Dynamics.of(_unfiltered(), 0.012).limit_n_per_mm()
+    limit = LoopModel.of(_unfiltered(), "mm", period_s=0.012).largest_stiffness()
     table = bare_skin(run, BEYOND * 5.0)
     loads = np.linspace(0.0, 5.0, 501)
     stiffness = np.gradient(loads, table.skin(loads).depth_mm)

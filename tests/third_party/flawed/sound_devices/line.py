@@ -2,14 +2,13 @@
 
 import itertools
 import struct
-from contextlib import suppress
 from dataclasses import replace
 
 import numpy as np
 
 from sound_devices import SPEC
 from tactbench.plugin import ChannelSpec, Quality, StreamSpec
-from tactbench.plugin.devices import ByteLink, LinkTimeout, RowDriver, RowEmulator, Sample, Unwrap
+from tactbench.plugin.devices import ByteLink, RowDriver, RowEmulator, Sample, Unwrap
 
 MARK, MOST_N = 0xA5, 50.0
 FORCES = StreamSpec(name="force_torque", rate_hz=100.0, channels=tuple(
@@ -26,10 +25,7 @@ class Framed(RowDriver[ByteLink]):
     def identify(self):
         return {"model": "framed"}
 
-    def start(self):
-        with suppress(LinkTimeout):
-            while True:
-                self.link.read(0.0)
+    def begin(self):
         self._left, self._numbers, self._unwrap = b"", [], Unwrap(8)
         self.link.write(b"go")
 

@@ -32,6 +32,8 @@ class LineDriver(Driver):
         return {"model": model.decode(), "serial": serial.decode()}
 
     def start(self):
+        self._link.discard()
+        self._text = b""
         self._link.write(b"go\n")
 
     def read(self, timeout_s):

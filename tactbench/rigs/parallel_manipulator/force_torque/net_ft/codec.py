@@ -7,7 +7,7 @@ core/src/detail/protocol.cpp, sequence.cpp and status.cpp).
 from __future__ import annotations
 
 import struct
-from enum import Enum, IntEnum, IntFlag
+from enum import IntEnum
 from functools import cached_property
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -16,14 +16,14 @@ import numpy.typing as npt
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from tactbench.plugin import Quality, RigError
-from tactbench.rigs.parallel_manipulator.force_torque.ati_xml import (
+from tactbench.plugin.devices import Options
+from tactbench.rigs.parallel_manipulator.force_torque.ati import (
     FORCE_UNITS,
     TORQUE_UNITS,
     AtiFileError,
     elements,
     unit,
 )
-from tactbench.rigs.parallel_manipulator.options import Options
 
 if TYPE_CHECKING:
     from tactbench.plugin import FloatArray
@@ -38,9 +38,6 @@ _HEADER = 0x1234
 RECORD_BYTES = _RECORD.size
 RECORDS = np.dtype([("rdt_sequence", ">u4"), ("ft_sequence", ">u4"), ("status", ">u4"), ("counts", ">i4", (6,))])
 """The same as `_RECORD`, for many at once."""
-MOST_BUFFERED = 40
-"""Records in one datagram of buffered transfer, at most (sourced: ATI manual 9620-05-NET FT, section 7.4, as quoted in
-a public client)."""
 SEQUENCE_MODULUS = 1 << 32
 LEAST_COUNT, GREATEST_COUNT = -(2**31), 2**31 - 1
 """Of the signed 32 bits of a record."""
@@ -61,8 +58,6 @@ class NetFtOptions(Options):
     is a file that holds the box's ``netftapi2.xml``."""
     bias: bool = False
     """Whether starting takes the present reading as zero: the sensor must be unloaded then."""
-    buffered: bool = False
-    """Whether several records come in a datagram: less work at high rates, and later."""
 
     @model_validator(mode="after")
     def _one_scale(self) -> NetFtOptions:
@@ -148,85 +143,31 @@ def encode_record(record: Record) -> bytes:
         raise ValueError(f"{record} does not fit its 32-bit fields: {error}") from error
 
 
-def decode_record(data: bytes) -> Record:
-    """Return the record in a datagram; raises DatagramError if its length is not 36."""
-    if len(data) != RECORD_BYTES:
-        raise DatagramError(f"A record has {RECORD_BYTES} bytes, not {len(data)}.")
-    rdt, ft, status, *counts = _RECORD.unpack(data)
-    return Record(rdt, ft, status, tuple(counts))
-
-
-def decode_records(data: bytes, *, most: int = 1) -> npt.NDArray[np.void]:
-    """Return the records of a datagram, an array of :data:`RECORDS`.
-
-    Parameters
-    ----------
-    data
-        A datagram, or several whole ones joined.
-    most
-        Records it may hold: 1, :data:`MOST_BUFFERED` for buffered transfer.
+def decode_records(data: bytes) -> npt.NDArray[np.void]:
+    """Return the records of a datagram, or of several joined, an array of :data:`RECORDS`.
 
     Raises
     ------
     DatagramError
-        If it is no such datagram.
+        If it is not one or more whole records.
     """
-    n, rest = divmod(len(data), RECORD_BYTES)
-    if rest or not 1 <= n <= most:
-        raise DatagramError(f"A datagram has 1 to {most} records of {RECORD_BYTES} bytes, not {len(data)} bytes.")
+    if not data or len(data) % RECORD_BYTES:
+        raise DatagramError(f"Records of {RECORD_BYTES} bytes were expected, not {len(data)} bytes.")
     return np.frombuffer(data, RECORDS)
 
 
-class Status(IntFlag):
-    """Bits of a record's status word (sourced: pyNetFT, status.cpp); undefined ones are kept."""
-
-    ERROR_SUMMARY = 0x80000000
-    CPU_OR_RAM = 0x40000000
-    DIGITAL_BOARD = 0x20000000
-    ANALOG_BOARD = 0x10000000
-    SERIAL_LINK = 0x08000000
-    PROGRAM_MEMORY = 0x04000000
-    HALTED_CONFIGURATION = 0x02000000
-    SETTINGS_VALIDATION = 0x01000000
-    CONFIGURATION_DOES_NOT_FIT = 0x00800000
-    NETWORK = 0x00400000
-    CAN = 0x00200000
-    RDT = 0x00100000
-    ETHERNET_IP = 0x00080000
-    DEVICE_NET = 0x00040000
-    SATURATION_OR_CONVERTER = 0x00020000
-    CONDITION_LATCHED = 0x00010000
-    WATCHDOG_TIMEOUT = 0x00004000
-    STACK_CHECK = 0x00002000
-    SERIAL_EEPROM = 0x00001000
-    SERIAL_FLASH = 0x00000800
-    ANALOG_BOARD_WATCHDOG = 0x00000400
-    EXCITATION_TOO_HIGH = 0x00000200
-    EXCITATION_TOO_LOW = 0x00000100
-    ARTIFICIAL_GROUND = 0x00000080
-    ANALOG_SUPPLY_TOO_HIGH = 0x00000040
-    ANALOG_SUPPLY_TOO_LOW = 0x00000020
-    SERIAL_LINK_DATA_UNAVAILABLE = 0x00000010
-    REFERENCE_OR_POWER = 0x00000008
-    TEMPERATURE = 0x00000004
-    HTTP = 0x00000002
-
-
-class Health(Enum):
-    """What a status word means for the values beside it."""
-
-    HEALTHY = "healthy"
-    WARNING = "warning"
-    """A threshold set in the sensor was passed; the values are good."""
-    ERROR = "error"
-    """The values must not be used."""
-
-
-def health(status: int) -> Health:
-    """Return what a status word means: 0, exactly 80010000, or anything else (sourced: pyNetFT, status.cpp)."""
-    if status == 0:
-        return Health.HEALTHY
-    return Health.WARNING if status == Status.ERROR_SUMMARY | Status.CONDITION_LATCHED else Health.ERROR
+STATUS_BITS = (
+    "error summary", "CPU or RAM", "digital board", "analog board", "serial link", "program memory",
+    "halted configuration", "settings validation", "configuration does not fit", "network", "CAN", "RDT", "EtherNet/IP",
+    "DeviceNet", "saturation or converter", "condition latched", "", "watchdog timeout", "stack check", "serial EEPROM",
+    "serial flash", "analog board watchdog", "excitation too high", "excitation too low", "artificial ground",
+    "analog supply too high", "analog supply too low", "serial link data unavailable", "reference or power",
+    "temperature", "HTTP", "",
+)  # fmt: skip
+"""Of a record's status word, from the highest bit down (sourced: pyNetFT, status.cpp); empty: undefined."""
+ERROR_SUMMARY, SATURATION, CONDITION_LATCHED = 0x80000000, 0x00020000, 0x00010000
+WARNING = ERROR_SUMMARY | CONDITION_LATCHED
+"""A threshold set in the sensor was passed: exactly this; its values are good (sourced: pyNetFT, status.cpp)."""
 
 
 def quality(status: int) -> Quality:
@@ -235,20 +176,18 @@ def quality(status: int) -> Quality:
     Errors are SUSPECT, not MISSING: the box forbids the use of the values, yet many of its bits (of the network, of
     other buses) do not touch them, and a mark keeps both facts.
     """
-    if health(status) is not Health.ERROR:
+    if status in (0, WARNING):
         return Quality.GOOD
-    known = Status.ERROR_SUMMARY | Status.CONDITION_LATCHED | Status.SATURATION_OR_CONVERTER
-    marks = Quality.SATURATED if status & Status.SATURATION_OR_CONVERTER else Quality.GOOD
-    return marks | Quality.SUSPECT if status & ~int(known) or not marks else marks
+    marks = Quality.SATURATED if status & SATURATION else Quality.GOOD
+    return marks | Quality.SUSPECT if status & ~(WARNING | SATURATION) or not marks else marks
 
 
 def status_text(status: int) -> str:
     """Return what a status word says, in words."""
-    if status == 0:
-        return "healthy"
-    names = [bit.name.lower().replace("_", " ") for bit in Status if status & bit and bit.name]
-    left = status & ~sum(Status)
-    return ", ".join([*names, *([f"undefined bits {left:08X}"] if left else [])])
+    bits = [(name, 1 << (31 - place)) for place, name in enumerate(STATUS_BITS) if status >> (31 - place) & 1]
+    names = [name for name, _ in bits if name]
+    undefined = sum(bit for name, bit in bits if not name)
+    return ", ".join([*names, *([f"undefined bits {undefined:08X}"] if undefined else [])]) or "healthy"
 
 
 class CountScale(BaseModel):
@@ -284,21 +223,17 @@ def read_configuration(data: bytes) -> CountScale:
     AtiFileError
         If `data` is no such file, if a tag that is needed is not there exactly once, or for an unknown unit.
     """
-    texts: dict[str, str] = {}
     needed = ("prodname", "cfgcpf", "cfgcpt", "scfgfu", "scfgtu")
-    for element in elements(data):
-        if element.name in needed:
-            if element.name in texts:
-                raise AtiFileError(f"The tag {element.name} stands twice in the sensor's configuration.")
-            texts[element.name] = element.text.strip()
-    missing = [name for name in needed if name not in texts]
-    if missing:
-        raise AtiFileError(f"The sensor's configuration has no {', '.join(missing)}.")
+    found = [(element.tag, (element.text or "").strip()) for element in elements(data) if element.tag in needed]
+    if sorted(tag for tag, _ in found) != sorted(needed):
+        raise AtiFileError(f"The sensor's configuration needs {', '.join(needed)} once each.")
+    texts = dict(found)
     force_n, torque_nm = unit(FORCE_UNITS, texts["scfgfu"], "force"), unit(TORQUE_UNITS, texts["scfgtu"], "torque")
     try:
-        per_force, per_torque = float(texts["cfgcpf"]), float(texts["cfgcpt"])
         return CountScale(
-            per_newton=per_force / force_n, per_newton_metre=per_torque / torque_nm, product=texts["prodname"]
+            per_newton=float(texts["cfgcpf"]) / force_n,
+            per_newton_metre=float(texts["cfgcpt"]) / torque_nm,
+            product=texts["prodname"],
         )
     except ValueError as error:
         raise AtiFileError(

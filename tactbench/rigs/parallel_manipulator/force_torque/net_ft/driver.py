@@ -21,28 +21,33 @@ from tactbench.plugin.devices import (
     LinkUnplugged,
     Received,
     Unwrap,
+    open_for,
+    read_file,
+    read_options,
 )
-from tactbench.rigs.parallel_manipulator.force_torque.ati_xml import LARGEST_BYTES
 from tactbench.rigs.parallel_manipulator.force_torque.net_ft.codec import (
     CONFIGURATION_PATH,
-    MOST_BUFFERED,
     RECORD_BYTES,
     SENSOR_RATE_HZ,
+    SEQUENCE_MODULUS,
     Command,
-    DatagramError,
     NetFtOptions,
     Request,
-    decode_record,
     decode_records,
     encode_request,
     quality,
     status_text,
 )
-from tactbench.rigs.parallel_manipulator.force_torque.wrench import AXES, STREAM, SampleCounter, stream
-from tactbench.rigs.parallel_manipulator.options import open_for, read_file, read_options
+from tactbench.rigs.parallel_manipulator.force_torque.wrench import AXES, STREAM, stream
 
+QUIET_S = 0.05
+"""After which a box that was stopped sends no more (assumed: a network of one cable, a busy host)."""
 ANSWER_S = 0.5
 """Within which a box answers, over the time its records take (assumed: a network of one cable)."""
+RESTARTED = 1000
+"""A number so far behind the highest is of a counter begun anew (assumed: no datagram is late by more)."""
+LARGEST_BYTES = 1 << 20
+"""Of the box's configuration (assumed: it has a few thousand)."""
 HTTP_S = 3.0
 """Of each wait for the box's web page (assumed)."""
 MOST_DATAGRAMS = 4096
@@ -66,8 +71,8 @@ class NetFtDriver(Driver):
         self._clock = settings.clock
         self._counts: Tally[str] = Tally()
         self._kept: list[Received] = []
-        self._sampling = False
-        self._restart()
+        self._sampling = self._silent = False
+        self._numbers, self._ticks, self._newest = Unwrap(32), Unwrap(32), 0
         self._link = open_for(settings, "net-ft", DatagramLink, "udp://192.168.1.1:49152")  # type: ignore[type-abstract]
         try:
             self._scale = options.scale(self._configuration())
@@ -114,11 +119,10 @@ class NetFtDriver(Driver):
         """
         if self._sampling:
             raise RigError("The box is sampling.", hint="Ask it before it is started, or stop it first.")
-        self._drop()
+        self._silence()
         self._send(Command.START_REALTIME, 2)
-        first = decode_record(self._next().data)
-        second = decode_record(self._next().data)
-        every = (second.ft_sequence - first.ft_sequence) % (1 << 32)
+        first, second = (decode_records(self._next().data)[0] for _ in range(2))
+        every = (int(second["ft_sequence"]) - int(first["ft_sequence"])) % SEQUENCE_MODULUS
         if every != self._options.every:
             raise RigError(
                 f"The box sends every {every}th of its {SENSOR_RATE_HZ} samples a second, expected was every "
@@ -128,7 +132,7 @@ class NetFtDriver(Driver):
         return {
             "model": self._scale.product or "Net F/T",
             "rate_hz": f"{SENSOR_RATE_HZ / every:.6g}",
-            "status": status_text(second.status),
+            "status": status_text(int(second["status"])),
         }
 
     def start(self) -> None:
@@ -141,9 +145,12 @@ class NetFtDriver(Driver):
         """
         if self._options.bias:
             self.tare()
-        self._drop()
-        self._restart()
-        self._send(Command.START_BUFFERED if self._options.buffered else Command.START_REALTIME)
+        if not self._silent:
+            self._silence()
+        self._silent = False
+        self._link.discard()
+        self._numbers, self._ticks, self._newest = Unwrap(32), Unwrap(32), 0
+        self._send(Command.START_REALTIME)
         self._sampling = True
         self._kept = [self._next()]
 
@@ -170,12 +177,12 @@ class NetFtDriver(Driver):
         return [self._block(good)] if good else []
 
     def stop(self) -> None:
-        """Let the box send no more."""
+        """Let the box send no more, and wait until nothing comes."""
         if self._sampling:
             self._sampling = False
             self._kept = []
             with suppress(LinkError):
-                self._send(Command.STOP)
+                self._silence()
 
     def tare(self) -> bool:
         """Let the box take its present reading as zero; records already under way are still of the old zero."""
@@ -187,32 +194,27 @@ class NetFtDriver(Driver):
         self.stop()
         self._link.close()
 
-    def _restart(self) -> None:
-        self._samples, self._ticks = SampleCounter("The Net F/T box"), Unwrap(32)
-
     def _send(self, command: Command, records: int = 0) -> None:
         self._link.send(encode_request(Request(command, records)))
 
-    def _next(self) -> Received:
-        in_datagram = MOST_BUFFERED if self._options.buffered else 1
-        return self._link.receive(ANSWER_S + 2 * in_datagram * self._options.every / SENSOR_RATE_HZ)
-
-    def _drop(self) -> None:
-        """Drop what has come since the box was stopped."""
+    def _silence(self) -> None:
+        """Stop the box, and drop what it sent before: records of an earlier start would seem to be of the next one."""
+        self._send(Command.STOP)
         with suppress(LinkTimeout):
             for _ in range(MOST_DATAGRAMS):
-                self._link.receive(0.0)
+                self._link.receive(QUIET_S + 2 * self._options.every / SENSOR_RATE_HZ)
+        self._silent = True
+
+    def _next(self) -> Received:
+        return self._link.receive(ANSWER_S + 2 * self._options.every / SENSOR_RATE_HZ)
 
     def _whole(self, datagram: bytes) -> bool:
-        try:
-            decode_records(datagram, most=MOST_BUFFERED if self._options.buffered else 1)
-        except DatagramError:
-            self._counts["rejected"] += 1
-            return False
-        return True
+        whole = len(datagram) == RECORD_BYTES
+        self._counts["rejected"] += not whole
+        return whole
 
     def _block(self, came: list[Received]) -> Block:
-        records = decode_records(b"".join(piece.data for piece in came), most=len(came) * MOST_BUFFERED)
+        records = decode_records(b"".join(piece.data for piece in came))
         marks = None
         if records["status"].any():
             words, which = np.unique(records["status"], return_inverse=True)
@@ -221,16 +223,20 @@ class NetFtDriver(Driver):
             self._counts["errors"] += int((each != 0).sum())
             self._counts["saturated"] += int(((each & Quality.SATURATED) != 0).sum())
             self._counts["warnings"] += int(((records["status"] != 0) & (each == 0)).sum())
-        ticks = self._ticks(records["ft_sequence"])
+        ticks, numbers = self._ticks(records["ft_sequence"]), self._numbers(records["rdt_sequence"])
+        if (numbers < np.maximum.accumulate(numbers) - RESTARTED).any() or numbers[0] < self._newest - RESTARTED:
+            raise RigError(
+                "The Net F/T box has begun to count its samples anew: it was without power, or another host commands "
+                "it.",
+                hint="Check power and network; start it again unloaded, since a bias set before may be lost.",
+            )
+        self._newest = max(self._newest, int(numbers.max()))
         return Block(
             stream=STREAM,
-            t_ns=np.repeat(
-                np.array([piece.t_ns for piece in came], dtype=np.int64),
-                [len(piece.data) // RECORD_BYTES for piece in came],
-            ),
+            t_ns=np.array([piece.t_ns for piece in came], dtype=np.int64),
             data=self._scale.wrench(records["counts"]),
             quality=marks,
-            sequence=self._samples.counted_on(records["rdt_sequence"]),
+            sequence=numbers,
             # 10^9 / 7000 in whole numbers.
             device_ns=ticks * 1_000_000 // 7,
         )

@@ -13,11 +13,21 @@ from typing import ClassVar
 from xml.sax.saxutils import escape
 
 from tactbench.plugin import UsageError
-from tactbench.plugin.devices import CanFrame, DeviceEmulator, EmulatorSettings, Fault, Sent, fault_concerns
+from tactbench.plugin.devices import (
+    CanFrame,
+    DeviceEmulator,
+    EmulatorSettings,
+    Fault,
+    Sent,
+    fault_concerns,
+    read_file,
+    read_options,
+)
 from tactbench.rigs.parallel_manipulator.force_torque.net_ft.codec import (
+    ERROR_SUMMARY,
     GREATEST_COUNT,
     LEAST_COUNT,
-    MOST_BUFFERED,
+    SATURATION,
     SENSOR_RATE_HZ,
     SEQUENCE_MODULUS,
     Command,
@@ -26,12 +36,10 @@ from tactbench.rigs.parallel_manipulator.force_torque.net_ft.codec import (
     NetFtOptions,
     Record,
     Request,
-    Status,
     decode_request,
     encode_record,
 )
 from tactbench.rigs.parallel_manipulator.force_torque.wrench import AXES, wrench_of
-from tactbench.rigs.parallel_manipulator.options import read_file, read_options
 
 
 @dataclass(frozen=True)
@@ -60,10 +68,6 @@ class RdtEmulator(DeviceEmulator):
     largest
         (6,) where the sensor saturates [N, N*m]; the default is that of a Nano17 SI-25-0.25 (sourced: calibration file
         FT8577, quoted in a public script).
-    threshold_n
-        A force on one axis that sets the monitor condition, which stays until it is reset; None: no condition.
-    buffer_records
-        Records in a datagram of buffered transfer.
     first_sequence
         Of records and samples, to begin near the wrap of the counters.
     faults
@@ -77,15 +81,11 @@ class RdtEmulator(DeviceEmulator):
         scale: CountScale | None = None,
         rate_hz: float = 1000.0,
         largest: Sequence[float] = (25.0, 25.0, 35.0, 0.25, 0.25, 0.25),
-        threshold_n: float | None = None,
-        buffer_records: int = MOST_BUFFERED,
         first_sequence: int = 1,
         faults: Iterable[DatagramFault] = (),
     ) -> None:
         if not 0.0 < rate_hz <= SENSOR_RATE_HZ:
             raise UsageError(f"A Net F/T box sends up to {SENSOR_RATE_HZ} records a second, not {rate_hz:g}.")
-        if not 1 <= buffer_records <= MOST_BUFFERED:
-            raise UsageError(f"A buffer holds 1 to {MOST_BUFFERED} records, not {buffer_records}.")
         self.scale = scale or CountScale(per_newton=1e6, per_newton_metre=1e6, product="EMULATED Net F/T")
         self.every = max(1, int(SENSOR_RATE_HZ // rate_hz))
         """Samples of the sensor from one record to the next."""
@@ -93,19 +93,14 @@ class RdtEmulator(DeviceEmulator):
         """Datagrams that were no request."""
         self._wrench = wrench
         self._largest = tuple(largest)
-        self._threshold_n = threshold_n
-        self._buffer_records = buffer_records
         self._first_sequence = first_sequence
         self.faults = list(faults)
         self._seen: Counter[Fault] = Counter()
         self._bias = [0] * len(AXES)
-        self._latched = False
         self._now_s = 0.0
         self._next: int | None = None
         self._left: int | None = None
         self._sequence = first_sequence
-        self._buffered = False
-        self._buffer: list[bytes] = []
         self._held: bytes | None = None
 
     @property
@@ -150,10 +145,9 @@ class RdtEmulator(DeviceEmulator):
 
     def _carry_out(self, request: Request) -> list[Sent]:
         match request.command:
-            case Command.START_REALTIME | Command.START_BUFFERED:
+            case Command.START_REALTIME:
                 ended = self._ended(self._now_s)
                 self._left = request.records or None
-                self._buffered = request.command is Command.START_BUFFERED
                 self._sequence = self._first_sequence
                 # The first sample after the request: a sample is not older than what asks for it.
                 self._next = math.floor(self._now_s * SENSOR_RATE_HZ) + 1
@@ -162,8 +156,6 @@ class RdtEmulator(DeviceEmulator):
                 return self._ended(self._now_s)
             case Command.SET_SOFTWARE_BIAS:
                 self._bias = self.scale.counts(self._sensed(self._now_s)[0]).tolist()
-            case Command.RESET_CONDITION_LATCH:
-                self._latched = False
         return []
 
     def _sensed(self, at_s: float) -> tuple[list[float], bool]:
@@ -178,11 +170,6 @@ class RdtEmulator(DeviceEmulator):
     def _one(self, sample: int) -> list[Sent]:
         at_s = sample / SENSOR_RATE_HZ
         wrench, saturated = self._sensed(at_s)
-        if self._threshold_n is not None and max(map(abs, wrench[:3])) > self._threshold_n:
-            self._latched = True
-        status = (Status.SATURATION_OR_CONVERTER if saturated else 0) | (
-            Status.CONDITION_LATCHED if self._latched else 0
-        )
         fx, fy, fz, tx, ty, tz = (
             min(max(count - zero, LEAST_COUNT), GREATEST_COUNT)
             for count, zero in zip(self.scale.counts(wrench).tolist(), self._bias, strict=True)
@@ -190,37 +177,26 @@ class RdtEmulator(DeviceEmulator):
         record = Record(
             self._sequence,
             (sample + self._first_sequence) % SEQUENCE_MODULUS,
-            int(status | Status.ERROR_SUMMARY if status else 0),
+            SATURATION | ERROR_SUMMARY if saturated else 0,
             (fx, fy, fz, tx, ty, tz),
         )
         self._sequence = (self._sequence + 1) % SEQUENCE_MODULUS
         self._next = sample + self.every
-        sent: list[Sent] = []
-        if self._buffered:
-            self._buffer.append(encode_record(record))
-            if len(self._buffer) == self._buffer_records:
-                sent += self._on_the_way(self._flushed(), at_s)
-        else:
-            sent += self._on_the_way(encode_record(record), at_s)
+        sent = self._on_the_way(encode_record(record), at_s)
         if self._left is not None:
             self._left -= 1
             if self._left == 0:
                 sent += self._ended(at_s)
         return sent
 
-    def _flushed(self) -> bytes:
-        datagram = b"".join(self._buffer)
-        self._buffer.clear()
-        return datagram
-
     def _ended(self, at_s: float) -> list[Sent]:
-        """Stop sending; return what is still under way (assumed: a started buffer is sent)."""
+        """Stop sending; return what is still under way."""
         self._next = None
-        sent = self._on_the_way(self._flushed(), at_s) if self._buffer else []
-        if self._held is not None:
-            sent.append((at_s, self._held))
-            self._held = None
-        return sent
+        return self._released(at_s)
+
+    def _released(self, at_s: float) -> list[Sent]:
+        held, self._held = self._held, None
+        return [] if held is None else [(at_s, held)]
 
     def _on_the_way(self, datagram: bytes, at_s: float) -> list[Sent]:
         """Return what arrives of a datagram sent at a time, in the order of arrival."""
@@ -229,13 +205,10 @@ class RdtEmulator(DeviceEmulator):
         )
         if dropped:
             return []
-        arriving = [datagram, datagram] if doubled else [datagram]
-        if self._held is not None:
-            arriving.append(self._held)
-            self._held = None
-        elif late:
-            self._held = arriving.pop()
-        return [(at_s, piece) for piece in arriving]
+        if late and self._held is None:
+            self._held = datagram
+            return [(at_s, datagram)] * doubled
+        return [(at_s, datagram)] * (1 + doubled) + self._released(at_s)
 
 
 def build(settings: EmulatorSettings) -> RdtEmulator:

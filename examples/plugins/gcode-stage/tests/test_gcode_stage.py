@@ -1,0 +1,99 @@
+"""The stage on its emulated controller: homed, moved, stopped, and pressing under force in the rig."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+from tactbench.plugin import ForceRamp, RigContext, Scene, assumed, load_object, load_registry
+from tactbench.plugin.devices import (
+    DriverSettings,
+    EmulatedDevice,
+    EmulatedDevices,
+    EmulatorSettings,
+    NotReadyError,
+    PositionerError,
+    PositionerSilentError,
+    RigFile,
+)
+from tactbench.testing import plugin_checks
+
+from tactbench_gcode_stage.driver import GcodeStage
+from tactbench_gcode_stage.emulator import GrblEmulator
+
+OPTIONS = {
+    "home_m": -3e-3, "lower_m": -4e-3, "upper_m": 5e-3, "speed_m_s": 5e-3, "acceleration_m_s2": 1.0, "corridor_m": 2e-6,
+    "retreat_m": -3e-3, "retreat_speed_m_s": 20e-3,
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("check", plugin_checks("gcode-stage"), ids=str)
+def test_conforms(check):
+    check()
+
+
+@pytest.fixture
+def stage():
+    emulator = GrblEmulator(EmulatorSettings(lambda t_s: {}, np.random.default_rng(1), OPTIONS))
+    devices = EmulatedDevices({"stage": EmulatedDevice("bytes", emulator)})
+    settings = DriverSettings(devices.opener("stage"), options=OPTIONS, clock=devices.clock)
+    with devices, GcodeStage(settings) as one:
+        one.emulator = emulator
+        yield one
+
+
+def done(stage):
+    while stage.moving:
+        stage.update(0.01)
+
+
+def test_it_is_homed_and_goes_where_it_is_sent(stage):
+    assert not stage.find_home()
+    with pytest.raises(NotReadyError, match="not homed"):
+        stage.move_to(0.0)
+    stage.home()
+    assert stage.find_home()
+    stage.move_to(1.2345e-3)
+    done(stage)
+    assert stage.emulator.position_m == pytest.approx(1.234e-3, abs=1e-6)
+    assert stage.at(1.2345e-3)
+    stage.move_by(-1e-3)
+    done(stage)
+    assert stage.emulator.position_m == pytest.approx(0.2345e-3, abs=2e-6)
+    with pytest.raises(NotReadyError, match="beyond the ends"):
+        stage.move_to(6e-3)
+
+
+def test_a_halt_ends_a_move_and_a_retreat_goes_out(stage):
+    stage.home()
+    for leave in (stage.halt, stage.retreat):
+        stage.move_to(4e-3)
+        while stage.position < 1e-3:
+            stage.update(0.01)
+        leave()
+        done(stage)
+    assert stage.at(-3e-3)
+
+
+def test_a_refusal_and_silence_are_named(stage):
+    stage.homed = stage.enabled = True
+    stage.move_to(0.0)
+    with pytest.raises(PositionerError, match="error:9"):
+        done(stage)
+    stage.emulator.feed = lambda piece, now_s: []
+    with pytest.raises(PositionerSilentError):
+        for _ in range(100):
+            stage.update(0.1)
+
+
+def test_it_presses_under_force_in_the_rig():
+    said = yaml.safe_load((Path(__file__).parents[1] / "rig.yaml").read_text(encoding="utf-8"))
+    said["settings"]["touch"]["settle_s"] = 2.0
+    registry = load_registry()
+    rig = load_object(registry.rigs["parallel-manipulator"].where)(RigContext(rig_file=RigFile.model_validate(said)))
+    profile = ForceRamp(hold=assumed(1.0, "s", "a test"), duration=assumed(12.0, "s", "a test"))
+    with rig.open(registry.sensors["icub"], Scene(name="press", profile=profile), seed=1) as acquisition:
+        force_n = np.concatenate([block.data[:, 2] for block in acquisition if block.stream == "force_torque"])
+    assert acquisition.ended == ""
+    # 5 N less what the ramp of 0.45 N/s is behind at a gain of 0.3 mm/(N s), and the noise of 0.69 N.
+    assert force_n[-250:].mean() == pytest.approx(5.0, abs=0.6)

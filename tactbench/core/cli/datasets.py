@@ -1,0 +1,34 @@
+"""``tactbench datasets``: public data that a run can name."""
+
+from __future__ import annotations
+
+import click
+
+from tactbench.core.cli.grid import GRID_FORMATS, print_records
+from tactbench.core.cli.options import format_option
+
+
+@click.command(name="datasets")
+@format_option(*GRID_FORMATS)
+def command(shape: str) -> None:
+    """List public data sets: what was measured, size, licence, the citation asked for, and whether it is here already.
+
+    `tactbench run --dataset NAME` fetches what is missing, once. One that is not public in this form needs --root.
+    """
+    from tactbench.core.cli.screen import remark
+    from tactbench.core.recording.datasets import cache, datasets
+
+    records = []
+    for name, one in datasets().items():
+        source = one.source
+        records.append(
+            {
+                "name": name, "sensor": one.mapping.sensor.name, "measured": source.measured,
+                "task": ", ".join(source.tasks), "MB": round(source.bytes / 1e6, 1), "files": len(source.files),
+                "from": source.address or "--root", "licence": source.licence, "citation": source.citation,
+                "cached": one.imported.is_dir(),
+            }
+        )  # fmt: skip
+    shown = ("name", "sensor", "measured", "task", "MB", "licence", "citation", "cached")
+    print_records(records, shape, title="data sets", columns=shown)
+    remark(f"Kept in {cache()}")

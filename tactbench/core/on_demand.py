@@ -1,0 +1,36 @@
+"""Names of a module that are imported when they are first used."""
+
+import sys
+from collections.abc import Callable, Mapping
+from functools import cache
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+
+def on_demand(door: str) -> Callable[[str], Any]:
+    """Return the ``__getattr__`` of module `door`: it imports what the module imports under ``if TYPE_CHECKING``.
+
+    What stands on numpy, and links, are imported so: a plugin that is only listed need not have them, nor a command
+    that shows its help.
+    """
+
+    def imported(name: str) -> Any:
+        if name not in _modules(door):
+            raise AttributeError(f"module {door!r} has no attribute {name!r}")
+        found = getattr(import_module(_modules(door)[name]), name)
+        setattr(sys.modules[door], name, found)
+        return found
+
+    return imported
+
+
+@cache
+def _modules(door: str) -> Mapping[str, str]:
+    """Return the modules that a door's source imports names from under a condition."""
+    import ast
+
+    tree = ast.parse(Path(sys.modules[door].__file__ or "").read_text(encoding="utf-8"))
+    conditions = [node for node in tree.body if isinstance(node, ast.If)]
+    imports = [node for one in conditions for node in one.body if isinstance(node, ast.ImportFrom)]
+    return {alias.name: node.module or "" for node in imports for alias in node.names}

@@ -1,0 +1,282 @@
+"""The emulated devices of a rig file in a process of their own, and what a recording tells them.
+
+In real time a recording's own work would hold up the devices that it reads: they run in another process, in which a
+simulated rig carries out the scene that the recording is of. The devices are at rest until the recording begins.
+"""
+
+from __future__ import annotations
+
+import atexit
+import json
+import os
+import signal
+import socket
+import subprocess
+import sys
+import threading
+from collections.abc import Callable, Mapping
+from typing import TYPE_CHECKING, Any, Protocol
+
+from tactbench.core.errors import NotApplicable, RigError, TactbenchError
+from tactbench.core.plugins.interfaces import Acquisition
+from tactbench.core.plugins.registry import Registry, load_object, load_registry
+from tactbench.core.plugins.rig_devices import descriptor_of, emulators_of, options_of, physics_of
+from tactbench.core.spec.rig import SensorDescriptor
+from tactbench.core.spec.rig_file import FORCE, RigFile
+from tactbench.core.spec.scene import Scene
+
+if TYPE_CHECKING:
+    from tactbench.devices.emulation.emulated_devices import EmulatedDevice
+    from tactbench.devices.emulation.scene_samples import SceneSamples
+
+PREPARE_S = 300.0
+"""Longest wait for a scene to be simulated."""
+BEGIN_S = 5.0
+LISTEN_S = 0.2
+"""How often a server looks whether its devices are whole, and whether it is to end."""
+
+
+class RigEmulators(Protocol):
+    """What ``RigDescriptor.emulators`` makes of a rig file and a registry: emulators that outlive scenes."""
+
+    devices: Mapping[str, EmulatedDevice]
+    """By their names in the rig file; at rest before the first scene."""
+
+    def prepare(self, simulated: Acquisition, sensor: SensorDescriptor, scene: Scene, seed: int) -> None:
+        """Take what the simulated rig has recorded of a scene; nothing is pressed before :meth:`begin`."""
+
+    def begin(self, at_s: float) -> None:
+        """Let the scene begin, at a second of the devices' clock."""
+
+
+class SceneEmulators(RigEmulators):
+    """Emulators of sensors and a force sensor that sense what a simulated rig has recorded; nothing moves."""
+
+    def __init__(self, file: RigFile, registry: Registry) -> None:
+        self._samples: SceneSamples | None = None
+        devices: dict[str, EmulatedDevice] = {}
+        for sensor in file.sensors:
+            devices |= emulators_of(file, registry, sensor, self._sensed)
+        self.devices = devices
+
+    def _sensed(self, t_s: float) -> Mapping[str, float]:
+        return {} if self._samples is None else self._samples(t_s)
+
+    def prepare(self, simulated: Acquisition, sensor: SensorDescriptor, scene: Scene, seed: int) -> None:
+        """Take a scene."""
+        from tactbench.devices.emulation.scene_samples import SceneSamples
+
+        profile = scene.profile
+        self._samples = SceneSamples(simulated, profile.duration.to("s"), rest_s=profile.hold_s)
+
+    def begin(self, at_s: float) -> None:
+        """Press."""
+        if self._samples is not None:
+            self._samples.start(at_s)
+
+
+def serve(
+    file: RigFile,
+    registry: Registry,
+    *,
+    started: Callable[[RigFile], None],
+    over: Callable[[], bool] = lambda: False,
+    told: Callable[[str], None] = lambda text: None,
+) -> None:
+    """Run the emulated devices of a rig file in real time, until `over` or an interrupt.
+
+    Parameters
+    ----------
+    started
+        Called with the rig file that opens them.
+    told
+        Called with a sentence for each scene that begins.
+
+    Raises
+    ------
+    UsageError
+        If a device, option or fault is not known, or has no emulator.
+    """
+    from tactbench.devices.emulation.emulated_devices import EmulatedDevices
+
+    physics = physics_of(file, registry)
+    where = registry.rigs[file.rig].emulators
+    emulators: RigEmulators = (load_object(where) if where else SceneEmulators)(file, registry)
+    with (
+        socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as control,
+        EmulatedDevices(emulators.devices, time="real") as emulated,
+    ):
+        control.bind(("127.0.0.1", 0))
+        control.settimeout(LISTEN_S)
+        started(_opening(file, registry, emulated.addresses, f"127.0.0.1:{control.getsockname()[1]}"))
+        while not over():
+            emulated.advance(emulated.clock())  # raises what an emulator has raised
+            try:
+                data, peer = control.recvfrom(65536)
+            except TimeoutError:
+                continue
+            asked = json.loads(data)
+            answer: dict[str, Any] = {}
+            try:
+                if asked.get("begin"):
+                    emulators.begin(emulated.clock() * 1e-9)
+                    told("The scene begins")
+                elif physics is not None:
+                    sensor, scene = registry.sensors[asked["sensor"]], Scene.model_validate(asked["scene"])
+                    with physics.open(sensor, scene, seed=asked["seed"]) as simulated:
+                        emulators.prepare(simulated, sensor, scene, asked["seed"])
+                        answer = {
+                            "plan": [entry.model_dump(mode="json") for entry in simulated.plan],
+                            "assumptions": dict(simulated.assumptions),
+                            "drawn": dict(simulated.drawn),
+                        }
+                    told(f"Ready for {scene.name}: {sensor.name}, {scene.indenter}")
+            except TactbenchError as error:
+                answer = {"error": error.message, "hint": error.hint, "skip": isinstance(error, NotApplicable)}
+            control.sendto(json.dumps(answer).encode(), peer)
+
+
+def _opening(file: RigFile, registry: Registry, addresses: Mapping[str, str], control: str) -> RigFile:
+    """Return the rig file that opens emulated devices at their addresses."""
+
+    def at(name: str, entry: Any) -> Any:
+        if name not in addresses:
+            return entry
+        options = options_of(descriptor_of(registry, name, entry), entry)
+        return entry.model_copy(update={"link": addresses[name], "options": options, "faults": (), "emulator": True})
+
+    update: dict[str, Any] = {
+        "sensors": {name: at(name, entry) for name, entry in file.sensors.items()},
+        "devices": {name: at(name, entry) for name, entry in file.devices.items()},
+        "emulation": file.emulation.model_copy(update={"time": "real", "control": control}),
+    }
+    if file.force is not None:
+        update["force"] = at(FORCE, file.force)
+    return file.model_copy(update=update)
+
+
+class EmulatorControl:
+    """Tells a process of emulated devices which scene is recorded, and when it begins.
+
+    Parameters
+    ----------
+    address
+        ``host:port``, as ``emulation: control`` of a rig file says.
+    """
+
+    def __init__(self, address: str) -> None:
+        host, _, port = address.rpartition(":")
+        self._peer = host, int(port)
+
+    def prepare(self, sensor: str, scene: Scene, seed: int) -> dict[str, Any]:
+        """Let a scene be simulated; return what a recording says of that: plan, assumptions and what was drawn.
+
+        Raises
+        ------
+        NotApplicable, RigError
+            If it cannot be, or nobody answers.
+        """
+        return self._ask({"sensor": sensor, "scene": scene.model_dump(mode="json"), "seed": seed}, PREPARE_S)
+
+    def begin(self) -> None:
+        """Let it begin; raises as :meth:`prepare`."""
+        self._ask({"begin": True}, BEGIN_S)
+
+    def _ask(self, message: dict[str, Any], timeout_s: float) -> dict[str, Any]:
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as link:
+            link.settimeout(timeout_s)
+            try:
+                link.connect(self._peer)
+                link.send(json.dumps(message).encode())
+                answer: dict[str, Any] = json.loads(link.recv(65536))
+            except OSError as error:
+                raise RigError(
+                    f"The emulated devices at {self._peer[0]}:{self._peer[1]} do not answer: {error}.",
+                    hint="Start them again: `tactbench emulate`.",
+                ) from error
+        if "error" in answer:
+            raise (NotApplicable if answer["skip"] else RigError)(answer["error"], hint=answer["hint"])
+        return answer
+
+
+class _Child:
+    """The process of one rig file's emulators; it ends when its stdin is closed, or this process is gone."""
+
+    def __init__(self, file: RigFile) -> None:
+        code = "from tactbench.core.plugins.emulators import main; main()"
+        self._process = subprocess.Popen([sys.executable, "-c", code], stdin=subprocess.PIPE, stdout=subprocess.PIPE)
+        assert self._process.stdin is not None
+        assert self._process.stdout is not None
+        self._process.stdin.write(file.model_dump_json().encode() + b"\n")
+        self._process.stdin.flush()
+        said = json.loads(self._process.stdout.readline() or '{"error": "its process ended", "hint": ""}')
+        if "error" in said:
+            self.close()
+            raise RigError(f"The devices cannot be emulated: {said['error']}", hint=said["hint"])
+        self.file = RigFile.model_validate(said)
+
+    @property
+    def alive(self) -> bool:
+        return self._process.poll() is None
+
+    def close(self) -> None:
+        assert self._process.stdin is not None
+        assert self._process.stdout is not None
+        self._process.stdin.close()
+        try:
+            self._process.wait(10.0)
+        except subprocess.TimeoutExpired:
+            self._process.kill()
+            self._process.wait()
+        self._process.stdout.close()
+
+
+_children: dict[tuple[int, str], _Child] = {}
+"""By process and rig file; of a process at most one."""
+
+
+def running(file: RigFile) -> RigFile:
+    """Return a rig file whose devices can be opened: emulated ones in real time run in a process of their own.
+
+    They go on until another file's are asked for, or this process ends. A file without such devices comes back as it
+    is.
+
+    Raises
+    ------
+    RigError
+        If they cannot be emulated.
+    """
+    if not file.emulated or file.emulation.time == "virtual":
+        return file
+    key = os.getpid(), file.model_dump_json()
+    child = _children.get(key)
+    if child is None or not child.alive:
+        end_running()
+        child = _children[key] = _Child(file)
+    return child.file
+
+
+def end_running() -> None:
+    """End the emulators that run in a process of their own."""
+    for key in [key for key in _children if key[0] == os.getpid()]:
+        _children.pop(key).close()
+
+
+atexit.register(end_running)
+
+
+def main() -> None:
+    """Serve the rig file of the first line of stdin; end when stdin does."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # of the whole terminal: who reads the devices has to end first
+    over = threading.Event()
+    file = RigFile.model_validate_json(sys.stdin.readline())
+
+    def listen() -> None:
+        sys.stdin.read()
+        over.set()
+
+    threading.Thread(target=listen, daemon=True).start()
+    try:
+        serve(file, load_registry(), started=lambda live: print(live.model_dump_json(), flush=True), over=over.is_set)
+    except TactbenchError as error:
+        print(json.dumps({"error": error.message, "hint": error.hint}), flush=True)

@@ -1,0 +1,139 @@
+"""Whether a recording of devices has what its scene was to give."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from tactbench.core.samples import Block, Quality
+from tactbench.core.spec.recording import StreamCounts
+from tactbench.core.spec.rig_file import Allowed
+from tactbench.core.spec.sensor import StreamSpec
+
+if TYPE_CHECKING:
+    import numpy.typing as npt
+
+INCOMPLETE = "incomplete: "
+"""What `excluded` of an incomplete recording begins with."""
+MOVED = 0.2
+"""Of the range of the force in a recording: a sensor whose readings all stand still meanwhile is frozen (assumed; the
+noise of a force sensor is less, and a sensor that is not pressed has nothing to show)."""
+
+
+@dataclass
+class _Track:
+    """One stream so far. Times are nanoseconds."""
+
+    last_ns: int | None = None
+    """Of the last row with a number."""
+    silence: tuple[int, int] = (0, 0)
+    """Length and begin of the longest time without one."""
+    row: npt.NDArray[Any] | None = None
+    """The last row."""
+
+
+@dataclass
+class _Stillness:
+    """Since when nothing changes in a stream of the force sensor, or in all streams of the sensor together."""
+
+    same_ns: tuple[int, int] | None = None
+    """From the last change to the last row."""
+    long: list[tuple[int, int]] = field(default_factory=list)
+    """Former ones, longer than is allowed."""
+
+
+class Completeness:
+    """What is missing in a recording, from its blocks as they are written.
+
+    Parameters
+    ----------
+    allowed
+        What may be missing.
+    sensor, reference
+        Streams of the sensor and of the force sensor. Silence is looked for in those that have a rate.
+    """
+
+    def __init__(self, allowed: Allowed, sensor: Sequence[StreamSpec], reference: Sequence[StreamSpec]) -> None:
+        self._allowed = allowed
+        self._reference = {stream.name: [one.name for one in stream.channels] for stream in reference}
+        self._rated = {stream.name for stream in (*sensor, *reference) if stream.rate_hz is not None}
+        self._tracks = {stream.name: _Track() for stream in (*sensor, *reference)}
+        of_sensor = _Stillness()  # a microphone may have nothing to say of a slow press
+        self._still = {stream.name: of_sensor for stream in sensor} | {one.name: _Stillness() for one in reference}
+        self._begin_ns: int | None = None
+        self._end_ns = 0
+        self._force: list[tuple[int, float]] = []
+
+    def add(self, block: Block) -> None:
+        """Look at a block; one without times says nothing."""
+        track = self._tracks.get(block.stream)
+        if track is None or block.t_ns is None or not len(block.data):
+            return
+        first, last = int(block.t_ns[0]), int(block.t_ns[-1])
+        self._begin_ns = first if self._begin_ns is None else min(self._begin_ns, first)
+        self._end_ns = max(self._end_ns, last)
+        missing = np.isnan(block.data.astype(np.float64))
+        if block.quality is not None:
+            missing |= (block.quality & np.uint8(Quality.MISSING)) != 0
+        good = ~missing.all(axis=1)
+        if good.any():
+            self._silence(track, block.t_ns[good])
+            self._stillness(track, self._still[block.stream], block.t_ns[good], block.data[good])
+        names = self._reference.get(block.stream, [])
+        pressing = next((place for place, name in enumerate(names) if name in ("fz", "normal")), None)
+        if pressing is not None and (~missing[:, pressing]).any():
+            self._force.append((last, float(block.data[~missing[:, pressing], pressing].mean())))
+
+    def _silence(self, track: _Track, t_ns: npt.NDArray[np.int64]) -> None:
+        before = self._begin_ns if track.last_ns is None else track.last_ns
+        times = np.concatenate((np.array([before], np.int64), t_ns))
+        steps = np.diff(times)
+        longest = int(steps.argmax())
+        track.silence = max(track.silence, (int(steps[longest]), int(times[longest])))
+        track.last_ns = int(t_ns[-1])
+
+    def _stillness(self, track: _Track, still: _Stillness, t_ns: npt.NDArray[np.int64], data: npt.NDArray[Any]) -> None:
+        row = data[0] if track.row is None else track.row
+        since_ns, seen_ns = still.same_ns or (int(t_ns[0]), int(t_ns[0]))
+        changed = (data != np.concatenate((row[None], data[:-1]))).any(axis=1)
+        begins = np.concatenate(([since_ns], t_ns[changed]))
+        ends = np.concatenate((np.concatenate(([seen_ns], t_ns[:-1]))[changed], t_ns[-1:]))
+        for place in np.flatnonzero(ends[:-1] - begins[:-1] > 1e9 * self._allowed.frozen_s).tolist():
+            still.long.append((int(begins[place]), int(ends[place])))
+        track.row, still.same_ns = data[-1].copy(), (int(begins.max()), int(max(ends[-1], seen_ns)))
+
+    @property
+    def seconds(self) -> float:
+        """Of the devices' clock from the first row to the last."""
+        return 1e-9 * (self._end_ns - (self._begin_ns or 0))
+
+    def lacking(self, counts: Mapping[str, StreamCounts]) -> list[str]:
+        """Return what is missing beyond what is allowed, in words; `counts` are the rig's, by stream."""
+        return [text for name, track in self._tracks.items() for text in self._of(name, track, counts.get(name))]
+
+    def _of(self, name: str, track: _Track, counts: StreamCounts | None) -> Iterator[str]:
+        begin_ns = self._begin_ns or 0
+        last_ns = begin_ns if track.last_ns is None else track.last_ns
+        silent_ns, from_ns = max(track.silence, (self._end_ns - last_ns, last_ns))
+        if name in self._rated and silent_ns > 1e9 * self._allowed.silent_s:
+            yield f"{name}: nothing for {1e-9 * silent_ns:.3g} s from {1e-9 * (from_ns - begin_ns):.3g} s on"
+        still = self._still[name]
+        for from_ns, to_ns in (*still.long, *([still.same_ns] if still.same_ns else [])):
+            if to_ns - from_ns <= 1e9 * self._allowed.frozen_s:
+                continue
+            if name in self._reference or self._pressed(from_ns, to_ns):
+                yield f"{name}: frozen for {1e-9 * (to_ns - from_ns):.3g} s from {1e-9 * (from_ns - begin_ns):.3g} s on"
+                break
+        if counts is not None:
+            lost, due = counts.gaps - counts.late + counts.dropped, counts.received + counts.gaps - counts.late
+            if due and lost / due > 0.01 * self._allowed.lost_percent:
+                yield f"{name}: {lost} of {due} rows lost"
+
+    def _pressed(self, from_ns: int, to_ns: int) -> bool:
+        """Return whether the force changed within a time."""
+        every = [value for _, value in self._force]
+        within = [value for at_ns, value in self._force if from_ns <= at_ns <= to_ns]
+        return bool(within) and max(within) - min(within) > MOVED * (max(every) - min(every)) > 0

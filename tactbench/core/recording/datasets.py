@@ -1,0 +1,245 @@
+"""Public data sets by name: what there is, and their recordings, fetched and imported once.
+
+A data set is a mapping with a `source`. Mappings lie in the folder `datasets` of tactbench's own package and of every
+package that brings a plugin, so that a plugin brings data sets as files; a path names one that lies anywhere.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import shutil
+import tempfile
+from collections.abc import Callable
+from contextlib import suppress
+from dataclasses import dataclass
+from functools import cached_property
+from importlib.metadata import entry_points
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any, Protocol
+
+import tactbench
+from tactbench.core.errors import (
+    ConfigError,
+    DuplicateNameError,
+    MissingRecordingError,
+    NotApplicable,
+    UnknownNameError,
+)
+from tactbench.core.plugins import hookspecs
+from tactbench.core.recording.format import VERSION
+from tactbench.core.recording.mapping.importing import import_tables
+from tactbench.core.recording.mapping.model import DataSource, Mapping
+from tactbench.core.spec.yaml_file import load_yaml
+
+CACHE = "TACTBENCH_CACHE"
+"""Environment variable: where data sets are kept, in place of the user's folder for caches."""
+FOLDER = "datasets"
+
+
+class Steps(Protocol):
+    """Receives how far the work has come; :class:`~tactbench.core.matrix.progress.Progress` is one."""
+
+    def begin(self, stage: str, total: int) -> None:
+        """Start a stage of `total` steps."""
+
+    def advance(self, what: str) -> None:
+        """Finish one step, named `what`."""
+
+
+@dataclass(frozen=True)
+class DataSet:
+    """A mapping with a source, by name.
+
+    Parameters
+    ----------
+    path
+        The mapping file; the data set has its name.
+    """
+
+    path: Path
+
+    @property
+    def name(self) -> str:
+        """The name."""
+        return self.path.stem
+
+    @cached_property
+    def mapping(self) -> Mapping:
+        """The mapping; raises ConfigError if the file is wrong or states no source."""
+        found = load_yaml(self.path, Mapping)
+        if found.source is None:
+            raise ConfigError(
+                str(self.path), None, "It states no source, so that it is no data set.",
+                hint=f"Add `source`, or import it: tactbench import {self.path}.",
+            )  # fmt: skip
+        return found
+
+    @property
+    def source(self) -> DataSource:
+        """Where the files lie."""
+        assert self.mapping.source is not None  # `mapping` refuses that
+        return self.mapping.source
+
+    @property
+    def files(self) -> Path:
+        """Where its files are kept."""
+        return cache() / self.name / "files"
+
+    @property
+    def imported(self) -> Path:
+        """Where its recordings are kept: another place whenever the mapping, or the format of recordings, changes."""
+        stated = hashlib.sha256(self.path.read_bytes()).hexdigest()[:12]
+        return cache() / self.name / f"recordings-{VERSION}-{stated}"
+
+    def recordings(self, root: Path | None = None, progress: Steps | None = None) -> Path:
+        """Return the folder of its recordings; what is missing is fetched, checked and imported.
+
+        Parameters
+        ----------
+        root
+            A folder that holds a copy, or whose sub-folder does. What is not there is fetched.
+        progress
+            Receives every file that is there, and every file that is imported.
+
+        Raises
+        ------
+        MissingRecordingError
+            If a file cannot be had, or its SHA-256 is another than the data set states.
+        NotApplicable
+            If the files lie at no public address and no copy is named.
+        MappingError, UnwritableError
+            As :func:`~tactbench.core.recording.mapping.importing.import_tables` raises them.
+        """
+        target = self.imported
+        if target.is_dir():
+            return target
+        self._fetch(_copy(root, next(iter(self.source.files))), root, progress)
+
+        def step(done: int, total: int, what: str) -> None:
+            if progress is not None:
+                if done == 1:
+                    progress.begin(f"importing {self.name}", total)
+                progress.advance(what)
+
+        with tempfile.TemporaryDirectory(prefix=".importing-", dir=target.parent) as aside:
+            made = Path(aside, "recordings")
+            import_tables(self.path, root=self.files, out=made, progress=step)
+            with suppress(OSError):  # another process was quicker
+                made.replace(target)
+        return target
+
+    def _fetch(self, copy: Path | None, root: Path | None, progress: Steps | None) -> None:
+        import pooch
+
+        address, files = self.source.address, self.source.files
+        there = pooch.create(path=self.files, base_url=address or "file:///", registry=dict(files))
+        pooch.get_logger().setLevel("WARNING")
+        download = None if copy is None else _copying(copy)
+        if progress is not None:
+            progress.begin(f"{'fetching' if copy is None else 'copying'} {self.name}", len(files))
+        for name in files:
+            if copy is None and not address and not (self.files / name).is_file():
+                raise NotApplicable(
+                    f"{self.name}: {name} lies at no public address{f', nor in {root}' if root else ''}.",
+                    hint=f"Name a folder that holds it with --root DIR, or put it into {self.files}.",
+                )
+            try:
+                there.fetch(name, downloader=download)
+            except ValueError as error:  # pooch's word for a digest that differs
+                origin = address + name if copy is None else copy / name
+                raise MissingRecordingError(
+                    f"{self.name}: {origin} is not the file that is meant: its SHA-256 is not {files[name]}.",
+                    hint="It is not kept. Files of another state are imported with `tactbench import MAPPING`.",
+                ) from error
+            except OSError as error:
+                origin = address + name if copy is None else str(copy / name)
+                missed = f" (not in {root} either)" if root is not None and copy is None else ""
+                raise MissingRecordingError(
+                    f"{self.name}: {origin} could not be fetched{missed}: {_reason(error)}. "
+                    f"Its files belong into {self.files}.",
+                    hint="Put them there by hand, or name a folder that holds a copy with --root DIR. "
+                    "What was fetched before is kept.",
+                ) from error
+            if progress is not None:
+                progress.advance(name)
+
+
+def cache() -> Path:
+    """Return the folder in which data sets are kept."""
+    if CACHE in os.environ:
+        return Path(os.environ[CACHE])
+    import pooch
+
+    return Path(pooch.os_cache("tactbench"))
+
+
+def datasets() -> dict[str, DataSet]:
+    """Return the data sets of all installed packages by name; mappings without a source are none.
+
+    Raises
+    ------
+    DuplicateNameError
+        If two packages bring one name.
+    ConfigError
+        If one of the files is wrong.
+    """
+    found: dict[str, tuple[str, DataSet]] = {}
+    for package, folder in _folders().items():
+        for path in sorted(folder.glob("*.yaml"), key=lambda one: one.stem):
+            if load_yaml(path, Mapping).source is None:
+                continue
+            if path.stem in found:
+                raise DuplicateNameError("data set", path.stem, (found[path.stem][0], package))
+            found[path.stem] = package, DataSet(path)
+    return {name: one for name, (_, one) in found.items()}
+
+
+def dataset_called(given: str) -> DataSet:
+    """Return the data set of that name, or the one in the mapping file `given`; raises UnknownNameError."""
+    if given.endswith((".yaml", ".yml")):
+        return DataSet(Path(given))
+    for folder in _folders().values():
+        if (folder / f"{given}.yaml").is_file():
+            return DataSet(folder / f"{given}.yaml")
+    raise UnknownNameError("data set", given, datasets())
+
+
+def _folders() -> dict[str, Path]:
+    """Return the folders of mappings by package; no plugin is imported."""
+    own = Path(tactbench.__file__).parent
+    in_checkout = own.parent / "examples" / "mappings"
+    found = {"tactbench": own / FOLDER if (own / FOLDER).is_dir() else in_checkout}
+    for package in {point.module.partition(".")[0] for point in entry_points(group=hookspecs.GROUP)} - {"tactbench"}:
+        spec = find_spec(package)
+        for place in (spec.submodule_search_locations or ()) if spec is not None else ():
+            found[package] = Path(place) / FOLDER
+    return found
+
+
+def _copy(root: Path | None, first: str) -> Path | None:
+    """Return `root`, or its sub-folder, in which the first file lies; None if there is none."""
+    if root is None:
+        return None
+    if not root.is_dir():
+        raise MissingRecordingError(f"There is no folder {root}.", hint="Name the folder of the copy with --root DIR.")
+    places = (root, *sorted(path for path in root.iterdir() if path.is_dir()))
+    return next((place for place in places if (place / first).is_file()), None)
+
+
+def _copying(copy: Path) -> Callable[[str, str, Any], None]:
+    """Return a downloader that takes the file from `copy`, for pooch to check."""
+
+    def download(url: str, output_file: str, there: Any) -> None:
+        shutil.copyfile(copy / url.removeprefix(there.base_url), output_file)
+
+    return download
+
+
+def _reason(error: OSError) -> str:
+    """Return why, in a few words: an HTTP library's own message holds the whole history of its connections."""
+    response = getattr(error, "response", None)
+    if response is not None:
+        return f"the server answers {response.status_code}"
+    return error.strerror or ("no connection" if type(error).__module__.startswith("requests") else str(error))

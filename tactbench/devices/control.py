@@ -1,0 +1,211 @@
+"""The loop that beats the guard: a control period at a time, in virtual time or in a thread of its own.
+
+A beat is a step of the press, so a controller that hangs is a beat that does not come, and the guard retreats.
+"""
+
+from __future__ import annotations
+
+import signal
+import threading
+from collections import deque
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager, suppress
+from dataclasses import replace
+from types import FrameType
+
+from tactbench.core.errors import TactbenchError
+from tactbench.core.samples import Block
+from tactbench.devices.guard_messages import Event, Limits, Report
+from tactbench.devices.guard_process import Guard
+from tactbench.devices.press import Press
+from tactbench.links.link import Clock
+
+STOP_S = 10.0
+"""The thread is waited for so long (assumed: a control period, and what a guard in another process takes to answer)."""
+COUNTED_NS = 250_000_000
+"""After which the guard's counts are asked for again."""
+
+
+class Control:
+    """Beats a guard with the steps of a press.
+
+    Parameters
+    ----------
+    guard
+        Armed right before :meth:`carry` or :meth:`start` is called.
+    limits
+        What it was armed with.
+    armed
+        What it answered.
+    press
+        What is done.
+    received
+        Returns how many rows of the sensor have come; while it stays the same they become old.
+    clock
+        The rig's.
+    period_s
+        Control period.
+    stale_s
+        How old they may be.
+    """
+
+    def __init__(
+        self,
+        guard: Guard,
+        limits: Limits,
+        armed: Report,
+        press: Press,
+        received: Callable[[], int],
+        clock: Clock,
+        *,
+        period_s: float,
+        stale_s: float,
+    ) -> None:
+        self.press = press
+        self.late = 0
+        """Control periods that began more than one period late."""
+        self._guard, self._limits, self._received, self._clock = guard, limits, received, clock
+        self._period_ns, self._stale_ns = round(1e9 * period_s), round(1e9 * stale_s)
+        self._report = armed
+        self._beats = 0
+        self._rows, self._rows_ns = -1, clock()
+        self._next_ns = self._rows_ns + self._period_ns
+        self._raw: list[tuple[float, float]] = []
+        self._blocks: deque[Block] = deque()
+        self._events: deque[Event] = deque()
+        self._over = threading.Event()
+        self._stop = ""
+        self._thread: threading.Thread | None = None
+        self._counts: Mapping[str, Mapping[str, int]] = {}
+        self._counted_ns = 0
+
+    @property
+    def report(self) -> Report:
+        """What the guard answered last."""
+        return self._report
+
+    def blocks(self) -> Iterator[Block]:
+        """Yield what force sensor and motor have sent and was not yet yielded."""
+        while self._blocks:
+            yield self._blocks.popleft()
+
+    def events(self) -> Iterator[Event]:
+        """Yield what has happened and was not yet yielded."""
+        while self._events:
+            yield self._events.popleft()
+
+    def carry(self, until_ns: int) -> None:
+        """Let time go on until a nanosecond of the clock, beating whenever it is due: for virtual time.
+
+        A Ctrl-C is raised between two periods: within one, a command may be out whose answer would be another's.
+        """
+        while self._next_ns <= until_ns:
+            with _interrupts_deferred():
+                self._guard.advance(self._next_ns)
+                self._period()
+        with _interrupts_deferred():
+            self._guard.advance(until_ns)
+
+    def start(self) -> None:
+        """Beat from a thread of its own, until :meth:`stop`: for real time."""
+        self._thread = threading.Thread(target=self._run, name="force control", daemon=True)
+        self._thread.start()
+
+    def retreat(self, why: str, within_s: float) -> None:
+        """Let the motor retreat from the next control period on; return when it has ended, or the time is over."""
+        self._stop = self._stop or why
+        until_ns = self._clock() + round(1e9 * within_s)
+        while not self.press.over and self._clock() < until_ns:
+            if self._thread is None:
+                self.carry(self._next_ns)
+            else:
+                self._over.wait(1e-9 * self._period_ns)
+
+    def stop(self) -> None:
+        """End the thread, if there is one; the guard may be used by the caller then."""
+        self._over.set()
+        if self._thread is not None:
+            self._thread.join(STOP_S)
+        with suppress(TactbenchError):  # a guard that is lost has nothing more to say
+            self._gather()
+            self._counts = self._guard.counts()
+
+    def counts(self) -> Mapping[str, Mapping[str, int]]:
+        """Return what guard, motor and force sensor have counted: beside the thread at most 0.25 s old."""
+        alone = self._thread is None and not self._over.is_set()
+        return self._guard.counts() if alone else self._counts
+
+    def _run(self) -> None:
+        try:
+            while not self._over.is_set():
+                self._guard.advance(self._next_ns)
+                self._period()
+        except Exception as error:
+            self.press.fail(_error_text(error))
+            self.press.abandon()
+
+    def _gather(self) -> None:
+        """Take what the guard has for the recording."""
+        for block in self._guard.force_blocks():
+            self._blocks.append(block)
+            self._raw += self._pressing(block)
+        self._blocks.extend(self._guard.motor_blocks())
+        self._events.extend(self._guard.events())
+        # Kept here: one thread alone may use the guard.
+        if self._thread is not None and self._clock() - self._counted_ns >= COUNTED_NS:
+            self._counts, self._counted_ns = self._guard.counts(), self._clock()
+
+    def _pressing(self, block: Block) -> list[tuple[float, float]]:
+        assert block.t_ns is not None
+        limits = self._limits
+        force = (block.data[:, limits.channel] - limits.zero[limits.channel]) * limits.sign
+        return list(zip((1e-9 * block.t_ns).tolist(), force.tolist(), strict=True))
+
+    def _period(self) -> None:
+        now_ns = self._clock()
+        self.late += now_ns - self._next_ns > self._period_ns
+        rows = self._received()
+        # Where it was this process that hung, the sensor's reading hung with it.
+        if rows != self._rows or now_ns - self._next_ns > self._stale_ns:
+            self._rows, self._rows_ns = rows, now_ns
+        self._next_ns = max(self._next_ns + self._period_ns, now_ns + self._period_ns // 2)
+        self._gather()
+        raw, self._raw = self._raw, []
+        press = self.press
+        if self._stop:
+            press.fail(self._stop)
+        if now_ns - self._rows_ns > self._stale_ns:
+            press.fail(f"the sensor has sent nothing for {1e-6 * (now_ns - self._rows_ns):.0f} ms")
+        try:
+            beat = press.step(self._report, raw, 1e-9 * now_ns)
+        except TactbenchError as error:
+            press.fail(_error_text(error))
+            beat = press.step(self._report, (), 1e-9 * now_ns)
+        self._beats += 1
+        number = self._report.force_sequence
+        beat = replace(beat, sequence=self._beats, t_ns=now_ns, state=str(press.state), force_sequence=number)
+        self._report = self._guard.beat(beat)
+
+
+@contextmanager
+def _interrupts_deferred() -> Iterator[None]:
+    """Leave a Ctrl-C to its handler at the end; only the main thread handles any.
+
+    A signal mask would not do: another thread takes the signal, and Python calls the handler here all the same.
+    """
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    came: list[tuple[int, FrameType | None]] = []
+    handler = signal.signal(signal.SIGINT, lambda *one: came.append(one))
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, handler)
+    if came and callable(handler):
+        handler(*came[0])
+
+
+def _error_text(error: Exception) -> str:
+    text = error.message if isinstance(error, TactbenchError) else f"{type(error).__name__}: {error}"
+    return text.rstrip(".")

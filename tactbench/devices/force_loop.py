@@ -1,0 +1,327 @@
+"""The force loop: one control law, the motor and skin around it, and which gains settle.
+
+One step of length T, position positive into the skin, measured force m, filter y, integral i, command c:
+
+    y_n = a y_{n-1} + (1 - a) m_n     a = exp(-2 pi f T)     e_n = setpoint_n - y_n
+    i_n = i_{n-1} + ki T e_n + T r_n/k                       c_n = kp e_n + i_n
+    x_{n+1} = b x_n + (1 - b) c_{n-d}                        b = exp(-T / lag),  d = delay/T rounded up
+
+r is the slope of the wanted force and k the assumed stiffness: the feed-forward of a ramp. With kp = 0 it is the law of
+increments c += ki T e; an admittance M x'' + D x' = e is ki = 1/D with a filter of time M/D. Filter and motor are
+held-input solutions of their first-order laws, exact for every T. Derived.
+
+Lengths have one unit of the caller's choice, in the gains as in the positions: m in rigs, mm in the twin.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Self
+
+import numpy as np
+
+from tactbench.core.errors import RigError, UsageError
+
+if TYPE_CHECKING:
+    from tactbench.core.samples import FloatArray
+    from tactbench.core.spec.drive import ForceLoop
+
+LATE = 1.5
+"""Periods after which a sample is late: half a period more than it should be."""
+MOST_OF_LIMIT = 0.5
+"""Part of the largest stable gain that may be used: overshoot, and a skin stiffer than declared, need the rest."""
+
+
+@dataclass(frozen=True)
+class ForceLaw:
+    """The control law, with its limits.
+
+    Raises
+    ------
+    UsageError
+        If a gain is negative, both are 0, or a limit is not positive.
+    """
+
+    period_s: float
+    """T."""
+    proportional: float
+    """kp [length / N]."""
+    integral: float
+    """ki [length / (N s)]."""
+    cutoff_hz: float | None = None
+    """f of the filter; None: unfiltered."""
+    speed: float = math.inf
+    """Largest speed of the command [length / s]."""
+    windup_s: float = math.inf
+    """Times `speed` is how far the command may be from the measured position."""
+    travel: tuple[float, float] = (-math.inf, math.inf)
+    """Least and greatest command."""
+    feed_forward: float = math.inf
+    """k [N / length]; infinite: no feed-forward."""
+
+    def __post_init__(self) -> None:
+        gains = (self.proportional, self.integral)
+        positive = (self.period_s, self.speed, self.windup_s, self.feed_forward, self.cutoff_hz or 1.0)
+        for wrong, problem in (
+            (not all(0 <= gain < math.inf for gain in gains) or gains == (0.0, 0.0), "its gains are negative or all 0"),
+            (not all(value > 0 for value in positive), "a period, speed, time, rate or stiffness is not above 0"),
+            (not self.travel[0] < self.travel[1], "its travel ends before it begins"),
+        ):
+            if wrong:
+                raise UsageError(f"The force loop cannot be stepped: {problem}.", hint="Correct its numbers.")
+
+    @classmethod
+    def of(cls, loop: ForceLoop, length: str = "m", *, period_s: float | None = None, **limits: Any) -> Self:
+        """Return the law of a declared loop with lengths in a unit.
+
+        Parameters
+        ----------
+        loop
+            Gains, filter and rate.
+        length
+            Unit of lengths.
+        period_s
+            T; None: the loop states its rate.
+        **limits
+            `speed`, `windup_s`, `travel` and `feed_forward`.
+        """
+        if period_s is None:
+            if loop.rate is None:
+                raise UsageError("The force loop's rate is not stated.", hint="State how often the motor is commanded.")
+            period_s = 1 / loop.rate.to("Hz")
+        return cls(
+            period_s=period_s,
+            proportional=loop.proportional.to(f"{length}/N"),
+            integral=loop.integral.to(f"{length}/N/s"),
+            cutoff_hz=None if loop.cutoff is None else loop.cutoff.to("Hz"),
+            **limits,
+        )
+
+    def kept(self, passed_s: float) -> float:
+        """Return a: what the filter keeps of its past after a time."""
+        return 0.0 if self.cutoff_hz is None else math.exp(-2 * math.pi * self.cutoff_hz * passed_s)
+
+
+class ForceController:
+    """The memory of the law: filter, integral and command; a new one for each press.
+
+    Parameters
+    ----------
+    law
+        Gains and limits.
+    force_n, position
+        Raw force and measured position at the beginning, from which it starts without a jump.
+
+    Attributes
+    ----------
+    filtered_n
+        The filtered force [N].
+    target
+        The position commanded last.
+    limited, late
+        Whether a limit acted in the last step, and whether its sample was late.
+    """
+
+    def __init__(self, law: ForceLaw, force_n: float, position: float) -> None:
+        _check_known(force_n, position)
+        self.law = law
+        self.filtered_n, self.target = force_n, position
+        self.limited = self.late = False
+        self._integral = position
+
+    def step(
+        self, force_n: float, position: float, passed_s: float, setpoint_n: float, slope_n_s: float = 0.0
+    ) -> float:
+        """Return the next command, positive into the skin.
+
+        Limited are, in this order, the command's speed, its distance from the measured position, and its travel. While
+        a limit acts, the integral does not grow in its direction. A late sample moves and integrates nothing.
+
+        Parameters
+        ----------
+        force_n, position
+            Raw force, positive when pressing, and measured position.
+        passed_s
+            Since the step before.
+        setpoint_n, slope_n_s
+            Wanted force and its slope, for the feed-forward.
+
+        Raises
+        ------
+        RigError
+            If a number is not finite.
+        UsageError
+            If no time has passed.
+        """
+        _check_known(force_n, position, passed_s, setpoint_n, slope_n_s)
+        if passed_s <= 0:
+            raise UsageError(f"The force loop was stepped {passed_s} s after the step before.")
+        law = self.law
+        kept = law.kept(passed_s)
+        self.filtered_n = kept * self.filtered_n + (1 - kept) * force_n
+        self.late, self.limited = passed_s > LATE * law.period_s, False
+        if self.late:
+            return self.target
+        missing = setpoint_n - self.filtered_n
+        growth = law.integral * passed_s * missing + passed_s * slope_n_s / law.feed_forward
+        integral = self._integral + growth
+        wish = law.proportional * missing + integral
+        most, ahead = law.speed * passed_s, law.speed * law.windup_s
+        target = min(max(wish, self.target - most), self.target + most)
+        target = min(max(target, position - ahead), position + ahead)
+        target = min(max(target, law.travel[0]), law.travel[1])
+        self.limited = target != wish
+        if not (self.limited and growth * (wish - target) > 0):
+            self._integral = integral
+        if law.proportional == 0:  # increments: what was cut is forgotten
+            self._integral = target
+        self.target = target
+        return target
+
+
+def _check_known(*numbers: float) -> None:
+    if not all(map(math.isfinite, numbers)):
+        raise RigError(
+            f"Force, position or time is not a number: {numbers}.",
+            hint="An unknown force counts as too large a force: retreat.",
+        )
+
+
+@dataclass(frozen=True)
+class LoopModel:
+    """A force law around a motor that presses: its simulation, and the matrix of one step on a linear skin."""
+
+    law: ForceLaw
+    lag_kept: float
+    """b, how much of its way the motor has left after one step; 0: no lag."""
+    delay_steps: int
+    speed: float = math.inf
+    """The motor's largest speed [length / s]; at a distance it is limited to what the motor can brake."""
+    acceleration: float = math.inf
+    resolution_n: float = 0.0
+    """Step of the measured force [N]; 0: not rounded."""
+
+    @classmethod
+    def of(cls, loop: ForceLoop, length: str = "m", *, period_s: float | None = None, **limits: Any) -> Self:
+        """Return the model of a declared loop; parameters as those of :meth:`ForceLaw.of`."""
+        return cls.around(
+            ForceLaw.of(loop, length, period_s=period_s, **limits),
+            lag_s=loop.motor_lag.to("s"),
+            delay_s=loop.delay.to("s"),
+            speed=loop.speed.to(f"{length}/s"),
+            acceleration=loop.acceleration.to(f"{length}/s/s"),
+            resolution_n=loop.resolution.to("N"),
+        )
+
+    @classmethod
+    def around(cls, law: ForceLaw, *, lag_s: float, delay_s: float, **motor: float) -> Self:
+        """Return the model of a law with the motor's lag and the delay of a command; `motor` as the fields."""
+        return cls(
+            law,
+            lag_kept=math.exp(-law.period_s / lag_s) if lag_s > 0 else 0.0,
+            # A delay of exactly so many steps must not become one more by rounding.
+            delay_steps=math.ceil(delay_s / law.period_s - 1e-9),
+            **motor,
+        )
+
+    def matrix(self, stiffness: float) -> FloatArray:
+        """Return what one step does to (x, y, i, c_{n-1} ... c_{n-d}) on a linear skin, without limits and rounding.
+
+        Its eigenvalues decide: the loop settles if and only if all lie inside the unit circle.
+        """
+        law, kept = self.law, self.law.kept(self.law.period_s)
+        x, y, integral, *late = np.eye(3 + self.delay_steps)  # each a row: by the state before the step
+        y = kept * y + (1 - kept) * stiffness * x
+        integral = integral - law.integral * law.period_s * y
+        late = [integral - law.proportional * y, *late]
+        x = self.lag_kept * x + (1 - self.lag_kept) * late[self.delay_steps]
+        return np.array([x, y, integral, *late[: self.delay_steps]])
+
+    def growth(self, stiffness: float) -> float:
+        """Return the largest modulus of the eigenvalues at a stiffness [N / length]: above 1 the loop oscillates."""
+        return float(np.abs(np.linalg.eigvals(self.matrix(stiffness))).max())
+
+    def largest_stiffness(self) -> float:
+        """Return the least stiffness [N / length] at which the loop no longer settles; infinite: there is none.
+
+        Loop gains k (kp + ki T) from 1e-4 to 1e3 are scanned in steps of 2 %, then the crossing is halved to 1e-6 of
+        itself. Only k kp and k ki count, so the largest stable gains at another stiffness are in inverse proportion.
+        """
+        law = self.law
+        softer = 1e-4 / (law.proportional + law.integral * law.period_s)
+        most = 1e7 * softer
+        while self.growth(softer) < 1:
+            stiffer = 1.02 * softer
+            if stiffer > most:
+                return math.inf
+            if self.growth(stiffer) >= 1:
+                while stiffer - softer > 1e-6 * softer:
+                    middle = 0.5 * (softer + stiffer)
+                    softer, stiffer = (middle, stiffer) if self.growth(middle) < 1 else (softer, middle)
+                return stiffer
+            softer = stiffer
+        return softer
+
+    def share_used(self, stiffness: float) -> float:
+        """Return the part of the largest stable gain that the loop uses at a stiffness [N / length].
+
+        Raises
+        ------
+        UsageError
+            If it is more than `MOST_OF_LIMIT`.
+        """
+        used = stiffness / self.largest_stiffness()
+        if used > MOST_OF_LIMIT:
+            raise UsageError(
+                f"The force loop's gains are {used:.2f} of those that no longer settle at the greatest stiffness; at "
+                f"most {MOST_OF_LIMIT:g} is permitted.",
+                hint=f"Divide both gains by {used / MOST_OF_LIMIT:.2f} or more.",
+            )
+        return used
+
+    def simulate(
+        self, force_n: Callable[[float], float], setpoint_n: FloatArray, noise_n: FloatArray, start: float = 0.0
+    ) -> FloatArray:
+        """Return the (n,) depth at each step.
+
+        Parameters
+        ----------
+        force_n
+            Force of the skin at a depth.
+        setpoint_n
+            (n,) wanted force.
+        noise_n
+            (n,) error of the force sensor.
+        start
+            Depth at the first step, at which the loop has settled.
+        """
+        x, velocity, resolution = start, 0.0, self.resolution_n
+        controller = ForceController(self.law, force_n(start), start)
+        late = [start] * (self.delay_steps + 1)
+        depths = np.empty(setpoint_n.size)
+        for n, (setpoint, noise) in enumerate(zip(setpoint_n.tolist(), noise_n.tolist(), strict=True)):
+            depths[n] = x
+            measured = force_n(x) + noise
+            if resolution > 0:
+                measured = round(measured / resolution) * resolution
+            late = [controller.step(measured, x, self.law.period_s, setpoint), *late[:-1]]
+            velocity = self._velocity(late[-1] - x, velocity)
+            x += velocity * self.law.period_s
+        return depths
+
+    def _velocity(self, way: float, velocity: float) -> float:
+        """Return the velocity of this step: that of the lag, unless a limit of the motor holds it back."""
+        period_s = self.law.period_s
+        wish = way * (1 - self.lag_kept) / period_s
+        if math.isinf(self.acceleration):
+            return min(max(wish, -self.speed), self.speed)
+        # The speed from which steps of `most_change` still stop it within the way that is left: the root of
+        # v^2 + v change - 2 acceleration way = 0, written so that nothing cancels.
+        most_change = self.acceleration * period_s
+        room = 2 * self.acceleration * abs(way)
+        brake = room / (0.5 * most_change + math.sqrt(0.25 * most_change**2 + room)) if room > 0 else 0.0
+        fastest = min(self.speed, brake)
+        wish = min(max(wish, -fastest), fastest)
+        return min(max(wish, velocity - most_change), velocity + most_change)

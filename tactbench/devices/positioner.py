@@ -1,0 +1,440 @@
+"""Anything that moves along or about one axis: a linear motor, a rail of a manipulator, a stage."""
+
+from __future__ import annotations
+
+import math
+from abc import abstractmethod
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any, ClassVar, Literal, Self
+
+import numpy as np
+from pydantic import Field, model_validator
+
+from tactbench.core.errors import LinkError, LinkTimeout, RigError
+from tactbench.core.samples import Block, Quality
+from tactbench.core.spec.sensor import ChannelSpec, StreamSpec
+from tactbench.devices.driver import Driver, DriverSettings
+from tactbench.devices.options import Options, open_for, read_options
+from tactbench.links.byte_link import ByteLink
+from tactbench.links.link import Link
+
+SILENT_S = 0.5
+"""After which a controller is said not to answer (assumed)."""
+SETTLE_S = 0.5
+"""Added to the time that a move takes by its speed and acceleration, after which it has not ended (assumed)."""
+
+
+class PositionerError(RigError):
+    """An axis or its controller does not do what it was asked for."""
+
+
+class PositionerSilentError(PositionerError):
+    """The controller does not answer, or did not answer a command; whether it was carried out is not known."""
+
+
+class NotReadyError(PositionerError):
+    """A move was asked for that is not allowed now, or at all; nothing was sent."""
+
+
+@dataclass(frozen=True)
+class PositionerFacts:
+    """What an axis states of itself; positions in m (or rad), those of a pressing axis positive into the skin."""
+
+    limits: tuple[float, float]
+    """Least and greatest position, kept by the controller too; NaN: none, and it is never moved."""
+    resolution: float
+    """Least step."""
+    corridor: float
+    """How far from its target a finished move may be."""
+    speed: float
+    """Largest speed of a move."""
+    acceleration: float
+    """Of braking."""
+    stop_latency_s: float
+    """From the call of :meth:`Positioner.halt` or :meth:`~Positioner.retreat` to the beginning of braking, at most."""
+    interruptible: bool
+    """Whether `halt` and `retreat` end a move that is under way."""
+    holds_unpowered: bool
+    """Whether it stays where it is without power: a horizontal axis, a brake, a counterweight, a self-locking screw."""
+    keeps_place: bool
+    """Whether the controller can tell after a restart of this program that it is homed."""
+    retreat: float = math.nan
+    """Where it is away from the skin; NaN: it retreats by standing still."""
+    retreat_speed: float = math.nan
+
+    @property
+    def near(self) -> float:
+        """How near to a place counts as there."""
+        return max(self.corridor, 2.0 * self.resolution)
+
+    def seconds(self, distance: float, speed: float) -> float:
+        """Return how long a move takes at most."""
+        return abs(distance) / speed + 2.0 * speed / self.acceleration + SETTLE_S
+
+
+@dataclass(frozen=True)
+class PositionerState:
+    """What was last read of an axis."""
+
+    t_ns: int
+    """When the position's answer came, on the host's clock."""
+    position: float
+    target: float = math.nan
+    """NaN: not known."""
+    current_a: float = math.nan
+    """Without sign; NaN: not known."""
+    problem: str = ""
+    """What the controller reports that must end a press (current limit, deviation); empty: nothing."""
+
+
+class PositionerOptions(Options):
+    """What a rig file says of any axis; a subclass has the options of its own controller."""
+
+    lower_m: float | None = None
+    """Ends of travel, kept by the controller and by the driver; without them the axis can be watched, not moved."""
+    upper_m: float | None = None
+    home_m: float = 0.0
+    """What the place is called that homing finds."""
+    speed_m_s: float | None = Field(default=None, gt=0.0)
+    """Of moves."""
+    acceleration_m_s2: float | None = Field(default=None, gt=0.0)
+    """Of starting and braking."""
+    corridor_m: float | None = Field(default=None, gt=0.0)
+    """Around a target, within which a move has ended: well below the shortest move."""
+    retreat_m: float | None = None
+    """Where it goes to be away from the sensor."""
+    retreat_speed_m_s: float | None = Field(default=None, gt=0.0)
+    orientation: Literal["horizontal", "vertical"] | None = None
+    """How the axis stands; this and, of a vertical one, the next two must be stated before anything presses."""
+    brake: bool | None = None
+    """Whether a brake holds it without power."""
+    counterweight: bool | None = None
+    """Whether a counterweight or spring does."""
+    peak_force_n: float | None = Field(default=None, gt=0.0)
+    """The largest force that its drive can exert: the last bound where the force sensor lies."""
+
+    @model_validator(mode="after")
+    def _consistent(self) -> Self:
+        if (self.lower_m is None) != (self.upper_m is None):
+            raise ValueError("give both lower_m and upper_m, or none")
+        if self.lower_m is not None and self.upper_m is not None:
+            if not self.lower_m < self.upper_m:
+                raise ValueError("lower_m is below upper_m")
+            if self.retreat_m is not None and not self.lower_m <= self.retreat_m <= self.upper_m:
+                raise ValueError("retreat_m is between lower_m and upper_m")
+        return self
+
+    @property
+    def largest_force_n(self) -> float | None:
+        """Largest force that the drive can exert [N]; None: not stated."""
+        return self.peak_force_n
+
+    @property
+    def holds_unpowered(self) -> bool:
+        """Whether it stays where it is without power; False where that is not known."""
+        return self.orientation == "horizontal" or bool(self.brake) or bool(self.counterweight)
+
+    def homes_towards(self) -> int:
+        """Return the sign of the direction in which homing moves; 0: it does not, or that is not known."""
+        return 0
+
+
+class Positioner(Driver):
+    """One axis.
+
+    Nothing but :meth:`home` and the moves lets it move, and nothing but :meth:`enable` and :meth:`home` gives it power.
+    :meth:`home`, :meth:`enable` and :meth:`disable` wait for their end, within a bound. :meth:`move_to`,
+    :meth:`move_by`, :meth:`halt` and :meth:`retreat` return at once; :meth:`update` carries them on, until
+    :attr:`moving` is false. `halt` and `retreat` replace a move that is under way; the other moves are refused then.
+
+    What goes wrong raises in the call that notices it: PositionerSilentError, another PositionerError, or a LinkError.
+
+    As a device of a rig an axis has one stream, `motor`: position, current and target, once per state that was read.
+    A subclass has the abstract methods and the class attributes. It calls :meth:`check_move` before it sends a move,
+    :meth:`begin` after, and :meth:`see` with each answer. A DeviceDescriptor's `driver` names the class itself.
+
+    Raises
+    ------
+    UsageError
+        For options that are not known or contradict each other.
+    """
+
+    device: ClassVar[str]
+    """Name in messages."""
+    link_kind: ClassVar[type[Link]] = ByteLink  # type: ignore[type-abstract]
+    """Of the link that is opened; and an example of its address."""
+    address: ClassVar[str] = "serial:///dev/ttyUSB0?baud=9600"
+    options_kind: ClassVar[type[PositionerOptions]] = PositionerOptions
+    resolution_m: ClassVar[float] = math.nan
+    """Least step."""
+    stop_latency_s: ClassVar[float] = math.nan
+    """See :attr:`PositionerFacts.stop_latency_s`; likewise the next two."""
+    interruptible: ClassVar[bool] = True
+    keeps_place: ClassVar[bool] = False
+    stream = "motor"
+
+    def __init__(self, settings: DriverSettings) -> None:
+        self.clock = settings.clock
+        """Nanoseconds of the host."""
+        self.options: Any = read_options(self.options_kind, settings.options, self.device)
+        self.facts = self.facts_of(self.options)
+        self._state: PositionerState | None = None
+        self._unread: list[PositionerState] = []
+        self._moving = self._retreats = False
+        self._goal = math.nan
+        self._rest, self._asked_ns = b"", 0
+        self.link: Any = open_for(settings, self.device, self.link_kind, self.address)
+        self.homed = False
+        """Whether positions mean anything, and limits hold."""
+        self.enabled = False
+        """Whether it has power, by what is known now."""
+
+    @classmethod
+    def facts_of(cls, options: Any) -> PositionerFacts:
+        """Return what an axis with these options states of itself; nothing is opened."""
+        return PositionerFacts(
+            limits=(_or(options.lower_m, math.nan), _or(options.upper_m, math.nan)),
+            resolution=cls.resolution_m,
+            corridor=_or(options.corridor_m, 0.0),
+            speed=_or(options.speed_m_s, math.inf),
+            acceleration=_or(options.acceleration_m_s2, math.inf),
+            stop_latency_s=cls.stop_latency_s,
+            interruptible=cls.interruptible,
+            holds_unpowered=options.holds_unpowered,
+            keeps_place=cls.keeps_place,
+            retreat=_or(options.retreat_m, math.nan),
+            retreat_speed=_or(options.retreat_speed_m_s, math.nan),
+        )
+
+    # What a subclass does ---------------------------------------------------------------------------------------------
+
+    @abstractmethod
+    def home(self, stop: Callable[[], bool] = lambda: False) -> None:
+        """Find the place that positions count from, and set the ends of travel; it has power afterwards.
+
+        Parameters
+        ----------
+        stop
+            Called repeatedly while it moves; true: stand at once and raise PositionerError.
+        """
+
+    def enable(self) -> None:
+        """Give it power; it holds its place. Nothing is sent, unless a subclass does."""
+        self.enabled = True
+
+    @abstractmethod
+    def disable(self) -> None:
+        """Take its power. Where :attr:`PositionerFacts.holds_unpowered` is false it may fall."""
+
+    @abstractmethod
+    def move_to(self, position: float, speed: float | None = None) -> float:
+        """Begin to move to a position, to the nearest step, which is returned; None: at the speed of the facts."""
+
+    @abstractmethod
+    def halt(self) -> None:
+        """Begin to brake and hold, whatever is under way."""
+
+    @abstractmethod
+    def update(self, timeout_s: float = 0.0) -> None:
+        """Carry on what is under way, waiting at most `timeout_s` for the controller; read the state."""
+
+    def retreat(self) -> None:
+        """Halt, and once it stands move to the place away from the skin, if there is one; whatever is under way."""
+        self.halt()
+        self._retreats = math.isfinite(self.facts.retreat)
+
+    def find_home(self) -> bool:
+        """Ask the controller whether it is homed already, and set :attr:`homed` then: after a restart of this program.
+
+        False, and nothing asked, where :attr:`PositionerFacts.keeps_place` is false.
+        """
+        return False
+
+    def confirm(self) -> None:
+        """Read back the limits that the controller must keep; raises PositionerError if it has others."""
+
+    def rescue(self, within_s: float | None) -> float:
+        """Retreat with a controller that another process had, without set-up or homing; return the position at the end.
+
+        Parameters
+        ----------
+        within_s
+            The time for the way; None: stand at once, wherever it is.
+
+        Raises
+        ------
+        PositionerError, LinkError
+            If it does not come to its place of retreat, or does not answer.
+        """
+        self.homed = self.enabled = True
+        if within_s is None:
+            self.halt()
+            return self.position
+        self.retreat()
+        until_ns = self.clock() + round(1e9 * within_s)
+        while self.clock() < until_ns:
+            self.update(0.01)
+            if not self.moving:
+                return self.position
+        raise PositionerSilentError(f"It is at {self.position:g} {within_s:.1f} s after it was sent away.")
+
+    # What a subclass calls --------------------------------------------------------------------------------------------
+
+    def begin(self, target: float = math.nan) -> None:
+        """Note that a move to a target was sent; NaN: to where it will stand, infinity: not before :meth:`begin`."""
+        self._moving, self._goal, self._retreats = True, target, False
+
+    def see(self, t_ns: int, position: float, *, idle: bool) -> None:
+        """Note an answer: when and where, and whether the controller says that it stands.
+
+        A move has ended when the controller stands at its target; one that says so before it has begun is not believed.
+        """
+        there = math.isnan(self._goal) or abs(position - self._goal) <= self.facts.near
+        self.note(PositionerState(t_ns, position, position if math.isnan(self._goal) else self._goal))
+        if idle and there:
+            self._moving = False
+            if self._retreats:
+                self.move_to(self.facts.retreat, self.facts.retreat_speed)
+
+    def lines(self, question: bytes, timeout_s: float) -> list[bytes]:
+        """Ask a controller on a ByteLink, unless an answer is out; return the lines that have come.
+
+        The caller calls :meth:`answered` with the answer. Raises PositionerSilentError if that takes `SILENT_S`.
+        """
+        if not self._asked_ns:
+            self.link.write(question)
+            self._asked_ns = self.clock()
+        try:
+            self._rest += self.link.read(timeout_s).data
+        except LinkTimeout:
+            if self.clock() - self._asked_ns > 1e9 * SILENT_S:
+                self._asked_ns = 0
+                raise PositionerSilentError(f"{self.device} does not answer {question!r}.") from None
+        *lines, self._rest = self._rest.split(b"\n")
+        return lines
+
+    def answered(self) -> None:
+        """Note that the answer has come: the next call of :meth:`lines` asks again."""
+        self._asked_ns = 0
+
+    def finish(self, stop: Callable[[], bool]) -> None:
+        """Wait for the end of a move; halts and raises PositionerError if `stop` says so."""
+        while self.moving:
+            self.update(0.05)
+            if stop():
+                self.halt()
+                raise PositionerError("The axis was told to stand.")
+
+    def note(self, state: PositionerState) -> None:
+        """Keep a state that was read."""
+        self._state = state
+        self._unread.append(state)
+        del self._unread[:-1000]
+
+    def check_move(self, position: float) -> None:
+        """Raise NotReadyError unless a move to a position may begin now."""
+        low, high = self.facts.limits
+        for wrong, problem, hint in (
+            (self.moving, "The axis is moving.", "Wait for the end of its move, or let it retreat."),
+            (not self.homed, "The axis is not homed.", "Use home()."),
+            (math.isnan(low), "The axis has no ends of travel.", "Give them in the rig file."),
+            (not self.enabled, "The axis has no power.", "Use enable()."),
+            (
+                not low - 1e-12 <= position <= high + 1e-12,
+                f"{position:g} m is beyond the ends of travel, {low:g} to {high:g} m.",
+                "Ask for less.",
+            ),
+        ):
+            if wrong:
+                raise NotReadyError(problem, hint=hint)
+
+    # What they have in common -----------------------------------------------------------------------------------------
+
+    @property
+    def moving(self) -> bool:
+        """Whether a move is under way, by what is known now."""
+        return self._moving
+
+    @property
+    def state(self) -> PositionerState | None:
+        """What was last read; None: nothing yet."""
+        return self._state
+
+    @property
+    def position(self) -> float:
+        """The last position; NaN: not read yet."""
+        return math.nan if self._state is None else self._state.position
+
+    def move_by(self, distance: float) -> float:
+        """Begin to move from the last target by a distance, to the nearest step; return the new target."""
+        if self._state is None or math.isnan(self._state.target):
+            raise NotReadyError("The axis does not know its target.", hint="Read it once it is at rest.")
+        return self.move_to(self._state.target + distance)
+
+    def at(self, position: float) -> bool:
+        """Whether it was last read at a place."""
+        return abs(self.position - position) <= self.facts.near
+
+    @property
+    def streams(self) -> tuple[StreamSpec, ...]:
+        """`motor`, at the rate that the line allows."""
+        channels = (
+            ChannelSpec(name="position", kind="position", unit="m"),
+            ChannelSpec(name="current", kind="other", unit="A"),
+            ChannelSpec(name="target", kind="position", unit="m"),
+        )
+        return (StreamSpec(name=self.stream, channels=channels),)
+
+    @property
+    def counts(self) -> Mapping[str, int]:
+        """An empty mapping, unless a subclass counts something."""
+        return {}
+
+    def identify(self) -> Mapping[str, str]:
+        """Return an empty mapping, unless a subclass asks the controller."""
+        return {}
+
+    def start(self) -> None:
+        """Read the state once; a subclass sets its controller up first."""
+        self.update(0.0)
+
+    def read(self, timeout_s: float) -> list[Block]:
+        """Return the states that were read since the last call, and carry a move on; raises as :meth:`update`."""
+        until_ns = self.clock() + round(1e9 * timeout_s)
+        while True:
+            left_s = max(0.0, 1e-9 * (until_ns - self.clock()))
+            self.update(left_s)
+            if self._unread or left_s == 0.0:
+                break
+        states, self._unread = self._unread, []
+        if not states:
+            return []
+        data = np.array([(one.position, one.current_a, one.target) for one in states])
+        marks = np.where(np.isfinite(data), int(Quality.GOOD), int(Quality.MISSING)).astype(np.uint8)
+        t_ns = np.array([one.t_ns for one in states], dtype=np.int64)
+        return [Block(stream=self.stream, t_ns=t_ns, data=data, quality=marks if marks.any() else None)]
+
+    def stop(self) -> None:
+        """Hand out no more. The axis ends the move it has, and holds."""
+        self._unread = []
+
+    def close(self) -> None:
+        """Close the link. The axis ends the move it has, and holds."""
+        self.stop()
+        self.link.close()
+
+
+def _or(value: float | None, otherwise: float) -> float:
+    return otherwise if value is None else value
+
+
+def power_off(axis: Positioner) -> bool:
+    """Take an axis' power where it holds without; return whether that was done. Raises nothing."""
+    if not axis.facts.holds_unpowered:
+        return False
+    try:
+        axis.disable()
+    except (LinkError, RigError):
+        return False
+    return True

@@ -1,0 +1,419 @@
+"""One press as a state machine, stepped once a control period with the guard's report; it waits for nothing.
+
+::
+
+    standoff -> approach -> contact -> lift -> unloaded -> return -> ramp -> hold -> unload -> done
+    any of them -> retreat -> failed
+
+The surface is found first: a quick way to where it cannot be yet, a slow one until the raw force says that it is
+touched, a small force kept for a while. From there the motor lifts the indenter off for the scene's unloaded hold, goes
+back, and follows the scene's profile. Touch is found on the raw force; the force is regulated on the filtered one. The
+guard looks at the raw force by itself, and retreats by itself.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from enum import StrEnum
+
+from tactbench.devices.force_loop import ForceController, ForceLaw
+from tactbench.devices.guard_messages import Beat, CommandKind, GuardState, Report
+
+SWINGS = 6
+"""Half swings of the error in a row, each above the band of errors, after which the loop is said to swing (assumed:
+three whole swings)."""
+SLOW = 1.5
+"""How many times as long as its way takes a move may last, and `SLACK_S` longer."""
+SLACK_S = 2.0
+
+
+class PressState(StrEnum):
+    """Where a press is."""
+
+    STANDOFF = "standoff"
+    """The motor is retracted, nothing touches."""
+    APPROACH = "approach"
+    CONTACT = "contact"
+    """A small force is kept."""
+    LIFT = "lift"
+    UNLOADED = "unloaded"
+    """Just above the skin, for the scene's unloaded hold."""
+    RETURN = "return"
+    RAMP = "ramp"
+    HOLD = "hold"
+    UNLOAD = "unload"
+    DONE = "done"
+    """Just above the skin again."""
+    RETREAT = "retreat"
+    FAILED = "failed"
+    """The motor is out, and :attr:`Press.ended` says why."""
+
+
+_REGULATED = (PressState.CONTACT, PressState.RAMP, PressState.HOLD)
+
+
+def _command(kind: CommandKind = CommandKind.NONE, **more: float) -> Beat:
+    """Return a beat that lacks its number, time and state."""
+    return Beat(0, 0, command=kind, **more)  # type: ignore[arg-type]
+
+
+@dataclass(frozen=True)
+class PressPlan:
+    """The numbers of a press, in m, N and s."""
+
+    law: ForceLaw
+    """In m."""
+    resolution_m: float
+    """Of the axis: shorter steps are not sent, and kept for later ones."""
+    step_m: float
+    """Largest increment of a control period."""
+    near_m: float
+    """Where the axis goes over to the speed of touching: above where the surface can be."""
+    deepest_m: float
+    """The greatest position that is ever asked for."""
+    speed_m_s: float
+    """To `near_m`."""
+    touch_speed_m_s: float
+    """From there on."""
+    unload_speed_m_s: float
+    mean_n: float
+    """A touch: the mean of the raw forces of the last `mean_s` above it; the guard stops at single ones."""
+    mean_s: float
+    contact_n: float
+    """Force that is kept after the touch until the surface is known; and the least on the ramp."""
+    settle_s: float
+    """How long."""
+    lift_m: float
+    """How far the axis goes back from there for the unloaded hold."""
+    error_band_n: float
+    """Filtered force this far from the wanted one for a second: retreat. Also the least height of a growing swing."""
+    band_n: float
+    """Filtered forces below it count as no force."""
+    lost_s: float
+    """Contact is lost, which ends the press, if the force is in the band for so long while more than twice the band is
+    wanted."""
+    hold_s: float = 0.0
+    """How long the largest force is held after the course."""
+
+
+@dataclass(frozen=True)
+class Course:
+    """What a scene asks for."""
+
+    setpoint_n: Callable[[float], float]
+    """Force at a second since its first sample."""
+    slope_n_s: float
+    """Of the ramp."""
+    ramp_s: float
+    """When the ramp begins."""
+    end_s: float
+    """When it ends."""
+
+
+class Press:
+    """One press of one scene.
+
+    Parameters
+    ----------
+    plan
+        Of the rig.
+    course
+        Of the scene.
+
+    Attributes
+    ----------
+    state
+        Where it is.
+    ended
+        Why it failed; empty: it has not.
+    not_out
+        What is to be done where the motor did not come out; empty: it did.
+    contact_m
+        Position of the motor at which the small force was kept; NaN: not yet.
+    touch_n
+        Largest raw force from the first touch until the small force was kept.
+    error_n
+        Filtered minus wanted force of the last regulated step.
+    """
+
+    def __init__(self, plan: PressPlan, course: Course) -> None:
+        self.state = PressState.STANDOFF
+        self.ended = ""
+        self.not_out = ""
+        self.contact_m = math.nan
+        self.touch_n = 0.0
+        self.error_n = math.nan
+        self.setpoint_n = 0.0
+        self._plan, self._course = plan, course
+        self._raw: deque[tuple[float, float]] = deque()
+        self._sum_n = 0.0
+        self._force_n = math.nan
+        self._controller: ForceController | None = None
+        self._stepped_s = 0.0
+        self._goal: Beat | None = None
+        self._requested_s: float | None = None
+        self._since_s = self._due_s = 0.0
+        self._began_s: float | None = None
+        self._band_since_s = self._error_since_s = math.nan
+        self._swings, self._peak_n = 0, 0.0
+        self._go = False
+
+    # What a rig says --------------------------------------------------------------------------------------------------
+
+    @property
+    def ready(self) -> bool:
+        """Whether the surface is found, and the scene may begin."""
+        return self.state is PressState.UNLOADED
+
+    @property
+    def over(self) -> bool:
+        """Whether nothing more will happen."""
+        return self.state in (PressState.DONE, PressState.FAILED)
+
+    def go(self) -> None:
+        """Leave the standoff."""
+        self._go = True
+
+    def begin(self, now_s: float) -> None:
+        """Let the scene begin: from now on its seconds count."""
+        self._began_s = now_s
+
+    def fail(self, why: str) -> None:
+        """Let the motor retreat, for a reason from outside; the first one stands."""
+        if not self.over and self.state is not PressState.RETREAT:
+            self.ended = why
+            self._enter(PressState.RETREAT, self._since_s)
+
+    def abandon(self) -> None:
+        """Do nothing more: nobody steps it any longer."""
+        if not self.over:
+            self._enter(PressState.FAILED, self._since_s)
+
+    # Stepping ---------------------------------------------------------------------------------------------------------
+
+    def step(self, report: Report, raw: Sequence[tuple[float, float]], now_s: float) -> Beat:
+        """Go on by one control period.
+
+        Parameters
+        ----------
+        report
+            What the guard answered last.
+        raw
+            Seconds and raw pressing forces [N] that have come since the last step, the zero subtracted.
+        now_s
+            On the rig's clock.
+        """
+        self._take(raw, now_s)
+        if report.state in (GuardState.RETREATING, GuardState.RETREATED, GuardState.FAULT):
+            return self._guarded(report, now_s)
+        match self.state:
+            case PressState.STANDOFF:
+                if self._go:
+                    self._enter(PressState.APPROACH, now_s)
+                    self._move(self._plan.near_m, self._plan.speed_m_s)
+            case PressState.APPROACH:
+                self._approach(report, now_s)
+            case PressState.LIFT | PressState.RETURN | PressState.UNLOAD:
+                self._on_the_way(report, now_s)
+            case PressState.UNLOADED:
+                if self._began_s is not None and now_s - self._began_s >= self._course.ramp_s:
+                    self._enter(PressState.RETURN, now_s)
+                    self._move(self.contact_m, self._plan.touch_speed_m_s)
+            case PressState.CONTACT | PressState.RAMP | PressState.HOLD:
+                return self._regulated(report, now_s)
+            case PressState.RETREAT:
+                return _command(CommandKind.RETREAT)
+        return self._asking(report, now_s)
+
+    def _take(self, raw: Sequence[tuple[float, float]], now_s: float) -> None:
+        """Keep the raw forces of the last moment, the newest, and the largest of a touch."""
+        for sample in raw:
+            self._raw.append(sample)
+            self._sum_n += sample[1]
+            self._force_n = sample[1]
+            if self.state in (PressState.APPROACH, PressState.CONTACT):
+                self.touch_n = max(self.touch_n, sample[1])
+        oldest = now_s - self._plan.mean_s
+        while self._raw and self._raw[0][0] < oldest:
+            self._sum_n -= self._raw.popleft()[1]
+
+    @property
+    def mean_n(self) -> float:
+        """Mean of the raw forces of the last `mean_ms` [N]; NaN: there are none."""
+        return self._sum_n / len(self._raw) if self._raw else math.nan
+
+    def _guarded(self, report: Report, now_s: float) -> Beat:
+        """Note that the guard retreats, or has retreated."""
+        if self.state is not PressState.RETREAT and not self.over:
+            self.ended = f"in {self.state}: {report.trigger or report.state}"
+            self._enter(PressState.RETREAT, now_s)
+        if report.state is not GuardState.RETREATING and not self.over:
+            self.not_out = report.not_out
+            self._enter(PressState.FAILED, now_s)
+        return _command()
+
+    def _enter(self, state: PressState, now_s: float) -> None:
+        self.state, self._since_s = state, now_s
+        self._goal = self._requested_s = None
+        self._band_since_s = self._error_since_s = math.nan
+        self._swings, self._peak_n = 0, 0.0
+
+    # Moves ------------------------------------------------------------------------------------------------------------
+
+    def _move(self, position_m: float, speed_m_s: float) -> None:
+        self._goal = _command(CommandKind.MOVE_TO, position_m=position_m, speed_m_s=speed_m_s)
+        self._requested_s = None
+
+    def _asking(self, report: Report, now_s: float) -> Beat:
+        """Return the move that is to be begun, until the guard has accepted it; a stop at once."""
+        if self._goal is None or self._requested_s is not None:
+            return _command()
+        if report.moving and self._goal.command is not CommandKind.STOP:
+            return _command()
+        self._requested_s = now_s
+        if self._goal.command is CommandKind.MOVE_TO:
+            way_m = abs(self._goal.position_m - report.position_m)
+            self._due_s = now_s + SLOW * way_m / self._goal.speed_m_s + SLACK_S
+        return self._goal
+
+    def _arrived(self, report: Report, now_s: float) -> bool:
+        """Return whether the last move is over; asks for it again if it was not accepted."""
+        if self._goal is None or self._requested_s is None or now_s <= self._requested_s:
+            return False
+        if not report.accepted:
+            self._requested_s = None
+            return False
+        if report.moving:
+            if now_s > self._due_s:
+                self.fail(f"the motor did not arrive at {1e3 * self._goal.position_m:.3f} mm in its time")
+            return False
+        return True
+
+    def _approach(self, report: Report, now_s: float) -> None:
+        plan = self._plan
+        if self._goal is None:  # standing after a touch
+            if not report.moving:
+                self._close_loop(report, now_s)
+            return
+        slowly = self._goal.position_m == plan.deepest_m
+        if slowly and self._requested_s is not None and (report.touched or self.mean_n > plan.mean_n):
+            # The guard has stopped it at a single touch; a mean that is reached is stopped here.
+            self._goal = None if report.touched else _command(CommandKind.STOP)
+            self._requested_s = None
+            return
+        if self._goal.command is CommandKind.STOP:
+            if self._requested_s is not None and not report.moving:
+                self._goal = None
+            return
+        if self._arrived(report, now_s):
+            if not slowly:
+                self._move(plan.deepest_m, plan.touch_speed_m_s)
+            elif not report.touched:
+                self.fail(f"no contact down to {1e3 * report.position_m:.3f} mm")
+
+    def _on_the_way(self, report: Report, now_s: float) -> None:
+        """Go over to the next state where a move ends; on the way back to the skin also at a touch."""
+        if not (self._arrived(report, now_s) or (self.state is PressState.RETURN and report.touched)):
+            return
+        if report.moving:
+            return
+        match self.state:
+            case PressState.LIFT:
+                self._enter(PressState.UNLOADED, now_s)
+            case PressState.UNLOAD:
+                if self.mean_n < self._plan.band_n:
+                    self._enter(PressState.DONE, now_s)
+                elif now_s > self._due_s + SLACK_S:
+                    self.fail(f"{self.mean_n:.2f} N are left after unloading")
+            case _:
+                self._enter(PressState.RAMP, now_s)
+                self._begin_loop(report, now_s)
+
+    # Under force ------------------------------------------------------------------------------------------------------
+
+    def _close_loop(self, report: Report, now_s: float) -> None:
+        """Begin to regulate the small force after a touch."""
+        self._enter(PressState.CONTACT, now_s)
+        self._begin_loop(report, now_s)
+
+    def _begin_loop(self, report: Report, now_s: float) -> None:
+        self._controller, self._stepped_s = ForceController(self._plan.law, self._force_n, report.position_m), now_s
+
+    def _setpoint(self, now_s: float) -> tuple[float, float]:
+        """Return the wanted force and its slope."""
+        least = self._plan.contact_n
+        if self.state is PressState.CONTACT or self._began_s is None:
+            return least, 0.0
+        scene_s = now_s - self._began_s
+        setpoint = self._course.setpoint_n(scene_s)
+        rising = self.state is PressState.RAMP and setpoint > least and scene_s < self._course.end_s
+        return max(least, setpoint), self._course.slope_n_s if rising else 0.0
+
+    def _regulated(self, report: Report, now_s: float) -> Beat:
+        controller = self._controller
+        assert controller is not None
+        self.setpoint_n, slope = self._setpoint(now_s)
+        controller.step(self._force_n, report.position_m, now_s - self._stepped_s, self.setpoint_n, slope)
+        self._stepped_s = now_s
+        self.error_n = controller.filtered_n - self.setpoint_n
+        if self.state is PressState.CONTACT:
+            if now_s - self._since_s >= self._plan.settle_s:
+                self.contact_m = controller.target
+                self._enter(PressState.LIFT, now_s)
+                self._move(self.contact_m - self._plan.lift_m, self._plan.touch_speed_m_s)
+                return self._asking(report, now_s)
+        elif self._kept(controller, now_s):
+            self._end_of(now_s)
+        if self.state not in _REGULATED:
+            return (
+                self._asking(report, now_s) if self.state is not PressState.RETREAT else _command(CommandKind.RETREAT)
+            )
+        if report.moving:
+            return _command()
+        way = controller.target - report.target_m
+        if abs(way) < 0.5 * self._plan.resolution_m:
+            return _command()
+        return _command(CommandKind.STEP, distance_m=min(max(way, -self._plan.step_m), self._plan.step_m))
+
+    def _end_of(self, now_s: float) -> None:
+        """Go over from ramp to hold, and from hold to unloading."""
+        assert self._began_s is not None
+        scene_s = now_s - self._began_s
+        if self.state is PressState.RAMP and scene_s >= self._course.end_s:
+            self._enter(PressState.HOLD, now_s)
+        if self.state is PressState.HOLD and scene_s >= self._course.end_s + self._plan.hold_s:
+            self._enter(PressState.UNLOAD, now_s)
+            self._move(self.contact_m - self._plan.lift_m, self._plan.unload_speed_m_s)
+
+    def _kept(self, controller: ForceController, now_s: float) -> bool:
+        """Return whether force and contact are as they should be; else see to what follows."""
+        rules = self._plan
+        in_band = controller.filtered_n < rules.band_n and self.setpoint_n > 2 * rules.band_n
+        self._band_since_s = _since(self._band_since_s, in_band, now_s)
+        if now_s - self._band_since_s >= rules.lost_s:
+            self.fail(f"contact was lost, at {self.setpoint_n:.2f} N")
+            return False
+        self._error_since_s = _since(self._error_since_s, abs(self.error_n) > rules.error_band_n, now_s)
+        if now_s - self._error_since_s >= 1.0:
+            self.fail(
+                f"the force was off by more than {rules.error_band_n:g} N for a second, at {self.setpoint_n:.2f} N"
+            )
+            return False
+        if self.error_n * self._peak_n < 0:
+            self._swings = self._swings + 1 if abs(self._peak_n) > rules.error_band_n else 0
+            self._peak_n = 0.0
+        self._peak_n = max(self._peak_n, self.error_n, key=abs)
+        if self._swings >= SWINGS:
+            self.fail(f"the force swings by more than {rules.error_band_n:g} N: lower the loop's gains")
+            return False
+        return True
+
+
+def _since(since_s: float, holds: bool, now_s: float) -> float:
+    """Return since when something holds; NaN: it does not."""
+    if not holds:
+        return math.nan
+    return now_s if math.isnan(since_s) else since_s

@@ -1,0 +1,561 @@
+"""What ``import tactbench`` gives: recordings, tasks, scores and results in Python.
+
+The command line goes through the same functions, and :func:`evaluate` computes the row that a cell of a run has.
+"""
+
+from __future__ import annotations
+
+import glob
+import os
+import random
+import shutil
+from collections import Counter
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from importlib import import_module
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+
+from tactbench.core.cli.config import default_matrix
+from tactbench.core.cli.results import opened, over_all, shown_rows, table_of
+from tactbench.core.cli.threads import keep_threads
+from tactbench.core.errors import FormatError, MissingRecordingError, UnknownNameError, UsageError
+from tactbench.core.evaluation.cell import PLAIN, TaskData
+from tactbench.core.evaluation.cell import load_task as folds_of
+from tactbench.core.evaluation.channels import numbers
+from tactbench.core.evaluation.metrics import metric_called
+from tactbench.core.evaluation.protocols import is_probe
+from tactbench.core.leaderboard.formats import records, write_tables
+from tactbench.core.leaderboard.pairwise import comparisons, record_of, tables_of, with_declared
+from tactbench.core.leaderboard.table import Table, build_table
+from tactbench.core.leaderboard.view import best, grids
+from tactbench.core.matrix.installed import rig_of
+from tactbench.core.matrix.plan import Cell, task_of
+from tactbench.core.matrix.solve import Job, read_dataset, solve, unanswered
+from tactbench.core.matrix.summary import fill_baselines
+from tactbench.core.plugins.declared import declared_in
+from tactbench.core.plugins.declared import with_declared as with_declared_tasks
+from tactbench.core.plugins.interfaces import Estimator
+from tactbench.core.plugins.registry import installed
+from tactbench.core.recording.reader import open_recording, read_meta
+from tactbench.core.samples import Answers, FloatArray, StreamData
+from tactbench.core.spec.declared_task import FILE
+from tactbench.core.spec.matrix import EstimatorChoice, MatrixSpec
+from tactbench.core.spec.recording import RecordingMeta
+from tactbench.core.spec.scene import Simulation
+from tactbench.core.spec.sensor import ChannelSpec, SensorSpec
+from tactbench.core.spec.task import TaskSpec, VectorTarget
+from tactbench.core.statistics.replicates import over_replicates
+from tactbench.core.tables.html import html
+from tactbench.core.tables.terminal import plain_text
+from tactbench.core.tables.text_table import TextTable
+
+if TYPE_CHECKING:
+    import pandas
+    import xarray
+
+Row = dict[str, Any]
+AnyPath = str | os.PathLike[str]
+
+
+@dataclass(frozen=True, repr=False)
+class Stream(StreamData):
+    """Channels of a recording that share a clock: `data` (n, channels) as stored, `quality`, `t_ns`, `annotations`."""
+
+    start_ns: int = 0
+    """When the recording's first sample was, of any stream."""
+
+    def __repr__(self) -> str:
+        return f"<Stream {self.spec.name}: {len(self.data)} rows of {', '.join(one.name for one in self.channels)}>"
+
+    @property
+    def channels(self) -> tuple[ChannelSpec, ...]:
+        """Return what is known of each channel: name, kind, unit, range, position."""
+        return self.spec.channels
+
+    @property
+    def time_s(self) -> FloatArray | None:
+        """Return (n,) seconds since the recording's first sample; None where it has no clock."""
+        return None if self.t_ns is None else np.asarray((self.t_ns - self.start_ns) * 1e-9)
+
+
+class Recording:
+    """A recording, by the `path` of its file. Meta and samples are read at first use and kept; no file stays open."""
+
+    def __init__(self, path: AnyPath) -> None:
+        self.path = Path(path)
+
+    def __repr__(self) -> str:
+        return f"<Recording {self.meta.name}: {self.sensor.name}>"
+
+    @cached_property
+    def meta(self) -> RecordingMeta:
+        """What the recording says about itself; raises FormatError if the file is no recording."""
+        return read_meta(self.path)
+
+    @property
+    def sensor(self) -> SensorSpec:
+        """Return the sensor's whole spec."""
+        return self.meta.sensor
+
+    @cached_property
+    def streams(self) -> Mapping[str, Stream]:
+        """The streams that hold data by name, the sensor's first, then the reference's."""
+        with open_recording(self.path) as file:
+            read = {name: file.read(name) for name in file.stream_names}
+        start_ns = min((int(one.t_ns[0]) for one in read.values() if one.t_ns is not None and len(one.t_ns)), default=0)
+        return {name: Stream(**vars(one), start_ns=start_ns) for name, one in read.items()}
+
+    @property
+    def reference(self) -> Mapping[str, Stream]:
+        """Return the streams that are not the sensor's own: force-torque sensor, probe."""
+        names = {spec.name for spec in self.meta.reference}
+        return {name: stream for name, stream in self.streams.items() if name in names}
+
+    def to_dataframe(self, stream: str | None = None) -> pandas.DataFrame:
+        """Return a stream (None: the sensor's first) as a pandas DataFrame: a column a channel, then labels of rows.
+
+        NaN is no sample. Raises FormatError if there is no such stream, UsageError if pandas is not installed.
+        """
+        pd, one = _library("pandas"), self._stream(stream)
+        index = None if one.time_s is None else pd.Index(one.time_s, name="time_s")
+        columns = dict(zip((channel.name for channel in one.channels), numbers(one).T, strict=True))
+        return pd.DataFrame({**columns, **one.annotations}, index=index)
+
+    def to_xarray(self, stream: str | None = None) -> xarray.Dataset:
+        """Return a stream as an xarray Dataset with time and channel coordinates.
+
+        It is what ``xarray.open_dataset(path, group="streams/NAME", engine="h5netcdf")`` reads of the file, with labels
+        of rows and units of channels beside. Raises as :meth:`to_dataframe`, UsageError if xarray is not installed.
+        """
+        xr, one = _library("xarray"), self._stream(stream)
+        rows, times = ("row", np.arange(len(one.data))) if one.t_ns is None else ("t_ns", one.t_ns)
+        found: dict[str, Any] = {name: (rows, values) for name, values in one.annotations.items()}
+        found["data"] = ((rows, "channel"), one.data)
+        if one.quality is not None:
+            found["quality"] = ((rows, "channel"), one.quality)
+        names, units = zip(*((channel.name, channel.unit) for channel in one.channels), strict=True)
+        coordinates = {rows: times, "channel": list(names), "unit": ("channel", list(units))}
+        made: xarray.Dataset = xr.Dataset(found, coordinates)
+        return made
+
+    def _stream(self, name: str | None) -> Stream:
+        found = self.streams.get(next(iter(self.streams), "") if name is None else name)
+        if found is None:
+            raise FormatError(f"{self.path} has no stream {name!r}.", hint=f"It has: {', '.join(self.streams)}.")
+        return found
+
+
+def _library(name: str) -> Any:
+    try:
+        return import_module(name)
+    except ImportError as error:
+        raise UsageError(
+            f"This needs {name}, which cannot be imported: {error}.", hint=f"Install it with `pip install {name}`."
+        ) from error
+
+
+Recordings = Recording | AnyPath | Iterable[Recording | AnyPath]
+"""What functions take as recordings: those of :func:`open_recordings`, files, folders or globs, one or several."""
+
+
+def open_recordings(path_or_paths: Recordings) -> list[Recording]:
+    """Open recordings; their samples are read when they are looked at.
+
+    Parameters
+    ----------
+    path_or_paths
+        A file, a folder (with all folders below it), a glob such as ``"recordings/**/*.h5"``, or several of these.
+
+    Returns
+    -------
+    list of Recording
+        Each file once, those of a folder or a glob in order of their paths; MissingRecordingError if there is none.
+    """
+    if isinstance(path_or_paths, Recording):
+        return [path_or_paths]
+    if not isinstance(path_or_paths, str | os.PathLike):
+        return list({one.path: one for each in path_or_paths for one in open_recordings(each)}.values())
+    path = Path(path_or_paths).expanduser()
+    if path.is_dir():
+        replay: Any = rig_of("replay", installed(), path)
+        return [Recording(one) for one in replay.recordings()]
+    if path.is_file():
+        return [Recording(path)]
+    paths = sorted(glob.glob(str(path), recursive=True))  # noqa: PTH207  (it takes absolute ones too)
+    if not paths:
+        raise MissingRecordingError(f"There is no recording {path}.", hint="Give a file, a folder or a glob.")
+    return open_recordings(paths)
+
+
+def dataset(name: str, root: AnyPath | None = None) -> list[Recording]:
+    """Return the recordings of a public data set; what is missing is fetched, checked, imported and kept.
+
+    Parameters
+    ----------
+    name
+        As ``tactbench datasets`` lists them, or a mapping file that states its source.
+    root
+        A folder that holds a copy, or whose sub-folder does.
+
+    Raises
+    ------
+    UnknownNameError
+        If there is no data set of that name.
+    MissingRecordingError, NotApplicable
+        If a file cannot be had, is not the one that is meant, or lies at no public address.
+    """
+    from tactbench.core.recording.datasets import dataset_called
+
+    return open_recordings(dataset_called(name).recordings(None if root is None else Path(root)))
+
+
+def _question(task: str | TaskSpec, recordings: Recordings, protocol: str) -> tuple[TaskSpec, str, tuple[Path, ...]]:
+    """Return a task, the JSON that declares it beside the recordings (empty: it is installed), and the files."""
+    paths = tuple(one.path for one in open_recordings(recordings))
+    folders = {path.parent for path in paths if (path.parent / FILE).is_file()}
+    registry = with_declared_tasks(installed(), {one: None for each in sorted(folders) for one in declared_in(each)})
+    declared = ""
+    if isinstance(task, str):
+        owned = registry.tasks.owned(task)
+        task, declared = owned.descriptor.spec, owned.declared.model_dump_json() if owned.declared else ""
+    if protocol not in task.protocols and not is_probe(protocol):
+        raise UnknownNameError(f"protocol of task {task.name!r}", protocol, task.protocols)
+    return task, declared, paths
+
+
+def load_task(
+    task: str | TaskSpec,
+    recordings: Recordings,
+    protocol: str = "deployable",
+    split: str | None = None,
+    *,
+    seed: int = 0,
+) -> TaskData:
+    """Return what a task asks of recordings as `X`, `y`, `groups`, `feature_names` and `folds`.
+
+    Parameters
+    ----------
+    task
+        Name of a task that is installed or declared beside the recordings, or its spec.
+    recordings
+        Those of :func:`open_recordings`, files, folders or globs.
+    protocol
+        How recordings become rows; see docs/protocols.md.
+    split
+        What training and test keep apart; None: the task's first that the recordings can serve.
+    seed
+        Of split ``shuffled``.
+
+    Returns
+    -------
+    TaskData
+        `X` (n, features), `y` (n,) or (n, components), `groups` (n,), `feature_names`, and `folds`, index arrays that
+        scikit-learn takes as `cv`. `X` is not scaled, and no row is dropped for its value: :func:`evaluate` does that
+        on each fold's training rows, as the protocol has it. Classes in `y` are indices into ``data.classes``.
+
+    Raises
+    ------
+    UsageError
+        If a name is unknown, or these recordings cannot be split so.
+    DataError
+        If nothing is left to evaluate; its kind NotApplicable if the question cannot be asked of these recordings.
+    """
+    spec, _, paths = _question(task, recordings, protocol)
+    return folds_of(spec, read_dataset(spec, paths), protocol, split, seed=seed)
+
+
+class Rows(list[dict[str, Any]]):
+    """Rows as mappings, shown as the `tables` that a terminal shows."""
+
+    def __init__(self, rows: Iterable[dict[str, Any]], tables: Sequence[TextTable]) -> None:
+        super().__init__(rows)
+        self.tables = tuple(tables)
+
+    def __repr__(self) -> str:
+        return plain_text(self.tables, shutil.get_terminal_size((120, 24)).columns).rstrip() or "no rows"
+
+    def _repr_html_(self) -> str:
+        return html(self.tables)
+
+    def to_dataframe(self) -> pandas.DataFrame:
+        """Return a pandas DataFrame, a line a row; raises UsageError if pandas is not installed."""
+        found: pandas.DataFrame = _library("pandas").DataFrame(list(self))
+        return found
+
+
+class Results(Rows):
+    """The rows of cells, one a cell over its replicates, in the order of the leaderboard.
+
+    A row has the keys of ``tactbench leaderboard --format json`` (docs/results.md).
+    """
+
+    def __init__(self, table: Table) -> None:
+        super().__init__((row for row, _ in records(table)), [*grids(table), *table.sections])
+        self.table = table
+
+    def best(self, count: int = 1) -> Results:
+        """Return the first `count` answers of each sensor to each question; places stay those among all."""
+        return Results(best(self.table, count))
+
+    def compare(self, a: str, b: str, task: str | None = None) -> Rows:
+        """Compare two sensors, estimators, protocols or splits replicate by replicate, as ``tactbench compare`` does.
+
+        Raises UnknownNameError if these rows have nothing of such a name, or the two are not of one kind.
+        """
+        found = comparisons(self.table.rows, a, b, task)
+        found = with_declared(found, self.table.rows, default_matrix().comparisons)
+        return Rows(map(record_of, found), tables_of(found))
+
+
+class Result(Results):
+    """The score of one estimator, with the task's trivial answers beside it as further rows.
+
+    Attributes
+    ----------
+    score
+        The metric over the test rows of all folds together.
+    interval
+        Its ends; ``row["ci_method"]`` says over what. Of one simulated campaign the table shows none.
+    trivial
+        Scores of the task's trivial answers by name; None of one that could not answer.
+    fold_scores
+        By name of the fold, in the order of ``load_task(...).folds``.
+    row
+        All that a result folder would hold: metric, unit, times, remarks …
+    answers
+        Truth and predictions of the test rows as arrays; classes are indices.
+    """
+
+    def __init__(self, rows: Sequence[Row], answers: Answers, task: TaskSpec, names: Sequence[str]) -> None:
+        super().__init__(build_table(over_replicates(rows), questions={task.name: task.question}))
+        row = rows[0]
+        self.score: float = row["score"]
+        self.interval: tuple[float, float] = row["ci_low"], row["ci_high"]
+        self.trivial = {str(one["estimator"]): one["score"] for one in rows[1:]}
+        self.fold_scores = {name.removeprefix("fold "): row["scores"].get(name) for name in row["fold_sizes"]}
+        self.row, self.answers, self._task, self._names = row, answers, task, names
+
+    @property
+    def recording_scores(self) -> dict[str, float]:
+        """Return the score over the test rows of each recording by its name; NaN where the metric is undefined."""
+        metric, one, found = metric_called(self.row["metric"]), self.answers, {}
+        with np.errstate(all="ignore"):
+            for place in np.unique(one.recording):
+                mine = one.recording == place
+                found[self._names[place]] = metric.of(one.y_true[mine], one.y_pred[mine], len(self.row["classes"]))
+        return found
+
+    @property
+    def predictions(self) -> dict[str, npt.NDArray[Any]]:
+        """Return columns of (n,), one line a test row: ``pandas.DataFrame(result.predictions)``.
+
+        recording, row (its place in the recording), time_s, fold, y_true and y_pred: class labels, numbers, or a column
+        for each component of a vector.
+        """
+        one, labels, target = self.answers, np.asarray(self.row["classes"]), self._task.target
+        found = {"recording": np.asarray(self._names)[one.recording]}
+        found |= {"row": one.row, "time_s": one.time_s, "fold": one.fold}
+        for name, values in (("y_true", one.y_true), ("y_pred", one.y_pred)):
+            if isinstance(target, VectorTarget):
+                found |= {f"{name}_{part}": column for part, column in zip(target.names, values.T, strict=True)}
+            else:
+                found[name] = labels[values] if len(labels) else values
+        return found
+
+
+def evaluate(
+    estimator: str | Estimator,
+    task: str | TaskSpec,
+    recordings: Recordings,
+    protocol: str = "deployable",
+    split: str | None = None,
+    *,
+    seed: int = 0,
+) -> Result:
+    """Score an estimator on recordings in this process, and the task's trivial answers beside it.
+
+    Parameters
+    ----------
+    estimator
+        Any object with scikit-learn's ``fit(X, y)`` and ``predict(X)``, of which each fold fits a copy, or the name of
+        an installed one. Its class may be defined in a notebook. Classes in `y` are indices.
+    task, recordings, protocol, split
+        As of :func:`load_task`.
+    seed
+        Decides resamples of intervals, split ``shuffled``, and what is drawn from the global generators of ``random``
+        and numpy, whose states are afterwards as they were.
+
+    Raises
+    ------
+    UsageError, DataError
+        As of :func:`load_task`.
+    PluginContractError
+        If the estimator answers with something else than a finite number, or a class, a row.
+    """
+    spec, declared, paths = _question(task, recordings, protocol)
+    data = read_dataset(spec, paths)
+    cell = Cell(
+        sensor=data.metas[0].sensor.name, task=spec.name, rig="replay", protocol=protocol, split=split,
+        estimator=name_of(estimator), params=(), baseline=False, repeat=1, repeats=1, seed=seed, declared_task=declared,
+    )  # fmt: skip
+    row, answers = _answered(cell, spec, paths, estimator)
+    trivial = [replace(cell, estimator=name, baseline=True) for name in spec.baselines if name != cell.estimator]
+    rows = [row, *(_ended(one, spec, paths, one.estimator, row["simulated"]) for one in trivial)]
+    fill_baselines(rows)
+    counts = Counter(one.name for one in data.metas)
+    names = [one.name if counts[one.name] == 1 else str(path) for one, path in zip(data.metas, data.paths, strict=True)]
+    return Result(rows, answers["test"], spec, names)
+
+
+def name_of(estimator: str | Estimator) -> str:
+    """Return what an estimator is called in tables: the name of its class, of a pipeline those of its steps."""
+    if isinstance(estimator, str):
+        return estimator
+    if isinstance(estimator, type) or not (hasattr(estimator, "fit") and hasattr(estimator, "predict")):
+        raise UsageError(
+            f"{estimator!r} is no estimator.",
+            hint="Give an object with fit(X, y) and predict(X), or an installed name.",
+        )
+    steps = [type(step).__name__ for _, step in getattr(estimator, "steps", ()) if step not in (None, "passthrough")]
+    return "+".join(steps) or type(estimator).__name__
+
+
+def _answered(
+    cell: Cell, task: TaskSpec, paths: Sequence[Path], estimator: str | Estimator
+) -> tuple[Row, Mapping[str, Answers]]:
+    """Evaluate a cell here; the global generators of random numbers are afterwards as they were."""
+    given = None if isinstance(estimator, str) else estimator
+    described = installed().estimators[cell.estimator] if given is None else PLAIN
+    job = Job(cell, task, described, tuple(paths), (), "", {})
+    states = random.getstate(), np.random.get_state()  # noqa: NPY002  (it is this old generator that cells seed)
+    try:
+        return solve(job, given=given)
+    finally:
+        random.setstate(states[0])
+        np.random.set_state(states[1])  # noqa: NPY002
+
+
+def _ended(cell: Cell, task: TaskSpec, paths: Sequence[Path], estimator: str | Estimator, simulated: bool) -> Row:
+    """Return the row of a cell that is evaluated here, whether it finishes or not."""
+    try:
+        return _answered(cell, task, paths, estimator)[0]
+    except Exception as error:
+        return unanswered(cell, task, error, simulated=simulated)
+
+
+Estimators = str | Estimator | list[str | Estimator] | tuple[str | Estimator, ...] | Mapping[str, str | Estimator]
+
+
+def run(
+    *,
+    sensor: str | Sequence[str] = (),
+    task: str | Sequence[str] = (),
+    estimator: Estimators = (),
+    recordings: AnyPath | None = None,
+    out: AnyPath = "tactbench-results",
+    **options: Any,
+) -> Results:
+    """Acquire, evaluate and rank, as ``tactbench run`` does.
+
+    Parameters
+    ----------
+    sensor, task
+        Names, one or several.
+    estimator
+        Names and objects with ``fit`` and ``predict``, one or several; a mapping gives objects their names. Where there
+        are objects alone, the tasks' trivial answers are run beside them, and no other estimators.
+    recordings, out
+        Folder of recordings to replay; the result folder.
+    **options
+        Every other option of the verb by its name, with ``_`` for ``-``: ``protocol="deployable"``, ``repeats=3``,
+        ``probe=True``, ``rig_file="rig.yaml"``, ``config="beyond"``; lists for options that may be repeated.
+
+    Notes
+    -----
+    What has a name is evaluated in processes of its own, as by the verb, and stored in `out`. Objects are evaluated
+    afterwards in this process, on the recordings of the other rows, and their rows are in the returned table alone: a
+    later run knows nothing of them. An option or a name that is wrong raises UsageError, and nothing is run.
+    """
+    from tactbench.core.cli.run import carry_out
+
+    names, objects = _named(estimator)
+
+    def trivial_beside_objects(matrix: MatrixSpec, folder: Path | None) -> MatrixSpec:
+        tasks = with_declared_tasks(installed(), declared_in(folder)).tasks
+        bars = [tuple(EstimatorChoice(name=name) for name in tasks[one.name].spec.baselines) for one in matrix.tasks]
+        alone = [one.model_copy(update={"estimators": bar}) for one, bar in zip(matrix.tasks, bars, strict=True)]
+        return matrix.model_copy(update={"tasks": tuple(alone)}) if objects and not names else matrix
+
+    asked = {"sensor": sensor, "task": task, "estimator": names, "recordings": recordings, "out": out} | options
+    before = set(os.environ)
+    keep_threads()  # of child processes; this one's libraries have read the environment already
+    try:
+        store, outcome = carry_out(**_as_read_by_the_verb(asked), changed=trivial_beside_objects)
+    finally:
+        for name in set(os.environ) - before:
+            del os.environ[name]
+    table = table_of(store, over_all(store, outcome.rows))
+    write_tables(table.rows, store.folder, table.provenance, table)
+    alike = ("sensor", "task", "rig", "protocol", "split", "repeat")
+    each = {tuple(row[name] for name in alike): row for row in outcome.rows if row["status"] == "done"}
+    beside = [_beside(row, name, given, store.folder) for name, given in objects.items() for row in each.values()]
+    return Results(table_of(store, over_all(store, [*outcome.rows, *beside])) if beside else table)
+
+
+def results(folder: AnyPath = "tactbench-results") -> Results:
+    """Return the rows of a result folder, what ``tactbench leaderboard FOLDER`` shows; UsageError if there are none."""
+    store = opened(Path(folder))
+    return Results(table_of(store, shown_rows(store)))
+
+
+def _named(estimator: Estimators) -> tuple[list[str], dict[str, Estimator]]:
+    """Return names of installed estimators, and objects by what they are called."""
+    if not isinstance(estimator, Mapping):
+        several = list(estimator) if isinstance(estimator, list | tuple) else [estimator]
+        pairs = [(name_of(one), one) for one in several]
+    else:
+        pairs = list(estimator.items())
+    objects = {name: one for name, one in pairs if not isinstance(one, str)}
+    names = [one for _, one in pairs if isinstance(one, str)]
+    if len(objects) + len(names) < len(pairs) or any(name in installed().estimators for name in objects):
+        raise UsageError(
+            f"Two estimators have one name: {', '.join(name for name, _ in pairs)}.",
+            hint="Give a mapping of names to objects, with names that no installed estimator has.",
+        )
+    return names, objects
+
+
+def _as_read_by_the_verb(options: Mapping[str, Any]) -> dict[str, Any]:
+    """Return options as ``tactbench run`` reads them from a command line; raises UsageError for one that is wrong."""
+    import click
+
+    from tactbench.core.cli.run import command
+
+    words = []
+    for name, given in options.items():
+        for one in given if isinstance(given, list | tuple) else [given]:
+            if one is True:
+                words.append(f"--{name.replace('_', '-')}")
+            elif one is not None and one is not False:
+                words.append(f"--{name.replace('_', '-')}={one}")
+    try:
+        with command.make_context("run", words) as context:
+            return {name: value for name, value in context.params.items() if name != "shape"}
+    except click.ClickException as error:
+        raise UsageError(error.format_message(), hint="See the options in `tactbench run --help`.") from error
+
+
+def _beside(row: Row, name: str, given: Estimator, folder: Path) -> Row:
+    """Return the row of an object that answers what another row answered, from the same recordings."""
+    same = ("sensor", "task", "rig", "protocol", "split", "repeat", "repeats", "seed", "declared_task")
+    cell = Cell(
+        **{key: row[key] for key in same}, estimator=name, params=(), baseline=False, timed=row["fit_s"] is not None,
+        simulation=Simulation.model_validate(row["simulation"]),
+    )  # fmt: skip
+    paths = [folder / one for one in row["recordings"]]
+    return _ended(cell, task_of(cell.task_key, installed()), paths, given, row["simulated"])

@@ -1,0 +1,183 @@
+"""MCAP bags, written by the library itself."""
+
+import json
+
+import numpy as np
+import pytest
+import yaml
+
+from tactbench.core.errors import MappingError
+from tactbench.core.recording.mapping import import_tables
+from tactbench.core.recording.reader import open_recording
+
+mcap_writer = pytest.importorskip("mcap.writer", reason="the extra mcap is not installed")
+ros2_writer = pytest.importorskip("mcap_ros2.writer", reason="the extra mcap is not installed")
+
+START = 1_700_000_000 * 10**9
+HEADER = """================================================================================
+MSG: std_msgs/Header
+builtin_interfaces/Time stamp
+string frame_id
+================================================================================
+MSG: builtin_interfaces/Time
+int32 sec
+uint32 nanosec
+"""
+TAXELS = f"std_msgs/Header header\nfloat32[] data\nstring object\n{HEADER}"
+VECTOR = f"{HEADER.splitlines()[0]}\nMSG: force_msgs/Vector\nfloat64 z\n"
+FORCE = f"std_msgs/Header header\nforce_msgs/Vector force\n{HEADER}{VECTOR}"
+
+
+def stamped(t_ns):
+    return {"stamp": {"sec": t_ns // 10**9, "nanosec": t_ns % 10**9}, "frame_id": "pad"}
+
+
+def ros_bag(path, rows=200):
+    """Taxels at 100 Hz whose stamps are 5 ms older than their log time, force at 1 kHz; chunks of some 4 kB."""
+    with path.open("wb") as opened:
+        writer = ros2_writer.Writer(opened, chunk_size=4096)
+        taxels = writer.register_msgdef("pad_msgs/msg/Taxels", TAXELS)
+        force = writer.register_msgdef("force_msgs/msg/Force", FORCE)
+        for row in range(rows):
+            t_ns = START + row * 10**7
+            message = {"header": stamped(t_ns), "data": [row, row + 0.5, -row], "object": f"ball{row // 100}"}
+            writer.write_message("/taxels", taxels, message, log_time=t_ns + 5 * 10**6)
+            for part in range(10):
+                later = t_ns + part * 10**6
+                message = {"header": stamped(later), "force": {"z": row + 0.1 * part}}
+                writer.write_message("/force", force, message, log_time=later + 1)
+        writer.finish()
+    return path
+
+
+def mapping(folder, **changes):
+    text = {
+        "version": 1, "title": "bag", "clock": "host",
+        "sensor": {"name": "pad", "title": "pad", "principle": "resistive",
+                   "principle_source": {"tag": "assumed", "reference": "none"}},
+        "tables": {
+            "taxels": {"files": "*.mcap", "read": {"format": "mcap", "topic": "/taxels"},
+                       "time": {"column": "header.stamp", "unit": "ns", "epoch": "unix"}},
+            "force": {"files": "*.mcap", "read": {"format": "mcap", "topic": "/force"},
+                      "time": {"column": "log_time", "unit": "ns", "epoch": "unix"}},
+        },
+        "join": {"by": "clock"},
+        "recording": {"name": "{file}", "session": "1"},
+        "streams": {
+            "taxels": {"table": "taxels", "dtype": "float32",
+                       "channels": [{"columns": "data.0..2", "name": "{column}", "kind": "taxel", "unit": "count"}],
+                       "annotations": {"object": {"column": "object"}}},
+            "force": {"table": "force", "of": "reference",
+                      "channels": [
+                          {"columns": "force.z", "name": "fz", "kind": "force", "unit": "N", "sentinels": []}]},
+        },
+    }  # fmt: skip
+    for path, value in changes.items():
+        *above, last = path.split("__")
+        place = text
+        for name in above:
+            place = place[name]
+        place[last] = value
+    (folder / "bag.yaml").write_text(yaml.safe_dump(text))
+    return folder / "bag.yaml"
+
+
+def imported(folder, **changes):
+    report = import_tables(mapping(folder, **changes), root=None, out=folder / "out")
+    with open_recording(report.recordings[0].path) as recording:
+        return {name: recording.read(name) for name in recording.stream_names}
+
+
+def test_topics_become_streams_with_clocks_of_their_own(tmp_path):
+    ros_bag(tmp_path / "press.mcap")
+    streams = imported(tmp_path)
+    taxels, force = streams["taxels"], streams["force"]
+    row = np.arange(200)
+    assert np.array_equal(taxels.data, np.stack([row, row + 0.5, -row], axis=1))
+    assert np.array_equal(taxels.t_ns, START + row * 10**7), "by the stamp of the header"
+    assert taxels.annotations["object"].tolist() == ["ball0"] * 100 + ["ball1"] * 100
+    assert np.array_equal(force.t_ns, START + np.arange(2000) * 10**6 + 1), "by the log time"
+    assert force.data[:, 0] == pytest.approx(np.repeat(row, 10) + 0.1 * np.tile(np.arange(10), 200), abs=1e-12)
+
+
+def test_one_topic_by_its_log_time_in_a_recording_for_each_object(tmp_path):
+    ros_bag(tmp_path / "press.mcap")
+    table = yaml.safe_load(mapping(tmp_path).read_text())
+    time = {"column": "log_time", "unit": "ns", "epoch": "unix"}
+    changed = {
+        "tables": {"taxels": {**table["tables"]["taxels"], "time": time}},
+        "streams": {"taxels": table["streams"]["taxels"]},
+        "split_by": {"object": "object"}, "recording__name": "{object}", "join": None,
+    }  # fmt: skip
+    report = import_tables(mapping(tmp_path, **changed), root=None, out=tmp_path / "out")
+    assert [one.name for one in report.recordings] == ["ball0", "ball1"]
+    with open_recording(report.recordings[1].path) as recording:
+        taxels = recording.read("taxels")
+    assert np.array_equal(taxels.t_ns, START + np.arange(100, 200) * 10**7 + 5 * 10**6)
+    assert taxels.data[0].tolist() == [100, 100.5, -100]
+
+
+def test_json_messages(tmp_path):
+    with (tmp_path / "press.mcap").open("wb") as opened:
+        writer = mcap_writer.Writer(opened)
+        writer.start()
+        taxels, force = (writer.register_channel(topic, "json", 0) for topic in ("/taxels", "/force"))
+        for row in range(20):
+            t_ns = START + row * 10**7
+            stamp = {"sec": t_ns // 10**9, "nsec": t_ns % 10**9}
+            message = {"header": {"stamp": stamp}, "data": [row, None if row == 3 else 1, 2], "object": 1}
+            message["data"] = [float("nan") if one is None else one for one in message["data"]]
+            writer.add_message(taxels, t_ns, json.dumps(message).encode(), t_ns)
+            writer.add_message(force, t_ns, json.dumps({"force": {"z": row}, "t": row / 8}).encode(), t_ns)
+        writer.finish()
+    time = {"column": "t", "unit": "s", "epoch": "start"}
+    streams = imported(tmp_path, tables__force__time=time)
+    assert np.isnan(streams["taxels"].data[3, 1])
+    assert np.array_equal(streams["taxels"].t_ns, START + np.arange(20) * 10**7)
+    assert np.array_equal(streams["force"].t_ns, np.arange(20) * 125_000_000)
+
+
+@pytest.mark.parametrize("share", [0.2, 0.9, 0.9999])
+def test_a_bag_that_was_cut_short_is_refused_and_nothing_is_left(tmp_path, share):
+    whole = ros_bag(tmp_path / "press.mcap").read_bytes()
+    (tmp_path / "press.mcap").write_bytes(whole[: int(share * len(whole))])
+    with pytest.raises(MappingError, match=r"press\.mcap is no whole bag") as found:
+        imported(tmp_path)
+    assert "mcap recover" in found.value.hint
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_damaged_bag_is_refused(tmp_path):
+    whole = bytearray(ros_bag(tmp_path / "press.mcap").read_bytes())
+    whole[len(whole) // 2] ^= 1
+    (tmp_path / "press.mcap").write_bytes(whole)
+    with pytest.raises(MappingError, match="is no whole bag"):
+        imported(tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("changes", "says"),
+    [
+        ({"tables__force__read": {"format": "mcap", "topic": "/forces"}}, r"no message of topic '/forces'"),
+        ({"streams__taxels__channels": [{"columns": "data.3", "name": "t", "kind": "taxel", "unit": "count"}]},
+         r"/taxels, message 0 has no 'data\.3'"),
+        ({"streams__taxels__channels": [{"columns": "object", "name": "t", "kind": "taxel", "unit": "count"}]},
+         r"/taxels, message 0 has no 'object' of the kind"),
+        ({"tables__taxels__time": {"column": "header.stamp", "unit": "ms", "epoch": "unix"}}, "is in nanoseconds"),
+    ],
+)  # fmt: skip
+def test_what_a_bag_does_not_have_is_named(tmp_path, changes, says):
+    ros_bag(tmp_path / "press.mcap", rows=3)
+    with pytest.raises(MappingError, match=says):
+        imported(tmp_path, **changes)
+
+
+def test_another_encoding_is_named(tmp_path):
+    with (tmp_path / "press.mcap").open("wb") as opened:
+        writer = mcap_writer.Writer(opened)
+        writer.start()
+        channel = writer.register_channel("/taxels", "protobuf", writer.register_schema("pad.Taxels", "protobuf", b""))
+        writer.add_message(channel, START, b"\x08\x01", START)
+        writer.finish()
+    with pytest.raises(MappingError, match="'/taxels' is encoded as protobuf"):
+        imported(tmp_path)

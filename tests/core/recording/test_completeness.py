@@ -1,0 +1,84 @@
+"""A recording that lacks more than is allowed says so: silence, rows lost, and readings that stand still."""
+
+import numpy as np
+import pytest
+
+from tactbench.core.recording.completeness import Completeness
+from tactbench.core.samples import Block, Quality
+from tactbench.core.spec.recording import StreamCounts
+from tactbench.core.spec.rig_file import Allowed
+from tactbench.core.spec.sensor import ChannelSpec, StreamSpec
+
+TAXELS = StreamSpec(name="taxels", rate_hz=100.0, channels=tuple(ChannelSpec(name=f"t{n}", kind="taxel") for n in "12"))
+FORCE = StreamSpec(name="force", rate_hz=100.0, channels=(ChannelSpec(name="fz", kind="force", unit="N"),))
+SECONDS, HZ = 10, 100
+
+
+def lacking(taxels=None, force=None, counts=None, keep=lambda name, t_s: True, quality=None, **allowed):
+    """Return what is missing of ten seconds in blocks of a tenth, both streams moving unless given otherwise."""
+    t_s = np.arange(SECONDS * HZ) / HZ
+    noise = np.random.default_rng(1).normal(size=(len(t_s), 3))
+    data = {
+        "taxels": noise[:, :2] + 100 if taxels is None else taxels(t_s),
+        "force": noise[:, 2:] * 0.01 + t_s[:, None] if force is None else force(t_s),
+    }
+    found = Completeness(Allowed(**allowed), (TAXELS,), (FORCE,))
+    for first in range(0, len(t_s), 10):
+        for name, values in data.items():
+            rows = [row for row in range(first, first + 10) if keep(name, t_s[row])]
+            marks = None if quality is None else quality(name, t_s[rows], values[rows])
+            found.add(Block(name, np.array([1e9 * t_s[row] for row in rows], np.int64), values[rows], marks))
+    return found.lacking(counts or {})
+
+
+def test_a_whole_recording_lacks_nothing():
+    assert lacking() == []
+
+
+@pytest.mark.parametrize("stream", ["taxels", "force"])
+@pytest.mark.parametrize(
+    ("keep", "says"),
+    [
+        (lambda t_s: t_s < 3.0, "nothing for 7 s from 2.99 s on"),  # it ended
+        (lambda t_s: not 3.0 <= t_s < 6.0, "nothing for 3.01 s from 2.99 s on"),  # it came back
+        (lambda t_s: t_s >= 3.0, "nothing for 3 s from 0 s on"),  # it began late
+    ],
+)
+def test_silence_is_missing(stream, keep, says):
+    assert lacking(keep=lambda name, t_s: name != stream or keep(t_s)) == [f"{stream}: {says}"]
+    assert lacking(keep=lambda name, t_s: name != stream or keep(t_s), silent_s=7.5) == []
+
+
+def test_rows_without_a_number_are_silence():
+    broken = lambda t_s: np.where(t_s < 3.0, t_s, np.nan)[:, None]  # noqa: E731
+    assert lacking(force=broken) == ["force: nothing for 7 s from 2.99 s on"]
+
+    def missing(name, t_s, values):
+        return np.where((name == "taxels") & (t_s > 5.0), Quality.MISSING, 0)[:, None].repeat(values.shape[1], 1)
+
+    assert lacking(quality=lambda *one: missing(*one).astype(np.uint8)) == ["taxels: nothing for 4.99 s from 5 s on"]
+
+
+def test_a_force_that_stands_still_is_frozen_and_a_sensor_if_the_force_moves_meanwhile():
+    stuck = lambda t_s: np.where(t_s < 4.0, t_s, 4.0)[:, None]  # noqa: E731
+    assert lacking(force=stuck) == ["force: frozen for 5.99 s from 4 s on"]
+    still = lambda t_s: np.full((len(t_s), 2), 7.0)  # noqa: E731
+    assert lacking(taxels=still) == ["taxels: frozen for 9.99 s from 0 s on"]
+    at_rest = lambda t_s: 1e-3 * np.sin(50 * t_s)[:, None] + np.where(t_s > 9.8, t_s - 9.8, 0.0)[:, None]  # noqa: E731
+    # A second stream of the sensor that changes shows that the sensor lives, whatever the first one does.
+    sound = StreamSpec(name="sound", rate_hz=100.0, channels=(ChannelSpec(name="pac", kind="ac_pressure"),))
+    found = Completeness(Allowed(), (TAXELS, sound), (FORCE,))
+    for second in range(10):
+        t_ns = np.array([second, second + 0.5]) * 10**9
+        found.add(Block("taxels", t_ns.astype(np.int64), np.array([[second, 0], [second, 1]])))
+        found.add(Block("sound", t_ns.astype(np.int64), np.zeros((2, 1))))
+        found.add(Block("force", t_ns.astype(np.int64), np.array([[second], [second + 0.5]])))
+    assert found.lacking({}) == []
+    pressed_last = lambda t_s: np.where(t_s > 9.8, t_s, 7.0)[:, None].repeat(2, 1)  # noqa: E731
+    assert lacking(taxels=pressed_last, force=at_rest) == []
+
+
+def test_rows_lost_are_missing_beyond_the_percentage_that_is_allowed():
+    counts = {"force": StreamCounts(received=970, written=960, dropped=10, gaps=30)}
+    assert lacking(counts=counts) == ["force: 40 of 1000 rows lost"]
+    assert lacking(counts=counts, lost_percent=4.0) == []

@@ -1,0 +1,242 @@
+"""The force loop: its step and limits, and the eigenvalues that say on a linear spring what it must do."""
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
+
+from tactbench.core.spec.drive import ForceLoop
+from tactbench.devices.force_loop import ForceController
+from tactbench.plugin import RigError, UsageError, assumed
+from tactbench.plugin.devices import ForceLaw, LoopModel
+
+T = 0.01
+
+
+def _q(value, unit):
+    return assumed(value, unit, "test")
+
+
+def _loop(kp=0.0, ki=0.5, cutoff=5.0, rate=100.0, limited=False, **more):
+    free = {"speed": _q(1e20, "mm/s"), "acceleration": _q(1e30, "mm/s/s")}
+    return ForceLoop(
+        proportional=_q(kp, "mm/N"),
+        integral=_q(ki, "mm/N/s"),
+        cutoff=None if cutoff is None else _q(cutoff, "Hz"),
+        rate=_q(rate, "Hz"),
+        **{"resolution": _q(0.0, "N"), **({} if limited else free), **more},
+    )
+
+
+def _model(*args, **more):
+    """Return a loop in mm."""
+    return LoopModel.of(_loop(*args, **more), "mm")
+
+
+def _kicked(model, stiffness, steps=4000, kick=1.0):
+    """The depths of a loop about a point of a spring that also pulls, begun beside that point."""
+    noise = np.zeros(steps)
+    noise[0] = stiffness * kick
+    return model.simulate(lambda x: stiffness * x, np.zeros(steps), noise)
+
+
+# Stability ------------------------------------------------------------------------------------------------------------
+
+
+@given(
+    st.floats(0, 1), st.floats(0.01, 5), st.one_of(st.none(), st.floats(0.1, 40)), st.integers(0, 6), st.floats(0.1, 50)
+)
+@settings(max_examples=60)
+def test_one_step_is_the_matrix_times_the_state(kp, ki, cutoff, delay, stiffness):
+    model = _model(kp, ki, cutoff, delay=_q(10.0 * delay, "ms"))
+    assert model.delay_steps == delay
+    assume(model.growth(stiffness) < 1.2)
+    found = _kicked(model, stiffness, steps=12)
+    # A kick on the measured force enters like a depth of 1 at the first step, which is not there afterwards.
+    matrix = model.matrix(stiffness)
+    first = np.zeros(3 + delay)
+    first[0] = 1.0
+    state = matrix @ first
+    state[0] -= model.lag_kept
+    for n in range(1, 12):
+        assert found[n] == pytest.approx(state[0], abs=1e-9 * 1.2**12 * max(1.0, stiffness))
+        state = matrix @ state
+
+
+LOOPS = [
+    _model(0.15, 1.0, 1.0, rate=80.0),
+    _model(0.15, 1.0, None, rate=80.0),
+    _model(0.15, 1.0, 4.0, delay=_q(40, "ms")),
+    _model(0.15, 1.0, None, rate=1000.0, delay=_q(5, "ms"), motor_lag=_q(8, "ms")),
+    _model(0.0, 1.0, None, delay=_q(0, "ms")),
+]
+
+
+@pytest.mark.parametrize("model", LOOPS)
+def test_the_loop_settles_below_its_limit_and_swings_up_above_as_the_eigenvalue_says(model):
+    limit = model.largest_stiffness()
+    for factor, settles in ((0.97, True), (1.03, False)):
+        slow = np.log(model.growth(factor * limit))
+        depths = np.abs(_kicked(model, factor * limit, steps=min(9000, int(np.log(1e12) / abs(slow)))))
+        third = depths.size // 3
+        first, second, last = (depths[n * third : (n + 1) * third].max() for n in range(3))
+        assert (last < 0.1 * first) if settles else (last > 10 * first)
+        # Peaks of two windows; the crest of a swing may lie between two steps.
+        assert np.log(last / second) / third == pytest.approx(slow, rel=0.05)
+
+
+@pytest.mark.parametrize("d", range(6))
+def test_the_limit_of_increments_without_filter_and_lag_is_the_closed_one(d):
+    model = _model(0.0, 1.0, None, delay=_q(10.0 * d, "ms"), motor_lag=_q(0.0, "s"))
+    assert model.largest_stiffness() * T == pytest.approx(2 * math.sin(math.pi / (2 * (2 * d + 1))), rel=1e-5)
+
+
+# Largest stable gain at 1 N/mm, lag 10 ms: K in mm/(N s) of increments, kp in mm/N with ki = kp/0.15 s.
+GAINS = {
+    ("I", None): {10: 10, 50: 50, 100: 100, 1000: 1000},
+    ("I", 5.0): {10: 10, 50: 46.4, 100: 73.1, 1000: 123},
+    ("I", 1.0): {10: 10, 50: 44, 100: 65.5, 1000: 101},
+    ("PI", None): {10: 0.721, 50: 1.08, 100: 1.52, 1000: 10.4},
+    ("PI", 5.0): {10: 0.747, 50: 2.08, 100: 3.98, 1000: 39.6},
+    ("PI", 1.0): {10: 1.33, 50: 7.47, 100: 15.4, 1000: 158},
+}
+
+
+@pytest.mark.parametrize(("kind", "cutoff"), GAINS)
+def test_a_largest_gain_computed_elsewhere(kind, cutoff):
+    for rate, wanted in GAINS[kind, cutoff].items():
+        kp, ki = (1.0, 1 / 0.15) if kind == "PI" else (0.0, 1.0)
+        model = _model(kp, ki, cutoff, rate=rate, delay=_q(1.0 if rate == 1000 else 10.0, "ms"))
+        # Stated with three digits.
+        assert model.largest_stiffness() == pytest.approx(wanted, rel=0.005)
+
+
+def test_gains_above_half_of_the_limit_are_refused():
+    # With a delay of one period and no lag the limit is k ki T = 1, whatever the filter.
+    model = LoopModel.of(_loop(ki=1.0, motor_lag=_q(0.0, "s")))
+    assert model.share_used(20e3) == pytest.approx(0.2, rel=1e-5)
+    with pytest.raises(UsageError, match=r"0\.80 of those .*Divide both gains by 1\.60"):
+        model.share_used(80e3)
+
+
+# The motor ------------------------------------------------------------------------------------------------------------
+
+
+@given(st.floats(0.1, 1e3), st.floats(1.0, 1e4), st.integers(0, 3))
+@settings(max_examples=30)
+def test_the_motor_keeps_its_limits(speed, acceleration, seed):
+    limits = {"speed": _q(speed, "mm/s"), "acceleration": _q(acceleration, "mm/s/s")}
+    model = LoopModel.of(_loop(0.15, 1.0, None, **limits), "mm", travel=(-1.0, 1.5))
+    noise = np.random.default_rng(seed).standard_normal(600)
+    depths = model.simulate(lambda x: 5.0 * max(x, 0.0), np.full(600, 3.0), noise)
+    velocity = np.diff(depths) / T
+    assert np.abs(velocity).max() <= speed * (1 + 1e-9)
+    assert np.abs(np.diff(velocity, prepend=0.0)).max() <= acceleration * T * (1 + 1e-9) + 1e-9
+
+
+def test_a_move_by_a_limited_motor_does_not_overshoot():
+    # No force, so that the command stays: wanted 1 N times 1 mm/N.
+    model = _model(1.0, 0.0, None, acceleration=_q(40.0, "mm/s/s"), motor_lag=_q(0, "s"))
+    depths = model.simulate(lambda x: 0.0, np.ones(400), np.zeros(400))
+    # Whole steps of velocity end within an eighth of what one step of acceleration moves.
+    assert depths.max() <= 1.0 + 40.0 * T**2 / 8 + 1e-9
+    assert depths[-1] == pytest.approx(1.0, abs=1e-6)
+
+
+def test_the_measured_force_is_rounded():
+    coarse = _model(0.15, 0.0, None, resolution=_q(1.0, "N"))
+    # 0.4 N reads as none: the loop does not move against it.
+    assert not coarse.simulate(lambda x: 0.4, np.zeros(50), np.zeros(50)).any()
+    assert coarse.simulate(lambda x: 0.6, np.zeros(50), np.zeros(50)).any()
+
+
+# The controller -------------------------------------------------------------------------------------------------------
+
+
+def _law(kp=0.0, ki=0.5e-3, **more):
+    return ForceLaw(T, kp, ki, 5.0, **{"speed": 1e-3, "windup_s": 0.1, "travel": (-10e-3, 10e-3), **more})
+
+
+def test_entering_does_not_move_the_motor():
+    controller = ForceController(_law(0.02e-3), 0.7, 2e-3)
+    assert controller.step(0.7, 2e-3, T, 0.7) == pytest.approx(2e-3, abs=1e-15)
+
+
+@given(st.lists(st.tuples(st.floats(-50, 50), st.floats(-20e-3, 20e-3), st.floats(0, 6)), min_size=1, max_size=40))
+@settings(max_examples=60)
+def test_every_target_keeps_the_limits(samples):
+    controller, before = ForceController(_law(0.05e-3, 5e-3, speed=2e-3, travel=(-3e-3, 4e-3)), 0.0, 0.0), 0.0
+    for force, position, wanted in samples:
+        target = controller.step(force, position, T, wanted)
+        assert -3e-3 <= target <= 4e-3
+        # The speed's limit gives way to a motor that is elsewhere, and to the travel.
+        near = np.clip(position, -3e-3, 4e-3)
+        assert abs(target - before) <= 2e-3 * T * 1.000001 or abs(target - near) <= 2e-3 * 0.1 * 1.000001
+        before = target
+
+
+@pytest.mark.parametrize("kp", [0.0, 0.02e-3])
+def test_a_stalled_motor_does_not_wind_the_loop_up(kp):
+    controller = ForceController(_law(kp), 0.0, 0.0)
+    for _ in range(1000):  # ten seconds at 5 N missing, and the motor stands
+        controller.step(0.0, 0.0, T, 5.0)
+    assert controller.limited
+    # The wind-up time at the loop's speed: 0.1 mm.
+    assert controller.target == pytest.approx(0.1e-3)
+    # It goes back at once, and not only after as long a time, when there is too much force.
+    for _ in range(30):
+        controller.step(5.5, 0.0, T, 5.0)
+    assert controller.target < 0.1e-3
+    assert not controller.limited
+
+
+def test_a_late_sample_moves_and_integrates_nothing():
+    controller = ForceController(_law(), 0.0, 0.0)
+    first = controller.step(0.0, 0.0, T, 1.0)
+    assert first > 0
+    assert controller.step(0.0, 0.0, 2 * T, 1.0) == first
+    assert controller.late
+    assert controller.step(0.0, 0.0, T, 1.0) == pytest.approx(2 * first)
+
+
+def test_feed_forward_takes_the_lag_of_a_ramp_away():
+    slope, k, n = 5 / 60, 20e3, 2000
+    wanted = slope * T * np.arange(1, n + 1)
+    errors = []
+    for feed_forward in (math.inf, k):
+        controller, x = ForceController(_law(ki=10 / k, feed_forward=feed_forward), 0.0, 0.0), 0.0
+        for setpoint in wanted:
+            force = k * x
+            x = controller.step(force, x, T, setpoint, slope)
+        errors.append(force - wanted[-1])
+    # r/(k ki) of the integral (derived): 8.3 mN.
+    assert errors[1] - errors[0] == pytest.approx(slope / 10, rel=1e-6)
+
+
+@pytest.mark.parametrize("bad", [math.nan, math.inf])
+def test_an_unknown_force_is_refused(bad):
+    controller = ForceController(_law(), 0.0, 0.0)
+    for numbers in ((bad, 0.0, T, 1.0), (0.0, bad, T, 1.0), (0.0, 0.0, bad, 1.0), (0.0, 0.0, T, bad)):
+        with pytest.raises(RigError, match="unknown force"):
+            controller.step(*numbers)
+    assert controller.target == 0
+    with pytest.raises(RigError):
+        ForceController(_law(), bad, 0.0)
+    with pytest.raises(UsageError, match=r"0\.0 s after"):
+        controller.step(0.0, 0.0, 0.0, 1.0)
+
+
+@pytest.mark.parametrize(
+    "changed",
+    [
+        {"period_s": 0.0}, {"integral": 0.0}, {"integral": -1.0}, {"proportional": math.nan}, {"speed": 0.0},
+        {"travel": (1.0, 1.0)}, {"feed_forward": 0.0},
+    ],
+)  # fmt: skip
+def test_a_law_that_cannot_be_is_refused(changed):
+    with pytest.raises(UsageError, match="cannot be stepped"):
+        ForceLaw(**{"period_s": T, "proportional": 0.0, "integral": 1.0, **changed})
+    with pytest.raises(UsageError, match="rate is not stated"):
+        ForceLaw.of(ForceLoop())

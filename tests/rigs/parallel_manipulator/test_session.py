@@ -1,0 +1,208 @@
+"""Axes that outlive a scene, are watched whenever they move, and keep their home."""
+
+import gc
+import re
+
+import numpy as np
+import pytest
+
+from tactbench.devices.guard_messages import GuardRefusesError
+from tactbench.plugin import RigError, assumed, load_registry
+from tactbench.plugin.devices import RigFile
+from tactbench.rigs.parallel_manipulator.kinematics import forward, inverse
+from tactbench.rigs.parallel_manipulator.rig import ParallelManipulator
+from tactbench.rigs.parallel_manipulator.session import Session
+from tactbench.rigs.parallel_manipulator.settings import JOINTS, settings_of, with_limits
+from tests.rigs.parallel_manipulator.presses import load
+from tests.rigs.parallel_manipulator.spring import Pressed, SpringRig, file_of, ramp, with_joints
+from tests.rigs.parallel_manipulator.test_press import RARER
+
+FILE = RigFile.model_validate(
+    with_joints(settings__places__reach_x_mm=[-15.0, 15.0], settings__places__reach_s_mm=[-15.0, 15.0], **RARER)
+)
+HOME_M = np.array([0.0, 0.0, -0.15])
+
+
+def drives(session):
+    """Return the emulated drives of motor and rails."""
+    return {name: session.emulated._devices[name].emulator.drive for name in ("motor", *JOINTS)}
+
+
+def true_place_m(session):
+    """Return where the platform stands, whatever its drives count: they were switched on at the home place."""
+    delta = session.platform.workspace.delta
+    away = [drives(session)[name].servo.position_m for name in JOINTS]
+    return forward(delta, inverse(delta, HOME_M) + away)
+
+
+class Force:
+    """What is sensed where nothing is pressed but a spring behind a way of the platform's first rail."""
+
+    def __init__(self):
+        self.servo, self.from_m, self.largest_n = None, 0.0, 0.0
+
+    def sensed(self, at_s, _position_m):
+        force_n = 0.0
+        if self.servo is not None:
+            force_n = 20e3 * max(0.0, self.servo.position_m - self.from_m)
+            self.largest_n = max(self.largest_n, force_n)
+        return {"fz": force_n + 1e-3 * np.sin(1e4 * at_s)}
+
+    def force_n(self, _position_m):
+        return 0.0
+
+    def obstacle(self, session, after_m):
+        """Let the rail run into the spring after a way from where it stands."""
+        self.servo = drives(session)["joint-1"].servo
+        self.from_m = self.servo.position_m + after_m
+
+
+def begun(file):
+    settings, registry = settings_of(file), load_registry()
+    one = Session(with_limits(file, settings, registry), settings, registry, ["icub"])
+    one.senses.press = Force()
+    return one
+
+
+@pytest.fixture
+def session():
+    one = begun(FILE)
+    yield one
+    one.close()
+
+
+def test_the_platform_is_where_it_believes_to_be_scene_after_scene(session):
+    rng = np.random.default_rng(7)
+    for _ in range(5):
+        xy_m = rng.uniform(-12e-3, 12e-3, 2)
+        place = session.travel(tuple(xy_m))
+        assert place == pytest.approx((*xy_m, -0.15), abs=20e-6)
+        # Three rails, each within its corridor of 10 um.
+        assert np.linalg.norm(true_place_m(session) - place) < 20e-6
+    assert sum(event.text.startswith("homing") for event in session.guard.events()) == 4
+
+
+def test_a_whole_session_of_scenes_keeps_its_home():
+    rig = ParallelManipulator(FILE, None, SpringRig(5.0))
+    icub, scene = load_registry().sensors["icub"], ramp(0.5, 0.2, 0.6)
+    with rig.session():
+        for x_mm in (8.0, 8.0):
+            place = scene.placement.model_copy(update={"x": assumed(x_mm, "mm", "a test")})
+            with rig.open(icub, scene.model_copy(update={"placement": place}), seed=1) as acquisition:
+                found = Pressed(acquisition)
+            assert found.acquisition.ended == ""
+            believed = [float(text) for text in found.acquisition.drawn["platform mm"].split(", ")]
+            assert believed == pytest.approx([8.0, 0.0, -150.0], abs=0.02)
+            assert 1e3 * true_place_m(rig._session) == pytest.approx(believed, abs=0.02)
+    events = [text for name, text in found.acquisition.drawn.items() if name.startswith("event")]
+    assert not any("homing" in text for text in events)
+    assert rig._session is None
+
+
+def test_by_the_clock_guard_and_home_are_kept_until_the_rig_is_forgotten(tmp_path):
+    # Emulators, rig and perhaps other programs share the machine: forces and beats may be late.
+    patient = {"force_age_ms": 1500.0, "heartbeat_ms": 1500.0}
+    rig = ParallelManipulator(
+        file_of(
+            emulation__time="real", force__options__rate_hz=250.0, settings__guard_log=str(tmp_path / "guard.log"),
+            settings__press__stale_ms=3000.0, **{f"settings__limits__{name}": value for name, value in patient.items()},
+        ), None, SpringRig(5.0),
+    )  # fmt: skip
+    for _ in range(2):
+        with rig.open(load_registry().sensors["icub"], ramp(1.0, 0.2, 1.5), seed=1) as acquisition:
+            found = Pressed(acquisition)
+        assert found.acquisition.ended == ""
+        # 1 N less the 0.3 N that a ramp of 0.77 N/s is behind at k K = 2.5/s, and late periods.
+        assert 0.4 < found.force_n[-10:].mean() < 1.1
+    guard = rig._session.guard
+    assert guard._process.poll() is None
+    del rig, acquisition, found
+    gc.collect()
+    assert guard._process.poll() == 0
+    said = (tmp_path / "guard.log").read_text(encoding="utf-8")
+    assert (said.count('"homing motor"'), said.count('"armed"}')) == (1, 4)
+
+
+def test_a_scene_is_the_same_in_its_own_session_each_time():
+    rig = ParallelManipulator(FILE, None, SpringRig(5.0))
+    icub, found = load_registry().sensors["icub"], []
+    for _ in range(2):
+        with rig.open(icub, ramp(0.5, 0.2, 0.6), seed=1) as acquisition:
+            found.append(Pressed(acquisition))
+    assert np.array_equal(found[0].force_n, found[1].force_n)
+    assert rig._session is None
+
+
+def test_the_zero_is_of_its_own_seconds_and_not_of_what_waited(session):
+    pressed = session.senses.press
+    session.senses.press = type("Hand", (), {"sensed": lambda self, at_s, x: {"fz": 5 + np.sin(1e4 * at_s)},
+                                             "force_n": lambda self, x: 0.0})()  # fmt: skip
+    session.emulated.advance(session.clock() + 200_000_000)
+    session.senses.press = pressed
+    _, zero, _ = session.measured_limits()
+    # Of 300 samples a few were on their way; with the 200 that waited it would be 2 N.
+    assert abs(zero["force_torque"][2]) < 0.1
+
+
+def test_force_while_the_platform_moves_stops_every_rail(session):
+    session.travel((0.0, 0.0))
+    session.senses.press.obstacle(session, 1e-3)
+    with pytest.raises(RigError, match="stopped on its way: force while travelling"):
+        session.travel((12e-3, 0.0))
+    session.guard.disarm()
+    # The ceiling of travel, 0.2 N, and the way of the rail at 50 mm/s in the guard's reaction and while it brakes.
+    reaction_s = 8e-3 + 24 * 10 / 115200 + 10e-3
+    assert 0.2 < session.senses.press.largest_n < 0.2 + 20e3 * 0.05 * (reaction_s + 0.05 / (2 * 0.5))
+    servos = [drives(session)[name].servo for name in JOINTS]
+    before = [servo.position_m for servo in servos]
+    session.emulated.advance(session.clock() + 500_000_000)
+    # They hold within the corridor of their drives.
+    assert [servo.position_m for servo in servos] == pytest.approx(before, abs=10e-6)
+
+
+def test_force_while_a_rail_is_homed_stops_it():
+    said = with_joints(**RARER)
+    for name in JOINTS:
+        said["devices"][name]["options"] = said["devices"][name]["options"] | {
+            "homing": "end-stop", "homing_speed_m_s": 0.01, "home_m": 0.0793,
+        }  # fmt: skip
+    session = begun(RigFile.model_validate(said))
+    try:
+        session.senses.press.obstacle(session, 2e-3)
+        with pytest.raises(GuardRefusesError, match=r"joint-1 stands .* force while travelling"):
+            session.travel((0.0, 0.0))
+        # The ceiling, and 10 mm/s for an answer of the drive and while it brakes.
+        assert 0.2 < session.senses.press.largest_n < 0.2 + 20e3 * 0.01 * 0.04
+        servo = drives(session)["joint-1"].servo
+        session.emulated.advance(session.clock() + 100_000_000)
+        here_m = servo.position_m
+        session.emulated.advance(session.clock() + 500_000_000)
+        assert servo.position_m == pytest.approx(here_m, abs=1e-5)
+        # The others were not begun.
+        assert [drives(session)[name].servo.position_m for name in JOINTS[1:]] == [0.0, 0.0]
+    finally:
+        session.close()
+
+
+def test_no_rail_moves_unless_the_motor_is_retracted(session):
+    from tactbench.plugin.devices import Beat, CommandKind
+
+    session.travel((0.0, 0.0))
+    _, _, limits = session.measured_limits()
+    guard, report = session.guard, session.guard.arm(limits)
+    guard.advance(session.clock() + 20_000_000)
+    report = guard.beat(Beat(1, session.clock()))
+    move = Beat(2, session.clock(), "", CommandKind.MOVE_TO, position_m=-2e-3, speed_m_s=5e-3,
+                force_sequence=report.force_sequence)  # fmt: skip
+    assert guard.beat(move).accepted
+    travel = Beat(3, session.clock(), "", CommandKind.TRAVEL, targets={"joint-1": 0.07})
+    refused = guard.beat(travel)
+    assert not refused.accepted
+    assert re.search("motor is not retracted", refused.reason)
+
+
+@pytest.mark.parametrize("seed", range(2))
+def test_random_faults_of_all_axes_keep_the_force_below_its_bound(seed):
+    """A few of the 200 of benchmarks/axes_faults.py."""
+    for outcome in load("axes_faults").schedules(3, 200 + seed):
+        assert outcome.wrong == (), outcome
