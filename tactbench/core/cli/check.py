@@ -14,13 +14,14 @@ from tactbench.core.cli.threads import keep_threads
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
+    from tactbench.core.conformance.check import Subject
     from tactbench.core.conformance.run import CheckReport
-    from tactbench.core.conformance.subject import Subject
     from tactbench.core.spec.rig_file import RigFile
 
 
 @click.command(name="check")
-@click.argument("name")
+@click.argument("name", required=False)
+@click.option("--list", "listed", is_flag=True, help="List the checks: of what, and why each exists.")
 @click.option("--recording", type=click.Path(path_type=Path, exists=True, dir_okay=False), metavar="FILE",
               help="Check this recording of the sensor, importing no code of the plugin.")  # fmt: skip
 @click.option("--rig-file", type=click.Path(path_type=Path, exists=True, dir_okay=False), metavar="FILE",
@@ -31,27 +32,36 @@ if TYPE_CHECKING:
 @format_option("table", "json")
 @click.pass_context
 def command(
-    ctx: click.Context, name: str, recording: Path | None, rig_file: Path | None, yes: bool,
-    out: Path | None, shape: str,
+    ctx: click.Context, name: str | None, listed: bool, recording: Path | None, rig_file: Path | None,
+    yes: bool, out: Path | None, shape: str,
 ) -> None:  # fmt: skip
     """Check whether a plugin conforms: a sensor, rig, device, task, estimator, effect, indenter or profile.
 
     NAME is one of these, or a plugin: then all it brings is checked. Without --rig-file nothing is opened and nothing
-    moves; docs/conformance.md lists the checks. Exit code 1 if a check failed or fewer ran than every plugin of that
-    kind can run, 2 if nothing is called NAME.
+    moves. Exit code 1 if a check failed, 2 if nothing is called NAME.
     """
     keep_threads()
     from tactbench.core.cli.grid import print_fields
     from tactbench.core.cli.operator import TerminalOperator
     from tactbench.core.cli.results import opened
     from tactbench.core.cli.screen import remark
-    from tactbench.core.conformance.check import KINDS, Mode
+    from tactbench.core.conformance.check import CHECKS, KINDS, Mode
     from tactbench.core.conformance.run import failed_plugins, plugins_named, run_checks, subjects_named
     from tactbench.core.errors import UnknownNameError, UsageError
     from tactbench.core.plugins.registry import load_registry
     from tactbench.core.plugins.rig_files import load_rig_file
     from tactbench.core.tables.text import json_text
 
+    if listed:
+        of = [(one, "all" if one.kinds == KINDS else ", ".join(one.kinds)) for one in CHECKS]
+        if shape == "json":
+            click.echo(json_text([{"check": one.name, "of": kinds, "mode": one.mode, "why": one.why, "do": one.cure}
+                                  for one, kinds in of], indent=1))  # fmt: skip
+        else:
+            print_fields([(one.name, f"{kinds}: {one.why}") for one, kinds in of])
+        return
+    if name is None:
+        raise UsageError("No NAME was given.", hint="`tactbench list plugins` shows what there is.")
     registry = load_registry()
     wrong = [f"{row.entry_point}: {row.reason}" for row in plugins_named(registry, name) if row.status == "failed"]
     try:
@@ -122,7 +132,7 @@ def _keep(out: Path, checked: Subject, report: CheckReport) -> None:
         path = write_level(
             out, checked.name,
             {
-                "level": report.level or "none", "ran": report.ran, "failed": len(report.failed),
+                "level": report.level or "none", "failed": len(report.failed),
                 "modes": list(report.modes), "kit": tactbench.__version__, "package": checked.package,
                 "identity": identity_of(checked.package, gather(checked.registry)),
             },
@@ -134,24 +144,20 @@ def _plain(report: CheckReport) -> dict[str, object]:
     import tactbench
 
     return {
-        "kind": report.kind, "name": report.name, "ok": report.ok, "level": report.level, "ran": report.ran,
+        "kind": report.kind, "name": report.name, "ok": report.ok, "level": report.level,
         "kit": tactbench.__version__, "modes": list(report.modes), "checks": [one._asdict() for one in report.outcomes],
     }  # fmt: skip
 
 
 def _lines(report: CheckReport) -> Iterator[tuple[str, str]]:
-    """Yield what did not pass, field by field; checks that were skipped for one reason together."""
-    from tactbench.core.conformance.kit import checks_of
-
-    cures = {one.name: one for one in checks_of(report.kind, *report.modes)}
+    """Yield what did not pass; checks that were skipped for one reason together."""
     for one in report.failed:
         yield "FAILED", f"{one.check}: {one.where}: {one.text}"
-        if one.check in cures:
-            yield "  why", cures[one.check].why
-            yield "  do", cures[one.check].cure
-    yield from (("expected", f"{one.check}: {one.text}") for one in report.expected)
+        if one.advice:
+            yield "  do", one.advice
+    yield from (("expected", f"{one.check}: {one.text}") for one in report.of("expected"))
     reasons: dict[str, list[str]] = {}
-    for one in report.skipped:
+    for one in report.of("skipped"):
         reasons.setdefault(one.text, []).append(one.check)
     for text, names in reasons.items():
         yield "skipped", f"{f'{len(names)} checks' if len(names) > 1 else names[0]}: {text}"

@@ -1,4 +1,4 @@
-"""What a check is, and what can come of one."""
+"""What a check is, what it looks at, and what can come of it."""
 
 from __future__ import annotations
 
@@ -6,18 +6,27 @@ import inspect
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import cached_property
+from importlib.metadata import EntryPoint
+from pathlib import Path
 from types import TracebackType
 from typing import Any, Literal, NamedTuple, NoReturn
 
-from tactbench.core.errors import TactbenchError
+from tactbench.core.errors import PluginError, TactbenchError
+from tactbench.core.plugins import hookspecs
+from tactbench.core.plugins.interfaces import Operator
+from tactbench.core.plugins.registry import Registry, ask_plugin, load_object
 
 Kind = Literal["sensor", "rig", "device", "task", "estimator", "effect", "indenter", "profile"]
 KINDS: tuple[Kind, ...] = ("sensor", "rig", "device", "task", "estimator", "effect", "indenter", "profile")
 Mode = Literal["passive", "invasive", "recording"]
 """`passive`: nothing is opened and nothing moves. `invasive`: a line is opened, something is pressed. `recording`: only
 a recording is read."""
-Level = Literal["bronze", "silver", "gold"]
-LEVELS: tuple[Level, ...] = ("bronze", "silver", "gold")
+CODE = (
+    "transducer", "driver", "emulator", "log_reader", "features_by", "where", "called_for", "verification",
+    "work_precision", "likeness", "file", "check", "emulators",
+)  # fmt: skip
+"""Fields of descriptors that name code."""
 
 
 class CheckFailed(AssertionError):  # noqa: N818  (a result, as its sibling)
@@ -41,6 +50,70 @@ class CheckSkipped(Exception):  # noqa: N818  (a result, not a failure)
     """A plugin lacks what a check is about, and may: the message says what."""
 
 
+class CheckOutcome(NamedTuple):
+    """What came of a check."""
+
+    check: str
+    status: Literal["passed", "failed", "skipped", "expected"]
+    """`expected`: it failed, and is listed among the expected failures."""
+    where: str = ""
+    """The field or line at fault."""
+    text: str = ""
+    """What is wrong, or why it was skipped; of an expected failure, the reason that is listed."""
+    advice: str = ""
+    """What to do; empty where the plugin's code raised: `where` and `text` then say all that is known."""
+
+
+@dataclass(frozen=True, eq=False)
+class Subject:
+    """A plugin's sensor, rig, device … under check, and what else is installed."""
+
+    kind: Kind
+    name: str
+    module: str
+    """The plugin's, as its entry point names it."""
+    distribution: str
+    registry: Registry
+    recording: Path | None = None
+    """What is read in the mode `recording`."""
+    rig_file: Path | None = None
+    """What is opened in the mode `invasive`."""
+    operator: Operator | None = None
+    """Who stands at the rig in the mode `invasive`."""
+
+    @cached_property
+    def descriptor(self) -> Any:
+        """What the plugin's hook gives in this very process; CheckFailed if it does not."""
+        try:
+            offered = ask_plugin(EntryPoint("checked", self.module, hookspecs.GROUP))[f"{self.kind}s"]
+        except (PluginError, KeyError) as error:
+            raise CheckFailed(self.module, f"its hook tactbench_{self.kind}s does not answer: {error}") from error
+        for descriptor in offered:
+            if descriptor.name == self.name:
+                return descriptor
+        raise CheckFailed(self.module, f"its hook tactbench_{self.kind}s does not give {self.name!r} again")
+
+    @property
+    def spec(self) -> Any:
+        """The spec of a sensor or task; of others the descriptor."""
+        return getattr(self.descriptor, "spec", self.descriptor)
+
+    @property
+    def package(self) -> str:
+        """The top of the plugin's module names."""
+        return self.module.partition(".")[0]
+
+    def names_code(self, field: str) -> str | None:
+        """Return ``module:callable`` of a field; None: it names none."""
+        owner = self.spec if field == "features_by" else self.descriptor
+        found = getattr(owner, field, None)
+        return found if isinstance(found, str) else None
+
+    def code(self, field: str) -> Any:
+        """Return what a field of the descriptor names, imported."""
+        return load_object(self.names_code(field) or "")
+
+
 @dataclass(frozen=True)
 class Check:
     """One thing that is checked of a plugin."""
@@ -49,37 +122,35 @@ class Check:
     """Lower case with hyphens; unique among the checks of a kind."""
     kinds: tuple[Kind, ...]
     mode: Mode
-    level: Level
-    """The lowest level that cannot be had without it."""
     why: str
     """Why it exists, in one sentence."""
     cure: str
     """What to do when it fails, in one sentence."""
     needs: tuple[str, ...]
-    """Checks that must have passed; otherwise it is skipped, with their reason."""
-    may_skip: bool
-    """Whether it is about an ability that a plugin need not have."""
-    run: Callable[[Any], None]
-    """Called with a Subject; raises CheckFailed, or CheckSkipped."""
+    """Checks that must have passed; otherwise it is skipped."""
+    carries_out: bool
+    """Whether the plugin does what it is for: what the level silver asks for."""
+    run: Callable[[Subject], None]
+    """Raises CheckFailed, or CheckSkipped."""
 
     def __str__(self) -> str:
         return self.name
 
 
+CHECKS: list[Check] = []
+"""All of them, in the order in which they run: a check stands behind those that it needs."""
+
+
 def check(
-    *kinds: Kind,
-    needs: tuple[str, ...] = (),
-    level: Level = "bronze",
-    mode: Mode = "passive",
-    may_skip: bool = False,
-) -> Callable[[Callable[[Any], None]], Check]:
+    *kinds: Kind, needs: tuple[str, ...] = (), mode: Mode = "passive", carries_out: bool = False
+) -> Callable[[Callable[[Subject], None]], Check]:
     """Make a check of a function: its name is the check's, its docstring says why it exists, and then what to do."""
 
-    def made(run: Callable[[Any], None]) -> Check:
+    def made(run: Callable[[Subject], None]) -> Check:
         why, _, cure = inspect.cleandoc(run.__doc__ or "").partition("\n\n")
-        name = run.__name__.strip("_").replace("_", "-")
         why, cure = (" ".join(text.split()) for text in (why, cure))
-        return Check(name, kinds, mode, level, why, cure, needs, may_skip or bool(needs), run)
+        CHECKS.append(Check(run.__name__.replace("_", "-"), kinds, mode, why, cure, needs, carries_out, run))
+        return CHECKS[-1]
 
     return made
 
@@ -94,45 +165,28 @@ def skip(text: str) -> NoReturn:
     raise CheckSkipped(text)
 
 
-class CheckOutcome(NamedTuple):
-    """What came of a check."""
-
-    check: str
-    status: Literal["passed", "failed", "skipped", "expected"]
-    """`expected`: it failed, and is listed among the expected failures."""
-    where: str = ""
-    """The field or line at fault."""
-    text: str = ""
-    """What is wrong, or why it was skipped; of an expected failure, the reason that is listed."""
-
-
 @contextmanager
-def code_of(where: str, package: str) -> Iterator[None]:
-    """Turn whatever the plugin's own code raises into a failure that names its line.
-
-    Parameters
-    ----------
-    where
-        The field that names the code.
-    package
-        The plugin's own.
-    """
+def code_of(field: str, subject: Subject) -> Iterator[None]:
+    """Turn whatever the plugin's code raises into a failure that names the field, the line and what was raised."""
     try:
         yield
     except (CheckFailed, CheckSkipped):
         raise
     except (Exception, SystemExit) as error:
-        line = line_in(package, error.__traceback__)
-        text = str(error) if isinstance(error, TactbenchError) else f"{type(error).__name__}: {error}"
-        raise CheckFailed(f"{where}{f' ({line})' if line else ''}", text.rstrip(": ")) from error
+        line = line_in(subject.package, error.__traceback__)
+        raise CheckFailed(f"{field} ({line})" if line else field, said(error)) from error
+
+
+def said(error: BaseException) -> str:
+    """Return an error as text: its message, with the class where that is not one of tactbench's."""
+    return str(error) if isinstance(error, TactbenchError) else f"{type(error).__name__}: {error}"
 
 
 def line_in(package: str, trace: TracebackType | None) -> str:
     """Return ``file, line N`` of the innermost frame in a package; "" if none is in it."""
     found = ""
     while trace is not None:
-        name = trace.tb_frame.f_globals.get("__name__", "")
-        if name.partition(".")[0] == package:
+        if trace.tb_frame.f_globals.get("__name__", "").partition(".")[0] == package:
             file = trace.tb_frame.f_code.co_filename.replace("\\", "/").split("/")
             found = f"{'/'.join(file[-2:])}, line {trace.tb_lineno}"
         trace = trace.tb_next

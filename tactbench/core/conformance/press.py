@@ -1,144 +1,231 @@
-"""Checks of what a tiny press gives, looked at as a recording would be; and of rigs before they press."""
+"""Checks of what a small press on a simulated rig gives, looked at as a recording would be; and of rigs' forces."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from pathlib import Path
-from tempfile import TemporaryDirectory
-from typing import Any
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import TYPE_CHECKING, Any
 
-from tactbench.core.conformance.check import check, code_of, fail, skip
-from tactbench.core.conformance.common import difference
-from tactbench.core.conformance.subject import Subject
-from tactbench.core.conformance.trial_press import (
-    FORCE_N,
-    SECONDS,
-    TrialPress,
-    carried_out,
-    pressed,
-    simulated_sensors,
-    tiny_scene,
-)
-from tactbench.core.errors import TactbenchError
+from tactbench.core.conformance.check import CheckFailed, Subject, check, code_of, fail, skip
+from tactbench.core.errors import NotApplicable
+from tactbench.core.plugins.registry import load_object
 from tactbench.core.plugins.taking_part import rig_context
-from tactbench.core.samples import Quality
+from tactbench.core.samples import Block, Quality
+from tactbench.core.spec.profile import ForceRamp
+from tactbench.core.spec.quantity import assumed
+from tactbench.core.spec.rig import RigDescriptor, SensorDescriptor
+from tactbench.core.spec.scene import Environment, Scene
 from tactbench.core.spec.sensor import StreamSpec
 
-FORCE_SHARE = 0.2
-"""Of `FORCE_N`, by which the recorded force may differ at the end: newtons and gram-force differ by a hundred times."""
+if TYPE_CHECKING:
+    import numpy.typing as npt
+
+    from tactbench.core.samples import FloatArray
+
+FORCE_N = 0.5
+"""At the end of the press: every sensor that is touched by a hand bears it."""
+SECONDS = 1.0
 LATE_S = 1.5
 """A sample of time may be missing at either end of `SECONDS`, and a half more for a rig that begins later."""
+NOISE_N = 0.005
+"""Of the reference force: a hundredth of the press, so that draws can be told apart and the force still be read."""
+FORCE_SHARE = 0.2
+"""Of `FORCE_N`, by which the recorded force may differ at the end: newtons and gram-force differ by a hundred times."""
+RATE_SHARE = 0.05
+RANGE_N = 2.0
+"""What the task `force` presses to where it is not installed."""
+MOST_SATURATED = 0.5
+"""Share of the samples of a press over the task's range that the channel which is worst off may stand at a limit."""
+WHY = "a check of plugins"
+UNITS_OF_TIME = {1e-9: "seconds", 1e-6: "milliseconds", 1e-3: "microseconds"}
 
 
-@check(
-    "sensor", "rig", needs=("finite-at-zero-load", "hdf5-round-trip", "code-names-resolve", "rig-builds"),
-    level="silver",
-)  # fmt: skip
-def tiny_press_is_carried_out(subject: Subject) -> None:
-    """One small press runs all that a campaign would: building, opening, skin, transducer, nuisances, converter.
-
-    Correct what the message names; `tactbench twin explain` shows which effects take part.
-    """
-    made = pressed(subject)
-    _has_samples(made, made.streams if subject.kind == "sensor" else made.every_stream)
+def tiny_scene(name: str = "tiny", end_n: float = FORCE_N, **changes: Any) -> Scene:
+    """Return a press of a second to half a newton, with everything else as scenes have it."""
+    ramp = ForceRamp(
+        end=assumed(end_n, "N", WHY), hold=assumed(SECONDS / 5, "s", WHY), duration=assumed(SECONDS, "s", WHY),
+        samples=100,
+    )  # fmt: skip
+    environment = Environment(force_noise=assumed(NOISE_N, "N", WHY))
+    return Scene(name=name, profile=ramp, environment=environment).model_copy(update=changes)
 
 
-def _has_samples(made: TrialPress, streams: Sequence[StreamSpec]) -> None:
-    if not streams:
-        fail("streams", "the press gave no stream")
-    for stream in streams:
-        rows = sum(len(one.data) for one in made.blocks if one.stream == stream.name)
-        if not rows:
-            fail(f"streams[{stream.name}]", "the press gave no sample of it")
+@dataclass(frozen=True)
+class TrialPress:
+    """What a rig gave for a scene."""
+
+    scene: Scene
+    sensor: SensorDescriptor
+    rig: RigDescriptor
+    streams: tuple[StreamSpec, ...]
+    reference: tuple[StreamSpec, ...]
+    about: Mapping[str, Any]
+    """Its plan, its assumptions and what it has drawn."""
+    blocks: tuple[Block, ...]
+
+    @property
+    def every_stream(self) -> tuple[StreamSpec, ...]:
+        """The sensor's streams, then those of the reference."""
+        return (*self.streams, *self.reference)
+
+    def values(self, stream: str) -> FloatArray:
+        """Return the (n, channels) samples of a stream."""
+        import numpy as np
+
+        return np.concatenate([np.asarray(one.data, dtype=np.float64) for one in self.blocks if one.stream == stream])
+
+    def quality(self, stream: str) -> npt.NDArray[Any]:
+        """Return the (n, channels) marks of a stream."""
+        import numpy as np
+
+        return np.concatenate([marks_of(one) for one in self.blocks if one.stream == stream])
 
 
-_PRESSED = ("tiny-press-is-carried-out",)
+def marks_of(block: Block) -> npt.NDArray[Any]:
+    """Return the (n, channels) marks of a block; one without any is good."""
+    import numpy as np
+
+    return np.zeros(np.shape(block.data), np.uint8) if block.quality is None else block.quality
 
 
-@check("sensor", "rig", needs=_PRESSED, level="silver")
+def carried_out(rig: Any, descriptor: RigDescriptor, sensor: SensorDescriptor, scene: Scene, seed: int) -> TrialPress:
+    """Carry out a scene on a rig that was built; raises what the rig raises."""
+    with rig.open(sensor, scene, seed=seed) as one:
+        streams, reference, blocks = tuple(one.streams), tuple(one.reference), tuple(one)
+        about = {"plan": tuple(one.plan), "assumptions": dict(one.assumptions), "drawn": dict(one.drawn)}
+    return TrialPress(scene, sensor, descriptor, streams, reference, about, blocks)
+
+
+def simulated_rig(subject: Subject) -> tuple[Any, RigDescriptor]:
+    """Return the first simulated rig, built, those that come with this package before others."""
+    simulated = [one for one in subject.registry.rigs.all_owned() if one.descriptor.simulated]
+    if not simulated:
+        skip("no simulated rig is installed")
+    descriptor = min(simulated, key=lambda one: not one.ours).descriptor
+    return load_object(descriptor.where)(rig_context(subject.registry)), descriptor
+
+
+def simulated_sensors(subject: Subject) -> Sequence[SensorDescriptor]:
+    """Return sensors that a simulation can press: of this package, the cheapest first, then of the plugin's own."""
+    able = []
+    for owned in subject.registry.sensors.all_owned():
+        skin = owned.descriptor.spec.skin
+        near = owned.ours or owned.distribution == subject.distribution
+        if near and skin is not None and owned.descriptor.transducer is not None:
+            cost = len(owned.descriptor.spec.channels()) * math.prod(skin.sheet.cells)
+            able.append((not owned.ours, cost, owned.descriptor.name, owned.descriptor))
+    if not able:
+        skip("no sensor that can be simulated is installed")
+    return [one[-1] for one in sorted(able, key=lambda one: one[:3])]
+
+
+def presses(subject: Subject, scenes: Sequence[Scene], field: str) -> Iterator[TrialPress]:
+    """Yield what every simulated sensor and scene that go with each other give."""
+    rig, descriptor = simulated_rig(subject)
+    for scene in scenes:
+        for sensor in simulated_sensors(subject):
+            try:
+                with code_of(field, subject):
+                    yield carried_out(rig, descriptor, sensor, scene, 1)
+            except CheckFailed as failure:
+                if not isinstance(failure.__cause__, NotApplicable):
+                    raise
+
+
+@lru_cache(maxsize=6)
+def pressed(subject: Subject, seed: int = 1) -> TrialPress:
+    """Return a press: of a sensor on a simulated rig over the range of the task `force`, or of a rig, a tiny one."""
+    end_n = FORCE_N
+    if subject.kind == "sensor":
+        rig, descriptor = simulated_rig(subject)
+        sensor, field = subject.descriptor, "spec"
+        scenes = subject.registry.tasks["force"].spec.scenes if "force" in subject.registry.tasks else ()
+        end_n = max((one.scene.profile.largest_n for one in scenes), default=RANGE_N)
+    else:
+        sensor, descriptor, field = simulated_sensors(subject)[0], subject.descriptor, "where"
+        rig = _built(subject)
+    kinds = tuple(dict.fromkeys(channel.kind for channel in sensor.spec.channels()))
+    with code_of(field, subject):
+        scene = tiny_scene(end_n=end_n, observe=("taxel",) if "taxel" in kinds else kinds)
+        return carried_out(rig, descriptor, sensor, scene, seed)
+
+
+def _built(subject: Subject) -> Any:
+    if not subject.descriptor.simulated:
+        skip("it moves something real, or replays: `--rig-file FILE` presses with it")
+    with code_of("where", subject):
+        return subject.code("where")(rig_context(subject.registry))
+
+
+@check("sensor", "rig", needs=("transducer-reads", "rest-is-as-stated", "code-names-resolve"))
 def blocks_fit_their_streams(subject: Subject) -> None:
-    """A recording has a column a channel; a block of another width or of an unknown stream ends it.
+    """A recording has a column a channel, and only numbers; one press runs all that a campaign would.
 
-    Yield blocks of shape (n, channels) for streams that the acquisition names.
+    Yield blocks of shape (n, channels) for streams that the acquisition names; mark what means nothing as MISSING.
     """
     import numpy as np
 
     made = pressed(subject)
     known = {stream.name: stream for stream in made.every_stream}
-    own = {stream.name: stream for stream in made.sensor.spec.streams}
+    own = {stream.name: {one.name for one in stream.channels} for stream in made.sensor.spec.streams}
     for block in made.blocks:
         if block.stream not in known:
             fail(f"block of {block.stream}", f"the acquisition names only {', '.join(known)}")
-        width = len(known[block.stream].channels)
-        if np.shape(block.data) != (len(block.data), width):
-            fail(f"streams[{block.stream}]", f"a block has shape {np.shape(block.data)}; (n, {width}) is needed")
-        if block.t_ns is not None and np.shape(block.t_ns) != (len(block.data),):
-            fail(f"streams[{block.stream}].t_ns", f"{np.shape(block.t_ns)} times for {len(block.data)} rows")
+        channels = known[block.stream].channels
+        if np.shape(block.data) != (len(block.data), len(channels)):
+            text = f"a block has shape {np.shape(block.data)}; (n, {len(channels)}) is needed"
+            fail(f"streams[{block.stream}]", text)
+        bad = np.argwhere(~np.isfinite(block.data) & ((marks_of(block) & Quality.MISSING) == 0))
+        if len(bad):
+            fail(f"streams[{block.stream}].channels[{channels[bad[0][1]].name}]", "it is not finite, and not marked")
     for stream in made.streams:
-        names = [channel.name for channel in own[stream.name].channels] if stream.name in own else []
-        strange = [channel.name for channel in stream.channels if channel.name not in names]
+        strange = [one.name for one in stream.channels if one.name not in own.get(stream.name, ())]
         if strange:
             fail(f"streams[{stream.name}]", f"the sensor's spec has no channel {strange[0]} there")
+    for name in known:
+        if not any(len(one.data) for one in made.blocks if one.stream == name):
+            fail(f"streams[{name}]", "the press gave no sample of it")
 
 
-@check("sensor", "rig", needs=_PRESSED, level="silver")
-def clocks_go_forward(subject: Subject) -> None:
-    """Rows are put on one clock by their times; a time that goes back cannot be.
+@check("sensor", "rig", needs=("blocks-fit-their-streams",))
+def clocks_are_in_nanoseconds(subject: Subject) -> None:
+    """Rows are put on one clock by their times; windows and delays are computed from the stated rate.
 
-    Count t_ns on in nanoseconds, over the device's own wraps as well.
+    Count t_ns on in whole nanoseconds, and state the rate in samples a second.
     """
     import numpy as np
 
     made = pressed(subject)
     for stream in made.every_stream:
-        t_ns = made.t_ns(stream.name)
-        if t_ns is None:
+        where = f"streams[{stream.name}]"
+        times = [one.t_ns for one in made.blocks if one.stream == stream.name and one.t_ns is not None]
+        if not times:
             continue
-        if t_ns.dtype.kind != "i":
-            fail(f"streams[{stream.name}].t_ns", f"its type is {t_ns.dtype}, and whole nanoseconds are needed")
+        t_ns = np.concatenate(times)
+        spans = float(t_ns[-1] - t_ns[0]) * 1e-9
+        named_unit(f"{where}.t_ns", spans / SECONDS)
+        if t_ns.dtype.kind != "i" or len(t_ns) != len(made.values(stream.name)):
+            fail(f"{where}.t_ns", f"{len(t_ns)} of {t_ns.dtype}: a whole number of nanoseconds a row is needed")
         back = np.flatnonzero(np.diff(t_ns) <= 0)
         if len(back):
-            fail(f"streams[{stream.name}].t_ns", f"time does not go forward at row {int(back[0]) + 1}")
+            fail(f"{where}.t_ns", f"time does not go forward at row {int(back[0]) + 1}")
+        rate = (len(t_ns) - 1) / spans
+        if stream.rate_hz is not None and len(t_ns) > 2 and abs(rate / stream.rate_hz - 1) > RATE_SHARE:
+            fail(f"{where}.rate_hz", f"{stream.rate_hz:g} Hz is stated, the times say {rate:.4g} Hz")
+        if not 1 / LATE_S <= spans / SECONDS <= LATE_S:
+            fail(f"{where}.t_ns", f"it spans {spans:.3g} s, and the scene lasts {SECONDS:g} s")
 
 
-@check("sensor", "rig", needs=("clocks-go-forward",), level="silver")
-def rates_are_as_stated(subject: Subject) -> None:
-    """Windows and delays are computed from the stated rate.
-
-    State the rate at which the rig samples in the acquisition's streams, in samples a second.
-    """
-    made = pressed(subject)
-    for stream in made.every_stream:
-        t_ns = made.t_ns(stream.name)
-        if t_ns is None or len(t_ns) < 3:
-            continue
-        seconds = float(t_ns[-1] - t_ns[0]) * 1e-9
-        rate = (len(t_ns) - 1) / seconds
-        if stream.rate_hz is not None and abs(rate / stream.rate_hz - 1) > 0.05:
-            fail(f"streams[{stream.name}].rate_hz", f"{stream.rate_hz:g} Hz is stated, the times say {rate:.4g} Hz")
-        if not SECONDS / LATE_S <= seconds <= SECONDS * LATE_S:
-            fail(f"streams[{stream.name}].t_ns", f"it spans {seconds:.3g} s, and the scene lasts {SECONDS:g} s")
+def named_unit(where: str, share: float) -> None:
+    """Fail if times, as a share of what they are in nanoseconds, are in another unit."""
+    for factor, unit in UNITS_OF_TIME.items():
+        if 0.5 < share / factor < 2:
+            fail(where, f"it is in {unit}, and nanoseconds are needed")
 
 
-@check("sensor", "rig", needs=_PRESSED, level="silver")
-def samples_are_finite(subject: Subject) -> None:
-    """An estimator cannot be taught with NaN; what is missing is said in the quality.
-
-    Mark samples that mean nothing as Quality.MISSING, and compute the others.
-    """
-    import numpy as np
-
-    made = pressed(subject)
-    for stream in made.every_stream:
-        there = (made.quality(stream.name) & Quality.MISSING) == 0
-        bad = np.argwhere(~np.isfinite(made.values(stream.name)) & there)
-        if len(bad):
-            row, column = bad[0]
-            fail(f"streams[{stream.name}].channels[{stream.channels[column].name}]", f"it is not finite in row {row}")
-
-
-@check("sensor", "rig", needs=_PRESSED, level="silver")
+@check("sensor", "rig", needs=("clocks-are-in-nanoseconds",), carries_out=True)
 def limits_are_kept(subject: Subject) -> None:
     """A converter gives nothing beyond its ends, and what stands at an end is marked as saturated.
 
@@ -148,118 +235,85 @@ def limits_are_kept(subject: Subject) -> None:
 
     made = pressed(subject)
     for stream in made.streams:
-        values, quality = made.values(stream.name), made.quality(stream.name)
-        for column, channel in enumerate(stream.channels):
+        for channel, values, marks in zip(
+            stream.channels, made.values(stream.name).T, made.quality(stream.name).T, strict=True
+        ):
             where = f"streams[{stream.name}].channels[{channel.name}]"
             low = -math.inf if channel.lower is None else channel.lower
             high = math.inf if channel.upper is None else channel.upper
-            beyond = (values[:, column] < low) | (values[:, column] > high)
-            if beyond.any():
-                fail(where, f"it reads {values[beyond, column][0]:g}, beyond its limits {low:g} to {high:g}")
+            beyond = values[(values < low) | (values > high)]
+            if len(beyond):
+                fail(where, f"it reads {beyond[0]:g}, beyond its limits {low:g} to {high:g}")
             # One that rests at an end has that reading without being full.
             rest = None if channel.rest is None else channel.rest.to(channel.unit)
-            ends = [end for end in (low, high) if end != rest]
-            at_end = np.isin(values[:, column], ends)
-            unmarked = at_end & ((quality[:, column] & Quality.SATURATED) == 0)
-            if channel.unit == "count" and np.count_nonzero(unmarked):
-                fail(where, f"it stands at its end in row {int(np.flatnonzero(unmarked)[0])}, not marked SATURATED")
+            at_end = np.isin(values, [end for end in (low, high) if end != rest])
+            if channel.unit == "count" and np.any(at_end & ((marks & Quality.SATURATED) == 0)):
+                fail(where, "it stands at its end, not marked SATURATED")
 
 
-@check("sensor", needs=("limits-are-kept",), level="silver")
-def gentle_press_is_within_range(subject: Subject) -> None:
-    """A sensor at its end under half a newton measures nothing: usually a factor of a thousand in a sensitivity.
+@check("sensor", needs=("limits-are-kept",))
+def range_of_the_task_is_measured(subject: Subject) -> None:
+    """A channel that stands at its limit tells nothing: usually a sensitivity that is off by a factor of ten or more.
 
     Look at the units of the sensitivity: a SkinState has N, mm and MPa.
     """
+    import numpy as np
+
     made = pressed(subject)
-    marks = [made.quality(stream.name) for stream in made.streams if stream.channels[0].kind == "taxel"]
-    full = [bool(((one[-1] & Quality.SATURATED) != 0).all()) for one in marks]
-    if full and all(full):
-        fail("transducer", f"every taxel stands at its converter's end under {FORCE_N:g} N")
+    for stream in made.streams:
+        full = np.mean((made.quality(stream.name) & Quality.SATURATED) != 0, axis=0)
+        worst = int(np.argmax(full))
+        if stream.channels[worst].kind == "taxel" and full[worst] > MOST_SATURATED:
+            text = f"{full[worst]:.0%} of its samples stand at a limit in a press to {made.scene.profile.largest_n:g} N"
+            fail(f"transducer: {stream.channels[worst].name}", text)
 
 
-@check("sensor", "rig", needs=_PRESSED, level="silver")
-def same_seed_same_samples(subject: Subject) -> None:
-    """`rerun` must give the same bytes; whatever is drawn comes from a generator made of the run's seed.
+@check("rig", needs=("blocks-fit-their-streams",))
+def seeds_decide(subject: Subject) -> None:
+    """The same seed must give the same bytes, and another one a replicate with everything drawn again.
 
-    Draw from numpy.random.default_rng([seed, …]) that is made for the scene, never from a global generator.
+    Draw from a generator that `open` makes of its `seed`, never from a global one.
     """
     import numpy as np
 
-    first, again = pressed(subject), _pressed_anew(subject)
-    for stream in first.every_stream:
-        a, b = first.values(stream.name), again.values(stream.name)
-        if a.shape != b.shape or not np.array_equal(a, b, equal_nan=True):
-            fail(f"streams[{stream.name}]", "another press with the same seed gives other samples")
-
-
-def _pressed_anew(subject: Subject) -> TrialPress:
-    """Return the same press, carried out once more."""
-    return pressed.__wrapped__(subject)
-
-
-@check("rig", needs=("same-seed-same-samples",), level="silver")
-def other_seed_other_samples(subject: Subject) -> None:
-    """Replicates are the campaign with everything drawn again; where the seed is ignored, they are one and the same.
-
-    Make the scene's generator from the `seed` of `open`.
-    """
-    import numpy as np
-
-    first, other = pressed(subject), pressed(subject, 2)
-    if all(np.array_equal(first.values(one.name), other.values(one.name)) for one in first.every_stream):
+    first, again, other = pressed(subject), pressed.__wrapped__(subject), pressed(subject, 2)
+    names = [stream.name for stream in first.every_stream]
+    for name in names:
+        if not np.array_equal(first.values(name), again.values(name), equal_nan=True):
+            fail(f"streams[{name}]", "another press with the same seed gives other samples")
+    if all(np.array_equal(first.values(name), other.values(name)) for name in names):
         fail("open(…, seed)", "two seeds give the same samples in every stream")
 
 
-_SOUND = ("blocks-fit-their-streams", "clocks-go-forward", "samples-are-finite", "limits-are-kept")
+@check("rig", needs=("blocks-fit-their-streams",))
+def force_follows_the_profile(subject: Subject) -> None:
+    """The recorded force is what estimators are taught: in another unit, or with another sign, every score is wrong.
 
-
-@check("sensor", "rig", needs=_SOUND, level="silver")
-def press_is_recorded(subject: Subject) -> None:
-    """What a rig gives is written to a file and read back before anybody computes with it.
-
-    Correct what the message names; `tactbench inspect FILE` shows the same findings.
-    """
-    from tactbench.core.recording.health import examine
-    from tactbench.core.recording.reader import open_recording
-    from tactbench.core.recording.writer import RecordingWriter
-    from tactbench.core.spec.recording import RecordingMeta
-
-    made = pressed(subject)
-    with TemporaryDirectory() as folder:
-        path = Path(folder) / "tiny.h5"
-        try:
-            spec = made.sensor.spec.model_copy(update={"streams": made.streams})
-            meta = RecordingMeta(
-                name="tiny", sensor=spec, reference=made.reference, rig=made.rig.name, simulated=True,
-                clock="simulated", plan=made.plan, scene=made.scene, seed=1, **made.said,
-            )  # fmt: skip
-            with RecordingWriter(path, meta) as writer:
-                for block in made.blocks:
-                    writer.append(block)
-            with open_recording(path) as recording:
-                wrong = [finding for finding in examine(recording) if finding.severity == "error"]
-        except (TactbenchError, ValueError) as error:
-            fail("recording", str(error))
-    if wrong:
-        fail(f"streams[{wrong[0].stream}]", f"the recording is not healthy: {wrong[0].message}")
-
-
-@check("rig", needs=("blocks-fit-their-streams",), level="silver")
-def force_is_recorded(subject: Subject) -> None:
-    """A task of force asks for the channel of kind ``force`` among the reference streams, in newtons.
-
-    Give a reference stream with a channel of kind "force", unit "N", sign 1, called fz or normal.
+    Give a reference stream with a channel of kind "force", unit "N", called fz or normal, positive where it presses.
     """
     made = pressed(subject)
-    found = [(stream, channel) for stream in made.reference for channel in stream.channels if channel.kind == "force"]
-    if not found:
-        fail("reference", "it has no channel of kind force")
-    for stream, channel in found:
-        if channel.unit != "N":
-            fail(f"reference[{stream.name}].channels[{channel.name}].unit", f"{channel.unit!r}, and 'N' is needed")
-    if len(found) > 1 and not {"fz", "normal"}.intersection(channel.name for _, channel in found):
-        fail("reference", "none of its force channels is called fz or normal: which one is pressed with?")
+    found = pressing_channel(made.reference)
+    if found is None:
+        fail("reference", "it has no channel of kind force called fz or normal")
+    stream, column = found
+    where = f"reference[{stream.name}].channels[{stream.channels[column].name}]"
+    if stream.channels[column].unit != "N":
+        fail(f"{where}.unit", f"{stream.channels[column].unit!r}, and 'N' is needed")
+    force_is(where, float(made.values(stream.name)[-5:, column].mean()), FORCE_N)
+
+
+def force_is(where: str, found_n: float, meant_n: float) -> None:
+    """Fail where a force at the end of a press is another one, and say which mistake makes it so."""
+    if abs(found_n - meant_n) > FORCE_SHARE * meant_n:
+        factor = found_n / meant_n
+        meant = (
+            "gram-force" if 80 < factor < 125
+            else "kilograms" if 0.09 < factor < 0.11
+            else "millinewtons" if 800 < factor < 1250
+            else ""
+        )  # fmt: skip
+        likely = f": are these {meant}?" if meant else ": is its sign turned?" if factor < 0 else ""
+        fail(where, f"{found_n:.4g} N at the end of a press to {meant_n:g} N{likely}")
 
 
 def pressing_channel(reference: Sequence[StreamSpec]) -> tuple[StreamSpec, int] | None:
@@ -269,126 +323,3 @@ def pressing_channel(reference: Sequence[StreamSpec]) -> tuple[StreamSpec, int] 
             if channel.kind == "force" and channel.name in ("fz", "normal"):
                 return stream, column
     return None
-
-
-@check("rig", needs=("force-is-recorded",), level="silver")
-def force_follows_the_profile(subject: Subject) -> None:
-    """The recorded force is what estimators are taught: in another unit, or with another sign, every score is wrong.
-
-    Record newtons, positive where the sensor is pressed; a gram-force is 0.00981 N.
-    """
-    made = pressed(subject)
-    end = made.scene.profile.end.to("N")
-    found = pressing_channel(made.reference)
-    if found is None:  # one force channel of another name, which force-is-recorded lets pass
-        return
-    stream, column = found
-    force = float(made.values(stream.name)[-5:, column].mean())
-    if abs(force - end) > FORCE_SHARE * end:
-        factor = force / end
-        meant = ": are these gram-force?" if 80 < factor < 125 else ": is its sign turned?" if factor < 0 else ""
-        fail(
-            f"reference[{stream.name}].channels[{stream.channels[column].name}]",
-            f"it says {force:.4g} at the end of a press to {end:g} N{meant}",
-        )
-
-
-@check("rig", needs=_PRESSED, level="silver")
-def scene_is_not_changed(subject: Subject) -> None:
-    """One scene is carried out many times, and stands in every recording.
-
-    Copy what you change: ``scene.model_copy(update=…)``.
-    """
-    rig, descriptor = _built(subject), subject.descriptor
-    sensor = simulated_sensors(subject)[0]
-    scene = tiny_scene(labels={"told": 1})
-    before = (scene.model_dump(mode="json"), sensor.model_dump(mode="json"))
-    with code_of("where", subject.package):
-        carried_out(rig, descriptor, sensor, scene, 1)
-    place = difference(before[0], scene.model_dump(mode="json"), "scene")
-    place = place or difference(before[1], sensor.model_dump(mode="json"), "sensor")
-    if place:
-        fail(place, "the rig has changed it")
-
-
-@check("rig", needs=_PRESSED, level="silver")
-def plan_says_why(subject: Subject) -> None:
-    """A simulation says which effects it includes and which it leaves out; without reasons nobody can judge that.
-
-    Give every PlanEntry a reason, and every number in `assumptions` and `drawn` by a name.
-    """
-    made = pressed(subject)
-    for entry in made.plan:
-        if not entry.reason.strip():
-            fail(f"plan[{entry.effect}].reason", "it is empty")
-    for field, said in made.said.items():
-        for name, value in said.items():
-            if not isinstance(name, str) or not isinstance(value, (str, int, float)):
-                fail(f"{field}[{name}]", f"a {type(value).__name__}, and a text or a number is needed")
-
-
-@check("rig", needs=("code-names-resolve",))
-def rig_builds(subject: Subject) -> None:
-    """A rig is built from a RigContext before anything else; one that needs a file or a folder says so.
-
-    Raise UsageError for what is missing, and return an object with open() or recordings().
-    """
-    from tactbench.core.errors import UsageError
-
-    try:
-        rig = _built(subject, usage=True)
-    except UsageError as error:
-        skip(f"it needs more than the check gives: {error.message}")
-    if not (hasattr(rig, "open") or hasattr(rig, "recordings")):
-        fail("where", f"it returned a {type(rig).__name__} with neither open() nor recordings()")
-
-
-def _built(subject: Subject, *, usage: bool = False) -> Any:
-    from tactbench.core.errors import UsageError
-
-    context = rig_context(subject.registry)
-    with code_of("where", subject.package):
-        try:
-            return subject.code("where")(context)
-        except UsageError as error:
-            if not usage:
-                raise
-            caught = error
-    raise caught
-
-
-@check("rig")
-def rungs_are_named_once(subject: Subject) -> None:
-    """A run asks for a rung by its name, and the cheapest that keeps a tolerance is taken in their order.
-
-    Name each rung once, the cheapest first; only simulated rigs have them.
-    """
-    rungs = subject.descriptor.rungs
-    doubled = sorted({name for name in rungs if rungs.count(name) > 1})
-    if doubled:
-        fail("rungs", f"{doubled[0]!r} stands there twice")
-    if rungs and not subject.descriptor.simulated:
-        fail("rungs", "the rig is not simulated")
-
-
-@check("rig", needs=("code-names-resolve",), may_skip=True)
-def rig_file_is_a_model(subject: Subject) -> None:
-    """Complaints about a rig file name its line where its class says what belongs into it.
-
-    Let `file` name a subclass of tactbench.plugin.devices.RigFile.
-    """
-    from tactbench.core.spec.rig_file import RigFile
-
-    if subject.descriptor.file is None:
-        skip("it names no class for its rig file")
-    found = subject.code("file")
-    if not (isinstance(found, type) and issubclass(found, RigFile)):
-        fail("file", f"{subject.descriptor.file} is no subclass of RigFile")
-
-
-CHECKS = (
-    rig_builds, rungs_are_named_once, rig_file_is_a_model, tiny_press_is_carried_out,
-    blocks_fit_their_streams, clocks_go_forward, rates_are_as_stated, samples_are_finite, limits_are_kept,
-    gentle_press_is_within_range, same_seed_same_samples, other_seed_other_samples, press_is_recorded,
-    force_is_recorded, force_follows_the_profile, scene_is_not_changed, plan_says_why,
-)  # fmt: skip

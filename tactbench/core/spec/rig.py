@@ -114,8 +114,8 @@ class EstimatorDescriptor(Frozen):
     scikit-learn's ``fit(X, y)`` and ``predict(X)``."""
     params: dict[str, Any] = Field(default_factory=dict)
     """Defaults; every name a user may set is here."""
-    grid: dict[str, tuple[float, ...]] = Field(default_factory=dict)
-    """Parameters chosen on validation data, and their candidates."""
+    grid: dict[str, tuple[int | float | str | bool | None, ...]] = Field(default_factory=dict)
+    """Parameters chosen on validation data, and their candidates: each keeps its type, 5 is no 5.0."""
     window_grid: tuple[int, ...] = (0,)
     """Candidates for k of the mean filter over samples t-k … t, chosen together with `grid`."""
     looks_at: Literal["features", "time", "nothing", "reference"] = "features"

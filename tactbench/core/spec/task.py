@@ -8,11 +8,17 @@ from typing import Final, Literal
 
 from pydantic import Field, model_validator
 
+from tactbench.core.errors import nearest
 from tactbench.core.spec.events import AlarmPolicy, SlipTarget
 from tactbench.core.spec.quantity import Frozen
 from tactbench.core.spec.scene import Role, Scene
 from tactbench.core.spec.sensor import ChannelKind
 from tactbench.core.spec.summary import Summary
+
+METRICS: Final = (
+    "rmse", "mae", "mean_euclidean_error", "r2", "accuracy", "balanced_accuracy", "macro_f1", "event_f1",
+)  # fmt: skip
+"""Names of metrics, as a task may ask for them."""
 
 WHERE = r"^[A-Za-z_][\w.]*:[A-Za-z_]\w*$"
 """Of code: ``module:callable``."""
@@ -166,6 +172,18 @@ class TaskSpec(Frozen):
     """Tasks that are run whenever this one is asked for: the same question, to be read beside it."""
     replicates: int | None = Field(default=None, ge=1)
     """How often a simulated rig records and answers it anew where nobody says; None: as often as any task."""
+
+    @model_validator(mode="after")
+    def _has_a_metric_and_classes(self) -> TaskSpec:
+        if self.metric not in METRICS:
+            close = nearest(self.metric, METRICS) or METRICS
+            raise ValueError(f"there is no metric {self.metric!r}; did you mean {' or '.join(close)}?")
+        if self.kind == "classification" and isinstance(self.target, ChannelTarget):
+            raise ValueError(
+                f"a channel of kind {self.target.kind} is a number on a continuous scale: give classes or a threshold "
+                "(a LabelTarget, or a SlipTarget of frames) to classify, or ask by kind: regression"
+            )
+        return self
 
     @model_validator(mode="after")
     def _frames_are_answered_in_one_way(self) -> TaskSpec:

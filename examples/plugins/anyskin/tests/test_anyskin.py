@@ -4,7 +4,7 @@ import struct
 
 import numpy as np
 import pytest
-from tactbench.testing import sensor_checks
+from tactbench.testing import plugin_checks
 
 from tactbench_anyskin.driver import FLOATS, SIZE, decode, encode
 
@@ -12,7 +12,7 @@ from tactbench_anyskin.driver import FLOATS, SIZE, decode, encode
 TRAP = struct.unpack("<f", bytes.fromhex("0D0A0041"))[0]
 
 
-@pytest.mark.parametrize("check", sensor_checks("anyskin"), ids=str)
+@pytest.mark.parametrize("check", plugin_checks("anyskin"), ids=str)
 def test_conforms(check):
     check()
 

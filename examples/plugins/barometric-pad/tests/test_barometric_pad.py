@@ -7,13 +7,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from tactbench.testing import sensor_checks
+from tactbench.testing import plugin_checks
 
 MAPPING = Path(__file__).parents[1] / "mapping.yaml"
 NAMES = [f"p{number}" for number in range(1, 9)]
 
 
-@pytest.mark.parametrize("check", sensor_checks("barometric-pad"), ids=str)
+@pytest.mark.parametrize("check", plugin_checks("barometric-pad"), ids=str)
 def test_conforms(check):
     check()
 
@@ -35,7 +35,8 @@ def test_from_tables_to_a_score(tmp_path):
         np.savetxt(tmp_path / "presses" / f"{day}-1.csv", rows, "%.6f", ",", header=",".join(["time_s", "force_n", *NAMES]),
                    comments="")  # fmt: skip
     said = tactbench(tmp_path, "import", str(MAPPING), "--root", ".", "--out", "pad")
-    assert "3 recordings of barometric-pad, 1500 rows" in said
+    facts = dict(line.split(maxsplit=1) for line in said.splitlines())
+    assert (facts["recordings"], facts["sensors"], facts["rows"]) == ("3", "barometric-pad", "1500")
     answer = ("--rig", "replay", "--recordings", "pad", "--task", "force", "--protocol", "deployable")
     rows = json.loads(tactbench(tmp_path, "run", *answer, "--estimator", "ols", "--format", "json"))
     scores = {row["estimator"]: row["score"] for row in rows}

@@ -5,10 +5,10 @@ import subprocess
 import sys
 
 import pytest
-from tactbench.testing import task_checks
+from tactbench.testing import plugin_checks
 
 
-@pytest.mark.parametrize("check", task_checks("contact-x"), ids=str)
+@pytest.mark.parametrize("check", plugin_checks("contact-x"), ids=str)
 def test_conforms(check):
     check()
 

@@ -5,10 +5,10 @@ import sys
 
 import h5py
 import pytest
-from tactbench.testing import effect_checks
+from tactbench.testing import plugin_checks
 
 
-@pytest.mark.parametrize("check", effect_checks("dead-taxels"), ids=str)
+@pytest.mark.parametrize("check", plugin_checks("dead-taxels"), ids=str)
 def test_conforms(check):
     check()
 

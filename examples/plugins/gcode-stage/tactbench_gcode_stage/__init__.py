@@ -7,7 +7,7 @@ that resets when its port is opened stops then, and forgets its place: it cannot
 from tactbench.plugin import hookimpl
 from tactbench.plugin.devices import DeviceDescriptor
 
-TACTBENCH_API = 1
+TACTBENCH_API = 2
 
 
 @hookimpl

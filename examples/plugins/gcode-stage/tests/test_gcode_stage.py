@@ -16,6 +16,7 @@ from tactbench.plugin.devices import (
     PositionerSilentError,
     RigFile,
 )
+from tactbench.testing import plugin_checks
 
 from tactbench_gcode_stage.driver import GcodeStage
 from tactbench_gcode_stage.emulator import GrblEmulator
@@ -24,6 +25,11 @@ OPTIONS = {
     "home_m": -3e-3, "lower_m": -4e-3, "upper_m": 5e-3, "speed_m_s": 5e-3, "acceleration_m_s2": 1.0, "corridor_m": 2e-6,
     "retreat_m": -3e-3, "retreat_speed_m_s": 20e-3,
 }  # fmt: skip
+
+
+@pytest.mark.parametrize("check", plugin_checks("gcode-stage"), ids=str)
+def test_conforms(check):
+    check()
 
 
 @pytest.fixture

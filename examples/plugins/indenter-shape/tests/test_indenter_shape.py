@@ -5,10 +5,10 @@ import subprocess
 import sys
 
 import pytest
-from tactbench.testing import indenter_checks, task_checks
+from tactbench.testing import plugin_checks
 
 
-@pytest.mark.parametrize("check", [*indenter_checks("cone"), *task_checks("indenter-shape")], ids=str)
+@pytest.mark.parametrize("check", [*plugin_checks("cone"), *plugin_checks("indenter-shape")], ids=str)
 def test_conforms(check):
     check()
 

@@ -1,14 +1,14 @@
 """Packets by the published package's rule, and the conformance kit."""
 
 import pytest
-from tactbench.testing import sensor_checks
+from tactbench.testing import plugin_checks
 
 from tactbench_robotiq_tsf85.driver import packet, static_taxels
 
 STATIC = bytes.fromhex("14") + b"".join((1000 + n).to_bytes(2, "big") for n in range(28))
 
 
-@pytest.mark.parametrize("check", sensor_checks("robotiq-tsf85"), ids=str)
+@pytest.mark.parametrize("check", plugin_checks("robotiq-tsf85"), ids=str)
 def test_conforms(check):
     check()
 

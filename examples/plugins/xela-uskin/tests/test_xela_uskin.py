@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from tactbench.plugin import Quality
 from tactbench.plugin.devices import CanFrame, DriverSettings, EmulatedDevice, EmulatedDevices, EmulatorSettings
-from tactbench.testing import sensor_checks
+from tactbench.testing import plugin_checks
 
 from tactbench_xela_uskin import REST
 from tactbench_xela_uskin.driver import Emulator, USkinDriver, decode, encode
@@ -18,7 +18,7 @@ VECTORS = [
 ]
 
 
-@pytest.mark.parametrize("check", sensor_checks("xela-uskin"), ids=str)
+@pytest.mark.parametrize("check", plugin_checks("xela-uskin"), ids=str)
 def test_conforms(check):
     check()
 

@@ -6,7 +6,7 @@ import math
 from typing import TYPE_CHECKING
 
 from tactbench.core.samples import SkinGrid, SkinState
-from tactbench.core.spec.sensor import SensorSpec, Vector
+from tactbench.core.spec.sensor import Vector
 from tactbench.core.spec.skin import FluidBackedShell, Skin, SkinSheet
 
 if TYPE_CHECKING:
@@ -15,11 +15,6 @@ if TYPE_CHECKING:
 PATCH_MM, PATCH_CELLS = 1.25, 1.5
 """Standard deviation of a local press: half the radius of a fingertip's contact, and no less than the grid resolves
 [cells]."""
-
-
-def sheet_of(spec: SensorSpec) -> SkinSheet | None:
-    """Return the sheet of a sensor's skin; None: it declares no skin."""
-    return None if spec.skin is None else spec.skin.sheet
 
 
 def on_sheet_mm(sheet: SkinSheet, position_m: Vector) -> tuple[float, float]:
@@ -47,11 +42,7 @@ def patch_mm(grid: SkinGrid) -> float:
 
 
 def pressed_locally(
-    skin: Skin,
-    grid: SkinGrid,
-    force_n: float,
-    at_mm: tuple[float, float] = (0.0, 0.0),
-    dragged: tuple[float, float] | None = None,
+    skin: Skin, grid: SkinGrid, force_n: float, at_mm: tuple[float, float], dragged: tuple[float, float] | None
 ) -> SkinState:
     """Return the state that a narrow press would leave: a bell of pressure, and a dent of the same shape.
 
@@ -64,39 +55,27 @@ def pressed_locally(
     import numpy as np
 
     sigma = patch_mm(grid)
-    bell = np.exp(-((grid.x_mm[:, None] - at_mm[0]) ** 2 + (grid.s_mm[None, :] - at_mm[1]) ** 2) / (2 * sigma**2))
-    rest = _thickness_mm(skin, grid)
-    deepest = min(force_n / 3, 0.9)
-    deflection = deepest * bell * rest
-    moved, shear = None, None
-    if dragged is not None:
-        outwards = np.stack(np.broadcast_arrays(grid.x_mm[:, None] - at_mm[0], grid.s_mm[None, :] - at_mm[1])) / sigma
-        way = np.array(dragged)[:, None, None]
-        moved = (outwards + way) * deflection / 3
-        shear = way * force_n / (2 * math.pi * sigma**2) * bell
-    least = skin.residual_film.to("mm") if isinstance(skin, FluidBackedShell) else 0.0
-    return SkinState(
-        grid=grid,
-        force_n=force_n,
-        deflection_mm=deflection,
-        pressure_mpa=force_n / (2 * math.pi * sigma**2) * bell,
-        thickness_mm=np.maximum(rest - deflection, least),
-        depth_mm=float(deflection.max()),
-        fluid_pressure_mpa=0.001 * force_n if isinstance(skin, FluidBackedShell) else 0.0,
-        contact_radius_mm=math.sqrt(5.0) * sigma if force_n else 0.0,
-        residual=0.0,
-        tangential_displacement_mm=moved,
-        shear_mpa=shear,
-    )
-
-
-def _thickness_mm(skin: Skin, grid: SkinGrid) -> FloatArray:
-    """Return the (nx, ns) film, foam or layer of a skin at rest."""
-    import numpy as np
-
+    x_mm, s_mm = np.meshgrid(grid.x_mm - at_mm[0], grid.s_mm - at_mm[1], indexing="ij")
+    bell = np.exp(-(x_mm**2 + s_mm**2) / (2 * sigma**2))
+    pressure = force_n / (2 * math.pi * sigma**2) * bell
+    fluid = isinstance(skin, FluidBackedShell)
     if isinstance(skin, FluidBackedShell):
         outer = skin.sheet.outer_radius
         radius = math.inf if outer is None else outer.to("mm")
-        film: FloatArray = skin.film.at(grid.x_mm, grid.s_mm / radius)
-        return film
-    return np.full((grid.x_mm.size, grid.s_mm.size), skin.thickness.to("mm"))
+        rest: FloatArray = skin.film.at(grid.x_mm, grid.s_mm / radius)
+        least = skin.residual_film.to("mm")
+    else:
+        rest, least = np.full(bell.shape, skin.thickness.to("mm")), 0.0
+    deflection = min(force_n / 3, 0.9) * bell * rest
+    moved, shear = None, None
+    if dragged is not None:
+        way = np.array(dragged)[:, None, None]
+        moved = (np.stack([x_mm, s_mm]) / sigma + way) * deflection / 3
+        shear = way * pressure
+    return SkinState(
+        grid=grid, force_n=force_n, deflection_mm=deflection, pressure_mpa=pressure,
+        thickness_mm=np.maximum(rest - deflection, least), depth_mm=float(deflection.max()),
+        fluid_pressure_mpa=0.001 * force_n if fluid else 0.0,
+        contact_radius_mm=math.sqrt(5.0) * sigma if force_n else 0.0, residual=0.0,
+        tangential_displacement_mm=moved, shear_mpa=shear,
+    )  # fmt: skip

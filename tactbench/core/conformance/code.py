@@ -1,0 +1,91 @@
+"""Checks of every plugin: its code can be found, its module is light, its numbers are numbers."""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import subprocess
+import sys
+from collections.abc import Iterator
+from functools import lru_cache
+from typing import Any
+
+from tactbench.core.conformance.check import CODE, KINDS, Subject, check, code_of, fail, skip
+
+HEAVY = frozenset({
+    "can", "cv2", "dask", "distributed", "h5py", "jax", "matplotlib", "numba", "pandas", "pyarrow", "rclpy", "rich",
+    "scipy", "serial", "sklearn", "spidev", "tensorflow", "torch", "transformers",
+})  # fmt: skip
+"""Packages that take tenths of a second to import, or that need not be installed where plugins are listed."""
+
+
+@check(*KINDS)
+def code_names_resolve(subject: Subject) -> None:
+    """Code is named by text and imported when it is needed, so that a slip of the pen shows in the middle of a run.
+
+    Correct the ``module:attribute`` in the descriptor, or the module itself where its import fails.
+    """
+    named = {field: where for field in CODE if (where := subject.names_code(field))}
+    if not named:
+        skip("its descriptor names no code")
+    for field, where in named.items():
+        with code_of(field, subject):
+            found = subject.code(field)
+        if not callable(found):
+            fail(field, f"{where} is a {type(found).__name__}, and something that can be called is needed")
+
+
+@check(*KINDS)
+def import_is_light(subject: Subject) -> None:
+    """The module of an entry point is imported by every command, also by one that only lists names.
+
+    Move imports of large packages into the module that the descriptor names, or into functions.
+    """
+    heavy = sorted(HEAVY.intersection(_imported_with(subject.module)))
+    if heavy:
+        fail(subject.module, f"its import also imports {', '.join(heavy)}")
+
+
+@lru_cache(maxsize=64)
+def _imported_with(module: str) -> list[str]:
+    """Return the packages that a module brings into a fresh interpreter."""
+    script = (
+        "import importlib, json, sys\n"
+        "import tactbench.plugin, tactbench.plugin.simulation, tactbench.plugin.devices\n"
+        "before = set(sys.modules)\n"
+        f"importlib.import_module({module!r})\n"
+        "print(json.dumps(sorted({name.partition('.')[0] for name in set(sys.modules) - before})))\n"
+    )
+    path = os.pathsep.join(part for part in sys.path if part)
+    done = subprocess.run(
+        [sys.executable, "-W", "ignore", "-c", script], env={**os.environ, "PYTHONPATH": path}, capture_output=True,
+        text=True, stdin=subprocess.DEVNULL, check=False,
+    )  # fmt: skip
+    if done.returncode != 0:
+        fail(module, f"it cannot be imported in a fresh interpreter: {done.stderr.strip().rpartition(chr(10))[2]}")
+    found: list[str] = json.loads(done.stdout.strip().rpartition("\n")[2])
+    return found
+
+
+@check(*KINDS)
+def numbers_are_finite(subject: Subject) -> None:
+    """NaN in a spec passes every comparison, and shows as a score of NaN.
+
+    Leave the field out where nobody states the number.
+    """
+    for place, value in walk(subject.descriptor, ""):
+        if isinstance(value, float) and not math.isfinite(value):
+            fail(place, f"it is {value}")
+
+
+def walk(value: Any, place: str) -> Iterator[tuple[str, Any]]:
+    """Yield every model and every plain value in a model, with its place by names."""
+    yield place, value
+    if hasattr(type(value), "model_fields"):
+        for field in type(value).model_fields:
+            yield from walk(getattr(value, field), f"{place}.{field}".removeprefix("."))
+    elif isinstance(value, dict | tuple | list):
+        pairs = value.items() if isinstance(value, dict) else enumerate(value)
+        for key, one in pairs:
+            yield from walk(one, f"{place}[{getattr(one, 'name', key)}]")

@@ -1,0 +1,242 @@
+"""Mistakes that makers make, one in each copy of a sound plugin: found by `check`, with the field, line or words."""
+
+from __future__ import annotations
+
+import pytest
+
+from tactbench.core.conformance.check import CHECKS
+from tactbench.core.conformance.run import plugins_named, run_checks, subjects_named
+from tactbench.core.plugins.registry import load_registry
+from tests.conftest import THIRD_PARTY
+
+SHELF = THIRD_PARTY / "flawed"
+SOUND = ("pad", "scale", "stage", "rig", "press", "task", "force", "estimator", "effect", "shape", "profile")
+PACKAGE = {"pad": "devices", "scale": "devices", "stage": "devices", "rig": "rigs", "press": "rigs"}
+KIND = {
+    "pad": "sensor", "scale": "device", "stage": "device", "rig": "rig", "press": "rig", "task": "task",
+    "force": "task", "estimator": "estimator", "effect": "effect", "shape": "indenter", "profile": "profile",
+}  # fmt: skip
+PLACE, WORLD = "(2e-3, 1.5e-3, 0.0)", "super().read(timeout_s)"
+CAUGHT = """    def caught(self, timeout_s):
+        try:
+            return super().read(timeout_s)
+        except Exception:
+            return []
+
+    def quiet"""
+STAMPED = "sequence=self._unwrap(self._numbers))"
+# What is flawed, what its author should have written, what was written, the check that finds it ("" where the plugin
+# cannot even be loaded), and words of the message.
+MISTAKES = [
+    ("pad", 'thickness=assumed(2, "mm", WHY)', 'thickness=assumed(2, "MPa", WHY)', "", "thickness"),
+    ("pad", 'young=assumed(0.5, "MPa", WHY)', 'young=assumed(0.5, "megapascal", WHY)', "", "line"),
+    ("pad", 'kind="taxel"', 'kind="taxels"', "", "kind"),
+    ("pad", 'f"t{n}"', '"t1"', "", "channel names must be unique"),
+    ("pad", "TACTBENCH_API = 2", "TACTBENCH_API = 99", "", "TACTBENCH_API"),
+    ("pad", "def tactbench_sensors", "def tactbench_sensor", "", "tactbench_sensor"),
+    ("pad", "transduction:build", "transducer:build", "code-names-resolve", "transducer"),
+    ("pad", '"""A pad of', 'import h5py\n"""A pad of', "import-is-light", "h5py"),
+    ("pad", "lower=-2048", 'lower=float("nan")', "numbers-are-finite", "channels[t1].lower: it is nan"),
+    ("pad", "upper=2047, ", "", "limits-are-in-order", "channels[t1].upper"),
+    ("pad", "upper=2047", "upper=70000", "limits-are-in-order", "does not fit int16"),
+    ("pad", "lower=-2048", "lower=200", "limits-are-in-order", "channels[t1].rest: 100 count is not within lower"),
+    ("pad", 'kind="taxel"', 'kind="force", unit="m"', "units-are-of-the-kind", "measured in N"),
+    ("pad", "rate_hz=100.0", "rate_hz=0.01", "rates-and-delays-are-possible", "is it a period? One of 0.01 s is 100"),
+    ("pad", 'link_delay=assumed(2, "ms"', 'link_delay=assumed(2, "mm"', "", "link_delay"),
+    ("pad", 'link_delay=assumed(2, "ms"', 'link_delay=assumed(2, "min"', "rates-and-delays-are-possible", "2 min is"),
+    ("pad", PLACE, "(2.0, 1.5, 0.0)", "positions-are-in-metres", "channels[t4].position_m: 2 m from"),
+    ("pad", PLACE, "(2.0, 1.5, 0.0)", "positions-are-in-metres", "are these millimetres?"),
+    ("pad", PLACE, "(0.08, 0.06, 0.0)", "positions-are-in-metres", "are these inches?"),
+    ("pad", PLACE, "(2e-3, -1.5e-3, 0.0)", "positions-are-apart", "channels[t4].position_m: it is also that of t3"),
+    ("pad", PLACE, "(7e-3, 1.5e-3, 0.0)", "positions-are-on-the-sheet", "x 7 mm"),
+    ("pad", "normal=(0.0, 0.0, 1.0)", "normal=(0.0, 1.0, 1.0)", "normals-point-outwards", "its length is 1.414"),
+    ("pad", "normal=(0.0, 0.0, 1.0)", "normal=(0.0, 0.0, 1.0 if n < 4 else -1.0)", "normals-point-outwards", "t4"),
+    ("pad", 'white=assumed(1, "count"', 'white=assumed(1, "mV"', "nuisances-are-in-its-units", "[taxel].white"),
+    ("pad", '{"taxel": Nui', '{"dc_pressure": Nui', "nuisances-are-in-its-units", "it has taxel"),
+    ("pad", 'rest=assumed(100, "count", WHY)', 'rest=assumed(500, "count", WHY)', "rest-is-as-stated", "t1: rest"),
+    ("pad", "sign=1", "sign=-1", "sign-is-as-stated", "t1: sign: -1 is stated"),
+    ("pad", 'indexing="ij"', 'indexing="xy"', "response-is-where-it-is-pressed", "axes swapped or mirrored?"),
+    ("pad", "py * 1e3", "-py * 1e3", "response-is-where-it-is-pressed", "axes swapped or mirrored?"),
+    ("pad", "px * 1e3", "px", "response-is-where-it-is-pressed", "transducer"),
+    ("pad", "100.0 + gain", "100.0 / state.force_n + gain", "transducer-reads", "line 18): ZeroDivisionError"),
+    ("pad", "state.pressure_mpa, 2)", "np.log(1.5 - state.depth_mm) * state.pressure_mpa, 2)", "transducer-reads",
+     "not finite at 100 N"),
+    ("pad", "channel_names:", "sensor.channels():", "transducer-reads", "transduction.py, line 11"),
+    ("pad", "in channel_names", "in channel_names[1:]", "transducer-reads", "shape (3,) for 4 channels"),
+    ("pad", "in channel_names", "in sorted(channel_names)", "order-follows-the-request", "another order"),
+    ("pad", "state.pressure_mpa, 2", "state.shear_mpa[0], 2", "transducer-reads", "spec.reads_shear"),
+    ("pad", "reads_shear=()", 'reads_shear=("taxel",)', "shear-turns-with-its-direction", "no channel changes"),
+    ("pad", "return 100.0", "state.pressure_mpa[:] *= 2; return 100.0", "transducer-has-no-memory", "pressure_mpa"),
+    ("pad", "return 100.0", "return 100.0 + np.random.rand(4)", "transducer-has-no-memory", "the same state"),
+    ("pad", "assumed(400,", "assumed(0.4,", "it-answers-to-a-press", "no more than noise and step"),
+    ("pad", "assumed(400,", "assumed(4e6,", "range-of-the-task-is-measured", "stand at a limit in a press to"),
+    ("pad", "state.pressure_mpa, 2)", "state.pressure_mpa, 2) / (1 + 3 * state.force_n**2)",
+     "more-load-more-response", "under 1.5 N"),
+    ("pad", STAMPED, STAMPED[:-1] + ", t_ns=block.t_ns / 1e9)", "driver-reads", "it is in seconds"),
+    ("pad", STAMPED, STAMPED[:-1] + ", t_ns=block.t_ns // 1000)", "driver-reads", "it is in microseconds"),
+    ("pad", STAMPED, STAMPED[:-1] + ", t_ns=block.t_ns // 1000000)", "driver-reads", "it is in milliseconds"),
+    ("pad", STAMPED, STAMPED[:-1] + ", t_ns=block.t_ns - block.t_ns[0])", "driver-reads", "device_ns"),
+    ("pad", STAMPED, STAMPED[:-1] + ", t_ns=block.t_ns * 0.5)", "driver-reads", "float64, and int64"),
+    ("pad", ("self._numbers.append(data[1])", "yield self.sample("),
+     ("self._numbers += [data[1]] * 2", "yield Sample([0] * len(values)); yield self.sample("), "driver-reads",
+     "200 Hz came"),
+    ("pad", "self._left = data\n", "self._left = b''\n", "driver-takes-any-pieces", "in pieces"),
+    ("pad", "data = data[size:]\n", "data = data[size:]\n            break\n", "driver-takes-any-pieces", "pieces or"),
+    ("pad", "or sum(data[: size - 1]) % 256 != data[size - 1]", "", "driver-drops-damaged-frames", "lost 5 bytes"),
+    ("pad", "self.counted[", "{'bytes of no frame': 0}[", "driver-drops-damaged-frames", "neither counted nor marked"),
+    ("pad", "data = data[1:]\n", "raise ValueError(data[:1])\n", "driver-drops-damaged-frames", "line.py, line"),
+    ("pad", "self._unwrap(self._numbers)", "np.array(self._numbers)", "driver-counts-on", "255 is followed by 0"),
+    ("pad", "[self.scale * value", "[abs(self.scale * value)", "driver-reads-what-is-sensed", "is its sign turned?"),
+    ("pad", "in values])", "in values[::-1]])", "driver-reads-what-is-sensed", "which is what t4 senses"),
+    ("pad", 'f"<{len(self.stream.channels)}{self.layout}", data', 'f">{len(self.stream.channels)}{self.layout}", data',
+     "driver-reads-what-is-sensed", "taxels.t1"),
+    ("pad", "def begin(self)", "def start(self)", "driver-starts-afresh", "s before it was started"),
+    ("pad", WORLD, "super().read(0.5)", "driver-does-not-wait-when-told-so", "read(0) took"),
+    ("pad", (WORLD, "    def quiet"), ("self.caught(timeout_s)", CAUGHT), "driver-reports-unplug", "as if nothing"),
+    ("pad", 'link_kind, layout', 'defaults = {"no_such_option": 0}\n    link_kind, layout',
+     "driver-refuses-unknown-options", "no_such_option"),
+    ("pad", '{"model": "framed"}', '{"serial": 7}', "driver-opens", "texts by name"),
+    ("scale", 'unit="N"', 'unit="mN"', "units-are-the-rigs", "[fx].unit"),
+    ("scale", 'FORCES, "i", 1e-3\n    _zero', 'FORCES, "i", 0.101972\n    _zero', "driver-reads-what-is-sensed",
+     "are these gram-force?"),
+    ("scale", 'FORCES, "i", 1e-3\n    _zero', 'FORCES, "i", 1.0\n    _zero', "driver-reads-what-is-sensed",
+     "are these millinewtons?"),
+    ("scale", "self._zero = self._last", "pass", "tare-and-overload-are-true", "it says that a zero is taken"),
+    ("scale", "Quality.SATURATED,", "Quality.GOOD,", "tare-and-overload-are-true", "not marked SATURATED"),
+    ("stage", 'unit="m"', 'unit="mm"', "units-are-the-rigs", "[position].unit"),
+    ("stage", 'self.link.write(b"go")', 'self.link.write(b"run"); self.link.write(b"go")',
+     "opening-and-reading-move-nothing", "nobody has moved it"),
+    ("rig", 'unit="N"', 'unit="gf"', "force-follows-the-profile", "channels[fz].unit"),
+    ("rig", "(self.force +", "(102.0 * self.force +", "force-follows-the-profile", "are these gram-force?"),
+    ("rig", "(self.force +", "(-self.force +", "force-follows-the-profile", "is its sign turned?"),
+    ("rig", "default_rng(seed)", "default_rng(0)", "seeds-decide", "two seeds"),
+    ("rig", "default_rng(seed)", "default_rng()", "seeds-decide", "the same seed"),
+    ("rig", "t_ns, data)", "t_ns[::-1].copy(), data)", "clocks-are-in-nanoseconds", "t_ns"),
+    ("rig", "self.t_s * 1e9", "self.t_s * 1e3", "clocks-are-in-nanoseconds", "it is in milliseconds"),
+    ("rig", '{"rate_hz": 100.0}', '{"rate_hz": 200.0}', "clocks-are-in-nanoseconds", "200 Hz is stated"),
+    ("rig", "data = np.round(", "data = np.round(-1e4 + ", "limits-are-kept", "beyond its limits"),
+    ("rig", "t_ns, data)", "t_ns, data[:, 1:])", "blocks-fit-their-streams", "a block has shape"),
+    ("rig", "t_ns, data)", "t_ns, data * np.nan)", "blocks-fit-their-streams", "not finite"),
+    ("press", "force = self.force[rows] + LEFT_N", "force = -self.force[rows]", "real-rig-presses", "sign turned?"),
+    ("press", "+ LEFT_N", "+ (2.0 if 300 < begin < 400 else 0.0)", "real-rig-presses", "the force rises to"),
+    ("press", "seed)\n\n\nclass PressRig", "seed)\n        globals()['LEFT_N'] = 0.4\n\n\nclass PressRig",
+     "real-rig-lets-go", "before anything touches"),
+    ("press", "self.stopped = True", "self.stopped = False", "real-rig-lets-go", "are left after it has returned"),
+    ("task", 'metric="macro_f1"', 'metric="macro_f2"', "", "did you mean macro_f1"),
+    ("task", 'target=LabelTarget(name="side")', "target=ChannelTarget()", "", "give classes or a threshold"),
+    ("task", 'metric="macro_f1"', 'metric="rmse"', "metric-has-its-unit", "is for regression"),
+    ("task", 'unit="1"', 'unit="mm"', "metric-has-its-unit", "spec.unit"),
+    ("task", '("roles", "session")', '("leave-one-out",)', "names-are-known", "spec.splits[0]"),
+    ("task", '("deployable",), splits=("roles", "s', '("karl",), splits=("roles", "s', "names-are-known", "protocols"),
+    ("task", '("logistic",)', '("ols",)', "names-are-known", "spec.estimators[0]"),
+    ("task", '("majority",)', '("logistic",)', "names-are-known", "no trivial answer"),
+    ("task", 'LabelTarget(name="side")', 'LabelTarget(name="sides")', "answers-are-in-the-scenes", "there is side"),
+    ("task", 'x=assumed(mm, "mm", WHY)', 'x=assumed(mm, "m", WHY)', "its-scene-is-carried-out", "scenes[train-left]"),
+    ("task", 'name=f"{role}-{side}"', "name=role", "answers-are-in-the-scenes", "two scenes have it"),
+    ("task", 'labels={"side": side', 'labels={"side": f"{side} {role}"', "answers-are-in-the-scenes", "role test has"),
+    ("task", 'observe=("taxel",)', 'observe=("ac_pressure",)', "answers-are-in-the-scenes", "observe"),
+    ("force", 'metric="rmse", unit="N"', 'metric="rmse", unit="kN"', "metric-has-its-unit", "is in N, not in kN"),
+    ("force", "ChannelTarget()", 'ChannelTarget(name="shear")', "its-scene-is-carried-out", "there is fz"),
+    ("estimator", '"alpha": 1.0,', '"lambda_": 1.0,', "answers-have-the-shape", "lambda_"),
+    ("estimator", 'grid={"alpha"', 'grid={"alfa"', "candidates-are-accepted", "grid[alfa]"),
+    ("estimator", 'kinds=("regression",)', 'kinds=("regresion",)', "", "kinds"),
+    ("estimator", "(40, 60)", "(40.0, 60)", "candidates-are-accepted", "grid[rows] = 40.0"),
+    ("estimator", "Z = (X", "X -= self.middle; Z = (X", "data-is-not-changed", "fit: X"),
+    ("estimator", "+ (X - self.middle)", "+ (X - X.mean(axis=0))", "rows-are-answered-alone", "a row asked alone"),
+    ("estimator", "return self.level + (X", "return -self.level - (X", "it-learns", "its error is"),
+    ("estimator", "@ self.weights", "@ self.weigths", "answers-have-the-shape", "code.py, line 25"),
+    ("estimator", "np.where(spread > 0, spread, 1.0)", "spread", "answers-have-the-shape", "predict"),
+    ("estimator", "X.mean(axis=0), y.mean()", "X.mean(axis=0), (KEPT.append(y.mean()), sum(KEPT))[1]",
+     "seed-and-data-decide", "answer differently"),
+    ("effect", '("disturbance",)', '("disturbence",)', "it-is-applied", "did you mean disturbance"),
+    ("effect", 'Reason(False, "only by name", 0.0)', "None", "it-is-applied", "a Reason("),
+    ("effect", "run.tracks", "run.track", "it-is-applied", "code.py, line 37"),
+    ("effect", "0.01 * run", "np.nan * run", "it-is-applied", "where"),
+    ("effect", 'run.of_recording("ripple", *track.scope)', "np.random.default_rng()", "it-is-applied", "same seed"),
+    ("shape", "(x_mm**2 + y_mm**2)", "x_mm**2", "indenter-is-pressed", "returned shape (61, 1)"),
+    ("shape", "(2 * size)", "(2 * size) + 0.1", "indenter-is-pressed", "0.1 mm high at (0, 0)"),
+    ("profile", "(0, 0, peak)", "(1, 1, peak)", "path-is-recorded", "it begins at 1 N"),
+    ("profile", "(0, 0, peak)", "(0, 0, 102 * peak)", "path-is-recorded", "are these gram-force?"),
+    ("profile", "samples=20", "samples=2", "path-is-recorded", "samples reach"),
+]  # fmt: skip
+PLANTED = [(number, *mistake) for number, mistake in enumerate(MISTAKES, 1)]
+
+
+def written(folder, number, name, right, wrong):
+    """Write a copy of a sound package with one mistake, named by its number, as an installer leaves it."""
+    old, new = f"sound_{PACKAGE.get(name, 'others')}", f"planted{number}_{PACKAGE.get(name, 'others')}"
+    texts = {path.name: path.read_text() for path in (SHELF / old).glob("*.py")}
+    pairs = [(right, wrong)] if isinstance(right, str) else list(zip(right, wrong, strict=True))
+    for one, _ in pairs:
+        assert any(one in text for text in texts.values()), f"{one!r} is not in {old}"
+    (folder / new).mkdir()
+    for file, text in texts.items():
+        for one, other in pairs:
+            text = text.replace(one, other)
+        changed = text.replace("sound_", f"planted{number}_")
+        (folder / new / file).write_text(changed.replace("sound-", f"planted{number}-"))
+    info = folder / f"{new}-1.0.dist-info"
+    info.mkdir()
+    (info / "METADATA").write_text(f"Metadata-Version: 2.1\nName: {new}\nVersion: 1.0\nSummary: Planted\n")
+    (info / "entry_points.txt").write_text(f"[tactbench]\nplanted-{number} = {new}\n")
+
+
+@pytest.fixture(scope="module")
+def registry(tmp_path_factory):
+    """All of them and the sound ones, installed side by side."""
+    folder = tmp_path_factory.mktemp("site")
+    for number, name, right, wrong, _, _ in PLANTED:
+        written(folder, number, name, right, wrong)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.syspath_prepend(folder)
+        patch.syspath_prepend(SHELF)
+        yield load_registry()
+
+
+def all_but(check):
+    """Return the names of all checks but one and those that it needs: the others take time and show nothing here."""
+    wanted, needs = [check], {one.name: one.needs for one in CHECKS}
+    for name in wanted:
+        wanted += needs[name]
+    return {one.name for one in CHECKS if one.mode != "recording"} - set(wanted)
+
+
+def report_of(registry, tmp_path, kind, name, without=()):
+    (subject,) = subjects_named(registry, name, (kind,))
+    rig_file = None
+    if name.endswith("press"):
+        rig_file = tmp_path / "rig.yaml"
+        rig_file.write_text(f"version: 1\nrig: {name}\nsensors:\n  sound-pad: {{link: 'loop://'}}\n")
+    modes = ("passive",) if rig_file is None else ("passive", "invasive")
+    return run_checks(subject, modes=modes, rig_file=rig_file, isolated=False, without=without)
+
+
+@pytest.mark.parametrize("name", SOUND)
+def test_without_a_mistake_it_passes(registry, tmp_path, name):
+    report = report_of(registry, tmp_path, KIND[name], f"sound-{name}")
+    assert report.ok, str(report)
+    assert report.level == "silver"
+
+
+@pytest.mark.parametrize(
+    ("number", "name", "right", "wrong", "check", "words"),
+    PLANTED,
+    ids=[f"{row[1]}-{row[4]}-{row[0]}" for row in PLANTED],
+)
+def test_a_mistake_is_found_and_named(registry, tmp_path, number, name, right, wrong, check, words):
+    if not check:
+        (row,) = plugins_named(registry, f"planted-{number}")
+        assert row.status == "failed"
+        assert words in row.reason
+        return
+    report = report_of(registry, tmp_path, KIND[name], f"planted{number}-{name}", all_but(check))
+    found = {one.check: f"{one.where}: {one.text}" for one in report.failed}
+    assert words in found.get(check, ""), str(report)
+    assert report.level is None
+
+
+def test_every_check_has_found_one():
+    found = {check for _, _, _, check, _ in [one[1:] for one in PLANTED]}
+    elsewhere = {"expected-failures-are-checks", "real-device-answers",
+                 }  # fmt: skip
+    assert {one.name for one in CHECKS if one.mode != "recording"} - elsewhere <= found
