@@ -221,7 +221,7 @@ def test_mistakes_are_named_before_anything_is_computed(folder, call, said):
 def test_a_run_is_that_of_the_verb_and_leaves_the_same_folder(folder, here, tmp_path):
     found = tactbench.run(task="force", recordings=folder, estimator=["ridge", "ols"], split="session", out="mine")
     table = Verbs(tmp_path, here=True)("leaderboard", "mine").stdout
-    assert repr(found).splitlines()[0] in table
+    assert repr(found).split()[:8] == table.split()[:8]  # times may make columns wider, and the title with them
     assert {row["estimator"] for row in found} == {"ridge", "ols", "mean", "time-index"}
     again = tactbench.results("mine")
     assert list(again) == list(found)

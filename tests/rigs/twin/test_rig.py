@@ -9,9 +9,9 @@ import sys
 import numpy as np
 import pytest
 
+from tactbench.core.spec.drive import ForceLoop
 from tactbench.core.spec.scene import NUISANCES, Simulation
 from tactbench.plugin import (
-    ForceLoop,
     ForceRamp,
     Indenter,
     NotApplicable,
