@@ -10,15 +10,14 @@ which the fault is noticed. A schedule that takes longer than its virtual time h
 
 from __future__ import annotations
 
-import importlib.util
 import sys
 import time
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+import guard_faults as faults
 import numpy as np
 
 from tactbench.devices.emulation.line import LinkFault
@@ -38,15 +37,6 @@ from tactbench.plugin.devices import (
 from tactbench.rigs.parallel_manipulator.force_torque.net_ft.driver import build as build_force
 from tactbench.rigs.parallel_manipulator.motor.driver import FaulhaberDriver
 from tactbench.rigs.parallel_manipulator.motor.emulator import MotorEmulator, MotorFault
-
-if TYPE_CHECKING:
-    import guard_faults as faults
-else:
-    _spec = importlib.util.spec_from_file_location("guard_faults", Path(__file__).with_name("guard_faults.py"))
-    faults = sys.modules.get("guard_faults") or importlib.util.module_from_spec(_spec)
-    if "guard_faults" not in sys.modules:
-        sys.modules["guard_faults"] = faults
-        _spec.loader.exec_module(faults)
 
 RAILS = ("joint-1", "joint-2", "joint-3")
 WAY_M, POINTS = 1e-3, 8

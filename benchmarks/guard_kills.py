@@ -10,7 +10,6 @@ the machine was too busy to keep its beat, is not counted, and said. So is the l
 
 from __future__ import annotations
 
-import importlib.util
 import json
 import os
 import random
@@ -23,21 +22,14 @@ from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import IO, TYPE_CHECKING, Any
+from typing import IO, Any
+
+import guard_faults as faults
 
 from tactbench.plugin import TactbenchError
 from tactbench.plugin.devices import DeviceSettings, GuardLostError, GuardProcess, ProcessSettings
 from tactbench.rigs.parallel_manipulator.motor.driver import FaulhaberDriver, retreat_command
 from tactbench.rigs.parallel_manipulator.motor.profile import FaulhaberOptions
-
-if TYPE_CHECKING:
-    import guard_faults as faults
-else:
-    _spec = importlib.util.spec_from_file_location("guard_faults", Path(__file__).with_name("guard_faults.py"))
-    faults = sys.modules.get("guard_faults") or importlib.util.module_from_spec(_spec)
-    if "guard_faults" not in sys.modules:
-        sys.modules["guard_faults"] = faults
-        _spec.loader.exec_module(faults)
 
 PACKAGE = "tactbench.rigs.parallel_manipulator"
 PERIODS_S = {115200: 10e-3, 9600: 30e-3}
