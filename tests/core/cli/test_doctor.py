@@ -73,7 +73,7 @@ def test_what_does_not_work_comes_first_and_what_works_in_one_line(doctor_here):
     named = {(one["kind"], one["name"]): one for one in about["host"]}
     assert [name for kind, name in named if kind == "serial port"] == sorted(port.device for port in comports())
     assert "sleeps of 5 ms end" in named["clock", "clock"]["text"]
-    offered = {"dask", "fast", "multicast", "parquet", "spi", "wavelets", "xlsx"}
+    offered = {"dask", "fast", "mcap", "multicast", "parquet", "spi", "wavelets", "xlsx"}
     assert {name for kind, name in named if kind == "extra"} == offered
 
 

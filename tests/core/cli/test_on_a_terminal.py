@@ -40,10 +40,10 @@ def test_ctrl_c_ends_it_with_one_sentence_and_the_next_run_continues(tmp_path, c
     assert "Traceback" not in seen
     assert "KeyboardInterrupt" not in seen
     folder = tmp_path / str(attempt)
-    assert not [path for path in folder.rglob("*") if path.suffix in (".partial", ".completing")]
     finished = {path: path.read_bytes() for path in folder.rglob("*.h5")}
     Verbs(folder, here=True)(*command[2:])
     assert {path: path.read_bytes() for path in finished} == finished, "what was finished is reused, not made again"
+    assert not [path for path in folder.rglob("*") if path.suffix in (".partial", ".completing")]
 
 
 def test_the_table_so_far_comes_with_each_replicate_and_stays_off_the_end(tmp_path):
