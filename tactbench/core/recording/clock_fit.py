@@ -20,7 +20,7 @@ from tactbench.core.spec.recording import ClockSegment, StreamClock
 
 STRETCH_NS = 30_000_000_000
 """Length of what one line is fitted to. Clocks wander: at 1 ppm with a period of 600 s one line over 600 s errs by
-190 us, lines over 30 s by some us [measured: benchmarks/clock_fit.py]. Shorter ones see fewer least delays."""
+190 us, lines over 30 s by some us [measured: studies/clock_fit.py]. Shorter ones see fewer least delays."""
 LEAP_NS = STRETCH_NS // 2
 """A longer step of the device's times begins a new run of lines: two stretches would no longer overlap."""
 WINDOWS = 6

@@ -4,7 +4,7 @@ A ring of 1.6 mm about 5.51 mm, 1.1 mm below the core's axis, its inner face hel
 kept and a frictionless plate pressed on (scikit-fem, quadratic, plane strain; active set on the outer face). Beside it
 the shell with kx = 0 and what holds it. Printed: the fluid's pressure in counts at two deflections of the midline.
 
-Usage: python benchmarks/skin_cross_section.py
+Usage: python studies/skin_cross_section.py
 """
 
 from __future__ import annotations

@@ -11,7 +11,7 @@ gamma       0.5 ms times gamma(2): few delays near the least one
 Every figure is of the times of all samples, as a recording stores them. `one line` fits one line to the whole record
 instead of one to each 30 s. Least squares stands beside. SIM.
 
-Usage: python benchmarks/clock_fit.py [--runs 250] [--quick]
+Usage: python studies/clock_fit.py [--runs 250] [--quick]
 """
 
 from __future__ import annotations

@@ -6,7 +6,7 @@ electrodes' radius, is fed through a film of the tip's thickness in three dimens
 electrodes; even films, and films that thin or thicken from the disc outwards as the tip's does. First stands the tip
 itself in hexahedra, on which the discs are staircases of nodes: coarser, but with the facet's true shape.
 
-Usage: python benchmarks/film_in_three_dimensions.py
+Usage: python studies/film_in_three_dimensions.py
 """
 
 from __future__ import annotations

@@ -12,7 +12,7 @@ was (with four standard deviations of gain on top): the check has to fail then.
 
 Exit status 1 if a bound does not hold.
 
-Usage: OMP_NUM_THREADS=1 python benchmarks/omission_bounds.py [N] [--seed S] [--assumed SENSOR=COUNTS_PER_N]...
+Usage: OMP_NUM_THREADS=1 python studies/omission_bounds.py [N] [--seed S] [--assumed SENSOR=COUNTS_PER_N]...
 """
 
 from __future__ import annotations

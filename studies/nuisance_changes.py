@@ -10,8 +10,8 @@ same unit, placement and noise in all sets, so that differences scatter less tha
 Curvature is answered by 200 trees on every fourth row, or by the task's own 500 trees on every row with --full; force
 by the Lasso at the paper's lambda of 0.2. Rows are SIM: a set says what the twin does, not what is true of the sensors.
 
-Usage: python benchmarks/nuisance_changes.py [--seeds 20] [--sensor NAME]... [--task NAME]... [--set NAME]... [--full]
-       python benchmarks/nuisance_changes.py --warm-up    the warm-up's time constant, recovered from rest levels
+Usage: python studies/nuisance_changes.py [--seeds 20] [--sensor NAME]... [--task NAME]... [--set NAME]... [--full]
+       python studies/nuisance_changes.py --warm-up    the warm-up's time constant, recovered from rest levels
 """
 
 from __future__ import annotations
