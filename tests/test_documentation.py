@@ -1,4 +1,4 @@
-"""Every page is found; what pages name exists: links, commands, files, imports; the scores of the README are those held."""
+"""Every page is found; links, commands, files and imports on pages exist; scores of the README are those held."""
 
 import ast
 import importlib
