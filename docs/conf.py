@@ -25,20 +25,22 @@ pygments_style = "friendly"
 
 CONTENTS = {
     "Start": ("tutorial", "python", "glossary", "choosing", "tables", "statistics"),
-    "Devices and recordings": ("hardware", "rig-files", "links", "emulation", "mappings", "real-recordings", "format"),
+    "Devices and recordings": ("hardware", "rig-files", "links", "emulation", "mappings", "datasets", "format"),
     "Plugins": ("plugins", "hooks", "plugin-reference", "conformance", "stability"),
-    "Reference": ("commands", "sensors", "estimators", "protocols", "events", "parameters", "*"),
+    "Reference": ("commands", "sensors", "estimators", "protocols", "events", "parameters"),
     "Decisions": ("decisions/*",),
 }
-"""Contents of the sidebar. On a code host ``index.md`` leads to the pages, by reader."""
+"""Contents of the sidebar; other pages follow. On a code host ``index.md`` leads to the pages, by reader."""
 
 
 def add_contents(app: Sphinx, docname: str, source: list[str]) -> None:
     """Append the table of contents that a site needs to the index."""
     if docname == root_doc:
+        listed = {root_doc, *(page for pages in CONTENTS.values() for page in pages)}
+        others = sorted(page for page in app.env.found_docs - listed if "/" not in page)
         trees = [
             f"```{{toctree}}\n:hidden:\n:glob:\n:caption: {caption}\n\n" + "\n".join(pages) + "\n```"
-            for caption, pages in CONTENTS.items()
+            for caption, pages in {**CONTENTS, "More": others}.items()
         ]
         source[0] = "\n\n".join([source[0], *trees])
 
