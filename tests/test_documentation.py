@@ -27,6 +27,11 @@ GENERATED = {"commands.md", "plugin-reference.md", "rig-files.md"}
 PAGES = sorted(page for page in (CHECKOUT / "docs").rglob("*.md") if page.name not in GENERATED)
 CURRENT = [README, *(page for page in PAGES if page.parent.name != "decisions")]
 """What is true of the present code; a decision tells what was true when it was taken."""
+NAMING = (
+    "emulation", "execution", "format", "glossary", "hardware", "hooks", "mappings", "plugins", "python", "results",
+    "stability", "tables",
+)  # fmt: skip
+"""Pages on keys, fields, options and functions."""
 FENCE = re.compile(r"^ *```(\w*)\n(.*?)^ *```", re.MULTILINE | re.DOTALL)
 
 
@@ -74,6 +79,16 @@ def test_every_file_of_the_repository_that_is_named_exists():
     named = re.compile(r"`((?:benchmarks|examples|firmware|studies|tactbench|tests/recordings)/[\w./-]+)`")
     found = [(page.name, name) for page in CURRENT for name in named.findall(page.read_text(encoding="utf-8"))]
     assert [(page, name) for page, name in found if not (CHECKOUT / name).exists()] == []
+
+
+def test_every_key_field_and_function_that_is_named_is_in_the_sources():
+    sources = " ".join(path.read_text(encoding="utf-8") for path in (CHECKOUT / "tactbench").rglob("*.py"))
+    known = set(re.findall(r"\w+", sources))
+    for page in (CHECKOUT / "docs" / f"{name}.md" for name in NAMING):
+        spans = " ".join(re.findall(r"`([^`/]+)`", FENCE.sub("", page.read_text(encoding="utf-8"))))
+        named = set(re.findall(r"\b[a-z]+(?:_[a-z0-9]+)+\b", spans))
+        shown = set(re.findall(r"\w+", " ".join(blocks(page, "python", "sql", "yaml"))))
+        assert sorted(named - known - shown) == [], page.name
 
 
 def test_every_name_that_a_block_imports_is_there():
