@@ -1,25 +1,22 @@
-"""Write ``docs/commands.md``: every verb with its arguments and options, as `--help` shows them.
+"""The page ``commands.md``: every verb with its arguments and options, as `--help` shows them.
 
-Usage: python docs/command_reference.py
+``conf.py`` writes the page when the site is built.
 """
 
 from __future__ import annotations
 
 import inspect
 from collections.abc import Iterator
-from pathlib import Path
 from typing import Any
 
 import click
 
 from tactbench.core.cli import VERBS, cli
 
-DOCUMENT = Path(__file__).resolve().parent / "commands.md"
 _TITLE = """# Commands
 
-Made by `python docs/command_reference.py` from what `tactbench VERB --help` shows. Exit codes: 0 all well, 1 something
-failed or is not as it should be, 2 what was asked for cannot be, 130 interrupted. Results go to stdout, progress and
-remarks to stderr.
+Generated from what `tactbench VERB --help` shows. Exit codes: 0 success, 1 something failed or was found wrong, 2 the
+command cannot be carried out as given, 130 interrupted. Results go to stdout, progress and remarks to stderr.
 """
 
 
@@ -64,12 +61,12 @@ def _argument(one: click.Argument) -> str:
 def _option(one: click.Option) -> str:
     names = "`, `".join(" / ".join(pair) for pair in _spellings(one))
     value: Any = "" if one.is_flag or one.count else _value(one)
-    told = (one.help or "").strip()
-    if told and not told.endswith((".", "…")):
-        told += "."
+    text = (one.help or "").strip()
+    if text and not text.endswith((".", "…")):
+        text += "."
     if one.show_default and one.default not in (None, False, ()):
-        told = f"{told} Default: `{one.default}`.".strip()
-    return f"- `{names}{value}`" + (f": {told}" if told else "")
+        text = f"{text} Default: `{one.default}`.".strip()
+    return f"- `{names}{value}`" + (f": {text}" if text else "")
 
 
 def _spellings(one: click.Option) -> list[list[str]]:
@@ -82,7 +79,3 @@ def _value(one: click.Option) -> str:
     if isinstance(one.type, click.Choice):
         return f" {'|'.join(map(str, one.type.choices))}"
     return f" {one.type.name.upper()}"
-
-
-if __name__ == "__main__":
-    DOCUMENT.write_text(reference(), encoding="utf-8")

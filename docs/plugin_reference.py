@@ -1,6 +1,6 @@
-"""Write ``docs/plugin-reference.md``: every name of the doors, as its docstrings describe it.
+"""The pages ``plugin-reference.md``, every name of the doors, and ``rig-files.md``, every field, from their docstrings.
 
-Read off the source, so that nothing is imported. Usage: python docs/plugin_reference.py
+Read from the source; nothing is imported. ``conf.py`` writes the pages when the site is built.
 """
 
 from __future__ import annotations
@@ -12,18 +12,48 @@ from collections.abc import Iterator
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
-DOCUMENT = ROOT / "docs" / "plugin-reference.md"
 DOORS = ("tactbench.plugin", "tactbench.plugin.simulation", "tactbench.plugin.devices")
-_TOLD = frozenset({"assumed", "derived", "measured", "sourced"})
+_TAGS = frozenset({"assumed", "derived", "measured", "sourced"})
 _TITLE = """# What a plugin imports
 
-Made by `python docs/plugin_reference.py`. How plugins are written: [plugins](plugins.md).
+Generated from the docstrings. How plugins are written: [plugins](plugins.md).
+"""
+_MANIPULATOR = "tactbench.rigs.parallel_manipulator"
+RIG_FILES = {
+    "Every rig file": ("tactbench.core.spec.rig_file",),
+    "Options of the BioTac": ("tactbench.sensors.biotac.options",),
+    "Options of the iCub fingertip": ("tactbench.sensors.icub.options",),
+    "Options of net-ft": (f"{_MANIPULATOR}.force_torque.net_ft.codec",),
+    "Options of every axis": ("tactbench.devices.positioner",),
+    "Options of faulhaber, beside those of every axis": (f"{_MANIPULATOR}.motor.profile",),
+    "Settings of parallel-manipulator": tuple(
+        f"{_MANIPULATOR}.{one}" for one in ("settings", "kinematics", "workspace")
+    ),
+}
+"""Chapters of ``rig-files.md`` and the modules whose models they describe."""
+_MODELS = {"Frozen", "DeviceEntry", "RigFile", "Options", "PositionerOptions", "BaseModel", "_Part"}
+"""Bases of the models of a rig file."""
+_RIG_FILES_TITLE = """# Rig files
+
+Generated from the docstrings. What a rig file is for: [devices](hardware.md).
 """
 
 
 def reference() -> str:
-    """Return the whole document."""
+    """Return ``plugin-reference.md``."""
     return "\n".join([_TITLE, *(text for door in DOORS for text in _door(door))])
+
+
+def rig_files() -> str:
+    """Return ``rig-files.md``."""
+    parts = [_RIG_FILES_TITLE]
+    for title, modules in RIG_FILES.items():
+        parts.append(f"## {title}\n")
+        for node in (node for module in modules for node in _parsed(module).body):
+            if isinstance(node, ast.ClassDef) and not node.name.startswith("_") and _MODELS & set(_bases(node)):
+                fields = "\n".join(_line(*field) for field in _fields(node))
+                parts.append(f"### {node.name}\n\n{_markdown(ast.get_docstring(node))}\n\n{fields}\n")
+    return "\n".join(parts)
 
 
 def _door(door: str) -> Iterator[str]:
@@ -76,7 +106,7 @@ def _described(node: ast.AST, after: ast.AST | None) -> str:
     if isinstance(node, ast.FunctionDef):
         return f"`{_signature(node)}`\n\n{_markdown(ast.get_docstring(node))}"
     if isinstance(node, ast.ClassDef):
-        bases = [base for base in map(ast.unparse, node.bases) if base != "Frozen"]
+        bases = [base for base in _bases(node) if base != "Frozen"]
         kind = f"A kind of {', '.join(f'`{base}`' for base in bases)}. " if bases else ""
         members = "\n".join(_members(node))
         return f"{kind}{_markdown(ast.get_docstring(node))}" + (f"\n\n{members}" if members else "")
@@ -92,19 +122,33 @@ def _members(node: ast.ClassDef) -> Iterator[str]:
         if name.startswith("_") and name != "__call__":
             continue
         if isinstance(member, ast.AnnAssign):
-            default = _default(member.value)
-            yield _line(f"{name}: {ast.unparse(member.annotation)}{default}", _text_of(after))
+            yield _line(_field(member), _text_of(after))
         elif isinstance(member, ast.Assign) and name != "model_config":
             yield _line(f"{name}{_default(member.value)}", _text_of(after))
         elif isinstance(member, ast.FunctionDef):
             kinds = {ast.unparse(one) for one in member.decorator_list}
-            told = f"{name}: {ast.unparse(member.returns)}" if "property" in kinds and member.returns else None
-            yield _line(told or _signature(member), ast.get_docstring(member))
+            text = f"{name}: {ast.unparse(member.returns)}" if "property" in kinds and member.returns else None
+            yield _line(text or _signature(member), ast.get_docstring(member))
+
+
+def _fields(node: ast.ClassDef) -> Iterator[tuple[str, str | None]]:
+    """Yield each annotated field with its description."""
+    for member, after in _statements(node.body):
+        if isinstance(member, ast.AnnAssign):
+            yield _field(member), _text_of(after)
+
+
+def _field(member: ast.AnnAssign) -> str:
+    return f"{_target(member)}: {ast.unparse(member.annotation)}{_default(member.value)}"
+
+
+def _bases(node: ast.ClassDef) -> list[str]:
+    return [ast.unparse(base) for base in node.bases]
 
 
 def _line(code: str, text: str | None) -> str:
-    said = re.sub(r"\n(?!\n)", "\n  ", _markdown(text))
-    return f"- `{code}`" + (f": {said}" if said else "")
+    description = re.sub(r"\n(?!\n)", "\n  ", _markdown(text))
+    return f"- `{code}`" + (f": {description}" if description else "")
 
 
 def _signature(node: ast.FunctionDef) -> str:
@@ -116,7 +160,7 @@ def _signature(node: ast.FunctionDef) -> str:
 def _default(value: ast.expr | None) -> str:
     """Return a field's default: of a quantity number, unit and tag; of ``Field`` its default alone."""
     if isinstance(value, ast.Call) and isinstance(value.func, ast.Name):
-        if value.func.id in _TOLD:
+        if value.func.id in _TAGS:
             number, unit = (ast.literal_eval(argument) for argument in value.args[:2])
             return f" = {number:g} {unit} ({value.func.id})"
         if value.func.id in ("Field", "field"):
@@ -152,7 +196,3 @@ def _markdown(text: str | None) -> str:
         else:
             lines.append(line.strip() if not section else f"  {line.strip()}".rstrip())
     return "\n".join(lines).strip()
-
-
-if __name__ == "__main__":
-    DOCUMENT.write_text(reference(), encoding="utf-8")

@@ -1,21 +1,38 @@
-"""Every page is found from the index, every link leads somewhere, and the floors drawn are those that are held."""
+"""Every page is found; links, commands, files and imports on pages exist; scores of the README are those held."""
 
+import ast
+import importlib
+import json
 import re
 import runpy
+import statistics
 import tomllib
 from pathlib import Path
 from types import ModuleType
 
 import click
 import pluggy
-import pytest
+import yaml
 
 from tactbench.core.cli import VERBS, cli
 from tactbench.core.plugins import hookspecs
 from tactbench.core.plugins.registry import _KINDS, load_registry
+from tactbench.core.spec.rig_file import RigFile
+from tactbench.core.spec.yaml_file import load_yaml
 
 CHECKOUT = Path(__file__).parents[1]
-PAGES = sorted((CHECKOUT / "docs").rglob("*.md"))
+README = CHECKOUT / "README.md"
+GENERATED = {"commands.md", "plugin-reference.md", "rig-files.md"}
+"""Pages that a build of the site leaves beside the others."""
+PAGES = sorted(page for page in (CHECKOUT / "docs").rglob("*.md") if page.name not in GENERATED)
+CURRENT = [README, *(page for page in PAGES if page.parent.name != "decisions")]
+"""What is true of the present code; a decision tells what was true when it was taken."""
+NAMING = (
+    "emulation", "execution", "format", "glossary", "hardware", "hooks", "mappings", "plugins", "python", "results",
+    "stability", "tables",
+)  # fmt: skip
+"""Pages on keys, fields, options and functions."""
+FENCE = re.compile(r"^ *```(\w*)\n(.*?)^ *```", re.MULTILINE | re.DOTALL)
 
 
 def links(page):
@@ -24,9 +41,71 @@ def links(page):
     return [(page.parent / link).resolve() for link in found if "://" not in link]
 
 
-@pytest.mark.parametrize("page", [CHECKOUT / "README.md", *PAGES], ids=lambda path: path.name)
-def test_every_link_leads_to_a_file(page):
-    assert [link for link in links(page) if not link.exists()] == []
+def blocks(page, *kinds):
+    """Return the fenced blocks of a page that are of one of the kinds."""
+    return [text for kind, text in FENCE.findall(page.read_text(encoding="utf-8")) if kind in kinds]
+
+
+def commands(page):
+    """Return the commands of a page as words after ``tactbench``: lines of shell blocks, and code within texts."""
+    lines = [line for text in blocks(page, "", "sh") for line in text.replace("\\\n", " ").splitlines()]
+    spans = re.findall(r"`([^`]+)`", FENCE.sub("", page.read_text(encoding="utf-8")))
+    parts = [part.partition(" #")[0].split() for code in lines + spans for part in re.split("&&|;", code)]
+    return [part[1:] for part in parts if len(part) > 1 and part[0].removeprefix(".venv/bin/") == "tactbench"]
+
+
+def unknown(words):
+    """Return the first word of a command that is no verb or option; None if there is none. VERB and … stand for any."""
+    command, context = cli, click.Context(cli)
+    while isinstance(command, click.Group) and words and not words[0].startswith("-"):
+        if re.fullmatch(r"[A-Z]+|…", words[0]):
+            return None
+        if words[0] not in command.list_commands(context):
+            return words[0]
+        command, words = command.get_command(context, words[0]), words[1:]
+    known = {name for param in command.get_params(context) for name in (*param.opts, *param.secondary_opts)}
+    return next((word for word in words if re.match("-+[a-z]", word) and word.partition("=")[0] not in known), None)
+
+
+def test_every_link_leads_to_a_file():
+    assert [link for page in (README, *PAGES) for link in links(page) if not link.exists()] == []
+
+
+def test_every_command_has_its_verb_and_options():
+    assert [(page.name, words) for page in CURRENT for words in commands(page) if unknown(words)] == []
+
+
+def test_every_file_of_the_repository_that_is_named_exists():
+    named = re.compile(r"`((?:benchmarks|examples|firmware|studies|tactbench|tests/recordings)/[\w./-]+)`")
+    found = [(page.name, name) for page in CURRENT for name in named.findall(page.read_text(encoding="utf-8"))]
+    assert [(page, name) for page, name in found if not (CHECKOUT / name).exists()] == []
+
+
+def test_every_key_field_and_function_that_is_named_is_in_the_sources():
+    sources = " ".join(path.read_text(encoding="utf-8") for path in (CHECKOUT / "tactbench").rglob("*.py"))
+    known = set(re.findall(r"\w+", sources))
+    for page in (CHECKOUT / "docs" / f"{name}.md" for name in NAMING):
+        spans = " ".join(re.findall(r"`([^`/]+)`", FENCE.sub("", page.read_text(encoding="utf-8"))))
+        named = set(re.findall(r"\b[a-z]+(?:_[a-z0-9]+)+\b", spans))
+        shown = set(re.findall(r"\w+", " ".join(blocks(page, "python", "sql", "yaml"))))
+        assert sorted(named - known - shown) == [], page.name
+
+
+def test_every_name_that_a_block_imports_is_there():
+    trees = [ast.parse(text) for page in CURRENT if page.name != "tutorial.md" for text in blocks(page, "python")]
+    for node in (node for tree in trees for node in ast.walk(tree) if isinstance(node, ast.ImportFrom)):
+        if node.module.startswith("tactbench."):
+            module = importlib.import_module(node.module)
+            assert [one.name for one in node.names if not hasattr(module, one.name)] == []
+
+
+def test_every_rig_file_that_is_shown_is_read(tmp_path):
+    texts = [text for page in CURRENT for text in blocks(page, "yaml") if "rig" in yaml.safe_load(text)]
+    for number, text in enumerate(texts):
+        path = tmp_path / f"{number}.yaml"
+        path.write_text(text, encoding="utf-8")
+        load_yaml(path, RigFile)
+    assert texts
 
 
 def test_every_page_is_in_the_index():
@@ -34,7 +113,48 @@ def test_every_page_is_in_the_index():
     decisions = CHECKOUT / "docs" / "decisions" / "README.md"
     listed = {index.resolve(), *links(index), *links(decisions)}
     assert [page.name for page in PAGES if page.resolve() not in listed] == []
-    assert index.resolve() in links(CHECKOUT / "README.md")
+    assert index.resolve() in links(README)
+
+
+def test_the_generated_pages_have_every_verb_and_field():
+    written = runpy.run_path(str(CHECKOUT / "docs" / "command_reference.py"))["reference"]()
+    assert [verb for verb in VERBS if f"\n## `tactbench {verb}`\n" not in written] == []
+    written = runpy.run_path(str(CHECKOUT / "docs" / "plugin_reference.py"))["rig_files"]()
+    for name in (
+        "zero_s",
+        "batches_ahead",
+        "skin_type",
+        "rate_hz",
+        "lower_m",
+        "homing",
+        "windup_ms",
+        "link_mm",
+        "serial",
+    ):
+        assert re.search(rf"^- `{name}: .*`: .", written, re.MULTILINE), name
+
+
+def test_the_rows_of_the_readme_are_those_of_the_board_and_of_the_frozen_scores():
+    text = README.read_text(encoding="utf-8")
+    board = (CHECKOUT / "docs" / "real-board.md").read_text(encoding="utf-8")
+    rows = re.findall(r"^\| (.*?) \| .*? \| ([\w-]+) \| [A-Za-z ]*([\d.]+)(?: \w+)? \| ([\d.]*)", text, re.MULTILINE)
+    real = [row for row in rows if row[0].endswith("?")]
+    assert len(real) == 5
+    for question, estimator, score, low in real:
+        there = re.findall(rf"^\| {estimator}\S* [^|]*\| ([\d.]+) \| ([\d.]*)", board, re.MULTILINE)
+        assert (score, low) in [(rounded(one, score), rounded(other, low)) for one, other in there], question
+    frozen = json.loads((CHECKOUT / "tests" / "frozen" / "default.json").read_text(encoding="utf-8"))
+    simulated = re.findall(r"^\| [\d=]+ \| (\w+) \| (\w+) \| ([\d.]+)", text, re.MULTILINE)
+    assert len(simulated) == 4
+    for sensor, estimator, score in simulated:
+        cell = re.compile(rf"{sensor}/curvature/twin/karl2016/{estimator}/\d")
+        median = statistics.median(row["score"] for name, row in frozen.items() if cell.fullmatch(name))
+        assert f"{median:.3f}" == score, (sensor, estimator)
+
+
+def rounded(number, like):
+    """Return a number as text with the decimals of another one."""
+    return f"{float(number):.{len(like.partition('.')[2])}f}" if number and like else number
 
 
 def test_the_floors_of_the_core_are_those_that_are_held():
@@ -71,22 +191,3 @@ def test_every_effect_stands_in_the_table_with_its_tokens():
     stated = {row[0].strip("`"): [re.findall(r"`([\w-]+)`", cell) for cell in row[2:]] for row in rows if len(row) == 5}
     effects = load_registry().effects
     assert stated == {one.name: [list(one.consumes), list(one.produces), list(one.groups)] for one in effects}
-
-
-def test_the_page_of_commands_is_what_help_shows():
-    # Made by: python docs/command_reference.py
-    made = runpy.run_path(str(CHECKOUT / "docs" / "command_reference.py"))["reference"]()
-    assert (CHECKOUT / "docs" / "commands.md").read_text(encoding="utf-8") == made
-
-
-def test_no_verb_or_option_is_missing_from_the_page_of_commands():
-    page = (CHECKOUT / "docs" / "commands.md").read_text(encoding="utf-8")
-    chapters = dict(re.findall(r"^##+ `tactbench ([\w -]+)`\n(.*?)(?=^##|\Z)", page, re.MULTILINE | re.DOTALL))
-    context = click.Context(cli)
-    missing = []
-    for verb in VERBS:
-        for param in cli.get_command(context, verb).params:
-            if isinstance(param, click.Option) and not all(name in chapters.get(verb, "") for name in param.opts):
-                missing.append(f"{verb} {param.opts}")
-    assert missing == []
-    assert set(VERBS) <= set(chapters)

@@ -42,7 +42,7 @@ def read_options(kind: type[_Model], given: Mapping[str, Any], device: str) -> _
         what = f"The option {name!r} of {device}" if name else f"What is said of {device}"
         problem = "is missing" if first["type"] == "missing" else f"is wrong: {first['msg']}"
         raise UsageError(
-            f"{what} {problem.replace('Value error, ', '')}.", hint="docs/hardware.md lists the options."
+            f"{what} {problem.replace('Value error, ', '')}.", hint="See docs/hardware.md, The rig file."
         ) from error
 
 

@@ -30,10 +30,10 @@ FRAMES = st.builds(
 )
 
 
-def test_vectors_of_the_document():
+def test_vectors_of_the_format():
     """A bus that answers each byte's complement; requests at 1 s, replies by 2 s."""
-    block = (ROOT / "docs" / "links.md").read_text(encoding="utf-8").split("```text\n")[1].split("```")[0]
-    lines = [(line[0], bytes.fromhex(line[1:])) for line in block.splitlines()]
+    text = (ROOT / "firmware" / "biotac_bridge" / "vectors.txt").read_text(encoding="utf-8")
+    lines = [(line[0], bytes.fromhex(line[1:])) for line in text.splitlines()]
     assert [side for side, _ in lines] == list("><" * 3)
     emulator = BridgeEmulator(Told())
     for (_, request), (_, reply) in zip(lines[::2], lines[1::2], strict=True):

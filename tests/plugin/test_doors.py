@@ -15,7 +15,6 @@ from tests.conftest import ROOT, THIRD_PARTY
 DOORS = ("tactbench.plugin", "tactbench.plugin.simulation", "tactbench.plugin.devices")
 PLUGINS = [*(ROOT / "tactbench" / family for family in ("sensors", "rigs", "tasks", "estimators")), THIRD_PARTY]
 PLUGINS.append(ROOT / "examples" / "plugins")
-DOCUMENT = ROOT / "docs" / "plugin-reference.md"
 
 
 def used_by_plugins():
@@ -33,7 +32,8 @@ def used_by_plugins():
 def chapters():
     """The reference's entries by door and name."""
     by_door = {}
-    for chapter in re.split(r"^## ", DOCUMENT.read_text(encoding="utf-8"), flags=re.M)[1:]:
+    written = runpy.run_path(str(ROOT / "docs" / "plugin_reference.py"))["reference"]()
+    for chapter in re.split(r"^## ", written, flags=re.M)[1:]:
         door = chapter.split("`")[1]
         by_door |= {
             (door, name): text for name, text in re.findall(r"^#### `(\w+)`\n(.*?)(?=^#|\Z)", chapter, re.M | re.S)
@@ -61,12 +61,6 @@ def test_what_no_plugin_uses_is_in_no_door():
     # A plugin states the version that it was written for, not the one that it meets.
     assert offered - used_by_plugins() == {("tactbench.plugin", "API_VERSION")}
     assert used_by_plugins() - offered == set()
-
-
-def test_the_reference_is_what_the_docstrings_say():
-    # Made by: python docs/plugin_reference.py
-    made = runpy.run_path(str(ROOT / "docs" / "plugin_reference.py"))["reference"]()
-    assert DOCUMENT.read_text(encoding="utf-8") == made
 
 
 def test_no_name_is_missing_in_the_reference_or_without_a_word_about_it():

@@ -2,8 +2,16 @@
 
 An HDF5 file cannot be that: between two flushes its chunks and their index disagree, and a process killed there leaves
 a file of which the last chunks, or all of it, cannot be read.
-A journal is frames, one after the other, each with its length and checksum. Whatever happens, the frames before hold.
-``docs/format.md`` describes it.
+A journal is the line ``tactbench-partial 2`` and frames, one after the other. Whatever happens, the frames before hold.
+A frame is a head of 16 bytes, little-endian (uint32 length of the JSON, uint64 length of the body, uint32 CRC-32 of
+both), the JSON, the body. The first frame's JSON is the meta, without body; every other one is
+
+- ``[stream, [[column, type, shape], ...]]``: a block, whose body is its columns, little-endian, in that order;
+- ``{"meta": {field: value, ...}}``: fields that replace those of the meta, without body;
+- ``{"annotation": [stream, label, type]}``: a label for every row of the stream, after its last block: ``<i8``, or
+  ``text``, a JSON list.
+
+``tactbench-partial 1``, which has blocks alone, without ``device_ns``, is read.
 """
 
 from __future__ import annotations

@@ -170,9 +170,13 @@ class PressRules(_Part):
     """What ends a press before its time, and how it ends; see :class:`PressPlan`."""
 
     error_band_n: Positive
+    """Filtered force this far from the wanted one for a second: retreat."""
     band_n: Positive
+    """Filtered forces below it count as no force."""
     lost_s: Positive
+    """Contact is lost after so long without force while more than twice the band is wanted."""
     unload_speed_mm_s: Positive
+    """After the scene's ramp."""
     stale_ms: Positive = 100.0
     """The sensor's rows may be this old, as received; older: retreat."""
 
