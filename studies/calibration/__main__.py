@@ -1,4 +1,4 @@
-"""Draw anew, or write the tables of docs/calibration.md from what is stored."""
+"""Draw anew, or write the tables (`results/tables.md`) from what is stored."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from studies.calibration.draws import Draw, Procedure, Result, carry_out, carry_
 
 HERE = Path(__file__).resolve().parent
 RESULTS = HERE / "results"
-DOCUMENT = HERE.parents[1] / "docs" / "calibration.md"
+DOCUMENT = RESULTS / "tables.md"
 
 
 def main() -> None:
@@ -36,9 +36,8 @@ def main() -> None:
 
 
 def document() -> str:
-    """Return docs/calibration.md: its text as it stands, and the tables of the stored results."""
-    result, text = read(RESULTS), DOCUMENT.read_text(encoding="utf-8")
-    return text[: text.index(f"## {result.procedure['title']}")] + tables(result, read(RESULTS / "earlier"))
+    """Return the tables of the stored results."""
+    return tables(read(RESULTS))
 
 
 def calibrate(procedure: Procedure, draws: int, jobs: int) -> Result:

@@ -1,4 +1,4 @@
-"""The tables of docs/calibration.md."""
+"""The tables of a calibration, as Markdown."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from tactbench.core.tables.markdown import markdown
 from tactbench.core.tables.text_table import TextTable, text_table
 
 
-def tables(result: Result, earlier: Result) -> str:
+def tables(result: Result) -> str:
     """Return every table as Markdown, under the calibration's title and who made the draws."""
     makers = ", ".join(f"{name} {value}" for name, value in result.made_by.items())
     made = [
@@ -34,10 +34,9 @@ def tables(result: Result, earlier: Result) -> str:
         _sensitivity(result),
         _agreement(result.procedure, result.draws),
         *(_variation(result, one) for one in result.procedure["variations"]),
-        _beside(result, earlier),
     ]
     return (
-        f"## {result.procedure['title']}\n\n"
+        f"# {result.procedure['title']}\n\n"
         f"SIM. {len(result.draws)} draws with seed {result.seed}; {result.cpu_s / 60:.0f} minutes of processor time; "
         f"{makers}.\n\n{markdown(made)}"
     )
@@ -153,34 +152,6 @@ def _variation(result: Result, variation: Any) -> TextTable:
         lines,
         numeric=("seeds",),
         notes=(f"{variation['reason']} Nothing is drawn from a prior here; the seeds are the same in every setting.",),
-    )
-
-
-def _beside(result: Result, earlier: Result) -> TextTable:
-    """Return published numbers and findings beside those of the earlier draws."""
-    titles, lines = _titles(result.procedure), []
-    both = [(one.procedure, one.draws, by_fitted(one.procedure, one.draws).draws) for one in (earlier, result)]
-    for one in result.procedure["published"]:
-        (then, then_kept), (now, now_kept) = (
-            (_range(output_values(draws, one["output"])), _range(output_values(kept, one["output"])))
-            for _, draws, kept in both
-        )
-        lines.append((titles[one["output"]], then, now, then_kept, now_kept))
-    for one in result.procedure["findings"]:
-        (then, then_kept), (now, now_kept) = (_shares(procedure, draws, one) for procedure, draws, _ in both)
-        lines.append((one["statement"], then, now, then_kept, now_kept))
-    then_priors, now_priors = (
-        {one["name"]: f"{one['prior']['low']:g} to {one['prior']['high']:g}" for one in procedure["nuisances"]}
-        for procedure, _, _ in both
-    )
-    other = [f"{name} {then_priors[name]} then, {now} now" for name, now in now_priors.items()
-             if then_priors[name] != now]  # fmt: skip
-    note = f"Priors that differ: {'; '.join(other)}. Earlier: {_acceptance(earlier.procedure, earlier.draws)}"
-    return text_table(
-        f"Beside the earlier {len(earlier.draws)} draws",
-        ("number or finding", "earlier prior", "prior", "earlier accepted", "accepted"),
-        lines,
-        notes=(note,),
     )
 
 
