@@ -47,11 +47,14 @@ def add_contents(app: Sphinx, docname: str, source: list[str]) -> None:
 
 def write_references(_: Sphinx) -> None:
     """Write the generated pages, which git ignores, beside the others."""
-    plugins, commands = (runpy.run_path(str(HERE / f"{name}_reference.py")) for name in ("plugin", "command"))
+    plugins, commands, parameters = (
+        runpy.run_path(str(HERE / f"{name}_reference.py")) for name in ("plugin", "command", "parameter")
+    )
     made = (
         ("plugin-reference", plugins["reference"]),
         ("rig-files", plugins["rig_files"]),
         ("commands", commands["reference"]),
+        ("parameters", parameters["reference"]),
     )
     for page, write in made:
         (HERE / f"{page}.md").write_text(write(), encoding="utf-8")

@@ -22,7 +22,7 @@ from tactbench.core.spec.yaml_file import load_yaml
 
 CHECKOUT = Path(__file__).parents[1]
 README = CHECKOUT / "README.md"
-GENERATED = {"commands.md", "plugin-reference.md", "rig-files.md"}
+GENERATED = {"commands.md", "parameters.md", "plugin-reference.md", "rig-files.md"}
 """Pages that a build of the site leaves beside the others."""
 PAGES = sorted(page for page in (CHECKOUT / "docs").rglob("*.md") if page.name not in GENERATED)
 CURRENT = [README, *(page for page in PAGES if page.parent.name != "decisions")]
@@ -119,6 +119,8 @@ def test_every_page_is_in_the_index():
 def test_the_generated_pages_have_every_verb_and_field():
     written = runpy.run_path(str(CHECKOUT / "docs" / "command_reference.py"))["reference"]()
     assert [verb for verb in VERBS if f"\n## `tactbench {verb}`\n" not in written] == []
+    written = runpy.run_path(str(CHECKOUT / "docs" / "parameter_reference.py"))["reference"]()
+    assert re.search(r"^\| taxel_white_count \| .* \| measured \| \w+", written, re.MULTILINE)
     written = runpy.run_path(str(CHECKOUT / "docs" / "plugin_reference.py"))["rig_files"]()
     for name in (
         "zero_s",
