@@ -4,7 +4,7 @@ import dataclasses
 
 import numpy as np
 
-from tactbench.plugin import ForceRamp, Indenter, RigContext, Scene, SensorDescriptor, assumed
+from tactbench.plugin import ForceRamp, Indenter, Scene, SensorDescriptor, assumed
 from tactbench.rigs.twin import tactbench_effects
 from tactbench.rigs.twin.fidelity import DEFAULT, FINE, Fidelity
 from tactbench.rigs.twin.rig import Twin
@@ -48,9 +48,3 @@ def test_a_rig_resolves_as_finely_as_it_is_told_and_keeps_tables_apart(specs):
     assert depths[0] == depths[2]
     # Half as many cells change the depth, but not by more than a cell's sag, 0.84² / (2 R).
     assert 0 < abs(depths[1] - depths[0]) < 0.84**2 / 20
-
-
-def test_context_makes_the_default():
-    from tactbench.rigs.twin.rig import build
-
-    assert build(RigContext(effects=())).fidelity is DEFAULT

@@ -7,9 +7,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tactbench.plugin import RigError, assumed
+from tactbench.plugin import assumed
 from tactbench.plugin.simulation import Dome, SheetTable, SkinGrid, SkinSheet
-from tactbench.rigs.twin.geometry import Contact, check_contact, finger_surface_mm, gap_mm, skin_grid
+from tactbench.rigs.twin.geometry import Contact, finger_surface_mm, gap_mm, skin_grid
 
 SHEET = SkinSheet(
     x_min=assumed(-10, "mm", "t"), x_max=assumed(10, "mm", "t"), arc=assumed(20, "mm", "t"), cells=(40, 50)
@@ -54,38 +54,6 @@ def test_beyond_the_cap_nothing_can_touch():
 def test_tilt_keeps_the_origin_of_the_approach():
     tilted = gap_mm(GRID, Contact(40.0, 0.0, 0.0, tilt_x=0.3), 8.2)
     assert tilted.min() == 0.0
-
-
-@pytest.mark.parametrize(
-    ("contact", "says"),
-    [
-        (Contact(0.3, 0.0, 0.0), "smaller than a cell"),
-        (Contact(5.0, 11.0, 0.0), "outside the skin"),
-        (Contact(5.0, 0.0, -10.5), "outside the skin"),
-    ],
-)
-def test_what_the_grid_cannot_resolve_is_refused(contact, says):
-    with pytest.raises(RigError, match=says):
-        check_contact(GRID, contact)
-
-
-def test_a_small_but_resolved_cap_is_taken():
-    check_contact(GRID, Contact(0.6, 9.9, 9.9))
-
-
-@pytest.mark.parametrize(
-    "contact",
-    [Contact(math.nan, 0.0, 0.0), Contact(-5.0, 0.0, 0.0), Contact(5.0, math.nan, 0.0), Contact(5.0, 0.0, math.nan)],
-)
-def test_a_contact_that_is_none_is_refused(contact):
-    with pytest.raises(RigError):
-        check_contact(GRID, contact)
-
-
-@pytest.mark.parametrize("slope", [1.01, -2.0, math.tan(math.pi / 2), math.nan])
-def test_an_indenter_on_its_side_is_refused(slope):
-    with pytest.raises(RigError, match="tilted"):
-        check_contact(GRID, Contact(5.0, 0.0, 0.0, tilt_s=slope))
 
 
 DOME = Dome(start=assumed(0.0, "mm", "test"))

@@ -7,7 +7,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tactbench.core.spec.scene import Simulation
 from tactbench.plugin import ForceRamp, Indenter, Placement, RigContext, Scene, assumed, load_registry
 from tactbench.rigs.twin import tactbench_effects
 from tactbench.rigs.twin.contact.stages import skin_under_load
@@ -101,25 +100,6 @@ def _apart(twin, sensor, one, other):
 
 def _unrounded(plan):
     return replace(plan, stages=tuple(effect for effect in plan.stages if effect.name != "converter"))
-
-
-def test_the_bound_is_broken_by_a_slope_from_elsewhere(twin, sensors):
-    """Over electrode 17 with the slope of the nominal place: what a constant of the sensor stood for."""
-    sensor, bounds = sensors["biotac"], {}
-    for place, x in (("nominal", 0.0), ("over electrode 17", 2.2)):
-        scene = _slow(2.0, 5.0, 3600.0, 500, placement=Placement(x=_q(x, "mm"), scatter=_q(0.0, "mm")))
-        bounds[place] = _creep(twin, sensor, scene).change
-    words = [scene.simulation.model_copy(update={"effects": (word,)}) for word in ("-creep", "+creep")]
-    apart = _apart(twin, sensor, *(scene.model_copy(update={"simulation": asked}) for asked in words))
-    assert bounds["nominal"] < apart <= bounds["over electrode 17"]
-
-
-def test_asked_for_by_name_it_is_applied_however_slow_the_ramp(twin, sensors):
-    asked = _slow(simulation=Simulation(effects=("+creep",)))
-    plan = twin.plan(sensors["biotac"], asked)
-    run = carried_out(sensors["biotac"], asked, 1, plan)
-    assert "taxel" in run.tracks[0].effective_n
-    assert {entry.effect: entry for entry in plan.settled(run.settled)}["creep"].included
 
 
 def test_a_ramp_of_a_minute_does_not(twin, sensors):

@@ -27,9 +27,8 @@ from tactbench.rigs.twin.geometry import Contact, check_contact, gap_mm, skin_gr
 from tactbench.rigs.twin.rig import build
 from tactbench.rigs.twin.shapes import Shape, shape_of
 from tactbench.sensors.ideal import tactbench_sensors
-from tests.oracles.boundary_elements import HalfSpace, Layer
+from tests.oracles.boundary_elements import Layer
 from tests.oracles.boundary_elements import press as press_elements
-from tests.oracles.closed_forms import FlatPunch
 
 INDENTERS = tactbench_indenters()
 
@@ -110,30 +109,6 @@ def test_a_pin_on_columns_presses_what_stands_under_it():
     assert area == pytest.approx(math.pi * 2.5**2, rel=0.02)
     np.testing.assert_allclose(state.pressure_mpa[touched], 1.0 / area, rtol=1e-3)
     assert state.depth_mm == pytest.approx(1.0 / area / K, rel=2e-3)  # and a hundredth of it in the penalty's springs
-
-
-def test_a_pin_on_a_half_space_sinks_in_as_boussinesq_says():
-    cells, side = 48, 8.0
-    x = (np.arange(cells) + 0.5) * side / cells - side / 2
-    height = shape("pin", radius=2.0).height_mm(x[:, None], x[None, :])
-    gap = np.where(height < 50, height, np.inf)
-    found = press_elements(HalfSpace(1.0), gap, (side / cells, side / cells), 1.0)
-    # 2 a E* d; the rim's pressure is infinite there and a mean over cells here: 12 cells a radius leave some per cent.
-    assert found.depth_mm == pytest.approx(FlatPunch(2.0, 1.0).depth_mm(1.0), rel=0.02)
-
-
-def test_a_cylinder_on_a_half_space_is_hertz_in_every_cross_section():
-    # Far from the ends of a long contact each section is plane: with its own load per length P, a² = 4 P R / (pi E*)
-    # and p0 = 2 P / (pi a) (Johnson 1985, section 4.2.3).
-    radius, cell = 10.0, 0.1
-    x, y = (np.arange(64) + 0.5) * 0.5 - 16, (np.arange(48) + 0.5) * cell - 2.4
-    gap = shape("cylinder", radius=radius).height_mm(x[:, None], y[None, :])
-    found = press_elements(HalfSpace(1.0), gap, (0.5, cell), 3.0)
-    middle = found.pressure_mpa[32]
-    load = float(middle.sum()) * cell
-    half_width = math.sqrt(4 * load * radius / math.pi)
-    assert middle.max() == pytest.approx(2 * load / (math.pi * half_width), rel=0.02)  # 16 cells a half-width
-    assert np.count_nonzero(middle) * cell == pytest.approx(2 * half_width, abs=2 * cell)
 
 
 @pytest.fixture(scope="module")
@@ -244,11 +219,6 @@ def test_a_pin_that_is_all_fillet_is_a_cap():
 @pytest.mark.parametrize("body", [shape("pin", radius=0.2), shape("edge", wedge_angle=80.0, tip_radius=0.0)])
 def test_a_shape_that_the_grid_cannot_resolve_is_refused(body):
     with pytest.raises(RigError, match=rf"indenter '{body.name}' .* rises by .* mm within 0.25 mm, a cell of the skin"):
-        check_contact(skin_grid(sheet(64)), pressed_by(body))
-
-
-def test_what_the_grid_does_resolve_is_not_refused():
-    for body in (shape("pin", radius=0.3), shape("edge", wedge_angle=90.0, tip_radius=0.0), shape("cylinder")):
         check_contact(skin_grid(sheet(64)), pressed_by(body))
 
 

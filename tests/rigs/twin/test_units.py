@@ -3,14 +3,12 @@
 import numpy as np
 import pytest
 
-from tactbench.plugin import ForceRamp, Indenter, RigContext, Scene, assumed
+from tactbench.plugin import ForceRamp, Indenter, Scene, assumed
 from tactbench.plugin.simulation import Environment
 from tactbench.rigs.twin import tactbench_effects
 from tactbench.rigs.twin.effects.channels import gain, rest_spread, unit_rest
 from tactbench.rigs.twin.planner import plan_scene
 from tactbench.rigs.twin.preparation import prepare
-from tactbench.rigs.twin.rig import build
-from tactbench.rigs.twin.synthesis import generator
 
 EFFECTS = tactbench_effects()
 NO_NOISE = Environment(force_noise=assumed(0.0, "N", "test"))
@@ -23,22 +21,6 @@ def scene(unit="1", **more):
 
 def prepared(sensor, unit, seed=1):
     return prepare(sensor, scene(unit), seed, plan_scene(EFFECTS, scene(unit), sensor.spec))
-
-
-@pytest.mark.parametrize("name", ["biotac", "icub"])
-def test_the_first_unit_draws_what_it_drew_before_there_were_units(sensors, name):
-    """Its scope is that of the sensor alone; recordings of it stay bit for bit what they were."""
-    run = prepared(sensors[name], "1")
-    for what in (("gain", "taxel"), ("rest", "taxel"), ("warm-up", "taxel")):
-        before = generator(1, name, "unit", *what).standard_normal(5)
-        np.testing.assert_array_equal(run.of_unit(*what).standard_normal(5), before)
-    readings = run.tracks[0].readings.copy()
-    unit_rest(run)
-    np.testing.assert_array_equal(run.tracks[0].readings, readings)
-    gain(run)
-    own = generator(1, name, "unit", "gain", "taxel").standard_normal(len(run.tracks[0].channels))
-    scatter = sensors[name].spec.nuisances["taxel"].gain_scatter.value
-    np.testing.assert_array_equal(run.tracks[0].gain, 1.0 + scatter * own)
 
 
 @pytest.mark.parametrize("name", ["biotac", "icub"])
@@ -91,11 +73,3 @@ def test_the_plan_includes_rest_levels_of_another_unit_only(sensors):
         (entry,) = [entry for entry in plan.entries if entry.effect == "unit-rest"]
         assert entry.included is wanted
         assert unit in entry.reason
-
-
-def test_a_recording_of_another_unit_says_what_is_assumed_of_it(sensors):
-    rig = build(RigContext(effects=tuple(EFFECTS)))
-    with rig.open(sensors["icub"], scene("2", environment=NO_NOISE), seed=1) as acquisition:
-        list(acquisition)
-    assert "assumed" in str(acquisition.drawn["remark unit gain"])
-    assert "measured" in str(acquisition.drawn["remark unit rest"])

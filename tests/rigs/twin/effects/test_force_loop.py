@@ -11,8 +11,7 @@ from tactbench.plugin.devices import LoopModel
 from tactbench.plugin.simulation import Environment
 from tactbench.rigs.twin import tactbench_effects
 from tactbench.rigs.twin.contact.stages import bare_skin
-from tactbench.rigs.twin.effects.force_loop import BEYOND, depth_of, force_at_depth
-from tactbench.rigs.twin.planner import plan_scene
+from tactbench.rigs.twin.effects.force_loop import BEYOND
 from tactbench.rigs.twin.preparation import prepare
 from tactbench.rigs.twin.rig import build
 
@@ -84,16 +83,6 @@ def test_the_swing_begins_where_the_skin_becomes_too_stiff_for_the_loop(pressed)
     assert critical < began < 1.2 * critical
 
 
-def test_noise_moves_the_motor_less_behind_the_filter(pressed):
-    held = {"start": _q(1.0, "N"), "end": _q(1.0, "N")}
-    filtered, plain = (
-        pressed(_scene(drive, 0.6875, **held), "force-loop").load.force_n[500:]
-        for drive in (ForceLoop(), _unfiltered())
-    )
-    # At 1 N the skin is soft enough for both: white noise behind a one-pole is smaller by sqrt((1-a)/(1+a)) = 0.19.
-    assert 0 < filtered.std() < 0.4 * plain.std()
-
-
 def test_everybody_follows_the_load_of_the_loop(pressed):
     run = pressed(_scene(ForceLoop(), 0.5))
     np.testing.assert_allclose(run.tracks[0].force_n, run.load.at(run.t_s))
@@ -116,24 +105,6 @@ def test_a_loop_that_swings_too_far_is_held_at_the_end_of_its_table_and_says_so(
     assert run.load.force_n.min() >= 0
 
 
-def test_a_drive_is_called_for_by_the_scene_alone(specs):
-    for drive, called in ((None, False), (ForceLoop(), True)):
-        plan = plan_scene(EFFECTS, _scene(drive), specs["icub"])
-        entry = next(entry for entry in plan.entries if entry.effect == "force-loop")
-        assert entry.included is called
-        assert "0 N" in entry.reason or "1 Hz" in entry.reason
-    assert plan.stages[0].name == "force-loop"
-
-
-def test_what_the_drive_is_made_of_is_printed_with_the_recording(sensors):
-    scene = _scene(_unfiltered(), samples=50)
-    with build(RigContext(effects=tuple(EFFECTS))).open(sensors["icub"], scene, seed=1) as recording:
-        said = recording.assumptions
-    assert said["drive_cutoff_hz"] == "none"
-    assert said["drive_proportional_mm_per_n"] == 0.15
-    assert said["drive_delay_ms"] == pytest.approx(10.0)
-
-
 def test_creep_is_never_left_out_behind_a_loop(sensors):
     slow = {"duration": _q(1e5, "s"), "samples": 200}
     rig = build(RigContext(effects=tuple(EFFECTS)))
@@ -150,14 +121,3 @@ def test_a_loop_that_means_nothing_is_refused_by_the_name_of_its_number(sensors,
     rig = build(RigContext(effects=tuple(EFFECTS)))
     with pytest.raises(RigError, match=name), rig.open(sensors["icub"], scene, seed=1):
         pass
-
-
-def test_depth_and_force_undo_each_other(pressed):
-    run = pressed(_scene(None), "contact")
-    table = bare_skin(run, 15.0)
-    force_n, deepest = force_at_depth(table)
-    for wanted in np.linspace(0.0, 15.0, 97):
-        # The straight lines between 4001 depths; 1.5 mN of 15 N.
-        assert force_n(depth_of(table, float(wanted))) == pytest.approx(wanted, abs=1.5e-3)
-    assert force_n(-1.0) == force_n(0.0) == 0.0
-    assert force_n(2 * deepest) == pytest.approx(15.0)

@@ -6,12 +6,11 @@ import numpy as np
 import pytest
 
 from tactbench.core.spec.scene import Simulation
-from tactbench.plugin import NotApplicable, Scene, load_registry
-from tactbench.plugin.simulation import Environment
+from tactbench.plugin import Scene, load_registry
 from tactbench.rigs.twin.effects.channels import offset, smooth_basis
 from tactbench.rigs.twin.geometry import Contact
 from tactbench.rigs.twin.preparation import handled
-from tactbench.rigs.twin.synthesis import Load, Synthesis, Track, generator
+from tactbench.rigs.twin.synthesis import Load, Synthesis, Track
 from tactbench.sensors.biotac.electrodes import ELECTRODES
 
 SEEDS = 400
@@ -83,25 +82,6 @@ def test_their_mean_square_over_electrodes_and_recordings_is_the_stated_one(own,
     assert np.sqrt(np.mean(own.mean(axis=1) ** 2)) == pytest.approx(stated * np.sqrt(0.14 / 19), rel=0.15)
 
 
-def test_recordings_are_independent_of_each_other(own, sensors):
-    # Correlations of an electrode's offsets in one recording with another's: 0, uncertain by 1/sqrt(400) each.
-    others = np.array(
-        [
-            _levels(_without_shared(sensors["biotac"]), seed, REST.model_copy(update={"name": "b"}))
-            for seed in range(SEEDS)
-        ]
-    )
-    between = np.mean(own * others, axis=0) / np.sqrt(np.mean(own**2, axis=0) * np.mean(others**2, axis=0))
-    assert np.abs(between).max() < 4.5 / np.sqrt(SEEDS)
-    np.testing.assert_array_equal(own[3], _levels(_without_shared(sensors["biotac"]), 3))
-
-
-@pytest.mark.parametrize("scale", [0.0, 0.5, 3.0])
-def test_they_scale(own, sensors, scale):
-    scene = REST.model_copy(update={"environment": Environment(offset_scale=scale)})
-    np.testing.assert_allclose(_levels(_without_shared(sensors["biotac"]), 3, scene), scale * own[3], rtol=1e-12)
-
-
 def test_the_space_of_fields_does_not_depend_on_how_places_are_written(sensors):
     spec = sensors["biotac"].spec
     basis = smooth_basis(spec, "taxel")
@@ -147,19 +127,6 @@ def test_few_places_or_none_leave_fewer_fields_or_none(sensors):
     assert np.std(found) == pytest.approx(2.0, rel=0.14)
 
 
-def test_hard_handled_draws_what_was_the_default_once(sensors):
-    biotac = sensors["biotac"]
-    scene = REST.model_copy(update={"simulation": Simulation(scenario="hard-handled")})
-    taxel = biotac.spec.handled("hard-handled").nuisances["taxel"]
-    assert [getattr(taxel, name).value for name in ("offset_shared", "offset_own", "wander", "wander_tau")] == [
-        15.0, 5.0, 0.5, 5.0,
-    ]  # fmt: skip
-    assert biotac.spec.handled("hard-handled").nuisances["dc_pressure"].warm_up.value == 100.0
-    shared, own = (generator(7, "biotac", "recording", "1", "a", "offset", what, "taxel") for what in ("shared", "own"))
-    expected = 15.0 * float(shared.standard_normal()) + 5.0 * own.standard_normal(19)
-    np.testing.assert_array_equal(_levels(biotac, 7, scene), expected)
-
-
 def test_a_scenario_leaves_what_it_does_not_name_and_is_never_the_default(sensors):
     spec = sensors["biotac"].spec
     hard = spec.handled("hard-handled")
@@ -171,8 +138,3 @@ def test_a_scenario_leaves_what_it_does_not_name_and_is_never_the_default(sensor
     for name in kept:
         assert getattr(hard.nuisances["taxel"], name) == getattr(spec.nuisances["taxel"], name)
     assert Scene(name="a").simulation.scenario is None
-
-
-def test_a_sensor_without_the_scenario_says_so(sensors):
-    with pytest.raises(NotApplicable, match="icub states no scenario 'hard-handled'"):
-        sensors["icub"].spec.handled("hard-handled")

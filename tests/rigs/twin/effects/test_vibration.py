@@ -12,7 +12,6 @@ from tactbench.plugin import RigError, assumed
 from tactbench.plugin.simulation import Surface
 from tactbench.rigs.twin.effects.ac_pressure import within_band
 from tactbench.rigs.twin.effects.channels import band_noise
-from tactbench.rigs.twin.effects.skin_mode import Mode, shaken
 from tactbench.rigs.twin.effects.skin_vibration import Profile, patch_mean
 
 RATE_HZ = 2200.0
@@ -105,17 +104,3 @@ def test_a_band_lets_through_what_two_first_order_filters_do(specs, frequency):
     expected = f / math.hypot(f, 10.0) / math.hypot(1.0, f / 1040.0)
     # Straight between samples: sinc^2 of f/2200 is 2.7 % at 200 Hz, 0.25 % at 60.
     assert gain == pytest.approx(expected, rel=2e-3 + (math.pi * f / RATE_HZ) ** 2 / 3)
-
-
-@given(st.lists(st.one_of(st.just(0.0), st.floats(1e-5, 2.0)), min_size=1, max_size=20), st.floats(0.0, 0.95))
-def test_a_mode_under_a_held_push_stays_where_it_is(steps, damping):
-    t = np.concatenate([[0.0], np.cumsum(steps)])
-    found = shaken(t, np.full(t.size, 0.7), Mode(2000.0, damping))
-    np.testing.assert_allclose(found, 0.7, rtol=1e-9)
-
-
-def test_a_slow_push_is_followed():
-    t = np.linspace(0.0, 1.0, 50)
-    push = np.sin(2 * math.pi * t)
-    # Late by 2 z/w = 0.1 ms of a motion of at most 2 pi/s; and the corners of its straight pieces ring.
-    np.testing.assert_allclose(shaken(t, push, Mode(2000.0, 0.1)), push, atol=2e-3)
