@@ -61,14 +61,10 @@ def test_the_untouched_core_is_the_same_circuit_without_a_contact():
     assert CORE.untouched(warm, np.zeros(1))[0] == CORE.room_c + CORE.rise_k
 
 
-def test_a_disc_of_one_millimetre_in_silicone():
+def test_heat_goes_through_a_disc_and_conductivity_grows_with_temperature_and_never_turns_negative():
     # 4 x 0.2 W/(m K) x 1e-3 m.
     assert disc_conductance_w_per_k(np.array([0.0, 1.0]), 0.2) == pytest.approx([0.0, 8e-4])
-
-
-def test_conductivity_is_that_of_25_degrees_there_and_never_negative():
-    found = relative_conductivity(np.array([25.0, 35.0, -200.0]), 0.02)
-    assert found == pytest.approx([1.0, 1.2, 0.1])
+    assert relative_conductivity(np.array([25.0, 35.0, -200.0]), 0.02) == pytest.approx([1.0, 1.2, 0.1])
 
 
 MAKERS = Thermistor(b_k=4025.0, p=155183.0, q=46555.0, full_scale=4095.0)
@@ -82,12 +78,6 @@ def by_the_maker(reading: float) -> float:
 @given(st.floats(-40, 120))
 def test_the_makers_formula_leads_back(degc):
     assert by_the_maker(float(MAKERS.reading(np.array([degc]))[0])) == pytest.approx(degc, abs=1e-9)
-
-
-def test_the_makers_formula_at_rest():
-    by_hand = by_the_maker(2576)
-    assert by_hand == pytest.approx(56.59, abs=0.005)
-    assert MAKERS.reading(np.array([by_hand]))[0] == pytest.approx(2576, abs=1e-8)
 
 
 def test_counts_rise_with_temperature_and_stay_on_the_converter():
