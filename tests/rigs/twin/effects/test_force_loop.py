@@ -6,26 +6,19 @@ import numpy as np
 import pytest
 
 from tactbench.core.spec.drive import ForceLoop
-from tactbench.plugin import ForceRamp, Indenter, RigContext, RigError, Scene, assumed
+from tactbench.plugin import ForceRamp, Indenter, RigError, Scene
 from tactbench.plugin.devices import LoopModel
-from tactbench.plugin.simulation import Environment
-from tactbench.rigs.twin import tactbench_effects
 from tactbench.rigs.twin.contact.stages import bare_skin
 from tactbench.rigs.twin.effects.force_loop import BEYOND
 from tactbench.rigs.twin.preparation import prepare
-from tactbench.rigs.twin.rig import build
+from tests.rigs.twin.conftest import SILENT, TWIN, named, q
 
-EFFECTS = tactbench_effects()
-CAP = Indenter(radius=assumed(10.0, "mm", "test"))
-
-
-def _q(value, unit):
-    return assumed(value, unit, "test")
+CAP = Indenter(radius=q(10.0))
 
 
 def _scene(drive, noise_n=0.0, **profile):
-    environment = Environment(noise_scale=0.0, drift_scale=0.0, force_noise=_q(noise_n, "N"))
-    ramp = ForceRamp(**{"samples": 2500, "duration": _q(30, "s"), "hold": _q(2, "s"), **profile})
+    environment = SILENT.model_copy(update={"force_noise": q(noise_n, "N")})
+    ramp = ForceRamp(**{"samples": 2500, "duration": q(30, "s"), "hold": q(2, "s"), **profile})
     return Scene(name="pressed", indenter=CAP, profile=ramp, environment=environment, drive=drive)
 
 
@@ -34,7 +27,7 @@ def pressed(sensors):
     """Carry out a scene on the iCub fingertip: its run."""
 
     def press(scene, until=None):
-        plan = build(RigContext(effects=tuple(EFFECTS))).plan(sensors["icub"], scene)
+        plan = TWIN.plan(sensors["icub"], scene)
         run = prepare(sensors["icub"], scene, 1, plan)
         for effect in plan.stages:
             run.apply(effect)
@@ -93,31 +86,28 @@ def test_everybody_follows_the_load_of_the_loop(pressed):
 
 
 def test_a_loop_with_its_own_rate_reaches_the_same_force(pressed):
-    fast = pressed(_scene(ForceLoop(rate=_q(500, "Hz"))), "force-loop")
+    fast = pressed(_scene(ForceLoop(rate=q(500, "Hz"))), "force-loop")
     assert fast.load.t_s.size == 15000
     assert fast.load.force_n[-1] == pytest.approx(5.0, abs=0.05)
 
 
 def test_a_loop_that_swings_too_far_is_held_at_the_end_of_its_table_and_says_so(pressed):
-    run = pressed(_scene(_unfiltered(proportional=_q(2.0, "mm/N"))), "force-loop")
+    run = pressed(_scene(_unfiltered(proportional=q(2.0, "mm/N"))), "force-loop")
     assert run.drawn["loop_steps_at_end"] > 0
     assert run.load.largest_n <= BEYOND * 5.0 * (1 + 1e-12)
     assert run.load.force_n.min() >= 0
 
 
 def test_creep_is_never_left_out_behind_a_loop(sensors):
-    slow = {"duration": _q(1e5, "s"), "samples": 200}
-    rig = build(RigContext(effects=tuple(EFFECTS)))
-    for drive, called in ((None, False), (ForceLoop(rate=_q(0.01, "Hz")), True)):
-        with rig.open(sensors["icub"], _scene(drive, **slow), seed=1) as recording:
-            assert next(entry for entry in recording.plan if entry.effect == "creep").included is called
+    slow = {"duration": q(1e5, "s"), "samples": 200}
+    for drive, called in ((None, False), (ForceLoop(rate=q(0.01, "Hz")), True)):
+        with TWIN.open(sensors["icub"], _scene(drive, **slow), seed=1) as recording:
+            assert named(recording.plan)["creep"].included is called
 
 
-@pytest.mark.parametrize("wrong", [{"cutoff": 0.0}, {"delay": -1.0}, {"speed": 0.0}, {"integral": float("nan")}])
-def test_a_loop_that_means_nothing_is_refused_by_the_name_of_its_number(sensors, wrong):
-    ((name, value),) = wrong.items()
+@pytest.mark.parametrize(("name", "value"), [("cutoff", 0.0), ("delay", -1.0)])
+def test_a_loop_that_means_nothing_is_refused_by_the_name_of_its_number(sensors, name, value):
     unit = getattr(ForceLoop(), name).unit
-    scene = _scene(ForceLoop(**{name: _q(value, unit)}))
-    rig = build(RigContext(effects=tuple(EFFECTS)))
-    with pytest.raises(RigError, match=name), rig.open(sensors["icub"], scene, seed=1):
+    scene = _scene(ForceLoop(**{name: q(value, unit)}))
+    with pytest.raises(RigError, match=name), TWIN.open(sensors["icub"], scene, seed=1):
         pass
