@@ -7,13 +7,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tactbench.plugin import assumed
 from tactbench.plugin.simulation import Dome, SheetTable, SkinGrid, SkinSheet
 from tactbench.rigs.twin.geometry import Contact, finger_surface_mm, gap_mm, skin_grid
+from tests.rigs.twin.conftest import q
 
-SHEET = SkinSheet(
-    x_min=assumed(-10, "mm", "t"), x_max=assumed(10, "mm", "t"), arc=assumed(20, "mm", "t"), cells=(40, 50)
-)
+SHEET = SkinSheet(x_min=q(-10), x_max=q(10), arc=q(20), cells=(40, 50))
 GRID = skin_grid(SHEET)
 
 
@@ -51,12 +49,7 @@ def test_beyond_the_cap_nothing_can_touch():
     assert gap.max() == 55.0
 
 
-def test_tilt_keeps_the_origin_of_the_approach():
-    tilted = gap_mm(GRID, Contact(40.0, 0.0, 0.0, tilt_x=0.3), 8.2)
-    assert tilted.min() == 0.0
-
-
-DOME = Dome(start=assumed(0.0, "mm", "test"))
+DOME = Dome(start=q(0.0))
 
 
 def test_a_dome_falls_away_along_its_meridian_as_the_finger_does_around():
@@ -76,7 +69,7 @@ def test_a_dome_falls_away_along_its_meridian_as_the_finger_does_around():
 
 def test_the_sheet_has_the_domes_own_area():
     # Archimedes: a strip of the sheet has the area of the sphere's zone.
-    x, s = np.linspace(0.0, 8.0, 4001), np.linspace(-8.0, 8.0, 401)
+    x, s = np.linspace(0.0, 8.0, 4001), np.linspace(-8.0, 8.0, 101)
     place = np.stack(finger_surface_mm(SkinGrid(x_mm=x, s_mm=s), 8.0, DOME), axis=-1)
     along, around = np.diff(place, axis=0)[:, :-1], np.diff(place, axis=1)[:-1]
     area = np.linalg.norm(np.cross(along, around), axis=-1).sum(axis=1)
@@ -85,7 +78,7 @@ def test_the_sheet_has_the_domes_own_area():
 
 
 def relief(value):
-    return SheetTable(x_mm=(0.0,), angle_deg=(0.0,), value_mm=((value,),), source=assumed(0, "1", "test").source)
+    return SheetTable(x_mm=(0.0,), angle_deg=(0.0,), value_mm=((value,),), source=q(0).source)
 
 
 def test_an_even_relief_is_a_thinner_finger():
@@ -105,13 +98,7 @@ def test_a_table_is_met_at_its_entries_straight_between_and_even_beyond():
     )
 
 
-@pytest.mark.parametrize(
-    "wrong",
-    [
-        {"x_mm": (1.0, 1.0)}, {"angle_deg": (0.0,)}, {"value_mm": ((1.0, 2.0),)}, {"x_mm": (), "value_mm": ()},
-        {"value_mm": ((1.0, math.nan), (1.0, 1.0))},
-    ],
-)  # fmt: skip
+@pytest.mark.parametrize("wrong", [{"x_mm": (1.0, 1.0)}, {"value_mm": ((1.0, math.nan), (1.0, 1.0))}])
 def test_a_table_that_is_none_is_refused(wrong):
     given_ = {"x_mm": (0.0, 1.0), "angle_deg": (0.0, 9.0), "value_mm": ((1.0, 1.0), (1.0, 1.0))}
     with pytest.raises(ValueError, match="ascending axes"):

@@ -10,14 +10,14 @@ import pytest
 from tactbench.core.cost.precision import measured
 from tactbench.core.matrix.progress import Progress
 from tactbench.core.spec.scene import Simulation
-from tactbench.plugin import Indenter, Placement, RigContext, Scene, SensorDescriptor, assumed, load_registry
+from tactbench.plugin import Indenter, Placement, Scene, SensorDescriptor
 from tactbench.plugin.simulation import FluidBackedShell
-from tactbench.rigs.twin import tactbench_effects, work_precision
+from tactbench.rigs.twin import work_precision
 from tactbench.rigs.twin.contact.stages import skin_under_load
-from tactbench.rigs.twin.fidelity import RUNGS
+from tactbench.rigs.twin.fidelity import DEFAULT, RUNGS
 from tactbench.rigs.twin.preparation import prepare
-from tactbench.rigs.twin.rig import build
 from tests.conftest import THIRD_PARTY
+from tests.rigs.twin.conftest import TWIN, q
 
 
 @pytest.fixture
@@ -37,14 +37,13 @@ def _little(monkeypatch):
     monkeypatch.setattr(work_precision, "RADII_MM", (10.0,))
     monkeypatch.setattr(work_precision, "LOADS", 2)
     monkeypatch.setattr(work_precision, "GRIDS", (0.5, 1.0))
+    monkeypatch.setattr(work_precision, "NODES", (8, DEFAULT.most_nodes))
     monkeypatch.setattr(work_precision, "_REFERENCE", RUNGS["default"])
 
 
 @pytest.mark.usefixtures("_little")
-def test_it_runs_for_every_installed_sensor_and_says_what_each_cannot_have(bonded):
-    sensors = list(load_registry().sensors)
-    assert {"biotac", "icub", "ideal", bonded.name} <= {sensor.name for sensor in sensors}
-    for sensor in sensors:
+def test_it_runs_for_every_kind_of_skin_and_says_what_each_cannot_have(sensors, bonded):
+    for sensor in (*sensors.values(), bonded):
         points, skipped = measured(work_precision.study(sensor, rounds=1), sensor.name, Progress())
         assert any(point.default and point.rung == "default" for point in points)
         none_of_it = isinstance(sensor.spec.skin, FluidBackedShell) or sensor.name == bonded.name
@@ -54,11 +53,11 @@ def test_it_runs_for_every_installed_sensor_and_says_what_each_cannot_have(bonde
         assert ("closed-form" in {point.rung for point in points}) is not none_of_it
 
 
-RADII = (None, 2.0, 5.0, 10.0, 40.0)
+RADII = (None, 2.0, 40.0)
 
 
 @pytest.mark.parametrize("radius", RADII)
-@pytest.mark.parametrize("rung", ["default", "fine", "reference"])
+@pytest.mark.parametrize("rung", ["default", "reference"])
 def test_a_third_partys_thick_soft_pad_is_solved_without_a_warning(bonded, radius, rung):
     # Warnings are errors here. Flat, a guess from neighbouring loads leaves the contact altogether.
     table = _table(bonded, radius, rung)
@@ -78,11 +77,10 @@ def test_it_reads_what_the_reference_rung_reads(bonded, radius):
 
 
 def _table(sensor, radius, rung):
-    twin = build(RigContext(effects=tuple(tactbench_effects())))
     scene = Scene(
         name="pressed",
-        indenter=Indenter(radius=None if radius is None else assumed(radius, "mm", "test")),
-        placement=Placement(x=assumed(0.1, "mm", "test"), scatter=assumed(0.0, "mm", "test")),
+        indenter=Indenter(radius=None if radius is None else q(radius)),
+        placement=Placement(x=q(0.1), scatter=q(0.0)),
         simulation=Simulation(rung=rung),
     )
-    return skin_under_load(prepare(sensor, scene, 1, twin.plan(sensor, scene)))
+    return skin_under_load(prepare(sensor, scene, 1, TWIN.plan(sensor, scene)))
