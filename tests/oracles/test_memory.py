@@ -1,4 +1,4 @@
-"""Everything with memory against closed forms: lags, drift, the heated core, low-passes."""
+"""Lags, low-passes and the heated core against closed forms."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from tactbench.rigs.twin.effects.heated_core import HeatedCore
-from tactbench.rigs.twin.effects.memory import lag, time_constant_s, wandering
+from tactbench.rigs.twin.effects.memory import lag, time_constant_s
 
 ROUNDING = 1e-12
 """Relative errors of exact filters: some thousand operations, each off by 1e-16."""
@@ -41,28 +41,6 @@ def test_the_lag_behind_a_curve_is_of_second_order():
         expected = (np.sin(omega * t_s) - x * np.cos(omega * t_s) + x * np.exp(-t_s / tau)) / (1 + x * x)
         errors.append(float(np.abs(lag(t_s, np.sin(omega * t_s), tau) - expected).max()))
     assert 1.9 <= order(errors) <= 2.1
-
-
-def test_drift_has_the_moments_of_ornstein_and_uhlenbeck():
-    spread, tau, paths = 2.0, 10.0, 4000
-    t_s = np.cumsum(np.tile([0.5, 1.5], 150))
-    drawn = wandering(t_s, spread, tau, paths, np.random.default_rng(5)) / spread
-    # Four standard errors: one in 16 000 is further off by chance, and the draws are fixed.
-    error = 4 / math.sqrt(paths)
-    for sample in (drawn[0], drawn[-1]):
-        assert abs(sample.mean()) <= error
-        assert abs(sample.var() - 1) <= math.sqrt(2) * error
-    rho = math.exp(-(t_s[30] - t_s[20]) / tau)
-    assert abs((drawn[20] * drawn[30]).mean() - rho) <= math.sqrt(1 + rho**2) * error
-    # The variance of a mean over T, exact for the trapezoid's weights.
-    weights = np.gradient(t_s)
-    weights[[0, -1]] = 0.5 * np.diff(t_s)[[0, -1]]
-    weights /= weights.sum()
-    expected = float(weights @ np.exp(-np.abs(t_s[:, None] - t_s[None, :]) / tau) @ weights)
-    assert abs((weights @ drawn).var() / expected - 1) <= math.sqrt(2) * error
-    share = tau / (t_s[-1] - t_s[0])
-    # Steps of up to 0.15 tau: the trapezoid errs by dt²/(12 tau²) of the peak.
-    assert expected == pytest.approx(2 * share * (1 + share * math.expm1(-1 / share)), rel=0.01)
 
 
 def test_a_heated_core_under_a_growing_contact_is_of_second_order():

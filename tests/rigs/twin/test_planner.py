@@ -66,6 +66,12 @@ def test_a_circle_of_effects_is_refused(specs):
         plan_scene([*EFFECTS, *circle], Scene(name="s"), specs["icub"])
 
 
+def test_a_predicate_that_answers_something_else_is_refused(specs):
+    odd = EffectDescriptor(name="odd", title="odd", where="x:y", produces=("disturbance",), called_for="operator:is_")
+    with pytest.raises(PluginContractError, match="not Reason"):
+        plan_scene([*EFFECTS, odd], Scene(name="s"), specs["icub"])
+
+
 def _asking(*words):
     return Scene(name="s", simulation=Simulation(effects=words))
 

@@ -15,7 +15,6 @@ from tactbench.plugin import (
     Indenter,
     NotApplicable,
     Placement,
-    Quality,
     RigContext,
     Scene,
 )
@@ -66,15 +65,6 @@ def test_a_recording_has_the_shape_it_promises(sensors):
     }  # fmt: skip
     assert acquisition.drawn["solver_residual"] < 1e-6
     assert acquisition.drawn["table_error_count"] < 1.0
-
-
-def test_the_force_is_held_and_then_rises_straight(sensors):
-    _, streams = _record(sensors["icub"], _scene(environment=SILENT))
-    t_s, force = streams["force_torque"][0] * 1e-9, streams["force_torque"][1][:, 0]
-    assert np.all(force[t_s < 7.2 - 1e-6] == 0)
-    ramp = t_s >= 7.2
-    # Time stamps are rounded to nanoseconds.
-    np.testing.assert_allclose(force[ramp], 5.0 * (t_s[ramp] - 7.2) / 52.8, atol=1e-8)
 
 
 @pytest.mark.parametrize("name", ["icub", "biotac"])
@@ -148,18 +138,6 @@ def test_the_warm_up_rises_towards_rest(sensors):
     rise = hot - cold
     assert 75 < rise < 105
     assert (hot - warm) / rise == pytest.approx(np.exp(-1), abs=0.03)
-
-
-def test_saturated_samples_are_clipped_and_flagged(sensors):
-    spec = sensors["icub"].spec
-    stream = spec.streams[0]
-    channels = tuple(channel.model_copy(update={"upper": 240.0}) for channel in stream.channels)
-    narrow = spec.model_copy(update={"streams": (stream.model_copy(update={"channels": channels}),)})
-    descriptor = sensors["icub"].model_copy(update={"spec": narrow})
-    _, streams = _record(descriptor, _scene())
-    _, data, quality = streams["taxels"]
-    assert data.max() == 240
-    np.testing.assert_array_equal(quality == Quality.SATURATED, data == 240)
 
 
 def test_only_observed_kinds_are_recorded_and_planned(sensors):

@@ -104,56 +104,44 @@ def test_a_pin_on_columns_presses_what_stands_under_it():
     assert state.depth_mm == pytest.approx(1.0 / area / K, rel=2e-3)  # and a hundredth of it in the penalty's springs
 
 
-@pytest.fixture(scope="module")
-def layer():
-    skin = BondedLayer(
-        sheet=sheet(48), young=q(1.0, "MPa"), poisson=q(0.3, "1"), thickness=q(2.0), contact_stiffness=q(300, "MPa/mm")
-    )
-    grid = skin_grid(skin.sheet)
-    return skin, grid, medium_of(skin, grid)
+LAYER = BondedLayer(
+    sheet=sheet(48), young=q(1.0, "MPa"), poisson=q(0.3, "1"), thickness=q(2.0), contact_stiffness=q(300, "MPa/mm")
+)
+MEDIUM = medium_of(LAYER, skin_grid(LAYER.sheet))
 
 
-def test_a_turned_cylinder_gives_the_transposed_pressure(layer):
-    _, grid, medium = layer
-    found = []
-    for angle in (0.0, 90.0):
-        contact = pressed_by(shape("cylinder", radius=5.0, angle=angle))
-        found.append(Press(medium, gap_mm(grid, contact), contact)(2.0).pressure_mpa)
+def layered(body: Shape) -> Press:
+    """Return the press of a bonded layer of 2 mm."""
+    return Press(MEDIUM, gap_mm(MEDIUM.grid, pressed_by(body)), pressed_by(body))
+
+
+def test_a_turned_cylinder_gives_the_transposed_pressure():
+    found = [layered(shape("cylinder", radius=5.0, angle=angle))(2.0).pressure_mpa for angle in (0.0, 90.0)]
     # The solver's own tolerance, 1e-6, is all that tells them apart.
     np.testing.assert_allclose(found[1], found[0].T, atol=1e-4 * found[0].max())
     assert np.ptp(found[0], axis=0).max() < 1e-4 * found[0].max()  # the same all along the cylinder
     assert np.ptp(found[0], axis=1).max() > 0.5 * found[0].max()
 
 
-def test_a_cylinder_sinks_in_less_than_a_cap_of_its_radius_and_an_edge_more(layer):
-    _, grid, medium = layer
-
-    def depth(contact: Contact) -> float:
-        return Press(medium, gap_mm(grid, contact), contact)(2.0).depth_mm
-
-    cylinder = depth(pressed_by(shape("cylinder", radius=5.0)))
-    assert cylinder < 0.7 * depth(Contact(5.0, 0.0, 0.0))
-    assert depth(pressed_by(shape("edge", wedge_angle=100.0, tip_radius=0.4))) > cylinder
-    # Flanks that begin beyond the contact are never touched: a rounded edge is then the cylinder of its tip.
-    assert depth(pressed_by(shape("edge", wedge_angle=90.0, tip_radius=5.0))) == pytest.approx(cylinder, rel=1e-9)
+def test_an_edge_whose_flanks_are_never_touched_is_the_cylinder_of_its_tip():
+    edge, cylinder = shape("edge", wedge_angle=90.0, tip_radius=5.0), shape("cylinder", radius=5.0)
+    assert layered(edge)(2.0).depth_mm == pytest.approx(layered(cylinder)(2.0).depth_mm, rel=1e-9)
 
 
-def test_the_cheapest_rung_presses_shapes_too(layer):
-    skin, grid, medium = layer
+def test_the_cheapest_rung_presses_shapes_too():
     contact = pressed_by(shape("cylinder", radius=5.0))
-    springs = float(medium.stiffness[0, 0])
+    press = LocalPress(LAYER, MEDIUM, gap_mm(MEDIUM.grid, contact), contact)
+    springs = float(MEDIUM.stiffness[0, 0])
     force = line_on_columns(0.3, lambda y: 5.0 - np.sqrt(np.maximum(25.0 - y**2, 0.0))) * springs / K
     # A cell is a third of a millimetre, the half-width five of them.
-    assert LocalPress(skin, medium, gap_mm(grid, contact), contact)(force).depth_mm == pytest.approx(0.3, rel=0.05)
+    assert press(force).depth_mm == pytest.approx(0.3, rel=0.05)
 
 
-def test_boundary_elements_agree_about_a_pin(layer):
-    _, grid, medium = layer
-    contact = pressed_by(shape("pin", radius=2.5))
-    gap = gap_mm(grid, contact)
-    default = Press(medium, gap, contact)(1.0)
+def test_boundary_elements_agree_about_a_pin():
+    pin = shape("pin", radius=2.5)
+    default, gap = layered(pin)(1.0), gap_mm(MEDIUM.grid, pressed_by(pin))
     # A flank is no surface: its height would be a mean with that of its neighbours.
-    elements = press_elements(Layer(1.0, 0.3, 2.0), np.where(gap < 50, gap, np.inf), grid.cell_mm, 1.0)
+    elements = press_elements(Layer(1.0, 0.3, 2.0), np.where(gap < 50, gap, np.inf), MEDIUM.grid.cell_mm, 1.0)
     assert np.array_equal(elements.pressure_mpa > 0, default.pressure_mpa > 0)
     # They differ by the penalty's 300 MPa/mm, 2e-4 mm here, and by what is beside the sheet: its own image, or no load.
     assert elements.depth_mm == pytest.approx(default.depth_mm, rel=0.03)
@@ -215,10 +203,8 @@ def test_a_shape_that_the_grid_cannot_resolve_is_refused(body):
         ({"wedge_angle": 60.0, "tip_radius": 0.5}, 20.0, "remark flank"),
     ],
 )
-def test_a_narrow_line_however_long_and_a_flank_steeper_than_45_degrees_are_remarked_upon(layer, sizes, load, expected):
-    _, grid, medium = layer
-    contact = pressed_by(shape("edge", **sizes))
-    assert expected in remarks(Press(medium, gap_mm(grid, contact), contact), (load,), math.inf)
+def test_a_narrow_line_however_long_and_a_flank_steeper_than_45_degrees_are_remarked_upon(sizes, load, expected):
+    assert expected in remarks(layered(shape("edge", **sizes)), (load,), math.inf)
 
 
 def test_a_shape_that_is_not_installed_or_of_another_unit_is_refused_with_what_there_is(sensors):

@@ -53,27 +53,16 @@ def test_it_runs_for_every_kind_of_skin_and_says_what_each_cannot_have(sensors, 
         assert ("closed-form" in {point.rung for point in points}) is not none_of_it
 
 
-RADII = (None, 2.0, 40.0)
-
-
-@pytest.mark.parametrize("radius", RADII)
-@pytest.mark.parametrize("rung", ["default", "reference"])
-def test_a_third_partys_thick_soft_pad_is_solved_without_a_warning(bonded, radius, rung):
+@pytest.mark.parametrize("radius", [None, 2.0, 40.0])
+def test_a_third_partys_thick_soft_pad_is_solved_without_a_warning_as_the_reference_rung_does(bonded, radius):
     # Warnings are errors here. Flat, a guess from neighbouring loads leaves the contact altogether.
-    table = _table(bonded, radius, rung)
-    assert np.all(np.isfinite(table.readings))
-    assert table.residual < 2e-6
-
-
-@pytest.mark.parametrize("radius", RADII)
-def test_it_reads_what_the_reference_rung_reads(bonded, radius):
-    loads = np.linspace(0.0, 5.0, 23)
-    own, reference = (_table(bonded, radius, rung)(loads) for rung in ("default", "reference"))
-    if radius is None:
-        # Within a count, of 25: in fact to the tolerance of the solver.
-        assert np.abs(own - reference).max() < 1e-3
+    tables = [_table(bonded, radius, rung) for rung in ("default", "reference")]
+    assert all(table.residual < 2e-6 for table in tables)
+    own, reference = (table(np.linspace(0.0, 5.0, 23)) for table in tables)
     # The pad's declared contact stiffness is part of the default rung only: 1 % of the signal is what it gives way.
-    assert np.abs(own - reference).max() < 0.01 * np.ptp(reference) + 1e-3
+    # Flat, it is not even that but, of 25 counts, the tolerance of the solver.
+    share = 0.0 if radius is None else 0.01
+    assert np.abs(own - reference).max() < share * np.ptp(reference) + 1e-3
 
 
 def _table(sensor, radius, rung):

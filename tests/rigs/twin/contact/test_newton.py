@@ -49,11 +49,6 @@ PRESSURES = {
 }
 
 
-def fluid_mpa(press, found):
-    local, _ = press.medium.respond(found.deflection_mm, np.empty(press.gap_mm.shape))
-    return float(np.mean(found.pressure_mpa - local))
-
-
 @pytest.mark.parametrize(("case", "depths"), ANCHORS.items())
 def test_reference_values(prototype, case, depths):
     name, radius = case
@@ -67,7 +62,10 @@ def test_reference_values(prototype, case, depths):
         # Half a unit of the last printed decimal, and 1e-5 for both solvers' own tolerance.
         assert found.depth_mm == pytest.approx(depth, abs=0.5e-3 + 1e-5)
         if name == "biotac":
-            assert 1e3 * fluid_mpa(press, found) == pytest.approx(PRESSURES[radius][i], abs=0.5e-2 + 1e-4)
+            local, _ = press.medium.respond(found.deflection_mm, np.empty(press.gap_mm.shape))
+            assert 1e3 * float(np.mean(found.pressure_mpa - local)) == pytest.approx(
+                PRESSURES[radius][i], abs=0.5e-2 + 1e-4
+            )
 
 
 @pytest.mark.parametrize(("x", "s"), [(-5.0, 0.0), (6.0, 1.3), (9.0, 0.0)])
@@ -102,13 +100,6 @@ def test_the_tip_does_not_feel_the_seal(x):
     # The rearmost row a hundred times as stiff: 4e-5 of the dent were found. Round a period it was 1 to 60 %.
     tip = plain.grid.x_mm > 5.0
     assert np.abs(found - other)[tip].max() < 1e-4 * found.max()
-
-
-def test_the_tip_gives_way_as_the_pad_does():
-    # With a clamp at the tip a newton raises the fluid's pressure there by a seventh of what it does under the pad.
-    presses = [solver("biotac", 10.0, x) for x in (-5.0, 6.0)]
-    pad, tip = (fluid_mpa(press, press.solve(1.0)) for press in presses)
-    assert 0.5 * pad < tip < 2 * pad
 
 
 def test_warm_and_cold_starts_meet():

@@ -15,8 +15,8 @@ from tactbench.rigs.twin.partial_slip import shear_modulus_mpa
 from tests.oracles.layers import bonded_layer
 
 
-def _drive(load, seconds=4.0, **more):
-    grid = np.linspace(0.0, seconds, 801)
+def _drive(load, seconds=4.0, nodes=801, **more):
+    grid = np.linspace(0.0, seconds, nodes)
     load_n = np.interp(grid, np.linspace(0.0, seconds, len(load)), load)
     return Drive(**{
         "speed_mm_s": 10.0, "start_s": 0.5, "end_s": math.inf, "static": 0.8, "kinetic": 0.6, "stribeck_mm_s": 5.0,
@@ -85,17 +85,6 @@ def test_after_the_motion_the_force_stays_until_the_load_lets_it_go():
     assert seen.force_n[-1] == 0
 
 
-def test_a_motion_that_ends_while_the_skin_sticks_keeps_its_elastic_force():
-    first = Dragged(_drive([1.0, 1.0], speed_mm_s=1.0)).let_go_s[0]
-    end = 0.5 + 0.9 * (first - 0.5)
-    dragged = Dragged(_drive([1.0, 1.0], end_s=end, speed_mm_s=1.0))
-    before, after = (dragged(np.array([t])) for t in (end - 1e-9, end + 1e-9))
-    viscous = 2.0 * dragged.drive.mode.damping / dragged.drive.mode.omega * 1.0 * dragged.drive.stiffness[0]
-    # The limit of what sticks rises by the viscous force that ends: the elastic force moves by less than that.
-    assert before.force_n[0] - after.force_n[0] == pytest.approx(viscous, abs=1.0 * viscous)
-    assert after.displacement_mm[0] == pytest.approx(before.displacement_mm[0], rel=1e-6)
-
-
 @given(st.floats(0.0, 0.95), st.floats(1e-4, 1.0), st.floats(1e-3, 500.0))
 def test_a_slip_ends_at_the_surfaces_speed_for_the_first_time(damping, u, speed):
     mode = Mode(2000.0, damping)
@@ -162,16 +151,12 @@ def test_steps_a_thousand_times_as_long_change_nothing(speed):
 
 @pytest.mark.parametrize("speed", [0.1, 20.0])
 def test_a_grid_of_loads_a_thousand_times_as_coarse_blows_nothing_up(speed):
-    seen = {}
-    for step_s in (0.002, 2.0):
-        grid = np.arange(0.0, 60.0 + step_s / 2, step_s)
-        load = np.interp(grid, [0.0, 10.0, 50.0, 60.0], [1.0, 1.0, 4.0, 4.0])
-        drive = Drive(speed, 10.0, math.inf, 0.8, 0.6, 5.0, Mode(2000.0, 0.1), grid, load, 2.0 * np.cbrt(load))
-        seen[step_s] = Dragged(drive)(np.linspace(0.0, 60.0, 60_001))
-        limit = 0.8 * np.interp(np.linspace(0.0, 60.0, 60_001), grid, load)
-        assert all(np.isfinite(values).all() for values in seen[step_s])
-        # A stiffness that is straight over 2 s while the load grows by 0.15 N: (0.15/1)^2/9 of the limit.
-        assert (seen[step_s].force_n - limit).max() < (1e-4 if step_s == 0.002 else 0.0025 * limit.max())
+    t, load = np.linspace(0.0, 60.0, 60_001), [1.0, 1.0, 1.75, 2.5, 3.25, 4.0, 4.0]
+    limit = 0.8 * np.interp(t, np.linspace(0.0, 60.0, 7), load)
+    fine, coarse = (Dragged(_drive(load, 60.0, nodes, speed_mm_s=speed, start_s=10.0))(t) for nodes in (30_001, 31))
+    # A stiffness that is straight over 2 s while the load grows by 0.15 N: (0.15/1)^2/9 of the limit.
+    for seen, close in ((fine, 1e-4), (coarse, 0.0025 * limit.max())):
+        assert all(np.isfinite(values).all() for values in seen)
+        assert (seen.force_n - limit).max() < close
     # Phases of single slips drift apart; what was slipped in all does not: the skin follows by less than a millimetre.
-    apart = np.abs(seen[2.0].slip_mm - seen[0.002].slip_mm).max()
-    assert apart < 2 * seen[0.002].displacement_mm.max()
+    assert np.abs(coarse.slip_mm - fine.slip_mm).max() < 2 * fine.displacement_mm.max()

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tactbench.core.spec.scene import Simulation
-from tactbench.plugin import ForceRamp, Scene, load_registry
+from tactbench.plugin import ForceRamp, Scene
 from tactbench.plugin.simulation import Environment
 from tactbench.rigs.twin.effects import creep
 from tactbench.rigs.twin.effects.channels import gain, offset, rest_spread, smooth_basis, unit_rest
@@ -115,21 +115,10 @@ def test_few_places_or_none_leave_fewer_fields_or_none(sensors):
     on_a_line = _placed(spec, *((1e-3 * number, 0.0, -5e-3) for number in range(6)))
     assert smooth_basis(on_a_line, "taxel").shape == (6, 2)  # straight and bent
     assert smooth_basis(_placed(spec, (0.0, 0.0, -5e-3), None), "taxel") is None
-    assert smooth_basis(load_registry().sensors["ideal"].spec, "taxel").shape == (16, 5)
     lone = _without_shared(sensors["biotac"].model_copy(update={"spec": _placed(spec, (0.0, 0.0, -5e-3))}))
     found = [levels(lone, seed=seed)[0] for seed in range(SEEDS)]
     # A single channel has no field: its whole offset is its own. 2 counts, uncertain by 3.5 %.
     assert np.std(found) == pytest.approx(2.0, rel=0.14)
-
-
-def test_a_scenario_leaves_what_it_does_not_name(sensors):
-    spec = sensors["biotac"].spec
-    hard = spec.handled("hard-handled")
-    for kind in spec.nuisances.keys() - spec.scenarios["hard-handled"].nuisances.keys():
-        assert hard.nuisances[kind] == spec.nuisances[kind]
-    kept = ("white", "offset_session", "gain_scatter", "warm_up", "warm_up_tau", "warm_up_scatter", "creep", "step")
-    for name in kept:
-        assert getattr(hard.nuisances["taxel"], name) == getattr(spec.nuisances["taxel"], name)
 
 
 def test_own_offsets_change_with_the_recording_and_session_offsets_do_not(sensors):
