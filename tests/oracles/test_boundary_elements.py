@@ -70,7 +70,7 @@ def test_flat_punches_sink_with_the_first_power_of_the_cell():
     cells, depths = [64, 128, 256], []
     for n in cells:
         off, pressures = [], []
-        for radius in (1.77, 1.83, 1.91, 2.0, 2.07, 2.13):
+        for radius in (1.77, 1.91, 2.07):
             punch, r = FlatPunch(radius, 1.0), distances(n)
             found = pressed(SOFT, np.where(r <= radius, 0.0, math.inf), SIDE, 1.0)
             inner = r < 0.7 * radius
@@ -84,7 +84,7 @@ def test_flat_punches_sink_with_the_first_power_of_the_cell():
     assert 0.7 <= order(cells, depths) <= 1.8
 
 
-@pytest.mark.parametrize("poisson", [0.3, 0.45, 0.499])
+@pytest.mark.parametrize("poisson", [0.3, 0.499])
 def test_a_layer_against_finite_elements_wide_contact(poisson):
     """Depth 0.5 mm: contact radii of 2.8 to 3.1 mm on a layer of 2 mm."""
     misses = []
