@@ -9,7 +9,7 @@ from tactbench.core.spec.drive import ForceLoop
 from tactbench.plugin import ForceRamp, Indenter, RigError, Scene
 from tactbench.plugin.devices import LoopModel
 from tactbench.rigs.twin.contact.stages import bare_skin
-from tactbench.rigs.twin.effects.force_loop import BEYOND
+from tactbench.rigs.twin.effects.force_loop import BEYOND, depth_of, force_at_depth
 from tactbench.rigs.twin.preparation import prepare
 from tests.rigs.twin.conftest import SILENT, TWIN, named, q
 
@@ -111,3 +111,13 @@ def test_a_loop_that_means_nothing_is_refused_by_the_name_of_its_number(sensors,
     scene = _scene(ForceLoop(**{name: q(value, unit)}))
     with pytest.raises(RigError, match=name), TWIN.open(sensors["icub"], scene, seed=1):
         pass
+
+
+def test_depth_and_force_undo_each_other(pressed):
+    table = bare_skin(pressed(_scene(None), "contact"), 15.0)
+    force_n, deepest = force_at_depth(table)
+    for wanted in np.linspace(0.0, 15.0, 97):
+        # The straight lines between 4001 depths; 1.5 mN of 15 N.
+        assert force_n(depth_of(table, float(wanted))) == pytest.approx(wanted, abs=1.5e-3)
+    assert force_n(-1.0) == force_n(0.0) == 0.0
+    assert force_n(2 * deepest) == pytest.approx(15.0)
