@@ -76,7 +76,7 @@ def test_a_recording_says_which_rung_it_was_asked_for(sensors):
 
 
 def test_a_tolerance_takes_the_cheapest_rung_that_keeps_it(sensors):
-    for tolerance, cheapest in ((40.0, "closed-form"), (1.0, "default")):
+    for tolerance, cheapest in ((40.0, "closed-form"), (1.0, "default"), (0.1, "fine")):
         acquisition, _ = _recorded(sensors["icub"], Simulation(tolerance=tolerance))
         assert acquisition.drawn["error_estimate_count"] <= tolerance
         assert acquisition.assumptions["tolerance_count"] == tolerance

@@ -148,12 +148,14 @@ def test_recording_fewer_channels_changes_none(sensors):
     np.testing.assert_array_equal(every.readings[:, :5], few.readings)
 
 
-def test_gains_scatter_about_one_and_belong_to_the_unit(sensors):
+def test_gains_scatter_about_one_and_belong_to_the_unit_as_rest_levels_do(sensors):
     gains = np.concatenate([after(sensors["biotac"], gain, seed=seed).tracks[0].gain for seed in range(40)])
     # 760 numbers of sd 0.05: standard errors 0.0018 and 0.0013, four of each.
     assert gains.mean() == pytest.approx(1.0, abs=0.0073)
     assert gains.std() == pytest.approx(0.05, abs=0.0052)
     first, second = (after(sensors["biotac"], gain, name=name).tracks[0].gain for name in ("a", "b"))
+    np.testing.assert_array_equal(first, second)
+    first, second = (levels(sensors["icub"], rest_spread, name=name) for name in ("a", "b"))
     np.testing.assert_array_equal(first, second)
 
 
