@@ -25,7 +25,7 @@ def test_scenes_of_the_default_matrix_lose_nothing(sensors, name, task):
 
 def _slow(radius=20.0, end=5.0, duration=14400.0, samples=2000, **more):
     profile = ForceRamp(duration=q(duration, "s"), hold=q(0.0, "s"), end=q(end, "N"), samples=samples)
-    indenter = Indenter(radius=None if radius is None else q(radius, "mm"))
+    indenter = Indenter(radius=None if radius is None else q(radius))
     return Scene(name="slow", indenter=indenter, profile=profile, **more)
 
 
@@ -59,7 +59,7 @@ def test_the_bound_follows_the_place_of_the_contact(sensors, name, drawn):
     """Readings are up to three times as steep here as where a sensor's spec was once asked how steep they get."""
     sensor = sensors[name]
     tilt = q(drawn.get("tilt", 0.0), "deg")
-    placement = Placement(x=q(drawn["x"], "mm"), s=q(drawn["s"], "mm"), tilt_x=tilt, scatter=q(0.0, "mm"))
+    placement = Placement(x=q(drawn["x"]), s=q(drawn["s"]), tilt_x=tilt, scatter=q(0.0))
     found = []
     # From where creep is called for to where it is left out, and as near to that as a factor of two tells.
     for doubled in range(12):
@@ -83,7 +83,7 @@ def _apart(sensor, one, other):
 
 
 def test_a_ramp_of_a_minute_does_not(sensors):
-    scene = Scene(name="paper", indenter=Indenter(radius=q(20.0, "mm")))
+    scene = Scene(name="paper", indenter=Indenter(radius=q(20.0)))
     entry = _creep(sensors["biotac"], scene)
     assert entry.included
     asked = scene.model_copy(update={"simulation": Simulation(effects=("-creep",))})

@@ -23,7 +23,7 @@ from tactbench.rigs.twin.preparation import prepare
 from tactbench.rigs.twin.rig import build
 from tests.rigs.twin.conftest import EFFECTS, SILENT, TWIN, named, q
 
-CAP = Indenter(radius=q(10.0, "mm"))
+CAP = Indenter(radius=q(10.0))
 
 
 def _scene(name="cap", **more):
@@ -76,7 +76,7 @@ def test_the_same_seed_gives_the_same_bits_and_another_does_not(sensors, name):
 
 
 def test_the_place_of_contact_is_stated_with_the_commanded_offset(sensors):
-    moved = Placement(x=q(1.5, "mm"), s=q(-0.5, "mm"), scatter=q(0.2, "mm"))
+    moved = Placement(x=q(1.5), s=q(-0.5), scatter=q(0.2))
     acquisition, _ = _record(sensors["biotac"], _scene(placement=moved, profile=ForceRamp(samples=20)))
     assumed_x, assumed_s = (acquisition.assumptions[f"contact_{axis}_mm"] for axis in "xs")
     assert (assumed_x, assumed_s) == (-3.5, -0.5)

@@ -26,8 +26,8 @@ from tests.rigs.twin.conftest import SILENT, TWIN, named, q
 
 DESCRIPTOR = RigDescriptor(name="twin", title="Twin", where="tactbench.rigs.twin.rig:build", simulated=True)
 EDGES = (2, 10, 30, 100, 200, 500, 1000)
-CAP = Indenter(radius=q(20.0, "mm"))
-NOMINAL = Placement(scatter=q(0.0, "mm"))
+CAP = Indenter(radius=q(20.0))
+NOMINAL = Placement(scatter=q(0.0))
 """So that all recordings of one load share one contact."""
 
 
@@ -154,8 +154,8 @@ def test_a_scene_that_only_presses_has_no_tangential_channels(record):
 
 
 def test_a_surface_of_an_earlier_recording_is_read_by_its_wavelength():
-    given = Surface().model_dump(exclude={"roll_off", "hurst"}) | {"wavelength": q(6.25, "mm"), "spread": 0.5}
-    assert Surface.model_validate(given).roll_off == q(6.25, "mm")
+    given = Surface().model_dump(exclude={"roll_off", "hurst"}) | {"wavelength": q(6.25), "spread": 0.5}
+    assert Surface.model_validate(given).roll_off == q(6.25)
 
 
 def test_louder_with_roughness(record):

@@ -20,9 +20,9 @@ def test_an_ordinary_scene_passes_and_an_infinite_radius_is_a_flat_surface():
     ("part", "says"),
     [
         ({"profile": ForceRamp(duration=q(math.nan, "s"))}, "profile duration"),
-        ({"placement": Placement(scatter=q(-0.1, "mm"))}, "placement scatter"),
+        ({"placement": Placement(scatter=q(-0.1))}, "placement scatter"),
         ({"environment": Environment(noise_scale=math.inf)}, "environment noise scale"),
-        ({"indenter": Indenter(radius=q(-math.inf, "mm"))}, "indenter radius"),
+        ({"indenter": Indenter(radius=q(-math.inf))}, "indenter radius"),
         ({"profile": ForceRamp(samples=MOST_SAMPLES + 1)}, "samples"),
     ],
 )

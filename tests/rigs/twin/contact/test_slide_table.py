@@ -32,8 +32,8 @@ GUESS = Source(tag="assumed", reference="test")
 
 
 SKIN = BondedLayer(
-    sheet=SkinSheet(x_min=q(-8, "mm"), x_max=q(8, "mm"), arc=q(16, "mm"), cells=(32, 32)),
-    young=q(0.5, "MPa"), poisson=q(0.45, "1"), thickness=q(3, "mm"), contact_stiffness=q(10, "MPa/mm"),
+    sheet=SkinSheet(x_min=q(-8), x_max=q(8), arc=q(16), cells=(32, 32)),
+    young=q(0.5, "MPa"), poisson=q(0.45, "1"), thickness=q(3), contact_stiffness=q(10, "MPa/mm"),
 )  # fmt: skip
 CHANNELS = ("force_x", "force_s", "moved_x", "moved_s", "field")
 SPEC = SensorSpec(
@@ -65,8 +65,8 @@ SENSOR = SensorDescriptor(spec=SPEC, transducer=f"{__name__}:build")
 def _scene(speed=5.0, angle_deg=0.0, **more):
     ramp = ForceRamp(start=q(0.5, "N"), end=q(1.5, "N"), hold=q(0, "s"), duration=q(2, "s"), samples=400)
     slide = Slide(speed=q(speed, "mm/s"), start=q(0.5, "s"), duration=q(1, "s"), direction=q(angle_deg, "deg"))
-    return Scene(name="slide", indenter=Indenter(radius=q(8, "mm")), profile=ramp, slide=slide, observe=("taxel",),
-                 placement=Placement(scatter=q(0, "mm")), **more)  # fmt: skip
+    return Scene(name="slide", indenter=Indenter(radius=q(8)), profile=ramp, slide=slide, observe=("taxel",),
+                 placement=Placement(scatter=q(0)), **more)  # fmt: skip
 
 
 def _readings(sensor, scene):
