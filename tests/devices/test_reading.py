@@ -198,12 +198,6 @@ def test_a_stream_that_was_not_announced_ends_the_reading(clock):
     assert "'other'" in reading.ended
 
 
-class Unstoppable(NumberedDriver):
-    def stop(self):
-        super().stop()
-        raise LinkUnplugged("It is gone.")
-
-
 def consume(
     reading: Reading, *, begun: Callable[[], None] = lambda: None, error: Exception | None = None, after: int = 0
 ) -> None:

@@ -52,29 +52,6 @@ class FlatPunch:
 
 
 @dataclass(frozen=True)
-class ThinLayer:
-    """A paraboloid on a thin layer bonded to a rigid base (section 5.8): E = 1 MPa, contact radius far above h.
-
-    The leading terms in h/a: springs of the oedometric modulus over the thickness, or a film that can only flow aside.
-    """
-
-    radius_mm: float
-    poisson: float
-    thickness_mm: float
-
-    def force_n(self, contact_radius_mm: float) -> float:
-        a, nu = contact_radius_mm, self.poisson
-        if nu == 0.5:
-            depth = a**2 / (4 * self.radius_mm)
-            return 2 / 3 * math.pi * self.radius_mm**2 * (depth / self.thickness_mm) ** 3
-        stiffness = (1 - nu) / ((1 + nu) * (1 - 2 * nu)) / self.thickness_mm
-        return math.pi * stiffness * self.radius_mm * (a**2 / (2 * self.radius_mm)) ** 2
-
-    def depth_mm(self, contact_radius_mm: float) -> float:
-        return contact_radius_mm**2 / ((4 if self.poisson == 0.5 else 2) * self.radius_mm)
-
-
-@dataclass(frozen=True)
 class CattaneoMindlin:
     """A pressed sphere that is then pushed sideways below slip (section 7.2): inside a circle it sticks.
 

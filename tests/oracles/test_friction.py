@@ -55,18 +55,6 @@ def test_partial_slip_is_what_its_tractions_add_up_to():
     assert share_of_force(np.array([1e-7]))[0] / 1e-7 == pytest.approx(1.5, abs=1e-6)
 
 
-def test_an_oscillating_contact_loses_mindlins_energy():
-    """The loop that Masing's rule makes of the loading curve (Johnson 1985, section 7.4)."""
-    stiffness = float(sliding_stiffness(np.array([RADIUS]), SHEAR)[0])
-    for share in (0.3, 0.7, 1.0):
-        s = (np.arange(4000) + 0.5) / 4000 * share
-        q = float(share_of_force(np.array([share]))[0])
-        found = (8.0 * np.sum(share_of_force(s)) * share / 4000 - 4.0 * q * share) * LIMIT**2 / stiffness
-        closed = 1.0 - (1 - q) ** (5 / 3) - 5.0 / 6.0 * q * (1.0 + (1 - q) ** (2 / 3))
-        # The midpoint rule on 4000 points.
-        assert found == pytest.approx(9.0 * LIMIT**2 / (10.0 * RADIUS * SHEAR) * closed, rel=1e-5)
-
-
 @pytest.mark.parametrize("speed", [0.01, 5.0, 60.0])
 def test_stick_slip_has_the_period_and_the_drop_of_two_coefficients(speed):
     found = Dragged(drive(speed, 0.0, 40.0 * period_s(speed)))
@@ -90,39 +78,6 @@ def test_a_damped_slip_ends_where_runge_and_kutta_find_it(damping, u, speed):
     assert state[1] == pytest.approx(speed, abs=1e-9 * OMEGA * u)
     closed, _ = swing(mode, np.array([u]), np.array([speed]), np.array([lasting]))
     assert state[0] == pytest.approx(closed[0], abs=1e-9 * u)
-
-
-def test_the_work_of_a_cycle_goes_into_friction_damper_and_annulus():
-    speed, damping = 20.0, 0.1
-    found = Dragged(drive(speed, damping, 1.0))
-    (stick, end), slip = found.caught_s[5:7], float(found.let_go_s[5])
-    viscous = 2.0 * damping / OMEGA * STIFFNESS
-    work = spent = 0.0
-    for begin, until in ((stick, slip), (slip, end)):
-        # Gauss points never ask at the instant itself, which belongs to the next phase.
-        nodes, weights = np.polynomial.legendre.leggauss(200)
-        dt, seen = 0.5 * (until - begin) * weights, found(begin + (until - begin) * 0.5 * (nodes + 1.0))
-        assert (seen.force_n * seen.slip_mm_s).min() >= -1e-9  # friction never drives
-        work += float(np.sum(seen.force_n * speed * dt))
-        spent += float(np.sum((seen.force_n * seen.slip_mm_s + viscous * (speed - seen.slip_mm_s) ** 2) * dt))
-    x = found(np.array([stick, slip])).displacement_mm
-    # The partial slip's share in closed form; quadrature of 200 points.
-    assert work == pytest.approx(spent + 0.1 * STIFFNESS * (x[1] - x[0]) ** 2, rel=1e-7)
-    # Damping takes energy from the swing.
-    assert 0.3 <= STIFFNESS * (x[1] - x[0]) / (2.0 * (STATIC - KINETIC) * LOAD_N) <= 1.0
-
-
-@pytest.mark.parametrize(("speed", "damping"), [(1.0, 0.05), (20.0, 0.1), (200.0, 0.3)])
-def test_no_force_exceeds_friction_under_a_load_that_rises_and_falls(speed, damping):
-    grid = np.linspace(0.0, 10.0, 5001)
-    load = np.interp(grid, [0.0, 2.0, 8.0, 10.0], [0.0, 0.0, 5.0, 1.0])
-    found = Dragged(Drive(speed, 1.0, 9.0, STATIC, KINETIC, 5.0, Mode(OMEGA, damping), grid, load, 2.0 * np.cbrt(load)))
-    t = np.linspace(0.0, 10.0, 40001)
-    seen = found(t)
-    # Stiffness is straight between nodes of 2 ms where the load's cube root is not: 2e-5 of 4 N.
-    assert (seen.force_n - STATIC * np.interp(t, grid, load)).max() <= 1e-4
-    assert not seen.force_n[t < 1.0].any()
-    assert np.diff(seen.slip_mm).min() >= -1e-12  # the surface never lags behind the skin
 
 
 def test_the_bristle():

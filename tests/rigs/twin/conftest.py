@@ -1,29 +1,49 @@
-"""Real skins and real sensors for the twin's tests."""
+"""Real skins and real sensors, the twin with all its effects, and runs before the converter."""
 
 from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from typing import Any
 
 import numpy as np
 import pytest
 
-from tactbench.plugin import SensorDescriptor, SensorSpec, assumed
-from tactbench.plugin.simulation import BondedLayer, SheetTable
+from tactbench.plugin import PlanEntry, Quantity, RigContext, Scene, SensorDescriptor, SensorSpec, assumed
+from tactbench.plugin.simulation import Environment, SheetTable
+from tactbench.rigs.twin import tactbench_effects, tactbench_indenters
 from tactbench.rigs.twin.contact.core import with_core
 from tactbench.rigs.twin.contact.media import Medium
-from tactbench.rigs.twin.contact.newton import NewtonSolver
 from tactbench.rigs.twin.contact.pressing import medium_of
-from tactbench.rigs.twin.geometry import Contact, gap_mm, skin_grid
+from tactbench.rigs.twin.geometry import skin_grid
+from tactbench.rigs.twin.preparation import carried_out
+from tactbench.rigs.twin.rig import build
+from tactbench.rigs.twin.synthesis import Synthesis
 from tactbench.sensors.biotac.spec import SPEC as BIOTAC
 from tactbench.sensors.icub.spec import SPEC as ICUB
-from tests.oracles.layers import bonded_layer
 
 SPECS = {"biotac": BIOTAC, "icub": ICUB}
+EFFECTS = tuple(tactbench_effects())
+TWIN = build(RigContext(effects=EFFECTS, indenters=tuple(tactbench_indenters())))
 
-SolverOf = Callable[..., NewtonSolver]
+
+def q(value: float, unit: str = "mm") -> Quantity:
+    return assumed(value, unit, "test")
+
+
+SILENT = Environment(noise_scale=0.0, drift_scale=0.0, force_noise=q(0.0, "N"))
+
+
+def named(entries: Iterable[PlanEntry]) -> dict[str, PlanEntry]:
+    return {entry.effect: entry for entry in entries}
+
+
+def unrounded(sensor: SensorDescriptor, scene: Scene) -> Synthesis:
+    """Return a scene carried out up to the converter."""
+    plan = TWIN.plan(sensor, scene)
+    stages = tuple(effect for effect in plan.stages if effect.name != "converter")
+    return carried_out(sensor, scene, 1, dataclasses.replace(plan, stages=stages))
 
 
 @pytest.fixture(scope="session")
@@ -37,30 +57,6 @@ def sensors() -> dict[str, SensorDescriptor]:
         name: SensorDescriptor(spec=spec, transducer=f"tactbench.sensors.{name}.transduction:build")
         for name, spec in SPECS.items()
     }
-
-
-@pytest.fixture(scope="session")
-def medium() -> Callable[..., Medium]:
-    """The whole skin of a sensor, the core included."""
-
-    def make(name: str, *, skin: object = None, core: bool = True) -> Medium:
-        declared = skin if skin is not None else SPECS[name].skin
-        made = medium_of(declared, skin_grid(declared.sheet))
-        return with_core(made, declared) if made.has_core and core else made
-
-    return make
-
-
-@pytest.fixture(scope="session")
-def solver(medium: Callable[..., Medium]) -> SolverOf:
-    def make(name: str, radius: float, x: float, s: float = 0.0, **more: object) -> NewtonSolver:
-        made = medium(name, **more)
-        sheet = SPECS[name].skin.sheet
-        return NewtonSolver(
-            made, gap_mm(made.grid, Contact(radius, x, s), sheet.outer_radius.to("mm"), sheet.dome, sheet.relief)
-        )
-
-    return make
 
 
 @pytest.fixture(scope="session")
@@ -80,24 +76,12 @@ def prototype() -> Callable[..., tuple[Medium, Any]]:
                 x_mm=(0.0,), angle_deg=tuple(angle), value_mm=(tuple(film),), source=skin.film.source
             )
             edges = {"x_min": -14.5, "x_max": 5.5, "arc": math.pi * 8.2, "outer_radius": 8.2}
-            edges = {key: assumed(value, "mm", "test") for key, value in edges.items()}
+            edges = {key: q(value) for key, value in edges.items()}
             sheet = sheet.model_copy(update={**edges, "dome": None, "relief": None, "cells": (48, 64)})
         skin = skin.model_copy(update={**change, "sheet": sheet})
         made = medium_of(skin, skin_grid(sheet))
         if made.has_core and core:
             made = with_core(made, skin)
         return dataclasses.replace(made, contact_updates=0), skin
-
-    return make
-
-
-@pytest.fixture(scope="session")
-def layer() -> Callable[..., tuple[BondedLayer, NewtonSolver]]:
-    """A flat bonded layer on 24 mm, pressed by a sphere of radius 10 mm in the middle."""
-
-    def make(poisson: float, **more: float) -> tuple[BondedLayer, NewtonSolver]:
-        skin = bonded_layer(poisson, **more)
-        grid = skin_grid(skin.sheet)
-        return skin, NewtonSolver(medium_of(skin, grid), gap_mm(grid, Contact(10.0, 0.0, 0.0)))
 
     return make

@@ -4,12 +4,12 @@ import dataclasses
 
 import numpy as np
 
-from tactbench.plugin import ForceRamp, Indenter, RigContext, Scene, SensorDescriptor, assumed
-from tactbench.rigs.twin import tactbench_effects
+from tactbench.plugin import ForceRamp, Indenter, Scene, SensorDescriptor
 from tactbench.rigs.twin.fidelity import DEFAULT, FINE, Fidelity
 from tactbench.rigs.twin.rig import Twin
+from tests.rigs.twin.conftest import EFFECTS, q
 
-SCENE = Scene(name="cap", indenter=Indenter(radius=assumed(10.0, "mm", "test")), profile=ForceRamp(samples=50))
+SCENE = Scene(name="cap", indenter=Indenter(radius=q(10.0)), profile=ForceRamp(samples=50))
 
 
 def test_the_default_leaves_the_sheets_own_cells(specs):
@@ -34,7 +34,7 @@ def plain_factory(sensor, grid, wanted):
 
 
 def _deepest(sensor: SensorDescriptor, fidelity: Fidelity) -> float:
-    rig = Twin(tuple(tactbench_effects()), fidelity)
+    rig = Twin(EFFECTS, fidelity)
     with rig.open(sensor, SCENE, seed=3) as acquisition:
         return float(acquisition.drawn["depth_mm"])
 
@@ -48,9 +48,3 @@ def test_a_rig_resolves_as_finely_as_it_is_told_and_keeps_tables_apart(specs):
     assert depths[0] == depths[2]
     # Half as many cells change the depth, but not by more than a cell's sag, 0.84² / (2 R).
     assert 0 < abs(depths[1] - depths[0]) < 0.84**2 / 20
-
-
-def test_context_makes_the_default():
-    from tactbench.rigs.twin.rig import build
-
-    assert build(RigContext(effects=())).fidelity is DEFAULT

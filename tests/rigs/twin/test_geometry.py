@@ -7,13 +7,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tactbench.plugin import RigError, assumed
 from tactbench.plugin.simulation import Dome, SheetTable, SkinGrid, SkinSheet
-from tactbench.rigs.twin.geometry import Contact, check_contact, finger_surface_mm, gap_mm, skin_grid
+from tactbench.rigs.twin.geometry import Contact, finger_surface_mm, gap_mm, skin_grid
+from tests.rigs.twin.conftest import q
 
-SHEET = SkinSheet(
-    x_min=assumed(-10, "mm", "t"), x_max=assumed(10, "mm", "t"), arc=assumed(20, "mm", "t"), cells=(40, 50)
-)
+SHEET = SkinSheet(x_min=q(-10), x_max=q(10), arc=q(20), cells=(40, 50))
 GRID = skin_grid(SHEET)
 
 
@@ -22,17 +20,6 @@ def test_cells_fill_the_sheet_symmetrically():
     assert GRID.cell_mm == pytest.approx((0.5, 0.4))
     # Rounding of half-integer multiples of 0.4 only.
     np.testing.assert_allclose(GRID.s_mm, -GRID.s_mm[::-1], atol=1e-14)
-
-
-def test_a_huge_cap_is_flat_to_rounding():
-    flat = gap_mm(GRID, Contact(math.inf, 0.3, -0.2), 8.2)
-    huge = gap_mm(GRID, Contact(1e9, 0.3, -0.2), 8.2)
-    # r²/2R is at most 2e-7 mm; the textbook form R - sqrt(R² - r²) would be off by 1e-7 mm of pure rounding.
-    np.testing.assert_allclose(
-        huge - flat,
-        ((GRID.x_mm[:, None] - 0.3) ** 2 + (8.2 * np.sin((GRID.s_mm + 0.2) / 8.2)) ** 2) / 2e9,
-        atol=1e-14,
-    )
 
 
 @given(st.floats(1.0, 1e6), st.floats(-3, 3), st.floats(-3, 3))
@@ -46,49 +33,7 @@ def test_the_cap_is_a_sphere(radius, x0, s0):
     assert np.all(gap >= 0)
 
 
-def test_beyond_the_cap_nothing_can_touch():
-    gap = gap_mm(GRID, Contact(5.0, 0.0, 0.0))
-    assert gap.max() == 55.0
-
-
-def test_tilt_keeps_the_origin_of_the_approach():
-    tilted = gap_mm(GRID, Contact(40.0, 0.0, 0.0, tilt_x=0.3), 8.2)
-    assert tilted.min() == 0.0
-
-
-@pytest.mark.parametrize(
-    ("contact", "says"),
-    [
-        (Contact(0.3, 0.0, 0.0), "smaller than a cell"),
-        (Contact(5.0, 11.0, 0.0), "outside the skin"),
-        (Contact(5.0, 0.0, -10.5), "outside the skin"),
-    ],
-)
-def test_what_the_grid_cannot_resolve_is_refused(contact, says):
-    with pytest.raises(RigError, match=says):
-        check_contact(GRID, contact)
-
-
-def test_a_small_but_resolved_cap_is_taken():
-    check_contact(GRID, Contact(0.6, 9.9, 9.9))
-
-
-@pytest.mark.parametrize(
-    "contact",
-    [Contact(math.nan, 0.0, 0.0), Contact(-5.0, 0.0, 0.0), Contact(5.0, math.nan, 0.0), Contact(5.0, 0.0, math.nan)],
-)
-def test_a_contact_that_is_none_is_refused(contact):
-    with pytest.raises(RigError):
-        check_contact(GRID, contact)
-
-
-@pytest.mark.parametrize("slope", [1.01, -2.0, math.tan(math.pi / 2), math.nan])
-def test_an_indenter_on_its_side_is_refused(slope):
-    with pytest.raises(RigError, match="tilted"):
-        check_contact(GRID, Contact(5.0, 0.0, 0.0, tilt_s=slope))
-
-
-DOME = Dome(start=assumed(0.0, "mm", "test"))
+DOME = Dome(start=q(0.0))
 
 
 def test_a_dome_falls_away_along_its_meridian_as_the_finger_does_around():
@@ -108,7 +53,7 @@ def test_a_dome_falls_away_along_its_meridian_as_the_finger_does_around():
 
 def test_the_sheet_has_the_domes_own_area():
     # Archimedes: a strip of the sheet has the area of the sphere's zone.
-    x, s = np.linspace(0.0, 8.0, 4001), np.linspace(-8.0, 8.0, 401)
+    x, s = np.linspace(0.0, 8.0, 4001), np.linspace(-8.0, 8.0, 101)
     place = np.stack(finger_surface_mm(SkinGrid(x_mm=x, s_mm=s), 8.0, DOME), axis=-1)
     along, around = np.diff(place, axis=0)[:, :-1], np.diff(place, axis=1)[:-1]
     area = np.linalg.norm(np.cross(along, around), axis=-1).sum(axis=1)
@@ -117,7 +62,7 @@ def test_the_sheet_has_the_domes_own_area():
 
 
 def relief(value):
-    return SheetTable(x_mm=(0.0,), angle_deg=(0.0,), value_mm=((value,),), source=assumed(0, "1", "test").source)
+    return SheetTable(x_mm=(0.0,), angle_deg=(0.0,), value_mm=((value,),), source=q(0).source)
 
 
 def test_an_even_relief_is_a_thinner_finger():
@@ -137,13 +82,7 @@ def test_a_table_is_met_at_its_entries_straight_between_and_even_beyond():
     )
 
 
-@pytest.mark.parametrize(
-    "wrong",
-    [
-        {"x_mm": (1.0, 1.0)}, {"angle_deg": (0.0,)}, {"value_mm": ((1.0, 2.0),)}, {"x_mm": (), "value_mm": ()},
-        {"value_mm": ((1.0, math.nan), (1.0, 1.0))},
-    ],
-)  # fmt: skip
+@pytest.mark.parametrize("wrong", [{"x_mm": (1.0, 1.0)}, {"value_mm": ((1.0, math.nan), (1.0, 1.0))}])
 def test_a_table_that_is_none_is_refused(wrong):
     given_ = {"x_mm": (0.0, 1.0), "angle_deg": (0.0, 9.0), "value_mm": ((1.0, 1.0), (1.0, 1.0))}
     with pytest.raises(ValueError, match="ascending axes"):

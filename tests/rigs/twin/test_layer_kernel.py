@@ -15,6 +15,7 @@ from tactbench.rigs.twin.contact.layer import compliance_shape, shear_shapes
 def test_short_waves_see_a_half_space(poisson, q):
     # The correction falls like q² e^-2q: 1e-14 at q = 20.
     assert compliance_shape(np.array([q]), poisson)[0] == pytest.approx(1.0, abs=1e-12)
+    assert np.array(shear_shapes(np.array(q), poisson)) == pytest.approx([0.5 - poisson, 1 - poisson, 1.0], abs=1e-12)
 
 
 @given(st.floats(0, 0.49), st.floats(1e-8, 1e-5))
@@ -35,13 +36,6 @@ def test_both_ways_of_summing_agree_where_they_meet(poisson):
     below, above = compliance_shape(np.array([0.35 - 1e-12, 0.35]), poisson)
     # Continuity to rounding: eight terms at y = 0.7 leave 1e-18.
     assert above == pytest.approx(below, rel=1e-10)
-
-
-@given(st.floats(0, 0.5), st.floats(1e-6, 300), st.floats(1.01, 2))
-def test_compliance_is_positive_and_finite(poisson, q, factor):
-    values = compliance_shape(np.array([q, q * factor]), poisson)
-    assert np.all(values > 0)
-    assert np.all(np.isfinite(values))
 
 
 def _by_plane_strain(q, poisson, *, pressure, traction):
@@ -70,12 +64,6 @@ def test_every_shape_solves_the_equations_of_plane_strain(poisson, q):
     assert -sunk.real == pytest.approx((1 - poisson) * compliance_shape(np.array(q), poisson), abs=1e-11)
     moved, _ = _by_plane_strain(q, poisson, pressure=0.0, traction=1.0)
     assert moved.real == pytest.approx(along, abs=1e-11)
-
-
-@given(st.floats(0, 0.5), st.floats(20, 400))
-def test_short_waves_move_along_a_half_space(poisson, q):
-    # As above: q² e^-2q.
-    assert np.array(shear_shapes(np.array(q), poisson)) == pytest.approx([0.5 - poisson, 1 - poisson, 1.0], abs=1e-12)
 
 
 @given(st.floats(0, 0.5), st.floats(1e-8, 1e-4))

@@ -4,17 +4,22 @@ import pytest
 from pydantic import ValidationError
 
 from tactbench.core.spec.scene import Simulation
-from tactbench.plugin import ForceRamp, NotApplicable, PluginContractError, RigContext, Scene, UsageError, assumed
+from tactbench.plugin import ForceRamp, NotApplicable, PluginContractError, RigContext, Scene, UsageError
 from tactbench.plugin.simulation import EffectDescriptor, Slide
-from tactbench.rigs.twin import tactbench_effects
 from tactbench.rigs.twin.planner import plan_scene
 from tactbench.rigs.twin.rig import build
-
-EFFECTS = tactbench_effects()
+from tests.rigs.twin.conftest import EFFECTS, named, q
 
 
 def _named(plan):
-    return {entry.effect: entry for entry in plan.entries}
+    return named(plan.entries)
+
+
+def _effect(name, consumes, produces, predicate="converter", **more):
+    return EffectDescriptor(
+        name=name, title=name, where="x:y", consumes=consumes, produces=produces,
+        called_for=f"tactbench.rigs.twin.effects.called_for:{predicate}", **more,
+    )  # fmt: skip
 
 
 def test_every_effect_has_one_entry_with_a_reason(specs):
@@ -33,43 +38,30 @@ def test_producers_come_before_consumers_whatever_the_order_given(specs):
 
 
 def test_what_changes_nothing_is_left_out(specs):
-    held = ForceRamp(start=assumed(2, "N", "t"), end=assumed(2, "N", "t"))
+    held = ForceRamp(start=q(2, "N"), end=q(2, "N"))
     plan = _named(plan_scene(EFFECTS, Scene(name="held", profile=held), specs["icub"]))
     assert not plan["creep"].included
-    assert "2 N" in plan["creep"].reason
     assert not plan["core"].included
-    idle = ForceRamp(end=assumed(0, "N", "t"))
+    idle = ForceRamp(end=q(0, "N"))
     plan = _named(plan_scene(EFFECTS, Scene(name="idle", profile=idle), specs["biotac"]))
     assert not plan["contact"].included
     assert not plan["core"].included
 
 
 def test_an_effect_that_is_not_called_for_drags_nothing_along(specs):
-    def effect(name, consumes, produces, predicate):
-        return EffectDescriptor(
-            name=name, title=name, where="x:y", consumes=consumes, produces=produces,
-            called_for=f"tactbench.rigs.twin.effects.{predicate}",
-        )  # fmt: skip
-
-    heir = effect("heir", ("oil",), ("disturbance",), "called_for:friction")
-    well = effect("well", (), ("oil",), "called_for:converter")
+    heir = _effect("heir", ("oil",), ("disturbance",), "friction")
+    well = _effect("well", (), ("oil",))
     still = Scene(name="s")
     plan = _named(plan_scene([*EFFECTS, heir, well], still, specs["icub"]))
     assert (plan["heir"].included, plan["well"].included) == (False, False)
     assert plan["well"].reason == "no observed channel depends on it"
-    sliding = still.model_copy(update={"slide": Slide(speed=assumed(5, "mm/s", "t"))})
+    sliding = still.model_copy(update={"slide": Slide(speed=q(5, "mm/s"))})
     plan = _named(plan_scene([*EFFECTS, heir, well], sliding, specs["icub"]))
     assert (plan["heir"].included, plan["well"].included) == (True, True)
 
 
 def test_a_circle_of_effects_is_refused(specs):
-    def effect(name, consumes, produces):
-        return EffectDescriptor(
-            name=name, title=name, where="x:y", consumes=consumes, produces=produces,
-            called_for="tactbench.rigs.twin.effects.called_for:converter",
-        )  # fmt: skip
-
-    circle = [effect("egg", ("hen",), ("egg", "taxel")), effect("hen", ("egg",), ("hen",))]
+    circle = [_effect("egg", ("hen",), ("egg", "taxel")), _effect("hen", ("egg",), ("hen",))]
     with pytest.raises(PluginContractError, match="circle"):
         plan_scene([*EFFECTS, *circle], Scene(name="s"), specs["icub"])
 
@@ -93,14 +85,12 @@ def test_effects_are_included_and_left_out_as_asked(specs):
     assert plan["fluid-pressure"].included
     assert {name for name, entry in plan.items() if entry.asked} == {"warm-up", "offset", "wander", "fluid-pressure"}
     assert _named(plan_scene(EFFECTS, _asking("-drift", "drift"), specs["biotac"]))["offset"].included
+    assert all(entry.included for entry in plan_scene(EFFECTS, _asking("+all"), specs["icub"]).entries)
 
 
 def test_an_effect_of_another_package_is_planned_only_where_it_is_named(sensors):
-    other = EffectDescriptor(
-        name="other", title="other", where="x:y", produces=("disturbance",), groups=("drift",),
-        called_for="tactbench.rigs.twin.effects.called_for:converter",
-    )  # fmt: skip
-    twin = build(RigContext(effects=tuple(EFFECTS), named_effects=(other,)))
+    other = _effect("other", (), ("disturbance",), groups=("drift",))
+    twin = build(RigContext(effects=EFFECTS, named_effects=(other,)))
     icub = sensors["icub"]
     naming = icub.model_copy(update={"effects": ("other",)})
     for sensor, words, included in [
@@ -113,19 +103,11 @@ def test_an_effect_of_another_package_is_planned_only_where_it_is_named(sensors)
         twin.plan(icub.model_copy(update={"effects": ("elsewhere",)}), _asking())
 
 
-def test_everything_can_be_asked_for(specs):
-    plan = _named(plan_scene(EFFECTS, _asking("+all"), specs["icub"]))
-    assert all(entry.included for entry in plan.values())
-
-
-def test_a_word_that_is_no_effect_is_refused_with_what_there_is(specs):
+def test_a_word_that_is_no_effect_is_refused_with_what_there_is_and_so_is_leaving_out_what_is_observed(specs):
     with pytest.raises(UsageError, match="'fog'") as refused:
         plan_scene(EFFECTS, _asking("+fog"), specs["icub"])
     assert "creep" in refused.value.hint
     assert "drift" in refused.value.hint
-
-
-def test_leaving_out_what_is_observed_is_refused_by_name(specs):
     with pytest.raises(NotApplicable, match="without transduction"):
         plan_scene(EFFECTS, _asking("-transduction"), specs["icub"])
 

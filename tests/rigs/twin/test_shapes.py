@@ -11,37 +11,29 @@ from tactbench.plugin import (
     FloatArray,
     ForceRamp,
     Indenter,
-    RigContext,
     RigError,
     Scene,
     UsageError,
-    assumed,
 )
 from tactbench.plugin.simulation import BondedLayer, FoamPad, SkinSheet, Slide
-from tactbench.rigs.twin import tactbench_effects, tactbench_indenters
 from tactbench.rigs.twin.contact.local import LocalPress
 from tactbench.rigs.twin.contact.press import Press
 from tactbench.rigs.twin.contact.pressing import medium_of
 from tactbench.rigs.twin.contact.validity import remarks
 from tactbench.rigs.twin.geometry import Contact, check_contact, gap_mm, skin_grid
-from tactbench.rigs.twin.rig import build
 from tactbench.rigs.twin.shapes import Shape, shape_of
 from tactbench.sensors.ideal import tactbench_sensors
-from tests.oracles.boundary_elements import HalfSpace, Layer
+from tests.oracles.boundary_elements import Layer
 from tests.oracles.boundary_elements import press as press_elements
-from tests.oracles.closed_forms import FlatPunch
+from tests.rigs.twin.conftest import TWIN, q
 
-INDENTERS = tactbench_indenters()
-
-
-def _q(value: float, unit: str = "mm"):
-    return assumed(value, unit, "a test")
+INDENTERS = TWIN.indenters
 
 
 def shape(name: str, angle: float = 0.0, **sizes: float) -> Shape:
     units = {name: one.unit for name, one in next(one for one in INDENTERS if one.name == name).dimensions.items()}
-    stated = {size: _q(value, units[size]) for size, value in sizes.items()}
-    found = shape_of(Indenter(shape=name, dimensions=stated, angle=_q(angle, "deg")), INDENTERS)
+    stated = {size: q(value, units[size]) for size, value in sizes.items()}
+    found = shape_of(Indenter(shape=name, dimensions=stated, angle=q(angle, "deg")), INDENTERS)
     assert found is not None
     return found
 
@@ -51,13 +43,13 @@ def pressed_by(body: Shape) -> Contact:
 
 
 def sheet(cells: int) -> SkinSheet:
-    return SkinSheet(x_min=_q(-8), x_max=_q(8), arc=_q(16), cells=(cells, cells))
+    return SkinSheet(x_min=q(-8), x_max=q(8), arc=q(16), cells=(cells, cells))
 
 
 # Nothing but columns: no shear, no cover, and so little strain that the foam is linear.
 FOAM = {
-    "young": _q(0.2, "MPa"), "thickness": _q(2.0), "densification": _q(1e9, "1"), "shear": _q(0.0, "MPa"),
-    "cover_tension": _q(0.0, "N/mm"), "cover_bending": _q(0.0, "N*mm"), "contact_stiffness": _q(1e3, "MPa/mm"),
+    "young": q(0.2, "MPa"), "thickness": q(2.0), "densification": q(1e9, "1"), "shear": q(0.0, "MPa"),
+    "cover_tension": q(0.0, "N/mm"), "cover_bending": q(0.0, "N*mm"), "contact_stiffness": q(1e3, "MPa/mm"),
 }  # fmt: skip
 K = 0.1
 """Of the columns: young / thickness [MPa/mm]."""
@@ -112,101 +104,59 @@ def test_a_pin_on_columns_presses_what_stands_under_it():
     assert state.depth_mm == pytest.approx(1.0 / area / K, rel=2e-3)  # and a hundredth of it in the penalty's springs
 
 
-def test_a_pin_on_a_half_space_sinks_in_as_boussinesq_says():
-    cells, side = 48, 8.0
-    x = (np.arange(cells) + 0.5) * side / cells - side / 2
-    height = shape("pin", radius=2.0).height_mm(x[:, None], x[None, :])
-    gap = np.where(height < 50, height, np.inf)
-    found = press_elements(HalfSpace(1.0), gap, (side / cells, side / cells), 1.0)
-    # 2 a E* d; the rim's pressure is infinite there and a mean over cells here: 12 cells a radius leave some per cent.
-    assert found.depth_mm == pytest.approx(FlatPunch(2.0, 1.0).depth_mm(1.0), rel=0.02)
+LAYER = BondedLayer(
+    sheet=sheet(48), young=q(1.0, "MPa"), poisson=q(0.3, "1"), thickness=q(2.0), contact_stiffness=q(300, "MPa/mm")
+)
+MEDIUM = medium_of(LAYER, skin_grid(LAYER.sheet))
 
 
-def test_a_cylinder_on_a_half_space_is_hertz_in_every_cross_section():
-    # Far from the ends of a long contact each section is plane: with its own load per length P, a² = 4 P R / (pi E*)
-    # and p0 = 2 P / (pi a) (Johnson 1985, section 4.2.3).
-    radius, cell = 10.0, 0.1
-    x, y = (np.arange(64) + 0.5) * 0.5 - 16, (np.arange(48) + 0.5) * cell - 2.4
-    gap = shape("cylinder", radius=radius).height_mm(x[:, None], y[None, :])
-    found = press_elements(HalfSpace(1.0), gap, (0.5, cell), 3.0)
-    middle = found.pressure_mpa[32]
-    load = float(middle.sum()) * cell
-    half_width = math.sqrt(4 * load * radius / math.pi)
-    assert middle.max() == pytest.approx(2 * load / (math.pi * half_width), rel=0.02)  # 16 cells a half-width
-    assert np.count_nonzero(middle) * cell == pytest.approx(2 * half_width, abs=2 * cell)
+def layered(body: Shape) -> Press:
+    """Return the press of a bonded layer of 2 mm."""
+    return Press(MEDIUM, gap_mm(MEDIUM.grid, pressed_by(body)), pressed_by(body))
 
 
-@pytest.fixture(scope="module")
-def layer():
-    skin = BondedLayer(
-        sheet=sheet(48),
-        young=_q(1.0, "MPa"),
-        poisson=_q(0.3, "1"),
-        thickness=_q(2.0),
-        contact_stiffness=_q(300, "MPa/mm"),
-    )
-    grid = skin_grid(skin.sheet)
-    return skin, grid, medium_of(skin, grid)
-
-
-def test_a_turned_cylinder_gives_the_transposed_pressure(layer):
-    _, grid, medium = layer
-    found = []
-    for angle in (0.0, 90.0):
-        contact = pressed_by(shape("cylinder", radius=5.0, angle=angle))
-        found.append(Press(medium, gap_mm(grid, contact), contact)(2.0).pressure_mpa)
+def test_a_turned_cylinder_gives_the_transposed_pressure():
+    found = [layered(shape("cylinder", radius=5.0, angle=angle))(2.0).pressure_mpa for angle in (0.0, 90.0)]
     # The solver's own tolerance, 1e-6, is all that tells them apart.
     np.testing.assert_allclose(found[1], found[0].T, atol=1e-4 * found[0].max())
     assert np.ptp(found[0], axis=0).max() < 1e-4 * found[0].max()  # the same all along the cylinder
     assert np.ptp(found[0], axis=1).max() > 0.5 * found[0].max()
 
 
-def test_a_cylinder_sinks_in_less_than_a_cap_of_its_radius_and_an_edge_more(layer):
-    _, grid, medium = layer
-
-    def depth(contact: Contact) -> float:
-        return Press(medium, gap_mm(grid, contact), contact)(2.0).depth_mm
-
-    cylinder = depth(pressed_by(shape("cylinder", radius=5.0)))
-    assert cylinder < 0.7 * depth(Contact(5.0, 0.0, 0.0))
-    assert depth(pressed_by(shape("edge", wedge_angle=100.0, tip_radius=0.4))) > cylinder
-    # Flanks that begin beyond the contact are never touched: a rounded edge is then the cylinder of its tip.
-    assert depth(pressed_by(shape("edge", wedge_angle=90.0, tip_radius=5.0))) == pytest.approx(cylinder, rel=1e-9)
+def test_an_edge_whose_flanks_are_never_touched_is_the_cylinder_of_its_tip():
+    edge, cylinder = shape("edge", wedge_angle=90.0, tip_radius=5.0), shape("cylinder", radius=5.0)
+    assert layered(edge)(2.0).depth_mm == pytest.approx(layered(cylinder)(2.0).depth_mm, rel=1e-9)
 
 
-def test_the_cheapest_rung_presses_shapes_too(layer):
-    skin, grid, medium = layer
+def test_the_cheapest_rung_presses_shapes_too():
     contact = pressed_by(shape("cylinder", radius=5.0))
-    springs = float(medium.stiffness[0, 0])
+    press = LocalPress(LAYER, MEDIUM, gap_mm(MEDIUM.grid, contact), contact)
+    springs = float(MEDIUM.stiffness[0, 0])
     force = line_on_columns(0.3, lambda y: 5.0 - np.sqrt(np.maximum(25.0 - y**2, 0.0))) * springs / K
     # A cell is a third of a millimetre, the half-width five of them.
-    assert LocalPress(skin, medium, gap_mm(grid, contact), contact)(force).depth_mm == pytest.approx(0.3, rel=0.05)
+    assert press(force).depth_mm == pytest.approx(0.3, rel=0.05)
 
 
-def test_boundary_elements_agree_about_a_pin(layer):
-    _, grid, medium = layer
-    contact = pressed_by(shape("pin", radius=2.5))
-    gap = gap_mm(grid, contact)
-    default = Press(medium, gap, contact)(1.0)
+def test_boundary_elements_agree_about_a_pin():
+    pin = shape("pin", radius=2.5)
+    default, gap = layered(pin)(1.0), gap_mm(MEDIUM.grid, pressed_by(pin))
     # A flank is no surface: its height would be a mean with that of its neighbours.
-    elements = press_elements(Layer(1.0, 0.3, 2.0), np.where(gap < 50, gap, np.inf), grid.cell_mm, 1.0)
+    elements = press_elements(Layer(1.0, 0.3, 2.0), np.where(gap < 50, gap, np.inf), MEDIUM.grid.cell_mm, 1.0)
     assert np.array_equal(elements.pressure_mpa > 0, default.pressure_mpa > 0)
     # They differ by the penalty's 300 MPa/mm, 2e-4 mm here, and by what is beside the sheet: its own image, or no load.
     assert elements.depth_mm == pytest.approx(default.depth_mm, rel=0.03)
 
 
 def test_contacts_of_other_dimensions_and_angles_are_solved_anew():
-    twin = build(RigContext(effects=tuple(tactbench_effects()), indenters=tuple(INDENTERS)))
     (ideal,) = tactbench_sensors()
     found = []
     for size, angle in ((4.0, 0.0), (4.0, 90.0), (8.0, 0.0)):
-        edge = Indenter(shape="cylinder", dimensions={"radius": _q(size)}, angle=_q(angle, "deg"))
-        slide = Slide(speed=_q(1, "mm/s"), start=_q(30, "s"))
+        edge = Indenter(shape="cylinder", dimensions={"radius": q(size)}, angle=q(angle, "deg"))
+        slide = Slide(speed=q(1, "mm/s"), start=q(30, "s"))
         scene = Scene(name="a", indenter=edge, slide=slide, profile=ForceRamp(samples=20))
-        with twin.open(ideal, scene, seed=1) as recording:
+        with TWIN.open(ideal, scene, seed=1) as recording:
             found.append(np.concatenate([one.data for one in recording if one.stream == "taxels"]))
             assert recording.assumptions["indenter radius"] == size
-            assert "take the contact of the cylinder for a circle" in recording.drawn["remark round"]
     assert not np.array_equal(found[0], found[1])
     assert not np.array_equal(found[0], found[2])
 
@@ -228,9 +178,8 @@ def test_a_rounded_edge_leaves_its_tip_without_a_kink():
     y = np.linspace(0.0, 4.0, 4001)
     slope = np.diff(body.height_mm(np.zeros(1), y)) / np.diff(y)
     assert slope[-1] == pytest.approx(1 / math.tan(math.radians(60)))
-    assert (
-        np.abs(np.diff(slope)).max() < 1e-3
-    )  # 1e-3 mm over a radius of 2 mm is half a thousandth, steepest at the end
+    # 1e-3 mm over a radius of 2 mm is half a thousandth, steepest at the end.
+    assert np.abs(np.diff(slope)).max() < 1e-3
 
 
 def test_a_pin_that_is_all_fillet_is_a_cap():
@@ -247,32 +196,21 @@ def test_a_shape_that_the_grid_cannot_resolve_is_refused(body):
         check_contact(skin_grid(sheet(64)), pressed_by(body))
 
 
-def test_what_the_grid_does_resolve_is_not_refused():
-    for body in (shape("pin", radius=0.3), shape("edge", wedge_angle=90.0, tip_radius=0.0), shape("cylinder")):
-        check_contact(skin_grid(sheet(64)), pressed_by(body))
+@pytest.mark.parametrize(
+    ("sizes", "load", "expected"),
+    [
+        ({"wedge_angle": 100.0, "tip_radius": 0.0}, 0.5, "remark contact"),
+        ({"wedge_angle": 60.0, "tip_radius": 0.5}, 20.0, "remark flank"),
+    ],
+)
+def test_a_narrow_line_however_long_and_a_flank_steeper_than_45_degrees_are_remarked_upon(sizes, load, expected):
+    assert expected in remarks(layered(shape("edge", **sizes)), (load,), math.inf)
 
 
-def test_a_narrow_line_is_remarked_upon_however_long_it_is(layer):
-    _, grid, medium = layer
-    contact = pressed_by(shape("edge", wedge_angle=100.0, tip_radius=0.0))
-    said = remarks(Press(medium, gap_mm(grid, contact), contact), (0.1, 0.5), math.inf)
-    assert said["contact_radius_cells"] < 3
-    assert "it follows the mesh" in said["remark contact"]
-
-
-def test_a_flank_steeper_than_45_degrees_is_remarked_upon(layer):
-    _, grid, medium = layer
-    contact = pressed_by(shape("edge", wedge_angle=60.0, tip_radius=0.5))
-    said = remarks(Press(medium, gap_mm(grid, contact), contact), (20.0,), math.inf)
-    assert said["remark flank"] == "the edge touches where its flank has a slope of 1.7"
-
-
-def test_a_scene_with_an_unknown_shape_says_which_are_installed(sensors):
-    twin = build(RigContext(effects=tuple(tactbench_effects()), indenters=tuple(INDENTERS)))
-    with pytest.raises(RigError, match="No indenter is called 'knob'") as caught:
-        twin.plan(sensors["icub"], Scene(name="a", indenter=Indenter(shape="knob")))
+def test_a_shape_that_is_not_installed_or_of_another_unit_is_refused_with_what_there_is(sensors):
+    with pytest.raises(RigError, match="'knob'") as caught:
+        TWIN.plan(sensors["icub"], Scene(name="a", indenter=Indenter(shape="knob")))
     assert caught.value.hint == "Installed are: cap, cylinder, edge, flat, pin."
+    edge = Indenter(shape="edge", dimensions={"tip_radius": q(2, "N")})
     with pytest.raises(UsageError, match=r"'edge': tip_radius is given as 2 N, and a number in mm is expected"):
-        twin.plan(
-            sensors["icub"], Scene(name="a", indenter=Indenter(shape="edge", dimensions={"tip_radius": _q(2, "N")}))
-        )
+        TWIN.plan(sensors["icub"], Scene(name="a", indenter=edge))

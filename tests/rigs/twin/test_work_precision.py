@@ -10,14 +10,13 @@ import pytest
 from tactbench.core.cost.precision import measured
 from tactbench.core.matrix.progress import Progress
 from tactbench.core.spec.scene import Simulation
-from tactbench.plugin import Indenter, Placement, RigContext, Scene, SensorDescriptor, assumed, load_registry
-from tactbench.plugin.simulation import FluidBackedShell
-from tactbench.rigs.twin import tactbench_effects, work_precision
+from tactbench.plugin import Indenter, Placement, Scene, SensorDescriptor
+from tactbench.rigs.twin import work_precision
 from tactbench.rigs.twin.contact.stages import skin_under_load
-from tactbench.rigs.twin.fidelity import RUNGS
+from tactbench.rigs.twin.fidelity import DEFAULT, RUNGS
 from tactbench.rigs.twin.preparation import prepare
-from tactbench.rigs.twin.rig import build
 from tests.conftest import THIRD_PARTY
+from tests.rigs.twin.conftest import TWIN, q
 
 
 @pytest.fixture
@@ -36,53 +35,38 @@ def _little(monkeypatch):
     """The same diagram with one contact, two loads and few ways: its rows are judged here, not its numbers."""
     monkeypatch.setattr(work_precision, "RADII_MM", (10.0,))
     monkeypatch.setattr(work_precision, "LOADS", 2)
-    monkeypatch.setattr(work_precision, "GRIDS", (0.5, 1.0))
+    monkeypatch.setattr(work_precision, "GRIDS", (1.0,))
+    monkeypatch.setattr(work_precision, "NODES", (8, DEFAULT.most_nodes))
     monkeypatch.setattr(work_precision, "_REFERENCE", RUNGS["default"])
 
 
 @pytest.mark.usefixtures("_little")
-def test_it_runs_for_every_installed_sensor_and_says_what_each_cannot_have(bonded):
-    sensors = list(load_registry().sensors)
-    assert {"biotac", "icub", "ideal", bonded.name} <= {sensor.name for sensor in sensors}
-    for sensor in sensors:
-        points, skipped = measured(work_precision.study(sensor, rounds=1), sensor.name, Progress())
-        assert any(point.default and point.rung == "default" for point in points)
-        none_of_it = isinstance(sensor.spec.skin, FluidBackedShell) or sensor.name == bonded.name
-        assert bool(skipped) is none_of_it
-        assert all(one.label.startswith("closed form") and one.reason for one in skipped)
-        assert ("closed-form" in {one.rung for one in skipped}) is none_of_it
-        assert ("closed-form" in {point.rung for point in points}) is not none_of_it
+@pytest.mark.parametrize(("name", "has_it"), [("biotac", False), ("icub", True)])
+def test_it_runs_for_a_skin_and_says_what_it_cannot_have(sensors, name, has_it):
+    points, skipped = measured(work_precision.study(sensors[name], rounds=1), name, Progress())
+    assert any(point.default and point.rung == "default" for point in points)
+    assert all(one.label.startswith("closed form") and one.reason for one in skipped)
+    assert ("closed-form" in {one.rung for one in skipped}) is not has_it
+    assert ("closed-form" in {point.rung for point in points}) is has_it
 
 
-RADII = (None, 2.0, 5.0, 10.0, 40.0)
-
-
-@pytest.mark.parametrize("radius", RADII)
-@pytest.mark.parametrize("rung", ["default", "fine", "reference"])
-def test_a_third_partys_thick_soft_pad_is_solved_without_a_warning(bonded, radius, rung):
+@pytest.mark.parametrize("radius", [None, 2.0, 40.0])
+def test_a_third_partys_thick_soft_pad_is_solved_without_a_warning_as_the_reference_rung_does(bonded, radius):
     # Warnings are errors here. Flat, a guess from neighbouring loads leaves the contact altogether.
-    table = _table(bonded, radius, rung)
-    assert np.all(np.isfinite(table.readings))
-    assert table.residual < 2e-6
-
-
-@pytest.mark.parametrize("radius", RADII)
-def test_it_reads_what_the_reference_rung_reads(bonded, radius):
-    loads = np.linspace(0.0, 5.0, 23)
-    own, reference = (_table(bonded, radius, rung)(loads) for rung in ("default", "reference"))
-    if radius is None:
-        # Within a count, of 25: in fact to the tolerance of the solver.
-        assert np.abs(own - reference).max() < 1e-3
+    tables = [_table(bonded, radius, rung) for rung in ("default", "reference")]
+    assert all(table.residual < 2e-6 for table in tables)
+    own, reference = (table(np.linspace(0.0, 5.0, 23)) for table in tables)
     # The pad's declared contact stiffness is part of the default rung only: 1 % of the signal is what it gives way.
-    assert np.abs(own - reference).max() < 0.01 * np.ptp(reference) + 1e-3
+    # Flat, it is not even that but, of 25 counts, the tolerance of the solver.
+    share = 0.0 if radius is None else 0.01
+    assert np.abs(own - reference).max() < share * np.ptp(reference) + 1e-3
 
 
 def _table(sensor, radius, rung):
-    twin = build(RigContext(effects=tuple(tactbench_effects())))
     scene = Scene(
         name="pressed",
-        indenter=Indenter(radius=None if radius is None else assumed(radius, "mm", "test")),
-        placement=Placement(x=assumed(0.1, "mm", "test"), scatter=assumed(0.0, "mm", "test")),
+        indenter=Indenter(radius=None if radius is None else q(radius)),
+        placement=Placement(x=q(0.1), scatter=q(0.0)),
         simulation=Simulation(rung=rung),
     )
-    return skin_under_load(prepare(sensor, scene, 1, twin.plan(sensor, scene)))
+    return skin_under_load(prepare(sensor, scene, 1, TWIN.plan(sensor, scene)))

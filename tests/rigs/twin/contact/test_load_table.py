@@ -9,23 +9,17 @@ from hypothesis import strategies as st
 
 from tactbench.plugin import load_object
 from tactbench.rigs.twin.contact.core import with_core
-from tactbench.rigs.twin.contact.interpolant import Interpolant, slopes
+from tactbench.rigs.twin.contact.interpolant import Interpolant
 from tactbench.rigs.twin.contact.load_table import build_table
 from tactbench.rigs.twin.contact.press import Press
-from tactbench.rigs.twin.contact.pressing import medium_of
-from tactbench.rigs.twin.geometry import Contact, gap_mm, skin_grid
+from tactbench.rigs.twin.geometry import Contact, gap_mm
+from tests.hard.families.contact import press_of
 
 FLAT = math.inf
 
 
-def _press(spec, radius, x, s=0.0, **more):
-    grid = skin_grid(spec.skin.sheet)
-    medium = medium_of(spec.skin, grid)
-    contact = Contact(radius, x, s)
-    core = (lambda below: with_core(below, spec.skin)) if medium.has_core else None
-    sheet = spec.skin.sheet
-    gap = gap_mm(grid, contact, sheet.outer_radius.to("mm"), sheet.dome, sheet.relief)
-    return Press(medium, gap, contact, core=core, **more)
+def _press(spec, radius, x, s=0.0):
+    return press_of(spec.skin, Contact(radius, x, s))
 
 
 def _prototype(prototype, radius):
@@ -43,13 +37,12 @@ def _table(spec, radius, x, s=0.0, largest=5.0):
 
 
 @pytest.mark.parametrize(
-    ("name", "radius", "x", "s"),
-    [("icub", 5.0, -0.3, 0.1), ("icub", 40.0, 0.4, 0.0), ("icub", FLAT, -0.3, -0.2), ("biotac", 10.0, -4.9, 0.07)],
+    ("name", "radius", "x", "s"), [("icub", 5.0, -0.3, 0.1), ("icub", FLAT, -0.3, -0.2), ("biotac", 10.0, -4.9, 0.07)]
 )
 def test_the_reported_bound_holds_at_random_loads(specs, name, radius, x, s):
     table, read = _table(specs[name], radius, x, s)
     direct = _press(specs[name], radius, x, s)
-    loads = np.random.default_rng(7).uniform(0, 5, 20)
+    loads = np.random.default_rng(7).uniform(0, 5, 12)
     worst = max(float(np.abs(read(direct(load)) - table(np.array([load]))[0]).max()) for load in loads)
     # The bound itself is the tolerance; it must say something: a few counts beside responses of 30 to 300.
     assert worst <= table.error.max()
@@ -60,7 +53,7 @@ def test_the_reported_bound_holds_at_random_loads(specs, name, radius, x, s):
 
 # First load at which the film closes, x0 = -5, from an independent implementation: printed with two decimals, and
 # the bracket is 0.01 N wide.
-@pytest.mark.parametrize(("radius", "load"), [(5.0, 0.96), (7.5, 1.05), (10.0, 1.15), (20.0, 1.69), (40.0, 3.44)])
+@pytest.mark.parametrize(("radius", "load"), [(5.0, 0.96), (10.0, 1.15), (40.0, 3.44)])
 def test_touch_down_is_bracketed(prototype, radius, load):
     press = _prototype(prototype, radius)
     table = build_table(press, lambda state: np.array([state.depth_mm]), largest_n=5.0, tolerance=np.array([1e-3]))
@@ -79,27 +72,13 @@ def test_a_flat_surface_never_touches_the_core(prototype):
     assert not press.touched_core
 
 
-def test_without_touching_the_core_changes_nothing(specs, solver):
-    """Below touch-down the solution without the core is the solution with it: an exact skip."""
-    press = _press(specs["biotac"], FLAT, -5.0)
-    without = press(2.0)
-    assert not press.touched_core
-    with_it = solver("biotac", FLAT, -5.0).solve(2.0)
-    # The same equations, solved along the same path: equal to rounding.
-    np.testing.assert_allclose(without.deflection_mm, with_it.deflection_mm, atol=1e-12)
-
-
-def test_rest_is_exact_and_tiny_loads_are_continuous(specs):
-    table, read = _table(specs["icub"], 10.0, -0.3)
+def test_rest_is_exact_tiny_loads_are_continuous_and_loads_beyond_are_held(specs):
+    table, read = _table(specs["icub"], 10.0, -0.3, largest=2.0)
+    np.testing.assert_array_equal(table(np.array([3.0])), table(np.array([2.0])))
     rest = read(_press(specs["icub"], 10.0, -0.3)(0.0))
     np.testing.assert_array_equal(table(np.array([0.0]))[0], rest)
     # A nanonewton moves no reading by more than a nanonewton's worth of the steepest slope (1e4 counts/N).
     np.testing.assert_allclose(table(np.array([1e-9]))[0], rest, atol=1e-5)
-
-
-def test_loads_beyond_the_table_are_held(specs):
-    table, _ = _table(specs["icub"], 10.0, -0.3, largest=2.0)
-    np.testing.assert_array_equal(table(np.array([3.0])), table(np.array([2.0])))
 
 
 def test_a_scene_without_load_solves_nothing(specs):
@@ -109,42 +88,15 @@ def test_a_scene_without_load_solves_nothing(specs):
     np.testing.assert_array_equal(table(np.zeros(4)), np.zeros((4, 1)))
 
 
-def test_state_of_a_press(specs):
-    state = _press(specs["biotac"], 10.0, -5.0)(1.0)
-    # Depth counts from first touch, so it lies below the approach by the gap's least value on the grid.
-    assert 0 < state.depth_mm < 1.2
-    assert state.thickness_mm.min() >= specs["biotac"].skin.residual_film.to("mm")
-    assert state.fluid_pressure_mpa > 0
-    assert 0 < state.contact_radius_mm < 10.0
-    unwatched = _press(specs["biotac"], 10.0, -5.0, fluid_pressure=False)(1.0)
-    assert unwatched.fluid_pressure_mpa == 0.0
-
-
-nodes = st.lists(st.floats(0.05, 1.0), min_size=1, max_size=12)
-
-
-@given(nodes, st.data())
+@given(st.lists(st.floats(0.05, 1.0), min_size=1, max_size=12), st.data())
 def test_monotone_nodes_give_a_monotone_interpolant(steps, data):
     x = np.concatenate([[0.0], np.cumsum(steps)])
     rises = data.draw(st.lists(st.floats(0, 10), min_size=len(steps), max_size=len(steps)))
     y = np.concatenate([[0.0], np.cumsum(rises)])[:, None]
     fine = Interpolant(x, y)(np.linspace(0, x[-1], 400))[:, 0]
+    np.testing.assert_allclose(Interpolant(x, y)(x), y, atol=1e-10)
     # Rounding of cubics of size up to 120 with slopes over 0.05.
     assert np.diff(fine).min() >= -1e-9 * (1 + y[-1, 0])
-
-
-@given(nodes)
-def test_the_interpolant_meets_its_nodes(steps):
-    x = np.concatenate([[0.0], np.cumsum(steps)])
-    y = np.stack([np.sin(3 * x), x**2], axis=1)
-    np.testing.assert_allclose(Interpolant(x, y)(x), y, atol=1e-10)
-
-
-def test_slopes_are_exact_for_cubics():
-    x = np.array([0.0, 0.3, 1.0, 1.4, 2.2, 3.0])
-    y = np.stack([x**3 + x, 2 * x + 1], axis=1)
-    # Not-a-knot ends reproduce any cubic; rounding of a 6 x 6 system.
-    np.testing.assert_allclose(slopes(x, y), np.stack([3 * x**2 + 1, np.full(6, 2.0)], axis=1), atol=1e-11)
 
 
 def test_no_cubic_crosses_a_break():

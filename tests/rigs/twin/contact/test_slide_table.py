@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import math
 
 import numpy as np
@@ -18,41 +17,30 @@ from tactbench.plugin import (
     SensorSpec,
     Source,
     StreamSpec,
-    assumed,
 )
 from tactbench.plugin.simulation import BondedLayer, SkinSheet, Slide
-from tactbench.rigs.twin import tactbench_effects
 from tactbench.rigs.twin.contact.load_table import build_table
 from tactbench.rigs.twin.contact.press import Press
 from tactbench.rigs.twin.contact.pressing import medium_of
 from tactbench.rigs.twin.contact.slide_table import build_slide_table, dragged_state, traction_shares
-from tactbench.rigs.twin.contact.stages import forget_tables
 from tactbench.rigs.twin.contact.tangential import pressed_state, tangential_of
 from tactbench.rigs.twin.geometry import Contact, gap_mm, skin_grid
 from tactbench.rigs.twin.planner import plan_scene
-from tactbench.rigs.twin.preparation import carried_out
+from tests.rigs.twin.conftest import EFFECTS, q, unrounded
 
 GUESS = Source(tag="assumed", reference="test")
 
 
-def _q(value, unit):
-    return assumed(value, unit, "test")
-
-
 SKIN = BondedLayer(
-    sheet=SkinSheet(x_min=_q(-8, "mm"), x_max=_q(8, "mm"), arc=_q(16, "mm"), cells=(32, 32)),
-    young=_q(0.5, "MPa"), poisson=_q(0.45, "1"), thickness=_q(3, "mm"), contact_stiffness=_q(10, "MPa/mm"),
+    sheet=SkinSheet(x_min=q(-8), x_max=q(8), arc=q(16), cells=(32, 32)),
+    young=q(0.5, "MPa"), poisson=q(0.45, "1"), thickness=q(3), contact_stiffness=q(10, "MPa/mm"),
 )  # fmt: skip
 CHANNELS = ("force_x", "force_s", "moved_x", "moved_s", "field")
 SPEC = SensorSpec(
-    name="magnet",
-    title="A magnet in a layer",
-    principle="magnetic",
-    principle_source=GUESS,
+    name="magnet", title="A magnet in a layer", principle="magnetic", principle_source=GUESS, skin=SKIN,
     streams=(StreamSpec(name="taxels", channels=tuple(ChannelSpec(name=name, kind="taxel") for name in CHANNELS)),),
-    skin=SKIN,
     reads_shear=("taxel",),
-)
+)  # fmt: skip
 
 
 def build(sensor, grid, wanted):
@@ -72,20 +60,18 @@ def build(sensor, grid, wanted):
 
 
 SENSOR = SensorDescriptor(spec=SPEC, transducer=f"{__name__}:build")
-BLIND = SENSOR.model_copy(update={"spec": SPEC.model_copy(update={"reads_shear": ()})})
 
 
 def _scene(speed=5.0, angle_deg=0.0, **more):
-    ramp = ForceRamp(start=_q(0.5, "N"), end=_q(1.5, "N"), hold=_q(0, "s"), duration=_q(2, "s"), samples=400)
-    slide = Slide(speed=_q(speed, "mm/s"), start=_q(0.5, "s"), duration=_q(1, "s"), direction=_q(angle_deg, "deg"))
-    return Scene(name="slide", indenter=Indenter(radius=_q(8, "mm")), profile=ramp, slide=slide, observe=("taxel",),
-                 placement=Placement(scatter=_q(0, "mm")), **more)  # fmt: skip
+    ramp = ForceRamp(start=q(0.5, "N"), end=q(1.5, "N"), hold=q(0, "s"), duration=q(2, "s"), samples=400)
+    slide = Slide(speed=q(speed, "mm/s"), start=q(0.5, "s"), duration=q(1, "s"), direction=q(angle_deg, "deg"))
+    return Scene(name="slide", indenter=Indenter(radius=q(8)), profile=ramp, slide=slide, observe=("taxel",),
+                 placement=Placement(scatter=q(0)), **more)  # fmt: skip
 
 
 def _readings(sensor, scene):
-    run = carried_out(sensor, scene, 1, plan_scene(tactbench_effects(), scene, sensor.spec))
-    (track,) = run.tracks
-    return run, track.readings
+    run = unrounded(sensor, scene)
+    return run, run.tracks[0].readings
 
 
 def test_between_the_nodes_the_table_gives_what_the_states_give():
@@ -138,37 +124,19 @@ def test_the_other_way_everything_tangential_turns():
 
 def test_it_costs_nothing_where_nobody_looks_along_the_skin():
     for spec, scene in (
-        (BLIND.spec, _scene()),
+        (SPEC.model_copy(update={"reads_shear": ()}), _scene()),
         (SPEC.model_copy(update={"reads_shear": ("dc_pressure",)}), _scene()),
-        (SPEC, _scene().model_copy(update={"profile": ForceRamp(end=_q(0, "N"))})),
+        (SPEC, _scene().model_copy(update={"profile": ForceRamp(end=q(0, "N"))})),
     ):
-        plan = plan_scene(tactbench_effects(), scene, spec)
+        plan = plan_scene(EFFECTS, scene, spec)
         (entry,) = (entry for entry in plan.entries if entry.effect == "shear")
         assert not entry.included
         assert "shear" not in [effect.name for effect in plan.stages]
-    asked = []
-    plan = plan_scene(tactbench_effects(), _scene(), BLIND.spec)
-    transducer = f"{__name__}:{build_blind.__name__}"
-    build_blind.seen = asked
-    forget_tables()
-    carried_out(BLIND.model_copy(update={"transducer": transducer}), _scene(), 1, plan)
-    assert asked
-    assert all(state.shear_mpa is None and state.tangential_displacement_mm is None for state in asked)
-
-
-def build_blind(sensor, grid, wanted):
-    """Remember the states."""
-
-    def read(state):
-        build_blind.seen.append(state)
-        return np.zeros(len(wanted))
-
-    return read
 
 
 def test_a_tolerance_is_kept_in_the_slide_too():
     # With this ratio the surface hardly moves under the press, so that only the slide tells the rungs apart.
-    still = SPEC.model_copy(update={"skin": SKIN.model_copy(update={"poisson": _q(0.35, "1")})})
+    still = SPEC.model_copy(update={"skin": SKIN.model_copy(update={"poisson": q(0.35, "1")})})
     sensor = SENSOR.model_copy(update={"spec": still})
     errors = {}
     for tolerance in (0.02, 0.002):
@@ -176,19 +144,3 @@ def test_a_tolerance_is_kept_in_the_slide_too():
         errors[run.rung] = run.rung_error
         assert 0 < run.rung_error <= tolerance
     assert len(errors) == 2
-
-
-def test_left_out_by_name_nothing_moves_along_the_skin():
-    scene = _scene()
-    scene = scene.model_copy(update={"simulation": scene.simulation.model_copy(update={"effects": ("-shear",)})})
-    _, readings = _readings(SENSOR, scene)
-    assert not readings.any()
-
-
-def test_fields_are_of_the_grid_and_of_nothing_else():
-    grid = skin_grid(SKIN.sheet)
-    rest = Press(medium_of(SKIN, grid), gap_mm(grid, Contact(8.0, 0.0, 0.0), math.inf), Contact(8.0, 0.0, 0.0))(0.5)
-    found = pressed_state(rest, tangential_of(SKIN, grid))
-    assert found.shear_mpa.shape == found.tangential_displacement_mm.shape == (2, *rest.pressure_mpa.shape)
-    others = [field.name for field in dataclasses.fields(rest)][:-2]
-    assert all(getattr(found, name) is getattr(rest, name) for name in others)

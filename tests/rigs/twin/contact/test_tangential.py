@@ -87,7 +87,7 @@ def test_an_even_traction_shears_a_layer():
     np.testing.assert_allclose(moved[1], -0.8 * by_h_over_g, rtol=1e-12)
 
 
-@pytest.mark.parametrize(("waves_x", "waves_s"), [(2, 0), (0, 3), (2, -1)])
+@pytest.mark.parametrize(("waves_x", "waves_s"), [(2, 0), (2, -1)])
 def test_a_wave_of_traction_moves_a_layer_along_itself_and_along_its_crests(waves_x, waves_s):
     skin, grid = _layer(0.3, cells=16, thickness_mm=3.0), skin_grid(_layer(0.3, cells=16).sheet)
     k = 2 * math.pi / SIDE_MM * np.array([waves_x, waves_s])
@@ -98,21 +98,6 @@ def test_a_wave_of_traction_moves_a_layer_along_itself_and_along_its_crests(wave
     ahead = k * (k @ way) / size**2
     moved = tangential_of(skin, grid).dragged(state, tuple(way), wave > 0)
     np.testing.assert_allclose(moved, np.multiply.outer(along * ahead + across * (way - ahead), wave), atol=1e-12)
-
-
-@given(st.floats(-1, 1), st.floats(0, 1), st.booleans())
-def test_no_share_exceeds_friction_wherever_the_inner_pressure_is_no_larger(since, inner, held):
-    # As in the recordings: after a slip that ended at a share `since` of the limit, by Mindlin or held as the way goes.
-    asked = since + (1 - since) * (1 - inner ** (2 / 3) if held else 1 - inner)
-    share, stuck, b = (
-        float(one[0]) for one in traction_shares(*(np.array([v]) for v in (2.0, asked * MU * 2.0, np.cbrt(inner))), MU)
-    )
-    assert share == pytest.approx(asked, abs=1e-12)
-    assert stuck == pytest.approx(inner, abs=1e-12)
-    outer = share + b * stuck
-    # q / mu p from where nothing sticks (p* = 0) to where the whole inner pressure is that of the contact.
-    assert outer <= 1 + 1e-12
-    assert outer - b >= -1 - 1e-12
 
 
 @pytest.fixture(scope="module")

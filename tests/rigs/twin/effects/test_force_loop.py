@@ -6,27 +6,19 @@ import numpy as np
 import pytest
 
 from tactbench.core.spec.drive import ForceLoop
-from tactbench.plugin import ForceRamp, Indenter, RigContext, RigError, Scene, assumed
+from tactbench.plugin import ForceRamp, Indenter, RigError, Scene
 from tactbench.plugin.devices import LoopModel
-from tactbench.plugin.simulation import Environment
-from tactbench.rigs.twin import tactbench_effects
 from tactbench.rigs.twin.contact.stages import bare_skin
 from tactbench.rigs.twin.effects.force_loop import BEYOND, depth_of, force_at_depth
-from tactbench.rigs.twin.planner import plan_scene
 from tactbench.rigs.twin.preparation import prepare
-from tactbench.rigs.twin.rig import build
+from tests.rigs.twin.conftest import SILENT, TWIN, named, q
 
-EFFECTS = tactbench_effects()
-CAP = Indenter(radius=assumed(10.0, "mm", "test"))
-
-
-def _q(value, unit):
-    return assumed(value, unit, "test")
+CAP = Indenter(radius=q(10.0))
 
 
 def _scene(drive, noise_n=0.0, **profile):
-    environment = Environment(noise_scale=0.0, drift_scale=0.0, force_noise=_q(noise_n, "N"))
-    ramp = ForceRamp(**{"samples": 2500, "duration": _q(30, "s"), "hold": _q(2, "s"), **profile})
+    environment = SILENT.model_copy(update={"force_noise": q(noise_n, "N")})
+    ramp = ForceRamp(**{"samples": 2500, "duration": q(30, "s"), "hold": q(2, "s"), **profile})
     return Scene(name="pressed", indenter=CAP, profile=ramp, environment=environment, drive=drive)
 
 
@@ -35,7 +27,7 @@ def pressed(sensors):
     """Carry out a scene on the iCub fingertip: its run."""
 
     def press(scene, until=None):
-        plan = build(RigContext(effects=tuple(EFFECTS))).plan(sensors["icub"], scene)
+        plan = TWIN.plan(sensors["icub"], scene)
         run = prepare(sensors["icub"], scene, 1, plan)
         for effect in plan.stages:
             run.apply(effect)
@@ -85,7 +77,7 @@ def test_the_swing_begins_where_the_skin_becomes_too_stiff_for_the_loop(pressed)
 
 
 def test_noise_moves_the_motor_less_behind_the_filter(pressed):
-    held = {"start": _q(1.0, "N"), "end": _q(1.0, "N")}
+    held = {"start": q(1.0, "N"), "end": q(1.0, "N")}
     filtered, plain = (
         pressed(_scene(drive, 0.6875, **held), "force-loop").load.force_n[500:]
         for drive in (ForceLoop(), _unfiltered())
@@ -104,57 +96,35 @@ def test_everybody_follows_the_load_of_the_loop(pressed):
 
 
 def test_a_loop_with_its_own_rate_reaches_the_same_force(pressed):
-    fast = pressed(_scene(ForceLoop(rate=_q(500, "Hz"))), "force-loop")
+    fast = pressed(_scene(ForceLoop(rate=q(500, "Hz"))), "force-loop")
     assert fast.load.t_s.size == 15000
     assert fast.load.force_n[-1] == pytest.approx(5.0, abs=0.05)
 
 
 def test_a_loop_that_swings_too_far_is_held_at_the_end_of_its_table_and_says_so(pressed):
-    run = pressed(_scene(_unfiltered(proportional=_q(2.0, "mm/N"))), "force-loop")
+    run = pressed(_scene(_unfiltered(proportional=q(2.0, "mm/N"))), "force-loop")
     assert run.drawn["loop_steps_at_end"] > 0
     assert run.load.largest_n <= BEYOND * 5.0 * (1 + 1e-12)
     assert run.load.force_n.min() >= 0
 
 
-def test_a_drive_is_called_for_by_the_scene_alone(specs):
-    for drive, called in ((None, False), (ForceLoop(), True)):
-        plan = plan_scene(EFFECTS, _scene(drive), specs["icub"])
-        entry = next(entry for entry in plan.entries if entry.effect == "force-loop")
-        assert entry.included is called
-        assert "0 N" in entry.reason or "1 Hz" in entry.reason
-    assert plan.stages[0].name == "force-loop"
-
-
-def test_what_the_drive_is_made_of_is_printed_with_the_recording(sensors):
-    scene = _scene(_unfiltered(), samples=50)
-    with build(RigContext(effects=tuple(EFFECTS))).open(sensors["icub"], scene, seed=1) as recording:
-        said = recording.assumptions
-    assert said["drive_cutoff_hz"] == "none"
-    assert said["drive_proportional_mm_per_n"] == 0.15
-    assert said["drive_delay_ms"] == pytest.approx(10.0)
-
-
 def test_creep_is_never_left_out_behind_a_loop(sensors):
-    slow = {"duration": _q(1e5, "s"), "samples": 200}
-    rig = build(RigContext(effects=tuple(EFFECTS)))
-    for drive, called in ((None, False), (ForceLoop(rate=_q(0.01, "Hz")), True)):
-        with rig.open(sensors["icub"], _scene(drive, **slow), seed=1) as recording:
-            assert next(entry for entry in recording.plan if entry.effect == "creep").included is called
+    slow = {"duration": q(1e5, "s"), "samples": 200}
+    for drive, called in ((None, False), (ForceLoop(rate=q(0.01, "Hz")), True)):
+        with TWIN.open(sensors["icub"], _scene(drive, **slow), seed=1) as recording:
+            assert named(recording.plan)["creep"].included is called
 
 
-@pytest.mark.parametrize("wrong", [{"cutoff": 0.0}, {"delay": -1.0}, {"speed": 0.0}, {"integral": float("nan")}])
-def test_a_loop_that_means_nothing_is_refused_by_the_name_of_its_number(sensors, wrong):
-    ((name, value),) = wrong.items()
+@pytest.mark.parametrize(("name", "value"), [("cutoff", 0.0), ("delay", -1.0)])
+def test_a_loop_that_means_nothing_is_refused_by_the_name_of_its_number(sensors, name, value):
     unit = getattr(ForceLoop(), name).unit
-    scene = _scene(ForceLoop(**{name: _q(value, unit)}))
-    rig = build(RigContext(effects=tuple(EFFECTS)))
-    with pytest.raises(RigError, match=name), rig.open(sensors["icub"], scene, seed=1):
+    scene = _scene(ForceLoop(**{name: q(value, unit)}))
+    with pytest.raises(RigError, match=name), TWIN.open(sensors["icub"], scene, seed=1):
         pass
 
 
 def test_depth_and_force_undo_each_other(pressed):
-    run = pressed(_scene(None), "contact")
-    table = bare_skin(run, 15.0)
+    table = bare_skin(pressed(_scene(None), "contact"), 15.0)
     force_n, deepest = force_at_depth(table)
     for wanted in np.linspace(0.0, 15.0, 97):
         # The straight lines between 4001 depths; 1.5 mN of 15 N.

@@ -9,14 +9,14 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 
 from tactbench.plugin import RigError
-from tactbench.rigs.twin.effects.bristle import bristle
 from tactbench.rigs.twin.effects.skin_mode import Mode, is_caught, slip_s, swing
 from tactbench.rigs.twin.effects.stick_slip import Dragged, Drive
-from tactbench.rigs.twin.partial_slip import share_of_force, shear_modulus_mpa, stick_ratio
+from tactbench.rigs.twin.partial_slip import shear_modulus_mpa
+from tests.oracles.layers import bonded_layer
 
 
-def _drive(load, seconds=4.0, **more):
-    grid = np.linspace(0.0, seconds, 801)
+def _drive(load, seconds=4.0, nodes=801, **more):
+    grid = np.linspace(0.0, seconds, nodes)
     load_n = np.interp(grid, np.linspace(0.0, seconds, len(load)), load)
     return Drive(**{
         "speed_mm_s": 10.0, "start_s": 0.5, "end_s": math.inf, "static": 0.8, "kinetic": 0.6, "stribeck_mm_s": 5.0,
@@ -52,19 +52,13 @@ def test_whatever_moves_the_laws_of_friction_hold(load, speed, damping, kinetic,
         assert np.all(np.isfinite(values))
 
 
-def test_the_same_moments_say_the_same_on_any_clock():
-    dragged = Dragged(_drive([1.0, 2.0]))
-    fine = np.linspace(0.0, 4.0, 8001)
-    for values, every in zip(dragged(fine), dragged(fine[::7]), strict=True):
-        np.testing.assert_array_equal(values[::7], every)
-
-
 def test_a_faster_drive_ends_stick_slip():
     # Sliding is stable from 26 mm/s on (N |mu'(V)| < c); stick-slip that lives already dies once w u, here 200 mm/s
     # less what damping takes, is below the drive.
     slow, fast = (Dragged(_drive([1.0, 1.0], speed_mm_s=v)) for v in (5.0, 200.0))
     assert slow.let_go_s.size > 50
     assert fast.let_go_s.size == 1
+    assert Dragged(_drive([1.0, 1.0], kinetic=0.8)).let_go_s.size <= 1, "equal coefficients never stick and slip"
     steady = fast(np.array([3.0]))
     expected = 0.6 + 0.2 * math.exp(-200.0 / 5.0)
     assert steady.force_n[0] == pytest.approx(expected, rel=1e-9)
@@ -91,32 +85,6 @@ def test_after_the_motion_the_force_stays_until_the_load_lets_it_go():
     assert seen.force_n[-1] == 0
 
 
-def test_a_motion_that_ends_while_the_skin_sticks_keeps_its_elastic_force():
-    first = Dragged(_drive([1.0, 1.0], speed_mm_s=1.0)).let_go_s[0]
-    for part in (0.2, 0.9):
-        start = 0.5
-        end = start + part * (first - start)
-        dragged = Dragged(_drive([1.0, 1.0], start_s=start, end_s=end, speed_mm_s=1.0))
-        before, after = (dragged(np.array([t])) for t in (end - 1e-9, end + 1e-9))
-        viscous = 2.0 * dragged.drive.mode.damping / dragged.drive.mode.omega * 1.0 * dragged.drive.stiffness[0]
-        # The limit of what sticks rises by the viscous force that ends: the elastic force moves by less than that.
-        assert before.force_n[0] - after.force_n[0] == pytest.approx(viscous, abs=1.0 * viscous)
-        assert after.displacement_mm[0] == pytest.approx(before.displacement_mm[0], rel=1e-6)
-
-
-def test_the_skin_sticks_less_and_less_on_the_way_to_a_slip():
-    dragged = Dragged(_drive([1.0, 1.0], speed_mm_s=1.0))
-    first = dragged.let_go_s[0]
-    seen = dragged(np.linspace(0.5, first - 1e-9, 50))
-    assert seen.stick_ratio[0] == pytest.approx(1.0)
-    assert np.all(np.diff(seen.stick_ratio) < 0)
-    assert seen.stick_ratio[-1] < 0.01
-    assert not seen.slipping.any()
-    # A small viscous force c V comes with the elastic one: 2 z/w V k = 2e-4 N.
-    elastic = seen.force_n - 2e-4
-    np.testing.assert_allclose(seen.stick_ratio[:-1], np.cbrt(1 - elastic / (0.8 - 2e-4))[:-1], atol=1e-9)
-
-
 @given(st.floats(0.0, 0.95), st.floats(1e-4, 1.0), st.floats(1e-3, 500.0))
 def test_a_slip_ends_at_the_surfaces_speed_for_the_first_time(damping, u, speed):
     mode = Mode(2000.0, damping)
@@ -130,30 +98,15 @@ def test_a_slip_ends_at_the_surfaces_speed_for_the_first_time(damping, u, speed)
         assert at_end[0] == pytest.approx(speed, abs=1e-9 * scale)
 
 
-def test_equal_coefficients_never_stick_slip():
-    assert Dragged(_drive([1.0, 1.0], kinetic=0.8)).let_go_s.size <= 1
-
-
 def test_a_mode_that_cannot_swing_is_refused():
     with pytest.raises(RigError, match="cannot swing"):
         Mode(2000.0, 1.0)
 
 
-@given(st.floats(0, 1))
-def test_cattaneos_radius_belongs_to_mindlins_force(share):
-    s = np.array([share])
-    np.testing.assert_allclose(stick_ratio(s) ** 3, 1.0 - share_of_force(s), atol=1e-15)
-
-
-def test_the_bristle_survives_no_load_and_repeated_stamps():
-    found = bristle(np.array([0.0, 1.0, 1.0, 2.0]), 3.0, np.array([0.5, 0.0, 0.0, 0.0]), 0.2)
-    np.testing.assert_allclose(found, [0.2, 0.5 - 0.3 * math.exp(-6.0), 0.5 - 0.3 * math.exp(-6.0), 0.0])
-
-
-def test_every_medium_has_a_shear_modulus(specs, layer):
+def test_every_medium_has_a_shear_modulus(specs):
     assert shear_modulus_mpa(specs["biotac"].skin) == pytest.approx(0.8 / 2.96 / 1.52)
     assert shear_modulus_mpa(specs["icub"].skin) == specs["icub"].skin.shear.to("MPa") / 2
-    assert shear_modulus_mpa(layer(0.3)[0]) == pytest.approx(1.0 / 2.6 / 1.7)
+    assert shear_modulus_mpa(bonded_layer(0.3)) == pytest.approx(1.0 / 2.6 / 1.7)
 
 
 @pytest.mark.parametrize(("speed", "damping", "stribeck"), [(2.0, 0.05, 0.0), (10.0, 0.1, 5.0), (30.0, 0.02, 50.0)])
@@ -189,57 +142,21 @@ def test_the_work_of_the_drive_is_stored_or_dissipated(speed, damping, stribeck)
     assert dissipated > 0.5 * work
 
 
-def test_within_a_slip_the_mass_takes_up_what_the_spring_loses():
-    speed, damping = 10.0, 0.1
-    mode = Mode(2000.0, damping)
-    dragged = Dragged(_drive([1.0, 1.0], speed_mm_s=speed, mode=mode))
-    stiffness = float(dragged.drive.stiffness[0])
-    mass, damper = stiffness / mode.omega**2, 2.0 * damping / mode.omega * stiffness
-    begin, until = float(dragged.let_go_s[3]), float(dragged.caught_s[4])
-    nodes, weights = np.polynomial.legendre.leggauss(60)
-
-    def stored(t_s):
-        seen = dragged(np.array([t_s]))
-        velocity = speed - seen.slip_mm_s[0]
-        return 0.5 * stiffness * float(seen.displacement_mm[0]) ** 2, 0.5 * mass * float(velocity) ** 2
-
-    at_first = stored(math.nextafter(begin, until))
-    kinetic = 0.0
-    for share in (0.25, 0.5, 0.75):
-        moment = begin + share * (until - begin)
-        seen = dragged(begin + (moment - begin) * 0.5 * (nodes + 1.0))
-        dt = 0.5 * (moment - begin) * weights
-        velocity = speed - seen.slip_mm_s
-        given = float(np.sum((seen.force_n * speed - seen.force_n * seen.slip_mm_s - damper * velocity**2) * dt))
-        now = stored(moment)
-        # 60 Gauss points on a smooth swing: rounding.
-        assert sum(now) - sum(at_first) == pytest.approx(given, abs=1e-12 * at_first[0] + 1e-15)
-        kinetic = max(kinetic, now[1])
-    # The balance is about something: the mass moves with more than a hundredth of what the spring held.
-    assert kinetic > 0.01 * at_first[0]
-
-
 @pytest.mark.parametrize("speed", [1.0, 20.0, 200.0])
 def test_steps_a_thousand_times_as_long_change_nothing(speed):
-    drive = _drive([1.0, 3.0], seconds=40.0, speed_mm_s=speed)
-    fine = np.linspace(0.0, 40.0, 400_001)
-    dragged = Dragged(drive)
+    dragged, fine = Dragged(_drive([1.0, 3.0], speed_mm_s=speed)), np.linspace(0.0, 4.0, 40_001)
     for values, every in zip(dragged(fine[::1000]), dragged(fine), strict=True):
         np.testing.assert_array_equal(values, every[::1000])
 
 
-@pytest.mark.parametrize("speed", [0.1, 20.0, 500.0])
+@pytest.mark.parametrize("speed", [0.1, 20.0])
 def test_a_grid_of_loads_a_thousand_times_as_coarse_blows_nothing_up(speed):
-    seen = {}
-    for step_s in (0.002, 2.0):
-        grid = np.arange(0.0, 60.0 + step_s / 2, step_s)
-        load = np.interp(grid, [0.0, 10.0, 50.0, 60.0], [1.0, 1.0, 4.0, 4.0])
-        drive = Drive(speed, 10.0, math.inf, 0.8, 0.6, 5.0, Mode(2000.0, 0.1), grid, load, 2.0 * np.cbrt(load))
-        seen[step_s] = Dragged(drive)(np.linspace(0.0, 60.0, 60_001))
-        limit = 0.8 * np.interp(np.linspace(0.0, 60.0, 60_001), grid, load)
-        assert all(np.isfinite(values).all() for values in seen[step_s])
-        # A stiffness that is straight over 2 s while the load grows by 0.15 N: (0.15/1)^2/9 of the limit.
-        assert (seen[step_s].force_n - limit).max() < (1e-4 if step_s == 0.002 else 0.0025 * limit.max())
+    t, load = np.linspace(0.0, 60.0, 60_001), [1.0, 1.0, 1.75, 2.5, 3.25, 4.0, 4.0]
+    limit = 0.8 * np.interp(t, np.linspace(0.0, 60.0, 7), load)
+    fine, coarse = (Dragged(_drive(load, 60.0, nodes, speed_mm_s=speed, start_s=10.0))(t) for nodes in (30_001, 31))
+    # A stiffness that is straight over 2 s while the load grows by 0.15 N: (0.15/1)^2/9 of the limit.
+    for seen, close in ((fine, 1e-4), (coarse, 0.0025 * limit.max())):
+        assert all(np.isfinite(values).all() for values in seen)
+        assert (seen.force_n - limit).max() < close
     # Phases of single slips drift apart; what was slipped in all does not: the skin follows by less than a millimetre.
-    apart = np.abs(seen[2.0].slip_mm - seen[0.002].slip_mm).max()
-    assert apart < 2 * seen[0.002].displacement_mm.max()
+    assert np.abs(coarse.slip_mm - fine.slip_mm).max() < 2 * fine.displacement_mm.max()

@@ -40,44 +40,6 @@ def test_a_constant_contact_is_followed_exactly_whatever_the_steps(steps, conduc
     np.testing.assert_allclose(found, goal + (start_c - goal) * np.exp(-t_s / tau), atol=1e-10)
 
 
-def test_a_thousand_time_constants_land_on_equilibrium_and_no_time_changes_nothing():
-    goal, tau = _equilibrium(0.01, 5.0)
-    found = CORE.carried(np.array([0.0, 1e3 * tau, 1e3 * tau]), np.full(3, 0.01), 5.0, 57.0)
-    assert found[1] == pytest.approx(goal, rel=1e-15)
-    assert found[2] == found[1]
-
-
-def test_heat_is_neither_made_nor_lost():
-    from scipy.integrate import simpson
-
-    t_s = np.linspace(0, 600, 4001)
-    found = CORE.carried(t_s, np.full(4001, 0.004), 40.0, 30.0)
-    area = simpson(found, x=t_s)
-    into = 0.25 * 600 + (23.0 * 600 - area) / 136.0 + 0.004 * (40.0 * 600 - area)
-    # Simpson's rule at 1/1600 of the time constant is exact to 1e-14 of 150 J, the sum of 4001 to rounding.
-    assert into == pytest.approx(3.7 * (found[-1] - 30.0), abs=1e-9)
-
-
-def test_a_changing_contact_is_met_to_second_order():
-    from scipy.integrate import solve_ivp
-
-    def through(t):
-        return 0.01 * np.sin(t / 40.0) ** 2
-
-    def rate(t, y):
-        lost = (CORE.room_c - y) / CORE.resistance_k_per_w + through(t) * (10.0 - y)
-        return (CORE.power_w + lost) / CORE.capacity_j_per_k
-
-    true = solve_ivp(rate, (0, 200), [57.0], rtol=1e-11, atol=1e-11, method="DOP853").y[0, -1]
-    errors = []
-    for n in (25, 50, 100):
-        t_s = np.linspace(0, 200, n + 1)
-        errors.append(abs(CORE.carried(t_s, through(t_s), 10.0, 57.0)[-1] - true))
-    orders = np.log2(np.array(errors[:-1]) / np.array(errors[1:]))
-    # Two, within what the next term does at these steps; first order would show 1.
-    assert orders == pytest.approx(2.0, abs=0.15)
-
-
 @given(st.floats(0, 100), st.floats(0, 0.05), st.floats(0, 3000))
 def test_warmth_lies_between_none_and_the_whole_difference(indenter_c, conductance, since):
     scene = SCENE.model_copy(update={"environment": Environment(since_power_on=assumed(since, "s", "t"))})
@@ -87,10 +49,6 @@ def test_warmth_lies_between_none_and_the_whole_difference(indenter_c, conductan
     assert np.all(warmth >= min(0.0, float(apart.min())) - 1e-9)
     assert np.all(warmth <= max(0.0, float(apart.max())) + 1e-9)
     assert np.abs(warmth).max() <= np.abs(apart).max() * conductance * 60 / CORE.capacity_j_per_k + 1e-9
-
-
-def test_without_a_contact_there_is_no_warmth_to_the_last_digit():
-    assert not CORE.warmth(SCENE, np.linspace(0, 60, 100), np.zeros(100), 5.0).any()
 
 
 def test_the_untouched_core_is_the_same_circuit_without_a_contact():
@@ -103,14 +61,10 @@ def test_the_untouched_core_is_the_same_circuit_without_a_contact():
     assert CORE.untouched(warm, np.zeros(1))[0] == CORE.room_c + CORE.rise_k
 
 
-def test_a_disc_of_one_millimetre_in_silicone():
+def test_heat_goes_through_a_disc_and_conductivity_grows_with_temperature_and_never_turns_negative():
     # 4 x 0.2 W/(m K) x 1e-3 m.
     assert disc_conductance_w_per_k(np.array([0.0, 1.0]), 0.2) == pytest.approx([0.0, 8e-4])
-
-
-def test_conductivity_is_that_of_25_degrees_there_and_never_negative():
-    found = relative_conductivity(np.array([25.0, 35.0, -200.0]), 0.02)
-    assert found == pytest.approx([1.0, 1.2, 0.1])
+    assert relative_conductivity(np.array([25.0, 35.0, -200.0]), 0.02) == pytest.approx([1.0, 1.2, 0.1])
 
 
 MAKERS = Thermistor(b_k=4025.0, p=155183.0, q=46555.0, full_scale=4095.0)
@@ -124,12 +78,6 @@ def by_the_maker(reading: float) -> float:
 @given(st.floats(-40, 120))
 def test_the_makers_formula_leads_back(degc):
     assert by_the_maker(float(MAKERS.reading(np.array([degc]))[0])) == pytest.approx(degc, abs=1e-9)
-
-
-def test_the_makers_formula_at_rest():
-    by_hand = by_the_maker(2576)
-    assert by_hand == pytest.approx(56.59, abs=0.005)
-    assert MAKERS.reading(np.array([by_hand]))[0] == pytest.approx(2576, abs=1e-8)
 
 
 def test_counts_rise_with_temperature_and_stay_on_the_converter():

@@ -6,56 +6,34 @@ import numpy as np
 import pytest
 
 from tactbench.core.spec.scene import Simulation
-from tactbench.plugin import ForceRamp, Indenter, NotApplicable, RigContext, Scene, assumed
+from tactbench.plugin import ForceRamp, Scene
 from tactbench.plugin.simulation import Environment
-from tactbench.rigs.twin import tactbench_effects
 from tactbench.rigs.twin.effects.called_for import contact_heat
 from tactbench.rigs.twin.effects.heated_core import HeatedCore, Thermistor
-from tactbench.rigs.twin.effects.memory import time_constant_s
+from tactbench.rigs.twin.effects.memory import lag, time_constant_s
 from tactbench.rigs.twin.planner import plan_scene
 from tactbench.rigs.twin.preparation import prepare
-from tactbench.rigs.twin.rig import build
+from tests.rigs.twin.conftest import EFFECTS, named, q, unrounded
 
-EFFECTS = tactbench_effects()
 HEAT = ("dc_temperature", "ac_temperature")
-FLAT = Indenter()
 REST_C = 56.59
 """The maker's formula at 2576 counts."""
 
 
-def _q(value, unit):
-    return assumed(value, unit, "test")
-
-
 def _scene(indenter_c=None, observe=HEAT, effects=(), end_n=2.0, **environment):
-    quiet = {"noise_scale": 0.0, "drift_scale": 0.0, "force_noise": _q(0, "N"), **environment}
+    quiet = {"noise_scale": 0.0, "drift_scale": 0.0, "force_noise": q(0, "N"), **environment}
     if indenter_c is not None:
-        quiet["indenter_temperature"] = _q(indenter_c, "degC")
-    touch = ForceRamp(end=_q(end_n, "N"), hold=_q(1.0, "s"), duration=_q(1.5, "s"), samples=150)
+        quiet["indenter_temperature"] = q(indenter_c, "degC")
+    touch = ForceRamp(end=q(end_n, "N"), hold=q(1.0, "s"), duration=q(1.5, "s"), samples=150)
     return Scene(
-        name="touch",
-        indenter=FLAT,
-        profile=touch,
-        environment=Environment(**quiet),
-        observe=observe,
+        name="touch", profile=touch, environment=Environment(**quiet), observe=observe,
         simulation=Simulation(effects=effects),
-    )
+    )  # fmt: skip
 
 
 @pytest.fixture(scope="module")
 def carried(sensors):
-    """Carry out a scene on the BioTac; the track as it is before the converter."""
-
-    def carry(scene):
-        twin = build(RigContext(effects=tuple(EFFECTS)))
-        plan = twin.plan(sensors["biotac"], scene)
-        run = prepare(sensors["biotac"], scene, 1, plan)
-        for effect in plan.stages:
-            if effect.name != "converter":
-                run.apply(effect)
-        return run.tracks[0]
-
-    return carry
+    return lambda scene: unrounded(sensors["biotac"], scene).tracks[0]
 
 
 def test_a_colder_indenter_cools_the_core_and_a_hotter_one_warms_it(carried):
@@ -71,7 +49,7 @@ def test_a_colder_indenter_cools_the_core_and_a_hotter_one_warms_it(carried):
 
 
 def test_a_sensor_that_warms_up_shows_it_in_tdc(carried, specs):
-    track = carried(_scene(since_power_on=_q(100, "s"), drift_scale=1.0, end_n=0.0))
+    track = carried(_scene(since_power_on=q(100, "s"), drift_scale=1.0, end_n=0.0))
     core = HeatedCore.of(_scene(), specs["biotac"])
     left = np.exp(-(100 + track.t_s) / core.tau_s)
     counts = Thermistor.of(specs["biotac"], 4095.0).reading(23.0 + core.rise_k * (1 - left))
@@ -82,13 +60,7 @@ def test_a_sensor_that_warms_up_shows_it_in_tdc(carried, specs):
 def test_tac_is_the_amplified_high_pass_of_tdc(carried):
     track = carried(_scene(23.0))
     t, tdc, tac = track.t_s, track.readings[:, 0], track.readings[:, 1]
-    tau = time_constant_s(0.45)
-    # z' = (x - z)/tau for a straight x, one sample after the other.
-    slow = [tdc[0]]
-    for n in range(1, t.size):
-        dt, slope = t[n] - t[n - 1], (tdc[n] - tdc[n - 1]) / (t[n] - t[n - 1])
-        slow.append(tdc[n] - slope * tau + (slow[-1] - tdc[n - 1] + slope * tau) * np.exp(-dt / tau))
-    np.testing.assert_allclose(tac - 2037, 98.0 * (tdc - np.array(slow)), atol=1e-6)
+    np.testing.assert_allclose(tac - 2037, 98.0 * (tdc - lag(t, tdc, time_constant_s(0.45))), atol=1e-6)
 
 
 def test_the_electrodes_fall_when_the_contact_cools_the_fluid_and_not_otherwise(carried):
@@ -104,10 +76,8 @@ def test_the_electrodes_fall_when_the_contact_cools_the_fluid_and_not_otherwise(
     np.testing.assert_allclose(fall[-1], expected, rtol=0.01)
 
 
-def test_a_sensor_without_a_heated_core_is_refused_and_one_that_is_asked_keeps_still(sensors):
+def test_a_sensor_without_a_heated_core_that_is_asked_keeps_still(sensors):
     icub = sensors["icub"].spec
-    with pytest.raises(NotApplicable):
-        plan_scene(EFFECTS, _scene(), icub)
     asked = _scene(5.0, ("taxel",), ("+contact-heat", "+thermal-drift"))
     run = prepare(sensors["icub"], asked, 1, plan_scene(EFFECTS, asked, icub))
     before = run.tracks[0].readings.copy()
@@ -118,29 +88,22 @@ def test_a_sensor_without_a_heated_core_is_refused_and_one_that_is_asked_keeps_s
 
 
 @pytest.mark.parametrize(
-    ("scene", "called", "number"),
+    ("scene", "called"),
     [
-        (_scene(None, ("taxel",)), False, "0 K"),
-        (_scene(5.0, ("taxel",), end_n=0.0), False, "0 N"),
-        (_scene(5.0, ("taxel",)), True, "K apart"),
-        (_scene(5.0, ("dc_pressure",)), False, "no observed channel"),
-        (_scene(56.55, ("taxel",)), False, "below a third"),
+        (_scene(None, ("taxel",)), False), (_scene(5.0, ("taxel",), end_n=0.0), False), (_scene(5.0, ("taxel",)), True),
+        (_scene(5.0, ("dc_pressure",)), False), (_scene(56.55, ("taxel",)), False),
     ],
-)
-def test_heat_is_called_for_by_a_difference_that_somebody_could_see(scene, called, number, specs):
+)  # fmt: skip
+def test_heat_is_called_for_by_a_difference_that_somebody_could_see(scene, called, specs):
     reason = contact_heat(scene, specs["biotac"])
     assert reason.called_for is called
-    assert number in reason.text
     assert called or reason.change is not None
-    plan = {entry.effect: entry for entry in plan_scene(EFFECTS, scene, specs["biotac"]).entries}
-    assert plan["contact-heat"].included is called
+    assert named(plan_scene(EFFECTS, scene, specs["biotac"]).entries)["contact-heat"].included is called
 
 
 @pytest.mark.parametrize("kind", ["dc_temperature", "ac_temperature", "taxel"])
 def test_what_heat_changes_stays_below_what_the_plan_says(kind, carried, specs):
     # 3.6 K: a bound that is neither nothing nor cut off by the whole difference.
     scene, without = (_scene(degc, (kind,), ("+contact-heat", "+thermal-drift"), end_n=0.5) for degc in (53.0, None))
-    entries = plan_scene(EFFECTS, scene, specs["biotac"]).entries
-    (entry,) = [entry for entry in entries if entry.effect == "contact-heat"]
-    found = np.abs(carried(scene).readings - carried(without).readings).max()
-    assert 0 < found <= entry.change
+    entry = named(plan_scene(EFFECTS, scene, specs["biotac"]).entries)["contact-heat"]
+    assert 0 < np.abs(carried(scene).readings - carried(without).readings).max() <= entry.change

@@ -6,13 +6,16 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tactbench.core.spec.scene import Simulation
-from tactbench.plugin import ForceRamp, Indenter, RigContext, Scene, assumed
+from tactbench.plugin import ForceRamp, Indenter, Scene, assumed
 from tactbench.plugin.simulation import Environment
-from tactbench.rigs.twin import tactbench_effects
+from tactbench.rigs.twin.contact.press import at_rest
+from tactbench.rigs.twin.contact.pressing import medium_of
 from tactbench.rigs.twin.effects.heat import largest_stretch, through_divider
 from tactbench.rigs.twin.effects.heated_core import HeatedCore, relative_conductivity
-from tactbench.rigs.twin.preparation import carried_out, prepare
-from tactbench.rigs.twin.rig import build
+from tactbench.rigs.twin.geometry import skin_grid
+from tactbench.rigs.twin.preparation import prepare
+from tactbench.sensors.biotac.transduction import build
+from tests.rigs.twin.conftest import TWIN, q, unrounded
 
 
 @given(st.floats(1, 4094), st.floats(0.2, 5))
@@ -30,20 +33,16 @@ def test_no_difference_grows_by_more_than_the_factor_or_its_inverse(one, other, 
     assert abs(there[1] - there[0]) <= max(gained, 1 / gained) * abs(other - one) * (1 + 1e-9) + 1e-9
 
 
-@pytest.mark.parametrize("degc", [-10.0, 20.0, 56.0, 57.0, 90.0])
-@pytest.mark.parametrize("since", [0.0, 3600.0])
+@pytest.mark.parametrize(("degc", "since"), [(-10.0, 0.0), (57.0, 3600.0), (90.0, 0.0), (90.0, 3600.0)])
 def test_the_largest_stretch_bounds_what_the_conductivity_does(sensors, degc, since):
-    twin = build(RigContext(effects=tuple(tactbench_effects())))
     scene = Scene(
         name="warm",
-        indenter=Indenter(radius=assumed(20.0, "mm", "test")),
-        environment=Environment(
-            indenter_temperature=assumed(degc, "degC", "test"), since_power_on=assumed(since, "s", "test")
-        ),
-        profile=ForceRamp(duration=assumed(3000.0, "s", "test"), samples=100),
+        indenter=Indenter(radius=q(20.0)),
+        environment=Environment(indenter_temperature=q(degc, "degC"), since_power_on=q(since, "s")),
+        profile=ForceRamp(duration=q(3000.0, "s"), samples=100),
         simulation=Simulation(effects=("+contact-heat", "+thermal-drift")),
     )
-    run = carried_out(sensors["biotac"], scene, 1, twin.plan(sensors["biotac"], scene))
+    run = unrounded(sensors["biotac"], scene)
     core = HeatedCore.of(scene, sensors["biotac"].spec)
     alone = core.untouched(scene, run.t_s)
     per_k = sensors["biotac"].spec.parameters["conductivity_coefficient"].to("1/K")
@@ -51,7 +50,7 @@ def test_the_largest_stretch_bounds_what_the_conductivity_does(sensors, degc, si
     largest = max(gained.max(), 1 / gained.min())
     assert 1.0 < largest <= largest_stretch(run)
     cold = scene.model_copy(update={"environment": Environment()})
-    assert largest_stretch(prepare(sensors["biotac"], cold, 1, twin.plan(sensors["biotac"], cold))) == 1.0
+    assert largest_stretch(prepare(sensors["biotac"], cold, 1, TWIN.plan(sensors["biotac"], cold))) == 1.0
 
 
 def test_ends_of_the_range_stay():
@@ -60,11 +59,6 @@ def test_ends_of_the_range_stay():
 
 
 def test_one_divider_per_electrode_is_what_a_warmer_fluid_gives(specs):
-    from tactbench.rigs.twin.contact.press import at_rest
-    from tactbench.rigs.twin.contact.pressing import medium_of
-    from tactbench.rigs.twin.geometry import skin_grid
-    from tactbench.sensors.biotac.transduction import build
-
     biotac = specs["biotac"]
     sigma = biotac.parameters["conductivity"].to("S/m")
 

@@ -8,18 +8,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tactbench.plugin import RigError, assumed
+from tactbench.plugin import RigError
 from tactbench.plugin.simulation import Surface
 from tactbench.rigs.twin.effects.ac_pressure import within_band
 from tactbench.rigs.twin.effects.channels import band_noise
-from tactbench.rigs.twin.effects.skin_mode import Mode, shaken
 from tactbench.rigs.twin.effects.skin_vibration import Profile, patch_mean
+from tests.rigs.twin.conftest import q
 
 RATE_HZ = 2200.0
-
-
-def _surface(**more):
-    return Surface(**{name: assumed(*value, "test") for name, value in more.items()})
 
 
 def _density(values):
@@ -75,7 +71,7 @@ def test_a_patch_feels_the_mean_under_it(turn):
 
 @pytest.mark.parametrize("hurst", [0.5, 0.8])
 def test_a_profile_has_its_roughness_and_is_self_affine_below_its_roll_off(hurst):
-    surface = _surface(roughness=(20.0, "um"), roll_off=(1.0, "mm"), hurst=(hurst, "1"))
+    surface = Surface(roughness=q(20.0, "um"), roll_off=q(1.0), hurst=q(hurst, "1"))
     step_mm = 0.008
     place = step_mm * np.arange(50000)
     profiles = [Profile(surface, np.random.default_rng(seed)) for seed in range(12)]
@@ -95,7 +91,7 @@ def test_a_profile_has_its_roughness_and_is_self_affine_below_its_roll_off(hurst
     assert slope(0.8, 0.04) == pytest.approx(-1 - 2 * hurst, abs=0.2)
 
 
-@pytest.mark.parametrize("frequency", [2.0, 10.0, 60.0, 200.0])
+@pytest.mark.parametrize("frequency", [2.0, 60.0, 200.0])
 def test_a_band_lets_through_what_two_first_order_filters_do(specs, frequency):
     (channel,) = specs["biotac"].channels("ac_pressure")
     t = np.arange(13200) / RATE_HZ
@@ -105,17 +101,3 @@ def test_a_band_lets_through_what_two_first_order_filters_do(specs, frequency):
     expected = f / math.hypot(f, 10.0) / math.hypot(1.0, f / 1040.0)
     # Straight between samples: sinc^2 of f/2200 is 2.7 % at 200 Hz, 0.25 % at 60.
     assert gain == pytest.approx(expected, rel=2e-3 + (math.pi * f / RATE_HZ) ** 2 / 3)
-
-
-@given(st.lists(st.one_of(st.just(0.0), st.floats(1e-5, 2.0)), min_size=1, max_size=20), st.floats(0.0, 0.95))
-def test_a_mode_under_a_held_push_stays_where_it_is(steps, damping):
-    t = np.concatenate([[0.0], np.cumsum(steps)])
-    found = shaken(t, np.full(t.size, 0.7), Mode(2000.0, damping))
-    np.testing.assert_allclose(found, 0.7, rtol=1e-9)
-
-
-def test_a_slow_push_is_followed():
-    t = np.linspace(0.0, 1.0, 50)
-    push = np.sin(2 * math.pi * t)
-    # Late by 2 z/w = 0.1 ms of a motion of at most 2 pi/s; and the corners of its straight pieces ring.
-    np.testing.assert_allclose(shaken(t, push, Mode(2000.0, 0.1)), push, atol=2e-3)
