@@ -1,33 +1,28 @@
-"""``tactbench compare`` as a person uses it, on a real run."""
+"""``tactbench compare`` of a result folder."""
 
 import csv
 import io
 import json
 
+import numpy as np
 import pytest
 
-from tactbench.core.matrix.run import run_matrix
 from tactbench.core.matrix.store import Store
-from tactbench.core.spec.matrix import MatrixSpec
 from tests.conftest import Verbs
-from tests.here import make_here
-
-MATRIX = {
-    "repeats": 5, "latency": False,
-    "tasks": [{"name": "force", "protocol": "deployable", "estimators": ["ols", "lasso"]}],
-}  # fmt: skip
-CHEAPEST = {"biotac": "default", "icub": "closed-form"}
-"""Rungs of the simulation."""
+from tests.core.matrix import made
 
 
 @pytest.fixture(scope="module")
 def verbs(tmp_path_factory):
-    verbs = Verbs(tmp_path_factory.mktemp("compared"))
-    for sensor, rung in CHEAPEST.items():
-        matrix = MatrixSpec.model_validate({**MATRIX, "sensors": [sensor], "simulation": {"rung": rung}})
-        with pytest.MonkeyPatch.context() as patch:
-            make_here(patch)
-            run_matrix(matrix, Store(verbs.folder / "here"))
+    """The verbs beside the results of two sensors, one worse than the other, and two estimators in five campaigns."""
+    verbs, rng = Verbs(tmp_path_factory.mktemp("compared")), np.random.default_rng(0)
+    with Store(verbs.folder / "here").hold() as store:
+        for sensor, score in (("biotac", 0.7), ("icub", 0.5)):
+            for estimator in ("ols", "lasso"):
+                for seed, one in enumerate((score + 0.02 * rng.standard_normal(5)).tolist(), 1):
+                    named = {"sensor": sensor, "estimator": estimator, "protocol": "deployable", "seed": seed}
+                    cell = f"{sensor}/force/twin/deployable/{estimator}/{seed}"
+                    made.kept(store, cell, score=one, repeat=seed, repeats=5, **named)
     return verbs
 
 
@@ -45,7 +40,6 @@ def test_two_sensors_in_every_format(verbs):
     first = f"{abs(records[0]['difference']):.4f}"
     for shape in ("table", "md", "latex"):
         assert first in verbs(*asked, "--format", shape).stdout
-    assert r"\toprule" in verbs(*asked, "--format", "latex").stdout
 
 
 def test_a_folder_against_itself_differs_nowhere_and_what_is_not_there_is_named(verbs):
@@ -54,5 +48,4 @@ def test_a_folder_against_itself_differs_nowhere_and_what_is_not_there_is_named(
     records = json.loads(verbs("compare", "here", "here", "--format", "json").stdout)
     assert len(records) == 4
     assert {(record["difference"], record["p"], record["paired"]) for record in records} == {(0.0, 1.0, True)}
-    assert "biotac" in verbs("compare", "biotack", "icub", "--out", "here", code=2).stderr
     assert "force" in verbs("compare", "biotac", "icub", "--out", "here", "--task", "forse", code=2).stderr

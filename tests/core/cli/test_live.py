@@ -4,7 +4,8 @@ import io
 import os
 import re
 import select
-from contextlib import contextmanager
+import time
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -31,7 +32,7 @@ RAMP = ForceRamp(
 )
 
 
-def test_a_picture_has_force_taxels_rates_and_losses():
+def test_a_picture_has_force_taxels_rates_and_losses(monkeypatch):
     class Acquisition:
         streams, reference = (PAD,), (SCALE,)
 
@@ -61,35 +62,31 @@ def test_a_picture_has_force_taxels_rates_and_losses():
     (scale,) = [line.split() for line in text.splitlines() if line.startswith("scale")]
     assert pad == ["pad", "300", "100/100", "7", "1", "0", "0", "1"]
     assert scale[1:3] == ["3000", "1000/1000"]
+    later_s = time.monotonic() + 3
+    monkeypatch.setattr("tactbench.core.cli.live.time", SimpleNamespace(monotonic=lambda: later_s))
+    console.print(view.picture())
+    assert " silent 3 s " in console.file.getvalue()
 
 
-@contextmanager
-def wired(tmp_path, seconds):
-    """Record a pad on a line that the test speaks for; give the terminal and the far end of the line."""
+def test_a_device_on_a_line_is_seen_while_it_is_recorded(tmp_path):
     command = ["-m", "tactbench", "record", "--sensor", "wired-pad", "--rig", "wired-rig", "--live"]
     with pty() as line:
         options = {"cwd": tmp_path, "path": [WIRED], "WIRED_LINK": f"serial://{line.name}?baud=115200"}
-        with on_terminal([*command, "--profile", f"ramp:duration={seconds}", "--out", "press.h5"], **options) as shown:
+        with on_terminal([*command, "--profile", "ramp:duration=3", "--out", "press.h5"], **options) as terminal:
             assert select.select([line.master], [], [], 60)[0]
             assert line.read_until(b"go\n") == b"go\n"
-            yield shown, line
-
-
-def test_a_device_on_a_line_is_seen_while_it_is_recorded_and_when_it_falls_silent(tmp_path):
-    with wired(tmp_path, "5") as (terminal, line):
-        line.write(b"1 100 100\n2 100 100\n")
-        terminal.read_screen_with("t1", "taxels 2 ")
-        line.write(b"9 100 2000\n")
-        lines = terminal.read_screen_with("taxels 3 ")
-        assert "wired-pad on wired-rig, flat" in lines[0]
-        assert "no reference force" in lines[1]
-        assert re.search(r"t2 +\+1900 ", "".join(lines))
-        (row,) = [line.split() for line in lines if line.startswith("taxels  ")]
-        assert row[3] == "6", "rows 3 to 8 are lost"
-        terminal.read_screen_with("taxels 3 silent 2 s 6")
-        line.write(b"10 100 100\n")
-        assert re.search(r"taxels +4 ", terminal.last_words()), "the last state stays on the terminal"
-        assert terminal.process.wait(60) == 0
+            line.write(b"1 100 100\n2 100 100\n")
+            terminal.read_screen_with("t1", "taxels 2 ")
+            line.write(b"9 100 2000\n")
+            lines = terminal.read_screen_with("taxels 3 ")
+            assert "wired-pad on wired-rig, flat" in lines[0]
+            assert "no reference force" in lines[1]
+            assert re.search(r"t2 +\+1900 ", "".join(lines))
+            (row,) = [line.split() for line in lines if line.startswith("taxels  ")]
+            assert row[3] == "6", "rows 3 to 8 are lost"
+            line.write(b"10 100 100\n")
+            assert re.search(r"taxels +4 ", terminal.last_words()), "the last state stays on the terminal"
+            assert terminal.process.wait(60) == 0
     assert terminal.seen.rindex(SHOW_CURSOR) > terminal.seen.rindex(HIDE_CURSOR)
     assert (tmp_path / "press.h5").exists()
 
