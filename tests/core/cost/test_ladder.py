@@ -18,7 +18,7 @@ from tactbench.core.spec.matrix import EstimatorChoice, MatrixSpec, TaskChoice
 from tests.core.evaluation.made import record
 from tests.here import IN_THIS_PROCESS
 
-QUICK = ("ols", "ridge", "knn", "svm", "forest-10", "mean")
+QUICK = ("ols", "ridge", "knn", "mean")
 
 
 def presses(folder, sessions=3, n=120):
