@@ -7,12 +7,9 @@ from tactbench.core.spec.status import STATUSES
 from .rows import row
 
 HOSTILE = (
-    "\x1b[31mred\x1b[0m", "a|b\\|c", "[link](javascript:x)", "<script>alert(1)</script>", "=1+1",
-    "**bold** _a_ `code` ~~x~~",
-    "\\\\ \\end{table} \\input{x}", "$x$ #1 %c ^2 & ~ {}", "line\nbreak", "\u202eright to left", "\ud800",
-    "é ï ø 中 😀",
-    "-- `` ?`", "# heading #", "&lt;&#38;", "1. one", "", " ", "\x85\u2028\x9b", "[bold red]a[/]", ":smile:",
-    '"a", b;c\td',
+    "\x1b[31mred\x1b[0m", "a|b\\|c", "[link](javascript:x)", "<b>&lt;</b>", "=1+1", "**bold** _a_ `code` ~~x~~",
+    "\\\\ \\end{table}", "$x$ #1 %c ^2 & ~ {}", "line\nbreak\u2028", "\u202eleft", "\ud800", "é 中 😀", "-- `` ?`",
+    "# heading #", "1. one", "", " ", "[bold red]a[/]", ":smile:", '"a", b;c\td',
 )  # fmt: skip
 
 texts = st.one_of(

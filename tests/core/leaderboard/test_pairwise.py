@@ -61,11 +61,7 @@ def test_what_must_not_be_compared_is_refused_with_its_reason(more, why):
 
 def test_a_name_that_is_neither_names_the_nearest():
     rows = [answered("biotac"), answered("icub")]
-    for names, nearest in (
-        (("biotack", "icub"), "biotac"),
-        (("biotac", "icup"), "icub"),
-        (("biotac", "lasso"), "lasso"),
-    ):
+    for names, nearest in ((("biotack", "icub"), "biotac"), (("biotac", "lasso"), "lasso")):
         with pytest.raises(UnknownNameError, match=nearest):
             comparisons(rows, *names)
 

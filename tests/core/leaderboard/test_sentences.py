@@ -1,6 +1,5 @@
 """What is said above and below a table is true of its rows; docs/tables.md has the list."""
 
-import json
 import re
 
 import numpy as np
@@ -9,7 +8,6 @@ import scipy.stats
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tactbench.core.leaderboard.formats import json_array, plain_text
 from tactbench.core.leaderboard.table import build_table
 from tactbench.core.statistics.ranking import ranks as ranked
 from tactbench.core.statistics.replicates import over_replicates
@@ -17,29 +15,6 @@ from tactbench.core.statistics.replicates import over_replicates
 from .rows import row
 
 RECORDED = {"simulated": False, "rig": "replay"}
-
-
-def answers(sensor, score, time_index, **more):
-    """An answer from readings, beside what the time alone gives on the same sensor, and a mean."""
-    return [
-        row(sensor, "forest", score, baseline=1.9, **more),
-        row(sensor, "time-index", time_index, is_baseline=True, looks_at="time", **more),
-        row(sensor, "mean", 1.9, is_baseline=True, looks_at="nothing", **more),
-    ]
-
-
-@pytest.mark.parametrize("more", [RECORDED, {}])
-def test_the_time_index_of_another_device_says_nothing_of_this_one_and_that_of_its_own_bars_it(more):
-    table = build_table([*answers("alike", 0.6, 0.17, **more), *answers("shuffled", 0.5, 1.85, **more)])
-    assert "these scores need no touch" not in " ".join(plain_text(table, 140).split())
-    ranks = {one["sensor"]: one["rank"] for one in json.loads(json_array(table)) if not one["is_baseline"]}
-    assert ranks == {"alike": None, "shuffled": 1}
-
-
-def test_one_session_is_not_said_of_five():
-    few = {**RECORDED, "n_replicates": 1, "replicate_unit": "session", "n_sessions": 5, "ci_low": None, "ci_high": None}
-    text = plain_text(build_table([row("a", **few), row("b", score=0.6, **few)]), 140)
-    assert not re.search("(one|1) session", text)
 
 
 @st.composite
