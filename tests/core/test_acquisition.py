@@ -190,27 +190,21 @@ def test_a_scene_that_a_device_ended_is_kept_as_incomplete(tmp_path):
     assert (tmp_path / "moving.h5").exists()
 
 
-def test_what_is_emulated_is_marked_by_the_rig_file_whatever_the_rig_says(tmp_path):
+def test_what_is_emulated_is_marked_by_the_rig_file_or_the_identity_of_a_device(tmp_path):
     """A rig of others says nothing of emulation: over emulators its recordings were taken for real ones."""
-    link = "can://virtual/there"
-    file = RigFile(
-        rig="weights",
-        sensors={SENSOR.name: DeviceEntry(link=link, emulator=True), "other": DeviceEntry(link="emulated")},
-    )
-    meta, _ = run(tmp_path / "r.h5", Devices(tmp_path / "r.h5"), simulated=False, rig_file=file)
-    assert (meta.simulated, meta.emulation.devices) == (True, (SENSOR.name,))
-    late = {SENSOR.name: DeviceEntry(link="emulated", faults=("late",))}
+    late = {SENSOR.name: DeviceEntry(link="emulated", faults=("late",)), "other": DeviceEntry(link="emulated")}
     virtual = RigFile(rig="weights", sensors=late, devices={"motor": {"device": "faulhaber", "link": "emulated"}})
-    made, _ = run(tmp_path / "virtual.h5", Devices(tmp_path / "r.h5"), simulated=False, rig_file=virtual)
-    assert (made.emulation.time, made.emulation.faults) == ("virtual", (f"{SENSOR.name}: late",))
-    assert set(made.emulation.devices) == {SENSOR.name, "motor"}
-    plain = file.model_copy(update={"sensors": {SENSOR.name: DeviceEntry(link=link)}})
-    real, _ = run(tmp_path / "real.h5", Devices(tmp_path / "r.h5"), simulated=False, rig_file=plain)
-    assert (real.simulated, real.emulation) == (False, None)
     rig = Devices(tmp_path / "r.h5")
+    made, _ = run(tmp_path / "virtual.h5", rig, simulated=False, rig_file=virtual)
+    assert (made.simulated, made.emulation.time) == (True, "virtual")
+    assert made.emulation.faults == (f"{SENSOR.name}: late",)
+    assert set(made.emulation.devices) == {SENSOR.name, "motor"}
+    real = RigFile(rig="weights", sensors={SENSOR.name: DeviceEntry(link="can://virtual/there")})
+    made, _ = run(tmp_path / "real.h5", rig, simulated=False, rig_file=real)
+    assert (made.simulated, made.emulation) == (False, None)
     rig.identity = {f"{SENSOR.name} adapter": "tactbench emulator"}
-    said, _ = run(tmp_path / "said.h5", rig, simulated=False, rig_file=plain)
-    assert said.emulation.devices == (SENSOR.name,)
+    made, _ = run(tmp_path / "said.h5", rig, simulated=False, rig_file=real)
+    assert made.emulation.devices == (SENSOR.name,)
 
 
 class Impatient(Devices):
