@@ -4,16 +4,29 @@ import shutil
 
 import pytest
 
-from .made import results
+from tactbench.core.matrix.store import Store
+from tactbench.core.plugins.registry import load_registry
+from tactbench.core.report.figures.group import groups
+from tactbench.core.report.results import open_results
+from tests.core.report.results import make_results
 
 
 @pytest.fixture(scope="session")
 def finished(tmp_path_factory):
-    """A result folder nobody may change."""
-    return results(tmp_path_factory.mktemp("finished"))
+    """A result folder of two sensors that nobody may change."""
+    return make_results(tmp_path_factory.mktemp("finished") / "results", "icub", "ideal")
 
 
 @pytest.fixture
 def folder(finished, tmp_path):
     """A result folder of one's own."""
-    return shutil.copytree(finished, tmp_path / "results", ignore=shutil.ignore_patterns("report"))
+    return shutil.copytree(finished, tmp_path / "results")
+
+
+def opened(folder):
+    return open_results(Store(folder), load_registry())
+
+
+def group_of(folder, task):
+    (found,) = [group for group in groups(opened(folder), [].append) if group.task.name == task]
+    return found

@@ -11,7 +11,7 @@ from tactbench.core.report.figures import (
 )
 from tactbench.core.report.figures.style import styled
 
-from .made import group_of
+from .conftest import group_of
 
 
 def drawn(make, group):

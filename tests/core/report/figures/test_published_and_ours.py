@@ -7,7 +7,7 @@ from tactbench.core.report.figures.style import BLACK, sensor_colours
 from tactbench.core.report.published import reproduce
 from tactbench.core.report.results import Results
 
-from .made import REGISTRY, opened
+from .conftest import opened
 
 
 def points(axes, marker):
@@ -20,8 +20,8 @@ def test_each_number_stands_at_its_place_in_its_sensor_s_colour(finished):
     for row in (row for row in material.rows if row["status"] == "done"):
         scores = [row["score"] * factor for factor in (0.95, 0.97, 0.98, 1.0, 1.0, 1.02, 1.04, 1.06)]
         rows.append({**row, "replicate_scores": scores, "ci_low": scores[0], "ci_high": scores[7]})
-    (axes,) = draw_published(Results(material.store, REGISTRY, tuple(rows))).figure.axes
-    lines = [line for line in reproduce(REGISTRY, rows) if line.row]
+    (axes,) = draw_published(Results(material.store, material.registry, tuple(rows))).figure.axes
+    lines = [line for line in reproduce(material.registry, rows) if line.row]
     drawn = zip(lines, points(axes, "o"), points(axes, "D"), points(axes, "|")[::3], strict=True)
     for place, (line, our, their, each) in enumerate(drawn):
         row = line.row
