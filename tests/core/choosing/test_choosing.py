@@ -52,7 +52,6 @@ def test_a_miss_says_by_how_much():
     ("more", "state", "says"),
     [
         ({"answer_delay_ms": None, "delay_parts_ms": {}, "latency_ms_p50": 0.06}, "unknown", "prediction alone 60"),
-        ({"answer_delay_ms": None, "delay_parts_ms": {"link": 1.0, "prediction": 0.5}}, "unknown", "without sampling"),
         ({"answer_delay_ms": 2.5, "delay_parts_ms": {"sampling": 2.0, "prediction": 0.5}}, "missed", "at least 500"),
         ({"answer_delay_ms": 0.5, "delay_parts_ms": {"prediction": 0.5}, "looks_at": "time"}, "met", "500"),
     ],

@@ -1,10 +1,9 @@
-"""The verb ``choose``, and ``show`` for programs."""
+"""The verb ``choose``."""
 
 import json
 
 from tactbench.core.cli.config import shipped_results
 from tactbench.core.matrix.store import Store
-from tests.core.cli.terminals import on_terminal, plain
 from tests.core.matrix import made
 
 WISH = ("--task", "force", "--max-delay-ms", "2", "--range-n", "5", "--rate-hz", "10")
@@ -38,23 +37,9 @@ def test_json_has_the_wish_the_criteria_and_what_is_unknown(verbs):
     assert choice["unknown"]
 
 
-def test_eighty_columns_break_no_word(tmp_path, verbs):
-    with on_terminal(["-m", "tactbench", "choose", *WISH], cwd=tmp_path) as terminal:
-        narrow = plain(terminal.read_until(None)).replace("\r", "")
-    assert max(len(line.rstrip()) for line in narrow.splitlines()) <= 80
-    assert set(narrow.split()) == set(verbs("choose", *WISH).stdout.split())
-
-
 def test_the_shipped_results_are_of_both_sensors_simulated():
     rows = json.loads(shipped_results().read_text(encoding="utf-8"))["rows"]
     asked = {(row["sensor"], row["task"], row["protocol"]) for row in rows if row["status"] == "done"}
     assert asked == {(sensor, task, protocol) for sensor in ("biotac", "icub") for task in ("force", "curvature")
                      for protocol in ("deployable", "karl2016")}  # fmt: skip
     assert all(row["simulated"] for row in rows)
-
-
-def test_json_of_show_holds_everything_that_is_stated(verbs):
-    task, biotac = json.loads(verbs("show", "force", "biotac", "--format", "json").stdout)
-    assert (len(task["spec"]["scenes"]), len(task["spec"]["campaigns"]["placement"])) == (3, 5)
-    assert biotac["spec"]["data_sheet"]["force_range"]["upper"] == 30
-    assert "Wettels" in verbs("show", "biotac", "--all").stdout

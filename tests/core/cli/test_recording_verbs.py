@@ -132,13 +132,8 @@ def test_a_log_of_a_sensor_becomes_a_recording_and_is_not_replaced_unasked(logge
     assert "taxels = 50" in logged(*log).stdout
     (about,) = json.loads(logged("inspect", "recordings/press.h5", "--format", "json").stdout)
     meta = about["meta"]
-    assert (meta["name"], meta["rig"], meta["clock"], meta["session"], meta["role"]) == (
-        "press", "import", "host", "a", "test",
-    )  # fmt: skip
+    assert (meta["rig"], meta["clock"], meta["session"], meta["role"]) == ("import", "host", "a", "test")
     assert (meta["labels"], meta["origin"]) == ({"cap_radius_mm": 4}, "bus.asc")
-    assert meta["counts"] == {"frames of others": 100}
-    (stream,) = about["streams"]
-    assert (stream["rows"], round(stream["mean_rate_hz"], 3)) == (50, 50.0)
     assert "exists already" in logged(*log, code=2).stderr
     logged(*log, "--replace")
 

@@ -12,9 +12,11 @@ from tactbench.plugin import load_registry
 from tests.conftest import Verbs
 from tests.core.evaluation.made import record
 from tests.core.evaluation.made_slip import campaign
+from tests.core.report.html import Reader
 from tests.core.report.unrendered import unrendered
 
 CHEAPEST = ("--set", "rung=closed-form")
+BY_UNIT = ("--protocol", "deployable", "--split", "unit")
 RUN = ("run", "--sensor", "icub", "--task", "force", "--estimator", "ols", "--repeats", "1", *CHEAPEST)
 SET = ("--set", "placement_scatter_mm=0.3", "--set", "taxel_white_count=2")
 
@@ -54,20 +56,12 @@ def test_every_packaged_matrix_can_be_planned(name):
     assert {cell.task for cell in cells if not cell.baseline} == {choice.name for choice in matrix.tasks}
 
 
-def test_protocols_and_splits_side_by_side(verbs):
-    asked = ("--protocol", "karl2016", "--protocol", "deployable", "--split", "roles", "--split", "unit")
-    rows = json.loads(verbs(*RUN, *asked, "--format", "json").stdout)
-    by_way = {(row["protocol"], row["split"]): row for row in rows if row["estimator"] == "ols"}
-    assert {way: row["status"] for way, row in by_way.items()} == {
-        ("karl2016", "roles"): "done", ("karl2016", "unit"): "skipped",
-        ("deployable", "roles"): "done", ("deployable", "unit"): "done",
-    }  # fmt: skip
-    unit = by_way["deployable", "unit"]
-    assert sum(key.startswith("fold unit") for key in unit["scores"]) == 5
-    assert "5 units" in unit["ci_method"]
-    replay = ("run", "--recordings", "tactbench-results/recordings", "--task", "force", "--split", "unit")
-    again = verbs(*replay, "--estimator", "ols", "--format", "json", "--out", "again")
-    assert row_of(again, "ols")["score"] == unit["score"]
+def test_a_split_by_units_records_every_unit_and_is_the_same_on_the_recordings(verbs):
+    row = row_of(verbs(*RUN, *BY_UNIT, "--format", "json"), "ols")
+    assert (row["protocol"], row["split"], row["n_replicates"]) == ("deployable", "unit", 5)
+    replay = ("run", "--recordings", "tactbench-results/recordings", "--task", "force", "--estimator", "ols")
+    again = verbs(*replay, *BY_UNIT, "--format", "json", "--out", "again")
+    assert row_of(again, "ols")["score"] == row["score"]
 
 
 def test_probes_say_whether_the_first_frame_tells(verbs):
@@ -102,7 +96,13 @@ def test_events_in_time_go_from_the_row_to_tables_why_cost_and_report(verbs):
     assert "Events, at the threshold" in verbs("leaderboard", "--wide").stdout
     assert re.search(r"false alarms per minute +0\n", verbs("why", "made/slip/replay/deployable/pac-band").stdout)
     with unrendered():
+        shown = verbs("cost", "--sensor", "made", *asked, "--rounds", "1").stdout
         verbs("report")
-        costs = json.loads(verbs("cost", "--sensor", "made", *asked, "--rounds", "1", "--format", "json").stdout)
-    (parts,) = [one["delay_parts_ms"] for one in costs if one["estimator"] == "pac-band"]
+    (line,) = [line.split() for line in shown.splitlines() if line.strip().startswith("pac-band")]
+    folder = verbs.folder / "tactbench-results"
+    rows = json.loads((folder / "cost" / "made-slip.json").read_text())["rows"]
+    (parts,) = [one["delay_parts_ms"] for one in rows if one["estimator"] == "pac-band"]
     assert (parts["window"], parts["sampling"]) == (50.0, 10.0)
+    page = Reader((folder / "report" / "index.html").read_text())
+    assert page.wrong == []
+    assert " ".join(line) in page.text, "the page shows the ladder as the terminal does"

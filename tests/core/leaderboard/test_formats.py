@@ -10,7 +10,6 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from markdown_it import MarkdownIt
-from rich.cells import cell_len
 
 from tactbench.core.errors import UsageError
 from tactbench.core.leaderboard.columns import SHOWN
@@ -18,7 +17,6 @@ from tactbench.core.leaderboard.formats import (
     OF_THE_MACHINE,
     latex,
     markdown,
-    plain_text,
     rendered,
     write_tables,
 )
@@ -84,21 +82,6 @@ def test_markdown_shows_the_cells_of_the_table_as_text(rows, times, view):
     assert [[" ".join(cell.split()) for cell in line] for line in [*cells]] == [
         [" ".join(cell.split()) for cell in line] for line in expected
     ]
-
-
-@many
-@given(some_rows(), st.sampled_from((80, 100, 140, 100_000)), views)
-def test_a_terminal_shows_the_cells_of_the_table_and_breaks_no_number_and_no_word_where_there_is_room(
-    rows, width, view
-):
-    table = build_table(rows)
-    text = plain_text(table, width, view)
-    gone = " ".join(text.partition("Too narrow for: ")[2].split())
-    for grid in grids(table, view):
-        for column, *cells in zip(grid.headers, *grid.lines, strict=True):
-            parts = cells if column in grid.numeric else [word for one in cells for word in one.split()]
-            if column not in gone and not view.columns and max(map(cell_len, [*parts, ""])) < 12:
-                assert [part for part in parts if part not in text] == []
 
 
 def test_nothing_in_a_name_acts_on_a_terminal_in_any_format():

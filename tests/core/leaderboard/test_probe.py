@@ -50,7 +50,6 @@ FEW = "too few recordings for the first frame"
         ([classed(0.88), classed(0.94, split="shuffled")], "OPTIMISTIC"),
         ([classed(0.88), classed(0.90, split="shuffled")], "no leak shown"),
         ([erring(1.0), erring(0.5, split="shuffled")], "OPTIMISTIC"),
-        ([erring(1.0), erring(0.9, split="shuffled")], "no leak shown"),
         (
             [classed(0.95, ci_low=None, ci_high=None), classed(0.99, split="shuffled")],
             "no interval for shuffled rows",

@@ -6,7 +6,7 @@ import pytest
 
 from tactbench.core.plugins.registry import load_registry
 from tactbench.core.report.datasheet import parameters_markdown
-from tactbench.core.report.published import published_table, records, reproduce
+from tactbench.core.report.published import published_table, reproduce
 from tests.core.leaderboard.rows import row
 
 DOCUMENT = Path(__file__).parents[3] / "docs" / "parameters.md"
@@ -37,8 +37,6 @@ def test_the_published_lies_inside_our_interval_bounds_included_or_there_is_a_re
     rows = [force_row(**more)]
     (line,) = beside(*rows)
     assert (line.verdict, line.reason) == (verdict, f"failed: {more['reason']}" if "reason" in more else "")
-    record = next(one for one in records(reproduce(REGISTRY, rows)) if one["cell"])
-    assert (record["published"], record["score"], record["verdict"]) == (0.7659, rows[0]["score"], verdict)
     table = published_table(REGISTRY, rows)
     shown = next(dict(zip(table.columns, line, strict=True)) for line in table.lines if line[1] == "0.7659")
     assert shown.get("ours − published", "–") == ("–" if verdict == "no answer" else "−0.0859")
