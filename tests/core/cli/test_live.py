@@ -46,6 +46,8 @@ def test_a_picture_has_force_taxels_rates_and_losses(monkeypatch):
         quality = np.zeros((10, 5), np.uint8)
         if tenth == 5:
             lost, quality[0], quality[-1, 0] = 7, Quality.GAP, Quality.SATURATED
+        if tenth == 29:
+            data[-1, 1], quality[-1, 1] = 1e9, Quality.MISSING  # the value before it is shown
         numbers = np.arange(10) + 10 * tenth + lost
         view.watch(Block("pad", began_ns + np.arange(10) * 10_000_000, data, quality, sequence=numbers))
         view.watch(Block("scale", began_ns + np.arange(100) * 1_000_000, np.full((100, 1), force_n)))
@@ -60,7 +62,7 @@ def test_a_picture_has_force_taxels_rates_and_losses(monkeypatch):
     assert "warmth 31.25 degC" in text
     (pad,) = [line.split() for line in text.splitlines() if line.startswith("pad  ")]
     (scale,) = [line.split() for line in text.splitlines() if line.startswith("scale")]
-    assert pad == ["pad", "300", "100/100", "7", "1", "0", "0", "1"]
+    assert pad == ["pad", "300", "100/100", "7", "1", "1", "0", "1"]
     assert scale[1:3] == ["3000", "1000/1000"]
     later_s = time.monotonic() + 3
     monkeypatch.setattr("tactbench.core.cli.live.time", SimpleNamespace(monotonic=lambda: later_s))
@@ -117,32 +119,20 @@ def test_a_prompt_has_the_terminal(tmp_path):
         assert terminal.process.wait(30) == 0
 
 
-def state_of(*blocks):
-    state = StreamState(PAD, rate_s=RATE_S)
-    for block in blocks:
-        state.take(block)
-    return state
-
-
 def test_a_rate_is_that_of_the_last_two_seconds():
     def blocks(many, began_s, period_ns):
         began_ns = began_s * 1_000_000_000 + np.arange(many) * 100_000_000
         rows = 100_000_000 // period_ns if period_ns else 10
         return [Block("s", began + np.arange(rows) * period_ns, np.zeros((rows, 5))) for began in began_ns]
 
+    def rate_hz(*blocks):
+        state = StreamState(PAD, rate_s=RATE_S)
+        for block in blocks:
+            state.take(block)
+        return state.rate_hz
+
     slow, quick, bursts = blocks(50, 0, 20_000_000), blocks(30, 5, 10_000_000), blocks(30, 0, 0)
-    assert state_of(*slow).rate_hz == state_of(slow[0]).rate_hz == pytest.approx(50)
-    assert state_of(*slow, *quick).rate_hz == pytest.approx(100, rel=0.01), "the first of the two ends before"
-    assert state_of(bursts[0]).rate_hz is None, "rows that come together do not count twice"
-    assert state_of(*bursts[:2]).rate_hz == state_of(*bursts).rate_hz == pytest.approx(100)
-
-
-def test_missing_samples_are_in_no_change():
-    data, quality = np.full((3, 5), 10.0), np.zeros((3, 5), np.uint8)
-    data[0, 1] = data[2, 0] = 1e6
-    quality[0, 1] = quality[2, 0] = Quality.MISSING
-    later = np.full((1, 5), 12.0)
-    state = state_of(Block("s", np.arange(3), data, quality), Block("s", np.arange(3, 4), later))
-    assert state.first.tolist() == [10, 12, 10, 10, 10]
-    assert state.largest.tolist() == [2, 0, 2, 2, 2]
-    assert state.counts[Quality.MISSING] == 2
+    assert rate_hz(*slow) == rate_hz(slow[0]) == pytest.approx(50)
+    assert rate_hz(*slow, *quick) == pytest.approx(100, rel=0.01), "the first of the two ends before"
+    assert rate_hz(bursts[0]) is None, "rows that come together do not count twice"
+    assert rate_hz(*bursts[:2]) == rate_hz(*bursts) == pytest.approx(100)

@@ -39,11 +39,10 @@ def test_what_is_set_is_in_row_recording_score_and_why_and_is_found_again(verbs)
     assert "0 computed now; 0 recordings made now" in verbs(*RUN, *SET).stderr
     facts = json.loads(verbs("why", "ols/1", "--format", "json").stdout)
     assert facts["simulation"]["nuisances"] == {"placement_scatter_mm": 0.3, "taxel_white_count": 2.0}
-    matrix = {
-        "sensors": ["icub"], "tasks": [{"name": "force", "estimators": ["ols"]}], "latency": False, "repeats": 1,
-        "simulation": {"rung": "closed-form", "nuisances": {"placement_scatter_mm": 0.2, "taxel_white_count": 2}},
-    }  # fmt: skip
-    (verbs.folder / "set.yaml").write_text(json.dumps(matrix))
+    (verbs.folder / "set.yaml").write_text(
+        "{sensors: [icub], tasks: [{name: force, estimators: [ols]}], latency: false, repeats: 1, simulation: "
+        "{rung: closed-form, nuisances: {placement_scatter_mm: 0.2, taxel_white_count: 2}}}"
+    )
     done = verbs("run", "--config", "set.yaml", *SET[:2], "--format", "json")
     assert "0 recordings made now" in done.stderr  # the option goes over the file, whose other values stay
     assert row_of(done, "ols")["score"] == row["score"]

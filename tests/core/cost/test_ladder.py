@@ -9,7 +9,6 @@ import pytest
 
 from tactbench.core.cost.ladder import climb
 from tactbench.core.cost.ladder_file import draw_ladder, write_ladder
-from tactbench.core.cost.task_score import quick_estimator
 from tactbench.core.errors import UnwritableError
 from tactbench.core.matrix.progress import Progress
 from tactbench.core.matrix.store import Store
@@ -76,10 +75,3 @@ def test_the_files_say_what_the_table_says(ladder, tmp_path):
     (tmp_path / "file").write_text("")
     with pytest.raises(UnwritableError, match="--out"):
         write_ladder(ladder, tmp_path / "file")
-
-
-def test_the_quick_estimator_is_linear_searches_nothing_and_is_no_trivial_one():
-    registry = load_registry()
-    for task in ("force", "curvature"):
-        chosen = registry.estimators[quick_estimator(registry, task)]
-        assert (chosen.linear, chosen.grid, chosen.baseline) == (True, {}, False)

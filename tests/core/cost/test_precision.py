@@ -7,7 +7,7 @@ import math
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tactbench.core.cost.precision import diagrams, draw, precise, quickest_enough
+from tactbench.core.cost.precision import precise, quickest_enough
 from tactbench.plugin.simulation import CostPoint
 
 
@@ -38,10 +38,3 @@ def test_the_quickest_point_that_will_do():
     assert quickest_enough([quick, default, slow]) is default
     assert quickest_enough([quick, _point(0.2, 0.2)]) is None
     assert quickest_enough([_point(1, 1, floor=math.inf)]) is None, "no noise is stated"
-
-
-def test_a_figure_has_a_panel_for_every_observable_with_noise_or_without(tmp_path):
-    points = [_point(0.1, 0.5), _point(0.2, 0.05, default=True), _point(0.3, 0.0, observable="dc", floor=math.inf)]
-    draw(points, "error against time", [tmp_path / "a.png"])
-    assert (tmp_path / "a.png").stat().st_size > 5000
-    assert list(diagrams(points)) == [("pad", "taxel"), ("pad", "dc")]

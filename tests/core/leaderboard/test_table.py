@@ -68,15 +68,6 @@ def test_shuffled_rows_and_probes_come_after_what_is_kept_apart():
     ] * 3
 
 
-def test_a_trivial_answer_stands_once_where_all_sensors_agree_on_its_digits():
-    rows = [row(name, estimator, score) for name in "ab" for estimator, score in (("lasso", 0.5), ("mean", 1.4))]
-    (grid,) = grids(build_table(rows))
-    assert [line[1:4] for line in grid.lines][2:] == [("", "mean", "1.4000")]
-    rows[1]["score"] = 1.3
-    (grid,) = grids(build_table(rows))
-    assert [line[1:4] for line in grid.lines][2:] == [("a", "mean", "1.3000"), ("b", "mean", "1.4000")]
-
-
 def test_columns_that_say_nothing_are_left_out_and_others_shown_if_asked_for():
     (grid,) = grids(build_table([row()]))
     assert grid.headers == ("place", "sensor", "estimator", "RMSE [N]", "95 % interval", "training")
