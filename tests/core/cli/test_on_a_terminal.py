@@ -1,9 +1,15 @@
-"""What a person sees of a run: on a terminal a bar, the table so far and one sentence on Ctrl-C; in a log, lines."""
+"""What a person sees and types: on a terminal a bar, the table so far, one sentence on Ctrl-C; in a log, lines."""
 
 import os
+import sys
+from pathlib import Path
 
+import pytest
+
+from tactbench.core.cli.operator import TerminalOperator
 from tactbench.core.cli.progress import progress
 from tactbench.core.cli.run import tell_stopped
+from tactbench.core.errors import RigError
 from tests.conftest import Verbs
 from tests.core.cli.terminals import on_terminal
 
@@ -71,3 +77,40 @@ def test_the_end_names_every_stopped_cell_and_how_to_look_into_it(capsys, tmp_pa
     assert "a/b/c: RuntimeError: two lines\\x1b[2J\n" in said.err, "a reason moves no cursor"
     assert f"tactbench why a/b/c --out {tmp_path} --again" in said.err
     assert max(len(line) for line in said.err.splitlines() if "a/b/d e" in line) < 260
+
+
+ASKS_TWICE = """
+from tactbench.core.cli.operator import TerminalOperator
+from tactbench.core.errors import RigError
+operator = TerminalOperator()
+operator.prompt("Place the cap.")
+print("placed", flush=True)
+try:
+    operator.prompt("Press.")
+except RigError as error:
+    print(error)
+"""
+
+
+def test_enter_answers_and_one_typed_before_does_not():
+    with on_terminal(["-c", ASKS_TWICE]) as terminal:
+        os.write(terminal.ours, b"\n")
+        assert "Place the cap." in terminal.read_until("Ctrl-C to end.")
+        os.write(terminal.ours, b"\n")
+        assert "Press." in terminal.read_until("Ctrl-C to end.")
+        os.write(terminal.ours, b"\x04")  # Ctrl-D; had the first Enter answered, the second would have answered this
+        said = terminal.read_until(None)
+        assert terminal.process.wait(30) == 0
+    assert "left without an answer" in said
+
+
+def test_without_a_terminal_somebody_has_to_be_there(monkeypatch):
+    with Path(os.devnull).open() as nothing:
+        monkeypatch.setattr(sys, "stdin", nothing)
+        with pytest.raises(RigError, match=r"Somebody has to be there: Place the cap\..*--yes"):
+            TerminalOperator().prompt("Place the cap.")
+
+
+def test_yes_goes_on(capsys):
+    TerminalOperator(yes=True).prompt("Place the cap.")
+    assert capsys.readouterr().err == "Place the cap.\n"

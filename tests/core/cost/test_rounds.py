@@ -1,16 +1,21 @@
-"""Timing in turns: on a clock that only the estimators move, every figure is exact."""
+"""Timing in turns, on a clock that only the estimators move: every figure is exact. Fronts of what was timed."""
 
 import gc
+import math
 from dataclasses import replace
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 from threadpoolctl import threadpool_info
 
 from tactbench.core.cost.ladder import by_score, mark_fronts, timed
+from tactbench.core.cost.precision import precise, quickest_enough
 from tactbench.core.cost.rounds import WARM_UP_ROWS, TimedEstimator, Timing, measure
 from tactbench.core.evaluation.metrics import metric_called
 from tactbench.core.matrix.progress import Progress
+from tactbench.plugin.simulation import CostPoint
 
 N = 1000
 BINARY = 2.0**-10  # durations that add up without rounding
@@ -134,3 +139,32 @@ def test_fronts_are_of_what_is_better_than_the_best_answer_from_nothing(higher, 
     assert [one["estimator"] for one in rows if one["front_delay"]] == ["good"]
     names = [one["estimator"] for one in by_score(rows, higher_is_better=higher)]
     assert names == ["time", "good", "slower", "quick", "no better", "mean", "gone"]
+
+
+def cost_point(seconds, error, *, default=False, floor=0.3):
+    return CostPoint(
+        subject="pad", observable="taxel", label="way", seconds=seconds, error=error, worst=2 * error, unit="count",
+        floor=floor, default=default, settings={"family": "newton"},
+    )  # fmt: skip
+
+
+POSITIVE = st.floats(1e-6, 1e3)
+
+
+@given(st.lists(st.tuples(POSITIVE, POSITIVE), min_size=1, max_size=20))
+def test_the_front_is_beaten_by_nobody_and_beats_everybody_else(pairs):
+    points = [cost_point(*pair) for pair in pairs]
+    best = precise(points)
+    for point in points:
+        beaten = any(o.seconds <= point.seconds and o.error <= point.error for o in best)
+        assert beaten
+    for one in best:
+        assert not any(o.seconds < one.seconds and o.error <= one.error for o in points)
+    assert [p.error for p in best] == sorted((p.error for p in best), reverse=True)
+
+
+def test_the_quickest_point_that_will_do():
+    quick, default, slow = cost_point(0.1, 0.5), cost_point(0.2, 0.05, default=True), cost_point(1.0, 0.01)
+    assert quickest_enough([quick, default, slow]) is default
+    assert quickest_enough([quick, cost_point(0.2, 0.2)]) is None
+    assert quickest_enough([cost_point(1, 1, floor=math.inf)]) is None, "no noise is stated"

@@ -18,7 +18,6 @@ from tactbench.core.leaderboard.formats import (
     latex,
     markdown,
     rendered,
-    write_tables,
 )
 from tactbench.core.leaderboard.table import build_table
 from tactbench.core.leaderboard.view import DEFAULT_VIEW, WHOLE, View, grids
@@ -115,15 +114,3 @@ def test_without_its_library_a_format_says_what_to_install(monkeypatch, library,
     monkeypatch.setitem(sys.modules, library, None)
     with pytest.raises(UsageError, match=rf"pip install 'tactbench\[{shape}\]'"):
         written(shape, [row()])
-
-
-def test_the_files_of_a_folder_are_the_same_bytes_in_any_order_of_the_rows(tmp_path):
-    rows = [row(key="1"), row("b", score=0.7, key="2"), row("c", status="failed", score=None, reason="no")]
-    paths = write_tables(rows, tmp_path, [{"host": "h", "cpu": "c"}])
-    assert {path.suffix for path in paths} == {".md", ".csv", ".json"}
-    first = [path.read_bytes() for path in paths]
-    assert [path.read_bytes() for path in write_tables(rows[::-1], tmp_path, [{"host": "h", "cpu": "c"}])] == first
-    paths[1].unlink()
-    paths[1].mkdir()
-    with pytest.raises(UsageError, match="tables cannot be written"):
-        write_tables(rows, tmp_path)

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from tactbench.core.errors import UnknownNameError
 from tactbench.core.leaderboard.formats import rendered
 from tactbench.core.leaderboard.table import build_table
-from tactbench.core.leaderboard.view import View, best, commands, grids, known_columns
+from tactbench.core.leaderboard.view import View, best, grids, known_columns
 
 from .rows import row
 from .strategies import some_rows
@@ -77,14 +77,6 @@ def test_columns_that_say_nothing_are_left_out_and_others_shown_if_asked_for():
     assert grid.lines == (("a/question/twin/deployable:session/lasso", "0.5000", "1"),)
     with pytest.raises(UnknownNameError, match=r"Did you mean 'score'.*Known: .*cell"):
         known_columns(["scor"])
-
-
-def test_the_commands_name_the_folder_and_the_shortest_name_of_a_cell():
-    rows = [row(), row(protocol="karl2016", estimator="ols")]
-    why, *_ = commands(build_table(rows), View(folder="my results"))
-    assert "tactbench why a/question/lasso --out 'my results'" in why
-    rows.append(row(protocol="karl2016"))
-    assert "why a/question/twin/deployable:session/lasso " in commands(build_table(rows))[0]
 
 
 def test_the_best_of_each_sensor_keep_the_places_they_have_among_all():
