@@ -123,7 +123,6 @@ LINE = 1 + PAD.splitlines().index("tasks:")
     ("old", "new", "says"),
     [
         ("names: [x, y]", "names: [x, z]", "It has x, y"),
-        ("kind: position, names", "kind: force, names", "a target of kind force"),
         ("[session, recording]", "[sesion]", "asks for the split sesion"),
         ("[session, recording]", "[]", f"pad.yaml:{LINE + 4}"),
         ("source: vector, kind: position, names: [x, y], unit: mm", "source: label, name: colour", "the label colour"),

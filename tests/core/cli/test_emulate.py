@@ -118,7 +118,6 @@ def test_a_rig_file_is_started_and_keeps_what_is_real(emulate, tmp_path):
         ((), "Either devices or a rig file"),
         (("pda",), "Did you mean 'pad'"),
         (("pad", "scale", "bare-scale"), "A rig has one force"),
-        (("scale",), "A rig has a sensor, and none is named"),
         (("pad", "bare-scale"), "bare-scale has no emulator"),
         (("--rig-file", "late.yaml"), "'delay_s'"),
         (("--rig-file", "twni.yaml"), "Did you mean 'twin'"),

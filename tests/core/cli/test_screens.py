@@ -62,21 +62,6 @@ def test_wrong_words_are_answered_with_the_next_step(verbs, arguments, says):
     assert [path for path in verbs.folder.rglob("*") if path.is_file() and path.name != ".lock"] == []
 
 
-@pytest.mark.parametrize(
-    ("text", "says"),
-    [
-        ("tasks: [force]\nsensor: [biotac]\n", "matrix.yaml:2: the key 'sensor'"),
-        (
-            "sensors: [icub]\ntasks: [force]\nsimulation: {nuisances: {placement_scater_mm: 1}}\n",
-            "placement_scatter_mm",
-        ),
-    ],
-)
-def test_a_wrong_matrix_names_file_and_line(verbs, text, says):
-    (verbs.folder / "matrix.yaml").write_text(text)
-    assert_one_clear_screen(verbs("run", "--config", "matrix.yaml", code=2), says)
-
-
 def test_a_folder_that_cannot_be_written(verbs):
     (verbs.folder / "taken").write_text("a file, not a folder")
     done = verbs("run", "--sensor", "icub", "--task", "force", "--out", "taken/results", code=2)

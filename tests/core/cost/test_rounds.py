@@ -110,7 +110,6 @@ def test_a_row_has_medians_quartiles_and_every_part_of_the_delay():
     assert (found["fit_s_q1"], found["fit_s"], found["fit_s_q3"], found["fits"]) == (2.0, 3.0, 4.0, 5)
     assert found["batch_s_per_row"] == 2.0 / N
     assert found["answer_delay_ms"] == pytest.approx(4.0 + 0.5 + 5.0 + 0.3 + 0.1)
-    assert found["answer_delay_ms"] == pytest.approx(sum(found["delay_parts_ms"].values()))
     assert (found["latency_ms_p95"], found["latency_ms_max"]) == (None, 50.0), "too few calls: the largest"
     unknown = timed(timed_estimator(Clock(), "a"), times)
     assert (unknown["answer_delay_ms"], unknown["answer_delay_ms_q1"]) == (None, None)

@@ -49,12 +49,9 @@ def test_json_csv_parquet_and_excel_hold_the_cells_of_the_table(rows, times):
     ]
     of_csv = list(csv.DictReader(io.StringIO(written("csv", rows, times=times).decode(), newline="")))
     assert [tuple(entry[f"shown_{name}"] for name in names) for entry in of_csv] == lines
-    assert [json.loads(entry["params"]) for entry in of_csv] == [one["params"] for one in table.rows]
     read = pq.read_table(io.BytesIO(written("parquet", rows, [{"host": "one"}], times=times)))
     assert list(zip(*(read[f"shown_{name}"].to_pylist() for name in names), strict=True)) == lines
     assert read["score"].to_pylist() == [one["score"] for one in table.rows]
-    types = {field.name: str(field.type) for field in read.schema}
-    assert [types[name] for name in ("score", "seed", "dagger", "sensor")] == ["double", "int64", "bool", "string"]
     assert json.loads(read.schema.metadata[b"tactbench.provenance"]) == ([{"host": "one"}] if times else [])
     sheet = openpyxl.load_workbook(io.BytesIO(written("xlsx", rows, times=times)))["leaderboard"]
     heads, *values = sheet.iter_rows()
