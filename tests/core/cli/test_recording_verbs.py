@@ -82,17 +82,15 @@ def test_without_what_only_posix_has(tables):
 
 
 def test_record_then_inspect(verbs):
-    press = ("record", "--sensor", "icub", "--indenter", "cap:radius=10", "--profile", "ramp:force=2,duration=3")
-    verbs(*press, "--out", "press.h5")
-    (about,) = json.loads(verbs("inspect", "press.h5", "--format", "json").stdout)
-    assert about["meta"]["simulated"]
-    assert about["meta"]["labels"] == {"cap_radius_mm": 10.0}
-    assert about["meta"]["scene"]["profile"]["end"]["value"] == 2.0
-    assert {stream["of"] for stream in about["streams"]} == {"sensor", "reference"}
+    verbs("record", "--sensor", "icub", "--indenter", "cap:radius=10", "--profile", "ramp:force=2", "--out", "press.h5")
     assert "exists already" in verbs("record", "--sensor", "icub", "--out", "press.h5", code=2).stderr
     shape, press = "cylinder:radius=4,angle=90", "press-hold-release:peak=2,rest=1,rate=20"
     verbs("record", "--sensor", "ideal", "--indenter", shape, "--profile", press, "--out", "line.h5")
-    (line,) = json.loads(verbs("inspect", "line.h5", "--format", "json").stdout)
+    cap, line = json.loads(verbs("inspect", "press.h5", "line.h5", "--format", "json").stdout)
+    assert cap["meta"]["simulated"]
+    assert cap["meta"]["labels"] == {"cap_radius_mm": 10.0}
+    assert cap["meta"]["scene"]["profile"]["end"]["value"] == 2.0
+    assert {stream["of"] for stream in cap["streams"]} == {"sensor", "reference"}
     assert line["meta"]["labels"] == {"indenter": "cylinder"}
     assert line["meta"]["assumptions"]["indenter radius"] == 4.0
     assert line["meta"]["scene"]["profile"]["kind"] == "path"

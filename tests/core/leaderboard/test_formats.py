@@ -24,7 +24,7 @@ from tactbench.core.leaderboard.view import DEFAULT_VIEW, WHOLE, View, grids
 from tactbench.core.tables.latex import tex
 
 from .rows import row
-from .strategies import HOSTILE, some_rows
+from .strategies import some_rows
 
 many = settings(max_examples=30)
 views = st.sampled_from((DEFAULT_VIEW, WHOLE, View(columns=("estimator", "score", "cell"))))
@@ -78,17 +78,6 @@ def test_markdown_shows_the_cells_of_the_table_as_text(rows, times, view):
     assert [[" ".join(cell.split()) for cell in line] for line in [*cells]] == [
         [" ".join(cell.split()) for cell in line] for line in expected
     ]
-
-
-def test_nothing_in_a_name_acts_on_a_terminal_in_any_format():
-    rows = [
-        row(name, name, score, cell=f"{place}{name}{status}", reason=name, status=status, stamps=[name], remarks=[name])
-        for place, name in enumerate(HOSTILE)
-        for status, score in (("done", 0.5), ("failed", None))
-    ]
-    for shape in ("json", "csv", "md", "latex", "table"):
-        text = written(shape, rows).decode()
-        assert not re.search("[\x00-\x09\x0b-\x1f\x7f-\x9f\u202a-\u202e\u2066-\u2069\ud800-\udfff]", text)
 
 
 def test_latex_sets_signs_as_they_are_and_names_letters_that_it_lacks_by_number():

@@ -87,7 +87,3 @@ def test_protocols_and_splits_are_compared_answer_by_answer():
         ("protocols", "a, lasso", "session"), ("protocols", "a, lasso", "unit"),
     ]  # fmt: skip
     assert all(one.difference.verdict == "worse" for one in found)
-    assert (
-        tables_of(found)[0].title
-        == "A = karl2016, B = deployable · question · RMSE [N] · split by session · SIM (twin)"
-    )

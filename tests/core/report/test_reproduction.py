@@ -59,11 +59,6 @@ def test_rows_stand_beside_the_numbers_they_are_comparable_with_and_no_others():
         force_row(cell="d", task="curvature"),
     ]
     assert [(line.published.score, line.row["cell"]) for line in beside(mine, *others)] == [(0.7659, mine["cell"])]
-    rows = [force_row(sensor, "time-index", is_baseline=True) for sensor in ("biotac", "icub")]
-    assert [(line.published.score, line.title) for line in beside(*rows)] == [
-        (0.6875, "force, RMSE of the time index (biotac)"),
-        (0.6875, "force, RMSE of the time index (icub)"),
-    ]
 
 
 def test_every_parameter_of_the_twin_stands_in_the_document_with_its_source():
