@@ -12,7 +12,7 @@ from tactbench.core.cost.ladder_file import write_ladder
 from tactbench.core.matrix.progress import Progress
 from tactbench.core.matrix.store import Store
 from tactbench.core.plugins.registry import load_registry
-from tactbench.core.spec.matrix import EstimatorChoice, MatrixSpec, TaskChoice
+from tactbench.core.spec.matrix import MatrixSpec
 from tests.core.evaluation.made import record
 from tests.here import IN_THIS_PROCESS
 
@@ -30,18 +30,13 @@ def presses(folder, sessions=3, n=120):
     return folder
 
 
-def climbed(folder, store, *estimators, rounds=2, split=None):
-    choice = TaskChoice(name="force", protocol="deployable", split=split,
-                        estimators=tuple(EstimatorChoice(name=name) for name in estimators))  # fmt: skip
-    matrix = MatrixSpec(rig="replay", sensors=("made",), tasks=(choice,))
-    return climb(matrix, load_registry(), store, rounds=rounds, clock=time.perf_counter,
-                 progress=Progress(), recordings=folder, choice=IN_THIS_PROCESS)  # fmt: skip
-
-
 @pytest.fixture(scope="module")
 def ladder(tmp_path_factory):
     root = tmp_path_factory.mktemp("ladder")
-    return climbed(presses(root / "shelf"), Store(root / "out"), *QUICK, split="session")
+    task = {"name": "force", "protocol": "deployable", "split": "session", "estimators": QUICK}
+    matrix = MatrixSpec.model_validate({"rig": "replay", "sensors": ["made"], "tasks": [task]})
+    return climb(matrix, load_registry(), Store(root / "out"), rounds=2, clock=time.perf_counter, progress=Progress(),
+                 recordings=presses(root / "shelf"), choice=IN_THIS_PROCESS)  # fmt: skip
 
 
 def test_what_is_timed_is_what_was_scored_whatever_was_chosen_on_validation_data(ladder):

@@ -17,6 +17,9 @@ from .rows import row
 RECORDED = {"simulated": False, "rig": "replay"}
 
 
+ESTIMATORS = (["ols"], ["ols", "lasso"], ["ols", "time", "mean"], ["ols", "lasso", "forest", "time", "mean"])
+
+
 @st.composite
 def boards(draw):
     """Cells of one question as a result folder holds them: of simulated campaigns, or of recorded sessions."""
@@ -28,11 +31,7 @@ def boards(draw):
     common = 0.1 * rng.standard_normal(repeats)
     rows = []
     for sensor in draw(st.sampled_from(["a", "ab", "abc"])):
-        for estimator in draw(
-            st.sampled_from(
-                [["ols"], ["ols", "lasso"], ["ols", "time", "mean"], ["ols", "lasso", "forest", "time", "mean"]]
-            )
-        ):
+        for estimator in draw(st.sampled_from(ESTIMATORS)):
             spread = rng.choice([0.0, 0.01, 0.3])
             each = np.clip(rng.choice([0.3, 0.5, 0.8]) + common + spread * rng.standard_normal(repeats), 0.01, 0.99)
             more = {
@@ -148,15 +147,12 @@ class Truth:
         key = "beyond" if beyond else "scores"
         assert bool(beyond) == ("beyond" in first["replicates"])
         apart = self.sign * (np.array(second["replicates"][key]) - np.array(first["replicates"][key]))
-        assert [float(value), *map(float, (low, high))] == pytest.approx(self.student(apart), abs=6e-4)
+        # Student's interval of the mean.
+        half = scipy.stats.t.ppf(0.975, len(apart) - 1) * apart.std(ddof=1) / len(apart) ** 0.5
+        told = [apart.mean(), apart.mean() - half, apart.mean() + half]
+        assert [*map(float, (value, low, high))] == pytest.approx(told, abs=6e-4)
         assert all(one["score"] == np.median(one["replicates"]["scores"]) for one in (first, second))
         return (int(wins), int(count)) == ((apart > 0).sum(), len(apart))
-
-    @staticmethod
-    def student(values):
-        """The mean and Student's interval of it."""
-        half = scipy.stats.t.ppf(0.975, len(values) - 1) * values.std(ddof=1) / len(values) ** 0.5
-        return values.mean(), values.mean() - half, values.mean() + half
 
     def beside(self, text):
         where = None
