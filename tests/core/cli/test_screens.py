@@ -43,6 +43,8 @@ def assert_one_clear_screen(done, *says):
         (("run", "--effects", "drift"), "+drift or -drift"),
         (("run", "--set", "rung=defaut"), "'default'"),
         (("run", "--set", "placement_scater_mm=0.3"), "'placement_scatter_mm'"),
+        (("run", "--set", "placement_scatter_mm=0.3mm"), "'placement_scatter_mm=0.3mm'"),
+        (("run", "--set", "noise_scale=-1"), "noise_scale = -1"),
         (("run", "--rig", "replay", "--recordings", ".", "--set", "noise_scale=2"), "simulated rigs"),
         (("leaderboard", os.devnull), os.devnull),
         (("why", "acme", "--out", "nowhere"), "nowhere"),
@@ -68,7 +70,7 @@ def test_a_folder_that_cannot_be_written(verbs):
     assert_one_clear_screen(done, "--out DIR")
 
 
-@pytest.mark.parametrize("words", [("list",), ("datasets",)])
+@pytest.mark.parametrize("words", [("list",), ("datasets",), ("show", "force", "biotac")])
 def test_a_list_for_programs_is_one_json_document(verbs, words):
     assert json.loads(verbs(*words, "--format", "json").stdout)
 
