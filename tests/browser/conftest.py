@@ -44,7 +44,7 @@ def chromium():
 @pytest.fixture(scope="session")
 def page(tmp_path_factory) -> Path:
     """The page of a small run, with a figure and skipped cells."""
-    folder = make_results(tmp_path_factory.mktemp("page") / "results")
+    folder = make_results(tmp_path_factory.mktemp("page") / "results", "icub")
     material = open_results(Store(folder), load_registry())
     row = next(row for row in material.rows if row["status"] == "done" and row["task"] == "force")
     row["fit_s"] = 2.5  # as on a slow machine: its neighbours' times are in milliseconds

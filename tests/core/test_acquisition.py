@@ -2,12 +2,11 @@
 
 import os
 import signal
-import subprocess
-import sys
 from contextlib import contextmanager
 
 import numpy as np
 import pytest
+from threadpoolctl import threadpool_info, threadpool_limits
 
 from tactbench.core.acquisition import acquire
 from tactbench.core.errors import LinkUnplugged, RigError
@@ -146,14 +145,13 @@ def test_what_devices_say_is_recorded_and_times_are_the_hosts(tmp_path):
     assert np.array_equal(force.t_ns, true)
 
 
-@pytest.mark.parametrize("complete", [True, False])
 @pytest.mark.parametrize(
-    ("stops", "left", "raised", "says"),
+    ("stops", "left", "raised", "says", "complete"),
     [
-        (KeyboardInterrupt(), "", KeyboardInterrupt, "stopped by hand"),
-        (KeyboardInterrupt(), "stand clear", RigError, "stopped by hand"),  # it still moves
-        (LinkUnplugged("the cable is gone"), "", LinkUnplugged, "the cable is gone"),
-        (ValueError("a bug of the driver"), "", ValueError, "a bug of the driver"),
+        (KeyboardInterrupt(), "", KeyboardInterrupt, "stopped by hand", True),
+        (KeyboardInterrupt(), "stand clear", RigError, "stopped by hand", False),  # it still moves
+        (LinkUnplugged("the cable is gone"), "", LinkUnplugged, "the cable is gone", True),
+        (ValueError("a bug of the driver"), "", ValueError, "a bug of the driver", False),
     ],
 )
 def test_a_real_rig_is_stopped_and_then_what_it_had_recorded_is_kept(tmp_path, stops, left, raised, says, complete):
@@ -192,27 +190,21 @@ def test_a_scene_that_a_device_ended_is_kept_as_incomplete(tmp_path):
     assert (tmp_path / "moving.h5").exists()
 
 
-def test_what_is_emulated_is_marked_by_the_rig_file_whatever_the_rig_says(tmp_path):
+def test_what_is_emulated_is_marked_by_the_rig_file_or_the_identity_of_a_device(tmp_path):
     """A rig of others says nothing of emulation: over emulators its recordings were taken for real ones."""
-    link = "can://virtual/there"
-    file = RigFile(
-        rig="weights",
-        sensors={SENSOR.name: DeviceEntry(link=link, emulator=True), "other": DeviceEntry(link="emulated")},
-    )
-    meta, _ = run(tmp_path / "r.h5", Devices(tmp_path / "r.h5"), simulated=False, rig_file=file)
-    assert (meta.simulated, meta.emulation.devices) == (True, (SENSOR.name,))
-    late = {SENSOR.name: DeviceEntry(link="emulated", faults=("late",))}
+    late = {SENSOR.name: DeviceEntry(link="emulated", faults=("late",)), "other": DeviceEntry(link="emulated")}
     virtual = RigFile(rig="weights", sensors=late, devices={"motor": {"device": "faulhaber", "link": "emulated"}})
-    made, _ = run(tmp_path / "virtual.h5", Devices(tmp_path / "r.h5"), simulated=False, rig_file=virtual)
-    assert (made.emulation.time, set(made.emulation.devices)) == ("virtual", {SENSOR.name, "motor"})
-    assert (made.emulation.faults, made.emulation.factor > 0) == ((f"{SENSOR.name}: late",), True)
-    plain = file.model_copy(update={"sensors": {SENSOR.name: DeviceEntry(link=link)}})
-    real, _ = run(tmp_path / "real.h5", Devices(tmp_path / "r.h5"), simulated=False, rig_file=plain)
-    assert (real.simulated, real.emulation) == (False, None)
     rig = Devices(tmp_path / "r.h5")
+    made, _ = run(tmp_path / "virtual.h5", rig, simulated=False, rig_file=virtual)
+    assert (made.simulated, made.emulation.time) == (True, "virtual")
+    assert made.emulation.faults == (f"{SENSOR.name}: late",)
+    assert set(made.emulation.devices) == {SENSOR.name, "motor"}
+    real = RigFile(rig="weights", sensors={SENSOR.name: DeviceEntry(link="can://virtual/there")})
+    made, _ = run(tmp_path / "real.h5", rig, simulated=False, rig_file=real)
+    assert (made.simulated, made.emulation) == (False, None)
     rig.identity = {f"{SENSOR.name} adapter": "tactbench emulator"}
-    said, _ = run(tmp_path / "said.h5", rig, simulated=False, rig_file=plain)
-    assert said.emulation.devices == (SENSOR.name,)
+    made, _ = run(tmp_path / "said.h5", rig, simulated=False, rig_file=real)
+    assert made.emulation.devices == (SENSOR.name,)
 
 
 class Impatient(Devices):
@@ -229,34 +221,23 @@ class Impatient(Devices):
             os.kill(os.getpid(), signal.SIGINT)
 
 
-@pytest.mark.parametrize("stops", [None, LinkUnplugged("the cable is gone")])
-def test_further_interrupts_do_not_cost_what_the_first_one_keeps(tmp_path, stops):
+def test_further_interrupts_do_not_cost_what_the_first_one_keeps(tmp_path):
     path = tmp_path / "kept.h5"
-    with pytest.raises(KeyboardInterrupt if stops is None else LinkUnplugged):
-        run(path, Impatient(path, stops), simulated=False, complete_interrupted=True,
-            watch=None if stops else lambda block: os.kill(os.getpid(), signal.SIGINT))  # fmt: skip
-    with open_recording(path) as recording:
-        recording.verify()
+    with pytest.raises(LinkUnplugged):
+        run(path, Impatient(path, LinkUnplugged("the cable is gone")), simulated=False, complete_interrupted=True)
+    opened(path)
     assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
 
 
-def test_a_simulation_says_the_same_whatever_number_of_threads_blas_was_started_with(tmp_path):
-    digests = set()
-    for threads in ("1", "2"):
-        path = tmp_path / threads / "press.h5"
-        env = {**os.environ, "OPENBLAS_NUM_THREADS": threads, "OMP_NUM_THREADS": threads}
-        command = [
-            sys.executable,
-            "-m",
-            "tactbench",
-            "record",
-            "--sensor",
-            "icub",
-            "--indenter",
-            "cap:radius=5",
-            "--profile",
-            "ramp:duration=10",
-        ]
-        subprocess.run([*command, "--out", path], env=env, check=True, capture_output=True)
-        digests.add(content_digest(path))
-    assert len(digests) == 1
+def test_a_simulation_has_one_thread_whatever_number_blas_was_started_with(tmp_path):
+    """Several threads sum in another order: the same seed would make other bytes on a machine with other processors."""
+
+    class Counting(Weights):
+        def __iter__(self):
+            self.threads = {pool["num_threads"] for pool in threadpool_info()}
+            return super().__iter__()
+
+    rig = Counting()
+    with threadpool_limits(2):
+        run(tmp_path / "r.h5", rig)
+    assert rig.threads == {1}

@@ -2,7 +2,6 @@
 
 from dataclasses import asdict
 
-import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -41,47 +40,31 @@ def states(choice, place=0):
     return {one.wish: one.state for one in choice.candidates[place].criteria}
 
 
-@pytest.mark.parametrize(
-    ("wish", "says"),
-    [
-        (Wish(max_delay_ms=0.4), "answer delay 1.00 ms, 600 µs too slow"),
-        (Wish(range_n=10.5), "force range 10 N, 0.5 N short of range"),
-        (Wish(rate_hz=130), "rate 100 Hz, 30 Hz too low"),
-        (Wish(score=0.3), "score 0.5000 N, 0.2000 N above the wished error"),
-    ],
-)
-def test_a_miss_says_by_how_much(wish, says):
-    choice = only([answer()], wish)
+def test_simulated_and_measured_rows_are_apart():
+    measured, simulated = choose([answer(), answer("b", simulated=False)], Wish(), PRESSED, {})
+    assert (measured.hardware, simulated.hardware) == ("rig twin", "SIM (twin)")
+
+
+def test_a_miss_says_by_how_much():
+    choice = only([answer()], Wish(max_delay_ms=0.4))
     (criterion,) = choice.candidates[0].criteria
     assert criterion.state == "missed"
-    assert choice.verdict == f"None meets all: nearest is a SIM / lasso, {says}."
+    assert choice.verdict == "None meets all: nearest is a SIM / lasso, answer delay 1.00 ms, 600 µs too slow."
 
 
-@pytest.mark.parametrize(
-    ("more", "state", "says"),
-    [
-        ({"answer_delay_ms": None, "delay_parts_ms": {}, "latency_ms_p50": 0.06}, "unknown", "prediction alone 60"),
-        ({"answer_delay_ms": None, "delay_parts_ms": {}, "latency_ms_p50": None}, "unknown", "not timed"),
-        ({"answer_delay_ms": None, "delay_parts_ms": {"link": 1.0, "prediction": 0.5}}, "unknown", "without sampling"),
-        ({"answer_delay_ms": 1.5, "delay_parts_ms": {"sampling": 1.0, "prediction": 0.5}}, "unknown", "without link"),
-        ({"answer_delay_ms": 2.5, "delay_parts_ms": {"sampling": 2.0, "prediction": 0.5}}, "missed", "at least 500"),
-        ({"answer_delay_ms": 0.5, "delay_parts_ms": {"prediction": 0.5}, "looks_at": "time"}, "met", "500"),
-    ],
-)
-def test_a_delay_that_lacks_a_part_is_a_lower_bound(more, state, says):
-    (criterion,) = only([answer(**more)], Wish(max_delay_ms=2)).candidates[0].criteria
-    assert criterion.state == state
-    assert says in criterion.text
+def test_a_delay_that_lacks_a_part_is_a_lower_bound():
+    """A wish that is missed without it is missed with it; one that is met without it is unknown."""
+    for sampling_ms, state in ((2.0, "missed"), (1.0, "unknown")):
+        more = {"answer_delay_ms": sampling_ms + 0.5, "delay_parts_ms": {"sampling": sampling_ms, "prediction": 0.5}}
+        assert states(only([answer(**more)], Wish(max_delay_ms=2))) == {"answer delay": state}
 
 
 def test_errors_of_force_are_those_beyond_the_floor_if_all_have_one():
     floored = {"score_beyond_floor": 0.1, "beyond_floor_ci_low": 0.0, "beyond_floor_ci_high": 0.3}
     choice = only([answer(**floored), answer("b", **(floored | {"score_beyond_floor": 0.05}))], Wish(score=0.2))
     assert [(one.score, one.low, one.high) for one in choice.candidates] == [(0.05, 0.0, 0.3), (0.1, 0.0, 0.3)]
-    assert "beyond" in choice.quantity
     plain = only([answer(**floored), answer("b")], Wish())
     assert {one.score for one in plain.candidates} == {0.5}
-    assert "interval" in choice.candidates[0].criteria[0].text
 
 
 def test_what_is_no_better_than_a_trivial_answer_is_never_proposed():
@@ -91,8 +74,7 @@ def test_what_is_no_better_than_a_trivial_answer_is_never_proposed():
     rows = [forest, answer(), worse, trivial, defined]
     choice = only(rows, Wish(max_delay_ms=2), sensor(), sensor("bad"), sensor("oracle", exists=False))
     assert [(one.row["sensor"], one.estimator) for one in choice.candidates] == [("a", "lasso")]
-    assert choice.left_out[0].startswith("bad: no answer of it is better")
-    assert choice.left_out[1] == "oracle: it exists as a definition only."
+    assert [text.partition(":")[0] for text in choice.left_out] == ["bad", "oracle"]
     alone = only([worse], Wish(max_delay_ms=2), sensor("bad"))
     assert alone.candidates == ()
     assert alone.verdict.startswith("Cannot say")
@@ -113,27 +95,6 @@ def test_order_all_met_then_fewest_unknown_then_least_missed():
     assert choice.verdict == "better SIM / lasso meets all 3 wishes; worse SIM / lasso too."
 
 
-def test_simulated_and_measured_rows_are_apart_and_marked():
-    measured, simulated = choose([answer(), answer("b", simulated=False)], Wish(), PRESSED, {})
-    assert (measured.hardware, simulated.hardware) == ("rig twin", "SIM (twin)")
-    assert [one.sensor for one in simulated.candidates] == ["a SIM"]
-    assert any("real unit" in one for one in simulated.unknown)
-    assert not any("real unit" in one for one in measured.unknown)
-
-
-def test_what_to_do_about_what_is_unknown():
-    rows = [answer(ci_low=None, ci_high=None, answer_delay_ms=None, delay_parts_ms={}), answer("gone", status="failed")]
-    choice = only(rows, Wish(max_delay_ms=2, range_n=5), sensor(upper=None), sensor("other"),
-                  sensor("oracle", exists=False))  # fmt: skip
-    told = "\n".join(choice.unknown)
-    assert "run `tactbench run --sensor a --task question --protocol deployable --estimator lasso`" in told
-    assert "it has no interval" in told
-    assert "the force range of a: not stated" in told
-    assert "how other scores: no result here; run `tactbench run --sensor other" in told
-    assert "oracle" not in told
-    assert choice.left_out == ("gone: there is no finished answer beside trivial ones.",)
-
-
 maybe = st.none() | st.floats(0.1, 100)
 sources = st.sampled_from([STATED, ASSUMED, None])
 
@@ -141,9 +102,7 @@ sources = st.sampled_from([STATED, ASSUMED, None])
 @given(delay=maybe, link=st.booleans(), rate=maybe, rate_source=sources, upper=maybe,
        range_source=st.sampled_from([STATED, ASSUMED]), score=st.floats(0.01, 3.0), trivial=maybe,
        wish=st.builds(Wish, maybe, maybe, maybe, maybe))  # fmt: skip
-def test_met_means_known_and_good_enough(
-    delay, link, rate, rate_source, upper, range_source, score, trivial, wish
-):  # fmt: skip
+def test_met_means_known_and_good_enough(delay, link, rate, rate_source, upper, range_source, score, trivial, wish):
     parts = {"sampling": 0.0, "window": 0.0, "features": 0.0, "prediction": delay, **({"link": 0.0} if link else {})}
     made = sensor(rate=rate, rate_source=rate_source, upper=upper, range_source=range_source)
     told = answer(score=score, baseline=trivial, answer_delay_ms=delay, delay_parts_ms=parts, latency_ms_p50=0.02)

@@ -17,7 +17,7 @@ from tests.core.pool.patience import ending
 
 ROOT = Path(__file__).parents[3]
 CONTROL = re.compile(r"\x1b\[[0-9;?]*[A-Za-z]")
-HOME, SHOW_CURSOR, HIDE_CURSOR = "\x1b[H", "\x1b[?25h", "\x1b[?25l"
+SHOW_CURSOR, HIDE_CURSOR = "\x1b[?25h", "\x1b[?25l"
 SECOND_SCREEN, FIRST_SCREEN = "\x1b[?1049h", "\x1b[?1049l"
 
 
@@ -43,20 +43,6 @@ class Terminal:
                 break
             self.seen += piece.decode(errors="replace")
         return self.seen[since:]
-
-    def read_screen_with(self, *texts, seconds=30):
-        """Read until a whole picture has all of `texts`, one blank between words; return its lines."""
-        until = time.monotonic() + seconds
-        while time.monotonic() < until:
-            for lines in reversed(self.screens()):
-                if all(any(text in " ".join(line.split()) for line in lines) for text in texts):
-                    return lines
-            self.read_until(HOME, 1)
-        raise AssertionError(f"no screen has {texts}: {self.screens()[-1:]}")
-
-    def screens(self):
-        """Return the lines of each whole picture on the second screen: what stands between two homes."""
-        return [plain(text).splitlines() for text in self.seen.split(HOME)[1:-1]]
 
     def last_words(self):
         """Return what stands on the first screen after the second one was left."""

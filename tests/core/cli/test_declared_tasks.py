@@ -81,7 +81,6 @@ def test_one_import_and_one_run_answer_a_question_of_a_table(pad):
     assert (row["metric"], row["unit"], row["split"]) == ("mean_euclidean_error", "mm", "session")
     # Presses of a training day lie 0.5 * 10 mm / sqrt(30) = 0.9 mm away; noise and faint first rows come on top.
     assert row["score"] < 0.75 * rows["mean"]["score"]
-    assert row["scores"]["median error"] < row["score"] < row["scores"]["95th percentile of the error"]
     assert json.loads(row["declared_task"])["name"] == "where"
     assert "0 computed now" in pad(*run).stderr, "what was declared decides the key as a task does"
     pad("why", "where/replay/deployable/knn", "--again")
@@ -115,10 +114,6 @@ def test_one_name_means_one_task(pad):
     assert "'where' is not the same in rec/a/tasks.yaml and in rec/b/tasks.yaml" in refused
     pad(*imports, "rec/a", "--replace")
     assert yaml.safe_load(declared.read_text())["tasks"][0]["splits"] == ["recording"]
-    (pad.folder / "pad.yaml").write_text(PAD.replace("name: where", "name: force"))
-    pad(*imports, "installed")
-    refused = pad("run", "--recordings", "installed", "--task", "force", code=2).stderr
-    assert "has the name of an installed one" in refused
 
 
 LINE = 1 + PAD.splitlines().index("tasks:")
@@ -128,10 +123,8 @@ LINE = 1 + PAD.splitlines().index("tasks:")
     ("old", "new", "says"),
     [
         ("names: [x, y]", "names: [x, z]", "It has x, y"),
-        ("kind: position, names", "kind: force, names", "a target of kind force"),
         ("[session, recording]", "[sesion]", "asks for the split sesion"),
         ("[session, recording]", "[]", f"pad.yaml:{LINE + 4}"),
-        ("estimators: [knn]", "features: [ac_pressure]", "ac_pressure"),
         ("source: vector, kind: position, names: [x, y], unit: mm", "source: label, name: colour", "the label colour"),
     ],
 )

@@ -1,9 +1,6 @@
 """What this machine has for devices, and whether those of a rig answer."""
 
 import json
-import sys
-import threading
-from contextlib import contextmanager
 from typing import ClassVar
 
 import numpy as np
@@ -18,95 +15,46 @@ from tactbench.core.spec.rig import DeviceDescriptor, SensorDescriptor
 from tactbench.core.spec.rig_file import RigFile
 from tactbench.core.spec.sensor import ChannelSpec, SensorSpec, Source, StreamSpec
 from tactbench.plugin.devices import Driver
-from tests.core.cli.terminals import ROOT
-from tests.links.ends import pty
+from tests.conftest import Verbs
 
-WIRED = ROOT / "tests" / "third_party" / "wired"
 RIG = """
 rig: bench
 sensors:
-  wired-pad: {{link: "serial://{pad}?baud=115200"}}
-force: {{device: wired-scale, link: "serial://{scale}?baud=115200"}}
+  wired-pad: {link: "loop://"}
+force: {device: wired-scale, link: "loop://"}
 devices:
-  motor: {{device: wired-motor, link: emulated}}
+  motor: {device: wired-motor, link: emulated}
 """
 
 
 @pytest.fixture
-def doctor_here(verbs, monkeypatch):
-    """The verb in this process, with the plugin of a pad and a scale on lines."""
-    monkeypatch.syspath_prepend(str(WIRED))
-    yield lambda *arguments, code=0: verbs("doctor", *arguments, code=code)
-    for name in [name for name in sys.modules if name.partition(".")[0] == "wired_tactile"]:
-        del sys.modules[name]
+def doctor(tmp_path, monkeypatch):
+    """The verb, with the plugin of a pad and a scale on lines."""
+    monkeypatch.setattr("tactbench.core.cli.host_devices.SLEEPS", 5)
+    verbs = Verbs(tmp_path, here=True)
+    return lambda *words, code=0: verbs("doctor", *words, code=code, plugins=("wired",)).stdout
 
 
-@contextmanager
-def talking(samples):
-    """The far end of a line: a device that says who it is, and sends its samples once it is started."""
-    with pty() as line:
-        stop = threading.Event()
-
-        def talk():
-            while not stop.is_set():
-                try:
-                    for word in line.read(0.05).split():
-                        line.write({b"id": b"pad-3000 0815\n", b"go": samples, b"stop": b""}[word])
-                except OSError:  # nobody has the line open, or no longer
-                    continue
-
-        thread = threading.Thread(target=talk)
-        thread.start()
-        try:
-            yield line
-        finally:
-            stop.set()
-            thread.join()
-
-
-def test_what_does_not_work_comes_first_and_what_works_in_one_line(doctor_here):
+def test_what_does_not_work_comes_first_and_what_works_in_one_line(doctor):
     code = 1 if any(one.state == "denied" for one in look_at_host()) else 0
-    *before, last = doctor_here(code=code).stdout.splitlines()
+    *before, last = doctor(code=code).splitlines()
     assert last.startswith("works ")
     assert all(line.startswith(("WRONG ", "missing ")) for line in before)
-    about = json.loads(doctor_here("--format", "json", code=code).stdout)
+    about = json.loads(doctor("--format", "json", code=code))
     named = {(one["kind"], one["name"]): one for one in about["host"]}
     assert [name for kind, name in named if kind == "serial port"] == sorted(port.device for port in comports())
     assert "sleeps of 5 ms end" in named["clock", "clock"]["text"]
-    offered = {"dask", "fast", "mcap", "multicast", "parquet", "spi", "wavelets", "xlsx"}
-    assert {name for kind, name in named if kind == "extra"} == offered
+    assert {"dask", "mcap", "spi"} <= {name for kind, name in named if kind == "extra"}
 
 
-def test_a_rig_on_lines_is_opened_asked_and_read(tmp_path, doctor_here):
-    pad = b"".join(b"%d %d 500\n" % (n, 100 + n % 2) for n in range(50)) + b"nonsense here\n60 100 500\n"
-    scale = b"".join(b"%d %.2f\n" % (n, 0.25 + 0.01 * (-1) ** n) for n in range(40))
-    with talking(pad) as one, talking(scale) as other:
-        (tmp_path / "rig.yaml").write_text(RIG.format(pad=one.name, scale=other.name))
-        asked = ("--rig-file", "rig.yaml", "--seconds", "0.5")
-        done = doctor_here(*asked, "--format", "json", code=1)
-        shown = doctor_here(*asked, code=1).stdout
-    about = json.loads(done.stdout)
-    sensor, force, motor = about["devices"]
-    assert sensor["identity"] == force["identity"] == {"model": "pad-3000", "serial": "0815"}
-    (taxels,) = sensor["streams"]
-    assert (taxels["rows"], taxels["lost"]) == (51, 10)
-    assert (taxels["noisiest"], taxels["constant"], taxels["mean"]["t2"]) == ("t1", ["t2"], 500)
-    assert sensor["counts"] == {"lines that are no samples": 1}
-    (fz,) = force["streams"]
-    assert (fz["kind"], fz["unit"]) == ("force", "N")
-    assert fz["mean"]["fz"] == pytest.approx(0.25)
-    assert fz["sd_median"] == pytest.approx(0.01 * np.sqrt(40 / 39))
-    assert (motor["emulated"], motor["identity"]) == (True, {}), "what is emulated is not opened"
-    (problem,) = about["problems"]
-    assert problem.startswith("wired-pad: Stream taxels, of 51 rows: 10 lost")
-    assert shown.startswith(f"WRONG    {problem}")
-
-
-def test_a_wrong_rig_file_is_a_usage_error(tmp_path, doctor_here):
-    (tmp_path / "rig.yaml").write_text("rig: bench\nsensors: {no-such: {link: emulated}}\n")
-    assert "no-such" in doctor_here("--rig-file", "rig.yaml", code=2).stderr
-    (tmp_path / "rig.yaml").write_text("rig: bench\nsensor: {}\n")
-    assert "rig.yaml:2" in doctor_here("--rig-file", "rig.yaml", code=2).stderr
+def test_what_is_wrong_with_the_devices_of_a_rig_file_comes_first_and_what_is_emulated_is_not_opened(tmp_path, doctor):
+    (tmp_path / "rig.yaml").write_text(RIG)
+    asked = ("--rig-file", "rig.yaml", "--seconds", "0.1")
+    about = json.loads(doctor(*asked, "--format", "json", code=1))
+    motor = about["devices"][2]
+    assert (motor["emulated"], motor["identity"], motor["problems"]) == (True, {}, [])
+    assert [problem.partition(":")[0] for problem in about["problems"]] == ["wired-pad", "force"]
+    assert doctor(*asked, code=1).startswith(f"WRONG    {about['problems'][0]}")
 
 
 TAXELS = tuple(ChannelSpec(name=f"t{place}", kind="taxel") for place in range(3))
@@ -118,7 +66,7 @@ class Paced(Driver):
     """A pad whose reads take the time they wait: its options say its rate, and what goes wrong."""
 
     streams = (PAD,)
-    counts: ClassVar = {}
+    counts: ClassVar = {"crc errors": 1}
     start, stop, close = (lambda self, name=name: log.append(name) for name in ("start", "stop", "close"))
 
     def __init__(self, settings):
@@ -140,7 +88,8 @@ class Paced(Driver):
         quality = np.zeros(data.shape, np.uint8)
         bad = (rows == 25) & self.options.get("bad", False)
         data[bad], quality[bad] = 1e9, Quality.MISSING
-        block = Block("taxels", np.round(rows / rate_hz * 1e9).astype(np.int64), data, quality, sequence=rows)
+        numbers = rows + (rows >= 25) * self.options.get("lost", 0)
+        block = Block("taxels", np.round(rows / rate_hz * 1e9).astype(np.int64), data, quality, sequence=numbers)
         return [block] if len(rows) else []
 
 
@@ -150,7 +99,7 @@ class VirtualClock:
 
 
 def checked(**options):
-    """Return the check of a pad with these options, and what was done to it."""
+    """Return the check of a pad with these options, and of a motor."""
     log.clear()
     where, source = f"{__name__}:Paced", Source(tag="assumed", reference="test")
     spec = SensorSpec(name="pad", title="p", principle="p", principle_source=source, streams=(PAD,))
@@ -169,15 +118,19 @@ def checked(**options):
         ({"rate_hz": 90}, "came at 90 Hz, stated are 100 Hz"),
         ({"rate_hz": 99}, ""),
         ({"bad": True}, "of 300 rows: 1 MISSING"),
+        ({"lost": 10}, "of 300 rows: 10 lost"),
         ({"mute": True}, "Nothing came of its stream taxels within 3 s"),
     ],
 )
 def test_what_a_stream_lacks_is_told(options, says):
-    pad, _ = checked(**options)
+    pad, motor = checked(**options)
     assert says in "".join(pad.problems)
     assert bool(says) == bool(pad.problems)
+    assert (pad.identity, pad.counts, motor.identity) == ({"model": "paced"}, Paced.counts, {"model": "paced"})
     for stream in pad.streams:  # of 300 values: a standard error of 4 %; samples that are missing are in no noise
         assert stream["sd_largest"] == pytest.approx(2, rel=0.15)
+        assert (stream["noisiest"], stream["constant"], stream["mean"]["t2"]) == ("t1", ["t2"], 1000)
+        assert stream["lost"] == options.get("lost", 0)
     assert log == ["identify", "start", "stop", "close", "identify", "close"], "a motor is not started"
 
 

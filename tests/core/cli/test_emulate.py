@@ -91,6 +91,7 @@ def test_the_rig_file_printed_opens_devices_that_are_pressed_when_the_recording_
     assert "The bench opens no motor; it is at udp://127.0.0.1:" in err
     assert "tactbench record --rig-file rig.yaml --sensor pad --live --out press.h5" in err
     assert "The scene begins" in err
+    assert "The emulated devices and their links are gone" in err
     # 1000 counts a newton; the ramp rises for 0.4 s.
     assert max(abs(data).max() for data in rest) < 100 < max(abs(data).max() for data in pressed)
 
@@ -117,27 +118,15 @@ def test_a_rig_file_is_started_and_keeps_what_is_real(emulate, tmp_path):
         ((), "Either devices or a rig file"),
         (("pda",), "Did you mean 'pad'"),
         (("pad", "scale", "bare-scale"), "A rig has one force"),
-        (("scale",), "A rig has a sensor, and none is named"),
         (("pad", "bare-scale"), "bare-scale has no emulator"),
-        (("mute",), "mute has no emulator"),
         (("--rig-file", "late.yaml"), "'delay_s'"),
-        (("--rig-file", "parity.yaml"), "no fault 'parity'"),
         (("--rig-file", "twni.yaml"), "Did you mean 'twin'"),
     ],
 )
 def test_what_cannot_be_is_said_with_the_next_step(emulate, tmp_path, words, said):
-    wrong = {"late": ", faults: ['late:delay=1']}}", "parity": ", faults: [parity]}}",
-             "twni": "}}\nemulation: {physics: twni}"}  # fmt: skip
+    wrong = {"late": ", faults: ['late:delay=1']}}", "twni": "}}\nemulation: {physics: twni}"}
     for name, more in wrong.items():
         (tmp_path / f"{name}.yaml").write_text(f"rig: bench\nsensors: {{pad: {{link: emulated{more}\n")
     code, out, err = emulate(*words)
     assert (code, out) == (2, "")
     assert said in err
-
-
-def test_ctrl_c_ends_it_with_130(emulate):
-    before = threading.active_count()
-    code, _, err = emulate("pad")
-    assert code == 130
-    assert "The emulated devices and their links are gone" in err
-    assert threading.active_count() == before

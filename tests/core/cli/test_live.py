@@ -3,8 +3,8 @@
 import io
 import os
 import re
-import select
-from contextlib import contextmanager
+import time
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -17,10 +17,8 @@ from tactbench.core.spec.profile import ForceRamp
 from tactbench.core.spec.quantity import sourced
 from tactbench.core.spec.scene import Scene
 from tactbench.core.spec.sensor import ChannelSpec, StreamSpec
-from tests.core.cli.terminals import FIRST_SCREEN, HIDE_CURSOR, ROOT, SECOND_SCREEN, SHOW_CURSOR, on_terminal
-from tests.links.ends import pty
+from tests.core.cli.terminals import FIRST_SCREEN, HIDE_CURSOR, SECOND_SCREEN, SHOW_CURSOR, on_terminal, plain
 
-WIRED = ROOT / "tests" / "third_party" / "wired"
 TAXELS = tuple(ChannelSpec(name=f"t{n}", kind="taxel", lower=0, upper=4095, sign=-1) for n in range(1, 5))
 PAD = StreamSpec(
     name="pad", rate_hz=100, channels=(*TAXELS, ChannelSpec(name="warmth", kind="dc_temperature", unit="degC"))
@@ -31,7 +29,7 @@ RAMP = ForceRamp(
 )
 
 
-def test_a_picture_has_force_taxels_rates_and_losses():
+def test_a_picture_has_force_taxels_rates_and_losses(monkeypatch):
     class Acquisition:
         streams, reference = (PAD,), (SCALE,)
 
@@ -45,6 +43,8 @@ def test_a_picture_has_force_taxels_rates_and_losses():
         quality = np.zeros((10, 5), np.uint8)
         if tenth == 5:
             lost, quality[0], quality[-1, 0] = 7, Quality.GAP, Quality.SATURATED
+        if tenth == 29:
+            data[-1, 1], quality[-1, 1] = 1e9, Quality.MISSING  # the value before it is shown
         numbers = np.arange(10) + 10 * tenth + lost
         view.watch(Block("pad", began_ns + np.arange(10) * 10_000_000, data, quality, sequence=numbers))
         view.watch(Block("scale", began_ns + np.arange(100) * 1_000_000, np.full((100, 1), force_n)))
@@ -59,39 +59,22 @@ def test_a_picture_has_force_taxels_rates_and_losses():
     assert "warmth 31.25 degC" in text
     (pad,) = [line.split() for line in text.splitlines() if line.startswith("pad  ")]
     (scale,) = [line.split() for line in text.splitlines() if line.startswith("scale")]
-    assert pad == ["pad", "300", "100/100", "7", "1", "0", "0", "1"]
+    assert pad == ["pad", "300", "100/100", "7", "1", "1", "0", "1"]
     assert scale[1:3] == ["3000", "1000/1000"]
+    later_s = time.monotonic() + 3
+    monkeypatch.setattr("tactbench.core.cli.live.time", SimpleNamespace(monotonic=lambda: later_s))
+    console.print(view.picture())
+    assert " silent 3 s " in console.file.getvalue()
 
 
-@contextmanager
-def wired(tmp_path, seconds):
-    """Record a pad on a line that the test speaks for; give the terminal and the far end of the line."""
-    command = ["-m", "tactbench", "record", "--sensor", "wired-pad", "--rig", "wired-rig", "--live"]
-    with pty() as line:
-        options = {"cwd": tmp_path, "path": [WIRED], "WIRED_LINK": f"serial://{line.name}?baud=115200"}
-        with on_terminal([*command, "--profile", f"ramp:duration={seconds}", "--out", "press.h5"], **options) as shown:
-            assert select.select([line.master], [], [], 60)[0]
-            assert line.read_until(b"go\n") == b"go\n"
-            yield shown, line
-
-
-def test_a_device_on_a_line_is_seen_while_it_is_recorded_and_when_it_falls_silent(tmp_path):
-    with wired(tmp_path, "5") as (terminal, line):
-        line.write(b"1 100 100\n2 100 100\n")
-        terminal.read_screen_with("t1", "taxels 2 ")
-        line.write(b"9 100 2000\n")
-        lines = terminal.read_screen_with("taxels 3 ")
-        assert "wired-pad on wired-rig, flat" in lines[0]
-        assert "no reference force" in lines[1]
-        assert re.search(r"t2 +\+1900 ", "".join(lines))
-        (row,) = [line.split() for line in lines if line.startswith("taxels  ")]
-        assert row[3] == "6", "rows 3 to 8 are lost"
-        terminal.read_screen_with("taxels 3 silent 2 s 6")
-        line.write(b"10 100 100\n")
-        assert re.search(r"taxels +4 ", terminal.last_words()), "the last state stays on the terminal"
-        assert terminal.process.wait(60) == 0
-    assert terminal.seen.rindex(SHOW_CURSOR) > terminal.seen.rindex(HIDE_CURSOR)
-    assert (tmp_path / "press.h5").exists()
+def test_a_recording_is_seen_while_it_is_made_and_its_last_state_stays(verbs, monkeypatch):
+    for name, value in (("FORCE_COLOR", "1"), ("TERM", "xterm"), ("LINES", "24")):
+        monkeypatch.setenv(name, value)
+    seen = verbs("record", "--sensor", "ideal", "--profile", "ramp:duration=1", "--live", "--out", "press.h5").stderr
+    assert seen.rindex(SHOW_CURSOR) > seen.rindex(HIDE_CURSOR)
+    last = plain(seen.rpartition(FIRST_SCREEN)[2])
+    assert "ideal on twin (SIM), flat" in last
+    assert re.search(r"taxels +83 +83/83 ", last)
 
 
 ASKS = """
@@ -109,7 +92,7 @@ with LiveView(Scene(name="fed", profile=RAMP), "pad") as view:
 
 def test_a_prompt_has_the_terminal(tmp_path):
     with on_terminal(["-c", ASKS], cwd=tmp_path) as terminal:
-        terminal.read_screen_with("4 taxels")
+        terminal.read_until("4 taxels")
         os.write(terminal.ours, b"\n")
         asked = terminal.read_until("Place the cap.")
         assert FIRST_SCREEN in asked
@@ -120,32 +103,20 @@ def test_a_prompt_has_the_terminal(tmp_path):
         assert terminal.process.wait(30) == 0
 
 
-def state_of(*blocks):
-    state = StreamState(PAD, rate_s=RATE_S)
-    for block in blocks:
-        state.take(block)
-    return state
-
-
 def test_a_rate_is_that_of_the_last_two_seconds():
     def blocks(many, began_s, period_ns):
         began_ns = began_s * 1_000_000_000 + np.arange(many) * 100_000_000
         rows = 100_000_000 // period_ns if period_ns else 10
         return [Block("s", began + np.arange(rows) * period_ns, np.zeros((rows, 5))) for began in began_ns]
 
+    def rate_hz(*blocks):
+        state = StreamState(PAD, rate_s=RATE_S)
+        for block in blocks:
+            state.take(block)
+        return state.rate_hz
+
     slow, quick, bursts = blocks(50, 0, 20_000_000), blocks(30, 5, 10_000_000), blocks(30, 0, 0)
-    assert state_of(*slow).rate_hz == state_of(slow[0]).rate_hz == pytest.approx(50)
-    assert state_of(*slow, *quick).rate_hz == pytest.approx(100, rel=0.01), "the first of the two ends before"
-    assert state_of(bursts[0]).rate_hz is None, "rows that come together do not count twice"
-    assert state_of(*bursts[:2]).rate_hz == state_of(*bursts).rate_hz == pytest.approx(100)
-
-
-def test_missing_samples_are_in_no_change():
-    data, quality = np.full((3, 5), 10.0), np.zeros((3, 5), np.uint8)
-    data[0, 1] = data[2, 0] = 1e6
-    quality[0, 1] = quality[2, 0] = Quality.MISSING
-    later = np.full((1, 5), 12.0)
-    state = state_of(Block("s", np.arange(3), data, quality), Block("s", np.arange(3, 4), later))
-    assert state.first.tolist() == [10, 12, 10, 10, 10]
-    assert state.largest.tolist() == [2, 0, 2, 2, 2]
-    assert state.counts[Quality.MISSING] == 2
+    assert rate_hz(*slow) == rate_hz(slow[0]) == pytest.approx(50)
+    assert rate_hz(*slow, *quick) == pytest.approx(100, rel=0.01), "the first of the two ends before"
+    assert rate_hz(bursts[0]) is None, "rows that come together do not count twice"
+    assert rate_hz(*bursts[:2]) == rate_hz(*bursts) == pytest.approx(100)

@@ -1,38 +1,37 @@
-"""What a person sees of a run: on a terminal a bar, the table so far and one sentence on Ctrl-C; in a log, lines."""
+"""What a person sees and types: on a terminal a bar, the table so far, one sentence on Ctrl-C; in a log, lines."""
 
 import os
+import sys
+from pathlib import Path
 
 import pytest
 
+from tactbench.core.cli.operator import TerminalOperator
 from tactbench.core.cli.progress import progress
 from tactbench.core.cli.run import tell_stopped
+from tactbench.core.errors import RigError
 from tests.conftest import Verbs
 from tests.core.cli.terminals import on_terminal
 
 RUN = ("-m", "tactbench", "run", "--sensor", "ideal")
 CURVATURE = (*RUN, "--task", "curvature", "--estimator", "logistic", "--repeats", "1")
-FORCE = (*RUN, "--task", "force", "--estimator", "ols", "--repeats")
+FORCE = (*RUN, "--task", "force", "--estimator", "ols", "--repeats", "2")
 
 
-def interrupted(folder, command, at):
-    """Press Ctrl-C once `at` is on the screen; return the exit code and the screen."""
+def interrupted(folder):
+    """Press Ctrl-C while the fifth recording is made; return the exit code and the screen."""
     folder.mkdir()
-    with on_terminal(command, cwd=folder, columns=140, lines=40) as terminal:
-        assert at in terminal.read_until(at)
+    with on_terminal(CURVATURE, cwd=folder, columns=140, lines=40) as terminal:
+        assert " 4/18" in terminal.read_until(" 4/18")
         os.write(terminal.ours, b"\x03")
         terminal.read_until(None)
         code = terminal.process.wait(60)
     return code, terminal.seen
 
 
-@pytest.mark.parametrize(
-    ("command", "at"),
-    [(CURVATURE, " 0/18"), (CURVATURE, " 4/18"), ((*FORCE, "1", "--estimator", "forest"), "/1")],
-    ids=["the first recording", "a later one", "evaluating"],
-)
-def test_ctrl_c_ends_it_with_one_sentence_and_the_next_run_continues(tmp_path, command, at):
+def test_ctrl_c_ends_it_with_one_sentence_and_the_next_run_continues(tmp_path):
     for attempt in range(3):  # Python drops an interrupt that comes while it is inside a destructor: rare
-        code, seen = interrupted(tmp_path / str(attempt), command, at)
+        code, seen = interrupted(tmp_path / str(attempt))
         if code == 130 and "Traceback" not in seen:
             break
     assert code == 130
@@ -41,13 +40,14 @@ def test_ctrl_c_ends_it_with_one_sentence_and_the_next_run_continues(tmp_path, c
     assert "KeyboardInterrupt" not in seen
     folder = tmp_path / str(attempt)
     finished = {path: path.read_bytes() for path in folder.rglob("*.h5")}
-    Verbs(folder, here=True)(*command[2:])
+    assert finished
+    Verbs(folder, here=True)(*CURVATURE[2:])
     assert {path: path.read_bytes() for path in finished} == finished, "what was finished is reused, not made again"
     assert not [path for path in folder.rglob("*") if path.suffix in (".partial", ".completing")]
 
 
 def test_the_table_so_far_comes_with_each_replicate_and_stays_off_the_end(tmp_path):
-    with on_terminal((*FORCE, "2"), cwd=tmp_path, columns=140, lines=40) as terminal:
+    with on_terminal(FORCE, cwd=tmp_path, columns=140, lines=40) as terminal:
         seen = terminal.read_until(None, 100)
         assert terminal.process.wait(60) == 0
     assert seen.index("recording and evaluating") < seen.index("RMSE")
@@ -77,3 +77,40 @@ def test_the_end_names_every_stopped_cell_and_how_to_look_into_it(capsys, tmp_pa
     assert "a/b/c: RuntimeError: two lines\\x1b[2J\n" in said.err, "a reason moves no cursor"
     assert f"tactbench why a/b/c --out {tmp_path} --again" in said.err
     assert max(len(line) for line in said.err.splitlines() if "a/b/d e" in line) < 260
+
+
+ASKS_TWICE = """
+from tactbench.core.cli.operator import TerminalOperator
+from tactbench.core.errors import RigError
+operator = TerminalOperator()
+operator.prompt("Place the cap.")
+print("placed", flush=True)
+try:
+    operator.prompt("Press.")
+except RigError as error:
+    print(error)
+"""
+
+
+def test_enter_answers_and_one_typed_before_does_not():
+    with on_terminal(["-c", ASKS_TWICE]) as terminal:
+        os.write(terminal.ours, b"\n")
+        assert "Place the cap." in terminal.read_until("Ctrl-C to end.")
+        os.write(terminal.ours, b"\n")
+        assert "Press." in terminal.read_until("Ctrl-C to end.")
+        os.write(terminal.ours, b"\x04")  # Ctrl-D; had the first Enter answered, the second would have answered this
+        said = terminal.read_until(None)
+        assert terminal.process.wait(30) == 0
+    assert "left without an answer" in said
+
+
+def test_without_a_terminal_somebody_has_to_be_there(monkeypatch):
+    with Path(os.devnull).open() as nothing:
+        monkeypatch.setattr(sys, "stdin", nothing)
+        with pytest.raises(RigError, match=r"Somebody has to be there: Place the cap\..*--yes"):
+            TerminalOperator().prompt("Place the cap.")
+
+
+def test_yes_goes_on(capsys):
+    TerminalOperator(yes=True).prompt("Place the cap.")
+    assert capsys.readouterr().err == "Place the cap.\n"

@@ -8,17 +8,15 @@ import numpy as np
 import pytest
 
 from tactbench.core.cost.ladder import climb
-from tactbench.core.cost.ladder_file import draw_ladder, write_ladder
-from tactbench.core.cost.task_score import quick_estimator
-from tactbench.core.errors import UnwritableError
+from tactbench.core.cost.ladder_file import write_ladder
 from tactbench.core.matrix.progress import Progress
 from tactbench.core.matrix.store import Store
 from tactbench.core.plugins.registry import load_registry
-from tactbench.core.spec.matrix import EstimatorChoice, MatrixSpec, TaskChoice
+from tactbench.core.spec.matrix import MatrixSpec
 from tests.core.evaluation.made import record
 from tests.here import IN_THIS_PROCESS
 
-QUICK = ("ols", "ridge", "knn", "svm", "forest-10", "mean")
+QUICK = ("ols", "ridge", "knn", "mean")
 
 
 def presses(folder, sessions=3, n=120):
@@ -32,18 +30,13 @@ def presses(folder, sessions=3, n=120):
     return folder
 
 
-def climbed(folder, store, *estimators, rounds=2, split=None):
-    choice = TaskChoice(name="force", protocol="deployable", split=split,
-                        estimators=tuple(EstimatorChoice(name=name) for name in estimators))  # fmt: skip
-    matrix = MatrixSpec(rig="replay", sensors=("made",), tasks=(choice,))
-    return climb(matrix, load_registry(), store, rounds=rounds, clock=time.perf_counter,
-                 progress=Progress(), recordings=folder, choice=IN_THIS_PROCESS)  # fmt: skip
-
-
 @pytest.fixture(scope="module")
 def ladder(tmp_path_factory):
     root = tmp_path_factory.mktemp("ladder")
-    return climbed(presses(root / "shelf"), Store(root / "out"), *QUICK, split="session")
+    task = {"name": "force", "protocol": "deployable", "split": "session", "estimators": QUICK}
+    matrix = MatrixSpec.model_validate({"rig": "replay", "sensors": ["made"], "tasks": [task]})
+    return climb(matrix, load_registry(), Store(root / "out"), rounds=2, clock=time.perf_counter, progress=Progress(),
+                 recordings=presses(root / "shelf"), choice=IN_THIS_PROCESS)  # fmt: skip
 
 
 def test_what_is_timed_is_what_was_scored_whatever_was_chosen_on_validation_data(ladder):
@@ -51,15 +44,8 @@ def test_what_is_timed_is_what_was_scored_whatever_was_chosen_on_validation_data
     for row in ladder.rows:
         assert row["status"] == "done", row["reason"]
         assert (row["ci_low"], row["ci_high"]) == (None, None), "three sessions carry no interval"
-        assert row["fit_s_q1"] <= row["fit_s"] <= row["fit_s_q3"]
-        assert 0 < row["latency_ms_p50"] <= row["latency_ms_max"]
-        assert row["answer_delay_ms"] == pytest.approx(sum(row["delay_parts_ms"].values()))
-        assert row["answer_delay_ms_q1"] <= row["answer_delay_ms"] <= row["answer_delay_ms_q3"]
-        assert (row["fits"], row["batches"]) == (2, 2)
         assert (row["n_train"], row["n_test"]) == (240, 120)
-        assert row["latency_n"] >= 40
-    assert ladder.about["fold"] == "2"
-    assert ladder.about["split"] == "session"
+    assert (ladder.about["fold"], ladder.about["split"]) == ("2", "session")
     by_name = {row["estimator"]: row for row in ladder.rows}
     assert max(value for key, value in by_name["ridge"]["chosen"].items() if key.startswith("k")) > 0
     assert by_name["mean"]["is_baseline"]
@@ -77,16 +63,3 @@ def test_the_files_say_what_the_table_says(ladder, tmp_path):
     assert json.loads(paths[0].read_text())["rows"] == json.loads(json.dumps(ladder.rows))
     with paths[1].open() as file:
         assert [float(row["fit_s"]) for row in csv.DictReader(file)] == [row["fit_s"] for row in ladder.rows]
-    figure = draw_ladder(ladder, [])
-    named = {text.get_text() for text in figure.legends[0].get_texts()}
-    assert named == {row["estimator"] for row in ladder.rows if not row["is_baseline"]}
-    (tmp_path / "file").write_text("")
-    with pytest.raises(UnwritableError, match="--out"):
-        write_ladder(ladder, tmp_path / "file")
-
-
-def test_the_quick_estimator_is_linear_searches_nothing_and_is_no_trivial_one():
-    registry = load_registry()
-    for task in ("force", "curvature"):
-        chosen = registry.estimators[quick_estimator(registry, task)]
-        assert (chosen.linear, chosen.grid, chosen.baseline) == (True, {}, False)

@@ -1,16 +1,21 @@
-"""Timing in turns: on a clock that only the estimators move, every figure is exact."""
+"""Timing in turns, on a clock that only the estimators move: every figure is exact. Fronts of what was timed."""
 
 import gc
+import math
 from dataclasses import replace
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 from threadpoolctl import threadpool_info
 
 from tactbench.core.cost.ladder import by_score, mark_fronts, timed
+from tactbench.core.cost.precision import precise, quickest_enough
 from tactbench.core.cost.rounds import WARM_UP_ROWS, TimedEstimator, Timing, measure
 from tactbench.core.evaluation.metrics import metric_called
 from tactbench.core.matrix.progress import Progress
+from tactbench.plugin.simulation import CostPoint
 
 N = 1000
 BINARY = 2.0**-10  # durations that add up without rounding
@@ -34,16 +39,15 @@ class Worker:
         self.takes = {"fit": fit_s, "batch": batch_s, "row": row_s}
 
     def _work(self, what):
-        threads = max(pool["num_threads"] for pool in threadpool_info())
-        self.clock.log.append((self.name, what, gc.isenabled(), threads))
-        took = self.takes[what]
-        self.clock.now += next(took) if hasattr(took, "__next__") else took
+        self.clock.log.append((self.name, what, gc.isenabled()))
+        self.clock.now += self.takes[what]
 
     def fit(self, X, y):
         if len(X) <= WARM_UP_ROWS:
             self.clock.now += 300.0  # a library imports something late
             return
         self._work("fit")
+        assert max(pool["num_threads"] for pool in threadpool_info()) == 1
         if sum(entry[:2] == (self.name, "fit") for entry in self.clock.log) == self.broken_fit:
             raise RuntimeError("broken")
 
@@ -61,42 +65,42 @@ def timed_estimator(clock, name, *, fit_s=512 * BINARY, batch_s=256 * BINARY, ro
     )  # fmt: skip
 
 
-def run(clock, *timed_estimators, rounds=5):
-    named = {one.name: one for one in timed_estimators}
-    return measure(named, rounds=rounds, seed=3, clock=clock, progress=Progress())
-
-
-def test_times_are_those_taken_each_in_every_round_in_changing_order_without_collections_on_one_thread():
+@pytest.fixture(scope="module")
+def three_rounds():
+    """What four estimators took, and the clock: two slow ones, and one that breaks in its second fit."""
     clock = Clock()
-    names = ["a", "b", "c", "d"]
-    slow = {"fit_s": 2.0, "batch_s": 0.5, "row_s": 0.25}
-    found = run(clock, *(timed_estimator(clock, name, **(slow if name == "b" else {})) for name in names))
-    assert (found["a"].fit_s, found["a"].batch_s) == ([512 * BINARY] * 5, [256 * BINARY] * 5)
-    assert found["a"].latency_s == [BINARY] * (5 * 200)
-    assert (found["b"].fit_s, found["b"].batch_s) == ([2.0] * 5, [0.5] * 5)
-    assert found["b"].latency_s == [0.25] * (5 * 20), "twenty calls a round where they take longer than 0.3 s"
-    turns = [name for name, what, *_ in clock.log if what == "fit"]
-    rounds = [turns[place : place + 4] for place in range(0, 20, 4)]
-    assert all(sorted(one) == names for one in rounds)
-    assert len({tuple(one) for one in rounds}) > 1
-    assert {(collecting, threads) for *_, collecting, threads in clock.log} == {(False, 1)}
+    some = {"a": {}, "slow": {"fit_s": 2.0, "batch_s": 0.5, "row_s": 0.25}, "weak": {"broken_fit": 2},
+            "too slow": {"fit_s": 21.0, "batch_s": 22.0}}  # fmt: skip
+    estimators = {name: timed_estimator(clock, name, **more) for name, more in some.items()}
+    return measure(estimators, rounds=3, seed=0, clock=clock, progress=Progress()), clock
+
+
+def test_times_are_those_taken(three_rounds):
+    found, _ = three_rounds
+    assert (found["a"].fit_s, found["a"].batch_s) == ([512 * BINARY] * 3, [256 * BINARY] * 3)
+    assert found["a"].latency_s == [BINARY] * (3 * 200)
+    assert (found["slow"].fit_s, found["slow"].batch_s) == ([2.0] * 3, [0.5] * 3)
+    assert found["slow"].latency_s == [0.25] * (3 * 20), "twenty calls a round where they take longer than 0.3 s"
+
+
+def test_each_is_timed_in_every_round_in_changing_order_without_collections(three_rounds):
+    _, clock = three_rounds
+    turns = [name for name, what, _ in clock.log if what == "fit" and name in ("a", "slow")]
+    assert {tuple(turns[place : place + 2]) for place in (0, 2, 4)} == {("a", "slow"), ("slow", "a")}
+    assert not any(collecting for *_, collecting in clock.log)
     assert gc.isenabled()
 
 
-def test_a_fit_beyond_the_budget_is_done_once_and_its_row_says_so():
-    clock = Clock()
-    slow = timed_estimator(clock, "slow", fit_s=21.0, batch_s=22.0)
-    found = run(clock, slow, timed_estimator(clock, "a"))
-    assert (found["slow"].fit_s, found["slow"].batch_s, len(found["a"].fit_s)) == ([21.0], [22.0], 5)
-    row = timed(slow, found["slow"])
+def test_a_fit_beyond_the_budget_is_done_once_and_its_row_says_so(three_rounds):
+    slow = three_rounds[0]["too slow"]
+    assert (slow.fit_s, slow.batch_s) == ([21.0], [22.0])
+    row = timed(timed_estimator(Clock(), "too slow"), slow)
     assert (row["fits"], row["batches"]) == (1, 1)
 
 
-def test_an_estimator_that_breaks_ends_its_own_timing_only():
-    clock = Clock()
-    found = run(clock, timed_estimator(clock, "weak", broken_fit=3), timed_estimator(clock, "a"))
-    assert (str(found["weak"].trouble), len(found["weak"].fit_s)) == ("broken", 2)
-    assert (found["a"].trouble, len(found["a"].fit_s)) == (None, 5)
+def test_an_estimator_that_breaks_ends_its_own_timing_only(three_rounds):
+    weak = three_rounds[0]["weak"]
+    assert (str(weak.trouble), len(weak.fit_s)) == ("broken", 1)
 
 
 def test_a_row_has_medians_quartiles_and_every_part_of_the_delay():
@@ -106,7 +110,6 @@ def test_a_row_has_medians_quartiles_and_every_part_of_the_delay():
     assert (found["fit_s_q1"], found["fit_s"], found["fit_s_q3"], found["fits"]) == (2.0, 3.0, 4.0, 5)
     assert found["batch_s_per_row"] == 2.0 / N
     assert found["answer_delay_ms"] == pytest.approx(4.0 + 0.5 + 5.0 + 0.3 + 0.1)
-    assert found["answer_delay_ms"] == pytest.approx(sum(found["delay_parts_ms"].values()))
     assert (found["latency_ms_p95"], found["latency_ms_max"]) == (None, 50.0), "too few calls: the largest"
     unknown = timed(timed_estimator(Clock(), "a"), times)
     assert (unknown["answer_delay_ms"], unknown["answer_delay_ms_q1"]) == (None, None)
@@ -135,3 +138,32 @@ def test_fronts_are_of_what_is_better_than_the_best_answer_from_nothing(higher, 
     assert [one["estimator"] for one in rows if one["front_delay"]] == ["good"]
     names = [one["estimator"] for one in by_score(rows, higher_is_better=higher)]
     assert names == ["time", "good", "slower", "quick", "no better", "mean", "gone"]
+
+
+def cost_point(seconds, error, *, default=False, floor=0.3):
+    return CostPoint(
+        subject="pad", observable="taxel", label="way", seconds=seconds, error=error, worst=2 * error, unit="count",
+        floor=floor, default=default, settings={"family": "newton"},
+    )  # fmt: skip
+
+
+POSITIVE = st.floats(1e-6, 1e3)
+
+
+@given(st.lists(st.tuples(POSITIVE, POSITIVE), min_size=1, max_size=20))
+def test_the_front_is_beaten_by_nobody_and_beats_everybody_else(pairs):
+    points = [cost_point(*pair) for pair in pairs]
+    best = precise(points)
+    for point in points:
+        beaten = any(o.seconds <= point.seconds and o.error <= point.error for o in best)
+        assert beaten
+    for one in best:
+        assert not any(o.seconds < one.seconds and o.error <= one.error for o in points)
+    assert [p.error for p in best] == sorted((p.error for p in best), reverse=True)
+
+
+def test_the_quickest_point_that_will_do():
+    quick, default, slow = cost_point(0.1, 0.5), cost_point(0.2, 0.05, default=True), cost_point(1.0, 0.01)
+    assert quickest_enough([quick, default, slow]) is default
+    assert quickest_enough([quick, cost_point(0.2, 0.2)]) is None
+    assert quickest_enough([cost_point(1, 1, floor=math.inf)]) is None, "no noise is stated"

@@ -1,7 +1,5 @@
 """Rows made by hand, with every key of the format."""
 
-import numpy as np
-
 from tactbench.core.matrix.plan import Cell
 from tactbench.core.matrix.solve import opening
 from tactbench.core.spec.task import LabelTarget, TaskSpec
@@ -20,13 +18,3 @@ def row(sensor="a", estimator="lasso", score=0.5, **more):
         "latency_ms_p95": 0.03, "simulated": True, "ci_method": "block bootstrap",
     }  # fmt: skip
     return filled | more
-
-
-def resampled(name, shift, rng, sessions=12, **more):
-    """A row whose squared errors are kept by session: metric `rmse`."""
-    squares = (1.0 + shift + 0.3 * rng.standard_normal(sessions)) ** 2
-    sums = [[10.0, 10.0 * float(square)] for square in squares]
-    score = float(np.sqrt(squares.mean()))
-    names = [f"session {place}" for place in range(sessions)]
-    return row(name, score=score, ci_low=score - 0.2, ci_high=score + 0.2, key="k",
-               replicates={"unit": "session", "names": names, "strata": None, "sums": sums}, **more)  # fmt: skip

@@ -7,12 +7,9 @@ from tactbench.core.spec.status import STATUSES
 from .rows import row
 
 HOSTILE = (
-    "\x1b[31mred\x1b[0m", "a|b\\|c", "[link](javascript:x)", "<script>alert(1)</script>", "=1+1",
-    "**bold** _a_ `code` ~~x~~",
-    "\\\\ \\end{table} \\input{x}", "$x$ #1 %c ^2 & ~ {}", "line\nbreak", "\u202eright to left", "\ud800",
-    "é ï ø 中 😀",
-    "-- `` ?`", "# heading #", "&lt;&#38;", "1. one", "", " ", "\x85\u2028\x9b", "[bold red]a[/]", ":smile:",
-    '"a", b;c\td',
+    "\x1b[31mred\x1b[0m", "a|b\\|c", "[link](javascript:x)", "<b>&lt;</b>", "=1+1", "**bold** _a_ `code` ~~x~~",
+    "\\\\ \\end{table}", "$x$ #1 %c ^2 & ~ {}", "line\nbreak\u2028", "\u202eleft", "\ud800", "é 中 😀", "-- `` ?`",
+    "# heading #", "1. one", "", " ", "[bold red]a[/]", ":smile:", '"a", b;c\td',
 )  # fmt: skip
 
 texts = st.one_of(
@@ -20,7 +17,6 @@ texts = st.one_of(
 )
 numbers = st.floats(-1e6, 1e6)
 times = st.one_of(st.none(), st.floats(0, 1e5))
-counts = st.one_of(st.none(), st.integers(0, 10**7))
 
 
 @st.composite
@@ -55,9 +51,6 @@ def one_row(draw, place):
         "ci_low": low if done else None,
         "ci_high": high if done else None,
         "published": draw(st.one_of(st.none(), numbers)),
-        "n_test": draw(counts),
-        "host": draw(st.sampled_from(["", "one", "two"])),
-        "concurrency": draw(st.sampled_from([None, 1, 4])),
-        **{key: draw(times) for key in ("sim_s", "fit_s", "predict_s", "latency_ms_p50", "latency_ms_p95")},
+        **{key: draw(times) for key in ("sim_s", "fit_s", "latency_ms_p50")},
     }
     return row(draw(texts), draw(texts), **more)

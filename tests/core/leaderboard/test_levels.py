@@ -7,8 +7,6 @@ import pytest
 from tactbench.core.leaderboard.levels import (
     OTHER_VERSION,
     identity_of,
-    merge_levels,
-    read_levels,
     write_level,
 )
 from tactbench.core.matrix.store import Store
@@ -25,17 +23,6 @@ def kept(tmp_path):
         store.begin(MADE_WITH)
         made.kept(store, "pad/force/twin/karl2016/mean/1", sensor="pad", simulated=False)
     return tmp_path / "kept"
-
-
-def test_of_two_folders_the_lower_level_of_a_sensor_is_kept_in_whatever_order(tmp_path):
-    for name, sensor, level in (("a", "pad", "gold"), ("b", "pad", "bronze"), ("b", "skin", "silver")):
-        (tmp_path / name).mkdir(exist_ok=True)
-        write_level(tmp_path / name, sensor, {"level": level})
-    for number, order in enumerate((["a", "b", "nowhere"], ["b", "a"])):
-        (tmp_path / str(number)).mkdir()
-        merge_levels([tmp_path / name for name in order], tmp_path / str(number))
-        found = {sensor: one["level"] for sensor, one in read_levels(tmp_path / str(number)).items()}
-        assert found == {"pad": "bronze", "skin": "silver"}
 
 
 def test_check_keeps_the_level_and_every_table_shows_it(verbs, kept):

@@ -44,16 +44,12 @@ FEW = "too few recordings for the first frame"
         ([classed(0.95), classed(0.425, "first-frame")], "PART"),
         ([classed(0.95), classed(0.40, "first-frame")], "no leak shown"),
         ([erring(1.0), erring(2.0, "first-frame")], "LEAK"),
-        ([erring(1.0), erring(5.6, "first-frame")], "PART"),
         ([erring(1.0), erring(9.9, "first-frame", ci_low=9.0, ci_high=10.5)], "no leak shown"),
         ([erring(1.0), erring(2.0, "first-frame", n_test=4)], FEW),
-        ([erring(1.0), erring(2.0, "first-frame", ci_low=None, ci_high=None)], FEW),
         ([classed(0.88), classed(0.86, "first-frame"), classed(0.99, split="shuffled")], "LEAK, OPTIMISTIC"),
         ([classed(0.88), classed(0.94, split="shuffled")], "OPTIMISTIC"),
         ([classed(0.88), classed(0.90, split="shuffled")], "no leak shown"),
-        ([classed(0.88), classed(0.70, split="shuffled")], "no leak shown"),
         ([erring(1.0), erring(0.5, split="shuffled")], "OPTIMISTIC"),
-        ([erring(1.0), erring(0.9, split="shuffled")], "no leak shown"),
         (
             [classed(0.95, ci_low=None, ci_high=None), classed(0.99, split="shuffled")],
             "no interval for shuffled rows",
@@ -82,7 +78,6 @@ def test_a_probe_that_makes_no_sense_says_why():
     [
         ({"mean": 10.0, "time-index": 0.9}, "TRIVIAL"),
         ({"time-index": 1.1, "mean": 10.0}, "TRIVIAL?"),
-        ({"mean": 0.5, "time-index": 0.9}, "TRIVIAL"),
         ({"mean": 10.0, "time-index": 3.0}, "no leak shown"),
     ],
 )

@@ -1,6 +1,5 @@
 """What is said above and below a table is true of its rows; docs/tables.md has the list."""
 
-import json
 import re
 
 import numpy as np
@@ -9,7 +8,6 @@ import scipy.stats
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tactbench.core.leaderboard.formats import json_array, plain_text
 from tactbench.core.leaderboard.table import build_table
 from tactbench.core.statistics.ranking import ranks as ranked
 from tactbench.core.statistics.replicates import over_replicates
@@ -19,27 +17,7 @@ from .rows import row
 RECORDED = {"simulated": False, "rig": "replay"}
 
 
-def answers(sensor, score, time_index, **more):
-    """An answer from readings, beside what the time alone gives on the same sensor, and a mean."""
-    return [
-        row(sensor, "forest", score, baseline=1.9, **more),
-        row(sensor, "time-index", time_index, is_baseline=True, looks_at="time", **more),
-        row(sensor, "mean", 1.9, is_baseline=True, looks_at="nothing", **more),
-    ]
-
-
-@pytest.mark.parametrize("more", [RECORDED, {}])
-def test_the_time_index_of_another_device_says_nothing_of_this_one_and_that_of_its_own_bars_it(more):
-    table = build_table([*answers("alike", 0.6, 0.17, **more), *answers("shuffled", 0.5, 1.85, **more)])
-    assert "these scores need no touch" not in " ".join(plain_text(table, 140).split())
-    ranks = {one["sensor"]: one["rank"] for one in json.loads(json_array(table)) if not one["is_baseline"]}
-    assert ranks == {"alike": None, "shuffled": 1}
-
-
-def test_one_session_is_not_said_of_five():
-    few = {**RECORDED, "n_replicates": 1, "replicate_unit": "session", "n_sessions": 5, "ci_low": None, "ci_high": None}
-    text = plain_text(build_table([row("a", **few), row("b", score=0.6, **few)]), 140)
-    assert not re.search("(one|1) session", text)
+ESTIMATORS = (["ols"], ["ols", "lasso"], ["ols", "time", "mean"], ["ols", "lasso", "forest", "time", "mean"])
 
 
 @st.composite
@@ -53,11 +31,7 @@ def boards(draw):
     common = 0.1 * rng.standard_normal(repeats)
     rows = []
     for sensor in draw(st.sampled_from(["a", "ab", "abc"])):
-        for estimator in draw(
-            st.sampled_from(
-                [["ols"], ["ols", "lasso"], ["ols", "time", "mean"], ["ols", "lasso", "forest", "time", "mean"]]
-            )
-        ):
+        for estimator in draw(st.sampled_from(ESTIMATORS)):
             spread = rng.choice([0.0, 0.01, 0.3])
             each = np.clip(rng.choice([0.3, 0.5, 0.8]) + common + spread * rng.standard_normal(repeats), 0.01, 0.99)
             more = {
@@ -173,15 +147,12 @@ class Truth:
         key = "beyond" if beyond else "scores"
         assert bool(beyond) == ("beyond" in first["replicates"])
         apart = self.sign * (np.array(second["replicates"][key]) - np.array(first["replicates"][key]))
-        assert [float(value), *map(float, (low, high))] == pytest.approx(self.student(apart), abs=6e-4)
+        # Student's interval of the mean.
+        half = scipy.stats.t.ppf(0.975, len(apart) - 1) * apart.std(ddof=1) / len(apart) ** 0.5
+        told = [apart.mean(), apart.mean() - half, apart.mean() + half]
+        assert [*map(float, (value, low, high))] == pytest.approx(told, abs=6e-4)
         assert all(one["score"] == np.median(one["replicates"]["scores"]) for one in (first, second))
         return (int(wins), int(count)) == ((apart > 0).sum(), len(apart))
-
-    @staticmethod
-    def student(values):
-        """The mean and Student's interval of it."""
-        half = scipy.stats.t.ppf(0.975, len(values) - 1) * values.std(ddof=1) / len(values) ** 0.5
-        return values.mean(), values.mean() - half, values.mean() + half
 
     def beside(self, text):
         where = None

@@ -8,9 +8,8 @@ from hypothesis import strategies as st
 
 from tactbench.core.errors import UnknownNameError
 from tactbench.core.leaderboard.formats import rendered
-from tactbench.core.leaderboard.notes import count_texts, picked
 from tactbench.core.leaderboard.table import build_table
-from tactbench.core.leaderboard.view import View, best, commands, grids, known_columns
+from tactbench.core.leaderboard.view import View, best, grids, known_columns
 
 from .rows import row
 from .strategies import some_rows
@@ -35,18 +34,6 @@ def lines(rows, *columns):
 def test_the_best_stands_first_and_equal_scores_share_a_place(scores, more, found):
     rows = [row(name, score=value, **more) for name, value in zip("abc", scores, strict=False)]
     assert lines(rows, "place", "sensor") == lines(rows[::-1], "place", "sensor") == found
-
-
-def test_trivial_answers_have_no_place_and_what_is_no_better_has_a_dash():
-    rows = [
-        row(),
-        row("a", "mean", 0.7),
-        row(estimator="ols", score=0.8),
-        row(estimator="x", score=None, status="failed"),
-    ]
-    assert lines(rows, "place", "estimator", "score") == [
-        ("1", "lasso", "0.5000"), ("–", "ols", "0.8000"), ("", "mean", "0.7000"), ("", "x", "FAILED"),
-    ]  # fmt: skip
 
 
 @settings(max_examples=40)
@@ -81,15 +68,6 @@ def test_shuffled_rows_and_probes_come_after_what_is_kept_apart():
     ] * 3
 
 
-def test_a_trivial_answer_stands_once_where_all_sensors_agree_on_its_digits():
-    rows = [row(name, estimator, score) for name in "ab" for estimator, score in (("lasso", 0.5), ("mean", 1.4))]
-    (grid,) = grids(build_table(rows))
-    assert [line[1:4] for line in grid.lines][2:] == [("", "mean", "1.4000")]
-    rows[1]["score"] = 1.3
-    (grid,) = grids(build_table(rows))
-    assert [line[1:4] for line in grid.lines][2:] == [("a", "mean", "1.3000"), ("b", "mean", "1.4000")]
-
-
 def test_columns_that_say_nothing_are_left_out_and_others_shown_if_asked_for():
     (grid,) = grids(build_table([row()]))
     assert grid.headers == ("place", "sensor", "estimator", "RMSE [N]", "95 % interval", "training")
@@ -101,16 +79,6 @@ def test_columns_that_say_nothing_are_left_out_and_others_shown_if_asked_for():
         known_columns(["scor"])
 
 
-def test_the_commands_name_the_folder_and_the_shortest_name_of_a_cell():
-    rows = [row(), row(protocol="karl2016", estimator="ols")]
-    (why, report, latex) = commands(build_table(rows), View(folder="my results"))
-    assert "tactbench why a/question/lasso --out 'my results'" in why
-    assert "tactbench report 'my results'" in report
-    assert "tactbench leaderboard 'my results' --format latex" in latex
-    rows.append(row(protocol="karl2016"))
-    assert "why a/question/twin/deployable:session/lasso " in commands(build_table(rows))[0]
-
-
 def test_the_best_of_each_sensor_keep_the_places_they_have_among_all():
     rows = [row(name, estimator, score=score) for name, estimator, score in (
         ("a", "lasso", 0.5), ("a", "ols", 0.6), ("b", "lasso", 0.7), ("b", "mean", 1.4),
@@ -118,13 +86,3 @@ def test_the_best_of_each_sensor_keep_the_places_they_have_among_all():
     (block,) = best(build_table(rows), 1).blocks
     assert [(line.texts["place"], line.texts["sensor"]) for line in block.lines] == [("1", "a"), ("3", "b")]
     assert "places among all" in block.setting
-
-
-def test_what_was_left_out_and_chosen_is_told_in_words():
-    counts = {f"{one} rows with T{n} beyond three sigma": n for one in ("training", "test") for n in range(7)}
-    counts |= {f"{one} rows before the press begins": 600 for one in ("training", "test")}
-    assert count_texts(counts) == [
-        "rows before the press begins: 1200",
-        "rows beyond three sigma in T6 12, T5 10, T4 8, T3 6 and 3 more channels",
-    ]
-    assert picked(row(chosen={"k": 40, "lambda_": 0.2})) == "k = 40, lambda_ = 0.2"

@@ -11,7 +11,6 @@ from tests.here import IN_THIS_PROCESS
 MATRIX = """\
 repeats: 1
 simulation: {rung: closed-form}  # the cheapest
-sensors: [icub]
 tasks:
   - name: force
     protocol: karl2016
@@ -23,9 +22,10 @@ tasks:
 """
 
 
-def make_results(folder):
-    """Run the matrix; the results are put into `folder`."""
-    run_matrix(MatrixSpec.model_validate(yaml.safe_load(MATRIX)), Store(folder), choice=IN_THIS_PROCESS)
+def make_results(folder, *sensors):
+    """Run the matrix for these sensors; the results are put into `folder`."""
+    matrix = MatrixSpec.model_validate({"sensors": sensors, **yaml.safe_load(MATRIX)})
+    run_matrix(matrix, Store(folder), choice=IN_THIS_PROCESS)
     return folder
 
 

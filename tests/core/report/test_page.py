@@ -1,6 +1,5 @@
 """The page, from real results."""
 
-import json
 import re
 
 import pytest
@@ -9,7 +8,6 @@ from tactbench.core.matrix.store import Store
 from tactbench.core.plugins.registry import load_registry
 from tactbench.core.report import results as sections
 from tactbench.core.report.cells import recording_scores
-from tactbench.core.report.costs import ladder_table
 from tactbench.core.report.page import make_page
 from tactbench.core.report.results import ReportData, Results, SavedFigure, open_results
 
@@ -124,26 +122,3 @@ def test_a_section_that_cannot_be_made_takes_no_other_with_it(material):
     assert len(page.broken) == 1
     assert page.broken[0].startswith("Details of each cell: This section cannot be made from these results: ")
     assert structure(page.html).count("[") >= 1
-
-
-def test_a_ladder_is_shown_as_the_terminal_shows_it(material, tmp_path):
-    about = {"sensor": "icub", "task": "force", "rig": "twin", "protocol": "karl2016", "split": "roles",
-             "metric": "rmse", "unit": "N", "remarks": [], "higher_is_better": False, "simulated": True,
-             "dagger": True, "rounds": 5, "threads": 1}  # fmt: skip
-    done = {"estimator": "lasso", "is_baseline": False, "status": "done", "reason": "", "score": 0.7, "ci_low": 0.6,
-            "ci_high": 0.8, "front_fit": True, "front_delay": False, "fit_s": 0.25, "fit_s_q1": 0.2,
-            "fit_s_q3": 0.3, "latency_ms_p50": 2.0, "latency_ms_p95": 4.0, "latency_ms_max": 5.0, "latency_n": 1000,
-            "answer_delay_ms": 8.5, "delay_parts_ms": {"sampling": 6.0, "link": 0.5, "prediction": 2.0},
-            "batch_s_per_row": 1e-6}  # fmt: skip
-    gone = {**done, **dict.fromkeys(("score", "fit_s")), "status": "skipped", "reason": "needs <it>"}
-    table = ladder_table({**about, "rows": [done, gone]})
-    assert table.title.startswith("icub, force: RMSE, lower is better · karl2016 † · split roles · SIM")
-    first, second = (dict(zip(table.columns, line, strict=True)) for line in table.lines)
-    assert (first["fit"], first["fit"].value, first["front"]) == ("250 ms", 0.25, "fit")
-    assert (first["delay"], first["delay"].value) == ("8.50 ms", 8.5)
-    assert second["remark"] == "skipped: needs <it>"
-    (tmp_path / "cost").mkdir()
-    (tmp_path / "cost" / "icub-force.json").write_text(json.dumps({**about, "rows": [done, gone]}))
-    page = make_page(ReportData(Results(Store(tmp_path), material.registry, material.rows)))
-    assert page.broken == ()
-    assert "needs &lt;it&gt;" in page.html

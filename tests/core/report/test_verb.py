@@ -37,15 +37,10 @@ def test_the_same_table_for_programs_and_the_same_page_in_another_folder(reporte
     assert page == (results / "report" / "index.html").read_bytes()
 
 
-def test_what_cannot_be_reported_or_written_is_one_sentence_with_the_next_step(reported, verbs):
-    done = verbs("report", "nowhere", code=2)
-    assert "There are no results in nowhere" in done.stderr
-    assert not (verbs.folder / "nowhere").exists()
-    verbs("run", "--repeats", "1", "--sensor", "icub", "--task", "grasp-stability")
-    assert "No cell in tactbench-results has finished" in verbs("report", code=2).stderr
-    there, _ = reported
-    (there.folder / "taken").write_text("a file, not a folder")
-    refused = there("report", "--out", "taken", code=2)
-    for one in (done, refused):
-        assert (one.stdout, one.stderr[:7]) == ("", "Error: ")
-    assert "--out" in refused.stderr
+def test_what_cannot_be_reported_or_written_is_one_sentence_with_the_next_step(reported):
+    verbs, _ = reported
+    (verbs.folder / "taken").write_text("a file, not a folder")
+    for words, says in (("nowhere",), "There are no results in nowhere"), (("--out", "taken"), "--out"):
+        refused = verbs("report", *words, code=2)
+        assert (refused.stdout, refused.stderr[:7]) == ("", "Error: ")
+        assert says in refused.stderr

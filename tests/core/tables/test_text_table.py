@@ -1,9 +1,14 @@
-"""Tables: what is sorted, what is left out, and how they are rendered."""
+"""Tables: what is sorted, what is left out, how they are rendered; text that would act is shown."""
 
 import math
+import shlex
+
+from hypothesis import given
+from hypothesis import strategies as st
 
 from tactbench.core.tables.markdown import markdown
 from tactbench.core.tables.terminal import plain_text
+from tactbench.core.tables.text import command_line, visible
 from tactbench.core.tables.text_table import Entry, TextTable, finite, sort_value, text_table
 
 
@@ -33,3 +38,25 @@ def test_a_narrow_terminal_leaves_columns_out_then_cuts_words_but_for_what_is_ty
     assert "y" * 20 in text
     assert text.count("x") == 60
     assert "Too narrow for: more." in text
+
+
+def test_controls_are_written_out():
+    shown = {
+        "plain é 中": "plain é 中", "\x1b[2J": "\\x1b[2J", "a\r\nb\tc": "a  b c", "\u202e": "\\u202e",
+        "\ud800": "\\ud800",
+        "\U000e0001": "\\U000e0001", "\u00a0": " ", "\x9b": "\\x9b",
+    }  # fmt: skip
+    assert {text: visible(text) for text in shown} == shown
+
+
+@given(st.text(st.characters(exclude_categories=())))
+def test_all_text_becomes_printable_once_and_for_all(text):
+    assert visible(text).isprintable()
+    assert visible(visible(text)) == visible(text)
+    visible(text).encode()
+
+
+def test_a_command_is_one_that_a_shell_reads_back_word_by_word():
+    words = ("tactbench", "why", "a/force,n=5/1; rm -rf ~", "--out", "two words")
+    assert shlex.split(command_line(*words)) == list(words)
+    assert "\x1b" not in command_line("tactbench", "why", "\x1b[2J")

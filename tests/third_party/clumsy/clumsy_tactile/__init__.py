@@ -14,6 +14,5 @@ def tactbench_estimators():
             ("breaks", "Breaks when it is taught"),
             ("tires", "Breaks when it is taught for the third time"),
             ("lacks", "Lacks something"),
-            ("wavers", "Is another one each time"),
         )
     ]

@@ -1,0 +1,120 @@
+"""``leaderboard``, ``compare`` and ``choose``: what they make of a result folder."""
+
+import csv
+import io
+import json
+
+import numpy as np
+import pytest
+
+from tactbench.core.cli.config import shipped_results
+from tactbench.core.matrix.store import Store
+from tests.conftest import Verbs
+from tests.core.cli.terminals import on_terminal
+from tests.core.matrix import made
+
+WISH = ("--task", "force", "--max-delay-ms", "2", "--range-n", "5", "--rate-hz", "10")
+
+
+@pytest.fixture(scope="module")
+def ran(tmp_path_factory):
+    """The verbs beside results of two sensors, one worse than the other: two answers and a trivial one, five times."""
+    verbs, rng = Verbs(tmp_path_factory.mktemp("ran")), np.random.default_rng(0)
+    with Store(verbs.folder / "out").hold() as store:
+        for sensor, worse in (("biotac", 0.2), ("icub", 0.0)):
+            for estimator, score in (("ols", 0.52), ("lasso", 0.5), ("mean", 1.5)):
+                for seed, one in enumerate((score + worse + 0.02 * rng.standard_normal(5)).tolist(), 1):
+                    named = {"sensor": sensor, "estimator": estimator, "is_baseline": estimator == "mean"}
+                    of_it = {"protocol": "deployable", "seed": seed, "repeat": seed, "repeats": 5, "fit_s": 1.0}
+                    cell = f"{sensor}/force/twin/deployable/{estimator}/{seed}"
+                    made.kept(store, cell, score=one, **named, **of_it)
+    return verbs
+
+
+def test_every_format_goes_to_a_file_named_for_it(ran):
+    for suffix, shape in ((".md", "md"), (".csv", "csv"), (".json", "json"), (".tex", "latex"), (".txt", "table")):
+        ran("leaderboard", "out", "--to", f"table{suffix}")
+        assert (ran.folder / f"table{suffix}").read_text() == ran("leaderboard", "out", "--format", shape).stdout
+    for suffix, begins in ((".xlsx", b"PK"), (".parquet", b"PAR1")):
+        ran("leaderboard", "out", "--to", f"table{suffix}")
+        assert (ran.folder / f"table{suffix}").read_bytes().startswith(begins)
+    assert ".xlsx" in ran("leaderboard", "out", "--to", "table.xls", code=2).stderr
+    assert not (ran.folder / "table.xls").exists()
+    assert "nowhere/table.md" in ran("leaderboard", "out", "--to", "nowhere/table.md", code=2).stderr
+
+
+def test_bytes_are_not_written_to_a_terminal(ran):
+    with on_terminal(["-m", "tactbench", "leaderboard", "out", "--format", "parquet"], cwd=ran.folder) as terminal:
+        assert "--to leaderboard.parquet" in terminal.read_until(None)
+        assert terminal.process.wait(30) == 2
+
+
+def test_rows_and_columns_are_chosen_by_name_and_unknown_names_are_refused_with_the_known(ran):
+    lasso = json.loads(ran("leaderboard", "out", "--estimator", "lasso", "--format", "json").stdout)
+    assert [(row["sensor"], row["estimator"]) for row in lasso] == [("icub", "lasso"), ("biotac", "lasso")]
+    assert lasso[0]["baseline"] is not None
+    best = ran("leaderboard", "out", "--best", "--columns", "sensor,estimator,cell").stdout
+    assert "icub    lasso      icub/force/twin/deployable/lasso\n" in best
+    assert "  ols  " not in best
+    for more, there in (((), True), (("--no-times",), False)):
+        assert ("fit_s" in ran("leaderboard", "out", *more, "--format", "csv").stdout) == there
+    for option, given, says in (("--sensor", "icup", "Known: biotac, icub"), ("--columns", "sensor,scor", "'score'")):
+        assert says in ran("leaderboard", "out", option, given, code=2).stderr
+    assert "always holds all columns" in ran("leaderboard", "out", "--columns", "#", "--format", "csv", code=2).stderr
+
+
+def test_two_sensors_are_compared_in_every_format(ran):
+    asked = ("compare", "biotac", "icub", "--out", "out")
+    assert "A = biotac, B = icub · force · RMSE [N] · deployable" in ran(*asked).stdout
+    records = json.loads(ran(*asked, "--format", "json").stdout)
+    assert {record["of"] for record in records} == {"ols", "lasso"}
+    assert all(record["declared"] and record["p_holm"] >= record["p"] for record in records), "by the default matrix"
+    assert all(record["low"] <= record["difference"] <= record["high"] for record in records)
+    lines = list(csv.DictReader(io.StringIO(ran(*asked, "--format", "csv").stdout)))
+    assert [float(line["difference"]) for line in lines] == [record["difference"] for record in records]
+    first = f"{abs(records[0]['difference']):.4f}"
+    for shape in ("table", "md", "latex"):
+        assert first in ran(*asked, "--format", shape).stdout
+
+
+def test_a_folder_against_itself_differs_nowhere_and_what_is_not_there_is_named(ran):
+    other = json.loads(ran("compare", "ols", "lasso", "--out", "out", "--format", "json").stdout)
+    assert not any(record["declared"] or record["p_holm"] for record in other)
+    records = json.loads(ran("compare", "out", "out", "--format", "json").stdout)
+    assert {(record["difference"], record["p"], record["paired"]) for record in records} == {(0.0, 1.0, True)}
+    for words, nearest in (("biotack", "icub"), "biotac"), (("biotac", "icub", "--task", "forse"), "force"):
+        assert nearest in ran("compare", *words, "--out", "out", code=2).stderr
+
+
+def test_results_of_ones_own_are_chosen_from_before_those_that_came_along(verbs):
+    shipped = verbs("choose", *WISH)
+    assert "results that came with tactbench" in shipped.stdout
+    assert "the force range of icub: not stated" in shipped.stdout
+    assert shipped.stderr == ""
+    with Store(verbs.folder / "tactbench-results").hold() as store:
+        made.kept(store, "icub/force/twin/karl2016/ols/1", estimator="ols", dagger=True)
+    shown = verbs("choose", *WISH).stdout
+    assert "protocol karl2016 †" in shown
+    assert "the results in tactbench-results" in shown
+    assert "tactbench run --sensor biotac --task force" in shown, "what is not known, and what to do"
+    # A task of which the folder has nothing is answered from what came along, unless the folder was asked for.
+    assert "came with tactbench" in verbs("choose", "--task", "curvature").stdout
+    assert "curvature" in verbs("choose", "tactbench-results", "--task", "curvature", code=2).stderr
+
+
+def test_a_choice_for_programs_has_the_wish_the_criteria_and_what_is_unknown(ran):
+    told = json.loads(ran("choose", "out", *WISH, "--score", "0.6", "--format", "json").stdout)
+    assert told["wish"] == {"max_delay_ms": 2, "range_n": 5, "rate_hz": 10, "score": 0.6}
+    (choice,) = told["choices"]
+    assert [one["sensor"] for one in choice["candidates"]] == ["icub", "biotac"]
+    for one in choice["candidates"]:
+        assert [criterion["wish"] for criterion in one["criteria"]] == ["answer delay", "force range", "rate", "score"]
+    assert choice["unknown"]
+
+
+def test_the_shipped_results_are_of_both_sensors_simulated():
+    rows = json.loads(shipped_results().read_text(encoding="utf-8"))["rows"]
+    asked = {(row["sensor"], row["task"], row["protocol"]) for row in rows if row["status"] == "done"}
+    assert asked == {(sensor, task, protocol) for sensor in ("biotac", "icub") for task in ("force", "curvature")
+                     for protocol in ("deployable", "karl2016")}  # fmt: skip
+    assert all(row["simulated"] for row in rows)

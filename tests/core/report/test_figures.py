@@ -1,0 +1,190 @@
+"""All figures of a folder: which there are, what stops none of them, and that they carry the numbers of its rows."""
+
+import shutil
+
+import numpy as np
+import pytest
+from matplotlib import rc_context
+from sklearn.metrics import confusion_matrix, f1_score
+
+from tactbench.core.matrix.progress import Progress
+from tactbench.core.matrix.run import run_matrix
+from tactbench.core.matrix.store import Store
+from tactbench.core.plugins.registry import load_registry
+from tactbench.core.report.figures import confusion, embedding_map, prediction_against_time, score_by_force
+from tactbench.core.report.figures.drawing import draw_figures
+from tactbench.core.report.figures.group import groups
+from tactbench.core.report.figures.published_and_ours import draw_published
+from tactbench.core.report.figures.style import styled
+from tactbench.core.report.published import reproduce
+from tactbench.core.report.results import Results, open_results
+from tactbench.core.spec.matrix import MatrixSpec
+from tests.here import IN_THIS_PROCESS
+
+from .results import make_results
+from .unrendered import unrendered
+
+PUBLISHED = ["published-and-ours"]
+FORCE = ["prediction-against-time", "residuals"]
+CURVATURE = ["confusion", "score-by-force", "embedding"]
+LOST = ("curvature", "forest", "ideal")
+
+
+@pytest.fixture(scope="module")
+def finished(tmp_path_factory):
+    """A result folder of two sensors that nobody may change."""
+    return make_results(tmp_path_factory.mktemp("finished") / "results", "icub", "ideal")
+
+
+@pytest.fixture
+def folder(finished, tmp_path):
+    """A result folder of one's own."""
+    return shutil.copytree(finished, tmp_path / "results")
+
+
+def opened(folder):
+    return open_results(Store(folder), load_registry())
+
+
+def group_of(folder, task):
+    (found,) = [group for group in groups(opened(folder), [].append) if group.task.name == task]
+    return found
+
+
+def draw(folder, out):
+    said = []
+    out.mkdir(exist_ok=True)
+    with pytest.MonkeyPatch.context() as patch:  # t-SNE takes most of the time of figures
+        patch.setattr(embedding_map, "ITERATIONS", 250)
+        patch.setattr(embedding_map, "AT_MOST", 100)
+        return draw_figures(opened(folder), out, Progress(), said.append), said
+
+
+def kinds(drawn):
+    return [next((kind for kind in FORCE + CURVATURE if one.name.startswith(kind)), one.name) for one in drawn]
+
+
+@pytest.fixture(scope="module")
+def all_of_it(finished, tmp_path_factory):
+    out = tmp_path_factory.mktemp("figures")
+    return *draw(finished, out), out
+
+
+def test_the_paper_s_figures_are_drawn_as_pdf_and_png_and_nothing_else(all_of_it):
+    drawn, said, out = all_of_it
+    assert kinds(drawn) == PUBLISHED + CURVATURE + FORCE
+    assert {path for one in drawn for path in (one.png, one.png.with_suffix(".pdf"))} == set(out.iterdir())
+    for one in drawn:
+        assert one.png.read_bytes().startswith(b"\x89PNG")
+        assert one.png.with_suffix(".pdf").read_bytes().startswith(b"%PDF")
+        assert "SIM: simulated" in one.caption
+        assert "†: each set, the test set too, is scaled by its own mean" in one.caption
+    assert [one.partition(";")[2] for one in said] == [" not shown: forest (max_depth=6, n_estimators=3)."]
+
+
+def test_the_same_bytes_again_whatever_the_user_s_style(all_of_it, finished, tmp_path):
+    with rc_context({"font.size": 30, "pdf.compression": 0, "lines.linewidth": 9}):
+        draw(finished, tmp_path / "again")
+    first = {path.name: path.read_bytes() for path in all_of_it[2].iterdir()}
+    assert {path.name: path.read_bytes() for path in (tmp_path / "again").iterdir()} == first
+
+
+def test_what_cannot_be_drawn_stops_no_other_figure(folder, tmp_path, all_of_it):
+    (name,) = (one.png.name for one in all_of_it[0] if one.name.startswith(FORCE[0]))
+    (tmp_path / "figures" / name).mkdir(parents=True)  # cannot be written
+    (lost,) = (r for r in opened(folder).rows if (r["task"], r["estimator"], r["sensor"]) == LOST)
+    (folder / "cells" / f"{lost['key']}.h5").write_bytes(b"no HDF5")
+    shutil.rmtree(folder / "recordings")  # those of the embedding
+    with unrendered():
+        drawn, said = draw(folder, tmp_path / "figures")
+    assert kinds(drawn) == [*PUBLISHED, *CURVATURE[:-1], FORCE[1]]
+    assert any(one.startswith("No prediction against time of force") for one in said)
+    assert any(f"{lost['key']}.h5" in one for one in said)
+
+
+def test_folds_have_figures_of_their_test_sets(finished, tmp_path):
+    trees = {"name": "forest", "params": {"n_estimators": 3, "max_depth": 6}}
+    asked = {"protocol": "deployable", "split": "shuffled", "estimators": [trees]}
+    tasks = [{"name": name, **asked} for name in ("curvature", "force")]
+    matrix = MatrixSpec.model_validate({"rig": "replay", "sensors": ["icub"], "tasks": tasks, "latency": False})
+    run_matrix(matrix, Store(tmp_path / "folds"), choice=IN_THIS_PROCESS, recordings=finished / "recordings")
+    with unrendered():
+        drawn, said = draw(tmp_path / "folds", tmp_path / "figures")
+    assert kinds(drawn) == ["confusion", "score-by-force", "residuals"]
+    assert all("‡: leaks" in one.caption for one in drawn)
+    assert len(said) == 2, "of training sets and of an embedding there are several"
+
+
+def drawn(make, group):
+    with styled():
+        return make.draw(group)
+
+
+def test_confusion_shows_the_row_s_own_counts_and_those_of_the_validation_set(finished):
+    group = group_of(finished, "curvature")
+    axes = drawn(confusion, group).figure.axes
+    for place, panel in enumerate(group.panels):
+        asked = panel.answers["validation"]
+        validation = confusion_matrix(asked.y_true, asked.y_pred, labels=range(5))
+        for here, role, table in zip(
+            axes[2 * place :], ("validation", "test"), (validation, np.array(panel.row["confusion"])), strict=False
+        ):
+            assert here.get_title() == f"{panel.sensor}, {role}"
+            shown = np.reshape([int(text.get_text()) for text in here.texts], (5, 5))
+            # Half a per cent: the numbers are whole per cents.
+            np.testing.assert_allclose(shown, 100 * table / table.sum(axis=1, keepdims=True), atol=0.5 + 1e-9)
+            assert [tick.get_text() for tick in here.get_yticklabels()] == ["5", "7.5", "10", "20", "40"]
+
+
+def test_prediction_against_time_shows_every_answer(finished):
+    group = group_of(finished, "force")
+    axes = drawn(prediction_against_time, group).figure.axes
+    for place, panel in enumerate(group.panels):
+        for column, role in enumerate(("train", "test")):
+            here, answers = axes[2 * place + column], panel.answers[role]
+            dots, line = here.get_lines()
+            np.testing.assert_array_equal(dots.get_ydata(), answers.y_true)
+            np.testing.assert_array_equal(line.get_ydata(), answers.y_pred)
+            np.testing.assert_array_equal(line.get_xdata(), answers.time_s)
+            error = np.sqrt(np.mean((answers.y_true - answers.y_pred) ** 2))
+            assert here.texts[0].get_text() == f"RMSE {error:.4f} N"
+
+
+def test_banded_scores_are_those_of_scikit_learn_on_the_same_rows(finished):
+    group = group_of(finished, "curvature")
+    lines = {line.get_label(): line for line in drawn(score_by_force, group).figure.axes[0].get_lines()}
+    for panel in group.panels:
+        test = panel.answers["test"]
+        force = score_by_force.smoothed_force(test)
+        scores, rows = score_by_force.banded(group, panel)
+        masks = (force < 1.5, (force >= 1.5) & (force < 3.0), force >= 3.0)
+        expected = [
+            f1_score(test.y_true[mask], test.y_pred[mask], labels=range(5), average="macro", zero_division=0.0)
+            for mask in masks
+        ]
+        assert rows == [mask.sum() for mask in masks]
+        # Sums of whole counts: only the order of a mean of five differs.
+        assert scores == pytest.approx(expected, rel=1e-12)
+        assert list(lines[panel.sensor].get_ydata()) == scores
+
+
+def test_each_number_stands_at_its_place(finished):
+    material = opened(finished)
+    rows = [
+        {**row, "ci_low": 0.95 * row["score"], "ci_high": 1.06 * row["score"]}
+        for row in material.rows
+        if row["status"] == "done"
+    ]
+    (axes,) = draw_published(Results(material.store, material.registry, tuple(rows))).figure.axes
+    lines = [line for line in reproduce(material.registry, rows) if line.row]
+    for marker, values in (
+        ("o", [line.row["score"] for line in lines]),
+        ("D", [line.published.score for line in lines]),
+    ):
+        marks = [mark for mark in axes.get_lines() if mark.get_marker() == marker]
+        assert [(mark.get_xdata()[0], mark.get_ydata()[0]) for mark in marks] == list(
+            zip(values, range(9), strict=False)
+        )
+    spans = [bar.get_segments()[0][:, 0] for bar in axes.collections]
+    # The bar is drawn from two differences.
+    np.testing.assert_allclose(spans, [(line.row["ci_low"], line.row["ci_high"]) for line in lines], rtol=1e-12)
