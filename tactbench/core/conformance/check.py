@@ -54,12 +54,11 @@ class CheckOutcome(NamedTuple):
     """What came of a check."""
 
     check: str
-    status: Literal["passed", "failed", "skipped", "expected"]
-    """`expected`: it failed, and is listed among the expected failures."""
+    status: Literal["passed", "failed", "skipped"]
     where: str = ""
     """The field or line at fault."""
     text: str = ""
-    """What is wrong, or why it was skipped; of an expected failure, the reason that is listed."""
+    """What is wrong, or why it was skipped."""
     advice: str = ""
     """What to do; empty where the plugin's code raised: `where` and `text` then say all that is known."""
 
@@ -86,12 +85,10 @@ class Subject:
         """What the plugin's hook gives in this very process; CheckFailed if it does not."""
         try:
             offered = ask_plugin(EntryPoint("checked", self.module, hookspecs.GROUP))[f"{self.kind}s"]
-        except (PluginError, KeyError) as error:
-            raise CheckFailed(self.module, f"its hook tactbench_{self.kind}s does not answer: {error}") from error
-        for descriptor in offered:
-            if descriptor.name == self.name:
-                return descriptor
-        raise CheckFailed(self.module, f"its hook tactbench_{self.kind}s does not give {self.name!r} again")
+            return next(one for one in offered if one.name == self.name)
+        except (PluginError, KeyError, StopIteration) as error:
+            text = f"its hook tactbench_{self.kind}s does not give {self.name!r} again: {error}"
+            raise CheckFailed(self.module, text) from error
 
     @property
     def spec(self) -> Any:

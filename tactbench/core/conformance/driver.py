@@ -3,200 +3,149 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass, field
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from tactbench.core.conformance.check import CheckFailed, Subject, check, code_of, fail, skip
-from tactbench.core.conformance.press import RATE_SHARE, UNITS_OF_TIME, marks_of, named_unit
+from tactbench.core.conformance.streams import BAD, good, joined, likely, marks_of, times_are_right
 from tactbench.core.errors import LinkError, RigError, UsageError
-from tactbench.core.samples import Quality
+from tactbench.core.samples import Quality, StreamData
 from tactbench.core.spec.rig import DeviceDescriptor
 from tactbench.core.spec.rig_file import EMULATED, DeviceEntry
 from tactbench.core.spec.sensor import ChannelSpec
 from tactbench.devices.driver import Driver, DriverSettings
-from tactbench.links.byte_link import ByteLink
-from tactbench.links.link import Link, Received
+from tactbench.links.link import Clock, Link
 
 if TYPE_CHECKING:
-    import numpy.typing as npt
-
-    from tactbench.core.samples import FloatArray, IntArray
+    from tactbench.core.samples import Block
+    from tactbench.devices.emulation.emulated_devices import EmulatedDevices
     from tactbench.devices.emulator import Senses
 
-READ_S, WAIT_S, AHEAD_S, SHORT_S = 1.0, 0.1, 0.1, 0.005
-"""How long a driver is read, how long one read waits, by how much time goes on between two reads that find several
-frames at once, and how long a read takes that does not wait."""
+READ_S, WAIT_S, SHORT_S = 1.0, 0.1, 0.005
+"""How long a driver is read, how long one read waits, and how long a read takes that does not wait."""
+RATED_S, LATE = 3.0, 0.05
+"""How long it is read where rate and noise are looked at; and by which share its times may span more or less."""
 BEFORE_S = 2.0
-"""What the host's clock says when a driver is made, so that units of time can be told apart."""
-WRAP_ROWS, MOST_WRAP_ROWS = 600, 140_000
-"""Rows in which a counter of 8 bits wraps twice; and of 16 bits."""
+"""What the host's clock says when a driver is made: frames wait before the start."""
+WRAPS = ((600, 0.0), (140_000, 1.0))
+"""Rows in which a counter of 8 bits wraps twice, and of 16 bits; and seconds between two reads."""
 UNPLUGGED_S, GONE_AT_S = 5.0, 2 * BEFORE_S
 MOST_STILL = 1000
 """Reads that may come back at one moment: of a device that sends a thousand samples at once."""
-BAD = Quality.MISSING | Quality.SUSPECT
 LEVELS = 8
-"""Readings by which channels are told apart, evenly over 0.1 to 0.9 of their range: more channels take several
-rounds, so that the tolerance follows the spacing however many there are."""
-SIZES = (1, 2, 5, 20, 40, 65536)
-"""Bytes of the pieces in which a stream comes: parts of frames, and several frames at once."""
+"""Readings by which channels are told apart, evenly over the middle of their range: more channels take several rounds,
+so that the tolerance follows the spacing however many there are."""
+MOVING_HZ, STALE = 997.3, 0.1
+"""How fast readings run through their range where no two rows are alike, and the share that may be by chance."""
+SIZES, HELD_S, APART_S = (1, 2, 5, 20, 40, 65536), 0.1, 1e-6
+"""Bytes of the pieces in which a stream comes: parts of frames, and several frames at once; for how long an adapter
+holds them back; and how far apart it hands them over."""
 DAMAGE_EVERY, DAMAGE = 16, 5
-"""Reads after which bytes are damaged, and how many of them are lost, with one of 0xFF in their place."""
+"""Pieces after which bytes are damaged, and how many of them are lost, with one of 0xFF in their place."""
 LOAD_N, READ_N, OVERLOAD_N, STILL_M = 0.5, 0.02, 1e6, 1e-5
 """Load of a force channel, a step of its converter and its noise, more than any sensor bears, and by how much the
 position of a motor at rest may change (assumed: an increment of its drive, twice)."""
 
 
-class _Pieces(ByteLink):
-    """A byte stream that comes in other pieces, after `change` on its way to the driver."""
+class _Adapter:
+    """An emulated device behind a serial adapter that holds bytes back, and hands them over cut anywhere.
 
-    def __init__(self, inner: ByteLink, change: Callable[[bytes], bytes]) -> None:
-        super().__init__(inner.address, inner._clock)
-        self._inner, self._change, self._left = inner, change, Received(b"", 0)
-        self._sizes = itertools.cycle(SIZES)
+    `change` is what becomes of each of the device's own pieces on the way.
+    """
 
-    def timer(self) -> float:
-        return self._inner.timer()
+    def __init__(self, inner: Any, change: Callable[[bytes], bytes]) -> None:
+        self._inner, self._change, self._sizes = inner, change, itertools.cycle(SIZES)
 
-    def read(self, timeout_s: float, *, size: int = 65536) -> Received:
-        if not self._left.data:
-            first = self._inner.read(timeout_s)
-            data = self._change(first.data)
-            with suppress(LinkError):
-                while True:
-                    data += self._change(self._inner.read(0.0).data)
-            self._left = Received(data, first.t_ns)
-        count = min(size, next(self._sizes))
-        given, rest = self._left.data[:count], self._left.data[count:]
-        self._left = Received(rest, self._left.t_ns)
-        return Received(given, self._left.t_ns)
+    def feed(self, piece: Any, now_s: float) -> list[tuple[float, bytes]]:
+        return self._cut(self._inner.feed(piece, now_s), now_s)
 
-    def write(self, data: bytes) -> None:
-        self._inner.write(data)
+    def poll(self, now_s: float) -> list[tuple[float, bytes]]:
+        return self._cut(self._inner.poll(now_s), now_s)
 
-    def discard(self) -> None:
-        self._left = Received(b"", 0)
-        self._inner.discard()
+    def next_s(self) -> float:
+        import numpy as np
 
-    def _release(self) -> None:
-        self._inner.close()
+        return HELD_S * float(np.ceil(self._inner.next_s() / HELD_S))
 
-
-class Line:
-    """Opens a driver's link and counts: what was opened must be closed."""
-
-    def __init__(self, opener: Any, change: Callable[[bytes], bytes] | None = None) -> None:
-        self._opener, self._change = opener, change
-        self.opened: list[Link] = []
-
-    def __call__(self) -> Link:  # noqa: D102  (a driver's `open_link`)
-        link: Link = self._opener()
-        if self._change is not None and isinstance(link, ByteLink):
-            link = _Pieces(link, self._change)
-        self.opened.append(link)
-        return link
-
-    @property
-    def still_open(self) -> int:
-        """How many of them are still open."""
-        return sum(not link._closed for link in self.opened)
-
-
-@dataclass
-class Rows:
-    """What was read of one stream."""
-
-    data: list[FloatArray] = field(default_factory=list)
-    """NaN where it is marked as missing or suspect."""
-    t_ns: list[IntArray] = field(default_factory=list)
-    sequence: list[IntArray] = field(default_factory=list)
-    marks: list[npt.NDArray[Any]] = field(default_factory=list)
-
-    def __len__(self) -> int:
-        return sum(map(len, self.data))
+    def _cut(self, sent: Iterable[tuple[float, bytes]], now_s: float) -> list[tuple[float, bytes]]:
+        data = b"".join(self._change(piece) for _, piece in sent)
+        pieces = list[tuple[float, bytes]]()
+        while data:
+            size = next(self._sizes)
+            pieces.append((now_s + APART_S * len(pieces), data[:size]))
+            data = data[size:]
+        return pieces
 
 
 class Opened:
-    """A driver that is open, and how time goes on: on its emulator in virtual time, or by itself."""
+    """A driver that is open, on its emulator in virtual time or on a real line.
 
-    def __init__(
-        self, subject: Subject, clock: Callable[[], int], advance: Callable[[int], None], line: Line, driver: Driver
-    ) -> None:
-        self.subject, self.now_ns, self.line, self.driver = subject, clock, line, driver
-        self._advance = advance
+    Attributes
+    ----------
+    links
+        Those that it has opened.
+    """
 
-    def go_on(self, seconds: float) -> None:
-        """Let time go on without a read."""
-        self._advance(self.now_ns() + round(seconds * 1e9))
+    def __init__(self, subject: Subject, open_link: Callable[[], Link], options: dict[str, Any], clock: Clock) -> None:
+        self.subject, self.now_ns, self.links = subject, clock, list[Link]()
+
+        def opened() -> Link:
+            self.links.append(open_link())
+            return self.links[-1]
+
+        streams = () if isinstance(subject.descriptor, DeviceDescriptor) else subject.descriptor.spec.streams
+        with code_of("driver", subject):
+            self.driver: Driver = subject.code("driver")(DriverSettings(opened, streams, options, clock))
 
     def start(self) -> None:
         """Start the driver."""
         with code_of("driver.start", self.subject):
             self.driver.start()
 
-    def read(self, seconds: float = READ_S, ahead_s: float = 0.0, rows: int = 0) -> dict[str, Rows]:
-        """Read for some time, or until each stream has so many `rows`; look at every block."""
-        read = {stream.name: Rows() for stream in self.driver.streams}
-        for _ in passing(self.now_ns, seconds):
-            self.go_on(ahead_s)
+    def read(
+        self, seconds: float = READ_S, rows: int = 0, before: Callable[[], object] = lambda: None
+    ) -> dict[str, StreamData]:
+        """Read for some time, or until each stream has so many `rows`, each time after `before`; return what came."""
+        blocks: list[Block] = []
+        left = {stream.name: rows for stream in self.driver.streams}
+        until_ns, before_ns, still = self.now_ns() + round(seconds * 1e9), -1, 0
+        while (now_ns := self.now_ns()) < until_ns and (not rows or max(left.values()) > 0):
+            still = still + 1 if now_ns == before_ns else 0
+            if still > MOST_STILL:
+                fail("driver.read", "time stands still: it returns at once, and nothing is waited for")
+            before_ns = now_ns
+            before()
             with code_of("driver.read", self.subject):
-                blocks = self.driver.read(WAIT_S)
-            take(self.driver, blocks, read)
-            if rows and min(map(len, read.values())) >= rows:
-                break
-        return read
+                came = list(self.driver.read(WAIT_S))
+            blocks += came
+            for block in came if rows else ():
+                left[block.stream] -= len(block.data)
+        return joined("driver.read", self.driver.streams, blocks)
 
-
-def passing(clock: Callable[[], int], seconds: float) -> Iterator[None]:
-    """Yield until so much time of a clock has passed; CheckFailed where it stands still."""
-    until_ns, before_ns, still = clock() + round(seconds * 1e9), -1, 0
-    while (now_ns := clock()) < until_ns:
-        still = still + 1 if now_ns == before_ns else 0
-        if still > MOST_STILL:
-            fail("driver.read", "time stands still: it returns at once, and nothing is waited for")
-        before_ns = now_ns
-        yield
-
-
-def take(driver: Driver, blocks: Any, read: dict[str, Rows]) -> None:
-    """Append blocks to what was read; fail where they are not as blocks must be."""
-    import numpy as np
-
-    if not isinstance(blocks, list):
-        fail("driver.read", f"it returned a {type(blocks).__name__}, and a list of Blocks is needed")
-    width = {stream.name: len(stream.channels) for stream in driver.streams}
-    for block in blocks:
-        if block.stream not in width:
-            fail("driver.read", f"a block of {block.stream!r}, which is none of its streams")
-        if np.shape(block.data) != (len(block.data), width[block.stream]):
-            fail("driver.read", f"a block of {block.stream} has shape {np.shape(block.data)}")
-        values, own = np.asarray(block.data, dtype=np.float64), read[block.stream]
-        marks = marks_of(block)
-        if not np.isfinite(values[(marks & BAD) == 0]).all():
-            fail("driver.read", f"a block of {block.stream} holds values that are not finite and not marked")
-        own.data.append(np.where((marks & BAD) != 0, np.nan, values))
-        own.marks.append(marks)
-        for name, found in (("t_ns", own.t_ns), ("sequence", own.sequence)):
-            counted = getattr(block, name)
-            if counted is not None:
-                if np.shape(counted) != (len(block.data),):
-                    fail(f"driver.read: {name}", f"shape {np.shape(counted)} for {len(block.data)} rows")
-                found.append(np.asarray(counted))
+    def closed(self) -> None:
+        """Close the driver, twice; fail where a link is left open."""
+        with code_of("driver.close", self.subject):
+            self.driver.close()
+            self.driver.close()
+        if not all(link._closed for link in self.links):
+            fail("driver.close", "its link is still open afterwards")
 
 
 @contextmanager
 def emulated(
-    subject: Subject, *faults: str, senses: Senses | None = None, change: Any = None, **options: Any
-) -> Iterator[Opened]:
-    """Open the driver on its emulator.
+    subject: Subject, *faults: str, senses: Senses = lambda t_s: {}, change: Callable[[bytes], bytes] | None = None,
+    started: bool = True, **options: Any,
+) -> Iterator[tuple[Opened, EmulatedDevices]]:  # fmt: skip
+    """Open the driver on its emulator, which has been running for some time, and start it.
 
     Parameters
     ----------
     faults
         Of the emulator, as a rig file names them.
     senses
-        What the device senses; None: it is at rest.
+        What the device senses; by default it is at rest.
     change
         What becomes of pieces on their way to the driver; byte streams then come in pieces of other sizes.
     options
@@ -205,34 +154,30 @@ def emulated(
     from tactbench.core.plugins.rig_devices import emulated_device, options_of
     from tactbench.devices.emulation.emulated_devices import EmulatedDevices
 
-    descriptor = subject.descriptor
-    entry = DeviceEntry(link=EMULATED, faults=faults)
+    name, entry = subject.name, DeviceEntry(link=EMULATED, faults=faults)
     with code_of("emulator", subject):
-        device = emulated_device(descriptor, subject.name, entry, senses or (lambda t_s: {}), 1)
-    devices = EmulatedDevices({subject.name: device})
+        device = emulated_device(subject.descriptor, name, entry, senses, 1)
+    if change is not None:
+        device = replace(device, emulator=_Adapter(device.emulator, change))
+    devices = EmulatedDevices({name: device})
     devices.advance(round(BEFORE_S * 1e9))
-    line = Line(devices.opener(subject.name), change)
-    streams = () if isinstance(descriptor, DeviceDescriptor) else descriptor.spec.streams
-    driver: Driver | None = None
+    given = {**options_of(subject.descriptor, entry), **options}
+    opened = Opened(subject, devices.opener(name), given, devices.clock)
     try:
-        with code_of("driver", subject):
-            given = {**options_of(descriptor, entry), **options}
-            driver = subject.code("driver")(DriverSettings(line, streams, given, devices.clock))
-        assert driver is not None
-        yield Opened(subject, devices.clock, devices.advance, line, driver)
+        if started:
+            opened.start()
+        yield opened, devices
     finally:
-        if driver is not None:
-            with suppress(Exception):
-                driver.close()
-        devices.close()
+        with suppress(Exception):
+            opened.driver.close()
 
 
 @check("sensor", "device", needs=("code-names-resolve",))
 def driver_opens(subject: Subject) -> None:
     """A driver is open once it is made, says who it is, has the spec's streams, and leaves nothing open.
 
-    Call settings.open_link() once in its making and close the link in close(), also when it was sampling; return the
-    streams of settings.streams, and texts from identify().
+    Open settings.open_link() once in its making and close the link in close(), also when it was sampling; return the
+    streams of settings.streams, and texts from identify(); raise UsageError for options that it does not know.
     """
     descriptor = subject.descriptor
     if descriptor.driver is None:
@@ -241,85 +186,80 @@ def driver_opens(subject: Subject) -> None:
         skip("it names no emulator: only `--rig-file FILE` tries its driver, on a real line")
     if descriptor.emulated_link is None:
         fail("emulated_link", "it names an emulator, and does not say on which kind of link")
-    with emulated(subject) as opened:
-        driver = opened.driver
-        if not isinstance(driver, Driver):
-            fail("driver", f"it is a {type(driver).__name__}; derive it from tactbench.plugin.devices.Driver")
-        if len(opened.line.opened) != 1:
-            fail("driver", f"it opened {len(opened.line.opened)} links, and 1 is given to it")
+    with emulated(subject, started=False) as (opened, _):
         with code_of("driver.identify", subject):
-            told = dict(driver.identify())
+            told = dict(opened.driver.identify())
         if not all(isinstance(one, str) for pair in told.items() for one in pair):
             fail("driver.identify", f"{told!r}, and texts by name are needed")
-        own = {one.name: one for one in driver.streams if isinstance(descriptor, DeviceDescriptor)}
-        own = own or {one.name: one for one in descriptor.spec.streams}
-        for stream in driver.streams:
+        own = {} if isinstance(descriptor, DeviceDescriptor) else {one.name: one for one in descriptor.spec.streams}
+        for stream in opened.driver.streams if own else ():
             if stream.name not in own or stream.channels != own[stream.name].channels:
                 fail(f"driver.streams[{stream.name}]", f"the spec has no such stream; it has {', '.join(own)}")
         opened.start()
-        with code_of("driver.close", subject):
-            driver.close()
-            driver.close()
-        if opened.line.still_open:
-            fail("driver.close", "its link is still open afterwards")
+        opened.closed()
+    try:
+        with emulated(subject, started=False, no_such_option=1):
+            pass
+    except CheckFailed as failure:
+        if isinstance(failure.__cause__, UsageError):
+            return
+        raise
+    fail("driver", "it took the option 'no_such_option' without a word")
 
 
 @check("sensor", "device", needs=("driver-opens",), carries_out=True)
 def driver_reads(subject: Subject) -> None:
-    """Rows have the host's time in nanoseconds, and come at the rate that the driver states.
+    """Rows have the host's time in nanoseconds, come at the rate that the driver states, and each of them once.
 
     Stamp with Received.t_ns or settings.clock(), both int64 nanoseconds; take everything that has come at each read,
-    and give each row once.
+    and return an empty list where nothing new has: a device that is asked for its last row may give it twice.
     """
-    with emulated(subject) as opened:
-        look_at(opened)
-
-
-def look_at(opened: Opened) -> None:
-    """Start a driver, read it for a while, and fail where its times are not as they must be."""
     import numpy as np
 
-    driver, clock = opened.driver, opened.now_ns
+    every: list[ChannelSpec] = []
+
+    def moving(t_s: float) -> dict[str, float]:
+        return {one.name: _reading(one, MOVING_HZ * t_s % 1.0)[0] for one in every}
+
+    with emulated(subject, senses=moving, started=False) as (opened, _):
+        every += _channels(opened)
+        for name, stream in look_at(opened).items():
+            again = float((np.diff(stream.data, axis=0) == 0).all(axis=1).mean())
+            if again > STALE and getattr(subject.descriptor, "kind", "") != "motor":
+                fail(f"driver.read: {name}", f"{again:.0%} of its rows are the one before once more, with a new time")
+
+
+def look_at(opened: Opened) -> dict[str, StreamData]:
+    """Start a driver, read it for a while, and return what came; fail where its times are not as they must be."""
     opened.start()
-    began_ns = clock()
-    found = opened.read()
-    seconds = (clock() - began_ns) * 1e-9
-    driver.stop()
-    for stream in driver.streams:
-        rows, where = found[stream.name], f"driver.read: {stream.name}.t_ns"
-        if not len(rows):
-            fail("driver.read", f"nothing came of its stream {stream.name} within {seconds:g} s")
-        if stream.rate_hz is not None and len(rows) > 20:
-            rate = len(rows) / seconds
-            # A start, and samples that come together, take a few rows.
-            if abs(rate / stream.rate_hz - 1) > RATE_SHARE + 5 / len(rows):
-                fail(f"driver.streams[{stream.name}].rate_hz", f"{stream.rate_hz:g} Hz is stated, {rate:.4g} Hz came")
-        if not rows.t_ns:
-            continue
-        t_ns = np.concatenate(rows.t_ns)
-        for factor, unit in UNITS_OF_TIME.items():
-            if 0.9 < t_ns[-1] / factor / clock() < 1.1:
-                fail(where, f"it is in {unit}, and nanoseconds are needed")
-        if len(t_ns) > 2:
-            named_unit(where, float(t_ns[-1] - t_ns[0]) * 1e-9 / seconds)
-        if t_ns.dtype != np.int64:
-            fail(where, f"it is {t_ns.dtype}, and int64 is needed")
-        if (np.diff(t_ns) < 0).any():
-            fail(where, "it goes back")
-        if abs(int(t_ns[-1]) - clock()) > 1e9 * READ_S:
-            off_s = (int(t_ns[-1]) - clock()) * 1e-9
-            fail(where, f"it is {off_s:+.3g} s off the host's clock; the device's own belongs into device_ns")
+    opened.read(WAIT_S)
+    began_ns = opened.now_ns()
+    found = opened.read(RATED_S)
+    ended_ns = opened.now_ns()
+    opened.driver.stop()
+    for name, stream in found.items():
+        if not len(stream.data):
+            fail("driver.read", f"nothing came of its stream {name} within {RATED_S:g} s")
+        times_are_right(f"driver.read: {name}", stream, (ended_ns - began_ns) * 1e-9, LATE, ended_ns)
+    return found
 
 
-def _reading(one: ChannelSpec, digit: int) -> tuple[float, float]:
-    """Return one of the readings by which channels are told apart, with its tolerance; forces have both signs."""
+def _channels(opened: Opened, *kinds: str) -> list[ChannelSpec]:
+    every = (channel for stream in opened.driver.streams for channel in stream.channels)
+    return [one for one in every if not kinds or one.kind in kinds]
+
+
+def _reading(one: ChannelSpec, share: float) -> tuple[float, float]:
+    """Return a reading at some share of the middle of a channel's range, and a tolerance; forces have both signs."""
+    low, span, rounding = 1.0, LEVELS - 1.0, 0.0
     if one.lower is not None and one.upper is not None:
-        step = 0.8 * (one.upper - one.lower) / (LEVELS - 1)
-        return float(round(one.lower + step * (digit + 0.875))), step / 4 + 0.5
-    if one.kind in ("force", "torque"):
+        low, span, rounding = 0.9 * one.lower + 0.1 * one.upper, 0.8 * (one.upper - one.lower), 1.0
+    elif one.kind in ("force", "torque"):
         load = LOAD_N if one.kind == "force" else READ_N
-        return load * (digit + 1) * (-1.0) ** digit, 0.04 * load * (digit + 2)
-    return (0.0 if one.rest is None else one.rest.to(one.unit)) + digit + 1, 0.25
+        low, span = -3.7 * load, 8 * load
+    elif one.rest is not None:
+        low += one.rest.to(one.unit)
+    return low + share * span, span / (LEVELS - 1) / 4 + rounding
 
 
 @check("sensor", "device", needs=("driver-reads",))
@@ -332,39 +272,32 @@ def driver_reads_what_is_sensed(subject: Subject) -> None:
 
     if getattr(subject.descriptor, "kind", "") == "motor":
         skip("what a motor's position is, its rig decides")
-    with emulated(subject) as opened:
-        streams = {stream.name: list(stream.channels) for stream in opened.driver.streams}
-    every = [one for channels in streams.values() for one in channels]
-    rounds = 1
-    while LEVELS**rounds < len(every):
-        rounds += 1
-    for place in range(rounds):
-        meant = {one.name: _reading(one, number // LEVELS**place % LEVELS) for number, one in enumerate(every)}
-        sensed: dict[str, float] = {}
-        with emulated(subject, senses=_senses(sensed)) as opened:
-            opened.start()
+    with emulated(subject, started=False) as (opened, _):
+        every = _channels(opened)
+    place, sensed = 1, dict[str, float]()
+    while place == 1 or place < len(every):
+        meant = {one.name: _reading(one, number // place % LEVELS / (LEVELS - 1)) for number, one in enumerate(every)}
+        sensed.clear()
+        with emulated(subject, senses=lambda t_s, now=sensed: now) as (opened, _):  # type: ignore[misc]
             sensed |= {name: value for name, (value, _) in meant.items()}
             opened.driver.read(WAIT_S)
             found = opened.read()
-        for stream, channels in streams.items():
-            table = np.concatenate(found[stream].data)
-            for channel, value in zip(channels, np.nanmedian(table[len(table) // 2 :], axis=0).tolist(), strict=True):
+        for name, stream in found.items():
+            for column, channel in enumerate(stream.spec.channels):
+                value = float(np.nanmedian(good(stream)[len(stream.data) // 2 :, column]))
                 expected, near = meant[channel.name]
-                if not abs(value - expected) <= near:
-                    others = [name for name, (one, within) in meant.items() if abs(value - one) <= within]
-                    likely = (
-                        f", which is what {others[0]} senses" if others
-                        else ": is its sign turned?" if abs(value + expected) <= near
-                        else ": are these gram-force?" if channel.unit == "N" and 80 < value / expected < 125
-                        else ": are these millinewtons?" if channel.unit == "N" and 800 < value / expected < 1250
-                        else ""
-                    )  # fmt: skip
-                    text = f"{value:.4g} where {expected:g} {channel.unit} are sensed{likely}"
-                    fail(f"driver.read: {stream}.{channel.name}", text)
-
-
-def _senses(sensed: Mapping[str, float]) -> Senses:
-    return lambda t_s: sensed
+                if abs(value - expected) <= near:
+                    continue
+                others = [other for other, (one, within) in meant.items() if abs(value - one) <= within]
+                if others:
+                    guess = f", which is what {others[0]} senses"
+                elif abs(value + expected) <= near:
+                    guess = ": is its sign turned?"
+                else:
+                    guess = likely(value / expected) if channel.unit == "N" else ""
+                text = f"{value:.4g} where {expected:.4g} {channel.unit} are sensed{guess}"
+                fail(f"driver.read: {name}.{channel.name}", text)
+        place *= LEVELS
 
 
 @check("sensor", "device", needs=("driver-reads-what-is-sensed",))
@@ -376,13 +309,12 @@ def driver_takes_any_pieces(subject: Subject) -> None:
     if subject.descriptor.emulated_link != "bytes":
         skip("its link hands over whole frames")
     numbers = []
-    for change in (None, lambda piece: piece):
-        with emulated(subject, change=change) as opened:
-            opened.start()
-            numbers.append({name: len(rows) for name, rows in opened.read(ahead_s=AHEAD_S).items()})
-    for stream, number in numbers[0].items():
-        if numbers[1][stream] < 0.9 * number - 2:
-            text = f"{numbers[1][stream]} rows of {stream} in {READ_S:g} s where frames come in pieces or several at"
+    for change in (None, bytes):
+        with emulated(subject, change=change) as (opened, _):
+            numbers.append({name: len(stream.data) for name, stream in opened.read().items()})
+    for name, number in numbers[0].items():
+        if numbers[1][name] < 0.9 * number - HELD_S * number / READ_S - 2:
+            text = f"{numbers[1][name]} rows of {name} in {READ_S:g} s where frames come in pieces or several at"
             fail("driver.read", f"{text} once, {number} where each comes whole")
 
 
@@ -400,31 +332,27 @@ def driver_drops_damaged_frames(subject: Subject) -> None:
     def damaged(data: bytes) -> bytes:
         if len(data) < 2 or next(seen) % DAMAGE_EVERY != DAMAGE_EVERY - 1:
             return data
-        middle = len(data) // 2
-        return data[:middle] + b"\xff" + data[middle + DAMAGE :]
+        return data[: len(data) // 2] + b"\xff" + data[len(data) // 2 + DAMAGE :]
 
-    with emulated(subject) as opened:
-        opened.start()
-        sound = {name: np.concatenate(rows.data) for name, rows in opened.read().items()}
-    with emulated(subject, change=damaged) as opened:
-        opened.start()
+    with emulated(subject) as (opened, _):
+        sound = opened.read()
+    with emulated(subject, change=damaged) as (opened, _):
         before = dict(opened.driver.counts)
         found = opened.read(2 * READ_S)
-        after = dict(opened.driver.counts)
+        marked = opened.driver.counts != before
     if next(seen) < DAMAGE_EVERY:
         skip("it sends too little to damage any of it")
-    marked = any((marks & BAD).any() for rows in found.values() for marks in rows.marks)
-    for stream, rows in found.items():
-        if not len(rows):
-            fail("driver.read", f"no row of {stream} comes where frames are damaged now and then")
-        low, high = sound[stream].min(axis=0), sound[stream].max(axis=0)
+    for name, stream in found.items():
+        if not len(stream.data):
+            fail("driver.read", f"no row of {name} comes where frames are damaged now and then")
+        low, high = sound[name].data.min(axis=0), sound[name].data.max(axis=0)
         near = 3 * (high - low) + 0.05 * (1 + np.abs(high)) + 3
-        table = np.concatenate(rows.data)
-        wrong = np.argwhere((table < low - near) | (table > high + near))
+        values = good(stream)
+        wrong = values[(values < low - near) | (values > high + near)]
         if len(wrong):
-            value = table[tuple(wrong[0])]
-            fail(f"driver.read: {stream}", f"a frame that lost {DAMAGE} bytes is taken for a whole one: {value:g}")
-    if after == before and not marked:
+            fail(f"driver.read: {name}", f"a frame that lost {DAMAGE} bytes is taken for a whole one: {wrong[0]:g}")
+        marked |= bool(np.isnan(values).any())
+    if not marked:
         fail("driver.counts", "frames were damaged, and neither counted nor marked")
 
 
@@ -434,27 +362,24 @@ def driver_counts_on(subject: Subject) -> None:
 
     Count on over the wraps: tactbench.plugin.devices.Unwrap(bits).
     """
-    with emulated(subject) as opened:
-        opened.start()
-        rates = [stream.rate_hz or 100.0 for stream in opened.driver.streams]
-        found = opened.read(WRAP_ROWS / min(rates) + READ_S, rows=WRAP_ROWS)
-        if not any(rows.sequence for rows in found.values()):
-            skip("its device numbers no samples")
-        _count_on(found)
-        if max(rates) <= 1000 and len(rates) == 1:
-            _count_on(opened.read(MOST_WRAP_ROWS / min(rates) + READ_S, ahead_s=1.0, rows=MOST_WRAP_ROWS))
-
-
-def _count_on(found: dict[str, Rows]) -> None:
     import numpy as np
 
-    for stream, rows in found.items():
-        if rows.sequence:
-            numbers = np.concatenate(rows.sequence)
-            wrong = np.flatnonzero(np.diff(numbers) != 1)
-            if len(wrong):
-                a, b = numbers[wrong[0]], numbers[wrong[0] + 1]
-                fail(f"driver.read: {stream}.sequence", f"{a} is followed by {b}, and no row was lost")
+    with emulated(subject) as (opened, devices):
+        rates = [stream.rate_hz or 100.0 for stream in opened.driver.streams]
+        for rows, ahead_s in WRAPS if max(rates) <= 1000 and len(rates) == 1 else WRAPS[:1]:
+
+            def ahead(seconds: float = ahead_s) -> None:
+                devices.advance(devices.clock() + round(seconds * 1e9))
+
+            found = opened.read(rows / min(rates) + READ_S, rows, ahead)
+            if all(stream.sequence is None for stream in found.values()):
+                skip("its device numbers no samples")
+            for name, stream in found.items():
+                numbers = np.zeros(0) if stream.sequence is None else stream.sequence
+                wrong = np.flatnonzero(np.diff(numbers) != 1)
+                if len(wrong):
+                    a, b = numbers[wrong[0] : wrong[0] + 2]
+                    fail(f"driver.read: {name}.sequence", f"{a} is followed by {b}, and no row was lost")
 
 
 @check("sensor", "device", needs=("driver-reads",))
@@ -463,16 +388,15 @@ def driver_starts_afresh(subject: Subject) -> None:
 
     Discard in start() what waits in the link (Link.discard), and forget the beginning of a frame.
     """
-    with emulated(subject) as opened:
+    with emulated(subject, started=False) as (opened, devices):
         for _ in range(2):
-            opened.go_on(BEFORE_S)
-            began_ns = opened.now_ns()
+            began_ns = devices.clock() + round(BEFORE_S * 1e9)
+            devices.advance(began_ns)
             opened.start()
-            for stream, rows in opened.read().items():
-                first_ns = min((int(t_ns[0]) for t_ns in rows.t_ns if len(t_ns)), default=began_ns)
-                if first_ns < began_ns:
-                    early_s = (began_ns - first_ns) * 1e-9
-                    fail("driver.start", f"a row of {stream} is from {early_s:.2g} s before it was started")
+            for name, stream in opened.read().items():
+                early_s = 0.0 if stream.t_ns is None else (began_ns - float(stream.t_ns[0])) * 1e-9
+                if early_s > 0:
+                    fail("driver.start", f"a row of {name} is from {early_s:.2g} s before it was started")
             opened.driver.stop()
 
 
@@ -482,15 +406,15 @@ def driver_does_not_wait_when_told_so(subject: Subject) -> None:
 
     Pass the time-out on to the link, and return an empty list when it raises LinkTimeout.
     """
-    with emulated(subject) as opened:
-        opened.start()
+    with emulated(subject) as (opened, _):
         opened.driver.read(WAIT_S)
-        before = opened.now_ns()
+        before_ns = opened.now_ns()
         with code_of("driver.read", subject):
             for _ in range(3):
                 opened.driver.read(0.0)
-        if (opened.now_ns() - before) * 1e-9 > SHORT_S:
-            fail("driver.read", f"read(0) took {(opened.now_ns() - before) * 1e-9:.2g} s")
+        took_s = (opened.now_ns() - before_ns) * 1e-9
+        if took_s > SHORT_S:
+            fail("driver.read", f"read(0) took {took_s:.2g} s")
 
 
 @check("sensor", "device", needs=("driver-reads",))
@@ -499,50 +423,16 @@ def driver_reports_unplug(subject: Subject) -> None:
 
     Let LinkUnplugged of the link pass through read(); catch LinkTimeout alone.
     """
-    with emulated(subject, f"unplug:start_s={GONE_AT_S:g}") as opened:
-        opened.start()
+    error = None
+    with emulated(subject, f"unplug:start_s={GONE_AT_S:g}") as (opened, _):
         try:
-            for _ in passing(opened.now_ns, GONE_AT_S - BEFORE_S + UNPLUGGED_S):
-                opened.driver.read(WAIT_S)
-        except CheckFailed:
-            pass
-        except (LinkError, RigError):
-            return
-        except Exception as error:
-            fail("driver.read", f"{type(error).__name__} instead of LinkUnplugged once the line is gone: {error}")
+            opened.read(GONE_AT_S - BEFORE_S + UNPLUGGED_S)
+        except CheckFailed as failure:
+            error = failure.__cause__
+    if error is None:
         fail("driver.read", "it goes on as if nothing had come once its line is gone")
-
-
-@check("sensor", "device", needs=("driver-opens",))
-def driver_refuses_unknown_options(subject: Subject) -> None:
-    """A misspelt option of a rig file that nobody refuses is a setting that nobody makes.
-
-    Raise UsageError for options that the driver does not know.
-    """
-    try:
-        with emulated(subject, no_such_option=1):
-            pass
-    except CheckFailed as failure:
-        if isinstance(failure.__cause__, UsageError):
-            return
-        raise
-    fail("driver", "it took the option 'no_such_option' without a word")
-
-
-def _channels(subject: Subject, device: str, kind: str) -> dict[str, tuple[str, int, ChannelSpec]]:
-    """Return stream, column and channel of a device's channels of a kind, by name."""
-    if subject.descriptor.kind != device:
-        skip(f"it is a {subject.descriptor.kind} device")
-    with emulated(subject) as opened:
-        found = {
-            channel.name: (stream.name, column, channel)
-            for stream in opened.driver.streams
-            for column, channel in enumerate(stream.channels)
-            if channel.kind == kind
-        }
-    if not found:
-        fail("driver.streams", f"none of its channels is of kind {kind}")
-    return found
+    if not isinstance(error, LinkError | RigError):
+        fail("driver.read", f"{type(error).__name__} instead of LinkUnplugged once the line is gone: {error}")
 
 
 @check("device", needs=("driver-opens",))
@@ -551,13 +441,19 @@ def units_are_the_rigs(subject: Subject) -> None:
 
     Give force channels unit "N", torques "N*m", a motor's channel `position` "m", and convert.
     """
-    kind, unit = ("force", "N") if subject.descriptor.kind == "force" else ("position", "m")
-    for name, (stream, _, channel) in _channels(subject, subject.descriptor.kind, kind).items():
+    kind, unit = {"force": ("force", "N"), "motor": ("position", "m")}.get(subject.descriptor.kind, ("", ""))
+    if not kind:
+        skip(f"it is a {subject.descriptor.kind} device")
+    with emulated(subject, started=False) as (opened, _):
+        found = _channels(opened, kind)
+    if not found:
+        fail("driver.streams", f"none of its channels is of kind {kind}")
+    for channel in found:
         if channel.unit != unit:
-            fail(f"driver.streams[{stream}].channels[{name}].unit", f"{channel.unit!r}, and {unit!r} is needed")
+            fail(f"driver.streams: {channel.name}.unit", f"{channel.unit!r}, and {unit!r} is needed")
 
 
-@check("device", needs=("driver-reads-what-is-sensed",))
+@check("device", needs=("driver-reads-what-is-sensed", "units-are-the-rigs"))
 def tare_and_overload_are_true(subject: Subject) -> None:
     """A driver that says it has taken a zero, and has not, presses harder; a sensor at its end reads like any other.
 
@@ -565,26 +461,24 @@ def tare_and_overload_are_true(subject: Subject) -> None:
     """
     import numpy as np
 
-    forces = _channels(subject, "force", "force")
+    if subject.descriptor.kind != "force":
+        skip("it is no force sensor")
     sensed: dict[str, float] = {}
-    with emulated(subject, senses=_senses(sensed)) as opened:
-        opened.start()
-        sensed |= dict.fromkeys(forces, LOAD_N)
-        opened.read()
-        with code_of("driver.tare", subject):
-            taken = opened.driver.tare()
-        opened.read()
-        for name, (stream, column, _) in forces.items() if taken else ():
-            found = float(np.nanmedian(np.concatenate(opened.read()[stream].data)[:, column]))
-            if abs(found) > 2 * READ_N:
-                fail("driver.tare", f"it says that a zero is taken, and {name} reads {found:.4g} N")
-        sensed |= dict.fromkeys(forces, OVERLOAD_N)
-        opened.read()
-        rows = opened.read()
-        for name, (stream, column, _) in forces.items():
-            marks = np.concatenate(rows[stream].marks)[:, column]
-            if not (marks & (Quality.SATURATED | BAD)).all():
-                fail(f"driver.read: {stream}.{name}", f"it is not marked SATURATED under {OVERLOAD_N:g} N")
+    with emulated(subject, senses=lambda t_s: sensed) as (opened, _):
+        taken = False
+        for force_n in (LOAD_N, LOAD_N, OVERLOAD_N):
+            sensed |= {one.name: force_n for one in _channels(opened, "force")}
+            opened.read()
+            for name, stream in opened.read().items():
+                forces = np.array([one.kind == "force" for one in stream.spec.channels])
+                found = np.abs(np.nanmedian(good(stream)[:, forces], axis=0))
+                if taken and force_n == LOAD_N and (found > 2 * READ_N).any():
+                    fail("driver.tare", f"it says that a zero is taken, and {found.max():.4g} N are read")
+                marked = marks_of(stream)[:, forces] & (Quality.SATURATED | BAD)
+                if force_n == OVERLOAD_N and not marked.all():
+                    fail(f"driver.read: {name}", f"forces are not marked SATURATED under {OVERLOAD_N:g} N")
+            with code_of("driver.tare", subject):
+                taken = taken or opened.driver.tare()
 
 
 @check("device", needs=("driver-reads", "units-are-the-rigs"))
@@ -595,13 +489,11 @@ def opening_and_reading_move_nothing(subject: Subject) -> None:
     """
     import numpy as np
 
-    places = _channels(subject, "motor", "position")
-    with emulated(subject) as opened:
-        opened.driver.identify()
-        opened.start()
-        rows = opened.read()
-        for name, (stream, column, _) in places.items():
-            table = np.concatenate(rows[stream].data)[:, column]
-            moved = float(np.ptp(table[np.isfinite(table)])) if np.isfinite(table).any() else 0.0
+    if subject.descriptor.kind != "motor":
+        skip("it is no motor")
+    with emulated(subject) as (opened, _):
+        for name, stream in opened.read().items():
+            places = good(stream)[:, [one.kind == "position" for one in stream.spec.channels]]
+            moved = float(np.ptp(places[np.isfinite(places).all(axis=1)], axis=0).max(initial=0.0)) if len(places) else 0.0
             if moved > STILL_M:
-                fail(f"driver.read: {name}", f"it changes by {1e3 * moved:.3g} mm, and nobody has moved it")
+                fail(f"driver.read: {name}", f"its place changes by {1e3 * moved:.3g} mm, and nobody has moved it")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Callable
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
@@ -12,16 +13,17 @@ from tactbench.core.errors import NotApplicable
 if TYPE_CHECKING:
     import numpy.typing as npt
 
+    Answer = Callable[[npt.NDArray[Any]], npt.NDArray[Any]]
+
 ROWS, NEW_ROWS, FEATURES, CLASSES, SEED = 90, 30, 4, 3, 1
 BETTER = 0.9
 """Of the error of the mean (or of the commonest class), that an answer which uses the features stays below: the
 question is linear with a tenth of noise, so that the worst of ours is at half."""
 SAME_ROW = 1e-6
 """Relative difference of one row answered alone and among others: sums of another order, and nothing else."""
-Data = tuple["npt.NDArray[Any]", "npt.NDArray[Any]", "npt.NDArray[Any]", "npt.NDArray[Any]"]
 
 
-def question(kind: str) -> Data:
+def question(kind: str) -> list[npt.NDArray[Any]]:
     """Return X, y, new X and new y of a question that four features answer; the last column is constant."""
     import numpy as np
 
@@ -33,44 +35,55 @@ def question(kind: str) -> Data:
         y = np.digitize(y, np.quantile(y, [1 / CLASSES, 2 / CLASSES])).astype(np.int64)
     if kind == "events":  # which frames hold one
         y = (y > np.median(y)).astype(np.int64)
-    return X[:ROWS], y[:ROWS], X[ROWS:], y[ROWS:]
+    return [X[:ROWS], y[:ROWS], X[ROWS:], y[ROWS:]]
 
 
-def _built(subject: Subject, kind: str, params: Any) -> Any:
+def _taught(subject: Subject, kind: str, params: Any = None, place: str = "", *, given: Any = None) -> Answer:
+    """Fit as an evaluation does, by default as in the rehearsal; return what answers rows and checks its answers."""
+    from tactbench.core.evaluation.fitting import answers, fit
+
+    X, y, *_ = given or question(kind)
+    params = {**subject.descriptor.params, **((subject.descriptor.rehearsal or {}) if params is None else params)}
     try:
-        with code_of("where", subject):
-            return subject.code("where")(kind=kind, seed=SEED, threads=1, **{**subject.descriptor.params, **params})
+        with code_of(f"{place}where", subject):
+            model = subject.code("where")(kind=kind, seed=SEED, threads=1, **params)
     except CheckFailed as failure:
         if isinstance(failure.__cause__, NotApplicable):
             skip(f"it says: {failure.__cause__.message}")
         raise
-
-
-def _fitted(subject: Subject, kind: str, params: Any = None, data: Data | None = None) -> Any:
-    """Fit as an evaluation does, by default with the parameters of the rehearsal."""
-    from tactbench.core.evaluation.fitting import fit
-
-    X, y, _, _ = data or question(kind)
-    model = _built(subject, kind, subject.descriptor.rehearsal or {} if params is None else params)
-    with code_of("fit", subject):
+    with code_of(f"{place}fit", subject):
         fit(model, X, y, subject.name, Counter())
-    return model
 
+    def answer(rows: npt.NDArray[Any]) -> npt.NDArray[Any]:
+        with code_of("predict", subject):
+            return answers(model, rows, subject.name, CLASSES if kind == "classification" else 0)
 
-def _answers(subject: Subject, model: Any, kind: str, X: npt.NDArray[Any]) -> npt.NDArray[Any]:
-    """Return what it answers, checked as an evaluation checks it."""
-    from tactbench.core.evaluation.fitting import answers
-
-    with code_of("predict", subject):
-        return answers(model, X, subject.name, CLASSES if kind == "classification" else 0)
+    return answer
 
 
 @lru_cache(maxsize=4)
-def _usual(subject: Subject, kind: str) -> npt.NDArray[Any]:
-    return _answers(subject, _fitted(subject, kind), kind, question(kind)[2])
+def _usual(subject: Subject, kind: str) -> Answer:
+    return _taught(subject, kind)
 
 
-@check("estimator", needs=("code-names-resolve",))
+@check("estimator", needs=("code-names-resolve",), carries_out=True)
+def answers_have_the_shape(subject: Subject) -> None:
+    """Each row gets one finite answer, also where a column is constant, and no array is changed: others use it as well.
+
+    Return an array of shape (n,) from predict: numbers, or the classes of y; leave a constant column out, or divide by
+    1; copy before changing: ``X = X.copy()``, no ``-=`` on X or y.
+    """
+    import numpy as np
+
+    for kind in subject.descriptor.kinds:
+        given = question(kind)
+        _taught(subject, kind, given=given)(given[2])
+        for name, now, old in zip(("fit: X", "fit: y", "predict: X"), given, question(kind), strict=False):
+            if not np.array_equal(now, old):
+                fail(name, "it was changed in place")
+
+
+@check("estimator", needs=("answers-have-the-shape",))
 def candidates_are_accepted(subject: Subject) -> None:
     """A candidate that cannot be fitted shows after minutes, when its turn comes.
 
@@ -78,37 +91,10 @@ def candidates_are_accepted(subject: Subject) -> None:
     """
     descriptor = subject.descriptor
     for name, candidates in descriptor.grid.items():
-        for candidate in candidates:
-            try:
-                _fitted(subject, descriptor.kinds[0], {**(descriptor.rehearsal or {}), name: candidate})
-            except CheckFailed as failure:
-                raise CheckFailed(f"grid[{name}] = {candidate!r}: {failure.where}", failure.text) from failure
-
-
-@check("estimator", needs=("code-names-resolve",), carries_out=True)
-def answers_have_the_shape(subject: Subject) -> None:
-    """Each row gets one finite answer, also where a column is constant: a dead taxel, whose deviation is 0.
-
-    Return an array of shape (n,) from predict: numbers, or the classes of y; leave such a column out, or divide by 1.
-    """
-    for kind in subject.descriptor.kinds:
-        _usual(subject, kind)
-
-
-@check("estimator", needs=("answers-have-the-shape",))
-def data_is_not_changed(subject: Subject) -> None:
-    """All estimators of a run are given the same arrays; one that scales them in place changes the others' scores.
-
-    Copy before changing: ``X = X.copy()``; no ``-=`` on X or y.
-    """
-    import numpy as np
-
-    for kind in subject.descriptor.kinds:
-        data = question(kind)
-        _answers(subject, _fitted(subject, kind, data=data), kind, data[2])
-        for name, now, old in zip(("fit: X", "fit: y", "predict: X"), data, question(kind), strict=False):
-            if not np.array_equal(now, old):
-                fail(name, "it was changed in place")
+        for one in candidates:
+            _taught(
+                subject, descriptor.kinds[0], {**(descriptor.rehearsal or {}), name: one}, f"grid[{name}] = {one!r}: "
+            )
 
 
 @check("estimator", needs=("answers-have-the-shape",))
@@ -120,10 +106,10 @@ def seed_and_data_decide(subject: Subject) -> None:
     import numpy as np
 
     for kind in subject.descriptor.kinds:
-        X, y, new, truth = question(kind)
-        _fitted(subject, kind, data=(-X, y[::-1].copy(), new, truth))
-        again = _answers(subject, _fitted(subject, kind), kind, new)
-        if not np.array_equal(again, _usual(subject, kind)):
+        X, y, new, _ = question(kind)
+        before = _usual(subject, kind)(new)
+        _taught(subject, kind, given=(-X, y[::-1].copy()))
+        if not np.array_equal(_taught(subject, kind)(new), before):
             fail("where: argument seed", f"two {kind} models of one seed and the same data answer differently")
 
 
@@ -136,11 +122,11 @@ def rows_are_answered_alone(subject: Subject) -> None:
     import numpy as np
 
     for kind in subject.descriptor.kinds:
-        together = _usual(subject, kind)
+        new, answer = question(kind)[2], _usual(subject, kind)
+        together = answer(new)
         if subject.descriptor.looks_at == "nothing" and len(np.unique(together)) > 1:
             skip("its answers are drawn")
-        model, new = _fitted(subject, kind), question(kind)[2]
-        alone = np.concatenate([_answers(subject, model, kind, new[place : place + 1]) for place in range(5)])
+        alone = np.concatenate([answer(new[place : place + 1]) for place in range(5)])
         if not np.allclose(alone, together[:5], rtol=SAME_ROW, atol=SAME_ROW):
             fail("predict", "a row asked alone is answered otherwise than among others")
 
@@ -153,12 +139,11 @@ def it_learns(subject: Subject) -> None:
     """
     import numpy as np
 
-    descriptor = subject.descriptor
-    if descriptor.baseline or descriptor.looks_at != "features":
+    if subject.descriptor.baseline or subject.descriptor.looks_at != "features":
         skip("it is a trivial answer by its own account")
-    for kind in descriptor.kinds:
+    for kind in subject.descriptor.kinds:
         _, y, new, truth = question(kind)
-        given = _answers(subject, _fitted(subject, kind, {}), kind, new)
+        given = _taught(subject, kind, {})(new)
         if kind == "events":  # scores, the higher the surer
             error, bar = -given[truth == 1].mean(), -given[truth == 0].mean() / BETTER
         elif kind == "regression":

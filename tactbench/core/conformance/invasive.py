@@ -9,21 +9,22 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from functools import lru_cache, partial
-from pathlib import Path
-from tempfile import TemporaryDirectory
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from tactbench.core.conformance.check import Subject, check, code_of, fail, skip
-from tactbench.core.conformance.driver import Line, Opened, look_at
-from tactbench.core.conformance.press import FORCE_SHARE, WHY, force_is, pressing_channel, tiny_scene
-from tactbench.core.errors import RigError, TactbenchError
+from tactbench.core.conformance.driver import Opened, look_at
+from tactbench.core.conformance.press import WHY, slow_ramp, tiny_scene
+from tactbench.core.conformance.streams import FORCE_SHARE, carried_out, force_is, good, joined, pressing_force
+from tactbench.core.errors import TactbenchError
 from tactbench.core.plugins.emulators import running
 from tactbench.core.plugins.rig_files import load_rig_file
 from tactbench.core.plugins.taking_part import rig_context
-from tactbench.core.spec.profile import ForceRamp
-from tactbench.core.spec.quantity import assumed
-from tactbench.core.spec.rig import DeviceDescriptor, SensorDescriptor
+from tactbench.core.samples import StreamData
+from tactbench.core.spec.rig import SensorDescriptor
 from tactbench.core.spec.rig_file import RigFile
+
+if TYPE_CHECKING:
+    from tactbench.core.samples import FloatArray
 
 FORCE_N = 1.0
 """At the end of a press: a motor with friction still follows it, and no fingertip is harmed."""
@@ -33,6 +34,8 @@ END_S, PEAK_S = 0.5, 0.1
 """Over which the force at the end, and the largest force are averaged: noise is no overshoot."""
 LARGEST = 1.5
 """Times `FORCE_N`, which the force may not exceed (assumed: a loop that overshoots by half is badly tuned)."""
+NOISY = 3.0
+"""By which factor a real unit's noise may differ from the stated one (assumed: units and rooms differ by two)."""
 
 
 def _file(subject: Subject) -> RigFile:
@@ -43,12 +46,11 @@ def _file(subject: Subject) -> RigFile:
 
 @check("sensor", "device", mode="invasive", needs=("code-names-resolve",), carries_out=True)
 def real_device_answers(subject: Subject) -> None:
-    """The emulator is what the author believes the device to be; only the device knows.
+    """The emulator is what the author believes the device to be; only the device knows its rate and its noise at rest.
 
-    Look at `tactbench doctor --rig-file FILE` for ports, permissions and what the device says.
+    Let nothing touch it. Look at `tactbench doctor --rig-file FILE` for ports, permissions and what the device says.
     """
     from tactbench.core.plugins.rig_devices import options_of
-    from tactbench.devices.driver import DriverSettings
     from tactbench.links.address import open_link
 
     descriptor, file = subject.descriptor, _file(subject)
@@ -60,19 +62,34 @@ def real_device_answers(subject: Subject) -> None:
     entry = named[subject.name]
     if entry.emulated:
         skip("the rig file says that the device is emulated")
-    line = Line(partial(open_link, entry.link))
-    streams = () if isinstance(descriptor, DeviceDescriptor) else descriptor.spec.streams
-    with code_of("driver", subject):
-        driver = subject.code("driver")(DriverSettings(line, streams, options_of(descriptor, entry)))
+    opened = Opened(subject, partial(open_link, entry.link), options_of(descriptor, entry), time.monotonic_ns)
     try:
         with code_of("driver.identify", subject):
-            driver.identify()
-        look_at(Opened(subject, time.monotonic_ns, lambda until_ns: None, line, driver))
+            opened.driver.identify()
+        for stream in look_at(opened).values():
+            _noise_is_as_stated(subject, stream)
     finally:
         with suppress(TactbenchError):
-            driver.close()
-    if line.still_open:
-        fail("driver.close", "its link is still open afterwards")
+            opened.driver.close()
+    opened.closed()
+
+
+def _noise_is_as_stated(subject: Subject, stream: StreamData) -> None:
+    """Fail where a channel stands still that has noise, or has much more or less of it than its spec states."""
+    import numpy as np
+
+    for column, channel in enumerate(stream.spec.channels):
+        where, sd = f"driver.read: {stream.spec.name}.{channel.name}", float(np.nanstd(good(stream)[:, column]))
+        stated = getattr(subject.spec, "nuisances", {}).get(channel.kind)
+        hidden = 0.0 if stated is None else stated.hidden()
+        seen = channel.kind == "force" or (stated is not None and stated.white.value > stated.step.value / 2)
+        if seen and sd == 0:
+            fail(where, "it is constant at rest: is it connected?")
+        if hidden and (sd > NOISY * hidden or (seen and sd < hidden / NOISY)):
+            fail(
+                where,
+                f"its noise at rest is {sd:.3g} {channel.unit} (sd), and {hidden:.3g} are stated in spec.nuisances",
+            )
 
 
 class _Kept:
@@ -87,67 +104,46 @@ class _Kept:
         with self._rig.open(sensor, scene, seed=seed) as self.last:
             yield self.last
 
+    @property
+    def zero_n(self) -> float:
+        """What was taken off the pressing force as its zero [N], as PressingForce.about says it; 0: nothing."""
+        for stream in self.last.reference:
+            for column, channel in enumerate(stream.channels):
+                about = str(self.last.drawn.get(f"zero of {stream.name}", ""))
+                if about and channel.name in ("fz", "normal"):
+                    return float(about.split(",")[column])
+        return 0.0
+
 
 def _built(subject: Subject) -> tuple[_Kept, SensorDescriptor, Any]:
     """Return the rig, the first sensor of its file, and a slow press."""
     file = _file(subject)
     if file.rig != subject.name:
         skip(f"the rig file is for the rig {file.rig}")
-    ramp = ForceRamp(
-        end=assumed(FORCE_N, "N", WHY), hold=assumed(HOLD_S, "s", WHY), duration=assumed(SECONDS, "s", WHY), samples=100
-    )
     context = rig_context(subject.registry, rig_file=running(file), operator=subject.operator)
-    rig = _Kept(subject.code("where")(context))
-    return rig, subject.registry.sensors[next(iter(file.sensors))], tiny_scene("check", profile=ramp)
-
-
-def _zero_n(acquisition: Any) -> float:
-    """Return what was taken off the pressing force as its zero [N], as PressingForce.about says it; 0: nothing."""
-    found = pressing_channel(tuple(acquisition.reference))
-    about = "" if found is None else acquisition.drawn.get(f"zero of {found[0].name}", "")
-    return float(str(about).split(",")[found[1]]) if found is not None and about else 0.0
+    scene = tiny_scene("check", profile=slow_ramp(FORCE_N, SECONDS, HOLD_S))
+    return _Kept(subject.code("where")(context)), subject.registry.sensors[next(iter(file.sensors))], scene
 
 
 @lru_cache(maxsize=1)
 def _first_zero_n(subject: Subject) -> float | None:
-    """Press once, recorded as `tactbench record` does it; return the zero [N], or None: nothing moves by itself."""
+    """Press once, and return the zero [N]; None: nothing moves by itself."""
     import numpy as np
 
-    from tactbench.core.acquisition import acquire
-    from tactbench.core.recording.health import examine
-    from tactbench.core.recording.reader import open_recording
-
-    with TemporaryDirectory() as folder, code_of("where", subject):
+    with code_of("where", subject):
         rig, sensor, scene = _built(subject)
-        path = Path(folder) / "check.h5"
-        made = acquire(
-            rig, sensor, subject.descriptor, scene, role=None, seed=1, path=path,
-            clock=time.perf_counter, provenance={}, rig_file=_file(subject),
-        )  # fmt: skip
-        if made.meta.excluded:
-            raise RigError(f"Its recording is {made.meta.excluded}.")
-        with open_recording(path) as recording:
-            wrong = [f"streams[{one.stream}]: {one.message}" for one in examine(recording) if one.severity == "error"]
-            read = {name: recording.read(name) for name in recording.stream_names}
-    if wrong:
-        fail("recording", f"it is not healthy: {'; '.join(wrong)}")
-    for name, one in read.items():
-        if not len(one.data):
-            fail(f"streams[{name}]", "the press gave no sample of it")
+        made = carried_out(rig, sensor, subject.descriptor, scene, rig_file=_file(subject))
     if not hasattr(rig.last, "stop"):
         return None
-    found = pressing_channel(tuple(rig.last.reference))
-    if found is None:
-        fail("reference", "it has no channel of kind force called fz or normal")
-    stream = read[found[0].name]
+    stream, force_n = pressing_force(made.came, made.meta.reference)
     assert stream.t_ns is not None
-    t_s, force_n = (stream.t_ns - stream.t_ns[0]) * 1e-9, stream.data[:, found[1]].astype(np.float64)
+    t_s = (stream.t_ns - stream.t_ns[0]) * 1e-9
     force_is("reference", float(force_n[t_s > t_s[-1] - END_S].mean()), FORCE_N)
     width = max(1, round(PEAK_S * len(t_s) / max(float(t_s[-1]), PEAK_S)))
     largest = float(np.convolve(force_n, np.ones(width) / width, "valid").max())
     if largest > LARGEST * FORCE_N:
         fail("reference", f"the force rises to {largest:.3g} N in a press to {FORCE_N:g} N")
-    return _zero_n(rig.last)
+    return rig.zero_n
 
 
 @check("rig", mode="invasive", needs=("code-names-resolve",), carries_out=True)
@@ -167,38 +163,35 @@ def real_rig_lets_go(subject: Subject) -> None:
     Retreat at the end of each scene, also of one that failed; let `stop` retreat, wait for its end, and return "" or
     what is to be done by hand.
     """
-    import numpy as np
-
     first_n = _first_zero_n(subject)
     if first_n is None:
         skip("nothing in it moves by itself: a hand presses")
-    rows: list[tuple[float, float]] = []
+    blocks: list[Any] = []
 
-    def take(block: Any) -> None:
-        if block.stream == stream.name:
-            rows.extend(zip((1e-9 * block.t_ns).tolist(), block.data[:, column].tolist(), strict=True))
+    def force() -> FloatArray:
+        every = (*acquisition.streams, *acquisition.reference)
+        return pressing_force(joined("open", every, blocks), acquisition.reference)[1]
 
     with code_of("where", subject):
         rig, sensor, scene = _built(subject)
         with rig.open(sensor, scene, seed=2) as acquisition:
-            stream, column = pressing_channel(tuple(acquisition.reference)) or fail("reference", "it has no fz now")
-            blocks = iter(acquisition)
+            came = iter(acquisition)
             try:
-                for block in blocks:
-                    take(block)
-                    if rows and abs(np.mean([force for _, force in rows[-5:]])) > FORCE_N / 2:
+                for block in came:
+                    blocks.append(block)
+                    rising = force()
+                    if len(rising) and abs(rising[-5:].mean()) > FORCE_N / 2:
                         break
             except KeyboardInterrupt:
                 acquisition.stop("stopped by hand")
                 raise
-            pressed = len(rows)
             message = acquisition.stop(WHY)
-            for block in blocks:
-                take(block)
-    hold = float(np.mean([force for t_s, force in rows if t_s - rows[0][0] < HOLD_S])) if rows else 0.0
-    for what, force in (("force", hold), ("zero", _zero_n(acquisition) - first_n)):
-        if abs(force) > FORCE_SHARE * FORCE_N:
-            fail("open", f"the {what} is {force:.3g} N off when the next press begins, before anything touches")
-    left = [force for _, force in rows[pressed:]][-5:]
-    if message or (left and abs(np.mean(left)) > FORCE_SHARE * FORCE_N):
-        fail("stop", message or f"{np.mean(left):.3g} N are left after it has returned")
+            blocks += came
+    # The hold is the first fifth of the way to half of the force, or more.
+    hold_n = float(rising[: max(1, len(rising) // 5)].mean())
+    for what, off_n in (("force", hold_n), ("zero", rig.zero_n - first_n)):
+        if abs(off_n) > FORCE_SHARE * FORCE_N:
+            fail("open", f"the {what} is {off_n:.3g} N off when the next press begins, before anything touches")
+    left = force()[len(rising) :][-5:]
+    if message or (len(left) and abs(left.mean()) > FORCE_SHARE * FORCE_N):
+        fail("stop", message or f"{left.mean():.3g} N are left after it has returned")

@@ -2,20 +2,11 @@
 
 from __future__ import annotations
 
-from functools import lru_cache
 from typing import get_args
 
 from tactbench.core.conformance.check import Subject, check, code_of, fail, skip
-from tactbench.core.conformance.press import (
-    FORCE_SHARE,
-    SECONDS,
-    WHY,
-    TrialPress,
-    presses,
-    pressing_channel,
-    simulated_sensors,
-    tiny_scene,
-)
+from tactbench.core.conformance.press import WHY, differing, presses, simulated_sensors, tiny_scene
+from tactbench.core.conformance.streams import FORCE_SHARE, Recorded, pressing_force
 from tactbench.core.errors import nearest
 from tactbench.core.plugins.force_profiles import force_path
 from tactbench.core.plugins.interfaces import Reason
@@ -34,33 +25,32 @@ MOST_N = 100.0
 """Beyond the rated range of every tactile sensor of a finger."""
 
 
-@lru_cache(maxsize=2)
-def _scenes(subject: Subject) -> tuple[Scene, ...]:
-    """Return tiny scenes: pressed, under force control, warmer than the sensor, sliding."""
-    kinds = dict.fromkeys(one.kind for sensor in simulated_sensors(subject) for one in sensor.spec.channels())
-    plain = tiny_scene(observe=tuple(kinds))
-    warm = plain.environment.model_copy(update={"indenter_temperature": assumed(40.0, "degC", WHY)})
-    slide = Slide(speed=assumed(10.0, "mm/s", WHY), start=assumed(SECONDS / 2, "s", WHY))
-    more = ({"drive": ForceLoop()}, {"environment": warm}, {"slide": slide})
-    return (plain, *(plain.model_copy(update=update) for update in more))
+def _pressed(subject: Subject) -> Recorded:
+    """Return a tiny press with the effect asked for by name, and those of its distribution that it consumes.
 
-
-def _pressed(subject: Subject) -> TrialPress:
-    """Return a tiny press with the effect asked for by name, and those of its distribution that it consumes."""
+    It is pressed plainly, under force control, warmer than the sensor, or sliding: as first calls for the effect.
+    """
     siblings = (one for one in subject.registry.effects.all_owned() if one.distribution == subject.distribution)
     consumed = set(subject.descriptor.consumes)
     words = [one.descriptor.name for one in siblings if consumed.intersection(one.descriptor.produces)]
-    asked = {"simulation": Simulation(effects=(*words, f"+{subject.name}"))}
-    calling = []
-    for scene in _scenes(subject):
-        for sensor in simulated_sensors(subject):
-            with code_of("called_for", subject):
-                reason = subject.code("called_for")(scene, sensor.spec)
+    sensors = simulated_sensors(subject)
+    plain = tiny_scene(
+        observe=tuple(dict.fromkeys(one.kind for sensor in sensors for one in sensor.spec.channels())),
+        simulation=Simulation(effects=(*words, f"+{subject.name}")),
+    )
+    warm = plain.environment.model_copy(update={"indenter_temperature": assumed(40.0, "degC", WHY)})
+    slide = Slide(speed=assumed(10.0, "mm/s", WHY), start=assumed(0.5, "s", WHY))
+    more: tuple[dict[str, object], ...] = ({}, {"drive": ForceLoop()}, {"environment": warm}, {"slide": slide})
+
+    def calls(scene: Scene) -> bool:
+        with code_of("called_for", subject):
+            reasons = [subject.code("called_for")(scene, sensor.spec) for sensor in sensors]
+        for reason in reasons:
             if not isinstance(reason, Reason) or not reason.text:
                 fail("called_for", f"it returned {reason!r}, and a Reason(called_for, text, change) is needed")
-            if reason.called_for and scene not in calling:
-                calling.append(scene)
-    scenes = [one.model_copy(update=asked) for one in calling or _scenes(subject)]
+        return any(reason.called_for for reason in reasons)
+
+    scenes = sorted((plain.model_copy(update=update) for update in more), key=calls, reverse=True)
     found = next(presses(subject, scenes, "where"), None)
     return skip("no simulated sensor and scene go with it") if found is None else found
 
@@ -73,24 +63,19 @@ def it_is_applied(subject: Subject) -> None:
     name a function of one argument, the synthesis, that changes it in place; guard divisions; draw from
     run.of_recording(…), run.of_session(…) or run.of_unit(…).
     """
-    import numpy as np
-
     produced = subject.descriptor.produces
     consumed = {token for one in subject.registry.effects for token in one.consumes}
     wanted = {*get_args(ChannelKind), *ALWAYS_WANTED, *consumed}
     if not wanted.intersection(produced):
         close = nearest(produced[0], wanted) if produced else []
         fail(f"produces{list(produced)}", f"nothing needs it{f'; did you mean {close[0]}?' if close else ''}")
-    made, again = _pressed(subject), _pressed(subject)
-    (entry,) = [one for one in made.about["plan"] if one.effect == subject.name]
+    made = _pressed(subject)
+    (entry,) = [one for one in made.meta.plan if one.effect == subject.name]
     if not (entry.included or entry.asked):  # the solve may leave out what it was lent and did not need
         fail("produces", "it was asked for by name, and the plan left it out: nothing needs what it produces")
-    for stream in made.every_stream:
-        bad = np.argwhere(~np.isfinite(made.values(stream.name)))
-        if len(bad):
-            fail(f"where: {stream.name}.{stream.channels[bad[0][1]].name}", f"it is not finite in row {bad[0][0]}")
-        if not np.array_equal(made.values(stream.name), again.values(stream.name)):
-            fail(f"where: {stream.name}", "another press with the same seed gives other samples")
+    changed = differing(made, _pressed(subject))
+    if changed:
+        fail(f"where: {changed[0]}", "another press with the same seed gives other samples")
 
 
 @check("indenter", needs=("code-names-resolve",), carries_out=True)
@@ -124,14 +109,11 @@ def path_is_recorded(subject: Subject) -> None:
     """
     with code_of("where", subject):
         path = force_path(subject.descriptor, {}, WHY)
-        path = type(path).model_validate(path.model_dump())
     if path.forces_n[0] != 0 or not path.hold_s > 0:
         fail("where", f"it begins at {path.forces_n[0]:g} N with {path.hold_s:g} s of hold: none is left to tare on")
     if path.largest_n > MOST_N:
         fail("where", f"its largest force is {path.largest_n:g} N by default: are these gram-force?")
     made = next(presses(subject, (tiny_scene(profile=path),), "where"))
-    found = pressing_channel(made.reference)
-    if found is not None:
-        recorded = float(made.values(found[0].name)[:, found[1]].max())
-        if abs(recorded - path.largest_n) > FORCE_SHARE * path.largest_n:
-            fail("where", f"its {path.samples} samples reach {recorded:.3g} N, and the path {path.largest_n:g} N")
+    recorded = float(pressing_force(made.came, made.meta.reference)[1].max())
+    if abs(recorded - path.largest_n) > FORCE_SHARE * path.largest_n:
+        fail("where", f"its {path.samples} samples reach {recorded:.3g} N, and the path {path.largest_n:g} N")

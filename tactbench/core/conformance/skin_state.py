@@ -60,9 +60,8 @@ def pressed_locally(
     pressure = force_n / (2 * math.pi * sigma**2) * bell
     fluid = isinstance(skin, FluidBackedShell)
     if isinstance(skin, FluidBackedShell):
-        outer = skin.sheet.outer_radius
-        radius = math.inf if outer is None else outer.to("mm")
-        rest: FloatArray = skin.film.at(grid.x_mm, grid.s_mm / radius)
+        radius_mm = math.inf if skin.sheet.outer_radius is None else skin.sheet.outer_radius.to("mm")
+        rest: FloatArray = skin.film.at(grid.x_mm, grid.s_mm / radius_mm)
         least = skin.residual_film.to("mm")
     else:
         rest, least = np.full(bell.shape, skin.thickness.to("mm")), 0.0
@@ -75,7 +74,7 @@ def pressed_locally(
     return SkinState(
         grid=grid, force_n=force_n, deflection_mm=deflection, pressure_mpa=pressure,
         thickness_mm=np.maximum(rest - deflection, least), depth_mm=float(deflection.max()),
-        fluid_pressure_mpa=0.001 * force_n if fluid else 0.0,
+        fluid_pressure_mpa=0.001 * force_n * fluid,
         contact_radius_mm=math.sqrt(5.0) * sigma if force_n else 0.0, residual=0.0,
         tangential_displacement_mm=moved, shear_mpa=shear,
     )  # fmt: skip

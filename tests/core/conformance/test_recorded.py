@@ -23,8 +23,8 @@ VARIANTS = {
     "with a clock that goes back": "recording-is-of-this-sensor",
     "at another rate": "recording-fits-the-spec",
     "beyond the limits": "recording-fits-the-spec",
-    "in grams": "recording-shows-a-response",
-    "with the sign turned": "recording-shows-a-response",
+    "in grams": "recording-fits-the-spec",
+    "with the sign turned": "recording-fits-the-spec",
 }
 
 
