@@ -12,7 +12,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, Literal, NamedTuple, NoReturn
 
-from tactbench.core.errors import PluginError, TactbenchError
+from tactbench.core.errors import NotApplicable, PluginError, TactbenchError
 from tactbench.core.plugins import hookspecs
 from tactbench.core.plugins.interfaces import Operator
 from tactbench.core.plugins.registry import Registry, ask_plugin, load_object
@@ -169,6 +169,8 @@ def code_of(field: str, subject: Subject) -> Iterator[None]:
         yield
     except (CheckFailed, CheckSkipped):
         raise
+    except NotApplicable as reason:
+        raise CheckSkipped(f"it says: {reason.message}") from reason
     except (Exception, SystemExit) as error:
         line = line_in(subject.package, error.__traceback__)
         raise CheckFailed(f"{field} ({line})" if line else field, said(error)) from error

@@ -3,25 +3,25 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import Any, NamedTuple
+
+import numpy as np
 
 from tactbench.core.conformance.check import CheckFailed, Subject, check, code_of, fail, skip
 from tactbench.core.conformance.streams import BAD, good, joined, likely, marks_of, times_are_right
 from tactbench.core.errors import LinkError, RigError, UsageError
-from tactbench.core.samples import Quality, StreamData
+from tactbench.core.plugins.rig_devices import emulated_device, options_of
+from tactbench.core.samples import Block, IntArray, Quality, StreamData
 from tactbench.core.spec.rig import DeviceDescriptor
 from tactbench.core.spec.rig_file import EMULATED, DeviceEntry
 from tactbench.core.spec.sensor import ChannelSpec
 from tactbench.devices.driver import Driver, DriverSettings
+from tactbench.devices.emulation.emulated_devices import EmulatedDevices
+from tactbench.devices.emulator import Senses
 from tactbench.links.link import Clock, Link
-
-if TYPE_CHECKING:
-    from tactbench.core.samples import Block
-    from tactbench.devices.emulation.emulated_devices import EmulatedDevices
-    from tactbench.devices.emulator import Senses
 
 READ_S, WAIT_S, SHORT_S = 1.0, 0.1, 0.005
 """How long a driver is read, how long one read waits, and how long a read takes that does not wait."""
@@ -29,9 +29,10 @@ RATED_S, LATE = 3.0, 0.05
 """How long it is read where rate and noise are looked at; and by which share its times may span more or less."""
 BEFORE_S = 2.0
 """What the host's clock says when a driver is made: frames wait before the start."""
-WRAPS = ((600, 0.0), (140_000, 1.0))
-"""Rows in which a counter of 8 bits wraps twice, and of 16 bits; and seconds between two reads."""
-UNPLUGGED_S, GONE_AT_S = 5.0, 2 * BEFORE_S
+WRAP_ROWS, SLOW_HZ = (600, 140_000), 1000.0
+"""Rows in which a counter of 8 bits wraps twice, and of 16 bits; and up to which rate as many are read."""
+GONE_AT_S = 10.0
+"""When the line is unplugged, and how long that is waited for."""
 MOST_STILL = 1000
 """Reads that may come back at one moment: of a device that sends a thousand samples at once."""
 LEVELS = 8
@@ -58,20 +59,18 @@ class _Adapter:
     def __init__(self, inner: Any, change: Callable[[bytes], bytes]) -> None:
         self._inner, self._change, self._sizes = inner, change, itertools.cycle(SIZES)
 
-    def feed(self, piece: Any, now_s: float) -> list[tuple[float, bytes]]:
+    def feed(self, piece: Any, now_s: float) -> Any:
         return self._cut(self._inner.feed(piece, now_s), now_s)
 
-    def poll(self, now_s: float) -> list[tuple[float, bytes]]:
+    def poll(self, now_s: float) -> Any:
         return self._cut(self._inner.poll(now_s), now_s)
 
     def next_s(self) -> float:
-        import numpy as np
-
         return HELD_S * float(np.ceil(self._inner.next_s() / HELD_S))
 
-    def _cut(self, sent: Iterable[tuple[float, bytes]], now_s: float) -> list[tuple[float, bytes]]:
+    def _cut(self, sent: Any, now_s: float) -> Any:
         data = b"".join(self._change(piece) for _, piece in sent)
-        pieces = list[tuple[float, bytes]]()
+        pieces: list[Any] = []
         while data:
             size = next(self._sizes)
             pieces.append((now_s + APART_S * len(pieces), data[:size]))
@@ -79,58 +78,38 @@ class _Adapter:
         return pieces
 
 
-class Opened:
-    """A driver that is open, on its emulator in virtual time or on a real line.
+class Opened(NamedTuple):
+    """A driver that is open, on its emulator in virtual time or on a real line."""
 
-    Attributes
-    ----------
-    links
-        Those that it has opened.
-    """
-
-    def __init__(self, subject: Subject, open_link: Callable[[], Link], options: dict[str, Any], clock: Clock) -> None:
-        self.subject, self.now_ns, self.links = subject, clock, list[Link]()
-
-        def opened() -> Link:
-            self.links.append(open_link())
-            return self.links[-1]
-
-        streams = () if isinstance(subject.descriptor, DeviceDescriptor) else subject.descriptor.spec.streams
-        with code_of("driver", subject):
-            self.driver: Driver = subject.code("driver")(DriverSettings(opened, streams, options, clock))
+    subject: Subject
+    driver: Driver
+    clock: Clock
 
     def start(self) -> None:
         """Start the driver."""
         with code_of("driver.start", self.subject):
             self.driver.start()
 
-    def read(
-        self, seconds: float = READ_S, rows: int = 0, before: Callable[[], object] = lambda: None
-    ) -> dict[str, StreamData]:
-        """Read for some time, or until each stream has so many `rows`, each time after `before`; return what came."""
+    def read(self, seconds: float = READ_S) -> dict[str, StreamData]:
+        """Read for some time; return what came."""
         blocks: list[Block] = []
-        left = {stream.name: rows for stream in self.driver.streams}
-        until_ns, before_ns, still = self.now_ns() + round(seconds * 1e9), -1, 0
-        while (now_ns := self.now_ns()) < until_ns and (not rows or max(left.values()) > 0):
+        until_ns, before_ns, still = self.clock() + round(seconds * 1e9), -1, 0
+        while (now_ns := self.clock()) < until_ns:
             still = still + 1 if now_ns == before_ns else 0
             if still > MOST_STILL:
                 fail("driver.read", "time stands still: it returns at once, and nothing is waited for")
             before_ns = now_ns
-            before()
             with code_of("driver.read", self.subject):
-                came = list(self.driver.read(WAIT_S))
-            blocks += came
-            for block in came if rows else ():
-                left[block.stream] -= len(block.data)
+                blocks += self.driver.read(WAIT_S)
         return joined("driver.read", self.driver.streams, blocks)
 
-    def closed(self) -> None:
-        """Close the driver, twice; fail where a link is left open."""
-        with code_of("driver.close", self.subject):
-            self.driver.close()
-            self.driver.close()
-        if not all(link._closed for link in self.links):
-            fail("driver.close", "its link is still open afterwards")
+
+def opened_on(subject: Subject, open_link: Callable[[], Link], options: dict[str, Any], clock: Clock) -> Opened:
+    """Open a driver."""
+    streams = () if isinstance(subject.descriptor, DeviceDescriptor) else subject.descriptor.spec.streams
+    with code_of("driver", subject):
+        driver: Driver = subject.code("driver")(DriverSettings(open_link, streams, options, clock))
+    return Opened(subject, driver, clock)
 
 
 @contextmanager
@@ -151,9 +130,6 @@ def emulated(
     options
         Beside those of the emulated device.
     """
-    from tactbench.core.plugins.rig_devices import emulated_device, options_of
-    from tactbench.devices.emulation.emulated_devices import EmulatedDevices
-
     name, entry = subject.name, DeviceEntry(link=EMULATED, faults=faults)
     with code_of("emulator", subject):
         device = emulated_device(subject.descriptor, name, entry, senses, 1)
@@ -162,7 +138,7 @@ def emulated(
     devices = EmulatedDevices({name: device})
     devices.advance(round(BEFORE_S * 1e9))
     given = {**options_of(subject.descriptor, entry), **options}
-    opened = Opened(subject, devices.opener(name), given, devices.clock)
+    opened = opened_on(subject, devices.opener(name), given, devices.clock)
     try:
         if started:
             opened.start()
@@ -184,19 +160,20 @@ def driver_opens(subject: Subject) -> None:
         skip("it names no driver: it can be simulated or replayed, not read")
     if descriptor.emulator is None:
         skip("it names no emulator: only `--rig-file FILE` tries its driver, on a real line")
-    if descriptor.emulated_link is None:
-        fail("emulated_link", "it names an emulator, and does not say on which kind of link")
-    with emulated(subject, started=False) as (opened, _):
+    own = () if isinstance(descriptor, DeviceDescriptor) else descriptor.spec.channels()
+    with emulated(subject, started=False) as (opened, devices):
         with code_of("driver.identify", subject):
             told = dict(opened.driver.identify())
         if not all(isinstance(one, str) for pair in told.items() for one in pair):
             fail("driver.identify", f"{told!r}, and texts by name are needed")
-        own = {} if isinstance(descriptor, DeviceDescriptor) else {one.name: one for one in descriptor.spec.streams}
-        for stream in opened.driver.streams if own else ():
-            if stream.name not in own or stream.channels != own[stream.name].channels:
-                fail(f"driver.streams[{stream.name}]", f"the spec has no such stream; it has {', '.join(own)}")
+        strange = [one.name for one in _channels(opened) if own and one not in own]
+        if strange:
+            fail("driver.streams", f"the spec has no such channel as {strange[0]}")
         opened.start()
-        opened.closed()
+        with code_of("driver.close: it must be possible to open its link again", subject):
+            opened.driver.close()
+            opened.driver.close()
+            devices.open_link(subject.name).close()
     try:
         with emulated(subject, started=False, no_such_option=1):
             pass
@@ -214,8 +191,6 @@ def driver_reads(subject: Subject) -> None:
     Stamp with Received.t_ns or settings.clock(), both int64 nanoseconds; take everything that has come at each read,
     and return an empty list where nothing new has: a device that is asked for its last row may give it twice.
     """
-    import numpy as np
-
     every: list[ChannelSpec] = []
 
     def moving(t_s: float) -> dict[str, float]:
@@ -233,9 +208,9 @@ def look_at(opened: Opened) -> dict[str, StreamData]:
     """Start a driver, read it for a while, and return what came; fail where its times are not as they must be."""
     opened.start()
     opened.read(WAIT_S)
-    began_ns = opened.now_ns()
+    began_ns = opened.clock()
     found = opened.read(RATED_S)
-    ended_ns = opened.now_ns()
+    ended_ns = opened.clock()
     opened.driver.stop()
     for name, stream in found.items():
         if not len(stream.data):
@@ -244,9 +219,8 @@ def look_at(opened: Opened) -> dict[str, StreamData]:
     return found
 
 
-def _channels(opened: Opened, *kinds: str) -> list[ChannelSpec]:
-    every = (channel for stream in opened.driver.streams for channel in stream.channels)
-    return [one for one in every if not kinds or one.kind in kinds]
+def _channels(opened: Opened) -> list[ChannelSpec]:
+    return [channel for stream in opened.driver.streams for channel in stream.channels]
 
 
 def _reading(one: ChannelSpec, share: float) -> tuple[float, float]:
@@ -268,8 +242,6 @@ def driver_reads_what_is_sensed(subject: Subject) -> None:
 
     Decode into the order of the stream's channels and into their units; the emulator must encode what its senses say.
     """
-    import numpy as np
-
     if getattr(subject.descriptor, "kind", "") == "motor":
         skip("what a motor's position is, its rig decides")
     with emulated(subject, started=False) as (opened, _):
@@ -302,46 +274,32 @@ def driver_reads_what_is_sensed(subject: Subject) -> None:
 
 @check("sensor", "device", needs=("driver-reads-what-is-sensed",))
 def driver_takes_any_pieces(subject: Subject) -> None:
-    """A serial port hands over half a frame or several at once, as the host happens to look.
+    """A serial port hands over half a frame or several at once, and cables lose bytes, which must not become a reading.
 
-    Keep what is left of a frame for the next read, and take all frames that are whole.
+    Keep what is left of a frame for the next read, and take all frames that are whole. Look for a frame's length, end
+    or checksum, leave out what is damaged, find the next beginning, and count it in `counts` or mark it as SUSPECT.
     """
     if subject.descriptor.emulated_link != "bytes":
         skip("its link hands over whole frames")
-    numbers = []
-    for change in (None, bytes):
-        with emulated(subject, change=change) as (opened, _):
-            numbers.append({name: len(stream.data) for name, stream in opened.read().items()})
-    for name, number in numbers[0].items():
-        if numbers[1][name] < 0.9 * number - HELD_S * number / READ_S - 2:
-            text = f"{numbers[1][name]} rows of {name} in {READ_S:g} s where frames come in pieces or several at"
-            fail("driver.read", f"{text} once, {number} where each comes whole")
-
-
-@check("sensor", "device", needs=("driver-takes-any-pieces",))
-def driver_drops_damaged_frames(subject: Subject) -> None:
-    """Cables lose bytes: a frame that is not whole must not become a reading, nor end the recording.
-
-    Look for the frame's length, end or checksum, leave out what is damaged, find the next beginning, and count it in
-    `counts` or mark it as SUSPECT or MISSING.
-    """
-    import numpy as np
-
-    seen = itertools.count()
+    seen, lost = itertools.count(), 0
 
     def damaged(data: bytes) -> bytes:
-        if len(data) < 2 or next(seen) % DAMAGE_EVERY != DAMAGE_EVERY - 1:
+        if not lost or len(data) < 2 or next(seen) % DAMAGE_EVERY != DAMAGE_EVERY - 1:
             return data
-        return data[: len(data) // 2] + b"\xff" + data[len(data) // 2 + DAMAGE :]
+        return data[: len(data) // 2] + b"\xff" + data[len(data) // 2 + lost :]
 
     with emulated(subject) as (opened, _):
         sound = opened.read()
     with emulated(subject, change=damaged) as (opened, _):
-        before = dict(opened.driver.counts)
+        cut = opened.read()
+        for name, stream in sound.items():
+            came, whole = len(cut[name].data), len(stream.data)
+            if came < (0.9 - HELD_S / READ_S) * whole - 2:
+                text = f"{came} rows of {name} in {READ_S:g} s where frames come in pieces or several at once"
+                fail("driver.read", f"{text}, {whole} where each comes whole")
+        lost, before = DAMAGE, dict(opened.driver.counts)
         found = opened.read(2 * READ_S)
-        marked = opened.driver.counts != before
-    if next(seen) < DAMAGE_EVERY:
-        skip("it sends too little to damage any of it")
+        noticed = opened.driver.counts != before or next(seen) < DAMAGE_EVERY
     for name, stream in found.items():
         if not len(stream.data):
             fail("driver.read", f"no row of {name} comes where frames are damaged now and then")
@@ -351,8 +309,8 @@ def driver_drops_damaged_frames(subject: Subject) -> None:
         wrong = values[(values < low - near) | (values > high + near)]
         if len(wrong):
             fail(f"driver.read: {name}", f"a frame that lost {DAMAGE} bytes is taken for a whole one: {wrong[0]:g}")
-        marked |= bool(np.isnan(values).any())
-    if not marked:
+        noticed |= bool(np.isnan(values).any())
+    if not noticed:
         fail("driver.counts", "frames were damaged, and neither counted nor marked")
 
 
@@ -362,33 +320,34 @@ def driver_counts_on(subject: Subject) -> None:
 
     Count on over the wraps: tactbench.plugin.devices.Unwrap(bits).
     """
-    import numpy as np
-
     with emulated(subject) as (opened, devices):
+        if all(stream.sequence is None for stream in opened.read().values()):
+            skip("its device numbers no samples")
         rates = [stream.rate_hz or 100.0 for stream in opened.driver.streams]
-        for rows, ahead_s in WRAPS if max(rates) <= 1000 and len(rates) == 1 else WRAPS[:1]:
-
-            def ahead(seconds: float = ahead_s) -> None:
-                devices.advance(devices.clock() + round(seconds * 1e9))
-
-            found = opened.read(rows / min(rates) + READ_S, rows, ahead)
-            if all(stream.sequence is None for stream in found.values()):
-                skip("its device numbers no samples")
-            for name, stream in found.items():
-                numbers = np.zeros(0) if stream.sequence is None else stream.sequence
+        slow = max(rates) <= SLOW_HZ and len(rates) == 1
+        last: dict[str, IntArray] = {}
+        until_ns = devices.clock() + round(1e9 * WRAP_ROWS[slow] / min(rates))
+        while devices.clock() < until_ns:
+            devices.advance(devices.clock() + slow * round(1e9 * WAIT_S))
+            with code_of("driver.read", subject):
+                blocks = opened.driver.read(WAIT_S)
+            for name, counted in ((one.stream, one.sequence) for one in blocks if one.sequence is not None):
+                numbers = np.concatenate([last.get(name, counted[:0]), counted])
                 wrong = np.flatnonzero(np.diff(numbers) != 1)
                 if len(wrong):
                     a, b = numbers[wrong[0] : wrong[0] + 2]
                     fail(f"driver.read: {name}.sequence", f"{a} is followed by {b}, and no row was lost")
+                last[name] = numbers[-1:]
 
 
 @check("sensor", "device", needs=("driver-reads",))
-def driver_starts_afresh(subject: Subject) -> None:
-    """What a device sent before the start would be recorded as if it had come then.
+def driver_reports_what_happens(subject: Subject) -> None:
+    """What came before the start is no reading, `read(0)` waits for nothing, and a line that is gone is no silence.
 
-    Discard in start() what waits in the link (Link.discard), and forget the beginning of a frame.
+    Discard in start() what waits in the link (Link.discard), and forget the beginning of a frame. Pass the time-out on
+    to the link, return an empty list when it raises LinkTimeout, and let LinkUnplugged pass.
     """
-    with emulated(subject, started=False) as (opened, devices):
+    with emulated(subject, f"unplug:start_s={GONE_AT_S:g}", started=False) as (opened, devices):
         for _ in range(2):
             began_ns = devices.clock() + round(BEFORE_S * 1e9)
             devices.advance(began_ns)
@@ -397,103 +356,60 @@ def driver_starts_afresh(subject: Subject) -> None:
                 early_s = 0.0 if stream.t_ns is None else (began_ns - float(stream.t_ns[0])) * 1e-9
                 if early_s > 0:
                     fail("driver.start", f"a row of {name} is from {early_s:.2g} s before it was started")
-            opened.driver.stop()
-
-
-@check("sensor", "device", needs=("driver-reads",))
-def driver_does_not_wait_when_told_so(subject: Subject) -> None:
-    """`read(0)` asks without waiting: a rig with several devices reads them in turn.
-
-    Pass the time-out on to the link, and return an empty list when it raises LinkTimeout.
-    """
-    with emulated(subject) as (opened, _):
-        opened.driver.read(WAIT_S)
-        before_ns = opened.now_ns()
-        with code_of("driver.read", subject):
-            for _ in range(3):
+            before_ns = opened.clock()
+            with code_of("driver.read", subject):
                 opened.driver.read(0.0)
-        took_s = (opened.now_ns() - before_ns) * 1e-9
-        if took_s > SHORT_S:
-            fail("driver.read", f"read(0) took {took_s:.2g} s")
-
-
-@check("sensor", "device", needs=("driver-reads",))
-def driver_reports_unplug(subject: Subject) -> None:
-    """Nothing that comes and nothing that is there look alike, unless the driver lets the link's error pass.
-
-    Let LinkUnplugged of the link pass through read(); catch LinkTimeout alone.
-    """
-    error = None
-    with emulated(subject, f"unplug:start_s={GONE_AT_S:g}") as (opened, _):
+            took_s = (opened.clock() - before_ns) * 1e-9
+            if took_s > SHORT_S:
+                fail("driver.read", f"read(0) took {took_s:.2g} s")
+            opened.driver.stop()
+        opened.start()
         try:
-            opened.read(GONE_AT_S - BEFORE_S + UNPLUGGED_S)
+            opened.read(GONE_AT_S)
         except CheckFailed as failure:
             error = failure.__cause__
-    if error is None:
-        fail("driver.read", "it goes on as if nothing had come once its line is gone")
-    if not isinstance(error, LinkError | RigError):
-        fail("driver.read", f"{type(error).__name__} instead of LinkUnplugged once the line is gone: {error}")
+            if isinstance(error, LinkError | RigError):
+                return
+            if error is not None:
+                what = type(error).__name__
+                fail("driver.read", f"{what} instead of LinkUnplugged once the line is gone: {error}")
+    fail("driver.read", "it goes on as if nothing had come once its line is gone")
 
 
-@check("device", needs=("driver-opens",))
-def units_are_the_rigs(subject: Subject) -> None:
-    """A rig's force loop, its ceilings and every score take forces for newtons, and positions for metres.
+@check("device", needs=("driver-reads",))
+def device_is_fit_for_a_rig(subject: Subject) -> None:
+    """A rig takes forces for newtons and places for metres, a zero for taken if the driver says so, a motor for still.
 
-    Give force channels unit "N", torques "N*m", a motor's channel `position` "m", and convert.
+    Give force channels unit "N", torques "N*m", a motor's channel `position` "m", and convert. Return True from tare()
+    only where the device takes its reading as zero; mark its range's end as SATURATED. Leave a motor where it is, and
+    without power, in the driver's making, identify(), start() and read().
     """
-    kind, unit = {"force": ("force", "N"), "motor": ("position", "m")}.get(subject.descriptor.kind, ("", ""))
-    if not kind:
-        skip(f"it is a {subject.descriptor.kind} device")
-    with emulated(subject, started=False) as (opened, _):
-        found = _channels(opened, kind)
-    if not found:
-        fail("driver.streams", f"none of its channels is of kind {kind}")
-    for channel in found:
-        if channel.unit != unit:
-            fail(f"driver.streams: {channel.name}.unit", f"{channel.unit!r}, and {unit!r} is needed")
-
-
-@check("device", needs=("driver-reads-what-is-sensed", "units-are-the-rigs"))
-def tare_and_overload_are_true(subject: Subject) -> None:
-    """A driver that says it has taken a zero, and has not, presses harder; a sensor at its end reads like any other.
-
-    Return True from tare() only where the device takes its reading as zero; mark its range's end as SATURATED.
-    """
-    import numpy as np
-
-    if subject.descriptor.kind != "force":
-        skip("it is no force sensor")
-    sensed: dict[str, float] = {}
+    device, sensed, taken = subject.descriptor.kind, dict[str, float](), False
+    kind, unit = ("force", "N") if device == "force" else ("position", "m")
+    if device not in ("force", "motor"):
+        skip(f"it is a {device} device")
     with emulated(subject, senses=lambda t_s: sensed) as (opened, _):
-        taken = False
+        own = [one for one in _channels(opened) if one.kind == kind]
+        for channel in own:
+            if channel.unit != unit:
+                fail(f"driver.streams: {channel.name}.unit", f"{channel.unit!r}, and {unit!r} is needed")
+        if not own:
+            fail("driver.streams", f"none of its channels is of kind {kind}")
         for force_n in (LOAD_N, LOAD_N, OVERLOAD_N):
-            sensed |= {one.name: force_n for one in _channels(opened, "force")}
+            sensed |= {channel.name: force_n for channel in own if kind == "force"}
             opened.read()
             for name, stream in opened.read().items():
-                forces = np.array([one.kind == "force" for one in stream.spec.channels])
-                found = np.abs(np.nanmedian(good(stream)[:, forces], axis=0))
-                if taken and force_n == LOAD_N and (found > 2 * READ_N).any():
-                    fail("driver.tare", f"it says that a zero is taken, and {found.max():.4g} N are read")
-                marked = marks_of(stream)[:, forces] & (Quality.SATURATED | BAD)
-                if force_n == OVERLOAD_N and not marked.all():
-                    fail(f"driver.read: {name}", f"forces are not marked SATURATED under {OVERLOAD_N:g} N")
+                columns = [one in own for one in stream.spec.channels]
+                values = good(stream)[:, columns]
+                there = values[np.isfinite(values).all(axis=1)]
+                moved = np.ptp(there, axis=0).max(initial=0.0) if len(there) else 0.0
+                if kind == "position" and moved > STILL_M:
+                    fail(f"driver.read: {name}", f"it changes by {1e3 * moved:.3g} mm, and nobody has moved it")
+                left_n = np.abs(np.nanmedian(values, axis=0)).max(initial=0.0) if taken else 0.0
+                if force_n == LOAD_N and left_n > 2 * READ_N:
+                    fail("driver.tare", f"it says that a zero is taken, and {left_n:.4g} N are read")
+                marked = marks_of(stream)[:, columns] & (Quality.SATURATED | BAD)
+                if force_n == OVERLOAD_N and kind == "force" and not marked.all():
+                    fail(f"driver.read: {name}", f"it is not marked SATURATED under {OVERLOAD_N:g} N")
             with code_of("driver.tare", subject):
-                taken = taken or opened.driver.tare()
-
-
-@check("device", needs=("driver-reads", "units-are-the-rigs"))
-def opening_and_reading_move_nothing(subject: Subject) -> None:
-    """A motor that runs off when its line is opened does so with a finger under it, and no guard is there yet.
-
-    Leave the motor where it is, and without power, in the driver's making, identify(), start() and read().
-    """
-    import numpy as np
-
-    if subject.descriptor.kind != "motor":
-        skip("it is no motor")
-    with emulated(subject) as (opened, _):
-        for name, stream in opened.read().items():
-            places = good(stream)[:, [one.kind == "position" for one in stream.spec.channels]]
-            moved = float(np.ptp(places[np.isfinite(places).all(axis=1)], axis=0).max(initial=0.0)) if len(places) else 0.0
-            if moved > STILL_M:
-                fail(f"driver.read: {name}", f"its place changes by {1e3 * moved:.3g} mm, and nobody has moved it")
+                taken = taken or (kind == "force" and opened.driver.tare())

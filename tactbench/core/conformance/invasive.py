@@ -6,25 +6,24 @@ They run in the process of the command, so that Ctrl-C reaches the rig, and with
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
-from functools import lru_cache, partial
-from typing import TYPE_CHECKING, Any
+from functools import partial
+from typing import Any
+
+import numpy as np
 
 from tactbench.core.conformance.check import Subject, check, code_of, fail, skip
-from tactbench.core.conformance.driver import Opened, look_at
+from tactbench.core.conformance.driver import look_at, opened_on
 from tactbench.core.conformance.press import WHY, slow_ramp, tiny_scene
 from tactbench.core.conformance.streams import FORCE_SHARE, carried_out, force_is, good, joined, pressing_force
 from tactbench.core.errors import TactbenchError
 from tactbench.core.plugins.emulators import running
 from tactbench.core.plugins.rig_files import load_rig_file
 from tactbench.core.plugins.taking_part import rig_context
-from tactbench.core.samples import StreamData
+from tactbench.core.samples import FloatArray, StreamData
 from tactbench.core.spec.rig import SensorDescriptor
 from tactbench.core.spec.rig_file import RigFile
-
-if TYPE_CHECKING:
-    from tactbench.core.samples import FloatArray
 
 FORCE_N = 1.0
 """At the end of a press: a motor with friction still follows it, and no fingertip is harmed."""
@@ -62,7 +61,7 @@ def real_device_answers(subject: Subject) -> None:
     entry = named[subject.name]
     if entry.emulated:
         skip("the rig file says that the device is emulated")
-    opened = Opened(subject, partial(open_link, entry.link), options_of(descriptor, entry), time.monotonic_ns)
+    opened = opened_on(subject, partial(open_link, entry.link), options_of(descriptor, entry), time.monotonic_ns)
     try:
         with code_of("driver.identify", subject):
             opened.driver.identify()
@@ -71,13 +70,10 @@ def real_device_answers(subject: Subject) -> None:
     finally:
         with suppress(TactbenchError):
             opened.driver.close()
-    opened.closed()
 
 
 def _noise_is_as_stated(subject: Subject, stream: StreamData) -> None:
     """Fail where a channel stands still that has noise, or has much more or less of it than its spec states."""
-    import numpy as np
-
     for column, channel in enumerate(stream.spec.channels):
         where, sd = f"driver.read: {stream.spec.name}.{channel.name}", float(np.nanstd(good(stream)[:, column]))
         stated = getattr(subject.spec, "nuisances", {}).get(channel.kind)
@@ -104,15 +100,11 @@ class _Kept:
         with self._rig.open(sensor, scene, seed=seed) as self.last:
             yield self.last
 
-    @property
-    def zero_n(self) -> float:
-        """What was taken off the pressing force as its zero [N], as PressingForce.about says it; 0: nothing."""
-        for stream in self.last.reference:
-            for column, channel in enumerate(stream.channels):
-                about = str(self.last.drawn.get(f"zero of {stream.name}", ""))
-                if about and channel.name in ("fz", "normal"):
-                    return float(about.split(",")[column])
-        return 0.0
+
+def _zeros(drawn: Mapping[str, Any]) -> list[float]:
+    """Return what was taken off the reference's channels as their zero, as PressingForce.about says it."""
+    texts = [str(text) for name, text in sorted(drawn.items()) if name.startswith("zero of ")]
+    return [float(one) for text in texts for one in text.split(",")]
 
 
 def _built(subject: Subject) -> tuple[_Kept, SensorDescriptor, Any]:
@@ -125,16 +117,19 @@ def _built(subject: Subject) -> tuple[_Kept, SensorDescriptor, Any]:
     return _Kept(subject.code("where")(context)), subject.registry.sensors[next(iter(file.sensors))], scene
 
 
-@lru_cache(maxsize=1)
-def _first_zero_n(subject: Subject) -> float | None:
-    """Press once, and return the zero [N]; None: nothing moves by itself."""
-    import numpy as np
+@check("rig", mode="invasive", needs=("code-names-resolve",), carries_out=True)
+def real_rig_presses(subject: Subject) -> None:
+    """Estimators are taught the recorded force: it must not come late, with another sign or too far, nor stay.
 
+    Look at `tactbench doctor --rig-file FILE` for limits, at the sign and unit of the force sensor in the rig file,
+    then at the gains of the force loop. Retreat at the end of each scene, also of one that failed; let `stop` retreat,
+    wait for its end, and return "" or what is to be done by hand.
+    """
     with code_of("where", subject):
         rig, sensor, scene = _built(subject)
         made = carried_out(rig, sensor, subject.descriptor, scene, rig_file=_file(subject))
     if not hasattr(rig.last, "stop"):
-        return None
+        return  # nothing in it moves by itself: a hand presses
     stream, force_n = pressing_force(made.came, made.meta.reference)
     assert stream.t_ns is not None
     t_s = (stream.t_ns - stream.t_ns[0]) * 1e-9
@@ -143,55 +138,30 @@ def _first_zero_n(subject: Subject) -> float | None:
     largest = float(np.convolve(force_n, np.ones(width) / width, "valid").max())
     if largest > LARGEST * FORCE_N:
         fail("reference", f"the force rises to {largest:.3g} N in a press to {FORCE_N:g} N")
-    return rig.zero_n
-
-
-@check("rig", mode="invasive", needs=("code-names-resolve",), carries_out=True)
-def real_rig_presses(subject: Subject) -> None:
-    """Estimators are taught the recorded force: a rig that presses late, with another sign or too far misleads them.
-
-    Look at `tactbench doctor --rig-file FILE` for limits, at the sign and unit of the force sensor in the rig file,
-    then at the gains of the force loop.
-    """
-    _first_zero_n(subject)
-
-
-@check("rig", mode="invasive", needs=("real-rig-presses",))
-def real_rig_lets_go(subject: Subject) -> None:
-    """A rig that still presses when the next press begins takes that load for zero; Ctrl-C must take the load off.
-
-    Retreat at the end of each scene, also of one that failed; let `stop` retreat, wait for its end, and return "" or
-    what is to be done by hand.
-    """
-    first_n = _first_zero_n(subject)
-    if first_n is None:
-        skip("nothing in it moves by itself: a hand presses")
-    blocks: list[Any] = []
-
-    def force() -> FloatArray:
-        every = (*acquisition.streams, *acquisition.reference)
-        return pressing_force(joined("open", every, blocks), acquisition.reference)[1]
-
     with code_of("where", subject):
         rig, sensor, scene = _built(subject)
         with rig.open(sensor, scene, seed=2) as acquisition:
-            came = iter(acquisition)
+            every = (*acquisition.streams, *acquisition.reference)
+
+            def force(*blocks: Any) -> FloatArray:
+                return pressing_force(joined("open", every, blocks), acquisition.reference)[1]
+
+            came, rising = iter(acquisition), []
             try:
                 for block in came:
-                    blocks.append(block)
-                    rising = force()
-                    if len(rising) and abs(rising[-5:].mean()) > FORCE_N / 2:
+                    rising.append(block)
+                    if np.abs(force(block)).max(initial=0.0) > FORCE_N / 2:
                         break
             except KeyboardInterrupt:
                 acquisition.stop("stopped by hand")
                 raise
             message = acquisition.stop(WHY)
-            blocks += came
+            left = force(*came)[-5:]
     # The hold is the first fifth of the way to half of the force, or more.
-    hold_n = float(rising[: max(1, len(rising) // 5)].mean())
-    for what, off_n in (("force", hold_n), ("zero", rig.zero_n - first_n)):
-        if abs(off_n) > FORCE_SHARE * FORCE_N:
-            fail("open", f"the {what} is {off_n:.3g} N off when the next press begins, before anything touches")
-    left = force()[len(rising) :][-5:]
+    held = force(*rising)
+    off = np.subtract(_zeros(rig.last.drawn), _zeros(made.meta.drawn))
+    off_n = max([held[: max(1, len(held) // 5)].mean(), *off], key=abs)
+    if abs(off_n) > FORCE_SHARE * FORCE_N:
+        fail("open", f"the force or its zero is {off_n:.3g} N off when the next press begins, before anything touches")
     if message or (len(left) and abs(left.mean()) > FORCE_SHARE * FORCE_N):
         fail("stop", message or f"{left.mean():.3g} N are left after it has returned")

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from functools import lru_cache
 
+import numpy as np
+
 from tactbench.core.conformance.check import Subject, check, fail, skip
 from tactbench.core.conformance.streams import Recorded, good, pressing_force, rate_is_right, read_back, within_limits
 from tactbench.core.errors import TactbenchError
@@ -48,8 +50,6 @@ def recording_fits_the_spec(subject: Subject) -> None:
     Correct rate_hz, lower, upper and sign of the spec, the type and byte order of the decoding, how the device is set
     up, or the force's unit in the mapping (1 gf is 0.00981 N).
     """
-    import numpy as np
-
     meta, data, _ = _read(subject)
     pressing = None
     if any(channel.kind == "force" for one in meta.reference if one.name in data for channel in one.channels):

@@ -5,14 +5,15 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 
+import numpy as np
+
 from tactbench.core.conformance.check import Subject, check, fail, skip
-from tactbench.core.conformance.skin_state import on_sheet_mm
 from tactbench.core.spec import units
 from tactbench.core.spec.sensor import ChannelSpec, StreamSpec, Vector
+from tactbench.core.spec.skin import SkinSheet
 
-LARGEST_M, SMALLEST_M = 0.5, 1e-4
-"""Farthest and least distance of the outermost taxels [m]: the skin of a forearm is 0.3 m long, and taxels of a tenth
-of a millimetre are the smallest that are made."""
+LARGEST_M = 0.5
+"""Farthest distance of the outermost taxels [m]: the skin of a forearm is 0.3 m long."""
 OF_KIND = {
     "force": "N", "torque": "N*m", "position": "m", "dc_pressure": "Pa", "ac_pressure": "Pa", "dc_temperature": "K",
     "joint": "rad",
@@ -26,6 +27,14 @@ UNIT_NORMAL = 1e-3
 """Data sheets state normals to three decimals."""
 INWARD = -0.5
 """Cosine between a stated normal and the sheet's own, below which it points into the sensor."""
+
+
+def on_sheet_mm(sheet: SkinSheet, position_m: Vector) -> tuple[float, float]:
+    """Return the axial coordinate and the arc length at which a place of the sensor's frame lies on the sheet [mm]."""
+    x_mm, y_mm, z_mm = (1e3 * part for part in position_m)
+    if sheet.outer_radius is None:
+        return x_mm, y_mm
+    return x_mm, sheet.outer_radius.to("mm") * math.atan2(y_mm, -z_mm)
 
 
 def _channels(subject: Subject) -> Iterator[tuple[str, StreamSpec, ChannelSpec]]:
@@ -42,8 +51,6 @@ def limits_are_in_order(subject: Subject) -> None:
     from a converter and need both ends. Give force, torque, position and pressure channels a unit of that dimension,
     or ``count`` for raw readings.
     """
-    import numpy as np
-
     for place, stream, channel in _channels(subject):
         unit = OF_KIND.get(channel.kind)
         if unit and channel.unit not in RAW and units.parse(channel.unit)[1] != units.parse(unit)[1]:
@@ -102,8 +109,6 @@ def positions_are_in_metres(subject: Subject) -> None:
     if far_m > min(2 * size_m, LARGEST_M):
         unit = "millimetres" if not of or far_m > 200 * size_m else "inches"
         fail(f"{place}.position_m", f"{far_m:g} m from the sensor's origin{of}: are these {unit}?")
-    if len({position_m for *_, position_m in placed}) > 1 and far_m < SMALLEST_M:
-        fail(f"{place}.position_m", f"no channel is farther than {far_m:g} m from the origin: is the unit larger?")
 
 
 @check("sensor", needs=("positions-are-in-metres",))
@@ -165,10 +170,8 @@ def nuisances_are_in_its_units(subject: Subject) -> None:
             kinds = sorted({channel.kind for channel in spec.channels()})
             fail(f"spec.nuisances[{kind}]", f"it has no {kind} channel; it has {', '.join(kinds)}")
         for field in nuisances.model_fields_set - {"creep"}:
-            amount, where = getattr(nuisances, field), f"spec.nuisances[{kind}].{field}"
+            amount = getattr(nuisances, field)
             share = field.endswith("_scatter") or field in ("unit_gain", "offset_smooth")
             unit = "1" if share else spec.channels(kind)[0].unit
             if amount is not None and not field.endswith("_tau") and amount.unit != unit:
-                fail(where, f"its unit is {amount.unit!r}, and {unit!r} is needed")
-            if amount is not None and amount.value < 0 and field != "warm_up":
-                fail(where, f"{amount} is below 0")
+                fail(f"spec.nuisances[{kind}].{field}", f"its unit is {amount.unit!r}, and {unit!r} is needed")

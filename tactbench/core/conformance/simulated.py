@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import get_args
 
+import numpy as np
+
 from tactbench.core.conformance.check import Subject, check, code_of, fail, skip
 from tactbench.core.conformance.press import WHY, differing, presses, simulated_sensors, tiny_scene
 from tactbench.core.conformance.streams import FORCE_SHARE, Recorded, pressing_force
@@ -31,8 +33,7 @@ def _pressed(subject: Subject) -> Recorded:
     It is pressed plainly, under force control, warmer than the sensor, or sliding: as first calls for the effect.
     """
     siblings = (one for one in subject.registry.effects.all_owned() if one.distribution == subject.distribution)
-    consumed = set(subject.descriptor.consumes)
-    words = [one.descriptor.name for one in siblings if consumed.intersection(one.descriptor.produces)]
+    words = [one.descriptor.name for one in siblings if set(subject.descriptor.consumes) & set(one.descriptor.produces)]
     sensors = simulated_sensors(subject)
     plain = tiny_scene(
         observe=tuple(dict.fromkeys(one.kind for sensor in sensors for one in sensor.spec.channels())),
@@ -85,8 +86,6 @@ def indenter_is_pressed(subject: Subject) -> None:
     Return one finite height [mm] for each pair of x_mm and y_mm, 0 at (0, 0) and nowhere below, 50 mm or more where no
     body is; choose defaults with flanks of up to 45 degrees.
     """
-    import numpy as np
-
     line = np.linspace(-REACH_MM, REACH_MM, 61)
     numbers = subject.descriptor.dimensions
     with code_of("where", subject):

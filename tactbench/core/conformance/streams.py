@@ -7,26 +7,25 @@ import time
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
 
 from tactbench.core.conformance.check import fail
-from tactbench.core.errors import RigError
-from tactbench.core.samples import Block, Quality, StreamData
+from tactbench.core.samples import Block, FloatArray, Quality, StreamData
 from tactbench.core.spec.recording import RecordingMeta
 from tactbench.core.spec.rig import RigDescriptor, SensorDescriptor
 from tactbench.core.spec.rig_file import RigFile
 from tactbench.core.spec.scene import Scene
 from tactbench.core.spec.sensor import ChannelSpec, StreamSpec
-
-if TYPE_CHECKING:
-    import numpy as np
-    import numpy.typing as npt
-
-    from tactbench.core.samples import FloatArray
+from tactbench.devices.queue import BlockQueue
 
 BAD = Quality.MISSING | Quality.SUSPECT
 RATE_SHARE = 0.02
 """A rate further from its nominal one is a mistake (assumed: quartz is a hundred times better)."""
+LONGEST_S = 1e3
+"""That is read at once."""
 LEAST_ROWS = 20
 """From which a rate is told."""
 OFF_S = 1.0
@@ -74,7 +73,7 @@ def carried_out(
             rig_file=rig_file,
         )  # fmt: skip
         if made.meta.excluded:
-            raise RigError(f"Its recording is {made.meta.excluded}.")
+            fail("recording", f"it is {made.meta.excluded}")
         recorded = read_back(path)
     if recorded.wrong:
         fail("recording", f"it is not healthy: {recorded.wrong}")
@@ -85,37 +84,24 @@ def carried_out(
 
 def joined(where: str, streams: Sequence[StreamSpec], blocks: Iterable[Any]) -> dict[str, StreamData]:
     """Return what came of each stream, NaN where it means nothing; fail where blocks are not as blocks must be."""
-    import numpy as np
-
-    came = list(blocks)
-    strange = {one.stream for one in came} - {stream.name for stream in streams}
-    if strange:
-        fail(where, f"a block of {min(strange)!r}, which is none of its streams")
+    queues = {spec.name: BlockQueue(spec, LONGEST_S) for spec in streams}
+    for block in blocks:
+        if block.stream not in queues:
+            fail(where, f"a block of {block.stream!r}, which is none of its streams")
+        queues[block.stream].put(block)
     found = {}
     for spec in streams:
-        own = [
-            Block(spec.name, None, np.empty((0, len(spec.channels)))),
-            *(one for one in came if one.stream == spec.name),
-        ]
-        for one in own:
-            rows = {len(given) for given in (one.data, one.t_ns, one.sequence) if given is not None}
-            if np.shape(one.data)[1:] != np.shape(own[0].data)[1:] or len(rows) > 1:
-                text = f"a block has shape {np.shape(one.data)}; {len(spec.channels)} columns, a time a row are needed"
-                fail(f"{where}: {spec.name}", text)
-        columns: dict[str, Any] = {"data": np.concatenate([one.data for one in own]), "t_ns": None}
-        for field in ("t_ns", "sequence"):
-            given = [getattr(one, field) for one in own if getattr(one, field) is not None]
-            if given:
-                columns[field] = np.concatenate(given)
-        stream = found[spec.name] = StreamData(spec, quality=np.concatenate([marks_of(one) for one in own]), **columns)
-        are_finite(where, stream)
+        nothing = Block(spec.name, None, np.empty((0, len(spec.channels))))
+        came = queues[spec.name].take() or nothing
+        if came.data.shape[1:] != nothing.data.shape[1:]:
+            fail(f"{where}: {spec.name}", f"it has {came.data.shape[1:]} columns for {len(spec.channels)} channels")
+        found[spec.name] = StreamData(spec, came.t_ns, came.data, came.quality, sequence=came.sequence)
+        are_finite(where, found[spec.name])
     return found
 
 
 def are_finite(where: str, stream: StreamData) -> None:
     """Fail where a sample is no number, and not marked so."""
-    import numpy as np
-
     wrong = np.argwhere(~np.isfinite(stream.data) & ((marks_of(stream) & BAD) == 0))
     if len(wrong):
         channel = stream.spec.channels[wrong[0][1]].name
@@ -124,15 +110,11 @@ def are_finite(where: str, stream: StreamData) -> None:
 
 def marks_of(stream: StreamData | Block) -> npt.NDArray[np.uint8]:
     """Return the (n, channels) marks; what has none is good."""
-    import numpy as np
-
     return np.zeros(np.shape(stream.data), np.uint8) if stream.quality is None else stream.quality
 
 
 def good(stream: StreamData) -> FloatArray:
     """Return the (n, channels) samples, NaN where they mean nothing."""
-    import numpy as np
-
     return np.where(marks_of(stream) & BAD, np.nan, stream.data.astype(np.float64))
 
 
@@ -141,8 +123,6 @@ def times_are_right(where: str, stream: StreamData, seconds: float, late: float,
 
     `ended_ns` is what the host's clock says when the last row has come; None: there is none.
     """
-    import numpy as np
-
     t_ns = stream.t_ns
     if t_ns is None or len(t_ns) < 2:
         return
@@ -164,8 +144,6 @@ def times_are_right(where: str, stream: StreamData, seconds: float, late: float,
 
 def rate_is_right(where: str, stream: StreamData, rate_hz: float | None) -> None:
     """Fail where times say another rate than the stated one."""
-    import numpy as np
-
     if rate_hz is None or stream.t_ns is None or len(stream.t_ns) < LEAST_ROWS:
         return
     found_hz = (len(stream.t_ns) - 1) / (float(stream.t_ns[-1] - stream.t_ns[0]) * 1e-9)

@@ -6,14 +6,15 @@ import inspect
 import math
 from dataclasses import fields
 from functools import lru_cache
-from typing import TYPE_CHECKING, Any
+from typing import Any
+
+import numpy as np
 
 from tactbench.core.conformance.check import CheckFailed, Subject, check, code_of, fail, skip
-from tactbench.core.conformance.skin_state import on_sheet_mm, patch_mm, pressed_locally, skin_grid
+from tactbench.core.conformance.sensor_spec import on_sheet_mm
+from tactbench.core.samples import FloatArray, SkinGrid, SkinState
 from tactbench.core.spec.sensor import ChannelSpec, Nuisances
-
-if TYPE_CHECKING:
-    from tactbench.core.samples import FloatArray, SkinState
+from tactbench.core.spec.skin import FluidBackedShell, SkinSheet
 
 Place = tuple[float, float]
 GENTLE_N, FORCES_N, OVERLOAD_N = 1.0, (0.5, 1.5), 100.0
@@ -35,21 +36,40 @@ def observed(subject: Subject) -> tuple[ChannelSpec, ...]:
     return tuple(subject.spec.channels("taxel", "dc_pressure"))
 
 
+PATCH_MM, PATCH_CELLS = 1.25, 1.5
+"""Standard deviation of a local press: half the radius of a fingertip's contact, and no less than the grid resolves
+[cells]."""
+
+
+def skin_grid(sheet: SkinSheet) -> SkinGrid:
+    """Return the centres of the sheet's own cells."""
+    along, across = sheet.cells
+    low, high, arc = sheet.x_min.to("mm"), sheet.x_max.to("mm"), sheet.arc.to("mm")
+    x_mm: FloatArray = low + (np.arange(along) + 0.5) * (high - low) / along
+    s_mm: FloatArray = -arc / 2 + (np.arange(across) + 0.5) * arc / across
+    return SkinGrid(x_mm=x_mm, s_mm=s_mm)
+
+
+def patch_mm(grid: SkinGrid) -> float:
+    """Return the standard deviation of a local press."""
+    return max(PATCH_CELLS * max(grid.cell_mm), PATCH_MM)
+
+
 @lru_cache(maxsize=4)
 def _prepared(subject: Subject, names: tuple[str, ...]) -> Any:
     factory = subject.code("transducer")
     asked = inspect.signature(factory).parameters
     # The twin gives its own to those that ask for them.
     twins = {"tolerance": 1e-6, "refinement": 1}
-    given = {name: value for name, value in twins.items() if name in asked and asked[name].default is asked[name].empty}
+    given = {
+        name: one for name, one in twins.items() if name in asked and asked[name].default is inspect.Parameter.empty
+    }
     with code_of("transducer", subject):
         return factory(subject.spec, skin_grid(subject.spec.skin.sheet), list(names), **given)
 
 
 def _read(subject: Subject, state: SkinState, names: tuple[str, ...] = ()) -> FloatArray:
     """Return the readings of a state, all of them in the order of the spec by default."""
-    import numpy as np
-
     names = names or tuple(one.name for one in observed(subject))
     transducer = _prepared(subject, names)
     try:
@@ -68,9 +88,35 @@ def _read(subject: Subject, state: SkinState, names: tuple[str, ...] = ()) -> Fl
 
 
 def _state(subject: Subject, force_n: float, at_mm: Place | None = None, dragged: Place = (0, 0)) -> SkinState:
-    """Return a state pressed at a place; None: the first that is pressed."""
-    skin, place = subject.spec.skin, at_mm or next(iter(_places(subject)))
-    return pressed_locally(skin, skin_grid(skin.sheet), force_n, place, dragged if subject.spec.reads_shear else None)
+    """Return the state that a narrow press would leave: a bell of pressure, and a dent of the same shape.
+
+    No equation is solved: it is a state that a transducer must be able to read, and that touches one place only; None:
+    the first that is pressed. The dent goes a third of the way through the skin at 1 N and further in proportion, never
+    through more than nine tenths. `dragged` is the tangential force over the normal one, along x and s, for a sensor
+    that reads shear: it moves the dent by a third of that share of its depth, and the press alone moves the skin away
+    from its middle by as much.
+    """
+    skin, grid, at_mm = subject.spec.skin, skin_grid(subject.spec.skin.sheet), at_mm or _places(subject)[0]
+    sigma = patch_mm(grid)
+    apart = np.stack(np.meshgrid(grid.x_mm - at_mm[0], grid.s_mm - at_mm[1], indexing="ij")) / sigma
+    bell = np.exp(-(apart**2).sum(axis=0) / 2)
+    pressure = force_n / (2 * math.pi * sigma**2) * bell
+    fluid = isinstance(skin, FluidBackedShell)
+    if isinstance(skin, FluidBackedShell):
+        radius_mm = math.inf if skin.sheet.outer_radius is None else skin.sheet.outer_radius.to("mm")
+        rest, least = skin.film.at(grid.x_mm, grid.s_mm / radius_mm), skin.residual_film.to("mm")
+    else:
+        rest, least = np.full(bell.shape, skin.thickness.to("mm")), 0.0
+    deflection = min(force_n / 3, 0.9) * bell * rest
+    way, sheared = np.array(dragged)[:, None, None], bool(subject.spec.reads_shear)
+    return SkinState(
+        grid=grid, force_n=force_n, deflection_mm=deflection, pressure_mpa=pressure,
+        thickness_mm=np.maximum(rest - deflection, least), depth_mm=float(deflection.max()),
+        fluid_pressure_mpa=0.001 * force_n * fluid,
+        contact_radius_mm=math.sqrt(5.0) * sigma if force_n else 0.0, residual=0.0,
+        tangential_displacement_mm=(apart + way) * deflection / 3 if sheared else None,
+        shear_mpa=way * pressure if sheared else None,
+    )  # fmt: skip
 
 
 @lru_cache(maxsize=2)
@@ -149,8 +195,6 @@ def transducer_has_no_memory(subject: Subject) -> None:
 
     Keep nothing between two calls, draw nothing, and copy what you change: ``state.pressure_mpa.copy()``.
     """
-    import numpy as np
-
     state, untouched = _state(subject, GENTLE_N), _state(subject, GENTLE_N)
     first = _read(subject, state)
     for field in fields(state):
@@ -168,8 +212,6 @@ def it_answers_to_a_press(subject: Subject) -> None:
 
     Look at units (mm, N, MPa in a SkinState; metres in position_m), and at the sensitivity.
     """
-    import numpy as np
-
     known = subject.spec.nuisances
     own = [known.get(one.kind, Nuisances()) for one in observed(subject)]
     least = np.array([max(one.white.value, one.step.value) for one in own])
@@ -219,8 +261,6 @@ def sign_is_as_stated(subject: Subject) -> None:
     State sign = 1 where the reading rises under load, -1 where it falls, 0 where it does either. Where it falls back
     under more load, look for a limit that wraps, an absolute value, or a thickness that goes below 0.
     """
-    import numpy as np
-
     for at_mm, change in _responses(subject, GENTLE_N).items():
         for column in _sites(subject).get(at_mm, []):
             channel = observed(subject)[column]
@@ -242,16 +282,12 @@ def shear_turns_with_its_direction(subject: Subject) -> None:
 
     Read tangential_displacement_mm and shear_mpa with their signs: [0] along x, [1] along s. Or leave reads_shear out.
     """
-    import numpy as np
-
     if not subject.spec.reads_shear:
         skip("its spec names no kind of channel that reads shear")
-    plain = _read(subject, _state(subject, GENTLE_N))
-    felt = False
-    for axis, way in (("x", (SHEAR, 0.0)), ("s", (0.0, SHEAR))):
-        back_way = (-way[0], -way[1])
-        there, back = (_read(subject, _state(subject, GENTLE_N, None, one)) - plain for one in (way, back_way))
-        most = int(np.argmax(np.abs(there - back) + np.abs(there + back)))
+    plain, felt = _read(subject, _state(subject, GENTLE_N)), False
+    for axis, (x, s) in {"x": (SHEAR, 0.0), "s": (0.0, SHEAR)}.items():
+        there, back = (_read(subject, _state(subject, GENTLE_N, None, one)) - plain for one in ((x, s), (-x, -s)))
+        most = int(np.argmax(np.abs(there) + np.abs(back)))
         felt |= bool(there[most] or back[most])
         if there[most] * back[most] > 0:
             text = f"dragged along {axis} it changes by {there[most]:+.3g}, dragged back by {back[most]:+.3g}"
