@@ -61,14 +61,13 @@ def test_a_plugin_that_could_not_be_used_is_mentioned_by_run(verbs):
     assert "Some plugins could not be used: broken." in done.stderr
 
 
-@pytest.mark.parametrize(("name", "says"), [("evil-hang", "longer than 2 s"), ("evil-abort", "SIGABRT")])
-def test_one_that_hangs_or_crashes_fails_its_check_and_ends_nothing(monkeypatch, name, says):
+def test_one_that_crashes_fails_its_check_and_ends_nothing(monkeypatch):
     monkeypatch.syspath_prepend(THIRD_PARTY / "evil")
-    (subject,) = subjects_named(load_registry(), name)
-    report = run_checks(subject, timeout_s=2)
+    (subject,) = subjects_named(load_registry(), "evil-abort")
+    report = run_checks(subject)
     (failed,) = report.failed
     assert failed.check == "answers-have-the-shape"
-    assert says in failed.text
+    assert "SIGABRT" in failed.text
     assert "not tried, for answers-have-the-shape has not passed" in {one.text for one in report.of("skipped")}
 
 
@@ -84,11 +83,6 @@ def test_nothing_is_opened_without_a_yes(verbs):
     asked = verbs("check", "parallel-manipulator", "--rig-file", str(EXAMPLE), code=2)
     assert "--yes" in asked.stderr
     assert asked.stdout == ""
-
-
-def test_an_invasive_check_needs_the_rig_file_of_that_rig(verbs):
-    other = verbs("check", "bench", "--rig-file", str(EXAMPLE), "--yes", code=2)
-    assert "The rig file is for the rig 'parallel-manipulator'" in other.stderr
 
 
 def of_the_press(done):
