@@ -46,7 +46,7 @@ def command(
     from tactbench.core.cli.results import opened
     from tactbench.core.cli.screen import remark
     from tactbench.core.conformance.check import CHECKS, KINDS, Mode
-    from tactbench.core.conformance.run import failed_plugins, plugins_named, run_checks, subjects_named
+    from tactbench.core.conformance.run import plugins_named, run_checks, subjects_named
     from tactbench.core.errors import UnknownNameError, UsageError
     from tactbench.core.plugins.registry import load_registry
     from tactbench.core.plugins.rig_files import load_rig_file
@@ -67,7 +67,7 @@ def command(
     try:
         subjects = subjects_named(registry, name, KINDS)
     except UnknownNameError as error:
-        wrong = list(failed_plugins(registry))
+        wrong = [f"{row.entry_point}: {row.reason}" for row in registry.failures] + list(map(str, registry.refused))
         if not wrong:
             raise
         subjects = []

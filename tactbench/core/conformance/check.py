@@ -130,23 +130,24 @@ class Check:
     run: Callable[[Subject], None]
     """Raises CheckFailed, or CheckSkipped."""
 
-    def __str__(self) -> str:
-        return self.name
-
 
 CHECKS: list[Check] = []
 """All of them, in the order in which they run: a check stands behind those that it needs."""
 
 
 def check(
-    *kinds: Kind, needs: tuple[str, ...] = (), mode: Mode = "passive", carries_out: bool = False
+    *kinds: Kind, needs: str = "", mode: Mode = "passive", carries_out: bool = False
 ) -> Callable[[Callable[[Subject], None]], Check]:
-    """Make a check of a function: its name is the check's, its docstring says why it exists, and then what to do."""
+    """Make a check of a function: its name is the check's, its docstring says why it exists, and then what to do.
+
+    `needs` are names of checks.
+    """
 
     def made(run: Callable[[Subject], None]) -> Check:
         why, _, cure = inspect.cleandoc(run.__doc__ or "").partition("\n\n")
         why, cure = (" ".join(text.split()) for text in (why, cure))
-        CHECKS.append(Check(run.__name__.replace("_", "-"), kinds, mode, why, cure, needs, carries_out, run))
+        name, needed = run.__name__.replace("_", "-"), tuple(needs.split())
+        CHECKS.append(Check(name, kinds, mode, why, cure, needed, carries_out, run))
         return CHECKS[-1]
 
     return made

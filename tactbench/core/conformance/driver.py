@@ -51,22 +51,24 @@ position of a motor at rest may change (assumed: an increment of its drive, twic
 
 
 class _Adapter:
-    """An emulated device behind a serial adapter that holds bytes back, and hands them over cut anywhere.
+    """An emulated device behind a serial adapter that holds back all but answers, and hands bytes over cut anywhere.
 
     `change` is what becomes of each of the device's own pieces on the way.
     """
 
     def __init__(self, inner: Any, change: Callable[[bytes], bytes]) -> None:
-        self._inner, self._change, self._sizes = inner, change, itertools.cycle(SIZES)
+        self._inner, self._change, self._sizes, self._told_s = inner, change, itertools.cycle(SIZES), 0.0
 
     def feed(self, piece: Any, now_s: float) -> Any:
+        self._told_s = now_s
         return self._cut(self._inner.feed(piece, now_s), now_s)
 
     def poll(self, now_s: float) -> Any:
         return self._cut(self._inner.poll(now_s), now_s)
 
     def next_s(self) -> float:
-        return HELD_S * float(np.ceil(self._inner.next_s() / HELD_S))
+        due_s = self._inner.next_s()
+        return due_s if due_s < self._told_s + HELD_S else HELD_S * float(np.ceil(due_s / HELD_S))
 
     def _cut(self, sent: Any, now_s: float) -> Any:
         data = b"".join(self._change(piece) for _, piece in sent)
@@ -148,7 +150,7 @@ def emulated(
             opened.driver.close()
 
 
-@check("sensor", "device", needs=("code-names-resolve",))
+@check("sensor", "device", needs="code-names-resolve")
 def driver_opens(subject: Subject) -> None:
     """A driver is open once it is made, says who it is, has the spec's streams, and leaves nothing open.
 
@@ -184,7 +186,7 @@ def driver_opens(subject: Subject) -> None:
     fail("driver", "it took the option 'no_such_option' without a word")
 
 
-@check("sensor", "device", needs=("driver-opens",), carries_out=True)
+@check("sensor", "device", needs="driver-opens", carries_out=True)
 def driver_reads(subject: Subject) -> None:
     """Rows have the host's time in nanoseconds, come at the rate that the driver states, and each of them once.
 
@@ -236,7 +238,7 @@ def _reading(one: ChannelSpec, share: float) -> tuple[float, float]:
     return low + share * span, span / (LEVELS - 1) / 4 + rounding
 
 
-@check("sensor", "device", needs=("driver-reads",))
+@check("sensor", "device", needs="driver-reads")
 def driver_reads_what_is_sensed(subject: Subject) -> None:
     """Swapped channels, bytes in the wrong order, a lost sign or gram-force give plausible readings of something else.
 
@@ -272,7 +274,7 @@ def driver_reads_what_is_sensed(subject: Subject) -> None:
         place *= LEVELS
 
 
-@check("sensor", "device", needs=("driver-reads-what-is-sensed",))
+@check("sensor", "device", needs="driver-reads-what-is-sensed")
 def driver_takes_any_pieces(subject: Subject) -> None:
     """A serial port hands over half a frame or several at once, and cables lose bytes, which must not become a reading.
 
@@ -314,7 +316,7 @@ def driver_takes_any_pieces(subject: Subject) -> None:
         fail("driver.counts", "frames were damaged, and neither counted nor marked")
 
 
-@check("sensor", "device", needs=("driver-reads",))
+@check("sensor", "device", needs="driver-reads")
 def driver_counts_on(subject: Subject) -> None:
     """A device's counter wraps; numbers that begin again with it look like rows that come late, and are left out.
 
@@ -340,7 +342,7 @@ def driver_counts_on(subject: Subject) -> None:
                 last[name] = numbers[-1:]
 
 
-@check("sensor", "device", needs=("driver-reads",))
+@check("sensor", "device", needs="driver-reads")
 def driver_reports_what_happens(subject: Subject) -> None:
     """What came before the start is no reading, `read(0)` waits for nothing, and a line that is gone is no silence.
 
@@ -376,7 +378,7 @@ def driver_reports_what_happens(subject: Subject) -> None:
     fail("driver.read", "it goes on as if nothing had come once its line is gone")
 
 
-@check("device", needs=("driver-reads",))
+@check("device", needs="driver-reads")
 def device_is_fit_for_a_rig(subject: Subject) -> None:
     """A rig takes forces for newtons and places for metres, a zero for taken if the driver says so, a motor for still.
 

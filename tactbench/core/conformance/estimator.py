@@ -52,12 +52,13 @@ def _taught(subject: Subject, kind: str, params: Any = None, place: str = "", *,
     return answer
 
 
-@check("estimator", needs=("code-names-resolve",), carries_out=True)
+@check("estimator", needs="code-names-resolve", carries_out=True)
 def answers_have_the_shape(subject: Subject) -> None:
     """Each row gets one finite answer, also where a column is constant, and no array is changed: others use it as well.
 
     Return an array of shape (n,) from predict: numbers, or the classes of y; leave a constant column out, or divide by
-    1; copy before changing: ``X = X.copy()``, no ``-=`` on X or y.
+    1; copy before changing: ``X = X.copy()``, no ``-=`` on X or y. Give candidates of the type that a parameter needs:
+    5, not 5.0, for a number of neighbours.
     """
     for kind in subject.descriptor.kinds:
         given = question(kind)
@@ -65,14 +66,6 @@ def answers_have_the_shape(subject: Subject) -> None:
         for name, now, old in zip(("fit: X", "fit: y", "predict: X"), given, question(kind), strict=False):
             if not np.array_equal(now, old):
                 fail(name, "it was changed in place")
-
-
-@check("estimator", needs=("answers-have-the-shape",))
-def candidates_are_accepted(subject: Subject) -> None:
-    """A candidate that cannot be fitted shows after minutes, when its turn comes.
-
-    Give candidates that the parameter may have, of the type it needs: 5, not 5.0, for a number of neighbours.
-    """
     descriptor = subject.descriptor
     for name, candidates in descriptor.grid.items():
         for one in candidates:
@@ -81,7 +74,7 @@ def candidates_are_accepted(subject: Subject) -> None:
             )
 
 
-@check("estimator", needs=("answers-have-the-shape",))
+@check("estimator", needs="answers-have-the-shape")
 def seed_and_data_decide(subject: Subject) -> None:
     """All chance comes from the seed, folds must not know of each other, and rows come one by one in use.
 
@@ -101,7 +94,7 @@ def seed_and_data_decide(subject: Subject) -> None:
             fail("where: argument seed", f"two {kind} models of one seed and the same data answer differently")
 
 
-@check("estimator", needs=("seed-and-data-decide",))
+@check("estimator", needs="seed-and-data-decide")
 def it_learns(subject: Subject) -> None:
     """Features answer a linear question: what is no better than the mean mixes rows, columns or signs up.
 

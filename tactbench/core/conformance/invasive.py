@@ -43,7 +43,7 @@ def _file(subject: Subject) -> RigFile:
     return load_rig_file(subject.rig_file, subject.registry)
 
 
-@check("sensor", "device", mode="invasive", needs=("code-names-resolve",), carries_out=True)
+@check("sensor", "device", mode="invasive", needs="code-names-resolve", carries_out=True)
 def real_device_answers(subject: Subject) -> None:
     """The emulator is what the author believes the device to be; only the device knows its rate and its noise at rest.
 
@@ -117,7 +117,7 @@ def _built(subject: Subject) -> tuple[_Kept, SensorDescriptor, Any]:
     return _Kept(subject.code("where")(context)), subject.registry.sensors[next(iter(file.sensors))], scene
 
 
-@check("rig", mode="invasive", needs=("code-names-resolve",), carries_out=True)
+@check("rig", mode="invasive", needs="code-names-resolve", carries_out=True)
 def real_rig_presses(subject: Subject) -> None:
     """Estimators are taught the recorded force: it must not come late, with another sign or too far, nor stay.
 

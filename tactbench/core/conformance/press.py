@@ -107,7 +107,7 @@ def pressed(subject: Subject, seed: int = 1) -> Recorded:
         return carried_out(rig, sensor, descriptor, scene, seed)
 
 
-@check("sensor", "rig", needs=("transducer-reads", "rest-is-as-stated", "code-names-resolve"))
+@check("sensor", "rig", needs="transducer-reads rest-is-as-stated code-names-resolve")
 def press_is_recorded(subject: Subject) -> None:
     """A recording has a column a channel, numbers only, and times by which rows are put on one clock.
 
@@ -119,7 +119,7 @@ def press_is_recorded(subject: Subject) -> None:
         times_are_right(f"streams: {name}", stream, SECONDS, LATE)
 
 
-@check("sensor", "rig", needs=("press-is-recorded",), carries_out=True)
+@check("sensor", "rig", needs="press-is-recorded", carries_out=True)
 def limits_are_kept(subject: Subject) -> None:
     """A converter gives nothing beyond its ends; what stands at an end is marked as saturated, and tells nothing.
 
@@ -145,7 +145,7 @@ def limits_are_kept(subject: Subject) -> None:
                 )
 
 
-@check("rig", needs=("press-is-recorded",))
+@check("rig", needs="press-is-recorded")
 def force_and_seed_decide(subject: Subject) -> None:
     """The recorded force is what estimators are taught, and replicates are drawn anew: the same seed gives the same.
 

@@ -43,7 +43,7 @@ def recording_is_of_this_sensor(subject: Subject) -> None:
         fail("file", wrong)
 
 
-@check("sensor", mode="recording", needs=("recording-is-of-this-sensor",))
+@check("sensor", mode="recording", needs="recording-is-of-this-sensor")
 def recording_fits_the_spec(subject: Subject) -> None:
     """A real unit shows another rate, range, sign or force than is stated where the spec or the decoding is wrong.
 
@@ -76,7 +76,7 @@ def recording_fits_the_spec(subject: Subject) -> None:
                     fail(f"{where}.sign", f"{sign:+d} is stated, its correlation with the force is {likeness:+.2f}")
 
 
-@check("sensor", mode="recording", needs=("recording-is-of-this-sensor",))
+@check("sensor", mode="recording", needs="recording-is-of-this-sensor")
 def recording_is_of_a_real_unit(subject: Subject) -> None:
     """Only a real unit shows what a sensor is; a simulation shows what somebody believes it to be.
 

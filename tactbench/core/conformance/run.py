@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Literal
@@ -118,14 +118,6 @@ def plugins_named(registry: Registry, name: str) -> list[PluginRow]:
         for row in registry.plugins
         if name in (row.entry_point, row.module) or alike == row.distribution.lower().replace("_", "-")
     ]
-
-
-def failed_plugins(registry: Registry) -> Iterator[str]:
-    """Yield a line for every plugin that could not be used: what is asked for may be in one of them."""
-    for row in registry.failures:
-        yield f"{row.entry_point} ({row.module} of {row.distribution} {row.version}): {row.reason}"
-    for error in registry.refused:
-        yield str(error)
 
 
 def run_checks(

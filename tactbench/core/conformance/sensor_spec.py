@@ -43,14 +43,22 @@ def _channels(subject: Subject) -> Iterator[tuple[str, StreamSpec, ChannelSpec]]
             yield f"spec.streams[{stream.name}].channels[{channel.name}]", stream, channel
 
 
-@check("sensor", needs=("numbers-are-finite",))
+@check("sensor", needs="numbers-are-finite")
 def limits_are_in_order(subject: Subject) -> None:
-    """Saturation, tolerances and plots are told from lower, rest and upper, and tasks ask for kinds of channels.
+    """Saturation, tolerances, windows and delays are computed from limits, rest levels and rates.
 
     State lower < upper, both within what the stream's dtype holds, and a rest level between them; whole numbers come
     from a converter and need both ends. Give force, torque, position and pressure channels a unit of that dimension,
-    or ``count`` for raw readings.
+    or ``count`` for raw readings; rate_hz in samples a second, and link_delay as a time.
     """
+    for rated in subject.spec.streams:
+        rate_hz = rated.rate_hz
+        if rate_hz is not None and not SLOWEST_HZ <= rate_hz <= FASTEST_HZ:
+            period = f"; is it a period? One of {rate_hz:g} s is {1 / rate_hz:g} Hz" if rate_hz < 1 else ""
+            fail(f"spec.streams[{rated.name}].rate_hz", f"{rate_hz:g} Hz{period}")
+    delay = subject.spec.link_delay
+    if delay is not None and not 0 <= delay.to("s") <= LATEST_S:
+        fail("spec.link_delay", f"{delay} is not within 0 to {LATEST_S:g} s")
     for place, stream, channel in _channels(subject):
         unit = OF_KIND.get(channel.kind)
         if unit and channel.unit not in RAW and units.parse(channel.unit)[1] != units.parse(unit)[1]:
@@ -71,89 +79,45 @@ def limits_are_in_order(subject: Subject) -> None:
 
 
 @check("sensor")
-def rates_and_delays_are_possible(subject: Subject) -> None:
-    """Delays, windows and clocks are computed from the stated rate; a period given for a rate is off by thousands.
+def places_are_on_the_skin(subject: Subject) -> None:
+    """Millimetres make a fingertip the size of a room; a taxel off the skin's sheet, or there twice, is a copied line.
 
-    State rate_hz in samples a second and link_delay as a time, or leave out what nobody states.
+    Convert position_m: 1 mm is 0.001, 1 inch 0.0254. Name the `site` that taxels share, and move them within the sheet:
+    x from x_min to x_max, along the arc within half its width. State as normal the unit vector that leaves the skin.
     """
-    for stream in subject.spec.streams:
-        rate_hz = stream.rate_hz
-        if rate_hz is not None and not SLOWEST_HZ <= rate_hz <= FASTEST_HZ:
-            period = f"; is it a period? One of {rate_hz:g} s is {1 / rate_hz:g} Hz" if rate_hz < 1 else ""
-            fail(f"spec.streams[{stream.name}].rate_hz", f"{rate_hz:g} Hz{period}")
-    delay = subject.spec.link_delay
-    if delay is not None and not 0 <= delay.to("s") <= LATEST_S:
-        fail("spec.link_delay", f"{delay} is not within 0 to {LATEST_S:g} s")
-
-
-def _placed(subject: Subject) -> list[tuple[str, ChannelSpec, Vector]]:
-    return [(place, one, one.position_m) for place, _, one in _channels(subject) if one.position_m is not None]
-
-
-@check("sensor")
-def positions_are_in_metres(subject: Subject) -> None:
-    """Places are in metres: millimetres make a fingertip the size of a room, inches forty times a finger.
-
-    Convert position_m: 1 mm is 0.001, 1 inch 0.0254.
-    """
-    placed = _placed(subject)
+    placed = [(place, one, one.position_m) for place, _, one in _channels(subject) if one.position_m is not None]
     if not placed:
         skip("it states no place of any channel")
-    size_m, of = LARGEST_M / 2, ""
-    if subject.spec.skin is not None:
-        sheet = subject.spec.skin.sheet
-        size_m = max(abs(sheet.x_min.to("m")), abs(sheet.x_max.to("m")), sheet.arc.to("m") / 2)
-        of = f" of a skin that reaches {1e3 * size_m:.3g} mm"
+    sheet = None if subject.spec.skin is None else subject.spec.skin.sheet
+    low, high, half = (-math.inf, math.inf, math.inf)
+    if sheet is not None:
+        low, high, half = sheet.x_min.to("mm"), sheet.x_max.to("mm"), sheet.arc.to("mm") / 2
+    size_m = min(1e-3 * max(abs(low), abs(high), half), LARGEST_M / 2)
     place, _, position_m = max(placed, key=lambda one: max(map(abs, one[2])))
     far_m = max(map(abs, position_m))
-    if far_m > min(2 * size_m, LARGEST_M):
-        unit = "millimetres" if not of or far_m > 200 * size_m else "inches"
-        fail(f"{place}.position_m", f"{far_m:g} m from the sensor's origin{of}: are these {unit}?")
-
-
-@check("sensor", needs=("positions-are-in-metres",))
-def taxels_are_on_the_sheet(subject: Subject) -> None:
-    """Two taxels in one place are usually a copied line; one off the skin's sheet is pressed by nothing.
-
-    Correct position_m of one of them, or name the `site` that both belong to. Move it within the sheet: x from x_min to
-    x_max, along the arc within half its width; or widen the sheet.
-    """
+    if far_m > 2 * size_m:
+        unit = "millimetres" if sheet is None or far_m > 200 * size_m else "inches"
+        text = f"{far_m:g} m from the origin of a sensor that reaches {1e3 * size_m:.3g} mm: are these {unit}?"
+        fail(f"{place}.position_m", text)
     places: dict[Vector, tuple[str, str]] = {}
-    for place, channel, position_m in _placed(subject):
-        if channel.kind != "taxel":
-            continue
+    ahead = None
+    for place, channel, position_m in placed:
         first, known = places.setdefault(position_m, (channel.name, channel.site or place))
-        if known != (channel.site or place):
+        if channel.kind == "taxel" and known != (channel.site or place):
             fail(f"{place}.position_m", f"it is also that of {first}")
-        if subject.spec.skin is None:
-            continue
-        sheet = subject.spec.skin.sheet
-        low, high, half = sheet.x_min.to("mm"), sheet.x_max.to("mm"), sheet.arc.to("mm") / 2
-        x_mm, s_mm = on_sheet_mm(sheet, position_m)
-        if not (low - EDGE_MM <= x_mm <= high + EDGE_MM and abs(s_mm) <= half + EDGE_MM):
+        x_mm, s_mm = (0.0, 0.0) if sheet is None else on_sheet_mm(sheet, position_m)
+        if channel.kind == "taxel" and not (low - EDGE_MM <= x_mm <= high + EDGE_MM and abs(s_mm) <= half + EDGE_MM):
             text = f"x {x_mm:.3g} mm, along the arc {s_mm:.3g} mm is off the sheet"
             fail(f"{place}.position_m", f"{text} (x {low:g} to {high:g} mm, arc {-half:g} to {half:g} mm)")
-
-
-@check("sensor", needs=("positions-are-in-metres",))
-def normals_point_outwards(subject: Subject) -> None:
-    """Forces are projected on normals; one of another length scales them, one that points inwards turns their sign.
-
-    State the unit vector that leaves the skin there.
-    """
-    skin, ahead = subject.spec.skin, None
-    for place, channel, (_, y, z) in _placed(subject):
         if channel.normal is None:
             continue
         length = math.hypot(*channel.normal)
         if not abs(length - 1.0) <= UNIT_NORMAL:
             fail(f"{place}.normal", f"its length is {length:.4g}, not 1")
         ahead = ahead or channel.normal
-        flat = skin is not None and skin.sheet.outer_radius is None
-        if flat and channel.normal[2] * ahead[2] < INWARD:
-            fail(f"{place}.normal", f"it points to the other side of the pad than {ahead}, the first one")
-        if skin is not None and not flat and y * channel.normal[1] + z * channel.normal[2] < INWARD * math.hypot(y, z):
-            fail(f"{place}.normal", "it points into the finger")
+        _, y, z = position_m if sheet is not None and sheet.outer_radius is not None else ahead
+        if y * channel.normal[1] + z * channel.normal[2] < INWARD * math.hypot(y, z):
+            fail(f"{place}.normal", "it points into the finger, or to the other side of the pad than the first one")
 
 
 @check("sensor")

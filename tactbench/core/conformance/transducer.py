@@ -143,7 +143,7 @@ def _responses(subject: Subject, force_n: float) -> dict[Place, FloatArray]:
     return {at: _read(subject, _state(subject, force_n, at)) - rest for at in _places(subject)}
 
 
-@check("sensor", needs=("code-names-resolve", "limits-are-in-order"))
+@check("sensor", needs="code-names-resolve limits-are-in-order")
 def transducer_reads(subject: Subject) -> None:
     """The twin calls it with the spec, a grid of the skin and the channels that are asked for, from rest to overload.
 
@@ -160,7 +160,7 @@ def transducer_reads(subject: Subject) -> None:
         _read(subject, _state(subject, force_n))
 
 
-@check("sensor", needs=("transducer-reads",))
+@check("sensor", needs="transducer-reads")
 def rest_is_as_stated(subject: Subject) -> None:
     """The spec's rest level is what drivers, tares and tables take for unloaded; the twin begins where this reads.
 
@@ -173,27 +173,12 @@ def rest_is_as_stated(subject: Subject) -> None:
             fail(f"channel {channel.name}: rest", f"{rest:g} {channel.unit} is stated, the transducer gives {found:g}")
 
 
-@check("sensor", needs=("transducer-reads",))
-def order_follows_the_request(subject: Subject) -> None:
-    """A run asks for the channels that it observes, in its own order; a transducer that ignores it mixes taxels up.
-
-    Look channels up by the names in `channel_names`; never rely on their number or order.
-    """
-    names = [one.name for one in observed(subject)]
-    state = _state(subject, GENTLE_N)
-    fewer = names[max(1, len(names) // 2) :: -1]
-    whole = _read(subject, state)[len(fewer) - 1 :: -1]
-    for name, value, before in zip(fewer, _read(subject, state, tuple(fewer)), whole, strict=True):
-        # A solver may stop elsewhere for fewer channels.
-        if not math.isclose(value, before, rel_tol=1e-3, abs_tol=1e-6):
-            fail("transducer", f"{name} reads {value:g} asked for in another order, and {before:g} before")
-
-
-@check("sensor", needs=("transducer-reads",))
+@check("sensor", needs="transducer-reads")
 def transducer_has_no_memory(subject: Subject) -> None:
-    """The twin interpolates between states and uses each several times; noise comes from the twin, under a seed.
+    """The twin uses a state several times, asks for some of the channels in an order of its own, and adds the noise.
 
-    Keep nothing between two calls, draw nothing, and copy what you change: ``state.pressure_mpa.copy()``.
+    Keep nothing between two calls, draw nothing, and copy what you change: ``state.pressure_mpa.copy()``. Look channels
+    up by the names in `channel_names`; never rely on their number or order.
     """
     state, untouched = _state(subject, GENTLE_N), _state(subject, GENTLE_N)
     first = _read(subject, state)
@@ -204,9 +189,17 @@ def transducer_has_no_memory(subject: Subject) -> None:
     changed = np.flatnonzero(first != _read(subject, untouched))
     if len(changed):
         fail("transducer", f"{observed(subject)[changed[0]].name} reads another value for the same state")
+    names = [one.name for one in observed(subject)]
+    fewer = names[max(1, len(names) // 2) :: -1]
+    for name, value, before in zip(
+        fewer, _read(subject, untouched, tuple(fewer)), first[len(fewer) - 1 :: -1], strict=True
+    ):
+        # A solver may stop elsewhere for fewer channels.
+        if not math.isclose(value, before, rel_tol=1e-3, abs_tol=1e-6):
+            fail("transducer", f"{name} reads {value:g} asked for in another order, and {before:g} before")
 
 
-@check("sensor", needs=("transducer-reads",))
+@check("sensor", needs="transducer-reads")
 def it_answers_to_a_press(subject: Subject) -> None:
     """A channel that changes by less than its noise and step tells nothing, and looks like a very quiet sensor.
 
@@ -223,7 +216,7 @@ def it_answers_to_a_press(subject: Subject) -> None:
             fail("transducer", f"{GENTLE_N:g} N change {name} by {change[most]:.3g}: no more than noise and step")
 
 
-@check("sensor", needs=("it-answers-to-a-press",))
+@check("sensor", needs="it-answers-to-a-press")
 def response_is_where_it_is_pressed(subject: Subject) -> None:
     """Swapped axes, a mirrored layout or places in another frame give plausible readings of the wrong taxels.
 
@@ -254,7 +247,7 @@ def response_is_where_it_is_pressed(subject: Subject) -> None:
                 fail("transducer", text.format(here=named(at_mm), most=named(most)))
 
 
-@check("sensor", needs=("it-answers-to-a-press",))
+@check("sensor", needs="it-answers-to-a-press")
 def sign_is_as_stated(subject: Subject) -> None:
     """Health checks, tares and plots rely on the stated sign of response, estimators on one load for one reading.
 
@@ -276,7 +269,7 @@ def sign_is_as_stated(subject: Subject) -> None:
             fail("transducer", f"{text} under {FORCES_N[1]:g} N")
 
 
-@check("sensor", needs=("it-answers-to-a-press",))
+@check("sensor", needs="it-answers-to-a-press")
 def shear_turns_with_its_direction(subject: Subject) -> None:
     """What is dragged the other way moves the other way; a size without its sign tells no direction.
 
