@@ -30,7 +30,7 @@ SPEC = SensorSpec(
                 )
                 for place, (x, y) in enumerate(PLACES_MM, 1)
             ),
-        )
+        ),
     ),
     skin=BondedLayer(
         sheet=SkinSheet(
