@@ -125,8 +125,6 @@ class Check:
     """What to do when it fails, in one sentence."""
     needs: tuple[str, ...]
     """Checks that must have passed; otherwise it is skipped."""
-    carries_out: bool
-    """Whether the plugin does what it is for: what the level silver asks for."""
     run: Callable[[Subject], None]
     """Raises CheckFailed, or CheckSkipped."""
 
@@ -135,9 +133,7 @@ CHECKS: list[Check] = []
 """All of them, in the order in which they run: a check stands behind those that it needs."""
 
 
-def check(
-    *kinds: Kind, needs: str = "", mode: Mode = "passive", carries_out: bool = False
-) -> Callable[[Callable[[Subject], None]], Check]:
+def check(*kinds: Kind, needs: str = "", mode: Mode = "passive") -> Callable[[Callable[[Subject], None]], Check]:
     """Make a check of a function: its name is the check's, its docstring says why it exists, and then what to do.
 
     `needs` are names of checks.
@@ -147,7 +143,7 @@ def check(
         why, _, cure = inspect.cleandoc(run.__doc__ or "").partition("\n\n")
         why, cure = (" ".join(text.split()) for text in (why, cure))
         name, needed = run.__name__.replace("_", "-"), tuple(needs.split())
-        CHECKS.append(Check(name, kinds, mode, why, cure, needed, carries_out, run))
+        CHECKS.append(Check(name, kinds, mode, why, cure, needed, run))
         return CHECKS[-1]
 
     return made

@@ -186,7 +186,7 @@ def driver_opens(subject: Subject) -> None:
     fail("driver", "it took the option 'no_such_option' without a word")
 
 
-@check("sensor", "device", needs="driver-opens", carries_out=True)
+@check("sensor", "device", needs="driver-opens")
 def driver_reads(subject: Subject) -> None:
     """Rows have the host's time in nanoseconds, come at the rate that the driver states, and each of them once.
 

@@ -52,7 +52,7 @@ def _taught(subject: Subject, kind: str, params: Any = None, place: str = "", *,
     return answer
 
 
-@check("estimator", needs="code-names-resolve", carries_out=True)
+@check("estimator", needs="code-names-resolve")
 def answers_have_the_shape(subject: Subject) -> None:
     """Each row gets one finite answer, also where a column is constant, and no array is changed: others use it as well.
 

@@ -33,8 +33,6 @@ SECONDS, LATE = 1.0, 0.5
 """How long it lasts; and by which share more or less for a rig that begins later."""
 NOISE_N = 0.005
 """Of the reference force: a hundredth of the press, so that draws can be told apart and the force still be read."""
-RANGE_N = 2.0
-"""What the task `force` presses to where it is not installed."""
 MOST_SATURATED = 0.5
 """Share of the samples of a press over the task's range that a taxel may stand at a limit."""
 WHY = "a check of plugins"
@@ -55,9 +53,7 @@ def tiny_scene(name: str = "tiny", end_n: float = FORCE_N, **changes: Any) -> Sc
 
 def simulated_rig(subject: Subject) -> tuple[Any, RigDescriptor]:
     """Return the first simulated rig, built, those that come with this package before others."""
-    simulated = [one for one in subject.registry.rigs.all_owned() if one.descriptor.simulated]
-    if not simulated:
-        skip("no simulated rig is installed")
+    simulated = (one for one in subject.registry.rigs.all_owned() if one.descriptor.simulated)
     descriptor = min(simulated, key=lambda one: not one.ours).descriptor
     return load_object(descriptor.where)(rig_context(subject.registry)), descriptor
 
@@ -71,8 +67,6 @@ def simulated_sensors(subject: Subject) -> Sequence[SensorDescriptor]:
         if near and skin is not None and owned.descriptor.transducer is not None:
             cost = len(owned.descriptor.spec.channels()) * math.prod(skin.sheet.cells)
             able.append((not owned.ours, cost, owned.descriptor.name, owned.descriptor))
-    if not able:
-        skip("no sensor that can be simulated is installed")
     return [one[-1] for one in sorted(able, key=lambda one: one[:3])]
 
 
@@ -93,8 +87,7 @@ def pressed(subject: Subject, seed: int = 1) -> Recorded:
     """Return a press: of a sensor on a simulated rig over the range of the task `force`, or of a rig, a tiny one."""
     if subject.kind == "sensor":
         (rig, descriptor), sensor, field = simulated_rig(subject), subject.descriptor, "spec"
-        scenes = subject.registry.tasks["force"].spec.scenes if "force" in subject.registry.tasks else ()
-        end_n = max((one.scene.profile.largest_n for one in scenes), default=RANGE_N)
+        end_n = max(one.scene.profile.largest_n for one in subject.registry.tasks["force"].spec.scenes)
     elif subject.descriptor.simulated:
         descriptor, sensor, field, end_n = subject.descriptor, simulated_sensors(subject)[0], "where", FORCE_N
         with code_of(field, subject):
@@ -119,7 +112,7 @@ def press_is_recorded(subject: Subject) -> None:
         times_are_right(f"streams: {name}", stream, SECONDS, LATE)
 
 
-@check("sensor", "rig", needs="press-is-recorded", carries_out=True)
+@check("sensor", "rig", needs="press-is-recorded")
 def limits_are_kept(subject: Subject) -> None:
     """A converter gives nothing beyond its ends; what stands at an end is marked as saturated, and tells nothing.
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any, Literal
+from typing import Literal
 
 from tactbench.core.conformance import (  # noqa: F401  # isort: skip  (their checks, in this order)
     code,
@@ -78,7 +78,7 @@ class CheckReport:
             return None
         if "recording-is-of-a-real-unit" in passed:
             return "gold"
-        return "silver" if any(one.carries_out and one.name in passed for one in CHECKS) else "bronze"
+        return "silver" if any(one.needs and one.name in passed for one in CHECKS) else "bronze"
 
     @property
     def summary(self) -> str:
@@ -98,15 +98,15 @@ def subjects_named(registry: Registry, name: str, kinds: Sequence[Kind] = KINDS)
     UnknownNameError
         If nothing is called so, and no plugin that failed to load.
     """
-    families = {kind: registry.families()[f"{kind}s"] for kind in kinds}
-    rows = plugins_named(registry, name)
-    found: list[tuple[Any, str]] = [(kind, name) for kind in kinds if name in families[kind]]
-    brought = [tuple(one.split(" ", 1)) for row in rows for one in row.brings]
-    found = found or [(kind, one) for kind, one in brought if kind in kinds]
+    families, rows = registry.families(), plugins_named(registry, name)
+    every = [(kind, one) for kind in kinds for one in families[f"{kind}s"].names()]
+    brought = {one for row in rows for one in row.brings}
+    found = [one for one in every if one[1] == name] or [one for one in every if " ".join(one) in brought]
     if not found and not any(row.status == "failed" for row in rows):
-        known = {one for family in families.values() for one in family.names()}
-        raise UnknownNameError("plugin", name, known | {row.entry_point for row in registry.plugins})
-    owned = [(kind, one, families[kind].owned(one)) for kind, one in found]
+        raise UnknownNameError(
+            "plugin", name, {one for _, one in every} | {row.entry_point for row in registry.plugins}
+        )
+    owned = [(kind, one, families[f"{kind}s"].owned(one)) for kind, one in found]
     return [Subject(kind, one, owner.module, owner.distribution, registry) for kind, one, owner in owned]
 
 

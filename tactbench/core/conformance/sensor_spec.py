@@ -43,7 +43,7 @@ def _channels(subject: Subject) -> Iterator[tuple[str, StreamSpec, ChannelSpec]]
             yield f"spec.streams[{stream.name}].channels[{channel.name}]", stream, channel
 
 
-@check("sensor", needs="numbers-are-finite")
+@check("sensor")
 def limits_are_in_order(subject: Subject) -> None:
     """Saturation, tolerances, windows and delays are computed from limits, rest levels and rates.
 
@@ -63,18 +63,16 @@ def limits_are_in_order(subject: Subject) -> None:
         unit = OF_KIND.get(channel.kind)
         if unit and channel.unit not in RAW and units.parse(channel.unit)[1] != units.parse(unit)[1]:
             fail(f"{place}.unit", f"a {channel.kind} is measured in {unit} or count, not in {channel.unit}")
-        whole = np.iinfo(stream.dtype) if np.dtype(stream.dtype).kind in "iu" else None
-        for field, limit in (("lower", channel.lower), ("upper", channel.upper)) if whole else ():
-            if limit is None:
-                fail(f"{place}.{field}", "its stream stores whole numbers, and the converter's end is not stated")
-            if whole and not whole.min <= limit <= whole.max:
-                fail(f"{place}.{field}", f"{limit:g} does not fit {stream.dtype}")
         low = -math.inf if channel.lower is None else channel.lower
         high = math.inf if channel.upper is None else channel.upper
-        if not low < high:
+        if low >= high:
             fail(f"{place}.lower", f"{low:g} is not below upper, {high:g}")
+        whole = np.iinfo(stream.dtype) if np.dtype(stream.dtype).kind in "iu" else None
+        if whole is not None and (low < whole.min or high > whole.max):
+            text = f"{low:g} to {high:g}: the converter's ends are needed, and must fit {stream.dtype}"
+            fail(f"{place}.lower, upper", text)
         rest = low if channel.rest is None else channel.rest.to(channel.unit)
-        if not low <= rest <= high:
+        if rest < low or rest > high:
             fail(f"{place}.rest", f"{rest:g} {channel.unit} is not within lower and upper, {low:g} to {high:g}")
 
 

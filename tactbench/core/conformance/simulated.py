@@ -56,7 +56,7 @@ def _pressed(subject: Subject) -> Recorded:
     return skip("no simulated sensor and scene go with it") if found is None else found
 
 
-@check("effect", needs="code-names-resolve", carries_out=True)
+@check("effect", needs="code-names-resolve")
 def it_is_applied(subject: Subject) -> None:
     """An effect changes a recording in the making: one NaN ends every cell, one draw elsewhere is never repeated.
 
@@ -79,7 +79,7 @@ def it_is_applied(subject: Subject) -> None:
         fail(f"where: {changed[0]}", "another press with the same seed gives other samples")
 
 
-@check("indenter", needs="code-names-resolve", carries_out=True)
+@check("indenter", needs="code-names-resolve")
 def indenter_is_pressed(subject: Subject) -> None:
     """A height is asked for at all places at once and counted from the lowest point, which touches first.
 
@@ -100,7 +100,7 @@ def indenter_is_pressed(subject: Subject) -> None:
     next(presses(subject, (scene,), "where"))
 
 
-@check("profile", needs="code-names-resolve", carries_out=True)
+@check("profile", needs="code-names-resolve")
 def path_is_recorded(subject: Subject) -> None:
     """A recording is tared on its own unloaded hold, and has as many samples of the force as the path says.
 

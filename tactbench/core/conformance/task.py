@@ -120,7 +120,7 @@ def answers_are_in_the_scenes(subject: Subject) -> None:
                 fail("spec.scenes", f"role {role} has {strange}; role train teaches {', '.join(map(str, taught))}")
 
 
-@check("task", needs="answers-are-in-the-scenes", carries_out=True)
+@check("task", needs="answers-are-in-the-scenes")
 def its_scene_is_carried_out(subject: Subject) -> None:
     """A scene that no rig can carry out, or whose target no rig records, is found out after those before it.
 

@@ -39,7 +39,7 @@ MISTAKES = [
     ("pad", "transduction:build", "transducer:build", "code-names-resolve", "transducer"),
     ("pad", '"""A pad of', 'import h5py\n"""A pad of', "import-is-light", "h5py"),
     ("pad", "lower=-2048", 'lower=float("nan")', "numbers-are-finite", "t1.lower: it is nan"),
-    ("pad", "upper=2047, ", "", "limits-are-in-order", "channels[t1].upper"),
+    ("pad", "upper=2047, ", "", "limits-are-in-order", "channels[t1].lower, upper"),
     ("pad", "lower=-2048", "lower=200", "limits-are-in-order", "channels[t1].rest: 100 count is not within lower"),
     ("pad", 'kind="taxel"', 'kind="force", unit="m"', "limits-are-in-order", "measured in N"),
     ("pad", "rate_hz=100.0", "rate_hz=0.01", "limits-are-in-order", "is it a period? One of 0.01 s is 100"),
