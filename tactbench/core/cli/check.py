@@ -103,7 +103,7 @@ def command(
 
 def _ask(subjects: Sequence[Subject], file: RigFile, yes: bool) -> None:
     """Say what is about to be opened and moved, and wait for a yes; raises UsageError without a terminal."""
-    from tactbench.core.conformance.invasive import FORCE_N
+    from tactbench.core.conformance.real import FORCE_N
     from tactbench.core.errors import UsageError
 
     rigs = [one.name for one in subjects if one.kind == "rig"]

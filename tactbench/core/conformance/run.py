@@ -8,16 +8,13 @@ from pathlib import Path
 from typing import Literal
 
 from tactbench.core.conformance import (  # noqa: F401  # isort: skip  (their checks, in this order)
-    code,
     sensor_spec,
     transducer,
     press,
     driver,
     task,
     estimator,
-    simulated,
-    recorded,
-    invasive,
+    real,
 )
 from tactbench.core.conformance.check import (
     CHECKS,

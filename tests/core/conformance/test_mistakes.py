@@ -68,7 +68,7 @@ MISTAKES = [
     ("pad", "assumed(400,", "assumed(0.4,", "it-answers-to-a-press", "no more than noise and step"),
     ("pad", "assumed(400,", "assumed(4e6,", "limits-are-kept", "stand at a limit in a press"),
     ("pad", "state.pressure_mpa, 2)", "state.pressure_mpa, 2) / (1 + 3 * state.force_n**2)",
-     "sign-is-as-stated", "under 1.5 N"),
+     "sign-is-as-stated", "under 2 N"),
     ("pad", STAMPED, STAMPED[:-1] + ", t_ns=block.t_ns / 1e9)", "driver-reads", "it is in seconds"),
     ("pad", STAMPED, STAMPED[:-1] + ", t_ns=block.t_ns // 1000)", "driver-reads", "it is in microseconds"),
     ("pad", STAMPED, STAMPED[:-1] + ", t_ns=block.t_ns // 1000000)", "driver-reads", "it is in milliseconds"),

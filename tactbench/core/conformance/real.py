@@ -1,6 +1,7 @@
-"""Checks that open a line or press: with the devices that a rig file names.
+"""Checks of what is real: a recording of a sensor, and the devices that a rig file names, which are read or press.
 
-They run in the process of the command, so that Ctrl-C reaches the rig, and without a limit of time.
+Of the plugin of a recording no code runs. Where a line is opened, checks run in the process of the command, so that
+Ctrl-C reaches the rig, and without a limit of time.
 """
 
 from __future__ import annotations
@@ -8,7 +9,7 @@ from __future__ import annotations
 import time
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
-from functools import partial
+from functools import lru_cache, partial
 from typing import Any
 
 import numpy as np
@@ -16,7 +17,18 @@ import numpy as np
 from tactbench.core.conformance.check import Subject, check, code_of, fail, skip
 from tactbench.core.conformance.driver import look_at, opened_on
 from tactbench.core.conformance.press import WHY, slow_ramp, tiny_scene
-from tactbench.core.conformance.streams import FORCE_SHARE, carried_out, force_is, good, joined, pressing_force
+from tactbench.core.conformance.streams import (
+    FORCE_SHARE,
+    Recorded,
+    carried_out,
+    force_is,
+    good,
+    joined,
+    pressing_force,
+    rate_is_right,
+    read_back,
+    within_limits,
+)
 from tactbench.core.errors import TactbenchError
 from tactbench.core.plugins.emulators import running
 from tactbench.core.plugins.rig_files import load_rig_file
@@ -26,6 +38,10 @@ from tactbench.core.spec.rig import SensorDescriptor
 from tactbench.core.spec.rig_file import RigFile
 from tactbench.core.spec.sensor import Nuisances
 
+LARGEST_N = 1000.0
+"""No fingertip is pressed with more; a press of 10 N in gram-force reads 1020."""
+CLEAR = 0.5
+"""Correlation of a taxel with the force from which on its sign can be told."""
 FORCE_N = 1.0
 """At the end of a press: a motor with friction still follows it, and no fingertip is harmed."""
 SECONDS, HOLD_S = 8.0, 1.0
@@ -37,6 +53,76 @@ LARGEST = 1.5
 """Times `FORCE_N`, which the force may not exceed (assumed: a loop that overshoots by half is badly tuned)."""
 NOISY = 3.0
 """By which factor a real unit's noise may differ from the stated one (assumed: units and rooms differ by two)."""
+
+
+@lru_cache(maxsize=2)
+def _read(subject: Subject) -> Recorded:
+    if subject.recording is None:
+        skip("no recording is given: `--recording FILE` reads one")
+    try:
+        return read_back(subject.recording)
+    except TactbenchError as error:
+        fail(str(subject.recording), str(error))
+
+
+@check("sensor", mode="recording")
+def recording_is_of_this_sensor(subject: Subject) -> None:
+    """A recording proves something about the sensor that it is of, if it is healthy.
+
+    Give a recording of this sensor; `tactbench inspect FILE` says whose it is and what is wrong with it.
+    """
+    meta, _, wrong = _read(subject)
+    spec = subject.registry.sensors[subject.name].spec
+    if meta.sensor.name != spec.name:
+        fail("meta.sensor.name", f"it is of {meta.sensor.name!r}")
+    strange = {one.name for one in meta.sensor.channels()} - {one.name for one in spec.channels()}
+    if strange:
+        fail("meta.sensor.streams", f"the sensor has no channel {min(strange)}")
+    if wrong:
+        fail("file", wrong)
+
+
+@check("sensor", mode="recording", needs="recording-is-of-this-sensor")
+def recording_fits_the_spec(subject: Subject) -> None:
+    """A real unit shows another rate, range, sign or force than is stated where the spec or the decoding is wrong.
+
+    Correct rate_hz, lower, upper and sign of the spec, the type and byte order of the decoding, how the device is set
+    up, or the force's unit in the mapping (1 gf is 0.00981 N).
+    """
+    meta, data, _ = _read(subject)
+    pressing = None
+    if any(channel.kind == "force" for one in meta.reference if one.name in data for channel in one.channels):
+        pressing, force_n = pressing_force(data, meta.reference)
+        if np.nanmax(np.abs(force_n)) > LARGEST_N:
+            fail("reference", f"it reaches {np.nanmax(np.abs(force_n)):.4g} N: are these gram-force?")
+    for stated in subject.registry.sensors[subject.name].spec.streams:
+        if stated.name not in data:
+            continue
+        stream, limits = data[stated.name], {one.name: one for one in stated.channels}
+        own_rate = stated.name in meta.own_rates_hz or (meta.simulated and meta.emulation is None)
+        rate_is_right(f"spec.streams[{stated.name}]", stream, None if own_rate else stated.rate_hz)
+        for column, channel in enumerate(stream.spec.channels):
+            sign, values = limits[channel.name].sign, good(stream)[:, column]
+            where = f"spec.streams[{stated.name}].channels[{channel.name}]"
+            within_limits(where, limits[channel.name], values)
+            if channel.kind != "taxel" or stream.t_ns is None or pressing is None or pressing.t_ns is None:
+                continue
+            felt = np.interp(stream.t_ns, pressing.t_ns, force_n)
+            there = np.isfinite(values) & np.isfinite(felt)
+            if there.any() and np.ptp(values[there]) > 0 and np.ptp(felt[there]) > 0:
+                likeness = float(np.corrcoef(values[there], felt[there])[0, 1])
+                if likeness * sign < -CLEAR:
+                    fail(f"{where}.sign", f"{sign:+d} is stated, its correlation with the force is {likeness:+.2f}")
+
+
+@check("sensor", mode="recording", needs="recording-is-of-this-sensor")
+def recording_is_of_a_real_unit(subject: Subject) -> None:
+    """Only a real unit shows what a sensor is; a simulation shows what somebody believes it to be.
+
+    Record a real unit, or import recordings of one.
+    """
+    if _read(subject).meta.simulated:
+        skip("it is simulated, or its devices are emulated")
 
 
 def _file(subject: Subject) -> RigFile:
