@@ -14,7 +14,7 @@ from functools import cached_property, lru_cache
 from importlib.metadata import EntryPoint
 from pathlib import Path
 from types import TracebackType
-from typing import Any, Literal, NamedTuple, NoReturn
+from typing import Any, Literal, NamedTuple, NoReturn, get_args
 
 from tactbench.core.errors import NotApplicable, PluginError, TactbenchError
 from tactbench.core.plugins import hookspecs
@@ -22,7 +22,7 @@ from tactbench.core.plugins.interfaces import Operator
 from tactbench.core.plugins.registry import Registry, ask_plugin, load_object
 
 Kind = Literal["sensor", "rig", "device", "task", "estimator", "effect", "indenter", "profile"]
-KINDS: tuple[Kind, ...] = ("sensor", "rig", "device", "task", "estimator", "effect", "indenter", "profile")
+KINDS: tuple[Kind, ...] = get_args(Kind)
 Mode = Literal["passive", "invasive", "recording"]
 """`passive`: nothing is opened and nothing moves. `invasive`: a line is opened, something is pressed. `recording`: only
 a recording is read."""
@@ -113,8 +113,7 @@ class Subject:
 
     def names_code(self, field: str) -> str | None:
         """Return ``module:callable`` of a field; None: it names none."""
-        owner = self.spec if field == "features_by" else self.descriptor
-        found = getattr(owner, field, None)
+        found = getattr(self.descriptor, field, getattr(self.spec, field, None))
         return found if isinstance(found, str) else None
 
     def code(self, field: str) -> Any:

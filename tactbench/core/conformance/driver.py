@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from tactbench.core.conformance.check import CheckFailed, Subject, check, code_of, fail, skip
-from tactbench.core.conformance.streams import BAD, good, joined, likely, marks_of, times_are_right
+from tactbench.core.conformance.streams import BAD, good, joined, likely, limits_of, marks_of, times_are_right
 from tactbench.core.errors import LinkError, RigError, UsageError
 from tactbench.core.plugins.rig_devices import emulated_device, options_of
 from tactbench.core.samples import Block, IntArray, Quality, StreamData
@@ -228,8 +228,9 @@ def _channels(opened: Opened) -> list[ChannelSpec]:
 def _reading(one: ChannelSpec, share: float) -> tuple[float, float]:
     """Return a reading at some share of the middle of a channel's range, and a tolerance; forces have both signs."""
     low, span, rounding = 1.0, LEVELS - 1.0, 0.0
-    if one.lower is not None and one.upper is not None:
-        low, span, rounding = 0.9 * one.lower + 0.1 * one.upper, 0.8 * (one.upper - one.lower), 1.0
+    lower, upper = limits_of(one)
+    if np.isfinite(upper - lower):
+        low, span, rounding = 0.9 * lower + 0.1 * upper, 0.8 * (upper - lower), 1.0
     elif one.kind in ("force", "torque"):
         load = LOAD_N if one.kind == "force" else READ_N
         low, span = -3.7 * load, 8 * load
@@ -306,7 +307,7 @@ def driver_takes_any_pieces(subject: Subject) -> None:
         if not len(stream.data):
             fail("driver.read", f"no row of {name} comes where frames are damaged now and then")
         low, high = sound[name].data.min(axis=0), sound[name].data.max(axis=0)
-        near = 3 * (high - low) + 0.05 * (1 + np.abs(high)) + 3
+        near = 3 * (high - low + 1) + 0.05 * np.abs(high)
         values = good(stream)
         wrong = values[(values < low - near) | (values > high + near)]
         if len(wrong):

@@ -27,9 +27,9 @@ def question(kind: str) -> list[Any]:
     y = X @ np.array([2.0, -1.0, 0.5, 0.0]) + 0.2 * rng.normal(size=len(X))
     X[:, 3] = 7.0  # a dead taxel
     if kind == "classification":
-        y = np.digitize(y, np.quantile(y, [1 / CLASSES, 2 / CLASSES])).astype(np.int64)
+        y = np.digitize(y, (-1.0, 1.0)).astype(np.int64)
     if kind == "events":  # which frames hold one
-        y = (y > np.median(y)).astype(np.int64)
+        y = (y > 0).astype(np.int64)
     return [X[:ROWS], y[:ROWS], X[ROWS:], y[ROWS:]]
 
 

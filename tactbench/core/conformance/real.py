@@ -66,12 +66,14 @@ def _read(subject: Subject) -> Recorded:
 
 
 @check("sensor", mode="recording")
-def recording_is_of_this_sensor(subject: Subject) -> None:
-    """A recording proves something about the sensor that it is of, if it is healthy.
+def recording_fits_the_spec(subject: Subject) -> None:
+    """A real unit shows another rate, range, sign or force than is stated where the spec or the decoding is wrong.
 
-    Give a recording of this sensor; `tactbench inspect FILE` says whose it is and what is wrong with it.
+    Give a healthy recording of this sensor (`tactbench inspect FILE`). Correct rate_hz, lower, upper and sign of the
+    spec, the type and byte order of the decoding, how the device is set up, or the force's unit in the mapping (1 gf is
+    0.00981 N).
     """
-    meta, _, wrong = _read(subject)
+    meta, data, wrong = _read(subject)
     spec = subject.registry.sensors[subject.name].spec
     if meta.sensor.name != spec.name:
         fail("meta.sensor.name", f"it is of {meta.sensor.name!r}")
@@ -80,22 +82,12 @@ def recording_is_of_this_sensor(subject: Subject) -> None:
         fail("meta.sensor.streams", f"the sensor has no channel {min(strange)}")
     if wrong:
         fail("file", wrong)
-
-
-@check("sensor", mode="recording", needs="recording-is-of-this-sensor")
-def recording_fits_the_spec(subject: Subject) -> None:
-    """A real unit shows another rate, range, sign or force than is stated where the spec or the decoding is wrong.
-
-    Correct rate_hz, lower, upper and sign of the spec, the type and byte order of the decoding, how the device is set
-    up, or the force's unit in the mapping (1 gf is 0.00981 N).
-    """
-    meta, data, _ = _read(subject)
     pressing = None
     if any(channel.kind == "force" for one in meta.reference if one.name in data for channel in one.channels):
         pressing, force_n = pressing_force(data, meta.reference)
         if np.nanmax(np.abs(force_n)) > LARGEST_N:
             fail("reference", f"it reaches {np.nanmax(np.abs(force_n)):.4g} N: are these gram-force?")
-    for stated in subject.registry.sensors[subject.name].spec.streams:
+    for stated in spec.streams:
         if stated.name not in data:
             continue
         stream, limits = data[stated.name], {one.name: one for one in stated.channels}
@@ -115,7 +107,7 @@ def recording_fits_the_spec(subject: Subject) -> None:
                     fail(f"{where}.sign", f"{sign:+d} is stated, its correlation with the force is {likeness:+.2f}")
 
 
-@check("sensor", mode="recording", needs="recording-is-of-this-sensor")
+@check("sensor", mode="recording", needs="recording-fits-the-spec")
 def recording_is_of_a_real_unit(subject: Subject) -> None:
     """Only a real unit shows what a sensor is; a simulation shows what somebody believes it to be.
 
@@ -166,10 +158,9 @@ def _noise_is_as_stated(subject: Subject, stream: StreamData) -> None:
         where, sd = f"driver.read: {stream.spec.name}.{channel.name}", float(np.nanstd(good(stream)[:, column]))
         stated = getattr(subject.spec, "nuisances", {}).get(channel.kind, Nuisances())
         hidden, seen = stated.hidden(), channel.kind == "force" or stated.white.value > stated.step.value / 2
-        if seen and sd == 0:
-            fail(where, "it is constant at rest: is it connected?")
-        if hidden and (sd > NOISY * hidden or (seen and sd < hidden / NOISY)):
-            fail(where, f"its noise at rest is {sd:.3g} {channel.unit} (sd), {hidden:.3g} are stated in spec.nuisances")
+        if (seen and sd <= hidden / NOISY) or (hidden and sd > NOISY * hidden):
+            text = f"its noise at rest is {sd:.3g} {channel.unit} (sd), {hidden:.3g} are stated in spec.nuisances"
+            fail(where, text if sd else f"it is constant at rest: is it connected? {hidden:.3g} (sd) are stated")
 
 
 class _Kept:
@@ -197,7 +188,7 @@ def _built(subject: Subject) -> tuple[_Kept, SensorDescriptor, Any]:
     if file.rig != subject.name:
         skip(f"the rig file is for the rig {file.rig}")
     context = rig_context(subject.registry, rig_file=running(file), operator=subject.operator)
-    scene = tiny_scene("check", profile=slow_ramp(FORCE_N, SECONDS, HOLD_S))
+    scene = tiny_scene(profile=slow_ramp(FORCE_N, SECONDS, HOLD_S))
     return _Kept(subject.code("where")(context)), subject.registry.sensors[next(iter(file.sensors))], scene
 
 
@@ -219,25 +210,23 @@ def real_rig_presses(subject: Subject) -> None:
     largest = float(np.percentile(force_n, PEAK))
     if largest > LARGEST * FORCE_N:
         fail("reference", f"the force rises to {largest:.3g} N in a press to {FORCE_N:g} N")
-    with code_of("where", subject):
-        rig, sensor, scene = _built(subject)
-        with rig.open(sensor, scene, seed=2) as acquisition:
-            every = (*acquisition.streams, *acquisition.reference)
+    with code_of("where", subject), rig.open(sensor, scene, seed=2) as acquisition:
+        every = (*acquisition.streams, *acquisition.reference)
 
-            def force(*blocks: Any) -> FloatArray:
-                return pressing_force(joined("open", every, blocks), acquisition.reference)[1]
+        def force(*blocks: Any) -> FloatArray:
+            return pressing_force(joined("open", every, blocks), acquisition.reference)[1]
 
-            came, rising = iter(acquisition), []
-            try:
-                for block in came:
-                    rising.append(block)
-                    if np.abs(force(block)).max(initial=0.0) > FORCE_N / 2:
-                        break
-            except KeyboardInterrupt:
-                acquisition.stop("stopped by hand")
-                raise
-            message = acquisition.stop(WHY)
-            left = force(*came)[-5:]
+        came, rising = iter(acquisition), []
+        try:
+            for block in came:
+                rising.append(block)
+                if np.abs(force(block)).max(initial=0.0) > FORCE_N / 2:
+                    break
+        except KeyboardInterrupt:
+            acquisition.stop("stopped by hand")
+            raise
+        message = acquisition.stop(WHY)
+        left = force(*came)[-5:]
     # The hold is the first fifth of the way to half of the force, or more.
     held = force(*rising)
     off = np.subtract(_zeros(rig.last.drawn), _zeros(made.meta.drawn))

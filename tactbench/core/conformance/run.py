@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Literal
 
 from tactbench.core.conformance import (  # noqa: F401  # isort: skip  (their checks, in this order)
     sensor_spec,
@@ -36,7 +35,6 @@ from tactbench.core.pool import InProcess, Limits, Pool
 
 TIMEOUT_S = 60.0
 """Seconds that one check may take: the slowest of ours, a press on the largest skin, takes two on an idle core."""
-Level = Literal["bronze", "silver", "gold"]
 
 
 def checks_of(kind: Kind, *modes: Mode) -> tuple[Check, ...]:
@@ -68,7 +66,7 @@ class CheckReport:
         return not self.failed
 
     @property
-    def level(self) -> Level | None:
+    def level(self) -> str | None:
         """How much was shown; None: something failed, or only a recording was read."""
         passed = {one.check for one in self.of("passed")}
         if "passive" not in self.modes or self.failed or not passed:

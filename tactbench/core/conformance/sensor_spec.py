@@ -8,6 +8,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from tactbench.core.conformance.check import Subject, check, fail, skip
+from tactbench.core.conformance.streams import limits_of
 from tactbench.core.spec import units
 from tactbench.core.spec.sensor import ChannelSpec, StreamSpec, Vector
 from tactbench.core.spec.skin import SkinSheet
@@ -63,8 +64,7 @@ def limits_are_in_order(subject: Subject) -> None:
         unit = OF_KIND.get(channel.kind)
         if unit and channel.unit not in RAW and units.parse(channel.unit)[1] != units.parse(unit)[1]:
             fail(f"{place}.unit", f"a {channel.kind} is measured in {unit} or count, not in {channel.unit}")
-        low = -math.inf if channel.lower is None else channel.lower
-        high = math.inf if channel.upper is None else channel.upper
+        low, high = limits_of(channel)
         if low >= high:
             fail(f"{place}.lower", f"{low:g} is not below upper, {high:g}")
         whole = np.iinfo(stream.dtype) if np.dtype(stream.dtype).kind in "iu" else None

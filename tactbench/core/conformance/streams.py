@@ -33,7 +33,7 @@ OFF_S = 1.0
 FORCE_SHARE = 0.2
 """By which a force at the end of a press may differ: newtons and gram-force differ by a hundred times."""
 UNITS_OF_TIME = {1e-9: "seconds", 1e-6: "milliseconds", 1e-3: "microseconds"}
-UNITS_OF_FORCE = {102.0: "gram-force", 0.102: "kilograms", 1000.0: "millinewtons"}
+UNITS_OF_FORCE = {102.0: "gram-force", 1000.0: "millinewtons"}
 """By what a reading in newtons is multiplied."""
 
 
@@ -54,7 +54,7 @@ def read_back(path: Path) -> Recorded:
 
     with open_recording(path) as recording:
         came = {name: recording.read(name) for name in recording.stream_names}
-        wrong = ["it was cut short by a crash"] if not recording.complete else []
+        wrong = [] if recording.complete else ["it was cut short by a crash"]
         wrong += [f"{one.stream}: {one.message}" for one in examine(recording) if one.severity == "error"]
         return Recorded(recording.meta, came, "".join(wrong[:1]))
 
@@ -152,14 +152,17 @@ def rate_is_right(where: str, stream: StreamData, rate_hz: float | None) -> None
         fail(f"{where}.rate_hz", f"{rate_hz:g} Hz is stated, the times say {found_hz:.4g} Hz")
 
 
-def within_limits(where: str, channel: ChannelSpec, values: FloatArray) -> tuple[float, float]:
-    """Return a channel's limits; fail where a value is beyond them."""
-    low = -math.inf if channel.lower is None else channel.lower
-    high = math.inf if channel.upper is None else channel.upper
+def limits_of(channel: ChannelSpec) -> tuple[float, float]:
+    """Return a channel's lower and upper limit, infinite where none is stated."""
+    return -math.inf if channel.lower is None else channel.lower, math.inf if channel.upper is None else channel.upper
+
+
+def within_limits(where: str, channel: ChannelSpec, values: FloatArray) -> None:
+    """Fail where a value is beyond a channel's limits."""
+    low, high = limits_of(channel)
     beyond = values[(values < low) | (values > high)]
     if len(beyond):
         fail(where, f"it reads {beyond[0]:g}, beyond its limits {low:g} to {high:g}")
-    return low, high
 
 
 def pressing_force(came: Mapping[str, StreamData], streams: Sequence[StreamSpec]) -> tuple[StreamData, FloatArray]:

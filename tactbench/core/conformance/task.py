@@ -40,11 +40,10 @@ def names_are_known(subject: Subject) -> None:
     labels = {label for _, planned in _planned(spec) for label in planned.scene.labels}
     known = {*SPLITS_WITHOUT_GROUPS, *GROUPS, *spec.campaigns, *labels}
     for name in spec.splits:
-        close = nearest(name, known)
         # Without scenes, a group may be any annotation of recordings that others have made.
-        if name not in known and shots(name) is None and (spec.scenes or close):
-            meant = f"; did you mean {' or '.join(close)}?" if close else ""
-            fail("spec.splits", f"{name!r} is no split that recordings of this task could serve{meant}")
+        if name not in known and shots(name) is None and (spec.scenes or nearest(name, known)):
+            served = ", ".join(sorted(known))
+            fail("spec.splits", f"{name!r} is no split that recordings of this task could serve; there are {served}")
     for field in ("estimators", "baselines"):
         with code_of(f"spec.{field}", subject):
             for found in [subject.registry.estimators[name] for name in getattr(spec, field)]:
@@ -65,8 +64,7 @@ def metric_has_its_unit(subject: Subject) -> None:
     spec = subject.spec
     metric = METRICS[spec.metric]
     if metric.kind != spec.kind:
-        fitting = ", ".join(name for name, one in METRICS.items() if one.kind == spec.kind)
-        fail("spec.metric", f"{spec.metric} is for {metric.kind}, the task is a {spec.kind}; there are {fitting}")
+        fail("spec.metric", f"{spec.metric} is for {metric.kind}, and the task is a {spec.kind}")
     target_unit = getattr(spec.target, "unit", "1")  # frames that slip or do not have none
     if isinstance(spec.target, LabelTarget) and "unit" not in spec.target.model_fields_set:
         target_unit = spec.unit  # a label of which nobody says more

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import inspect
 import math
 from dataclasses import fields
 from functools import lru_cache
@@ -12,6 +11,7 @@ import numpy as np
 
 from tactbench.core.conformance.check import CheckFailed, Subject, check, code_of, fail, skip
 from tactbench.core.conformance.sensor_spec import on_sheet_mm
+from tactbench.core.conformance.streams import limits_of
 from tactbench.core.samples import FloatArray, SkinGrid, SkinState
 from tactbench.core.spec.sensor import ChannelSpec, Nuisances
 from tactbench.core.spec.skin import FluidBackedShell, SkinSheet
@@ -57,15 +57,8 @@ def patch_mm(grid: SkinGrid) -> float:
 
 @lru_cache(maxsize=4)
 def _prepared(subject: Subject, names: tuple[str, ...]) -> Any:
-    factory = subject.code("transducer")
-    asked = inspect.signature(factory).parameters
-    # The twin gives its own to those that ask for them.
-    twins = {"tolerance": 1e-6, "refinement": 1}
-    given = {
-        name: one for name, one in twins.items() if name in asked and asked[name].default is inspect.Parameter.empty
-    }
     with code_of("transducer", subject):
-        return factory(subject.spec, skin_grid(subject.spec.skin.sheet), list(names), **given)
+        return subject.code("transducer")(subject.spec, skin_grid(subject.spec.skin.sheet), list(names))
 
 
 def _read(subject: Subject, state: SkinState, names: tuple[str, ...] = ()) -> FloatArray:
@@ -168,7 +161,8 @@ def rest_is_as_stated(subject: Subject) -> None:
     """
     for channel, found in zip(observed(subject), _read(subject, _state(subject, 0.0)), strict=True):
         rest = found if channel.rest is None else channel.rest.to(channel.unit)
-        span = channel.upper - channel.lower if channel.upper is not None and channel.lower is not None else 0.0
+        low, high = limits_of(channel)
+        span = high - low if math.isfinite(high - low) else 0.0
         if abs(found - rest) > max(REST_SHARE * span, REST_COUNTS):
             fail(f"channel {channel.name}: rest", f"{rest:g} {channel.unit} is stated, the transducer gives {found:g}")
 
@@ -208,10 +202,10 @@ def it_answers_to_a_press(subject: Subject) -> None:
     known = subject.spec.nuisances
     own = [known.get(one.kind, Nuisances()) for one in observed(subject)]
     least = np.array([max(one.white.value, one.step.value) for one in own])
-    for at_mm, change in _responses(subject, GENTLE_N).items():
+    for change in _responses(subject, GENTLE_N).values():
         # Elsewhere it may be felt as well, and more: then it is the place that is wrong.
         if not (np.abs(change) > least).any():
-            most = max(_sites(subject).get(at_mm, range(len(change))), key=lambda one: abs(change[one]))
+            most = int(np.argmax(np.abs(change)))
             name = observed(subject)[most].name
             fail("transducer", f"{GENTLE_N:g} N change {name} by {change[most]:.3g}: no more than noise and step")
 

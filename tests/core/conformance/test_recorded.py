@@ -18,9 +18,9 @@ FORCE = StreamSpec(
 )
 VARIANTS = {
     "sound": None,
-    "of another sensor": "recording-is-of-this-sensor",
-    "with a dead channel": "recording-is-of-this-sensor",
-    "with a clock that goes back": "recording-is-of-this-sensor",
+    "of another sensor": "recording-fits-the-spec",
+    "with a dead channel": "recording-fits-the-spec",
+    "with a clock that goes back": "recording-fits-the-spec",
     "at another rate": "recording-fits-the-spec",
     "beyond the limits": "recording-fits-the-spec",
     "in grams": "recording-fits-the-spec",
