@@ -36,7 +36,6 @@ def test_a_report_raises_nothing_and_a_wrong_name_does():
         ("passed", None),
         ("failed", CheckFailed),
         ("skipped", pytest.skip.Exception),
-        ("expected", pytest.xfail.Exception),
     ],
 )
 def test_what_came_of_a_check_is_pytests(status, raised):

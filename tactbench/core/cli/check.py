@@ -46,7 +46,7 @@ def command(
     from tactbench.core.cli.results import opened
     from tactbench.core.cli.screen import remark
     from tactbench.core.conformance.check import CHECKS, KINDS, Mode
-    from tactbench.core.conformance.run import failed_plugins, plugins_named, run_checks, subjects_named
+    from tactbench.core.conformance.run import plugins_named, run_checks, subjects_named
     from tactbench.core.errors import UnknownNameError, UsageError
     from tactbench.core.plugins.registry import load_registry
     from tactbench.core.plugins.rig_files import load_rig_file
@@ -67,7 +67,7 @@ def command(
     try:
         subjects = subjects_named(registry, name, KINDS)
     except UnknownNameError as error:
-        wrong = list(failed_plugins(registry))
+        wrong = [f"{row.entry_point}: {row.reason}" for row in registry.failures] + list(map(str, registry.refused))
         if not wrong:
             raise
         subjects = []
@@ -103,7 +103,7 @@ def command(
 
 def _ask(subjects: Sequence[Subject], file: RigFile, yes: bool) -> None:
     """Say what is about to be opened and moved, and wait for a yes; raises UsageError without a terminal."""
-    from tactbench.core.conformance.invasive import FORCE_N
+    from tactbench.core.conformance.real import FORCE_N
     from tactbench.core.errors import UsageError
 
     rigs = [one.name for one in subjects if one.kind == "rig"]
@@ -155,7 +155,6 @@ def _lines(report: CheckReport) -> Iterator[tuple[str, str]]:
         yield "FAILED", f"{one.check}: {one.where}: {one.text}"
         if one.advice:
             yield "  do", one.advice
-    yield from (("expected", f"{one.check}: {one.text}") for one in report.of("expected"))
     reasons: dict[str, list[str]] = {}
     for one in report.of("skipped"):
         reasons.setdefault(one.text, []).append(one.check)

@@ -1,24 +1,28 @@
-"""What a check is, what it looks at, and what can come of it."""
+"""What a check is, what it looks at, and what can come of it; and the checks of every plugin."""
 
 from __future__ import annotations
 
 import inspect
+import os
+import re
+import subprocess
+import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 from importlib.metadata import EntryPoint
 from pathlib import Path
 from types import TracebackType
-from typing import Any, Literal, NamedTuple, NoReturn
+from typing import Any, Literal, NamedTuple, NoReturn, get_args
 
-from tactbench.core.errors import PluginError, TactbenchError
+from tactbench.core.errors import NotApplicable, PluginError, TactbenchError
 from tactbench.core.plugins import hookspecs
 from tactbench.core.plugins.interfaces import Operator
 from tactbench.core.plugins.registry import Registry, ask_plugin, load_object
 
 Kind = Literal["sensor", "rig", "device", "task", "estimator", "effect", "indenter", "profile"]
-KINDS: tuple[Kind, ...] = ("sensor", "rig", "device", "task", "estimator", "effect", "indenter", "profile")
+KINDS: tuple[Kind, ...] = get_args(Kind)
 Mode = Literal["passive", "invasive", "recording"]
 """`passive`: nothing is opened and nothing moves. `invasive`: a line is opened, something is pressed. `recording`: only
 a recording is read."""
@@ -27,6 +31,13 @@ CODE = (
     "work_precision", "likeness", "file", "check", "emulators",
 )  # fmt: skip
 """Fields of descriptors that name code."""
+
+
+HEAVY = frozenset({
+    "can", "cv2", "dask", "distributed", "h5py", "jax", "matplotlib", "numba", "pandas", "pyarrow", "rclpy", "rich",
+    "scipy", "serial", "sklearn", "spidev", "tensorflow", "torch", "transformers",
+})  # fmt: skip
+"""Packages that take tenths of a second to import, or that need not be installed where plugins are listed."""
 
 
 class CheckFailed(AssertionError):  # noqa: N818  (a result, as its sibling)
@@ -54,12 +65,11 @@ class CheckOutcome(NamedTuple):
     """What came of a check."""
 
     check: str
-    status: Literal["passed", "failed", "skipped", "expected"]
-    """`expected`: it failed, and is listed among the expected failures."""
+    status: Literal["passed", "failed", "skipped"]
     where: str = ""
     """The field or line at fault."""
     text: str = ""
-    """What is wrong, or why it was skipped; of an expected failure, the reason that is listed."""
+    """What is wrong, or why it was skipped."""
     advice: str = ""
     """What to do; empty where the plugin's code raised: `where` and `text` then say all that is known."""
 
@@ -86,12 +96,10 @@ class Subject:
         """What the plugin's hook gives in this very process; CheckFailed if it does not."""
         try:
             offered = ask_plugin(EntryPoint("checked", self.module, hookspecs.GROUP))[f"{self.kind}s"]
-        except (PluginError, KeyError) as error:
-            raise CheckFailed(self.module, f"its hook tactbench_{self.kind}s does not answer: {error}") from error
-        for descriptor in offered:
-            if descriptor.name == self.name:
-                return descriptor
-        raise CheckFailed(self.module, f"its hook tactbench_{self.kind}s does not give {self.name!r} again")
+            return next(one for one in offered if one.name == self.name)
+        except (PluginError, KeyError, StopIteration) as error:
+            text = f"its hook tactbench_{self.kind}s does not give {self.name!r} again: {error}"
+            raise CheckFailed(self.module, text) from error
 
     @property
     def spec(self) -> Any:
@@ -105,8 +113,7 @@ class Subject:
 
     def names_code(self, field: str) -> str | None:
         """Return ``module:callable`` of a field; None: it names none."""
-        owner = self.spec if field == "features_by" else self.descriptor
-        found = getattr(owner, field, None)
+        found = getattr(self.descriptor, field, getattr(self.spec, field, None))
         return found if isinstance(found, str) else None
 
     def code(self, field: str) -> Any:
@@ -128,28 +135,25 @@ class Check:
     """What to do when it fails, in one sentence."""
     needs: tuple[str, ...]
     """Checks that must have passed; otherwise it is skipped."""
-    carries_out: bool
-    """Whether the plugin does what it is for: what the level silver asks for."""
     run: Callable[[Subject], None]
     """Raises CheckFailed, or CheckSkipped."""
-
-    def __str__(self) -> str:
-        return self.name
 
 
 CHECKS: list[Check] = []
 """All of them, in the order in which they run: a check stands behind those that it needs."""
 
 
-def check(
-    *kinds: Kind, needs: tuple[str, ...] = (), mode: Mode = "passive", carries_out: bool = False
-) -> Callable[[Callable[[Subject], None]], Check]:
-    """Make a check of a function: its name is the check's, its docstring says why it exists, and then what to do."""
+def check(*kinds: Kind, needs: str = "", mode: Mode = "passive") -> Callable[[Callable[[Subject], None]], Check]:
+    """Make a check of a function: its name is the check's, its docstring says why it exists, and then what to do.
+
+    `needs` are names of checks.
+    """
 
     def made(run: Callable[[Subject], None]) -> Check:
         why, _, cure = inspect.cleandoc(run.__doc__ or "").partition("\n\n")
         why, cure = (" ".join(text.split()) for text in (why, cure))
-        CHECKS.append(Check(run.__name__.replace("_", "-"), kinds, mode, why, cure, needs, carries_out, run))
+        name, needed = run.__name__.replace("_", "-"), tuple(needs.split())
+        CHECKS.append(Check(name, kinds, mode, why, cure, needed, run))
         return CHECKS[-1]
 
     return made
@@ -172,6 +176,8 @@ def code_of(field: str, subject: Subject) -> Iterator[None]:
         yield
     except (CheckFailed, CheckSkipped):
         raise
+    except NotApplicable as reason:
+        raise CheckSkipped(f"it says: {reason.message}") from reason
     except (Exception, SystemExit) as error:
         line = line_in(subject.package, error.__traceback__)
         raise CheckFailed(f"{field} ({line})" if line else field, said(error)) from error
@@ -191,3 +197,54 @@ def line_in(package: str, trace: TracebackType | None) -> str:
             found = f"{'/'.join(file[-2:])}, line {trace.tb_lineno}"
         trace = trace.tb_next
     return found
+
+
+@check(*KINDS)
+def code_names_resolve(subject: Subject) -> None:
+    """Code is named by text and imported when it is needed, so that a slip of the pen shows in the middle of a run.
+
+    Correct the ``module:attribute`` in the descriptor, or the module itself where its import fails.
+    """
+    named = {field: where for field in CODE if (where := subject.names_code(field))}
+    if not named:
+        skip("its descriptor names no code")
+    for field, where in named.items():
+        with code_of(field, subject):
+            found = subject.code(field)
+        if not callable(found):
+            fail(field, f"{where} is a {type(found).__name__}, and something that can be called is needed")
+
+
+@check(*KINDS)
+def import_is_light(subject: Subject) -> None:
+    """The module of an entry point is imported by every command, also by one that only lists names.
+
+    Move imports of large packages into the module that the descriptor names, or into functions.
+    """
+    heavy = sorted(HEAVY.intersection(_imported_with(subject.module)))
+    if heavy:
+        fail(subject.module, f"its import also imports {', '.join(heavy)}")
+
+
+@lru_cache(maxsize=64)
+def _imported_with(module: str) -> list[str]:
+    """Return the modules of a fresh interpreter with one; what tactbench itself imports is not heavy."""
+    path = os.pathsep.join(part for part in sys.path if part)
+    done = subprocess.run(
+        [sys.executable, "-W", "ignore", "-c", f"import sys, {module}; print(*sys.modules)"],
+        env={**os.environ, "PYTHONPATH": path}, capture_output=True, text=True, stdin=subprocess.DEVNULL, check=False,
+    )  # fmt: skip
+    if done.returncode != 0:
+        fail(module, f"it cannot be imported in a fresh interpreter: {done.stderr.strip().rpartition(chr(10))[2]}")
+    return done.stdout.split()
+
+
+@check(*KINDS)
+def numbers_are_finite(subject: Subject) -> None:
+    """NaN in a spec passes every comparison, and shows as a score of NaN.
+
+    Leave the field out where nobody states the number.
+    """
+    found = re.search(r"name='([^']*)'[^()]*?(\w+)=(-?inf|nan)\b", repr(subject.descriptor))
+    if found is not None:
+        fail(f"{found[1]}.{found[2]}", f"it is {found[3]}")

@@ -3,524 +3,181 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from dataclasses import replace
+from typing import Any, NamedTuple
+
+import numpy as np
 
 from tactbench.core.conformance.check import CheckFailed, Subject, check, code_of, fail, skip
-from tactbench.core.conformance.press import RATE_SHARE, UNITS_OF_TIME, marks_of, named_unit
+from tactbench.core.conformance.streams import BAD, good, joined, likely, limits_of, marks_of, times_are_right
 from tactbench.core.errors import LinkError, RigError, UsageError
-from tactbench.core.samples import Quality
+from tactbench.core.plugins.rig_devices import emulated_device, options_of
+from tactbench.core.samples import Block, IntArray, Quality, StreamData
 from tactbench.core.spec.rig import DeviceDescriptor
 from tactbench.core.spec.rig_file import EMULATED, DeviceEntry
 from tactbench.core.spec.sensor import ChannelSpec
 from tactbench.devices.driver import Driver, DriverSettings
-from tactbench.links.byte_link import ByteLink
-from tactbench.links.link import Link, Received
+from tactbench.devices.emulation.emulated_devices import EmulatedDevices
+from tactbench.devices.emulator import Senses
+from tactbench.links.link import Clock, Link
 
-if TYPE_CHECKING:
-    import numpy.typing as npt
-
-    from tactbench.core.samples import FloatArray, IntArray
-    from tactbench.devices.emulator import Senses
-
-READ_S, WAIT_S, AHEAD_S, SHORT_S = 1.0, 0.1, 0.1, 0.005
-"""How long a driver is read, how long one read waits, by how much time goes on between two reads that find several
-frames at once, and how long a read takes that does not wait."""
+READ_S, WAIT_S, SHORT_S = 1.0, 0.1, 0.005
+"""How long a driver is read, how long one read waits, and how long a read takes that does not wait."""
+RATED_S, LATE = 3.0, 0.05
+"""How long it is read where rate and noise are looked at; and by which share its times may span more or less."""
 BEFORE_S = 2.0
-"""What the host's clock says when a driver is made, so that units of time can be told apart."""
-WRAP_ROWS, MOST_WRAP_ROWS = 600, 140_000
-"""Rows in which a counter of 8 bits wraps twice; and of 16 bits."""
-UNPLUGGED_S, GONE_AT_S = 5.0, 2 * BEFORE_S
+"""What the host's clock says when a driver is made: frames wait before the start."""
+WRAP_ROWS, SLOW_HZ = (600, 140_000), 1000.0
+"""Rows in which a counter of 8 bits wraps twice, and of 16 bits; and up to which rate as many are read."""
+GONE_AT_S = 10.0
+"""When the line is unplugged, and how long that is waited for."""
 MOST_STILL = 1000
 """Reads that may come back at one moment: of a device that sends a thousand samples at once."""
-BAD = Quality.MISSING | Quality.SUSPECT
 LEVELS = 8
-"""Readings by which channels are told apart, evenly over 0.1 to 0.9 of their range: more channels take several
-rounds, so that the tolerance follows the spacing however many there are."""
-SIZES = (1, 2, 5, 20, 40, 65536)
-"""Bytes of the pieces in which a stream comes: parts of frames, and several frames at once."""
+"""Readings by which channels are told apart, evenly over the middle of their range: more channels take several rounds,
+so that the tolerance follows the spacing however many there are."""
+MOVING_HZ, STALE = 997.3, 0.1
+"""How fast readings run through their range where no two rows are alike, and the share that may be by chance."""
+SIZES, HELD_S, APART_S = (1, 2, 5, 20, 40, 65536), 0.1, 1e-6
+"""Bytes of the pieces in which a stream comes: parts of frames, and several frames at once; for how long an adapter
+holds them back; and how far apart it hands them over."""
 DAMAGE_EVERY, DAMAGE = 16, 5
-"""Reads after which bytes are damaged, and how many of them are lost, with one of 0xFF in their place."""
+"""Pieces after which bytes are damaged, and how many of them are lost, with one of 0xFF in their place."""
 LOAD_N, READ_N, OVERLOAD_N, STILL_M = 0.5, 0.02, 1e6, 1e-5
 """Load of a force channel, a step of its converter and its noise, more than any sensor bears, and by how much the
 position of a motor at rest may change (assumed: an increment of its drive, twice)."""
 
 
-class _Pieces(ByteLink):
-    """A byte stream that comes in other pieces, after `change` on its way to the driver."""
+class _Adapter:
+    """An emulated device behind a serial adapter that holds back all but answers, and hands bytes over cut anywhere.
 
-    def __init__(self, inner: ByteLink, change: Callable[[bytes], bytes]) -> None:
-        super().__init__(inner.address, inner._clock)
-        self._inner, self._change, self._left = inner, change, Received(b"", 0)
-        self._sizes = itertools.cycle(SIZES)
+    `change` is what becomes of each of the device's own pieces on the way.
+    """
 
-    def timer(self) -> float:
-        return self._inner.timer()
+    def __init__(self, inner: Any, change: Callable[[bytes], bytes]) -> None:
+        self._inner, self._change, self._sizes, self._told_s = inner, change, itertools.cycle(SIZES), 0.0
 
-    def read(self, timeout_s: float, *, size: int = 65536) -> Received:
-        if not self._left.data:
-            first = self._inner.read(timeout_s)
-            data = self._change(first.data)
-            with suppress(LinkError):
-                while True:
-                    data += self._change(self._inner.read(0.0).data)
-            self._left = Received(data, first.t_ns)
-        count = min(size, next(self._sizes))
-        given, rest = self._left.data[:count], self._left.data[count:]
-        self._left = Received(rest, self._left.t_ns)
-        return Received(given, self._left.t_ns)
+    def feed(self, piece: Any, now_s: float) -> Any:
+        self._told_s = now_s
+        return self._cut(self._inner.feed(piece, now_s), now_s)
 
-    def write(self, data: bytes) -> None:
-        self._inner.write(data)
+    def poll(self, now_s: float) -> Any:
+        return self._cut(self._inner.poll(now_s), now_s)
 
-    def discard(self) -> None:
-        self._left = Received(b"", 0)
-        self._inner.discard()
+    def next_s(self) -> float:
+        due_s = self._inner.next_s()
+        return due_s if due_s < self._told_s + HELD_S else HELD_S * float(np.ceil(due_s / HELD_S))
 
-    def _release(self) -> None:
-        self._inner.close()
+    def _cut(self, sent: Any, now_s: float) -> Any:
+        data = b"".join(self._change(piece) for _, piece in sent)
+        pieces: list[Any] = []
+        while data:
+            size = next(self._sizes)
+            pieces.append((now_s + APART_S * len(pieces), data[:size]))
+            data = data[size:]
+        return pieces
 
 
-class Line:
-    """Opens a driver's link and counts: what was opened must be closed."""
+class Opened(NamedTuple):
+    """A driver that is open, on its emulator in virtual time or on a real line."""
 
-    def __init__(self, opener: Any, change: Callable[[bytes], bytes] | None = None) -> None:
-        self._opener, self._change = opener, change
-        self.opened: list[Link] = []
-
-    def __call__(self) -> Link:  # noqa: D102  (a driver's `open_link`)
-        link: Link = self._opener()
-        if self._change is not None and isinstance(link, ByteLink):
-            link = _Pieces(link, self._change)
-        self.opened.append(link)
-        return link
-
-    @property
-    def still_open(self) -> int:
-        """How many of them are still open."""
-        return sum(not link._closed for link in self.opened)
-
-
-@dataclass
-class Rows:
-    """What was read of one stream."""
-
-    data: list[FloatArray] = field(default_factory=list)
-    """NaN where it is marked as missing or suspect."""
-    t_ns: list[IntArray] = field(default_factory=list)
-    sequence: list[IntArray] = field(default_factory=list)
-    marks: list[npt.NDArray[Any]] = field(default_factory=list)
-
-    def __len__(self) -> int:
-        return sum(map(len, self.data))
-
-
-class Opened:
-    """A driver that is open, and how time goes on: on its emulator in virtual time, or by itself."""
-
-    def __init__(
-        self, subject: Subject, clock: Callable[[], int], advance: Callable[[int], None], line: Line, driver: Driver
-    ) -> None:
-        self.subject, self.now_ns, self.line, self.driver = subject, clock, line, driver
-        self._advance = advance
-
-    def go_on(self, seconds: float) -> None:
-        """Let time go on without a read."""
-        self._advance(self.now_ns() + round(seconds * 1e9))
+    subject: Subject
+    driver: Driver
+    clock: Clock
 
     def start(self) -> None:
         """Start the driver."""
         with code_of("driver.start", self.subject):
             self.driver.start()
 
-    def read(self, seconds: float = READ_S, ahead_s: float = 0.0, rows: int = 0) -> dict[str, Rows]:
-        """Read for some time, or until each stream has so many `rows`; look at every block."""
-        read = {stream.name: Rows() for stream in self.driver.streams}
-        for _ in passing(self.now_ns, seconds):
-            self.go_on(ahead_s)
+    def read(self, seconds: float = READ_S) -> dict[str, StreamData]:
+        """Read for some time; return what came."""
+        blocks: list[Block] = []
+        until_ns, before_ns, still = self.clock() + round(seconds * 1e9), -1, 0
+        while (now_ns := self.clock()) < until_ns:
+            still = still + 1 if now_ns == before_ns else 0
+            if still > MOST_STILL:
+                fail("driver.read", "time stands still: it returns at once, and nothing is waited for")
+            before_ns = now_ns
             with code_of("driver.read", self.subject):
-                blocks = self.driver.read(WAIT_S)
-            take(self.driver, blocks, read)
-            if rows and min(map(len, read.values())) >= rows:
-                break
-        return read
+                blocks += self.driver.read(WAIT_S)
+        return joined("driver.read", self.driver.streams, blocks)
 
 
-def passing(clock: Callable[[], int], seconds: float) -> Iterator[None]:
-    """Yield until so much time of a clock has passed; CheckFailed where it stands still."""
-    until_ns, before_ns, still = clock() + round(seconds * 1e9), -1, 0
-    while (now_ns := clock()) < until_ns:
-        still = still + 1 if now_ns == before_ns else 0
-        if still > MOST_STILL:
-            fail("driver.read", "time stands still: it returns at once, and nothing is waited for")
-        before_ns = now_ns
-        yield
-
-
-def take(driver: Driver, blocks: Any, read: dict[str, Rows]) -> None:
-    """Append blocks to what was read; fail where they are not as blocks must be."""
-    import numpy as np
-
-    if not isinstance(blocks, list):
-        fail("driver.read", f"it returned a {type(blocks).__name__}, and a list of Blocks is needed")
-    width = {stream.name: len(stream.channels) for stream in driver.streams}
-    for block in blocks:
-        if block.stream not in width:
-            fail("driver.read", f"a block of {block.stream!r}, which is none of its streams")
-        if np.shape(block.data) != (len(block.data), width[block.stream]):
-            fail("driver.read", f"a block of {block.stream} has shape {np.shape(block.data)}")
-        values, own = np.asarray(block.data, dtype=np.float64), read[block.stream]
-        marks = marks_of(block)
-        if not np.isfinite(values[(marks & BAD) == 0]).all():
-            fail("driver.read", f"a block of {block.stream} holds values that are not finite and not marked")
-        own.data.append(np.where((marks & BAD) != 0, np.nan, values))
-        own.marks.append(marks)
-        for name, found in (("t_ns", own.t_ns), ("sequence", own.sequence)):
-            counted = getattr(block, name)
-            if counted is not None:
-                if np.shape(counted) != (len(block.data),):
-                    fail(f"driver.read: {name}", f"shape {np.shape(counted)} for {len(block.data)} rows")
-                found.append(np.asarray(counted))
+def opened_on(subject: Subject, open_link: Callable[[], Link], options: dict[str, Any], clock: Clock) -> Opened:
+    """Open a driver."""
+    streams = () if isinstance(subject.descriptor, DeviceDescriptor) else subject.descriptor.spec.streams
+    with code_of("driver", subject):
+        driver: Driver = subject.code("driver")(DriverSettings(open_link, streams, options, clock))
+    return Opened(subject, driver, clock)
 
 
 @contextmanager
 def emulated(
-    subject: Subject, *faults: str, senses: Senses | None = None, change: Any = None, **options: Any
-) -> Iterator[Opened]:
-    """Open the driver on its emulator.
+    subject: Subject, *faults: str, senses: Senses = lambda t_s: {}, change: Callable[[bytes], bytes] | None = None,
+    started: bool = True, **options: Any,
+) -> Iterator[tuple[Opened, EmulatedDevices]]:  # fmt: skip
+    """Open the driver on its emulator, which has been running for some time, and start it.
 
     Parameters
     ----------
     faults
         Of the emulator, as a rig file names them.
     senses
-        What the device senses; None: it is at rest.
+        What the device senses; by default it is at rest.
     change
         What becomes of pieces on their way to the driver; byte streams then come in pieces of other sizes.
     options
         Beside those of the emulated device.
     """
-    from tactbench.core.plugins.rig_devices import emulated_device, options_of
-    from tactbench.devices.emulation.emulated_devices import EmulatedDevices
-
-    descriptor = subject.descriptor
-    entry = DeviceEntry(link=EMULATED, faults=faults)
+    name, entry = subject.name, DeviceEntry(link=EMULATED, faults=faults)
     with code_of("emulator", subject):
-        device = emulated_device(descriptor, subject.name, entry, senses or (lambda t_s: {}), 1)
-    devices = EmulatedDevices({subject.name: device})
+        device = emulated_device(subject.descriptor, name, entry, senses, 1)
+    if change is not None:
+        device = replace(device, emulator=_Adapter(device.emulator, change))
+    devices = EmulatedDevices({name: device})
     devices.advance(round(BEFORE_S * 1e9))
-    line = Line(devices.opener(subject.name), change)
-    streams = () if isinstance(descriptor, DeviceDescriptor) else descriptor.spec.streams
-    driver: Driver | None = None
+    given = {**options_of(subject.descriptor, entry), **options}
+    opened = opened_on(subject, devices.opener(name), given, devices.clock)
     try:
-        with code_of("driver", subject):
-            given = {**options_of(descriptor, entry), **options}
-            driver = subject.code("driver")(DriverSettings(line, streams, given, devices.clock))
-        assert driver is not None
-        yield Opened(subject, devices.clock, devices.advance, line, driver)
+        if started:
+            opened.start()
+        yield opened, devices
     finally:
-        if driver is not None:
-            with suppress(Exception):
-                driver.close()
-        devices.close()
+        with suppress(Exception):
+            opened.driver.close()
 
 
-@check("sensor", "device", needs=("code-names-resolve",))
+@check("sensor", "device", needs="code-names-resolve")
 def driver_opens(subject: Subject) -> None:
     """A driver is open once it is made, says who it is, has the spec's streams, and leaves nothing open.
 
-    Call settings.open_link() once in its making and close the link in close(), also when it was sampling; return the
-    streams of settings.streams, and texts from identify().
+    Open settings.open_link() once in its making and close the link in close(), also when it was sampling; return the
+    streams of settings.streams, and texts from identify(); raise UsageError for options that it does not know.
     """
     descriptor = subject.descriptor
     if descriptor.driver is None:
         skip("it names no driver: it can be simulated or replayed, not read")
     if descriptor.emulator is None:
         skip("it names no emulator: only `--rig-file FILE` tries its driver, on a real line")
-    if descriptor.emulated_link is None:
-        fail("emulated_link", "it names an emulator, and does not say on which kind of link")
-    with emulated(subject) as opened:
-        driver = opened.driver
-        if not isinstance(driver, Driver):
-            fail("driver", f"it is a {type(driver).__name__}; derive it from tactbench.plugin.devices.Driver")
-        if len(opened.line.opened) != 1:
-            fail("driver", f"it opened {len(opened.line.opened)} links, and 1 is given to it")
+    own = () if isinstance(descriptor, DeviceDescriptor) else descriptor.spec.channels()
+    with emulated(subject, started=False) as (opened, devices):
         with code_of("driver.identify", subject):
-            told = dict(driver.identify())
+            told = dict(opened.driver.identify())
         if not all(isinstance(one, str) for pair in told.items() for one in pair):
             fail("driver.identify", f"{told!r}, and texts by name are needed")
-        own = {one.name: one for one in driver.streams if isinstance(descriptor, DeviceDescriptor)}
-        own = own or {one.name: one for one in descriptor.spec.streams}
-        for stream in driver.streams:
-            if stream.name not in own or stream.channels != own[stream.name].channels:
-                fail(f"driver.streams[{stream.name}]", f"the spec has no such stream; it has {', '.join(own)}")
+        strange = [one.name for one in _channels(opened) if own and one not in own]
+        if strange:
+            fail("driver.streams", f"the spec has no such channel as {strange[0]}")
         opened.start()
-        with code_of("driver.close", subject):
-            driver.close()
-            driver.close()
-        if opened.line.still_open:
-            fail("driver.close", "its link is still open afterwards")
-
-
-@check("sensor", "device", needs=("driver-opens",), carries_out=True)
-def driver_reads(subject: Subject) -> None:
-    """Rows have the host's time in nanoseconds, and come at the rate that the driver states.
-
-    Stamp with Received.t_ns or settings.clock(), both int64 nanoseconds; take everything that has come at each read,
-    and give each row once.
-    """
-    with emulated(subject) as opened:
-        look_at(opened)
-
-
-def look_at(opened: Opened) -> None:
-    """Start a driver, read it for a while, and fail where its times are not as they must be."""
-    import numpy as np
-
-    driver, clock = opened.driver, opened.now_ns
-    opened.start()
-    began_ns = clock()
-    found = opened.read()
-    seconds = (clock() - began_ns) * 1e-9
-    driver.stop()
-    for stream in driver.streams:
-        rows, where = found[stream.name], f"driver.read: {stream.name}.t_ns"
-        if not len(rows):
-            fail("driver.read", f"nothing came of its stream {stream.name} within {seconds:g} s")
-        if stream.rate_hz is not None and len(rows) > 20:
-            rate = len(rows) / seconds
-            # A start, and samples that come together, take a few rows.
-            if abs(rate / stream.rate_hz - 1) > RATE_SHARE + 5 / len(rows):
-                fail(f"driver.streams[{stream.name}].rate_hz", f"{stream.rate_hz:g} Hz is stated, {rate:.4g} Hz came")
-        if not rows.t_ns:
-            continue
-        t_ns = np.concatenate(rows.t_ns)
-        for factor, unit in UNITS_OF_TIME.items():
-            if 0.9 < t_ns[-1] / factor / clock() < 1.1:
-                fail(where, f"it is in {unit}, and nanoseconds are needed")
-        if len(t_ns) > 2:
-            named_unit(where, float(t_ns[-1] - t_ns[0]) * 1e-9 / seconds)
-        if t_ns.dtype != np.int64:
-            fail(where, f"it is {t_ns.dtype}, and int64 is needed")
-        if (np.diff(t_ns) < 0).any():
-            fail(where, "it goes back")
-        if abs(int(t_ns[-1]) - clock()) > 1e9 * READ_S:
-            off_s = (int(t_ns[-1]) - clock()) * 1e-9
-            fail(where, f"it is {off_s:+.3g} s off the host's clock; the device's own belongs into device_ns")
-
-
-def _reading(one: ChannelSpec, digit: int) -> tuple[float, float]:
-    """Return one of the readings by which channels are told apart, with its tolerance; forces have both signs."""
-    if one.lower is not None and one.upper is not None:
-        step = 0.8 * (one.upper - one.lower) / (LEVELS - 1)
-        return float(round(one.lower + step * (digit + 0.875))), step / 4 + 0.5
-    if one.kind in ("force", "torque"):
-        load = LOAD_N if one.kind == "force" else READ_N
-        return load * (digit + 1) * (-1.0) ** digit, 0.04 * load * (digit + 2)
-    return (0.0 if one.rest is None else one.rest.to(one.unit)) + digit + 1, 0.25
-
-
-@check("sensor", "device", needs=("driver-reads",))
-def driver_reads_what_is_sensed(subject: Subject) -> None:
-    """Swapped channels, bytes in the wrong order, a lost sign or gram-force give plausible readings of something else.
-
-    Decode into the order of the stream's channels and into their units; the emulator must encode what its senses say.
-    """
-    import numpy as np
-
-    if getattr(subject.descriptor, "kind", "") == "motor":
-        skip("what a motor's position is, its rig decides")
-    with emulated(subject) as opened:
-        streams = {stream.name: list(stream.channels) for stream in opened.driver.streams}
-    every = [one for channels in streams.values() for one in channels]
-    rounds = 1
-    while LEVELS**rounds < len(every):
-        rounds += 1
-    for place in range(rounds):
-        meant = {one.name: _reading(one, number // LEVELS**place % LEVELS) for number, one in enumerate(every)}
-        sensed: dict[str, float] = {}
-        with emulated(subject, senses=_senses(sensed)) as opened:
-            opened.start()
-            sensed |= {name: value for name, (value, _) in meant.items()}
-            opened.driver.read(WAIT_S)
-            found = opened.read()
-        for stream, channels in streams.items():
-            table = np.concatenate(found[stream].data)
-            for channel, value in zip(channels, np.nanmedian(table[len(table) // 2 :], axis=0).tolist(), strict=True):
-                expected, near = meant[channel.name]
-                if not abs(value - expected) <= near:
-                    others = [name for name, (one, within) in meant.items() if abs(value - one) <= within]
-                    likely = (
-                        f", which is what {others[0]} senses" if others
-                        else ": is its sign turned?" if abs(value + expected) <= near
-                        else ": are these gram-force?" if channel.unit == "N" and 80 < value / expected < 125
-                        else ": are these millinewtons?" if channel.unit == "N" and 800 < value / expected < 1250
-                        else ""
-                    )  # fmt: skip
-                    text = f"{value:.4g} where {expected:g} {channel.unit} are sensed{likely}"
-                    fail(f"driver.read: {stream}.{channel.name}", text)
-
-
-def _senses(sensed: Mapping[str, float]) -> Senses:
-    return lambda t_s: sensed
-
-
-@check("sensor", "device", needs=("driver-reads-what-is-sensed",))
-def driver_takes_any_pieces(subject: Subject) -> None:
-    """A serial port hands over half a frame or several at once, as the host happens to look.
-
-    Keep what is left of a frame for the next read, and take all frames that are whole.
-    """
-    if subject.descriptor.emulated_link != "bytes":
-        skip("its link hands over whole frames")
-    numbers = []
-    for change in (None, lambda piece: piece):
-        with emulated(subject, change=change) as opened:
-            opened.start()
-            numbers.append({name: len(rows) for name, rows in opened.read(ahead_s=AHEAD_S).items()})
-    for stream, number in numbers[0].items():
-        if numbers[1][stream] < 0.9 * number - 2:
-            text = f"{numbers[1][stream]} rows of {stream} in {READ_S:g} s where frames come in pieces or several at"
-            fail("driver.read", f"{text} once, {number} where each comes whole")
-
-
-@check("sensor", "device", needs=("driver-takes-any-pieces",))
-def driver_drops_damaged_frames(subject: Subject) -> None:
-    """Cables lose bytes: a frame that is not whole must not become a reading, nor end the recording.
-
-    Look for the frame's length, end or checksum, leave out what is damaged, find the next beginning, and count it in
-    `counts` or mark it as SUSPECT or MISSING.
-    """
-    import numpy as np
-
-    seen = itertools.count()
-
-    def damaged(data: bytes) -> bytes:
-        if len(data) < 2 or next(seen) % DAMAGE_EVERY != DAMAGE_EVERY - 1:
-            return data
-        middle = len(data) // 2
-        return data[:middle] + b"\xff" + data[middle + DAMAGE :]
-
-    with emulated(subject) as opened:
-        opened.start()
-        sound = {name: np.concatenate(rows.data) for name, rows in opened.read().items()}
-    with emulated(subject, change=damaged) as opened:
-        opened.start()
-        before = dict(opened.driver.counts)
-        found = opened.read(2 * READ_S)
-        after = dict(opened.driver.counts)
-    if next(seen) < DAMAGE_EVERY:
-        skip("it sends too little to damage any of it")
-    marked = any((marks & BAD).any() for rows in found.values() for marks in rows.marks)
-    for stream, rows in found.items():
-        if not len(rows):
-            fail("driver.read", f"no row of {stream} comes where frames are damaged now and then")
-        low, high = sound[stream].min(axis=0), sound[stream].max(axis=0)
-        near = 3 * (high - low) + 0.05 * (1 + np.abs(high)) + 3
-        table = np.concatenate(rows.data)
-        wrong = np.argwhere((table < low - near) | (table > high + near))
-        if len(wrong):
-            value = table[tuple(wrong[0])]
-            fail(f"driver.read: {stream}", f"a frame that lost {DAMAGE} bytes is taken for a whole one: {value:g}")
-    if after == before and not marked:
-        fail("driver.counts", "frames were damaged, and neither counted nor marked")
-
-
-@check("sensor", "device", needs=("driver-reads",))
-def driver_counts_on(subject: Subject) -> None:
-    """A device's counter wraps; numbers that begin again with it look like rows that come late, and are left out.
-
-    Count on over the wraps: tactbench.plugin.devices.Unwrap(bits).
-    """
-    with emulated(subject) as opened:
-        opened.start()
-        rates = [stream.rate_hz or 100.0 for stream in opened.driver.streams]
-        found = opened.read(WRAP_ROWS / min(rates) + READ_S, rows=WRAP_ROWS)
-        if not any(rows.sequence for rows in found.values()):
-            skip("its device numbers no samples")
-        _count_on(found)
-        if max(rates) <= 1000 and len(rates) == 1:
-            _count_on(opened.read(MOST_WRAP_ROWS / min(rates) + READ_S, ahead_s=1.0, rows=MOST_WRAP_ROWS))
-
-
-def _count_on(found: dict[str, Rows]) -> None:
-    import numpy as np
-
-    for stream, rows in found.items():
-        if rows.sequence:
-            numbers = np.concatenate(rows.sequence)
-            wrong = np.flatnonzero(np.diff(numbers) != 1)
-            if len(wrong):
-                a, b = numbers[wrong[0]], numbers[wrong[0] + 1]
-                fail(f"driver.read: {stream}.sequence", f"{a} is followed by {b}, and no row was lost")
-
-
-@check("sensor", "device", needs=("driver-reads",))
-def driver_starts_afresh(subject: Subject) -> None:
-    """What a device sent before the start would be recorded as if it had come then.
-
-    Discard in start() what waits in the link (Link.discard), and forget the beginning of a frame.
-    """
-    with emulated(subject) as opened:
-        for _ in range(2):
-            opened.go_on(BEFORE_S)
-            began_ns = opened.now_ns()
-            opened.start()
-            for stream, rows in opened.read().items():
-                first_ns = min((int(t_ns[0]) for t_ns in rows.t_ns if len(t_ns)), default=began_ns)
-                if first_ns < began_ns:
-                    early_s = (began_ns - first_ns) * 1e-9
-                    fail("driver.start", f"a row of {stream} is from {early_s:.2g} s before it was started")
-            opened.driver.stop()
-
-
-@check("sensor", "device", needs=("driver-reads",))
-def driver_does_not_wait_when_told_so(subject: Subject) -> None:
-    """`read(0)` asks without waiting: a rig with several devices reads them in turn.
-
-    Pass the time-out on to the link, and return an empty list when it raises LinkTimeout.
-    """
-    with emulated(subject) as opened:
-        opened.start()
-        opened.driver.read(WAIT_S)
-        before = opened.now_ns()
-        with code_of("driver.read", subject):
-            for _ in range(3):
-                opened.driver.read(0.0)
-        if (opened.now_ns() - before) * 1e-9 > SHORT_S:
-            fail("driver.read", f"read(0) took {(opened.now_ns() - before) * 1e-9:.2g} s")
-
-
-@check("sensor", "device", needs=("driver-reads",))
-def driver_reports_unplug(subject: Subject) -> None:
-    """Nothing that comes and nothing that is there look alike, unless the driver lets the link's error pass.
-
-    Let LinkUnplugged of the link pass through read(); catch LinkTimeout alone.
-    """
-    with emulated(subject, f"unplug:start_s={GONE_AT_S:g}") as opened:
-        opened.start()
-        try:
-            for _ in passing(opened.now_ns, GONE_AT_S - BEFORE_S + UNPLUGGED_S):
-                opened.driver.read(WAIT_S)
-        except CheckFailed:
-            pass
-        except (LinkError, RigError):
-            return
-        except Exception as error:
-            fail("driver.read", f"{type(error).__name__} instead of LinkUnplugged once the line is gone: {error}")
-        fail("driver.read", "it goes on as if nothing had come once its line is gone")
-
-
-@check("sensor", "device", needs=("driver-opens",))
-def driver_refuses_unknown_options(subject: Subject) -> None:
-    """A misspelt option of a rig file that nobody refuses is a setting that nobody makes.
-
-    Raise UsageError for options that the driver does not know.
-    """
+        with code_of("driver.close: it must be possible to open its link again", subject):
+            opened.driver.close()
+            opened.driver.close()
+            devices.open_link(subject.name).close()
     try:
-        with emulated(subject, no_such_option=1):
+        with emulated(subject, started=False, no_such_option=1):
             pass
     except CheckFailed as failure:
         if isinstance(failure.__cause__, UsageError):
@@ -529,79 +186,233 @@ def driver_refuses_unknown_options(subject: Subject) -> None:
     fail("driver", "it took the option 'no_such_option' without a word")
 
 
-def _channels(subject: Subject, device: str, kind: str) -> dict[str, tuple[str, int, ChannelSpec]]:
-    """Return stream, column and channel of a device's channels of a kind, by name."""
-    if subject.descriptor.kind != device:
-        skip(f"it is a {subject.descriptor.kind} device")
-    with emulated(subject) as opened:
-        found = {
-            channel.name: (stream.name, column, channel)
-            for stream in opened.driver.streams
-            for column, channel in enumerate(stream.channels)
-            if channel.kind == kind
-        }
-    if not found:
-        fail("driver.streams", f"none of its channels is of kind {kind}")
+@check("sensor", "device", needs="driver-opens")
+def driver_reads(subject: Subject) -> None:
+    """Rows have the host's time in nanoseconds, come at the rate that the driver states, and each of them once.
+
+    Stamp with Received.t_ns or settings.clock(), both int64 nanoseconds; take everything that has come at each read,
+    and return an empty list where nothing new has: a device that is asked for its last row may give it twice.
+    """
+    every: list[ChannelSpec] = []
+
+    def moving(t_s: float) -> dict[str, float]:
+        return {one.name: _reading(one, MOVING_HZ * t_s % 1.0)[0] for one in every}
+
+    with emulated(subject, senses=moving, started=False) as (opened, _):
+        every += _channels(opened)
+        for name, stream in look_at(opened).items():
+            again = float((np.diff(stream.data, axis=0) == 0).all(axis=1).mean())
+            if again > STALE and getattr(subject.descriptor, "kind", "") != "motor":
+                fail(f"driver.read: {name}", f"{again:.0%} of its rows are the one before once more, with a new time")
+
+
+def look_at(opened: Opened) -> dict[str, StreamData]:
+    """Start a driver, read it for a while, and return what came; fail where its times are not as they must be."""
+    opened.start()
+    opened.read(WAIT_S)
+    began_ns = opened.clock()
+    found = opened.read(RATED_S)
+    ended_ns = opened.clock()
+    opened.driver.stop()
+    for name, stream in found.items():
+        if not len(stream.data):
+            fail("driver.read", f"nothing came of its stream {name} within {RATED_S:g} s")
+        times_are_right(f"driver.read: {name}", stream, (ended_ns - began_ns) * 1e-9, LATE, ended_ns)
     return found
 
 
-@check("device", needs=("driver-opens",))
-def units_are_the_rigs(subject: Subject) -> None:
-    """A rig's force loop, its ceilings and every score take forces for newtons, and positions for metres.
+def _channels(opened: Opened) -> list[ChannelSpec]:
+    return [channel for stream in opened.driver.streams for channel in stream.channels]
 
-    Give force channels unit "N", torques "N*m", a motor's channel `position` "m", and convert.
+
+def _reading(one: ChannelSpec, share: float) -> tuple[float, float]:
+    """Return a reading at some share of the middle of a channel's range, and a tolerance; forces have both signs."""
+    low, span, rounding = 1.0, LEVELS - 1.0, 0.0
+    lower, upper = limits_of(one)
+    if np.isfinite(upper - lower):
+        low, span, rounding = 0.9 * lower + 0.1 * upper, 0.8 * (upper - lower), 1.0
+    elif one.kind in ("force", "torque"):
+        load = LOAD_N if one.kind == "force" else READ_N
+        low, span = -3.7 * load, 8 * load
+    elif one.rest is not None:
+        low += one.rest.to(one.unit)
+    return low + share * span, span / (LEVELS - 1) / 4 + rounding
+
+
+@check("sensor", "device", needs="driver-reads")
+def driver_reads_what_is_sensed(subject: Subject) -> None:
+    """Swapped channels, bytes in the wrong order, a lost sign or gram-force give plausible readings of something else.
+
+    Decode into the order of the stream's channels and into their units; the emulator must encode what its senses say.
     """
-    kind, unit = ("force", "N") if subject.descriptor.kind == "force" else ("position", "m")
-    for name, (stream, _, channel) in _channels(subject, subject.descriptor.kind, kind).items():
-        if channel.unit != unit:
-            fail(f"driver.streams[{stream}].channels[{name}].unit", f"{channel.unit!r}, and {unit!r} is needed")
+    if getattr(subject.descriptor, "kind", "") == "motor":
+        skip("what a motor's position is, its rig decides")
+    with emulated(subject, started=False) as (opened, _):
+        every = _channels(opened)
+    place, sensed = 1, dict[str, float]()
+    while place == 1 or place < len(every):
+        meant = {one.name: _reading(one, number // place % LEVELS / (LEVELS - 1)) for number, one in enumerate(every)}
+        sensed.clear()
+        with emulated(subject, senses=lambda t_s, now=sensed: now) as (opened, _):  # type: ignore[misc]
+            sensed |= {name: value for name, (value, _) in meant.items()}
+            opened.driver.read(WAIT_S)
+            found = opened.read()
+        for name, stream in found.items():
+            for column, channel in enumerate(stream.spec.channels):
+                value = float(np.nanmedian(good(stream)[len(stream.data) // 2 :, column]))
+                expected, near = meant[channel.name]
+                if abs(value - expected) <= near:
+                    continue
+                others = [other for other, (one, within) in meant.items() if abs(value - one) <= within]
+                if others:
+                    guess = f", which is what {others[0]} senses"
+                elif abs(value + expected) <= near:
+                    guess = ": is its sign turned?"
+                else:
+                    guess = likely(value / expected) if channel.unit == "N" else ""
+                text = f"{value:.4g} where {expected:.4g} {channel.unit} are sensed{guess}"
+                fail(f"driver.read: {name}.{channel.name}", text)
+        place *= LEVELS
 
 
-@check("device", needs=("driver-reads-what-is-sensed",))
-def tare_and_overload_are_true(subject: Subject) -> None:
-    """A driver that says it has taken a zero, and has not, presses harder; a sensor at its end reads like any other.
+@check("sensor", "device", needs="driver-reads-what-is-sensed")
+def driver_takes_any_pieces(subject: Subject) -> None:
+    """A serial port hands over half a frame or several at once, and cables lose bytes, which must not become a reading.
 
-    Return True from tare() only where the device takes its reading as zero; mark its range's end as SATURATED.
+    Keep what is left of a frame for the next read, and take all frames that are whole. Look for a frame's length, end
+    or checksum, leave out what is damaged, find the next beginning, and count it in `counts` or mark it as SUSPECT.
     """
-    import numpy as np
+    if subject.descriptor.emulated_link != "bytes":
+        skip("its link hands over whole frames")
+    seen, lost = itertools.count(), 0
 
-    forces = _channels(subject, "force", "force")
-    sensed: dict[str, float] = {}
-    with emulated(subject, senses=_senses(sensed)) as opened:
+    def damaged(data: bytes) -> bytes:
+        if not lost or len(data) < 2 or next(seen) % DAMAGE_EVERY != DAMAGE_EVERY - 1:
+            return data
+        return data[: len(data) // 2] + b"\xff" + data[len(data) // 2 + lost :]
+
+    with emulated(subject) as (opened, _):
+        sound = opened.read()
+    with emulated(subject, change=damaged) as (opened, _):
+        cut = opened.read()
+        for name, stream in sound.items():
+            came, whole = len(cut[name].data), len(stream.data)
+            if came < (0.9 - HELD_S / READ_S) * whole - 2:
+                text = f"{came} rows of {name} in {READ_S:g} s where frames come in pieces or several at once"
+                fail("driver.read", f"{text}, {whole} where each comes whole")
+        lost, before = DAMAGE, dict(opened.driver.counts)
+        found = opened.read(2 * READ_S)
+        noticed = opened.driver.counts != before or next(seen) < DAMAGE_EVERY
+    for name, stream in found.items():
+        if not len(stream.data):
+            fail("driver.read", f"no row of {name} comes where frames are damaged now and then")
+        low, high = sound[name].data.min(axis=0), sound[name].data.max(axis=0)
+        near = 3 * (high - low + 1) + 0.05 * np.abs(high)
+        values = good(stream)
+        wrong = values[(values < low - near) | (values > high + near)]
+        if len(wrong):
+            fail(f"driver.read: {name}", f"a frame that lost {DAMAGE} bytes is taken for a whole one: {wrong[0]:g}")
+        noticed |= bool(np.isnan(values).any())
+    if not noticed:
+        fail("driver.counts", "frames were damaged, and neither counted nor marked")
+
+
+@check("sensor", "device", needs="driver-reads")
+def driver_counts_on(subject: Subject) -> None:
+    """A device's counter wraps; numbers that begin again with it look like rows that come late, and are left out.
+
+    Count on over the wraps: tactbench.plugin.devices.Unwrap(bits).
+    """
+    with emulated(subject) as (opened, devices):
+        if all(stream.sequence is None for stream in opened.read().values()):
+            skip("its device numbers no samples")
+        rates = [stream.rate_hz or 100.0 for stream in opened.driver.streams]
+        slow = max(rates) <= SLOW_HZ and len(rates) == 1
+        last: dict[str, IntArray] = {}
+        until_ns = devices.clock() + round(1e9 * WRAP_ROWS[slow] / min(rates))
+        while devices.clock() < until_ns:
+            devices.advance(devices.clock() + slow * round(1e9 * WAIT_S))
+            with code_of("driver.read", subject):
+                blocks = opened.driver.read(WAIT_S)
+            for name, counted in ((one.stream, one.sequence) for one in blocks if one.sequence is not None):
+                numbers = np.concatenate([last.get(name, counted[:0]), counted])
+                wrong = np.flatnonzero(np.diff(numbers) != 1)
+                if len(wrong):
+                    a, b = numbers[wrong[0] : wrong[0] + 2]
+                    fail(f"driver.read: {name}.sequence", f"{a} is followed by {b}, and no row was lost")
+                last[name] = numbers[-1:]
+
+
+@check("sensor", "device", needs="driver-reads")
+def driver_reports_what_happens(subject: Subject) -> None:
+    """What came before the start is no reading, `read(0)` waits for nothing, and a line that is gone is no silence.
+
+    Discard in start() what waits in the link (Link.discard), and forget the beginning of a frame. Pass the time-out on
+    to the link, return an empty list when it raises LinkTimeout, and let LinkUnplugged pass.
+    """
+    with emulated(subject, f"unplug:start_s={GONE_AT_S:g}", started=False) as (opened, devices):
+        for _ in range(2):
+            began_ns = devices.clock() + round(BEFORE_S * 1e9)
+            devices.advance(began_ns)
+            opened.start()
+            for name, stream in opened.read().items():
+                early_s = 0.0 if stream.t_ns is None else (began_ns - float(stream.t_ns[0])) * 1e-9
+                if early_s > 0:
+                    fail("driver.start", f"a row of {name} is from {early_s:.2g} s before it was started")
+            before_ns = opened.clock()
+            with code_of("driver.read", subject):
+                opened.driver.read(0.0)
+            took_s = (opened.clock() - before_ns) * 1e-9
+            if took_s > SHORT_S:
+                fail("driver.read", f"read(0) took {took_s:.2g} s")
+            opened.driver.stop()
         opened.start()
-        sensed |= dict.fromkeys(forces, LOAD_N)
-        opened.read()
-        with code_of("driver.tare", subject):
-            taken = opened.driver.tare()
-        opened.read()
-        for name, (stream, column, _) in forces.items() if taken else ():
-            found = float(np.nanmedian(np.concatenate(opened.read()[stream].data)[:, column]))
-            if abs(found) > 2 * READ_N:
-                fail("driver.tare", f"it says that a zero is taken, and {name} reads {found:.4g} N")
-        sensed |= dict.fromkeys(forces, OVERLOAD_N)
-        opened.read()
-        rows = opened.read()
-        for name, (stream, column, _) in forces.items():
-            marks = np.concatenate(rows[stream].marks)[:, column]
-            if not (marks & (Quality.SATURATED | BAD)).all():
-                fail(f"driver.read: {stream}.{name}", f"it is not marked SATURATED under {OVERLOAD_N:g} N")
+        try:
+            opened.read(GONE_AT_S)
+        except CheckFailed as failure:
+            error = failure.__cause__
+            if isinstance(error, LinkError | RigError):
+                return
+            if error is not None:
+                what = type(error).__name__
+                fail("driver.read", f"{what} instead of LinkUnplugged once the line is gone: {error}")
+    fail("driver.read", "it goes on as if nothing had come once its line is gone")
 
 
-@check("device", needs=("driver-reads", "units-are-the-rigs"))
-def opening_and_reading_move_nothing(subject: Subject) -> None:
-    """A motor that runs off when its line is opened does so with a finger under it, and no guard is there yet.
+@check("device", needs="driver-reads")
+def device_is_fit_for_a_rig(subject: Subject) -> None:
+    """A rig takes forces for newtons and places for metres, a zero for taken if the driver says so, a motor for still.
 
-    Leave the motor where it is, and without power, in the driver's making, identify(), start() and read().
+    Give force channels unit "N", torques "N*m", a motor's channel `position` "m", and convert. Return True from tare()
+    only where the device takes its reading as zero; mark its range's end as SATURATED. Leave a motor where it is, and
+    without power, in the driver's making, identify(), start() and read().
     """
-    import numpy as np
-
-    places = _channels(subject, "motor", "position")
-    with emulated(subject) as opened:
-        opened.driver.identify()
-        opened.start()
-        rows = opened.read()
-        for name, (stream, column, _) in places.items():
-            table = np.concatenate(rows[stream].data)[:, column]
-            moved = float(np.ptp(table[np.isfinite(table)])) if np.isfinite(table).any() else 0.0
-            if moved > STILL_M:
-                fail(f"driver.read: {name}", f"it changes by {1e3 * moved:.3g} mm, and nobody has moved it")
+    device, sensed, taken = subject.descriptor.kind, dict[str, float](), False
+    kind, unit = ("force", "N") if device == "force" else ("position", "m")
+    if device not in ("force", "motor"):
+        skip(f"it is a {device} device")
+    with emulated(subject, senses=lambda t_s: sensed) as (opened, _):
+        own = [one for one in _channels(opened) if one.kind == kind]
+        for channel in own:
+            if channel.unit != unit:
+                fail(f"driver.streams: {channel.name}.unit", f"{channel.unit!r}, and {unit!r} is needed")
+        if not own:
+            fail("driver.streams", f"none of its channels is of kind {kind}")
+        for force_n in (LOAD_N, LOAD_N, OVERLOAD_N):
+            sensed |= {channel.name: force_n for channel in own if kind == "force"}
+            opened.read()
+            for name, stream in opened.read().items():
+                columns = [one in own for one in stream.spec.channels]
+                values = good(stream)[:, columns]
+                there = values[np.isfinite(values).all(axis=1)]
+                moved = np.ptp(there, axis=0).max(initial=0.0) if len(there) else 0.0
+                if kind == "position" and moved > STILL_M:
+                    fail(f"driver.read: {name}", f"it changes by {1e3 * moved:.3g} mm, and nobody has moved it")
+                left_n = np.abs(np.nanmedian(values, axis=0)).max(initial=0.0) if taken else 0.0
+                if force_n == LOAD_N and left_n > 2 * READ_N:
+                    fail("driver.tare", f"it says that a zero is taken, and {left_n:.4g} N are read")
+                marked = marks_of(stream)[:, columns] & (Quality.SATURATED | BAD)
+                if force_n == OVERLOAD_N and kind == "force" and not marked.all():
+                    fail(f"driver.read: {name}", f"it is not marked SATURATED under {OVERLOAD_N:g} N")
+            with code_of("driver.tare", subject):
+                taken = taken or (kind == "force" and opened.driver.tare())

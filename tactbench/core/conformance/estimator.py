@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections import Counter
-from functools import lru_cache
-from typing import TYPE_CHECKING, Any
+from collections.abc import Callable
+from typing import Any
 
-from tactbench.core.conformance.check import CheckFailed, Subject, check, code_of, fail, skip
-from tactbench.core.errors import NotApplicable
+import numpy as np
 
-if TYPE_CHECKING:
-    import numpy.typing as npt
+from tactbench.core.conformance.check import Subject, check, code_of, fail, skip
+
+Answer = Callable[[Any], Any]
 
 ROWS, NEW_ROWS, FEATURES, CLASSES, SEED = 90, 30, 4, 3, 1
 BETTER = 0.9
@@ -18,147 +18,92 @@ BETTER = 0.9
 question is linear with a tenth of noise, so that the worst of ours is at half."""
 SAME_ROW = 1e-6
 """Relative difference of one row answered alone and among others: sums of another order, and nothing else."""
-Data = tuple["npt.NDArray[Any]", "npt.NDArray[Any]", "npt.NDArray[Any]", "npt.NDArray[Any]"]
 
 
-def question(kind: str) -> Data:
+def question(kind: str) -> list[Any]:
     """Return X, y, new X and new y of a question that four features answer; the last column is constant."""
-    import numpy as np
-
     rng = np.random.default_rng(0)
     X = rng.normal(size=(ROWS + NEW_ROWS, FEATURES))
     y = X @ np.array([2.0, -1.0, 0.5, 0.0]) + 0.2 * rng.normal(size=len(X))
     X[:, 3] = 7.0  # a dead taxel
     if kind == "classification":
-        y = np.digitize(y, np.quantile(y, [1 / CLASSES, 2 / CLASSES])).astype(np.int64)
+        y = np.digitize(y, (-1.0, 1.0)).astype(np.int64)
     if kind == "events":  # which frames hold one
-        y = (y > np.median(y)).astype(np.int64)
-    return X[:ROWS], y[:ROWS], X[ROWS:], y[ROWS:]
+        y = (y > 0).astype(np.int64)
+    return [X[:ROWS], y[:ROWS], X[ROWS:], y[ROWS:]]
 
 
-def _built(subject: Subject, kind: str, params: Any) -> Any:
-    try:
-        with code_of("where", subject):
-            return subject.code("where")(kind=kind, seed=SEED, threads=1, **{**subject.descriptor.params, **params})
-    except CheckFailed as failure:
-        if isinstance(failure.__cause__, NotApplicable):
-            skip(f"it says: {failure.__cause__.message}")
-        raise
+def _taught(subject: Subject, kind: str, params: Any = None, place: str = "", *, given: Any = None) -> Answer:
+    """Fit as an evaluation does, by default as in the rehearsal; return what answers rows and checks its answers."""
+    from tactbench.core.evaluation.fitting import answers, fit
 
-
-def _fitted(subject: Subject, kind: str, params: Any = None, data: Data | None = None) -> Any:
-    """Fit as an evaluation does, by default with the parameters of the rehearsal."""
-    from tactbench.core.evaluation.fitting import fit
-
-    X, y, _, _ = data or question(kind)
-    model = _built(subject, kind, subject.descriptor.rehearsal or {} if params is None else params)
-    with code_of("fit", subject):
+    X, y, *_ = given or question(kind)
+    params = {**subject.descriptor.params, **((subject.descriptor.rehearsal or {}) if params is None else params)}
+    with code_of(f"{place}where", subject):
+        model = subject.code("where")(kind=kind, seed=SEED, threads=1, **params)
+    with code_of(f"{place}fit", subject):
         fit(model, X, y, subject.name, Counter())
-    return model
+
+    def answer(rows: Any) -> Any:
+        with code_of("predict", subject):
+            return answers(model, rows, subject.name, CLASSES if kind == "classification" else 0)
+
+    return answer
 
 
-def _answers(subject: Subject, model: Any, kind: str, X: npt.NDArray[Any]) -> npt.NDArray[Any]:
-    """Return what it answers, checked as an evaluation checks it."""
-    from tactbench.core.evaluation.fitting import answers
-
-    with code_of("predict", subject):
-        return answers(model, X, subject.name, CLASSES if kind == "classification" else 0)
-
-
-@lru_cache(maxsize=4)
-def _usual(subject: Subject, kind: str) -> npt.NDArray[Any]:
-    return _answers(subject, _fitted(subject, kind), kind, question(kind)[2])
-
-
-@check("estimator", needs=("code-names-resolve",))
-def candidates_are_accepted(subject: Subject) -> None:
-    """A candidate that cannot be fitted shows after minutes, when its turn comes.
-
-    Give candidates that the parameter may have, of the type it needs: 5, not 5.0, for a number of neighbours.
-    """
-    descriptor = subject.descriptor
-    for name, candidates in descriptor.grid.items():
-        for candidate in candidates:
-            try:
-                _fitted(subject, descriptor.kinds[0], {**(descriptor.rehearsal or {}), name: candidate})
-            except CheckFailed as failure:
-                raise CheckFailed(f"grid[{name}] = {candidate!r}: {failure.where}", failure.text) from failure
-
-
-@check("estimator", needs=("code-names-resolve",), carries_out=True)
+@check("estimator", needs="code-names-resolve")
 def answers_have_the_shape(subject: Subject) -> None:
-    """Each row gets one finite answer, also where a column is constant: a dead taxel, whose deviation is 0.
+    """Each row gets one finite answer, also where a column is constant, and no array is changed: others use it as well.
 
-    Return an array of shape (n,) from predict: numbers, or the classes of y; leave such a column out, or divide by 1.
+    Return an array of shape (n,) from predict: numbers, or the classes of y; leave a constant column out, or divide by
+    1; copy before changing: ``X = X.copy()``, no ``-=`` on X or y. Give candidates of the type that a parameter needs:
+    5, not 5.0, for a number of neighbours.
     """
     for kind in subject.descriptor.kinds:
-        _usual(subject, kind)
-
-
-@check("estimator", needs=("answers-have-the-shape",))
-def data_is_not_changed(subject: Subject) -> None:
-    """All estimators of a run are given the same arrays; one that scales them in place changes the others' scores.
-
-    Copy before changing: ``X = X.copy()``; no ``-=`` on X or y.
-    """
-    import numpy as np
-
-    for kind in subject.descriptor.kinds:
-        data = question(kind)
-        _answers(subject, _fitted(subject, kind, data=data), kind, data[2])
-        for name, now, old in zip(("fit: X", "fit: y", "predict: X"), data, question(kind), strict=False):
+        given = question(kind)
+        _taught(subject, kind, given=given)(given[2])
+        for name, now, old in zip(("fit: X", "fit: y", "predict: X"), given, question(kind), strict=False):
             if not np.array_equal(now, old):
                 fail(name, "it was changed in place")
+    descriptor = subject.descriptor
+    for name, candidates in descriptor.grid.items():
+        for one in candidates:
+            _taught(
+                subject, descriptor.kinds[0], {**(descriptor.rehearsal or {}), name: one}, f"grid[{name}] = {one!r}: "
+            )
 
 
-@check("estimator", needs=("answers-have-the-shape",))
+@check("estimator", needs="answers-have-the-shape")
 def seed_and_data_decide(subject: Subject) -> None:
-    """All chance comes from the seed, and folds must not know of each other: nothing is kept of another fit.
+    """All chance comes from the seed, folds must not know of each other, and rows come one by one in use.
 
-    Pass `seed` on as random_state, return a new object from each call of the factory, and let fit() begin anew.
+    Pass `seed` on as random_state, return a new object from each call of the factory, and let fit() begin anew. Take
+    means, scales and neighbours from fit(), never from the X of predict().
     """
-    import numpy as np
-
     for kind in subject.descriptor.kinds:
-        X, y, new, truth = question(kind)
-        _fitted(subject, kind, data=(-X, y[::-1].copy(), new, truth))
-        again = _answers(subject, _fitted(subject, kind), kind, new)
-        if not np.array_equal(again, _usual(subject, kind)):
+        X, y, new, _ = question(kind)
+        answer = _taught(subject, kind)
+        together = answer(new)
+        alone = np.concatenate([answer(new[place : place + 1]) for place in range(5)])
+        drawn = subject.descriptor.looks_at == "nothing"
+        if not drawn and not np.allclose(alone, together[:5], rtol=SAME_ROW, atol=SAME_ROW):
+            fail("predict", "a row asked alone is answered otherwise than among others")
+        _taught(subject, kind, given=(-X, y[::-1].copy()))
+        if not np.array_equal(_taught(subject, kind)(new), together):
             fail("where: argument seed", f"two {kind} models of one seed and the same data answer differently")
 
 
-@check("estimator", needs=("seed-and-data-decide",))
-def rows_are_answered_alone(subject: Subject) -> None:
-    """In use rows come one by one; an answer that depends on the other rows of a test set uses what nobody has.
-
-    Take means, scales and neighbours from fit(), never from the X of predict().
-    """
-    import numpy as np
-
-    for kind in subject.descriptor.kinds:
-        together = _usual(subject, kind)
-        if subject.descriptor.looks_at == "nothing" and len(np.unique(together)) > 1:
-            skip("its answers are drawn")
-        model, new = _fitted(subject, kind), question(kind)[2]
-        alone = np.concatenate([_answers(subject, model, kind, new[place : place + 1]) for place in range(5)])
-        if not np.allclose(alone, together[:5], rtol=SAME_ROW, atol=SAME_ROW):
-            fail("predict", "a row asked alone is answered otherwise than among others")
-
-
-@check("estimator", needs=("seed-and-data-decide",))
+@check("estimator", needs="seed-and-data-decide")
 def it_learns(subject: Subject) -> None:
     """Features answer a linear question: what is no better than the mean mixes rows, columns or signs up.
 
     Look at the order of rows, at scaling and at signs; set baseline=True where a trivial answer is meant.
     """
-    import numpy as np
-
-    descriptor = subject.descriptor
-    if descriptor.baseline or descriptor.looks_at != "features":
+    if subject.descriptor.baseline or subject.descriptor.looks_at != "features":
         skip("it is a trivial answer by its own account")
-    for kind in descriptor.kinds:
+    for kind in subject.descriptor.kinds:
         _, y, new, truth = question(kind)
-        given = _answers(subject, _fitted(subject, kind, {}), kind, new)
+        given = _taught(subject, kind, {})(new)
         if kind == "events":  # scores, the higher the surer
             error, bar = -given[truth == 1].mean(), -given[truth == 0].mean() / BETTER
         elif kind == "regression":

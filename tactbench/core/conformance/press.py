@@ -1,108 +1,74 @@
-"""Checks of what a small press on a simulated rig gives, looked at as a recording would be; and of rigs' forces."""
+"""Checks of what a small press on a simulated rig gives, recorded and read back, and of all that takes part in it."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from functools import lru_cache
-from typing import TYPE_CHECKING, Any
+from typing import Any, get_args
 
-from tactbench.core.conformance.check import CheckFailed, Subject, check, code_of, fail, skip
-from tactbench.core.errors import NotApplicable
+import numpy as np
+
+from tactbench.core.conformance.check import CheckSkipped, Subject, check, code_of, fail, skip
+from tactbench.core.conformance.streams import (
+    FORCE_SHARE,
+    Recorded,
+    carried_out,
+    force_is,
+    marks_of,
+    pressing_force,
+    times_are_right,
+    within_limits,
+)
+from tactbench.core.errors import nearest
+from tactbench.core.plugins.force_profiles import force_path
+from tactbench.core.plugins.interfaces import Reason
 from tactbench.core.plugins.registry import load_object
 from tactbench.core.plugins.taking_part import rig_context
-from tactbench.core.samples import Block, Quality
+from tactbench.core.samples import Quality
+from tactbench.core.spec.drive import ForceLoop
 from tactbench.core.spec.profile import ForceRamp
 from tactbench.core.spec.quantity import assumed
 from tactbench.core.spec.rig import RigDescriptor, SensorDescriptor
-from tactbench.core.spec.scene import Environment, Scene
-from tactbench.core.spec.sensor import StreamSpec
-
-if TYPE_CHECKING:
-    import numpy.typing as npt
-
-    from tactbench.core.samples import FloatArray
+from tactbench.core.spec.scene import Environment, Indenter, Scene, Simulation, Slide
+from tactbench.core.spec.sensor import ChannelKind
 
 FORCE_N = 0.5
 """At the end of the press: every sensor that is touched by a hand bears it."""
-SECONDS = 1.0
-LATE_S = 1.5
-"""A sample of time may be missing at either end of `SECONDS`, and a half more for a rig that begins later."""
+SECONDS, LATE = 1.0, 0.5
+"""How long it lasts; and by which share more or less for a rig that begins later."""
 NOISE_N = 0.005
 """Of the reference force: a hundredth of the press, so that draws can be told apart and the force still be read."""
-FORCE_SHARE = 0.2
-"""Of `FORCE_N`, by which the recorded force may differ at the end: newtons and gram-force differ by a hundred times."""
-RATE_SHARE = 0.05
-RANGE_N = 2.0
-"""What the task `force` presses to where it is not installed."""
 MOST_SATURATED = 0.5
-"""Share of the samples of a press over the task's range that the channel which is worst off may stand at a limit."""
+"""Share of the samples of a press over the task's range that a taxel may stand at a limit."""
+ALWAYS_WANTED = ("stored", "reference-force")
+"""What every recording needs, beside the kinds of channels that are observed."""
+REACH_MM = 15.0
+"""Half of the side of the plane over which heights are looked at: no skin here is wider."""
+LOWEST_MM = 1e-9
+"""By which the lowest point may miss 0: rounding of millimetres, and nothing that a skin feels."""
+MOST_N = 100.0
+"""Beyond the rated range of every tactile sensor of a finger."""
 WHY = "a check of plugins"
-UNITS_OF_TIME = {1e-9: "seconds", 1e-6: "milliseconds", 1e-3: "microseconds"}
 
 
-def tiny_scene(name: str = "tiny", end_n: float = FORCE_N, **changes: Any) -> Scene:
+def slow_ramp(end_n: float, seconds: float, hold_s: float) -> ForceRamp:
+    """Return a press of a hundred samples."""
+    end, hold, duration = assumed(end_n, "N", WHY), assumed(hold_s, "s", WHY), assumed(seconds, "s", WHY)
+    return ForceRamp(end=end, hold=hold, duration=duration, samples=100)
+
+
+def tiny_scene(end_n: float = FORCE_N, **changes: Any) -> Scene:
     """Return a press of a second to half a newton, with everything else as scenes have it."""
-    ramp = ForceRamp(
-        end=assumed(end_n, "N", WHY), hold=assumed(SECONDS / 5, "s", WHY), duration=assumed(SECONDS, "s", WHY),
-        samples=100,
-    )  # fmt: skip
     environment = Environment(force_noise=assumed(NOISE_N, "N", WHY))
-    return Scene(name=name, profile=ramp, environment=environment).model_copy(update=changes)
-
-
-@dataclass(frozen=True)
-class TrialPress:
-    """What a rig gave for a scene."""
-
-    scene: Scene
-    sensor: SensorDescriptor
-    rig: RigDescriptor
-    streams: tuple[StreamSpec, ...]
-    reference: tuple[StreamSpec, ...]
-    about: Mapping[str, Any]
-    """Its plan, its assumptions and what it has drawn."""
-    blocks: tuple[Block, ...]
-
-    @property
-    def every_stream(self) -> tuple[StreamSpec, ...]:
-        """The sensor's streams, then those of the reference."""
-        return (*self.streams, *self.reference)
-
-    def values(self, stream: str) -> FloatArray:
-        """Return the (n, channels) samples of a stream."""
-        import numpy as np
-
-        return np.concatenate([np.asarray(one.data, dtype=np.float64) for one in self.blocks if one.stream == stream])
-
-    def quality(self, stream: str) -> npt.NDArray[Any]:
-        """Return the (n, channels) marks of a stream."""
-        import numpy as np
-
-        return np.concatenate([marks_of(one) for one in self.blocks if one.stream == stream])
-
-
-def marks_of(block: Block) -> npt.NDArray[Any]:
-    """Return the (n, channels) marks of a block; one without any is good."""
-    import numpy as np
-
-    return np.zeros(np.shape(block.data), np.uint8) if block.quality is None else block.quality
-
-
-def carried_out(rig: Any, descriptor: RigDescriptor, sensor: SensorDescriptor, scene: Scene, seed: int) -> TrialPress:
-    """Carry out a scene on a rig that was built; raises what the rig raises."""
-    with rig.open(sensor, scene, seed=seed) as one:
-        streams, reference, blocks = tuple(one.streams), tuple(one.reference), tuple(one)
-        about = {"plan": tuple(one.plan), "assumptions": dict(one.assumptions), "drawn": dict(one.drawn)}
-    return TrialPress(scene, sensor, descriptor, streams, reference, about, blocks)
+    scene = Scene(name="check", profile=slow_ramp(end_n, SECONDS, SECONDS / 5), environment=environment)
+    return scene.model_copy(update=changes)
 
 
 def simulated_rig(subject: Subject) -> tuple[Any, RigDescriptor]:
     """Return the first simulated rig, built, those that come with this package before others."""
-    simulated = [one for one in subject.registry.rigs.all_owned() if one.descriptor.simulated]
-    if not simulated:
-        skip("no simulated rig is installed")
+    simulated = (one for one in subject.registry.rigs.all_owned() if one.descriptor.simulated)
     descriptor = min(simulated, key=lambda one: not one.ours).descriptor
     return load_object(descriptor.where)(rig_context(subject.registry)), descriptor
 
@@ -114,212 +80,173 @@ def simulated_sensors(subject: Subject) -> Sequence[SensorDescriptor]:
         skin = owned.descriptor.spec.skin
         near = owned.ours or owned.distribution == subject.distribution
         if near and skin is not None and owned.descriptor.transducer is not None:
-            cost = len(owned.descriptor.spec.channels()) * math.prod(skin.sheet.cells)
-            able.append((not owned.ours, cost, owned.descriptor.name, owned.descriptor))
-    if not able:
-        skip("no sensor that can be simulated is installed")
+            able.append((not owned.ours, math.prod(skin.sheet.cells), owned.descriptor.name, owned.descriptor))
     return [one[-1] for one in sorted(able, key=lambda one: one[:3])]
 
 
-def presses(subject: Subject, scenes: Sequence[Scene], field: str) -> Iterator[TrialPress]:
+def presses(subject: Subject, scenes: Sequence[Scene], field: str) -> Iterator[Recorded]:
     """Yield what every simulated sensor and scene that go with each other give."""
     rig, descriptor = simulated_rig(subject)
     for scene in scenes:
         for sensor in simulated_sensors(subject):
-            try:
-                with code_of(field, subject):
-                    yield carried_out(rig, descriptor, sensor, scene, 1)
-            except CheckFailed as failure:
-                if not isinstance(failure.__cause__, NotApplicable):
-                    raise
+            with suppress(CheckSkipped), code_of(field, subject):
+                yield carried_out(rig, sensor, descriptor, scene)
 
 
 @lru_cache(maxsize=6)
-def pressed(subject: Subject, seed: int = 1) -> TrialPress:
+def pressed(subject: Subject, seed: int = 1) -> Recorded:
     """Return a press: of a sensor on a simulated rig over the range of the task `force`, or of a rig, a tiny one."""
-    end_n = FORCE_N
     if subject.kind == "sensor":
-        rig, descriptor = simulated_rig(subject)
-        sensor, field = subject.descriptor, "spec"
-        scenes = subject.registry.tasks["force"].spec.scenes if "force" in subject.registry.tasks else ()
-        end_n = max((one.scene.profile.largest_n for one in scenes), default=RANGE_N)
+        (rig, descriptor), sensor, field = simulated_rig(subject), subject.descriptor, "spec"
+        end_n = max(one.scene.profile.largest_n for one in subject.registry.tasks["force"].spec.scenes)
+    elif subject.descriptor.simulated:
+        descriptor, sensor, field, end_n = subject.descriptor, simulated_sensors(subject)[0], "where", FORCE_N
     else:
-        sensor, descriptor, field = simulated_sensors(subject)[0], subject.descriptor, "where"
-        rig = _built(subject)
+        skip("it moves something real, or replays: `--rig-file FILE` presses with it")
     kinds = tuple(dict.fromkeys(channel.kind for channel in sensor.spec.channels()))
     with code_of(field, subject):
+        if subject.kind == "rig":
+            rig = subject.code(field)(rig_context(subject.registry))
         scene = tiny_scene(end_n=end_n, observe=("taxel",) if "taxel" in kinds else kinds)
-        return carried_out(rig, descriptor, sensor, scene, seed)
+        return carried_out(rig, sensor, descriptor, scene, seed)
 
 
-def _built(subject: Subject) -> Any:
-    if not subject.descriptor.simulated:
-        skip("it moves something real, or replays: `--rig-file FILE` presses with it")
-    with code_of("where", subject):
-        return subject.code("where")(rig_context(subject.registry))
+@check("sensor", "rig", needs="transducer-reads rest-is-as-stated code-names-resolve")
+def press_is_recorded(subject: Subject) -> None:
+    """A recording has a column a channel, numbers only, and times by which rows are put on one clock.
 
-
-@check("sensor", "rig", needs=("transducer-reads", "rest-is-as-stated", "code-names-resolve"))
-def blocks_fit_their_streams(subject: Subject) -> None:
-    """A recording has a column a channel, and only numbers; one press runs all that a campaign would.
-
-    Yield blocks of shape (n, channels) for streams that the acquisition names; mark what means nothing as MISSING.
+    Yield blocks of shape (n, channels) for streams that the acquisition names; mark what means nothing as MISSING;
+    count t_ns on in whole nanoseconds, and state the rate in samples a second.
     """
-    import numpy as np
-
     made = pressed(subject)
-    known = {stream.name: stream for stream in made.every_stream}
-    own = {stream.name: {one.name for one in stream.channels} for stream in made.sensor.spec.streams}
-    for block in made.blocks:
-        if block.stream not in known:
-            fail(f"block of {block.stream}", f"the acquisition names only {', '.join(known)}")
-        channels = known[block.stream].channels
-        if np.shape(block.data) != (len(block.data), len(channels)):
-            text = f"a block has shape {np.shape(block.data)}; (n, {len(channels)}) is needed"
-            fail(f"streams[{block.stream}]", text)
-        bad = np.argwhere(~np.isfinite(block.data) & ((marks_of(block) & Quality.MISSING) == 0))
-        if len(bad):
-            fail(f"streams[{block.stream}].channels[{channels[bad[0][1]].name}]", "it is not finite, and not marked")
-    for stream in made.streams:
-        strange = [one.name for one in stream.channels if one.name not in own.get(stream.name, ())]
-        if strange:
-            fail(f"streams[{stream.name}]", f"the sensor's spec has no channel {strange[0]} there")
-    for name in known:
-        if not any(len(one.data) for one in made.blocks if one.stream == name):
-            fail(f"streams[{name}]", "the press gave no sample of it")
+    for name, stream in made.came.items():
+        times_are_right(f"streams: {name}", stream, SECONDS, LATE)
 
 
-@check("sensor", "rig", needs=("blocks-fit-their-streams",))
-def clocks_are_in_nanoseconds(subject: Subject) -> None:
-    """Rows are put on one clock by their times; windows and delays are computed from the stated rate.
-
-    Count t_ns on in whole nanoseconds, and state the rate in samples a second.
-    """
-    import numpy as np
-
-    made = pressed(subject)
-    for stream in made.every_stream:
-        where = f"streams[{stream.name}]"
-        times = [one.t_ns for one in made.blocks if one.stream == stream.name and one.t_ns is not None]
-        if not times:
-            continue
-        t_ns = np.concatenate(times)
-        spans = float(t_ns[-1] - t_ns[0]) * 1e-9
-        named_unit(f"{where}.t_ns", spans / SECONDS)
-        if t_ns.dtype.kind != "i" or len(t_ns) != len(made.values(stream.name)):
-            fail(f"{where}.t_ns", f"{len(t_ns)} of {t_ns.dtype}: a whole number of nanoseconds a row is needed")
-        back = np.flatnonzero(np.diff(t_ns) <= 0)
-        if len(back):
-            fail(f"{where}.t_ns", f"time does not go forward at row {int(back[0]) + 1}")
-        rate = (len(t_ns) - 1) / spans
-        if stream.rate_hz is not None and len(t_ns) > 2 and abs(rate / stream.rate_hz - 1) > RATE_SHARE:
-            fail(f"{where}.rate_hz", f"{stream.rate_hz:g} Hz is stated, the times say {rate:.4g} Hz")
-        if not 1 / LATE_S <= spans / SECONDS <= LATE_S:
-            fail(f"{where}.t_ns", f"it spans {spans:.3g} s, and the scene lasts {SECONDS:g} s")
-
-
-def named_unit(where: str, share: float) -> None:
-    """Fail if times, as a share of what they are in nanoseconds, are in another unit."""
-    for factor, unit in UNITS_OF_TIME.items():
-        if 0.5 < share / factor < 2:
-            fail(where, f"it is in {unit}, and nanoseconds are needed")
-
-
-@check("sensor", "rig", needs=("clocks-are-in-nanoseconds",), carries_out=True)
+@check("sensor", "rig", needs="press-is-recorded")
 def limits_are_kept(subject: Subject) -> None:
-    """A converter gives nothing beyond its ends, and what stands at an end is marked as saturated.
+    """A converter gives nothing beyond its ends, and what stands at an end tells nothing.
 
-    Clip to lower and upper, and mark those samples as Quality.SATURATED.
+    Clip to lower and upper, mark those samples as Quality.SATURATED, and look at the units of the sensitivity: a
+    SkinState has N, mm and MPa.
     """
-    import numpy as np
-
     made = pressed(subject)
-    for stream in made.streams:
-        for channel, values, marks in zip(
-            stream.channels, made.values(stream.name).T, made.quality(stream.name).T, strict=True
-        ):
-            where = f"streams[{stream.name}].channels[{channel.name}]"
-            low = -math.inf if channel.lower is None else channel.lower
-            high = math.inf if channel.upper is None else channel.upper
-            beyond = values[(values < low) | (values > high)]
-            if len(beyond):
-                fail(where, f"it reads {beyond[0]:g}, beyond its limits {low:g} to {high:g}")
-            # One that rests at an end has that reading without being full.
-            rest = None if channel.rest is None else channel.rest.to(channel.unit)
-            at_end = np.isin(values, [end for end in (low, high) if end != rest])
-            if channel.unit == "count" and np.any(at_end & ((marks & Quality.SATURATED) == 0)):
-                fail(where, "it stands at its end, not marked SATURATED")
+    for spec in made.meta.sensor.streams:
+        stream = made.came[spec.name]
+        for column, channel in enumerate(spec.channels):
+            where, values = f"streams: {spec.name}.{channel.name}", stream.data[:, column]
+            within_limits(where, channel, values)
+            full = (marks_of(stream)[:, column] & Quality.SATURATED) != 0
+            if subject.kind == "sensor" and channel.kind == "taxel" and full.mean() > MOST_SATURATED:
+                fail(
+                    where,
+                    f"{full.mean():.0%} of its samples stand at a limit in a press over the range of the task force",
+                )
 
 
-@check("sensor", needs=("limits-are-kept",))
-def range_of_the_task_is_measured(subject: Subject) -> None:
-    """A channel that stands at its limit tells nothing: usually a sensitivity that is off by a factor of ten or more.
+@check("rig", needs="press-is-recorded")
+def force_and_seed_decide(subject: Subject) -> None:
+    """The recorded force is what estimators are taught, and replicates are drawn anew: the same seed gives the same.
 
-    Look at the units of the sensitivity: a SkinState has N, mm and MPa.
-    """
-    import numpy as np
-
-    made = pressed(subject)
-    for stream in made.streams:
-        full = np.mean((made.quality(stream.name) & Quality.SATURATED) != 0, axis=0)
-        worst = int(np.argmax(full))
-        if stream.channels[worst].kind == "taxel" and full[worst] > MOST_SATURATED:
-            text = f"{full[worst]:.0%} of its samples stand at a limit in a press to {made.scene.profile.largest_n:g} N"
-            fail(f"transducer: {stream.channels[worst].name}", text)
-
-
-@check("rig", needs=("blocks-fit-their-streams",))
-def seeds_decide(subject: Subject) -> None:
-    """The same seed must give the same bytes, and another one a replicate with everything drawn again.
-
+    Give a reference stream with a channel of kind "force", unit "N", called fz or normal, positive where it presses.
     Draw from a generator that `open` makes of its `seed`, never from a global one.
     """
-    import numpy as np
-
-    first, again, other = pressed(subject), pressed.__wrapped__(subject), pressed(subject, 2)
-    names = [stream.name for stream in first.every_stream]
-    for name in names:
-        if not np.array_equal(first.values(name), again.values(name), equal_nan=True):
-            fail(f"streams[{name}]", "another press with the same seed gives other samples")
-    if all(np.array_equal(first.values(name), other.values(name)) for name in names):
+    made = pressed(subject)
+    stream, force_n = pressing_force(made.came, made.meta.reference)
+    force_is(f"reference: {stream.spec.name}", float(force_n[-5:].mean()), FORCE_N)
+    changed = differing(made, pressed.__wrapped__(subject))
+    if changed:
+        fail(f"streams: {changed[0]}", "another press with the same seed gives other samples")
+    if not differing(made, pressed(subject, 2)):
         fail("open(…, seed)", "two seeds give the same samples in every stream")
 
 
-@check("rig", needs=("blocks-fit-their-streams",))
-def force_follows_the_profile(subject: Subject) -> None:
-    """The recorded force is what estimators are taught: in another unit, or with another sign, every score is wrong.
+def differing(one: Recorded, other: Recorded) -> list[str]:
+    """Return the streams of which two presses give other samples."""
+    return [name for name, stream in one.came.items() if stream.data.tobytes() != other.came[name].data.tobytes()]
 
-    Give a reference stream with a channel of kind "force", unit "N", called fz or normal, positive where it presses.
+
+def _effected(subject: Subject) -> Recorded:
+    """Return a tiny press with the effect asked for by name, and those of its distribution that it consumes.
+
+    It slides, under force control, on a sensor that is colder than the indenter; plainly where no sensor may.
     """
-    made = pressed(subject)
-    found = pressing_channel(made.reference)
-    if found is None:
-        fail("reference", "it has no channel of kind force called fz or normal")
-    stream, column = found
-    where = f"reference[{stream.name}].channels[{stream.channels[column].name}]"
-    if stream.channels[column].unit != "N":
-        fail(f"{where}.unit", f"{stream.channels[column].unit!r}, and 'N' is needed")
-    force_is(where, float(made.values(stream.name)[-5:, column].mean()), FORCE_N)
+    siblings = (one for one in subject.registry.effects.all_owned() if one.distribution == subject.distribution)
+    words = [one.descriptor.name for one in siblings if set(subject.descriptor.consumes) & set(one.descriptor.produces)]
+    sensors = simulated_sensors(subject)
+    plain = tiny_scene(
+        observe=tuple(dict.fromkeys(one.kind for sensor in sensors for one in sensor.spec.channels())),
+        simulation=Simulation(effects=(*words, f"+{subject.name}")),
+    )
+    warm = plain.environment.model_copy(update={"indenter_temperature": assumed(40.0, "degC", WHY)})
+    slide = Slide(speed=assumed(10.0, "mm/s", WHY), start=assumed(SECONDS / 2, "s", WHY))
+    full = plain.model_copy(update={"drive": ForceLoop(), "environment": warm, "slide": slide})
+    for sensor in sensors:
+        with code_of("called_for", subject):
+            reason = subject.code("called_for")(full, sensor.spec)
+        if not isinstance(reason, Reason) or not reason.text:
+            fail("called_for", f"it returned {reason!r}, and a Reason(called_for, text, change) is needed")
+    found = next(presses(subject, (full, plain), "where"), None)
+    return skip("no simulated sensor and scene go with it") if found is None else found
 
 
-def force_is(where: str, found_n: float, meant_n: float) -> None:
-    """Fail where a force at the end of a press is another one, and say which mistake makes it so."""
-    if abs(found_n - meant_n) > FORCE_SHARE * meant_n:
-        factor = found_n / meant_n
-        meant = (
-            "gram-force" if 80 < factor < 125
-            else "kilograms" if 0.09 < factor < 0.11
-            else "millinewtons" if 800 < factor < 1250
-            else ""
-        )  # fmt: skip
-        likely = f": are these {meant}?" if meant else ": is its sign turned?" if factor < 0 else ""
-        fail(where, f"{found_n:.4g} N at the end of a press to {meant_n:g} N{likely}")
+@check("effect", needs="code-names-resolve")
+def it_is_applied(subject: Subject) -> None:
+    """An effect changes a recording in the making: one NaN ends every cell, one draw elsewhere is never repeated.
+
+    Return a Reason with a text from called_for(scene, sensor); produce what an effect or channel needs; let `where`
+    name a function of one argument, the synthesis, that changes it in place; guard divisions; draw from
+    run.of_recording(…), run.of_session(…) or run.of_unit(…).
+    """
+    produced = subject.descriptor.produces
+    consumed = {token for one in subject.registry.effects for token in one.consumes}
+    wanted = {*get_args(ChannelKind), *ALWAYS_WANTED, *consumed}
+    if not wanted.intersection(produced):
+        close = nearest(produced[0], wanted) if produced else []
+        fail(f"produces{list(produced)}", f"nothing needs it{f'; did you mean {close[0]}?' if close else ''}")
+    made = _effected(subject)
+    (entry,) = [one for one in made.meta.plan if one.effect == subject.name]
+    if not (entry.included or entry.asked):  # the solve may leave out what it was lent and did not need
+        fail("produces", "it was asked for by name, and the plan left it out: nothing needs what it produces")
+    changed = differing(made, _effected(subject))
+    if changed:
+        fail(f"where: {changed[0]}", "another press with the same seed gives other samples")
 
 
-def pressing_channel(reference: Sequence[StreamSpec]) -> tuple[StreamSpec, int] | None:
-    """Return the stream and column of the pressing force; None: there is no such channel."""
-    for stream in reference:
-        for column, channel in enumerate(stream.channels):
-            if channel.kind == "force" and channel.name in ("fz", "normal"):
-                return stream, column
-    return None
+@check("indenter", needs="code-names-resolve")
+def indenter_is_pressed(subject: Subject) -> None:
+    """A height is asked for at all places at once and counted from the lowest point, which touches first.
+
+    Return one finite height [mm] for each pair of x_mm and y_mm, 0 at (0, 0) and nowhere below, 50 mm or more where no
+    body is; choose defaults with flanks of up to 45 degrees.
+    """
+    line = np.linspace(-REACH_MM, REACH_MM, 61)
+    numbers = subject.descriptor.dimensions
+    with code_of("where", subject):
+        sizes = {name: one.default for name, one in numbers.items()}
+        found = np.asarray(subject.code("where")(line[:, None], line[None, :], **sizes))
+    if found.shape != (61, 61) or not np.isfinite(found).all():
+        fail("where", f"for places of shapes (61, 1) and (1, 61) it returned shape {found.shape}, or no finite heights")
+    if abs(found[30, 30]) > LOWEST_MM or found.min() < -LOWEST_MM:
+        fail("where", f"it is {found[30, 30]:g} mm high at (0, 0), at least {found.min():g} mm: 0 is needed")
+    units = {name: assumed(one.default, one.unit, WHY) for name, one in numbers.items()}
+    scene = tiny_scene(indenter=Indenter(shape=subject.name, dimensions=units))
+    next(presses(subject, (scene,), "where"))
+
+
+@check("profile", needs="code-names-resolve")
+def path_is_recorded(subject: Subject) -> None:
+    """A recording is tared on its own unloaded hold, and has as many samples of the force as the path says.
+
+    Begin with a hold at 0 N, state newtons (a gram-force is 0.0098 N), and give samples enough for each piece.
+    """
+    with code_of("where", subject):
+        path = force_path(subject.descriptor, {}, WHY)
+    if path.forces_n[0] != 0 or not path.hold_s > 0:
+        fail("where", f"it begins at {path.forces_n[0]:g} N with {path.hold_s:g} s of hold: none is left to tare on")
+    if path.largest_n > MOST_N:
+        fail("where", f"its largest force is {path.largest_n:g} N by default: are these gram-force?")
+    made = next(presses(subject, (tiny_scene(profile=path),), "where"))
+    recorded = float(pressing_force(made.came, made.meta.reference)[1].max())
+    if abs(recorded - path.largest_n) > FORCE_SHARE * path.largest_n:
+        fail("where", f"its {path.samples} samples reach {recorded:.3g} N, and the path {path.largest_n:g} N")

@@ -2,23 +2,18 @@
 
 from __future__ import annotations
 
-import importlib
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any, Literal
 
 from tactbench.core.conformance import (  # noqa: F401  # isort: skip  (their checks, in this order)
-    code,
     sensor_spec,
     transducer,
     press,
     driver,
     task,
     estimator,
-    simulated,
-    recorded,
-    invasive,
+    real,
 )
 from tactbench.core.conformance.check import (
     CHECKS,
@@ -30,8 +25,6 @@ from tactbench.core.conformance.check import (
     Kind,
     Mode,
     Subject,
-    check,
-    fail,
     line_in,
     said,
 )
@@ -42,9 +35,6 @@ from tactbench.core.pool import InProcess, Limits, Pool
 
 TIMEOUT_S = 60.0
 """Seconds that one check may take: the slowest of ours, a press on the largest skin, takes two on an idle core."""
-LISTED = "EXPECTED_FAILURES"
-"""Name in a plugin's module: by name of a descriptor, checks that fail and why they may."""
-Level = Literal["bronze", "silver", "gold"]
 
 
 def checks_of(kind: Kind, *modes: Mode) -> tuple[Check, ...]:
@@ -62,33 +52,33 @@ class CheckReport:
     outcomes: tuple[CheckOutcome, ...] = field(repr=False)
 
     def of(self, status: str) -> tuple[CheckOutcome, ...]:
-        """Return the outcomes of a status: passed, failed, skipped or expected."""
+        """Return the outcomes of a status: passed, failed or skipped."""
         return tuple(one for one in self.outcomes if one.status == status)
 
     @property
     def failed(self) -> tuple[CheckOutcome, ...]:
-        """The checks that failed, unexpectedly."""
+        """The checks that failed."""
         return self.of("failed")
 
     @property
     def ok(self) -> bool:
-        """Whether nothing failed unexpectedly."""
+        """Whether nothing failed."""
         return not self.failed
 
     @property
-    def level(self) -> Level | None:
+    def level(self) -> str | None:
         """How much was shown; None: something failed, or only a recording was read."""
         passed = {one.check for one in self.of("passed")}
-        if "passive" not in self.modes or self.failed or self.of("expected") or not passed:
+        if "passive" not in self.modes or self.failed or not passed:
             return None
-        if not any(one.carries_out and one.name in passed for one in checks_of(self.kind, *self.modes)):
-            return "bronze"
-        return "gold" if "recording-is-of-a-real-unit" in passed else "silver"
+        if "recording-is-of-a-real-unit" in passed:
+            return "gold"
+        return "silver" if any(one.needs and one.name in passed for one in CHECKS) else "bronze"
 
     @property
     def summary(self) -> str:
         """How many checks ran, and what came of them, in one line."""
-        counts = ", ".join(f"{status} {len(self.of(status))}" for status in ("passed", "failed", "skipped", "expected"))
+        counts = ", ".join(f"{status} {len(self.of(status))}" for status in ("passed", "failed", "skipped"))
         return f"{self.kind} {self.name}: {counts}.{f' Level: {self.level}.' if self.level else ''}"
 
     def __str__(self) -> str:
@@ -103,15 +93,14 @@ def subjects_named(registry: Registry, name: str, kinds: Sequence[Kind] = KINDS)
     UnknownNameError
         If nothing is called so, and no plugin that failed to load.
     """
-    families = registry.families()
-    rows = plugins_named(registry, name)
-    found: list[tuple[Any, str]] = [(kind, name) for kind in kinds if name in families[f"{kind}s"]]
-    if not found:
-        brought = (one.partition(" ") for row in rows for one in row.brings)
-        found = [(kind, one) for kind, _, one in brought if kind in kinds]
+    families, rows = registry.families(), plugins_named(registry, name)
+    every = [(kind, one) for kind in kinds for one in families[f"{kind}s"].names()]
+    brought = {one for row in rows for one in row.brings}
+    found = [one for one in every if one[1] == name] or [one for one in every if " ".join(one) in brought]
     if not found and not any(row.status == "failed" for row in rows):
-        known = {one for kind in kinds for one in families[f"{kind}s"].names()}
-        raise UnknownNameError("plugin", name, known | {row.entry_point for row in registry.plugins})
+        raise UnknownNameError(
+            "plugin", name, {one for _, one in every} | {row.entry_point for row in registry.plugins}
+        )
     owned = [(kind, one, families[f"{kind}s"].owned(one)) for kind, one in found]
     return [Subject(kind, one, owner.module, owner.distribution, registry) for kind, one, owner in owned]
 
@@ -124,14 +113,6 @@ def plugins_named(registry: Registry, name: str) -> list[PluginRow]:
         for row in registry.plugins
         if name in (row.entry_point, row.module) or alike == row.distribution.lower().replace("_", "-")
     ]
-
-
-def failed_plugins(registry: Registry) -> Iterator[str]:
-    """Yield a line for every plugin that could not be used: what is asked for may be in one of them."""
-    for row in registry.failures:
-        yield f"{row.entry_point} ({row.module} of {row.distribution} {row.version}): {row.reason}"
-    for error in registry.refused:
-        yield str(error)
 
 
 def run_checks(
@@ -166,77 +147,43 @@ def run_checks(
     outcomes: dict[str, CheckOutcome] = {}
     while waiting := [one.name for one in checks if one.mode != "invasive" and one.name not in outcomes]:
         engine = Pool(1, Limits(timeout_s=timeout_s)) if isolated else InProcess()
-        for name, given in engine.each(_Carrier(subject, tuple(modes), dict(outcomes)), waiting):
-            if isinstance(given, BaseException):
-                outcomes[name] = _stopped(name, given, subject)
-                break  # what is left is tried in another process
+        for name, given in engine.each(_Trier(subject, dict(outcomes)), waiting):
+            if isinstance(given, BaseException):  # it hung or crashed; what is left is tried in another process
+                text = str(given) if isinstance(given, CellStopped) else said(given)
+                outcomes[name] = CheckOutcome(name, "failed", subject.module, text)
+                break
             outcomes[name] = given
-    here = _Carrier(subject, tuple(modes), outcomes)
+    here = _Trier(subject, outcomes)
     for one in checks:
-        if one.name not in outcomes:
-            outcomes[one.name] = here(one.name)
+        if one.mode == "invasive":
+            here(one.name)
     return CheckReport(subject.kind, subject.name, tuple(modes), tuple(outcomes[one.name] for one in checks))
 
 
-class _Carrier:
-    """Carries out checks by name in one process, one after the other."""
+class _Trier:
+    """Tries checks by name in one process, one after the other, and keeps what came of them."""
 
-    def __init__(self, subject: Subject, modes: tuple[Mode, ...], outcomes: dict[str, CheckOutcome]) -> None:
-        self._subject = subject
-        self._modes = modes
-        self._outcomes = outcomes
+    def __init__(self, subject: Subject, outcomes: dict[str, CheckOutcome]) -> None:
+        self._subject, self._outcomes = subject, outcomes
 
     def __call__(self, name: str) -> CheckOutcome:
-        """Return what comes of a check, in the light of the failures that are expected."""
-        (one,) = [one for one in checks_of(self._subject.kind, *self._modes) if one.name == name]
-        outcome = self._tried(one)
-        self._outcomes[name] = outcome
-        reason = {} if self._modes == ("recording",) else expected_of(self._subject)
-        if name in reason and outcome.status == "failed":
-            return outcome._replace(status="expected", text=reason[name])
-        if name in reason and outcome.status == "passed":
-            return outcome._replace(status="failed", where=LISTED, text=f"it passes: take it off ({reason[name]})")
-        return outcome
+        self._outcomes[name] = self._tried(name)
+        return self._outcomes[name]
 
-    def _tried(self, one: Check) -> CheckOutcome:
-        for name in one.needs:
-            before = self._outcomes.get(name)
-            if before is not None and before.status != "passed":
-                text = before.text if before.status == "skipped" else f"not tried, for {name} has not passed"
-                return CheckOutcome(one.name, "skipped", "", text)
+    def _tried(self, name: str) -> CheckOutcome:
+        (one,) = [one for one in CHECKS if one.name == name]
+        for before in filter(None, map(self._outcomes.get, one.needs)):
+            if before.status != "passed":
+                text = before.text if before.status == "skipped" else f"not tried, for {before.check} has not passed"
+                return CheckOutcome(name, "skipped", "", text)
         try:
             one.run(self._subject)
         except CheckFailed as failure:
             advice = "" if failure.__cause__ is not None else one.cure
-            return CheckOutcome(one.name, "failed", failure.where, failure.text, advice)
+            return CheckOutcome(name, "failed", failure.where, failure.text, advice)
         except CheckSkipped as reason:
-            return CheckOutcome(one.name, "skipped", "", str(reason))
+            return CheckOutcome(name, "skipped", "", str(reason))
         except (Exception, SystemExit) as error:
             line = line_in(self._subject.package, error.__traceback__) or self._subject.module
-            return CheckOutcome(one.name, "failed", line, said(error))
-        return CheckOutcome(one.name, "passed")
-
-
-def _stopped(name: str, error: BaseException, subject: Subject) -> CheckOutcome:
-    """Return the failure of a check that hung or crashed."""
-    return CheckOutcome(name, "failed", subject.module, str(error) if isinstance(error, CellStopped) else said(error))
-
-
-def expected_of(subject: Subject) -> dict[str, str]:
-    """Return the failures that a plugin expects, with its reasons."""
-    try:
-        listed = dict(getattr(importlib.import_module(subject.module), LISTED, {}).get(subject.name, {}))
-    except Exception:
-        return {}  # a module that cannot be imported fails every check
-    return {str(name): str(reason) for name, reason in listed.items()}
-
-
-@check(*KINDS)
-def expected_failures_are_checks(subject: Subject) -> None:
-    """A list of expected failures grows old: a name that is no check excuses nothing.
-
-    Correct the names in EXPECTED_FAILURES of the plugin's module, or take them off.
-    """
-    known = {one.name for one in checks_of(subject.kind, "passive", "invasive", "recording")}
-    for name in sorted(set(expected_of(subject)) - known):
-        fail(f"{subject.module}.{LISTED}[{subject.name}][{name}]", "no check has this name")
+            return CheckOutcome(name, "failed", line, said(error))
+        return CheckOutcome(name, "passed")

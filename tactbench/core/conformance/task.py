@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from tactbench.core.conformance.check import Subject, check, code_of, fail, skip
 from tactbench.core.conformance.press import SECONDS, WHY, presses, tiny_scene
 from tactbench.core.conformance.sensor_spec import OF_KIND
-from tactbench.core.errors import TactbenchError, UnknownNameError, UsageError, nearest
+from tactbench.core.errors import nearest
 from tactbench.core.spec import units
 from tactbench.core.spec.quantity import assumed
 from tactbench.core.spec.task import ChannelTarget, LabelTarget, PlannedScene, TaskSpec
@@ -34,29 +34,23 @@ def names_are_known(subject: Subject) -> None:
     from tactbench.core.evaluation.splits import SPLITS_WITHOUT_GROUPS
 
     spec = subject.spec
-    for number, name in enumerate(spec.protocols):
-        try:
+    with code_of("spec.protocols", subject):
+        for name in spec.protocols:
             protocol_called(name)
-        except UnknownNameError as error:
-            fail(f"spec.protocols[{number}]", str(error))
     labels = {label for _, planned in _planned(spec) for label in planned.scene.labels}
     known = {*SPLITS_WITHOUT_GROUPS, *GROUPS, *spec.campaigns, *labels}
-    for number, name in enumerate(spec.splits):
-        close = nearest(name, known)
+    for name in spec.splits:
         # Without scenes, a group may be any annotation of recordings that others have made.
-        if name not in known and shots(name) is None and (spec.scenes or close):
-            meant = f"; did you mean {' or '.join(close)}?" if close else ""
-            fail(f"spec.splits[{number}]", f"{name!r} is no split that recordings of this task could serve{meant}")
+        if name not in known and shots(name) is None and (spec.scenes or nearest(name, known)):
+            served = ", ".join(sorted(known))
+            fail("spec.splits", f"{name!r} is no split that recordings of this task could serve; there are {served}")
     for field in ("estimators", "baselines"):
-        for number, name in enumerate(getattr(spec, field)):
-            try:
-                found = subject.registry.estimators[name]
-            except UnknownNameError as error:
-                fail(f"spec.{field}[{number}]", str(error))
-            if spec.kind not in found.kinds:
-                fail(f"spec.{field}[{number}]", f"{name} is for {' and '.join(found.kinds)}, not for {spec.kind}")
-            if field == "baselines" and not found.baseline:
-                fail(f"spec.{field}[{number}]", f"{name} is no trivial answer by its own account")
+        with code_of(f"spec.{field}", subject):
+            for found in [subject.registry.estimators[name] for name in getattr(spec, field)]:
+                if spec.kind not in found.kinds:
+                    fail(f"spec.{field}", f"{found.name} is for {' and '.join(found.kinds)}, not for {spec.kind}")
+                if field == "baselines" and not found.baseline:
+                    fail("spec.baselines", f"{found.name} is no trivial answer by its own account")
 
 
 @check("task")
@@ -70,20 +64,16 @@ def metric_has_its_unit(subject: Subject) -> None:
     spec = subject.spec
     metric = METRICS[spec.metric]
     if metric.kind != spec.kind:
-        fitting = ", ".join(name for name, one in METRICS.items() if one.kind == spec.kind)
-        fail("spec.metric", f"{spec.metric} is for {metric.kind}, the task is a {spec.kind}; there are {fitting}")
+        fail("spec.metric", f"{spec.metric} is for {metric.kind}, and the task is a {spec.kind}")
     target_unit = getattr(spec.target, "unit", "1")  # frames that slip or do not have none
     if isinstance(spec.target, LabelTarget) and "unit" not in spec.target.model_fields_set:
         target_unit = spec.unit  # a label of which nobody says more
     expected = target_unit if spec.metric in ("rmse", "mae") or metric.vector else "1"
     kind = getattr(spec.target, "kind", None)
-    try:
-        if kind in OF_KIND and units.parse(target_unit)[1] != units.parse(OF_KIND[kind])[1]:
-            fail("spec.target.unit", f"a {kind} is measured in {OF_KIND[kind]}, not in {target_unit}")
-        if units.parse(spec.unit) != units.parse(expected):
-            fail("spec.unit", f"{spec.metric} of a target in {target_unit} is in {expected}, not in {spec.unit}")
-    except UsageError as error:
-        fail("spec.unit", str(error))
+    if kind in OF_KIND and units.parse(target_unit)[1] != units.parse(OF_KIND[kind])[1]:
+        fail("spec.target.unit", f"a {kind} is measured in {OF_KIND[kind]}, not in {target_unit}")
+    if units.parse(spec.unit) != units.parse(expected):
+        fail("spec.unit", f"{spec.metric} of a target in {target_unit} is in {expected}, not in {spec.unit}")
 
 
 @check("task")
@@ -128,7 +118,7 @@ def answers_are_in_the_scenes(subject: Subject) -> None:
                 fail("spec.scenes", f"role {role} has {strange}; role train teaches {', '.join(map(str, taught))}")
 
 
-@check("task", needs=("answers-are-in-the-scenes",), carries_out=True)
+@check("task", needs="answers-are-in-the-scenes")
 def its_scene_is_carried_out(subject: Subject) -> None:
     """A scene that no rig can carry out, or whose target no rig records, is found out after those before it.
 
@@ -137,25 +127,16 @@ def its_scene_is_carried_out(subject: Subject) -> None:
     spec = subject.spec
     if not spec.scenes:
         skip("it has no scenes: recordings made elsewhere answer it")
-    for place, planned in _planned(spec):
-        with code_of(f"{place}.profile", subject):
-            ramp = planned.scene.profile
-            if not ramp.duration.to("s") > 0 or min(ramp.start.to("N"), ramp.end.to("N"), ramp.hold.to("s")) < 0:
-                fail(f"{place}.profile", "a duration above 0, and forces and a hold of 0 or more are needed")
     scene = spec.scenes[0].scene
     slide = scene.slide
     if slide is not None:
         slide = slide.model_copy(update={"start": assumed(SECONDS / 2, "s", WHY), "duration": None})
     kept = {field: getattr(scene, field) for field in
             ("indenter", "placement", "observe", "labels", "drive", "simulation")}  # fmt: skip
-    field = f"spec.scenes[{scene.name}]"
-    try:
-        press = next(presses(subject, (tiny_scene(slide=slide, **kept),), field), None)
-    except TactbenchError as error:
-        fail(field, str(error))
+    press = next(presses(subject, (tiny_scene(slide=slide, **kept),), f"spec.scenes[{scene.name}]"), None)
     if press is None:
         skip("no sensor that can be simulated goes with it: it needs another rig, or recordings")
-    channels = [channel for stream in press.reference for channel in stream.channels]
+    channels = [channel for stream in press.meta.reference for channel in stream.channels]
     for one in getattr(spec.target, "components", (spec.target,)):
         names = [channel.name for channel in channels if channel.kind == getattr(one, "kind", "")]
         if isinstance(one, ChannelTarget) and (not names or (one.name is not None and one.name not in names)):

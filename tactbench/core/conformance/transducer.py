@@ -2,21 +2,22 @@
 
 from __future__ import annotations
 
-import copy
-import inspect
 import math
 from dataclasses import fields
 from functools import lru_cache
-from typing import TYPE_CHECKING, Any
+from typing import Any
+
+import numpy as np
 
 from tactbench.core.conformance.check import CheckFailed, Subject, check, code_of, fail, skip
-from tactbench.core.conformance.skin_state import on_sheet_mm, patch_mm, pressed_locally, skin_grid
-from tactbench.core.spec.sensor import ChannelSpec
+from tactbench.core.conformance.sensor_spec import on_sheet_mm
+from tactbench.core.conformance.streams import limits_of
+from tactbench.core.samples import FloatArray, SkinGrid, SkinState
+from tactbench.core.spec.sensor import ChannelSpec, Nuisances
+from tactbench.core.spec.skin import FluidBackedShell, SkinSheet
 
-if TYPE_CHECKING:
-    from tactbench.core.samples import FloatArray, SkinState
-
-GENTLE_N, OVERLOAD_N = 1.0, 100.0
+Place = tuple[float, float]
+GENTLE_N, FIRM_N, OVERLOAD_N = 1.0, 2.0, 100.0
 """The overload is beyond what any fingertip is pressed with on purpose."""
 SHEAR = 0.3
 """Tangential over normal force of a press that is dragged: what skin sticks to on most surfaces."""
@@ -30,31 +31,39 @@ and currents or foam carry a press to their neighbours. Swapped or mirrored axes
 SHEAR_FIELDS = "reads_shear names no kind of channel, so tangential_displacement_mm and shear_mpa are None"
 
 
-@lru_cache(maxsize=2)
-def observed(subject: Subject) -> dict[str, ChannelSpec]:
-    """Return the channels that the transducer answers for, by name."""
-    return {one.name: one for one in subject.spec.channels("taxel", "dc_pressure")}
+def observed(subject: Subject) -> tuple[ChannelSpec, ...]:
+    """Return the channels that the transducer answers for."""
+    return tuple(subject.spec.channels("taxel", "dc_pressure"))
+
+
+PATCH_MM, PATCH_CELLS = 1.25, 1.5
+"""Standard deviation of a local press: half the radius of a fingertip's contact, and no less than the grid resolves
+[cells]."""
+
+
+def skin_grid(sheet: SkinSheet) -> SkinGrid:
+    """Return the centres of the sheet's own cells."""
+    along, across = sheet.cells
+    low, high, arc = sheet.x_min.to("mm"), sheet.x_max.to("mm"), sheet.arc.to("mm")
+    x_mm: FloatArray = low + (np.arange(along) + 0.5) * (high - low) / along
+    s_mm: FloatArray = -arc / 2 + (np.arange(across) + 0.5) * arc / across
+    return SkinGrid(x_mm=x_mm, s_mm=s_mm)
+
+
+def patch_mm(grid: SkinGrid) -> float:
+    """Return the standard deviation of a local press."""
+    return max(PATCH_CELLS * max(grid.cell_mm), PATCH_MM)
 
 
 @lru_cache(maxsize=4)
 def _prepared(subject: Subject, names: tuple[str, ...]) -> Any:
-    factory = subject.code("transducer")
-    asked = inspect.signature(factory).parameters
-    # The twin gives its own to those that ask for them.
-    given = {
-        name: value
-        for name, value in (("tolerance", 1e-6), ("refinement", 1))
-        if name in asked and asked[name].default is inspect.Parameter.empty
-    }
     with code_of("transducer", subject):
-        return factory(subject.spec, skin_grid(subject.spec.skin.sheet), list(names), **given)
+        return subject.code("transducer")(subject.spec, skin_grid(subject.spec.skin.sheet), list(names))
 
 
 def _read(subject: Subject, state: SkinState, names: tuple[str, ...] = ()) -> FloatArray:
     """Return the readings of a state, all of them in the order of the spec by default."""
-    import numpy as np
-
-    names = names or tuple(observed(subject))
+    names = names or tuple(one.name for one in observed(subject))
     transducer = _prepared(subject, names)
     try:
         with code_of("transducer", subject), np.errstate(all="ignore"):
@@ -71,38 +80,63 @@ def _read(subject: Subject, state: SkinState, names: tuple[str, ...] = ()) -> Fl
     return given.astype(np.float64)
 
 
-def _state(
-    subject: Subject, force_n: float, at_mm: tuple[float, float] | None = None, dragged: tuple[float, float] = (0, 0)
-) -> SkinState:
-    spec = subject.spec
-    sheet = spec.skin.sheet
-    place = at_mm or ((sheet.x_min.to("mm") + sheet.x_max.to("mm")) / 2, 0.0)
-    return pressed_locally(spec.skin, skin_grid(sheet), force_n, place, dragged if spec.reads_shear else None)
+def _state(subject: Subject, force_n: float, at_mm: Place | None = None, dragged: Place = (0, 0)) -> SkinState:
+    """Return the state that a narrow press would leave: a bell of pressure, and a dent of the same shape.
 
-
-@lru_cache(maxsize=32)
-def _response(subject: Subject, force_n: float, at_mm: tuple[float, float] | None = None) -> dict[str, float]:
-    """Return the change of each reading against rest."""
-    change = _read(subject, _state(subject, force_n, at_mm)) - _read(subject, _state(subject, 0.0))
-    return dict(zip(observed(subject), change.tolist(), strict=True))
+    No equation is solved: it is a state that a transducer must be able to read, and that touches one place only; None:
+    the first that is pressed. The dent goes a third of the way through the skin at 1 N and further in proportion, never
+    through more than nine tenths. `dragged` is the tangential force over the normal one, along x and s, for a sensor
+    that reads shear: it moves the dent by a third of that share of its depth, and the press alone moves the skin away
+    from its middle by as much.
+    """
+    skin, grid, at_mm = subject.spec.skin, skin_grid(subject.spec.skin.sheet), at_mm or _places(subject)[0]
+    sigma = patch_mm(grid)
+    apart = np.stack(np.meshgrid(grid.x_mm - at_mm[0], grid.s_mm - at_mm[1], indexing="ij")) / sigma
+    bell = np.exp(-(apart**2).sum(axis=0) / 2)
+    pressure = force_n / (2 * math.pi * sigma**2) * bell
+    fluid = isinstance(skin, FluidBackedShell)
+    if isinstance(skin, FluidBackedShell):
+        radius_mm = math.inf if skin.sheet.outer_radius is None else skin.sheet.outer_radius.to("mm")
+        rest, least = skin.film.at(grid.x_mm, grid.s_mm / radius_mm), skin.residual_film.to("mm")
+    else:
+        rest, least = np.full(bell.shape, skin.thickness.to("mm")), 0.0
+    deflection = min(force_n / 3, 0.9) * bell * rest
+    way, sheared = np.array(dragged)[:, None, None], bool(subject.spec.reads_shear)
+    return SkinState(
+        grid=grid, force_n=force_n, deflection_mm=deflection, pressure_mpa=pressure,
+        thickness_mm=np.maximum(rest - deflection, least), depth_mm=float(deflection.max()),
+        fluid_pressure_mpa=0.001 * force_n * fluid,
+        contact_radius_mm=math.sqrt(5.0) * sigma if force_n else 0.0, residual=0.0,
+        tangential_displacement_mm=(apart + way) * deflection / 3 if sheared else None,
+        shear_mpa=way * pressure if sheared else None,
+    )  # fmt: skip
 
 
 @lru_cache(maxsize=2)
-def _sites(subject: Subject) -> dict[tuple[float, float], list[str]]:
-    """Return the names of the taxels at each place on the sheet [mm]."""
-    sites: dict[tuple[float, float], list[str]] = {}
-    for name, channel in observed(subject).items():
+def _sites(subject: Subject) -> dict[Place, list[int]]:
+    """Return the columns of the taxels at each place on the sheet [mm]."""
+    sites: dict[Place, list[int]] = {}
+    for column, channel in enumerate(observed(subject)):
         if channel.kind == "taxel" and channel.position_m is not None:
-            sites.setdefault(on_sheet_mm(subject.spec.skin.sheet, channel.position_m), []).append(name)
+            sites.setdefault(on_sheet_mm(subject.spec.skin.sheet, channel.position_m), []).append(column)
     return sites
 
 
-def _pressed_places(subject: Subject) -> list[tuple[float, float]]:
-    sites = list(_sites(subject))
-    return sites[:: max(1, math.ceil(len(sites) / MOST_PRESSED))]
+def _places(subject: Subject) -> list[Place]:
+    """Return what is pressed: some of the taxels' places, or the middle of the sheet where none is stated."""
+    sites, sheet = list(_sites(subject)), subject.spec.skin.sheet
+    middle = (sheet.x_min.to("mm") + sheet.x_max.to("mm")) / 2, 0.0
+    return sites[:: max(1, math.ceil(len(sites) / MOST_PRESSED))] or [middle]
 
 
-@check("sensor", needs=("code-names-resolve", "limits-are-in-order"))
+@lru_cache(maxsize=4)
+def _responses(subject: Subject, force_n: float) -> dict[Place, FloatArray]:
+    """Return by pressed place the change of each reading against rest."""
+    rest = _read(subject, _state(subject, 0.0))
+    return {at: _read(subject, _state(subject, force_n, at)) - rest for at in _places(subject)}
+
+
+@check("sensor", needs="code-names-resolve limits-are-in-order")
 def transducer_reads(subject: Subject) -> None:
     """The twin calls it with the spec, a grid of the skin and the channels that are asked for, from rest to overload.
 
@@ -119,83 +153,64 @@ def transducer_reads(subject: Subject) -> None:
         _read(subject, _state(subject, force_n))
 
 
-@check("sensor", needs=("transducer-reads",))
+@check("sensor", needs="transducer-reads")
 def rest_is_as_stated(subject: Subject) -> None:
     """The spec's rest level is what drivers, tares and tables take for unloaded; the twin begins where this reads.
 
     State the `rest` that the transducer gives at zero load, or add it there.
     """
-    for channel, found in zip(observed(subject).values(), _read(subject, _state(subject, 0.0)), strict=True):
-        if channel.rest is None:
-            continue
-        rest = channel.rest.to(channel.unit)
-        span = channel.upper - channel.lower if channel.upper is not None and channel.lower is not None else 0.0
+    for channel, found in zip(observed(subject), _read(subject, _state(subject, 0.0)), strict=True):
+        rest = found if channel.rest is None else channel.rest.to(channel.unit)
+        low, high = limits_of(channel)
+        span = high - low if math.isfinite(high - low) else 0.0
         if abs(found - rest) > max(REST_SHARE * span, REST_COUNTS):
             fail(f"channel {channel.name}: rest", f"{rest:g} {channel.unit} is stated, the transducer gives {found:g}")
 
 
-@check("sensor", needs=("transducer-reads",))
-def order_follows_the_request(subject: Subject) -> None:
-    """A run asks for the channels that it observes, in its own order; a transducer that ignores it mixes taxels up.
-
-    Look channels up by the names in `channel_names`; never rely on their number or order.
-    """
-    names = tuple(observed(subject))
-    at_mm = next(iter(_sites(subject)), None)
-    state = _state(subject, GENTLE_N, at_mm)
-    whole = dict(zip(names, _read(subject, state).tolist(), strict=True))
-    fewer = tuple(reversed(names[: max(2, len(names) // 2)]))
-    for name, value in zip(fewer, _read(subject, state, fewer).tolist(), strict=True):
-        # A solver may stop elsewhere for fewer channels.
-        if not math.isclose(value, whole[name], rel_tol=1e-3, abs_tol=1e-6):
-            fail("transducer", f"{name} reads {value:g} asked for in another order, and {whole[name]:g} before")
-
-
-@check("sensor", needs=("transducer-reads",))
+@check("sensor", needs="transducer-reads")
 def transducer_has_no_memory(subject: Subject) -> None:
-    """The twin interpolates between states and uses each several times; noise comes from the twin, under a seed.
+    """The twin uses a state several times, asks for some of the channels in an order of its own, and adds the noise.
 
-    Keep nothing between two calls, draw nothing, and copy what you change: ``state.pressure_mpa.copy()``.
+    Keep nothing between two calls, draw nothing, and copy what you change: ``state.pressure_mpa.copy()``. Look channels
+    up by the names in `channel_names`; never rely on their number or order.
     """
-    import numpy as np
-
-    state = _state(subject, GENTLE_N)
-    before = copy.deepcopy(state)
+    state, untouched = _state(subject, GENTLE_N), _state(subject, GENTLE_N)
     first = _read(subject, state)
     for field in fields(state):
-        if field.name != "grid" and not np.array_equal(getattr(state, field.name), getattr(before, field.name)):
+        if field.name != "grid" and not np.array_equal(getattr(state, field.name), getattr(untouched, field.name)):
             fail(f"state.{field.name}", "the transducer has changed it")
-    _read(subject, _state(subject, 2 * GENTLE_N))
-    changed = np.flatnonzero(first != _read(subject, _state(subject, GENTLE_N)))
+    _read(subject, _state(subject, FIRM_N))
+    changed = np.flatnonzero(first != _read(subject, untouched))
     if len(changed):
-        fail("transducer", f"{list(observed(subject))[changed[0]]} reads another value for the same state")
+        fail("transducer", f"{observed(subject)[changed[0]].name} reads another value for the same state")
+    names = [one.name for one in observed(subject)]
+    fewer = names[max(1, len(names) // 2) :: -1]
+    for name, value, before in zip(
+        fewer, _read(subject, untouched, tuple(fewer)), first[len(fewer) - 1 :: -1], strict=True
+    ):
+        # A solver may stop elsewhere for fewer channels.
+        if not math.isclose(value, before, rel_tol=1e-3, abs_tol=1e-6):
+            fail("transducer", f"{name} reads {value:g} asked for in another order, and {before:g} before")
 
 
-@check("sensor", needs=("transducer-reads",))
+@check("sensor", needs="transducer-reads")
 def it_answers_to_a_press(subject: Subject) -> None:
     """A channel that changes by less than its noise and step tells nothing, and looks like a very quiet sensor.
 
     Look at units (mm, N, MPa in a SkinState; metres in position_m), and at the sensitivity.
     """
-    nuisances = subject.spec.nuisances
-
-    def felt(name: str, change: float) -> bool:
-        own = nuisances.get(observed(subject)[name].kind)
-        least = 0.0 if own is None else max(own.white.value, own.step.value)
-        return abs(change) > least
-
-    places: list[tuple[float, float] | None] = [*_pressed_places(subject)] or [None]
-    for at_mm in places:
-        change = _response(subject, GENTLE_N, at_mm)
-        own = _sites(subject)[at_mm] if at_mm else list(change)
+    known = subject.spec.nuisances
+    own = [known.get(one.kind, Nuisances()) for one in observed(subject)]
+    least = np.array([max(one.white.value, one.step.value) for one in own])
+    for change in _responses(subject, GENTLE_N).values():
         # Elsewhere it may be felt as well, and more: then it is the place that is wrong.
-        if not any(felt(name, change[name]) for name in change):
-            most = max(own, key=lambda name: abs(change[name]))
-            where = f"{most} on its own place" if at_mm else f"{most} most of all"
-            fail("transducer", f"{GENTLE_N:g} N change {where} by {change[most]:.3g}: no more than noise and step")
+        if not (np.abs(change) > least).any():
+            most = int(np.argmax(np.abs(change)))
+            name = observed(subject)[most].name
+            fail("transducer", f"{GENTLE_N:g} N change {name} by {change[most]:.3g}: no more than noise and step")
 
 
-@check("sensor", needs=("it-answers-to-a-press",))
+@check("sensor", needs="it-answers-to-a-press")
 def response_is_where_it_is_pressed(subject: Subject) -> None:
     """Swapped axes, a mirrored layout or places in another frame give plausible readings of the wrong taxels.
 
@@ -204,74 +219,66 @@ def response_is_where_it_is_pressed(subject: Subject) -> None:
     sites = _sites(subject)
     if len(sites) < 2:
         skip("it states no places of several taxels")
+    responses = _responses(subject, GENTLE_N)
     # A neighbour may answer more strongly where the layout is finer than the press.
     near_mm = 2 * patch_mm(skin_grid(subject.spec.skin.sheet))
-    for at_mm in _pressed_places(subject):
-        change = _response(subject, GENTLE_N, at_mm)
-        strength = {at: max(abs(change[one]) for one in ones) for at, ones in sites.items()}
-        most = max(strength, key=strength.__getitem__)
-        if strength[at_mm] < AS_STRONG * strength[most] and math.dist(most, at_mm) > near_mm:
-            fail(
-                "transducer",
-                f"pressed at {sites[at_mm][0]} (x {at_mm[0]:.3g} mm, arc {at_mm[1]:.3g} mm), {sites[most][0]} at "
-                f"(x {most[0]:.3g}, arc {most[1]:.3g}) answers most: are axes swapped or mirrored?",
+
+    def strength(pressed: Place, there: Place) -> float:
+        return float(max(abs(responses[pressed][column]) for column in sites[there]))
+
+    def named(place: Place) -> str:
+        return f"{observed(subject)[sites[place][0]].name} (x {place[0]:.3g} mm, arc {place[1]:.3g} mm)"
+
+    for at_mm in responses:
+        answering = {there: strength(at_mm, there) for there in sites}
+        felt = {there: strength(there, at_mm) for there in responses}
+        for strengths, text in (
+            (answering, "pressed at {here}, {most} answers most: are axes swapped or mirrored?"),
+            (felt, "{here} answers most to a press at {most}: is position_m read in another unit?"),
+        ):
+            most = max(strengths, key=strengths.__getitem__)
+            if strengths[at_mm] < AS_STRONG * strengths[most] and math.dist(most, at_mm) > near_mm:
+                fail("transducer", text.format(here=named(at_mm), most=named(most)))
+
+
+@check("sensor", needs="it-answers-to-a-press")
+def sign_is_as_stated(subject: Subject) -> None:
+    """Health checks, tares and plots rely on the stated sign of response, estimators on one load for one reading.
+
+    State sign = 1 where the reading rises under load, -1 where it falls, 0 where it does either. Where it falls back
+    under more load, look for a limit that wraps, an absolute value, or a thickness that goes below 0.
+    """
+    for at_mm, change in _responses(subject, GENTLE_N).items():
+        for column in _sites(subject).get(at_mm, []):
+            channel = observed(subject)[column]
+            if change[column] * channel.sign < 0:
+                text = f"{channel.sign:+d} is stated, and it changes by {change[column]:+.3g} under load"
+                fail(f"channel {channel.name}: sign", text)
+        firm, most = _responses(subject, FIRM_N)[at_mm], int(np.argmax(np.abs(change)))
+        # A sensor at its end gives the same reading twice; a hundredth is left to solvers.
+        if abs(firm[most]) < 0.99 * abs(change[most]):
+            name = observed(subject)[most].name
+            text = (
+                f"{name} changes by {change[most]:.3g} under {GENTLE_N:g} N and by {firm[most]:.3g} under {FIRM_N:g} N"
             )
-        felt = {
-            there: max(abs(_response(subject, GENTLE_N, there)[one]) for one in sites[at_mm])
-            for there in _pressed_places(subject)
-        }
-        most = max(felt, key=felt.__getitem__)
-        if felt[at_mm] < AS_STRONG * felt[most] and math.dist(most, at_mm) > near_mm:
-            text = f"{sites[at_mm][0]} answers most to a press at {sites[most][0]}: is position_m read in another unit?"
             fail("transducer", text)
 
 
-@check("sensor", needs=("it-answers-to-a-press",))
-def sign_is_as_stated(subject: Subject) -> None:
-    """Health checks, tares and plots rely on the stated sign of response.
-
-    State sign = 1 where the reading rises under load, -1 where it falls, 0 where it does either.
-    """
-    for at_mm in _pressed_places(subject):
-        for name in _sites(subject)[at_mm]:
-            stated, change = observed(subject)[name].sign, _response(subject, GENTLE_N, at_mm)[name]
-            if change * stated < 0:
-                fail(f"channel {name}: sign", f"{stated:+d} is stated, and it changes by {change:+.3g} under load")
-
-
-@check("sensor", needs=("it-answers-to-a-press",))
-def more_load_more_response(subject: Subject) -> None:
-    """A reading that falls back under more load gives two forces for one value.
-
-    Look for a limit that wraps, an absolute value, or a thickness that goes below 0.
-    """
-    for at_mm in _pressed_places(subject)[:1]:
-        gentle, firm = (_response(subject, force_n, at_mm) for force_n in (0.5, 1.5))
-        name = max(_sites(subject)[at_mm], key=lambda one: abs(gentle[one]))
-        # A sensor at its end gives the same reading twice; a hundredth is left to solvers.
-        if abs(firm[name]) < 0.99 * abs(gentle[name]):
-            fail("transducer", f"{name} changes by {gentle[name]:.3g} under 0.5 N and by {firm[name]:.3g} under 1.5 N")
-
-
-@check("sensor", needs=("it-answers-to-a-press",))
+@check("sensor", needs="it-answers-to-a-press")
 def shear_turns_with_its_direction(subject: Subject) -> None:
     """What is dragged the other way moves the other way; a size without its sign tells no direction.
 
     Read tangential_displacement_mm and shear_mpa with their signs: [0] along x, [1] along s. Or leave reads_shear out.
     """
-    import numpy as np
-
     if not subject.spec.reads_shear:
         skip("its spec names no kind of channel that reads shear")
-    at_mm = next(iter(_sites(subject)), None)
-    plain = _read(subject, _state(subject, GENTLE_N, at_mm))
-    felt = False
-    for axis, way in (("x", np.array([SHEAR, 0])), ("s", np.array([0, SHEAR]))):
-        there, back = (_read(subject, _state(subject, GENTLE_N, at_mm, tuple(one))) - plain for one in (way, -way))
-        most = int(np.argmax(np.abs(there - back) + np.abs(there + back)))
+    plain, felt = _read(subject, _state(subject, GENTLE_N)), False
+    for axis, (x, s) in {"x": (SHEAR, 0.0), "s": (0.0, SHEAR)}.items():
+        there, back = (_read(subject, _state(subject, GENTLE_N, None, one)) - plain for one in ((x, s), (-x, -s)))
+        most = int(np.argmax(np.abs(there) + np.abs(back)))
         felt |= bool(there[most] or back[most])
         if there[most] * back[most] > 0:
             text = f"dragged along {axis} it changes by {there[most]:+.3g}, dragged back by {back[most]:+.3g}"
-            fail(f"channel {list(observed(subject))[most]}", text)
+            fail(f"channel {observed(subject)[most].name}", text)
     if not felt:
         fail("spec.reads_shear", "dragged along x or s, no channel changes")

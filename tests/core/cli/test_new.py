@@ -69,7 +69,7 @@ def test_what_is_made_is_formatted_and_typed(made):
     # Errors in tactbench itself are not these packages': its own check finds them.
     config.write_text(f"[mypy]\nstrict = True\nmypy_path = {path}\n[mypy-tactbench.*]\nfollow_imports = silent\n")
     packages = [word for kind in KINDS for word in ("-p", f"tactbench_my_{kind}")]
-    run("mypy", "--config-file", str(config), "--cache-dir", str(made / "cache"), *packages)
+    run("mypy", "--config-file", str(config), "--cache-dir", str(ROOT / ".mypy_cache" / "made"), *packages)
 
 
 def test_every_kind_passes_its_checks(made):

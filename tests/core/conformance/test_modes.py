@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 
+import numpy as np
 import pytest
 import yaml
 
@@ -60,14 +61,13 @@ def test_a_plugin_that_could_not_be_used_is_mentioned_by_run(verbs):
     assert "Some plugins could not be used: broken." in done.stderr
 
 
-@pytest.mark.parametrize(("name", "says"), [("evil-hang", "longer than 2 s"), ("evil-abort", "SIGABRT")])
-def test_one_that_hangs_or_crashes_fails_its_check_and_ends_nothing(monkeypatch, name, says):
+def test_one_that_crashes_fails_its_check_and_ends_nothing(monkeypatch):
     monkeypatch.syspath_prepend(THIRD_PARTY / "evil")
-    (subject,) = subjects_named(load_registry(), name)
-    report = run_checks(subject, timeout_s=2)
+    (subject,) = subjects_named(load_registry(), "evil-abort")
+    report = run_checks(subject)
     (failed,) = report.failed
     assert failed.check == "answers-have-the-shape"
-    assert says in failed.text
+    assert "SIGABRT" in failed.text
     assert "not tried, for answers-have-the-shape has not passed" in {one.text for one in report.of("skipped")}
 
 
@@ -76,18 +76,13 @@ def test_reading_a_recording_imports_no_code_of_the_plugin(verbs, tmp_path):
     done = verbs("check", "icub", "--recording", str(path), "--format", "json", code=1)
     (report,) = json.loads(done.stdout)["checked"]
     assert report["modes"] == ["recording"]
-    assert [one["check"] for one in report["checks"] if one["status"] == "failed"] == ["recording-shows-a-response"]
+    assert [one["check"] for one in report["checks"] if one["status"] == "failed"] == ["recording-fits-the-spec"]
 
 
 def test_nothing_is_opened_without_a_yes(verbs):
     asked = verbs("check", "parallel-manipulator", "--rig-file", str(EXAMPLE), code=2)
     assert "--yes" in asked.stderr
     assert asked.stdout == ""
-
-
-def test_an_invasive_check_needs_the_rig_file_of_that_rig(verbs):
-    other = verbs("check", "bench", "--rig-file", str(EXAMPLE), "--yes", code=2)
-    assert "The rig file is for the rig 'parallel-manipulator'" in other.stderr
 
 
 def of_the_press(done):
@@ -106,19 +101,16 @@ def quick(tmp_path, **changes):
 def test_an_emulated_rig_presses_lets_go_and_retreats(verbs, tmp_path):
     done = verbs("check", "parallel-manipulator", "--rig-file", quick(tmp_path), "--yes",
                  "--format", "json")  # fmt: skip
-    assert {status for status, _ in of_the_press(done).values()} == {"passed"}
-    assert len(of_the_press(done)) == 2
+    assert of_the_press(done) == {"real-rig-presses": ("passed", "")}
     assert json.loads(done.stdout)["checked"][0]["level"] == "silver"
 
 
 def test_a_press_that_the_guard_ends_fails_and_is_not_repeated(verbs, tmp_path):
     file = quick(tmp_path, force__faults=["saturated:start_s=3"])
     done = verbs("check", "parallel-manipulator", "--rig-file", file, "--yes", "--format", "json", code=1)
-    found = of_the_press(done)
-    status, text = found.pop("real-rig-presses")
+    status, text = of_the_press(done)["real-rig-presses"]
     assert status == "failed"
     assert "force sensor is saturated" in text
-    assert {status for status, _ in found.values()} == {"skipped"}
 
 
 def test_a_hand_at_the_bench_is_not_expected_to_follow(verbs, tmp_path):
@@ -126,9 +118,7 @@ def test_a_hand_at_the_bench_is_not_expected_to_follow(verbs, tmp_path):
     said["sensors"].pop("biotac")
     (tmp_path / "rig.yaml").write_text(yaml.safe_dump(said), encoding="utf-8")
     done = verbs("check", "bench", "--rig-file", "rig.yaml", "--yes", "--format", "json")
-    found = of_the_press(done)
-    assert found.pop("real-rig-presses") == ("passed", "")
-    assert set(found.values()) == {("skipped", "nothing in it moves by itself: a hand presses")}
+    assert of_the_press(done) == {"real-rig-presses": ("passed", "")}
 
 
 def test_ctrl_c_stops_what_moves(tmp_path, monkeypatch):
@@ -145,37 +135,23 @@ def test_ctrl_c_stops_what_moves(tmp_path, monkeypatch):
     assert code.STOPPED == ["stopped by hand"]
 
 
-def test_with_a_yes_a_real_line_is_opened_and_read(tmp_path, monkeypatch):
+@pytest.mark.parametrize(("noise", "status", "says"), [(1.0, "passed", ""), (0.0, "failed", "constant at rest")])
+def test_with_a_yes_a_real_line_is_opened_and_its_noise_compared(tmp_path, monkeypatch, noise, status, says):
     monkeypatch.syspath_prepend(THIRD_PARTY / "flawed")
-    registry = load_registry()
-    (subject,) = subjects_named(registry, "sound-pad")
-    device = emulated_device(subject.descriptor, "sound-pad", DeviceEntry(link="emulated"), lambda t_s: {}, 1)
+    (subject,) = subjects_named(load_registry(), "sound-pad")
+    names, rng = [one.name for one in subject.spec.channels()], np.random.default_rng(0)
+
+    def senses(t_s):
+        return dict(zip(names, 100 + noise * rng.normal(size=len(names)), strict=True))
+
+    device = emulated_device(subject.descriptor, "sound-pad", DeviceEntry(link="emulated"), senses, 1)
     file = tmp_path / "rig.yaml"
     with EmulatedDevices({"sound-pad": device}, time="real") as devices:
         link = devices.addresses["sound-pad"]
         file.write_text(f"version: 1\nrig: bench\nsensors:\n  sound-pad: {{link: {json.dumps(link)}}}\n")
         report = run_checks(subject, modes=("invasive",), rig_file=file, isolated=False)
-    assert [(one.check, one.status) for one in report.outcomes] == [("real-device-answers", "passed")], str(report)
-
-
-def test_expected_failures_are_reported_with_their_reason_and_keep_the_level(monkeypatch):
-    monkeypatch.syspath_prepend(THIRD_PARTY / "flawed")
-    (subject,) = subjects_named(load_registry(), "sound-shape")
-    import sound_others
-
-    def report_with(listed):
-        monkeypatch.setattr(sound_others, "EXPECTED_FAILURES", {"sound-shape": listed}, raising=False)
-        return run_checks(subject, isolated=False, without=("import-is-light", "indenter-is-pressed"))
-
-    (failed,) = report_with({"numbers-are-finite": "the data sheet has it so"}).failed
-    assert failed.text == "it passes: take it off (the data sheet has it so)"
-    (failed,) = report_with({"no-such-check": "it was renamed"}).failed
-    assert "no check has this name" in failed.text
-    excused = {"expected-failures-are-checks": "it was renamed", "no-such-check": "likewise"}
-    report = report_with(excused)
-    assert [one.text for one in report.of("expected")] == ["it was renamed"]
-    assert report.ok
-    assert report.level is None
+    assert [(one.check, one.status) for one in report.outcomes] == [("real-device-answers", status)], str(report)
+    assert says in report.outcomes[0].text
 
 
 def test_checks_are_listed_without_a_name(verbs):
