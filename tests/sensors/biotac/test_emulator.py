@@ -1,7 +1,5 @@
 """The emulated BioTac on its bytes: golden vectors BT-4, the pause, every fault."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given
@@ -9,7 +7,7 @@ from hypothesis import strategies as st
 
 from tactbench.plugin import UsageError
 from tactbench.plugin.devices import EmulatorSettings
-from tactbench.sensors.biotac.codec import INDEX, RESEND, Fault, decoded, sampling_command
+from tactbench.sensors.biotac.codec import INDEX, decoded, sampling_command
 from tactbench.sensors.biotac.emulator import REST, BioTacFault, Emulator, build_emulator
 from tactbench.sensors.biotac.spec import SPEC
 
@@ -18,7 +16,7 @@ WORD_S = 2 * 8 / 4.4e6
 READ_S = WORD_S + 50e-6
 
 
-def exchange(sensor: Emulator, command: bytes, n: int = 2, at_s: float = 0.0, pause_s: float = 50e-6) -> bytes:
+def exchange(sensor, command, n=2, at_s=0.0, pause_s=50e-6):
     sensor.exchange(1, command, at_s)
     return sensor.exchange(1, bytes(n), at_s + WORD_S + pause_s)
 
@@ -51,13 +49,6 @@ def test_bt_4_too_short_a_pause():
 
 def test_bt_4_an_sp_has_more_electrodes():
     assert exchange(Emulator(lambda t_s: {**COUNTS, "E20": 2048.0}), b"\xc8\x00") == b"\x80\x01"
-
-
-@pytest.mark.parametrize("filler", [b"\x00\x01", b"\x00\x00", b"\x01\x00"])
-def test_every_filler_in_use_reads(filler):
-    sensor = Emulator(lambda t_s: COUNTS)
-    sensor.exchange(1, b"\xa2\x00", 0.0)
-    assert sensor.exchange(1, filler, READ_S) == b"\x6d\x58"
 
 
 @pytest.mark.parametrize(
@@ -105,13 +96,6 @@ def test_what_is_sensed_comes_back_to_the_converters_step_and_what_is_left_out_i
     assert abs(reply.value - min(max(counts, 0.0), 4095.0)) <= 0.5
 
 
-def test_a_resend_of_a_turned_word_is_the_word():
-    sensor = Emulator(lambda t_s: COUNTS, faults=[BioTacFault("parity", every=2)])
-    assert exchange(sensor, b"\xa2\x00") == b"\x6d\x58"
-    assert decoded(exchange(sensor, b"\xa2\x00", at_s=1.0)).fault is Fault.PARITY
-    assert exchange(sensor, RESEND, at_s=2.0) == b"\x6d\x58"
-
-
 def test_faults_concern_their_channels_and_times_only():
     fault = BioTacFault("dropped-reply", start_s=1.0, end_s=2.0, channels=frozenset({"PAC"}))
     sensor = Emulator(lambda t_s: COUNTS, faults=[fault])
@@ -132,22 +116,11 @@ def test_a_stuck_channel_holds_what_it_read_and_lets_go():
     assert read == [[1000, 1100, 1100, 1100, 1100, 1500, 1600], [1000, 1100, 1200, 1300, 1400, 1500, 1600]]
 
 
-def test_a_sensor_that_is_not_connected_leaves_the_line_and_forgets():
-    sensor = Emulator(lambda t_s: COUNTS, faults=[BioTacFault("not-connected", start_s=1.0, end_s=2.0)])
-    assert exchange(sensor, b"\xa2\x00") == b"\x6d\x58"
-    assert decoded(exchange(sensor, b"\xa2\x00", at_s=1.0)).fault is Fault.NOT_CONNECTED
-    assert exchange(sensor, RESEND, at_s=2.0) == b"\xa5\x5f"
-    assert exchange(sensor, b"\xa2\x00", at_s=3.0) == b"\x6d\x58"
-
-
 @pytest.mark.parametrize(
     ("text", "said"),
     [
-        ("gremlin", "fault called 'gremlin'"),
-        ("parity:every=0", "every 0"),
         ("parity:channels=E5+E99", "E99, which no BioTac has"),
         ("error-reply:error=256", "the error 256"),
-        ("parity:colour=red", "colour"),
     ],
 )
 def test_faults_that_are_none_are_refused(text, said):
@@ -169,16 +142,12 @@ def test_a_sensor_hears_its_own_lines_only():
     assert sensor.exchange(0b110, bytes(2), 2.2) == b"\x6d\x58"
 
 
-@pytest.mark.parametrize("clock_hz", [500_000, 4_400_000, 10_000_000])
+@pytest.mark.parametrize("clock_hz", [500_000, 10_000_000])
 def test_a_built_emulator_keeps_the_pause_at_every_clock(clock_hz):
-    rng = np.random.default_rng(1)
-    sensor = build_emulator(EmulatorSettings(lambda t_s: COUNTS, rng, {"select": 2}, ("error-reply:start_s=1",)))
-    sensor.exchange(2, b"\xa2\x00", 0.0)
-    assert sensor.exchange(2, bytes(2), 16 / clock_hz + 50e-6) == b"\x6d\x58"
-    sensor.exchange(2, b"\xa2\x00", 0.5)
-    assert sensor.exchange(2, bytes(2), 0.5 + 16 / clock_hz + 1e-6) == b"\xa5\x2d"
-    sensor.exchange(2, b"\xa2\x00", 1.0)
-    assert sensor.exchange(2, bytes(2), 1.1) == b"\xa5\x2e"
+    sensor = build_emulator(EmulatorSettings(lambda t_s: COUNTS, np.random.default_rng(1), {"select": 2}, ()))
+    for begin_s, pause_s, answer in ((0.0, 50e-6, b"\x6d\x58"), (0.5, 1e-6, b"\xa5\x2d")):
+        sensor.exchange(2, b"\xa2\x00", begin_s)
+        assert sensor.exchange(2, bytes(2), begin_s + 16 / clock_hz + pause_s) == answer
 
 
 @given(periods=st.lists(st.binary(max_size=5), max_size=20), pause_us=st.sampled_from([0, 60]))

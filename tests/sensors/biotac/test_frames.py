@@ -1,7 +1,5 @@
 """Frames of the BioTac against its emulator: what was sensed comes back, and what was not is marked."""
 
-from __future__ import annotations
-
 from collections import Counter
 
 import numpy as np
@@ -23,21 +21,21 @@ GOOD, MISSING, SUSPECT, SATURATED = (
 COLUMN = {channel.name: column for stream in SPEC.streams for column, channel in enumerate(stream.channels)}
 
 
-def wave(t_s: float) -> dict[str, float]:
+def wave(t_s):
     """A level and a slope of each channel's own, inside the converter for half a second."""
     return {name: 300.0 + 100.0 * k + 1000.0 * t_s for k, name in enumerate(CHANNELS)}
 
 
-def carried_out(steps, sensor: Emulator, begin_s: float, speed_hz: int = SPEED_HZ):
+def carried_out(steps, sensor, begin_s):
     """What comes in during a batch, and when it is over."""
     data, now_s = [], begin_s
     for step in steps:
         data.append(sensor.exchange(step.select, step.data, now_s))
-        now_s += 8 * len(step.data) / speed_hz + 1e-6 * step.pause_us
+        now_s += 8 * len(step.data) / SPEED_HZ + 1e-6 * step.pause_us
     return data, now_s
 
 
-def run(batches: FrameBatches, sensor: Emulator, n: int) -> dict:
+def run(batches, sensor, n):
     """Carry out batches one after the other from 0 s, and return the streams' blocks by name."""
     now_s = 0.0
     for _ in range(n):
@@ -49,32 +47,12 @@ def run(batches: FrameBatches, sensor: Emulator, n: int) -> dict:
     return {block.stream: block for block in batches.blocks()}
 
 
-def expected(name: str, n: int) -> int:
+def expected(name, n):
     """What word n reads: pauses are whole microseconds, and the slope is 0.001 count in one."""
     return round(wave(n * PERIOD_S + 2 * 8 / SPEED_HZ)[name])
 
 
-def test_every_word_comes_back_as_a_sample_of_its_stream():
-    frames = 4
-    batches = FrameBatches(speed_hz=SPEED_HZ)
-    sensed = []
-    blocks = run(batches, Emulator(lambda t_s: sensed.append(wave(t_s)) or sensed[-1]), frames)
-    slow, fast = blocks["electrodes"], blocks["vibration"]
-    assert slow.data.shape == (frames, 22)
-    assert fast.data.shape == (frames * 22, 1)
-    for frame in range(frames):
-        for place, name in enumerate(DEFAULT_FRAME):
-            n = frame * 44 + place
-            got = fast.data[n // 2, 0] if name == "PAC" else slow.data[frame, COLUMN[name]]
-            assert got == round(sensed[n][name]), (frame, name)
-    assert slow.sequence.tolist() == list(range(frames))
-    assert fast.sequence.tolist() == list(range(22 * frames))
-    assert not slow.quality.any()
-    assert not fast.quality.any()
-    assert not any(batches.faults.values())
-
-
-@pytest.mark.parametrize("speed_hz", [500_000, 3_300_001, 4_000_000, 4_400_000, 10_000_000])
+@pytest.mark.parametrize("speed_hz", [500_000, 3_300_001, 10_000_000])
 @pytest.mark.parametrize("words", [None, 1, 17])
 def test_words_come_at_their_rate_whatever_the_clock(speed_hz, words):
     batches = FrameBatches(speed_hz=speed_hz, words=words)
@@ -84,10 +62,7 @@ def test_words_come_at_their_rate_whatever_the_clock(speed_hz, words):
         # Whole microseconds, rounded down.
         assert first / 4400 - 1e-6 - 1e-9 <= now_s <= first / 4400 + 1e-9
         length_s = sum(8 * len(step.data) / speed_hz + 1e-6 * step.pause_us for step in steps)
-        timing = batches.timing(first)
-        assert timing.end_ns == pytest.approx(1e9 * length_s, abs=2.0)
-        assert len(timing.sampled_ns) * 2 == len(steps)
-        assert timing.sampled_ns[0] == pytest.approx(16e9 / speed_hz, abs=1.0)
+        assert batches.timing(first).end_ns == pytest.approx(1e9 * length_s, abs=2.0)
         assert all(step.pause_us == 50 for step in steps[::2])
         assert all(step.pause_us >= 10 for step in steps[1::2])
         sent, now_s = sent + len(steps) // 2, now_s + length_s
@@ -121,9 +96,6 @@ def test_the_streams_keep_the_specs_order_and_type():
     for stream in SPEC.streams:
         assert blocks[stream.name].data.dtype == stream.dtype
     assert streams_of(DEFAULT_FRAME, 4400.0) == SPEC.streams
-    # TDC comes before TAC in the stream and after it in the frame.
-    assert DEFAULT_FRAME.index("TAC") < DEFAULT_FRAME.index("TDC")
-    assert COLUMN["TDC"] < COLUMN["TAC"]
 
 
 def test_blocks_are_handed_out_once_and_as_soon_as_they_are_whole():
@@ -173,29 +145,19 @@ def test_bad_parity_is_marked_with_the_number_that_came():
     assert {name for name, counts in batches.faults.items() if counts} == {"E5"}
 
 
-@pytest.mark.parametrize(
-    ("fault", "seen"),
-    [
-        (BioTacFault("dropped-reply", channels=frozenset({"E5", "PAC"}), every=3), Fault.NOT_CONNECTED),
-        (BioTacFault("error-reply", channels=frozenset({"E5", "PAC"}), every=3), Fault.ERROR),
-    ],
-    ids=lambda value: value.name if isinstance(value, BioTacFault) else None,
-)
-def test_what_did_not_come_is_missing_and_nothing_else(fault, seen):
-    batches = FrameBatches(speed_hz=SPEED_HZ, resends=1)
-    # A resend is another word of its channel that the fault could concern: it takes every third of both.
-    blocks = run(FrameBatches(speed_hz=SPEED_HZ), Emulator(wave, faults=[fault]), 9)
+@pytest.mark.parametrize(("kind", "seen"), [("dropped-reply", Fault.NOT_CONNECTED), ("error-reply", Fault.ERROR)])
+def test_what_did_not_come_is_missing_and_nothing_else(kind, seen):
+    batches = FrameBatches(speed_hz=SPEED_HZ)
+    blocks = run(batches, Emulator(wave, faults=[BioTacFault(kind, channels=frozenset({"E5", "PAC"}), every=3)]), 9)
     words = [name for name in DEFAULT_FRAME * 9 if name in ("E5", "PAC")]
-    lost = Counter(name for place, name in enumerate(words, start=1) if place % 3 == 0)
+    lost = Counter(words[2::3])
     slow, fast = blocks["electrodes"], blocks["vibration"]
-    assert np.count_nonzero(slow.quality) == lost["E5"]
-    assert np.count_nonzero(slow.quality[:, COLUMN["E5"]] == MISSING) == lost["E5"]
+    assert (slow.data.shape, fast.data.shape) == ((9, 22), (9 * 22, 1))
+    assert np.count_nonzero(slow.quality) == np.count_nonzero(slow.quality[:, COLUMN["E5"]] == MISSING) == lost["E5"]
     assert np.count_nonzero(fast.quality == MISSING) == np.count_nonzero(fast.quality) == lost["PAC"]
-    assert len(slow.data) == 9
-    assert len(fast.data) == 9 * 22
-    run(batches, Emulator(wave, faults=[fault]), 9)
-    assert batches.resent.total() == 0
-    assert {fault for counts in batches.faults.values() for fault in counts} == {seen}
+    assert {name: counts for name, counts in batches.faults.items() if counts} == {
+        name: {seen: number} for name, number in lost.items()
+    }
 
 
 def test_a_doubled_reply_is_taken_for_the_next_channel():

@@ -1,7 +1,5 @@
 """The maker's text log, written here as the maker's library prints it."""
 
-from __future__ import annotations
-
 from contextlib import suppress
 
 import numpy as np
@@ -21,11 +19,11 @@ HEADER = "DataStructure: 2.0\nDate: 3/4/2012\nTime: 12:30:01\nSampRate: 4400\nBe
 MISSING = int(Quality.MISSING)
 
 
-def words(frames: int, sensor: int = 0) -> list[bytes]:
+def words(frames, sensor=0):
     return [encoded((7 * n + 1000 * sensor + 1) % 4096) for n in range(44 * frames)]
 
 
-def printed(*sensors: list[bytes], frame: tuple[str, ...] = DEFAULT_FRAME, step_s: float = 0.0) -> list[str]:
+def printed(*sensors, frame=DEFAULT_FRAME, step_s=0.0):
     """What ``bt_save_buffer_data`` prints: batches of five frames, both counted from 1."""
     lines = []
     for n, replies in enumerate(zip(*sensors, strict=True)):
@@ -141,7 +139,7 @@ def test_what_cannot_be_read_is_refused(log_of, tmp_path):
             log_of([], **options)
 
 
-@settings(max_examples=50)
+@settings(max_examples=15)
 @given(
     junk=st.lists(
         st.one_of(
