@@ -108,6 +108,7 @@ def test_all_leaves_the_first_baseline_of_the_task_first():
     choice = TaskChoice(name="backwards", estimators=(EstimatorChoice(name="all"),))
     cells = plan_cells(MatrixSpec(repeats=1, tasks=(choice,)), ("biotac",), registry)
     assert [cell.estimator for cell in cells if cell.baseline] == ["time-index", "mean"]
+    assert {cell.estimator for cell in cells} == {one.name for one in ESTIMATORS if "regression" in one.kinds}
 
 
 def test_all_beside_a_name_with_parameters_keeps_both():

@@ -4,29 +4,23 @@ import numpy as np
 import pytest
 
 from tactbench.core.evaluation.reference_floor import Floor, hold_of
-from tactbench.core.plugins.registry import installed
-from tactbench.plugin import RigContext, assumed
-from tactbench.rigs.twin import tactbench_effects
-from tactbench.rigs.twin.rig import build
+from tactbench.plugin import assumed
 from tactbench.tasks import force
+
+from .made import REGISTRY, twin
 
 NOISE_N = 0.6875
 HOLD_S, END_S, END_N = 7.2, 60.0, 5.0
 
 
-@pytest.fixture(scope="module")
-def twin():
-    return build(RigContext(effects=tuple(tactbench_effects())))
-
-
-def references(twin, environment, seeds, sensor="ideal"):
+def references(environment, seeds):
     """Yield (n,) seconds and the (n,) reference force of the task's test scene, one a seed."""
     (planned,) = [one for one in force.SCENES if one.role == "test"]
     asked = planned.scene.model_copy(
         update={"environment": planned.scene.environment.model_copy(update=environment), "observe": ("taxel",)}
     )
     for seed in seeds:
-        with twin.open(installed().sensors[sensor], asked, seed=seed) as acquisition:
+        with twin().open(REGISTRY.sensors["ideal"], asked, seed=seed) as acquisition:
             blocks = [block for block in acquisition if block.stream == "force_torque"]
         yield (
             np.concatenate([block.t_ns for block in blocks]) * 1e-9,
@@ -38,17 +32,16 @@ def floor_of(found):
     return Floor({place: hold_of(y[t_s < HOLD_S]) for place, (t_s, y) in enumerate(found)}).value
 
 
-@pytest.mark.parametrize("first", [1, 9, 17])
-def test_eight_replicates_know_the_twins_noise_to_3_percent(twin, first):
+def test_eight_replicates_know_the_twins_noise_to_3_percent():
     """4800 unloaded samples: one standard error is 1.0 %."""
-    found = list(references(twin, {}, range(first, first + 8)))
+    found = list(references({}, range(1, 9)))
     assert [int((t_s < HOLD_S).sum()) for t_s, _ in found] == [600] * 8
     assert floor_of(found) == pytest.approx(NOISE_N, rel=0.03)
 
 
-def test_behind_a_low_pass_the_hold_still_tells_the_noise_of_the_press(twin):
+def test_behind_a_low_pass_the_hold_still_tells_the_noise_of_the_press():
     """0.12 s of memory at the filter's 1.3 Hz: the holds of 16 replicates are worth some 500 independent samples."""
-    found = list(references(twin, {"force_filter": assumed(1.3, "Hz", "a test")}, range(1, 17)))
+    found = list(references({"force_filter": assumed(1.3, "Hz", "a test")}, range(1, 17)))
     floor = floor_of(found)
     press = []
     for t_s, y in found:
