@@ -159,14 +159,6 @@ def test_compute_time_delays_alarms_and_changes_no_hit(paths):
     assert [late[name] for name in same] == [at_once[name] for name in same]
 
 
-def test_latency_that_is_measured_is_in_the_events(paths):
-    result = run(paths, latency=True)
-    parts = result.times.delay_parts_ms
-    spent_s = (parts["features"] + parts["prediction"]) / 1e3
-    assert result.events["compute s per s of signal"] == pytest.approx(spent_s / 0.01)
-    assert (parts["window"], parts["sampling"]) == (50.0, 10.0)
-
-
 def test_states_are_answered_a_frame_and_shown_under_other_thresholds(paths):
     asked = slip_state.SPEC.model_copy(update={"scenes": ()})
     result = run(paths, "logistic", asked)

@@ -60,7 +60,7 @@ def test_a_vector_is_answered_in_the_tasks_unit(tmp_path):
     assert all(run(place_task(), paths, trivial).score > 1.0 for trivial in ("mean", "time-index"))
 
 
-@pytest.mark.parametrize("estimator", ["lasso", "svm", "boosting", "forest-10", "knn"])
+@pytest.mark.parametrize("estimator", ["lasso", "forest-10", "knn"])
 def test_each_component_is_learnt_as_if_it_were_asked_for_alone(tmp_path, estimator):
     """Parameters that are searched are fixed: a vector has one choice for all of its components."""
     paths = presses(tmp_path, noise=3.0)
