@@ -26,13 +26,8 @@ SOLVED = 1e-5
 
 def skins() -> dict[str, AnySkin]:
     """Return the skin of every installed sensor that declares one."""
-    found = {}
-    sensors = load_registry().sensors
-    for name in sensors.names():
-        skin = sensors[name].spec.skin
-        if skin is not None:
-            found[name] = skin
-    return found
+    found = {sensor.spec.name: sensor.spec.skin for sensor in load_registry().sensors}
+    return {name: skin for name, skin in found.items() if skin is not None}
 
 
 def draw_skin(case: Case) -> AnySkin:
@@ -76,12 +71,10 @@ def lawful(case: Case, press: Press, loads: Sequence[float]) -> list[SkinState]:
     states: list[SkinState] = []
     for load in loads:
         state = press(load)
-        for what, values in (
-            ("deflection", state.deflection_mm), ("pressure", state.pressure_mpa), ("thickness", state.thickness_mm),
-            ("depth", state.depth_mm), ("fluid pressure", state.fluid_pressure_mpa),
-            ("radius", state.contact_radius_mm),
+        for what in (
+            "deflection_mm", "pressure_mpa", "thickness_mm", "depth_mm", "fluid_pressure_mpa", "contact_radius_mm"
         ):  # fmt: skip
-            case.holds(np.isfinite(values).all(), f"{what} at {load:g} N is not finite")
+            case.holds(np.isfinite(getattr(state, what)).all(), f"{what} at {load:g} N is not finite")
         case.holds(np.all(state.pressure_mpa >= 0), f"the indenter pulls at {load:g} N")
         carried = float(state.pressure_mpa.sum()) * dx * ds
         case.holds(abs(carried - load) <= BALANCE * load, f"{carried!r} N are carried of {load!r} N")
@@ -94,6 +87,11 @@ def lawful(case: Case, press: Press, loads: Sequence[float]) -> list[SkinState]:
             case.holds(state.depth_mm >= before * (1 - SOLVED), f"depth falls to {state.depth_mm!r} at {load:g} N")
         states.append(state)
     return states
+
+
+def reaches(press: Press, skin: AnySkin, load: float) -> None:
+    """Raise RigError where the indenter ends before the skin that it touches."""
+    check_reach(press, load, outer_radius_mm(skin.sheet), skin.sheet.dome, skin.sheet.relief)
 
 
 def _loads(case: Case, low: float, high: float) -> list[float]:
@@ -112,7 +110,7 @@ def any_radius(case: Case) -> None:
     case.right = "refusal" if radius < cell else "either" if radius < 3.0 else "answer"
     press = press_of(skin, draw_contact(case, skin, radius))
     states = lawful(case, press, loads)
-    check_reach(press, loads[-1], outer_radius_mm(skin.sheet), skin.sheet.dome, skin.sheet.relief)
+    reaches(press, skin, loads[-1])
     told = remarks(press, loads, outer_radius_mm(skin.sheet), pad_of(skin.sheet, press.medium.grid))
     few = np.count_nonzero(states[-1].pressure_mpa) < math.pi * 3**2
     case.holds(
@@ -128,16 +126,15 @@ def past_the_rim(case: Case) -> None:
     touched = press.gap_mm[state.pressure_mpa > 0]
     # Every gap under a cap is below its radius and the finger's fall; beyond it there are 50 mm more.
     case.right = "refusal" if touched.max() > 30.0 else "answer"
-    check_reach(press, state.force_n, outer_radius_mm(skin.sheet), skin.sheet.dome, skin.sheet.relief)
+    reaches(press, skin, state.force_n)
 
 
 def a_cap_that_is_none(case: Case) -> None:
     """Refuse radii of zero, below zero and not a number."""
+    skin = draw_skin(case)
+    radius = (0.0, -case.decades(1e-3, 1e3), math.nan)[case.rng.integers(3)]
     case.right = "refusal"
-    press_of(
-        skin := draw_skin(case),
-        draw_contact(case, skin, (0.0, -case.decades(1e-3, 1e3), math.nan)[case.rng.integers(3)]),
-    )
+    press_of(skin, draw_contact(case, skin, radius))
 
 
 def unresolved_contact(case: Case) -> None:
@@ -167,10 +164,8 @@ def flat_is_a_huge_cap(case: Case) -> None:
     huge = Contact(case.decades(1e9, 1e15), flat.x_mm, flat.s_mm)
     load = case.decades(1e-6, 100.0)
     first, second = (lawful(case, press_of(skin, one), [load])[0].depth_mm for one in (flat, huge))
-    grid = skin_grid(skin.sheet)
-    apart = float(
-        np.abs(gap_mm(grid, flat, outer_radius_mm(skin.sheet)) - gap_mm(grid, huge, outer_radius_mm(skin.sheet))).max()
-    )
+    grid, outer = skin_grid(skin.sheet), outer_radius_mm(skin.sheet)
+    apart = float(np.abs(gap_mm(grid, flat, outer) - gap_mm(grid, huge, outer)).max())
     r2 = grid.x_mm.size**2 * grid.cell_mm[0] ** 2 + grid.s_mm.size**2 * grid.cell_mm[1] ** 2
     case.holds(apart <= r2 / (2 * huge.radius_mm) * 1.01 + 1e-13, f"the cap sags by {apart!r} mm")
     case.holds(abs(first - second) <= 2 * apart + SOLVED * first, f"{first!r} mm flat, {second!r} mm huge")
@@ -186,7 +181,7 @@ def any_load(case: Case) -> None:
     states = lawful(case, press, loads)
     case.holds(0 < states[0].depth_mm < 1e-9, f"a piconewton presses {states[0].depth_mm:g} mm deep")
     case.right = "either"
-    check_reach(press, loads[-1], outer_radius_mm(skin.sheet), skin.sheet.dome, skin.sheet.relief)
+    reaches(press, skin, loads[-1])
     case.holds("remark load" in remarks(press, loads, outer_radius_mm(skin.sheet)), "500 N and no remark")
 
 

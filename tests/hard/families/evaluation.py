@@ -9,7 +9,7 @@ from __future__ import annotations
 import itertools
 import tempfile
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import partial
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
@@ -17,26 +17,12 @@ from typing import Any
 
 import numpy as np
 
-from tactbench.core.evaluation.cell import CellContext, evaluate_cell
 from tactbench.core.evaluation.protocols import PROTOCOLS
 from tactbench.core.plugins.registry import installed
-from tactbench.core.recording.writer import RecordingWriter
-from tactbench.core.spec.recording import RecordingMeta
-from tactbench.plugin import (
-    Block,
-    ChannelSpec,
-    ChannelTarget,
-    EstimatorDescriptor,
-    LabelTarget,
-    Quality,
-    SensorSpec,
-    Source,
-    StreamSpec,
-    TaskSpec,
-)
+from tactbench.plugin import Block, ChannelSpec, EstimatorDescriptor, Quality, StreamSpec
+from tests.core.evaluation.made import FORCE, evaluated, force_task, label_task, sensor_of, write
 from tests.hard.cases import Case, Family
 
-FORCE = StreamSpec(name="force_torque", channels=(ChannelSpec(name="fz", kind="force", unit="N"),))
 QUICK: dict[str, dict[str, Any]] = {"forest": {"n_estimators": 5}}
 """Parameters that make an estimator quick without making it another one."""
 ROLES = ("train", "validation", "test")
@@ -57,8 +43,15 @@ class Made:
     dtype: str = "float64"
     dropped: int = 0
     """Rows in which some taxel has no sample."""
-    annotated: np.ndarray | None = field(default=None)
+    annotated: np.ndarray | None = None
     """(n,) labels of rows instead of one for the recording."""
+
+    def keep(self, rows: int) -> None:
+        """Leave the first rows; how many of those have a dropout is for the package to say."""
+        for name in ("X", "force", "quality", "t_ns", "force_t_ns", "annotated"):
+            values = getattr(self, name)
+            setattr(self, name, None if values is None else values[:rows])
+        self.dropped = 0
 
 
 def families() -> dict[str, Family]:
@@ -100,19 +93,15 @@ def any_data(case: Case, *, protocol: str, name: str, kind: str) -> None:
     # A probe refuses what changes within a recording, as a force does.
     answerable = kind == "regression" and HARMLESS.issuperset(hardships) and not PROTOCOLS[protocol].probe
     case.right = "answer" if answerable else "either"
-    estimator = installed().estimators[name]
+    asked = {"regression": force_task, "classification": label_task}[kind](
+        protocols=tuple(PROTOCOLS), splits=("roles", "session", "in-session", "shuffled"), baselines=("mean",)
+    )
     with tempfile.TemporaryDirectory() as folder:
         paths = [_written(made, Path(folder) / f"r{place}.h5") for place, made in enumerate(recordings)]
-        ticks = itertools.count()
         splits = [None] if PROTOCOLS[protocol].roles_only else [None, "in-session", "shuffled"]
         split = splits[case.rng.integers(len(splits))]
         case.says(split=str(split))
-        result = evaluate_cell(
-            CellContext(
-                _task(kind), estimator, QUICK.get(name, {}), protocol, split, seed=1, clock=lambda: next(ticks) * 1e-3
-            ),
-            paths,
-        )
+        result = evaluated(asked, paths, name, protocol, split, params=QUICK.get(name), latency=True)
     for what, value in (("score", result.score), ("low end", result.interval.low), ("high end", result.interval.high)):
         case.holds(np.isfinite(value), f"the {what} is {value}")
     case.holds(
@@ -243,12 +232,7 @@ def few_rows(case: Case, recordings: list[Made]) -> None:
     """Leave one to ten rows, fewer than any window; under the paper's protocol one to ten after its first 600."""
     rows = int(case.rng.integers(1, 11))
     for made in _some(case, recordings):
-        rows_kept = rows + (600 if len(made.X) > 600 and case.chance(0.8) else 0)
-        made.X, made.force, made.quality = made.X[:rows_kept], made.force[:rows_kept], made.quality[:rows_kept]
-        made.t_ns = None if made.t_ns is None else made.t_ns[:rows_kept]
-        made.force_t_ns = None if made.force_t_ns is None else made.force_t_ns[:rows_kept]
-        made.annotated = None if made.annotated is None else made.annotated[:rows_kept]
-        made.dropped = 0  # how many of those left is for the package to say
+        made.keep(rows + (600 if len(made.X) > 600 and case.chance(0.8) else 0))
 
 
 def every_row_an_outlier(case: Case, recordings: list[Made]) -> None:
@@ -257,22 +241,13 @@ def every_row_an_outlier(case: Case, recordings: list[Made]) -> None:
     taxels = max(n, max(made.X.shape[1] for made in recordings))
     hit = _some(case, recordings)
     for made in recordings:
-        rows = len(made.X)
-        wide = np.ones((rows, taxels))
-        wide[:, : made.X.shape[1]] = made.X
-        quality = np.zeros(wide.shape, np.uint8)
-        quality[:, : made.X.shape[1]] = made.quality
-        made.X, made.quality = wide, quality
+        more = ((0, 0), (0, taxels - made.X.shape[1]))
+        made.X, made.quality = np.pad(made.X, more, constant_values=1.0), np.pad(made.quality, more)
     for made in hit:
-        keep = slice(0, (600 if len(made.X) > 600 else 0) + n)
-        made.X, made.quality, made.force = made.X[keep], made.quality[keep], made.force[keep]
-        made.t_ns = None if made.t_ns is None else made.t_ns[keep]
-        made.force_t_ns = None if made.force_t_ns is None else made.force_t_ns[keep]
-        made.annotated = None if made.annotated is None else made.annotated[keep]
+        made.keep((600 if len(made.X) > 600 else 0) + n)
         last = min(n, len(made.X))
         made.X[-last:] = 1.0
         made.X[-last:][np.arange(last), np.arange(last)] = 1e6
-        made.dropped = 0
 
 
 def strange_clocks(case: Case, recordings: list[Made]) -> None:
@@ -313,32 +288,14 @@ HARMLESS = frozenset(
 """What no regression may refuse: nothing that is asked for is missing."""
 
 
-def _task(kind: str) -> TaskSpec:
-    regression = kind == "regression"
-    return TaskSpec(
-        name="hard", title="Hard", question="?", kind=kind,
-        target=ChannelTarget(kind="force") if regression else LabelTarget(name="kind"),
-        metric="rmse" if regression else "macro_f1", unit="N" if regression else "",
-        protocols=tuple(PROTOCOLS), estimators=("lasso",), splits=("roles", "session", "in-session", "shuffled"),
-        baselines=("mean",),
-    )  # fmt: skip
-
-
 def _written(made: Made, path: Path) -> Path:
     channels = tuple(ChannelSpec(name=f"t{place}", kind="taxel") for place in range(made.X.shape[1]))
-    stream = StreamSpec(name="taxels", channels=channels, dtype=made.dtype)
-    sensor = SensorSpec(
-        name="made", title="Made by hand", principle="none", streams=(stream,),
-        principle_source=Source(tag="assumed", reference="a hard case"),
+    times = made.t_ns if made.force_t_ns is None else made.force_t_ns
+    return write(
+        path, sensor_of(StreamSpec(name="taxels", channels=channels, dtype=made.dtype)),
+        Block("taxels", made.t_ns, made.X.astype(made.dtype), made.quality),
+        Block("force_torque", times, made.force[:, None]),
+        annotations={} if made.annotated is None else {"kind": made.annotated}, reference=(FORCE,),
+        clock="none" if made.t_ns is None else "device", role=made.role, session=made.session,
+        labels={"kind": made.label} if made.annotated is None else {},
     )  # fmt: skip
-    about = RecordingMeta(
-        name=path.stem, sensor=sensor, reference=(FORCE,), rig="made", clock="none" if made.t_ns is None else "device",
-        role=made.role, session=made.session, labels={} if made.annotated is not None else {"kind": made.label},
-    )  # fmt: skip
-    with RecordingWriter(path, about) as writer:
-        writer.append(Block("taxels", made.t_ns, made.X.astype(made.dtype), made.quality))
-        times = made.t_ns if made.force_t_ns is None else made.force_t_ns
-        writer.append(Block("force_torque", times, made.force[:, None]))
-        if made.annotated is not None:
-            writer.annotate("taxels", "kind", made.annotated)
-    return path
