@@ -133,15 +133,6 @@ def test_faults_as_a_rig_file_writes_them():
     assert fault == BioTacFault("error-reply", start_s=1.5, every=3, channels=frozenset({"E5", "PAC"}), error=0x57)
 
 
-def test_a_sensor_hears_its_own_lines_only():
-    sensor = Emulator(lambda t_s: COUNTS, select=0b110)
-    sensor.exchange(0b011, b"\xa2\x00", 0.0)
-    assert sensor.exchange(0b111, bytes(2), 1.0) == b"\xff\xff"
-    sensor.exchange(0b111, b"\xa2\x00", 2.0)
-    assert sensor.exchange(0b001, bytes(2), 2.1) == b"\xff\xff"
-    assert sensor.exchange(0b110, bytes(2), 2.2) == b"\x6d\x58"
-
-
 @pytest.mark.parametrize("clock_hz", [500_000, 10_000_000])
 def test_a_built_emulator_keeps_the_pause_at_every_clock(clock_hz):
     sensor = build_emulator(EmulatorSettings(lambda t_s: COUNTS, np.random.default_rng(1), {"select": 2}, ()))

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tactbench.plugin import Quality
-from tactbench.sensors.biotac.codec import CHANNELS, INDEX, RESEND, Fault, encoded, sampling_command
+from tactbench.sensors.biotac.codec import CHANNELS, INDEX, Fault, encoded, sampling_command
 from tactbench.sensors.biotac.emulator import BioTacFault, Emulator
 from tactbench.sensors.biotac.frames import DEFAULT_FRAME, FrameBatches, FrameRows, streams_of
 from tactbench.sensors.biotac.spec import SPEC
@@ -121,16 +121,6 @@ def test_a_resend_that_is_bad_too_leaves_the_first_word_marked():
     assert batches.resent.total() == 0
 
 
-def test_each_resend_follows_its_own_word():
-    first, steps = FrameBatches(("E1", "PAC"), speed_hz=SPEED_HZ, resends=1, select=4).next()
-    assert [step.data for step in steps[::2]] == [b"\xa2\x00", RESEND, b"\x80\x00", RESEND]
-    assert {step.select for step in steps} == {4}
-    assert (first, len(steps)) == (0, 8)
-    assert sum(8 * len(step.data) / SPEED_HZ + 1e-6 * step.pause_us for step in steps) == pytest.approx(
-        2 / 4400, abs=1e-6
-    )
-
-
 def test_bad_parity_is_marked_with_the_number_that_came():
     batches = FrameBatches(speed_hz=SPEED_HZ)
     faults = [BioTacFault("parity", channels=frozenset({"E5"}))]
@@ -169,15 +159,6 @@ def test_a_doubled_reply_is_taken_for_the_next_channel():
     assert slow.data[:, COLUMN["E5"]].tolist() == fast.data[3::22, 0].tolist()
     assert not slow.quality.any()
     assert not any(batches.faults.values())
-
-
-def test_a_sensor_that_is_not_connected_has_rows_of_missing_samples():
-    batches = FrameBatches(speed_hz=SPEED_HZ)
-    faults = [BioTacFault("not-connected", start_s=0.0099, end_s=0.0199)]  # after the last word of each
-    block = run(batches, Emulator(wave, faults=faults), 3)["electrodes"]
-    assert (block.quality == MISSING).all(axis=1).tolist() == [False, True, False]
-    assert not block.quality[[0, 2]].any()
-    assert sum(counts[Fault.NOT_CONNECTED] for counts in batches.faults.values()) == 44
 
 
 def test_the_ends_of_the_converter_are_marked_saturated():

@@ -11,8 +11,6 @@ from hypothesis import strategies as st
 from tactbench.plugin import Quality, UsageError
 from tactbench.plugin.devices import CanFrame
 from tactbench.sensors.icub.codec import (
-    NO_ACK,
-    NOT_CONNECTED,
     BoardSetup,
     OldSetup,
     OldSetup2,
@@ -22,7 +20,6 @@ from tactbench.sensors.icub.codec import (
     Version,
     VersionRequest,
     command_frame,
-    out_of_range,
     read_command,
     read_version,
     reading,
@@ -36,8 +33,7 @@ from tactbench.sensors.icub.spec import SPEC
 GOOD, MISSING, SATURATED, SUSPECT = Quality.GOOD, Quality.MISSING, Quality.SATURATED, Quality.SUSPECT
 PERIOD_S = 0.02
 PERIOD_NS = 20_000_000
-REST = "F0 " * 7
-REST_TAIL = "F0 " * 5
+HEAD, TAIL = "40" + "F0" * 7, "C0" + "F0" * 5
 
 COMMANDS = [
     (0x20E, "4D 01 28 F0", BoardSetup(1, 40, 240), "t20E44D0128F0"),
@@ -56,47 +52,28 @@ COMMANDS = [
 ]
 """Identifier, data, command, Lawicel text."""
 
-PAIRS = [
-    (0x4E3, "40" + REST, "C0" + REST_TAIL + "00 00", [240] * 12, 0),
-    (0x4E0, "40 F5 F5 F5 F5 F5 F5 F5", "C0 F5 F5 F5 F5 F5 00 00", [245] * 12, 0),
-    (0x4E4, "40 0A 0B 0C 0D 0E 0F 10", "C0 11 12 13 14 15 00 00", list(range(10, 22)), 0),
-    (0x4E1, "40 F0 F0 F0 F0 F0 B4 F0", "C0" + REST_TAIL + "00 00", [240] * 5 + [180] + [240] * 6, 0),
-    (0x4E2, "40" + REST, "C0 64 F0 F0 F0 00 00 00", [240] * 7 + [100, 240, 240, 240, 0], 0),
-    (0x4E2, "40 FF F0 F0 F0 F0 F0 F0", "C0" + REST_TAIL + "00 10", [255] + [240] * 11, 0x0010),
-    (0x4E2, "40" + REST, "C0 F0 F0 F0 F0 00 80 00", [240] * 11 + [0], 0x8000),
-    (0x41F, "40" + REST, "C0" + REST_TAIL + "00 01", [240] * 12, 0x0001),
-    (0x4FF, "40" + "00" * 7, "C0" + "00" * 5 + "FF F2", [0] * 12, 0xFFF2),
-    (0x400, "40" + "FF" * 7, "C0" + "FF" * 5 + "00 00", [255] * 12, 0),
-    (0x3E3, "40" + REST, "C0" + REST_TAIL + "00 00", [240] * 12, 0),
-]
-"""Identifier, head, tail, taxels, error word."""
+PAIRS = """
+    4E3 40F0F0F0F0F0F0F0 C0F0F0F0F0F00000 GGGGGGGGGGGG
+    4E0 40F5F5F5F5F5F5F5 C0F5F5F5F5F50000 GGGGGGGGGGGG
+    4E4 400A0B0C0D0E0F10 C011121314150000 GGGGGGGGGGGG
+    4E1 40F0F0F0F0F0B4F0 C0F0F0F0F0F00000 GGGGGGGGGGGG
+    4E2 40F0F0F0F0F0F0F0 C064F0F0F0000000 GGGGGGGGGGGE
+    4E2 40FFF0F0F0F0F0F0 C0F0F0F0F0F00010 RGGGGGGGGGGG
+    4E2 40F0F0F0F0F0F0F0 C0F0F0F0F0008000 GGGGGGGGGGGR
+    41F 40F0F0F0F0F0F0F0 C0F0F0F0F0F00001 SSSSSSSSSSSS
+    4FF 4000000000000000 C00000000000FFF2 MMMMMMMMMMMM
+    400 40FFFFFFFFFFFFFF C0FFFFFFFFFF0000 EEEEEEEEEEEE
+    3E3 40F0F0F0F0F0F0F0 C0F0F0F0F0F00000 GGGGGGGGGGGG
+"""
+"""Identifier, head and tail; quality of each taxel: good, at its end, out of range, suspect, missing."""
+MARKS = {"G": GOOD, "E": SATURATED, "R": SATURATED | SUSPECT, "S": SUSPECT, "M": MISSING}
 
-MARKS = {
-    4: [GOOD] * 11 + [SATURATED],
-    5: [SATURATED | SUSPECT] + [GOOD] * 11,
-    6: [GOOD] * 11 + [SATURATED | SUSPECT],
-    7: [SUSPECT] * 12,
-    8: [MISSING] * 12,
-    9: [SATURATED] * 12,
-}
-"""Quality of those pairs that are not all good."""
-
-WORDS = [
-    ("00 00", (), 0),
-    *((f"{0x10 << taxel >> 8:02X} {0x10 << taxel & 0xFF:02X}", (taxel,), 0) for taxel in range(12)),
-    ("00 01", (), NO_ACK),
-    ("00 02", (), NOT_CONNECTED),
-    ("00 03", (), NO_ACK | NOT_CONNECTED),
-    ("80 10", (0, 11), 0),
-    ("08 01", (7,), NO_ACK),
-    ("FF F0", tuple(range(12)), 0),
-    ("FF F2", tuple(range(12)), NOT_CONNECTED),
-    ("05 50", (0, 2, 4, 6), 0),
-    ("00 F0", (0, 1, 2, 3), 0),
-    ("0F 00", (4, 5, 6, 7), 0),
-    ("F0 00", (8, 9, 10, 11), 0),
-]
-"""Bytes 6 and 7 of the tail, taxels out of range, flags."""
+WORDS = """
+    0000: 0010:0 0020:1 0040:2 0080:3 0100:4 0200:5 0400:6 0800:7 1000:8 2000:9 4000:10 8000:11
+    0001: 0002: 0003: 8010:0,11 0801:7 FFF0:0,1,2,3,4,5,6,7,8,9,10,11 FFF2:0,1,2,3,4,5,6,7,8,9,10,11
+    0550:0,2,4,6 00F0:0,1,2,3 0F00:4,5,6,7 F000:8,9,10,11
+"""
+"""Bytes 6 and 7 of the tail, and the taxels out of range; 1 is no acknowledgement, 2 not connected."""
 
 CHANGES = {
     (240, 2): "0 240, 1 240, 3 240, 4 239, 40 230, 400 140, 956 1, 959 1, 960 0, 1919 0, 1920 0*, -1 241, -4 241, "
@@ -140,94 +117,86 @@ def test_commands(identifier, data, command, text):
         bus.shutdown()
 
 
-@pytest.mark.parametrize(
-    ("number", "identifier", "head", "tail", "taxels", "word"),
-    [(n, *row) for n, row in enumerate(PAIRS)],
-    ids=[f"IC-2.{n}" for n in range(1, len(PAIRS) + 1)],
-)
-def test_pairs(number, identifier, head, tail, taxels, word):
+@pytest.mark.parametrize("line", PAIRS.strip().splitlines(), ids=[f"IC-2.{n}" for n in range(1, 12)])
+def test_pairs(line):
+    number, head, tail, marks = line.split()
+    identifier = int(number, 16)
     frames = frame(identifier, head), frame(identifier, tail)
     board, triangle, old = identifier >> 4 & 0xF, identifier & 0xF, identifier >> 8 == 3
+    taxels, word = frames[0].data[1:] + frames[1].data[1:6], int(tail[-4:], 16)
     assert skin_frames(board, triangle, taxels, word, old=old) == frames
     decoder = SkinDecoder(PERIOD_S, old_ids=True)
     assert decoder.feed(frames[0]) == []
     (sample,) = decoder.feed(frames[1])
     assert (sample.board, sample.triangle, sample.sequence) == (board, triangle, 0)
-    assert list(sample.taxels) == taxels
-    assert sample.word == word
-    assert list(sample.quality) == MARKS.get(number, [GOOD] * 12)
+    assert (sample.taxels, sample.word) == (taxels, word)
+    assert sample.quality == tuple(MARKS[mark] for mark in marks)
 
 
 def test_short_tail_of_old_firmware_ic_2():
     decoder = SkinDecoder(PERIOD_S)
-    (sample,) = fed(decoder, frame(0x4E3, "40" + REST), frame(0x4E3, "C0" + REST_TAIL))
-    assert list(sample.taxels) == [240] * 12
-    assert sample.word is None
-    assert set(sample.quality) == {GOOD}
+    (sample,) = fed(decoder, frame(0x4E3, HEAD), frame(0x4E3, TAIL))
+    assert (sample.taxels, sample.word, set(sample.quality)) == (bytes([240] * 12), None, {GOOD})
     assert decoder.counts[14, 3].without_word == 1
 
 
 def test_no_skin_data_ic_2():
     decoder = SkinDecoder(PERIOD_S)
-    assert fed(decoder, frame(0x4E3, "80" + REST)) == []
+    assert fed(decoder, frame(0x4E3, "80" + HEAD[2:])) == []
     assert decoder.foreign == 1
     assert decoder.flush() == []
 
 
-@pytest.mark.parametrize(("data", "taxels", "flags"), WORDS, ids=[f"IC-3.{n}" for n in range(1, len(WORDS) + 1)])
-def test_error_words(data, taxels, flags):
-    word = int(data.replace(" ", ""), 16)
-    assert out_of_range(word) == taxels
+@pytest.mark.parametrize("entry", WORDS.split(), ids=lambda entry: f"IC-3-{entry[:4]}")
+def test_error_words(entry):
+    data, _, numbers = entry.partition(":")
+    word, taxels = int(data, 16), [int(number) for number in numbers.split(",") if number]
     decoder = SkinDecoder(PERIOD_S)
-    (sample,) = fed(decoder, frame(0x4E3, "40" + REST), frame(0x4E3, "C0" + REST_TAIL + data))
-    assert (sample.word, sample.word & 0xF) == (word, flags)
-    if flags & NOT_CONNECTED:
+    (sample,) = fed(decoder, frame(0x4E3, HEAD), frame(0x4E3, TAIL + data))
+    assert sample.word == word
+    if word & 2:
         assert set(sample.quality) == {MISSING}
     else:
-        assert [taxel for taxel, mark in enumerate(sample.quality) if mark & SATURATED] == list(taxels)
-        suspect = range(12) if flags & NO_ACK else taxels
-        assert [taxel for taxel, mark in enumerate(sample.quality) if mark & SUSPECT] == list(suspect)
+        assert [taxel for taxel, mark in enumerate(sample.quality) if mark & SATURATED] == taxels
+        suspect = list(range(12)) if word & 1 else taxels
+        assert [taxel for taxel, mark in enumerate(sample.quality) if mark & SUSPECT] == suspect
     counts = decoder.counts[14, 3]
     assert counts.out_of_range == [int(taxel in taxels) for taxel in range(12)]
-    assert (counts.no_ack, counts.not_connected) == (bool(flags & NO_ACK), bool(flags & NOT_CONNECTED))
+    assert (counts.no_ack, counts.not_connected) == (word & 1, word >> 1 & 1)
 
 
 @pytest.mark.parametrize(
-    ("rest", "shift", "change", "wanted"),
-    [
-        pytest.param(rest, shift, *entry.split(), id=f"IC-4 rest {rest} shift {shift} change {entry.split()[0]}")
-        for (rest, shift), entries in CHANGES.items()
-        for entry in entries.split(", ")
-    ],
+    ("rest", "shift", "entry"),
+    [(rest, shift, entry) for (rest, shift), entries in CHANGES.items() for entry in entries.split(", ")],
 )
-def test_readings(rest, shift, change, wanted):
+def test_readings_ic_4(rest, shift, entry):
+    change, wanted = entry.split()
     assert reading(int(change), rest, shift) == (int(wanted.rstrip("*")), wanted.endswith("*"))
 
 
 def test_version_as_the_firmware_lays_it_out():
     # Message_GET_VERSION: command, board type, version and build, protocol, whether it fits; to the one who asked.
     version = Version(11, (1, 2, 3), (2, 1), True)
-    answer = version_frame(14, version)
-    assert answer == frame(0x2E0, "1C 0B 01 02 03 02 01 01")
-    assert read_version(answer) == (14, version)
-    assert read_command(answer) is None
-    request = command_frame(14, VersionRequest(2, 1))
-    assert request == frame(0x20E, "1C 02 01")
-    assert read_command(request) == (14, VersionRequest(2, 1))
-    assert read_version(request) is None
+    answer, request = frame(0x2E0, "1C 0B 01 02 03 02 01 01"), frame(0x20E, "1C 02 01")
+    assert (version_frame(14, version), command_frame(14, VersionRequest(2, 1))) == (answer, request)
+    assert (read_version(answer), read_command(answer)) == ((14, version), None)
+    assert (read_version(request), read_command(request)) == (None, (14, VersionRequest(2, 1)))
 
 
-def test_numbers_that_do_not_fit_are_refused():
-    for wrong in (
+@pytest.mark.parametrize(
+    "wrong",
+    [
         lambda: skin_id(-1, 0),
         lambda: command_frame(14, BoardSetup(period_ms=256)),
         lambda: command_frame(14, TriangleSetup(first=5, last=4)),
         lambda: command_frame(14, TriangleSetup(cdc_offset=0x10000)),
         lambda: skin_frames(14, 3, [0] * 11),
         lambda: SkinDecoder(float("nan")),
-    ):
-        with pytest.raises(UsageError):
-            wrong()
+    ],
+)
+def test_numbers_that_do_not_fit_are_refused(wrong):
+    with pytest.raises(UsageError):
+        wrong()
 
 
 def test_halves_pair_in_their_order_on_the_bus():
