@@ -29,12 +29,6 @@ def sets(paths, role):
     return kept, part(kept, FeatureScale(*moments(kept.X)), 0), counts
 
 
-def test_the_first_600_samples_are_dropped(tmp_path):
-    kept, _, _ = sets(three(tmp_path, ramp), "train")
-    assert kept.row.min() == 600
-    assert len(kept.row) == 1000
-
-
 def test_a_sample_goes_if_any_channel_is_beyond_three_sigma_of_its_set(tmp_path):
     def with_outliers(seed):
         X, force = ramp(seed)

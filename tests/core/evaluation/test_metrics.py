@@ -51,15 +51,6 @@ def test_sessions_are_resampled_where_there_are_enough():
     assert within.high - within.low < by_session.high - by_session.low, "time alone does not see the sessions' spread"
 
 
-def test_a_class_in_few_sessions_is_never_resampled_away():
-    recording = np.repeat(np.arange(5), 100)
-    y = recording.copy()
-    p = np.where(np.random.default_rng(0).random(500) < 0.7, y, 0)
-    found = interval(y, p, recording, recording, "macro_f1", 5)
-    assert "within 5 recordings" in found.method
-    assert found.low < METRICS["macro_f1"].of(y, p, 5) < found.high
-
-
 def test_the_block_interval_covers_the_truth_where_errors_have_memory():
     rng = np.random.default_rng(4)
     hits, naive = 0, 0

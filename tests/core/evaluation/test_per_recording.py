@@ -207,20 +207,6 @@ def test_frames_vote_and_of_equals_the_first_class_wins():
     assert mean.tolist() == [2.0, 5.0]
 
 
-def test_a_vote_scores_recordings_that_frames_alone_get_half_wrong(tmp_path):
-    """A class shifts readings by half their deviation: 60 % of the frames are answered rightly, and 60 frames agree."""
-    rng = np.random.default_rng(4)
-    paths = [record(tmp_path / f"s{place:02d}.h5", rng.normal(place % 2 * 0.5, 1, (120, 1)),
-                    labels={"slip": place % 2}) for place in range(20)]  # fmt: skip
-    frames = label_task("slip", splits=("recording",))
-    one, all_of_them = run(frames, paths, estimator="logistic"), run(vote(), paths, estimator="logistic")
-    assert one.score < 0.7
-    assert all_of_them.score > 0.9
-    assert (one.sizes.n_test, all_of_them.sizes.n_test, all_of_them.times.batch_rows) == (2400, 20, 2400)
-    assert one.sizes.n_train == all_of_them.sizes.n_train
-    assert all_of_them.interval.method.startswith("jackknife over 20 recordings ")
-
-
 def pushes(folder, number=18, n=60, seed=2):
     """Recordings that rise to a force of their own, which the first channel follows; what it rests at tells nothing."""
     rng = np.random.default_rng(seed)

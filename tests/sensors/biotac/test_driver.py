@@ -238,16 +238,6 @@ def test_a_host_that_is_late_by_less_than_what_is_under_way_loses_nothing():
         assert driver.counts == {}
 
 
-def test_an_adapter_without_a_counter_has_host_times_alone():
-    with virtual(Sensed(), counter=False, holds=1) as (driver, _, _):
-        driver.start()
-        streams = read_frames(driver, 10)
-        assert driver.counts == {}
-    assert streams["electrodes"]["device_ns"] is None
-    assert np.diff(streams["electrodes"]["t_ns"]) == pytest.approx(1e7, abs=1000)
-    assert np.diff(streams["vibration"]["t_ns"]) == pytest.approx(1e9 / 2200, abs=1500)
-
-
 def test_stopped_it_reads_nothing_and_begins_anew():
     with virtual(Sensed(), "parity:channels=E5") as (driver, link, _):
         assert driver.read(0.0) == []

@@ -96,14 +96,6 @@ def test_what_is_sensed_comes_back_to_the_converters_step_and_what_is_left_out_i
     assert abs(reply.value - min(max(counts, 0.0), 4095.0)) <= 0.5
 
 
-def test_faults_concern_their_channels_and_times_only():
-    fault = BioTacFault("dropped-reply", start_s=1.0, end_s=2.0, channels=frozenset({"PAC"}))
-    sensor = Emulator(lambda t_s: COUNTS, faults=[fault])
-    for command, at_s, answer in ((b"\x80\x00", 0.5, "7F29"), (b"\x80\x00", 1.5, "FFFF"), (b"\xa2\x00", 1.6, "6D58")):
-        assert exchange(sensor, command, at_s=at_s) == bytes.fromhex(answer)
-    assert exchange(sensor, b"\x80\x00", at_s=2.0) == b"\x7f\x29"
-
-
 def test_a_stuck_channel_holds_what_it_read_and_lets_go():
     sensor = Emulator(
         lambda t_s: {"E1": 1000.0 + 100.0 * t_s, "E2": 1000.0 + 100.0 * t_s},

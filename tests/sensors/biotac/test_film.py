@@ -2,13 +2,11 @@
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from tactbench.plugin.simulation import SkinGrid
 from tactbench.sensors.biotac.electrodes import ELECTRODES
 from tactbench.sensors.biotac.film import core_mm, mid_film_mm, refined, spectral_interpolation
-from tactbench.sensors.biotac.meshes import CORE_MM, ELECTRODES_MM, ray_on_sheet, sheet_x
+from tactbench.sensors.biotac.meshes import CORE_MM, ELECTRODES_MM
 from tactbench.sensors.biotac.sheet import faces_between
 from tactbench.sensors.biotac.spec import SKIN
 
@@ -41,17 +39,6 @@ def test_every_electrode_is_let_into_the_core_by_the_same_depth():
 def test_the_inner_skin_ends_where_the_meshes_do():
     (tip,) = mid_film_mm(np.array([OUTER + DOME]), np.zeros(1), np.zeros((1, 1)), OUTER, DOME)[0]
     assert tip == pytest.approx([7.13, 0.0, 0.0], abs=0.03)
-
-
-@given(x=st.floats(-17.0, 1.8), height=st.floats(4.0, 5.4))
-def test_behind_the_tip_what_faces_a_point_lies_radially_above(x, height):
-    assert sheet_x(x, height, OUTER, DOME) == x
-
-
-@given(ray=st.floats(0.0, 1.55), further=st.floats(0.001, 0.01))
-def test_rays_meet_the_sheet_in_order_and_on_it(ray, further):
-    here, there = (ray_on_sheet(angle, OUTER, DOME) for angle in (ray, ray + further))
-    assert 1.8 <= here < there <= OUTER + DOME
 
 
 def test_a_curved_film_conducts_as_its_middle_is_long():

@@ -98,20 +98,6 @@ def test_the_streams_keep_the_specs_order_and_type():
     assert streams_of(DEFAULT_FRAME, 4400.0) == SPEC.streams
 
 
-def test_blocks_are_handed_out_once_and_as_soon_as_they_are_whole():
-    batches, sensor, seen = FrameBatches(speed_hz=SPEED_HZ, words=1), Emulator(wave), Counter()
-    for n in range(3 * 44):
-        first, steps = batches.next()
-        assert first == n
-        batches.take(first, carried_out(steps, sensor, n * PERIOD_S)[0], t_ns=0)
-        for block in batches.blocks():
-            seen[block.stream] += len(block.data)
-        assert seen["vibration"] == (n + 1) // 2
-        assert seen["electrodes"] == (n + 1 + 1) // 44 if n >= 42 else seen["electrodes"] == 0
-    batches.close()
-    assert batches.blocks() == []
-
-
 def test_a_resend_that_is_bad_too_leaves_the_first_word_marked():
     batches = FrameBatches(speed_hz=SPEED_HZ, resends=1)
     faults = [BioTacFault("parity", channels=frozenset({"E5"}))]

@@ -3,7 +3,6 @@
 from dataclasses import replace
 
 import can
-import numpy as np
 import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
@@ -25,10 +24,8 @@ from tactbench.sensors.icub.codec import (
     reading,
     skin_frames,
     skin_id,
-    to_block,
     version_frame,
 )
-from tactbench.sensors.icub.spec import SPEC
 
 GOOD, MISSING, SATURATED, SUSPECT = Quality.GOOD, Quality.MISSING, Quality.SATURATED, Quality.SUSPECT
 PERIOD_S = 0.02
@@ -226,14 +223,6 @@ def test_equal_samples_in_a_burst_are_not_doubled():
     assert decoder.counts[14, 3].doubled == 0
 
 
-def test_boards_and_triangles_are_kept_apart():
-    places = [(board, triangle) for board in (1, 14) for triangle in (0, 15)]
-    heads, tails = zip(*(skin_frames(*place, [k] * 12) for k, place in enumerate(places)), strict=True)
-    samples = fed(SkinDecoder(PERIOD_S), *heads, *tails)
-    assert [(sample.board, sample.triangle, sample.sequence) for sample in samples] == [(*one, 0) for one in places]
-    assert [sample.taxels for sample in samples] == [bytes([k] * 12) for k in range(4)]
-
-
 def test_frames_of_wrong_length_and_kind_are_kept_out():
     decoder = SkinDecoder(PERIOD_S)
     head, tail = pair()
@@ -247,20 +236,6 @@ def test_frames_of_wrong_length_and_kind_are_kept_out():
 def test_reserved_bits_make_a_sample_suspect():
     (sample,) = fed(SkinDecoder(PERIOD_S), *pair(word=0x0004))
     assert set(sample.quality) == {SUSPECT}
-
-
-def test_samples_are_a_block_of_the_stream():
-    (stream,) = SPEC.streams
-    block = to_block(
-        fed(SkinDecoder(PERIOD_S), *pair(), *pair(PERIOD_NS, 0), pair(2 * PERIOD_NS)[0], *pair(3 * PERIOD_NS))
-    )
-    assert (block.stream, block.data.dtype, block.data.shape) == (stream.name, np.dtype(stream.dtype), (4, 12))
-    assert block.t_ns.tolist() == [0, PERIOD_NS, 2 * PERIOD_NS, 3 * PERIOD_NS]
-    assert block.quality[1].tolist() == [int(SATURATED)] * 12
-    assert block.quality[2].tolist() == [int(SUSPECT)] * 7 + [int(MISSING)] * 5
-    # The boards have no counter of their own, and a block's sequence is just that.
-    assert block.sequence is None
-    assert to_block([]).data.shape == (0, 12)
 
 
 frames = st.builds(

@@ -2,7 +2,6 @@
 
 import math
 
-import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -16,7 +15,6 @@ from tactbench.sensors.icub.codec import (
     Transmit,
     TriangleSetup,
     command_frame,
-    skin_id,
 )
 from tactbench.sensors.icub.emulator import BoardFault, Bus
 
@@ -60,19 +58,6 @@ def test_it_sends_from_the_start_to_the_stop_at_its_period():
     assert bus.poll(30.0) == []
 
 
-def test_what_stops_it_and_what_starts_it_anew():
-    bus = bus_of()
-    told(bus, BoardSetup(), Transmit(True))
-    assert bus.poll(1.0) == []  # a board's set-up disables its triangles
-    started(bus, now_s=1.0)
-    told(bus, TriangleSetup(0, 2), now_s=1.1)
-    assert len(bus.poll(2.0)) == 0
-    told(bus, Transmit(True), BoardSetup(period_ms=20), TriangleSetup(3, 3), Transmit(True), now_s=2.0)
-    assert len(samples_of(bus, 2.11)) == 5
-    told(bus, TriangleSetup(3, 3, enabled=False), Transmit(True), now_s=2.11)
-    assert bus.poll(3.0) == []
-
-
 def test_a_board_that_was_not_set_up_has_the_firmware_s_defaults():
     bus = bus_of()
     told(bus, Transmit(True))
@@ -84,28 +69,6 @@ def test_a_board_that_was_not_set_up_has_the_firmware_s_defaults():
         else:  # no chip: nothing has changed, and the error word says so
             assert (sample.taxels, sample.word) == (bytes([245] * 12), 0x0002)
             assert set(sample.quality) == {Quality.MISSING}
-
-
-def test_what_the_firmware_passes_over_changes_nothing():
-    bus = started(bus_of())
-    for identifier, data in (
-        (0x20E, "50 05 04 02 01 00 22"),  # triangles out of order
-        (0x20E, "50 00 10 02 01 00 22"),
-        (0x20E, ""),
-        (0x20D, "07 01"),  # another board's
-    ):
-        bus.feed(CanFrame(identifier, bytes.fromhex(data)), 0.0)
-    assert len(bus.poll(0.05)) == 2
-
-
-def test_frames_take_their_time_on_the_bus_one_after_the_other():
-    bus = bus_of()
-    told(bus, BoardSetup(), TriangleSetup(0, 15), Transmit(True))
-    frames = [frame for _, frame in bus.poll(0.079)]
-    assert [frame.id for frame in frames] == [skin_id(14, triangle) for triangle in range(16) for _ in range(2)]
-    assert [frame.data[0] for frame in frames] == [0x40, 0xC0] * 16
-    ends_ns = [frame.t_ns for frame in frames]
-    assert ends_ns == pytest.approx(40e6 + 135e3 * np.arange(1, 33), abs=1)
 
 
 @given(st.lists(st.floats(0.0, 0.5), max_size=20))
