@@ -8,11 +8,8 @@ import numpy as np
 import pytest
 
 from tactbench.core.evaluation.fitting import fit
-from tactbench.core.matrix.plan import Cell
-from tactbench.core.matrix.solve import Job, solve, unanswered
 from tactbench.core.provenance.source import versions
 from tactbench.plugin import NotApplicable, load_object, load_registry
-from tests.core.evaluation.made import record
 
 REGISTRY = load_registry()
 FAST = REGISTRY.estimators["forest-fast"]
@@ -35,24 +32,12 @@ def extra():
         pytest.importorskip("sklearnex", reason="the extra [fast] is not installed")
 
 
-def test_a_cell_without_the_extra_is_skipped_with_the_reason_and_is_no_failure(tmp_path, monkeypatch):
+def test_without_the_extra_the_reason_names_the_command(monkeypatch):
+    """A cell that is not applicable is skipped with the reason, and is no failure."""
     monkeypatch.setitem(sys.modules, "sklearnex", None)
     monkeypatch.delitem(sys.modules, "sklearnex.ensemble", raising=False)
-    rng = np.random.default_rng(0)
-    paths = tuple(
-        record(tmp_path / f"{name}-{radius}.h5", rng.normal(size=(50, 3)), session=name,
-               labels={"cap_radius_mm": radius})
-        for name in ("first", "second") for radius in (5.0, 40.0)
-    )  # fmt: skip
-    cell = Cell(
-        sensor="made", task="curvature", rig="replay", protocol="deployable", split="session", estimator="forest-fast",
-        params=(), baseline=False, repeat=1, repeats=1, seed=1,
-    )  # fmt: skip
-    with pytest.raises(NotApplicable) as reason:
-        solve(Job(cell, REGISTRY.tasks["curvature"].spec, FAST, paths, (), "", {}))
-    row = unanswered(cell, REGISTRY.tasks["curvature"].spec, reason.value, simulated=False)
-    assert row["status"] == "skipped", row["reason"]
-    assert "pip install 'tactbench[fast]'" in row["reason"], "the next step"
+    with pytest.raises(NotApplicable, match=r"pip install 'tactbench\[fast\]'"):
+        build()
 
 
 def test_a_cell_of_it_is_keyed_by_the_version_of_the_extra():

@@ -37,11 +37,9 @@ class Answering:
     ("given", "n_classes", "says"),
     [
         (np.zeros((3, 1)), 0, r"shape \(3, 1\)"),
-        (np.zeros(2), 0, r"shape \(2,\)"),
         (np.array([0.0, np.nan, np.inf]), 0, "2 values that are NaN"),
         (np.array(["a", "b", "c"]), 3, "type"),
         (np.array([0, 1, 3]), 3, "do not exist"),
-        (np.array([0, 1, -1]), 3, "do not exist"),
         (np.array([0.0, 0.5, 1.0]), 3, "do not exist"),
     ],
 )

@@ -107,20 +107,6 @@ def test_a_resend_that_is_bad_too_leaves_the_first_word_marked():
     assert batches.resent.total() == 0
 
 
-def test_bad_parity_is_marked_with_the_number_that_came():
-    batches = FrameBatches(speed_hz=SPEED_HZ)
-    faults = [BioTacFault("parity", channels=frozenset({"E5"}))]
-    block = run(batches, Emulator(lambda t_s: {**wave(t_s), "E5": 1739.0}, faults=faults), 16)["electrodes"]
-    column = COLUMN["E5"]
-    assert set(block.quality[:, column]) == {SUSPECT}
-    # One bit in turn, from the last: two parity bits and two reserved ones leave the number as it is.
-    off = block.data[:, column].astype(int) ^ 1739
-    assert sorted(off) == [0, 0, 0, 0] + [1 << bit for bit in range(12)]
-    assert batches.faults["E5"] == {Fault.PARITY: 16}
-    assert not np.delete(block.quality, column, axis=1).any()
-    assert {name for name, counts in batches.faults.items() if counts} == {"E5"}
-
-
 @pytest.mark.parametrize(("kind", "seen"), [("dropped-reply", Fault.NOT_CONNECTED), ("error-reply", Fault.ERROR)])
 def test_what_did_not_come_is_missing_and_nothing_else(kind, seen):
     batches = FrameBatches(speed_hz=SPEED_HZ)

@@ -105,17 +105,6 @@ def test_the_columns_of_an_absent_sensor_are_missing(log_of):
     assert log.counts["not connected PAC"] == 44
 
 
-def test_lost_lines_are_missing_and_the_next_frame_is_whole(log_of):
-    lines = printed(words(4))
-    clean = log_of(lines).blocks
-    del lines[44 + 2], lines[44 + 8]  # E2 of the second frame, and the PAC after E5
-    slow, fast = log_of(lines).blocks
-    assert slow.quality[1].tolist() == [0, MISSING] + [0] * 20
-    assert not slow.quality[[0, 2, 3]].any()
-    assert set(clean[1].sequence) - set(fast.sequence) == {2 * 22 + 4}
-    assert np.array_equal(fast.data, clean[1].data[np.isin(clean[1].sequence, fast.sequence)])
-
-
 def test_lines_that_are_no_sample_are_counted(log_of):
     lines = printed(words(2))
     lines[10:10] = ["0.0 1 1 17 12\n", "nan 1 1 17 12 0\n", "0.0 1 1 17 4096 0\n", "0.0 1 1 17 12 2\n", "\n"]
