@@ -44,7 +44,7 @@ def main(arguments: list[str] | None = None) -> int:
     print(f"{len(jobs)} hard cases of {len(names)} families, seed {asked.seed}", flush=True)
     began = time.perf_counter()
     verdicts: dict[str, Counter[str]] = defaultdict(Counter)
-    slowest: dict[str, tuple[float, int]] = {}
+    slowest: dict[str, float] = defaultdict(float)
     failures = []
     preload("tests.hard.families")
     with Pool(asked.workers, Limits(timeout_s=asked.limit)) as pool:
@@ -55,7 +55,7 @@ def main(arguments: list[str] | None = None) -> int:
                 outcome = ("failed", f"{type(outcome).__name__}: {outcome}", {}, asked.limit)
             verdict, detail, drawn, seconds = outcome
             verdicts[name][verdict] += 1
-            slowest[name] = max(slowest.get(name, (0.0, 0)), (seconds, number))
+            slowest[name] = max(slowest[name], seconds)
             if verdict == "failed":
                 failures.append((name, number, detail, drawn))
             if asked.case is not None:
@@ -63,8 +63,7 @@ def main(arguments: list[str] | None = None) -> int:
     wide = max(map(len, names))
     for name in names:
         counts = "  ".join(f"{verdict} {verdicts[name][verdict]:4d}" for verdict in ("passed", "refused", "failed"))
-        seconds, number = slowest.get(name, (0.0, 0))
-        print(f"{name:{wide}}  {counts}  slowest {seconds:6.2f} s (case {number})")
+        print(f"{name:{wide}}  {counts}  slowest {slowest[name]:6.2f} s")
     total = sum(verdicts.values(), Counter())
     print(
         f"{len(jobs)} random hard cases, seed {asked.seed}: {total['passed']} passed, {total['refused']} refused with "

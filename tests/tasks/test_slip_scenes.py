@@ -60,22 +60,6 @@ def test_no_clock_tells_when_a_slip_begins():
 
 
 @pytest.mark.parametrize("sensor", ["biotac", "icub"])
-def test_friction_and_vibration_are_planned_where_something_slides_and_nowhere_else(sensor):
-    still = [
-        item.scene
-        for task in REGISTRY.tasks
-        for split in (None, *task.spec.campaigns)
-        for item in task.spec.scenes_for(split)
-        if item.scene.slide is None
-    ]
-    assert len(still) > 100
-    for scene in (*still[::7], *SCENES.values()):
-        plan = {entry.effect: entry for entry in twin().plan(REGISTRY.sensors[sensor], scene).entries}
-        for effect in ("friction", "skin-vibration"):
-            assert plan[effect].included == (scene.slide is not None)
-
-
-@pytest.mark.parametrize("sensor", ["biotac", "icub"])
 def test_labels_agree_with_what_the_twin_knows(sensor):
     """Frames by :func:`slip_labels` against the twin's own state: slipped yet, and its stick ratio.
 

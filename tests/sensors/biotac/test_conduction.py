@@ -24,25 +24,6 @@ def centred(cells, half_mm):
     return -half_mm + (np.arange(cells) + 0.5) * step, step
 
 
-class Held:
-    """One electrode and the drive as cells held almost perfectly.
-
-    Their joints have a millionth of the sheet's own resistance: smaller still, and float64 would not resolve the sheet
-    beside them.
-    """
-
-    def __init__(self, electrode, drive):
-        self.count, self.under = 1, np.flatnonzero(electrode)
-        self.owner = np.zeros_like(self.under)
-        self._drive = 1e6 * drive.ravel()
-
-    def joints(self, film_mm):
-        return np.full(self.under.size, 1e6), self._drive
-
-    def narrow(self, film_mm, along_x, along_s):
-        pass
-
-
 class WithRing:
     """A disc inside a drive that holds everything beyond a circle, both on one grid."""
 
@@ -61,16 +42,6 @@ class WithRing:
 def resistance(contacts, film, cell_mm=(1.0, 1.0)):
     """Times sigma, between drive and the only electrode."""
     return float(FilmSheet(flat_faces(film.shape, cell_mm), contacts).resistances(film)[0, 0])
-
-
-@given(width=st.integers(2, 12), length=st.integers(3, 30), film=st.floats(0.05, 3.0), aspect=st.floats(0.3, 3.0))
-@settings(max_examples=40, deadline=None)  # the first example imports scipy
-def test_a_uniform_strip_has_the_resistance_of_a_strip(width, length, film, aspect):
-    ends = np.zeros((2, length, width))
-    ends[0, 0] = ends[1, -1] = 1.0
-    found = resistance(Held(ends[1], ends[0]), np.full((length, width), film), (aspect, 1.0))
-    # L / (h W) between the centres of the end cells
-    assert found == pytest.approx((length - 1) * aspect / (film * width), rel=1e-4)
 
 
 @pytest.mark.parametrize("film", [0.06, 0.2, 0.6, 1.2])

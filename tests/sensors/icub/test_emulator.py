@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tactbench.plugin import Quality, UsageError
+from tactbench.plugin import UsageError
 from tactbench.plugin.devices import CanFrame
 from tactbench.sensors.icub.codec import (
     BROADCAST,
@@ -56,19 +56,6 @@ def test_it_sends_from_the_start_to_the_stop_at_its_period():
     assert {sample.taxels for sample in samples} == {bytes(range(199, 187, -1))}
     told(bus, Transmit(False), to=BROADCAST, now_s=21.01)
     assert bus.poll(30.0) == []
-
-
-def test_a_board_that_was_not_set_up_has_the_firmware_s_defaults():
-    bus = bus_of()
-    told(bus, Transmit(True))
-    samples = samples_of(bus, 0.11, period_s=0.05)
-    assert [sample.triangle for sample in samples] == [*range(16)] * 2
-    for sample in samples:
-        if sample.triangle == 3:
-            assert sample.taxels == bytes(range(199, 187, -1))
-        else:  # no chip: nothing has changed, and the error word says so
-            assert (sample.taxels, sample.word) == (bytes([245] * 12), 0x0002)
-            assert set(sample.quality) == {Quality.MISSING}
 
 
 @given(st.lists(st.floats(0.0, 0.5), max_size=20))

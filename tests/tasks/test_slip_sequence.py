@@ -1,4 +1,4 @@
-"""Curvature asked of whole recordings of the twin, and slip of the sequences of eFlesh."""
+"""Slip, asked of the real sequences of eFlesh."""
 
 from pathlib import Path
 
@@ -7,28 +7,8 @@ import pytest
 from tactbench.core.errors import NotApplicable
 from tactbench.core.evaluation.dataset import load_dataset
 from tactbench.core.recording.mapping import import_tables
-from tactbench.plugin import Summary
-from tactbench.tasks import curvature, slip_sequence
-from tactbench.tasks.surfaces import in_sessions
+from tactbench.tasks import slip_sequence
 from tests.core.evaluation.made import evaluated
-
-from .made import recorded
-
-CAPS_MM, SESSIONS = (5.0, 40.0), 5
-
-
-def test_curvature_is_asked_of_whole_recordings_of_the_twin(tmp_path):
-    """Two caps in five sessions, each pressed anew."""
-    summaries = (Summary(measure="mean"), Summary(measure="range"), Summary(measure="change", start=0.5))
-    task = curvature.SPEC.model_copy(update={"answer_per": "recording", "summaries": summaries})
-    paths = recorded("icub", tmp_path, in_sessions(SESSIONS, CAPS_MM))
-    result = evaluated(task, paths, "forest", split="session", params={"n_estimators": 20})
-    assert sorted(result.sets["test"].recording.tolist()) == list(range(10))
-    assert result.interval.method.startswith("jackknife over 5 sessions ")
-    # Guessing one of two caps leaves a macro F1 of a half at best.
-    assert result.score > evaluated(task, paths, "majority", split="session").score + 0.2
-    assert result.tare_s == pytest.approx(7.2, abs=0.1), "the hold of the scenes is tared on as for samples"
-    assert result.times.delay_parts_ms["window"] == pytest.approx(60e3 - 7.2e3, rel=0.01)
 
 
 @pytest.fixture(scope="module")
