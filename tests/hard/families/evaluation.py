@@ -102,12 +102,9 @@ def any_data(case: Case, *, protocol: str, name: str, kind: str) -> None:
         split = splits[case.rng.integers(len(splits))]
         case.says(split=str(split))
         result = evaluated(asked, paths, name, protocol, split, params=QUICK.get(name), latency=True)
-    for what, value in (("score", result.score), ("low end", result.interval.low), ("high end", result.interval.high)):
-        case.holds(np.isfinite(value), f"the {what} is {value}")
-    case.holds(
-        result.interval.low <= result.interval.high,
-        f"the interval runs from {result.interval.low} to {result.interval.high}",
-    )
+    low, high = result.interval.low, result.interval.high
+    case.holds(np.isfinite([result.score, low, high]).all(), f"the score is {result.score} in {low} to {high}")
+    case.holds(low <= high, f"the interval runs from {low} to {high}")
     case.holds(np.isfinite(list(result.scores.values())).all(), f"a score is none: {result.scores}")
     warned = [text for text in result.counts if "RuntimeWarning" in text]
     case.holds(not warned, f"{warned}")

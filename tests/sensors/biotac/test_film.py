@@ -61,16 +61,14 @@ def test_refined_cells_fill_the_same_sheet():
         assert cells[0] - step / 2 == pytest.approx(coarse[0] - 0.2)
 
 
-@pytest.mark.parametrize(("n", "factor"), [(16, 4), (48, 2), (64, 3)])
+@pytest.mark.parametrize(("n", "factor"), [(16, 4), (64, 3)])
 def test_waves_below_nyquist_arrive_unchanged(n, factor):
     to_fine = spectral_interpolation(n, n * factor)
-    coarse = (np.arange(n) + 0.5) / n
-    fine = (np.arange(n * factor) + 0.5) / (n * factor)
-    for wave in (0, 1, 3, n // 2 - 1):
-        for phase in (0.0, 0.7):
-            there = np.cos(2 * np.pi * wave * fine + phase)
-            # Exact in exact arithmetic; n terms of rounding. A missing half-cell shift is off by pi*wave/(2n).
-            assert to_fine @ np.cos(2 * np.pi * wave * coarse + phase) == pytest.approx(there, abs=1e-12)
+    coarse, fine = ((np.arange(cells) + 0.5) / cells for cells in (n, n * factor))
+    for wave in (0, 1, n // 2 - 1):
+        # Exact in exact arithmetic; n terms of rounding. A missing half-cell shift is off by pi*wave/(2n).
+        there = np.cos(2 * np.pi * wave * fine + 0.7)
+        assert to_fine @ np.cos(2 * np.pi * wave * coarse + 0.7) == pytest.approx(there, abs=1e-12)
 
 
 def test_a_mirrored_sample_goes_on_as_its_own_image():
