@@ -7,7 +7,6 @@ import pytest
 
 from tactbench.core.errors import DataError, NotApplicable, PluginContractError
 from tactbench.core.evaluation.dataset import load_dataset
-from tactbench.core.evaluation.event_answers import Detected, EventRules
 from tactbench.core.evaluation.frames import frame_features, frame_times, framed
 from tactbench.core.evaluation.protocols import protocol_called
 from tactbench.core.evaluation.summaries import summary_of
@@ -132,18 +131,15 @@ def test_without_disturbances_or_a_reference_nothing_is_answered_and_what_is_mis
 
 
 def test_compute_time_delays_alarms_and_changes_no_hit(paths):
-    task, estimator = TASK, REGISTRY.estimators["pac-band"]
-    data = framed(load_dataset(task, paths[:2]), task, RULES, estimator)
-    rules = EventRules.of(task, 0.5)
-    found = []
-    for place, table in enumerate(data.tables):
-        one = type("Part", (), {"recording": np.full(len(table.row), place), "row": table.row})
-        found += rules.scored(one, (table.y == 1).astype(float), data)
-    tested = [Detected(one, 0.5, ()) for one in found]
-    at_once, late = rules.figures(tested, 0.0), rules.figures(tested, 0.05)
-    assert late["onset latency p50 ms"] == pytest.approx(at_once["onset latency p50 ms"] + 50.0)
-    assert late["displacement at detection p50 mm"] == pytest.approx(at_once["displacement at detection p50 mm"] + 0.5)
-    assert late["compute s per s of signal"] == pytest.approx(5.0)
+    at_once, timed = run(paths).events, run(paths, latency=True)
+    parts, late = timed.times.delay_parts_ms, timed.events
+    assert (parts["window"], parts["sampling"]) == (50.0, 10.0)
+    spent_ms = parts["features"] + parts["prediction"]
+    assert late["compute s per s of signal"] == pytest.approx(spent_ms / 10.0)
+    assert late["onset latency p50 ms"] == pytest.approx(at_once["onset latency p50 ms"] + spent_ms)
+    # At 10 mm/s.
+    moved_mm = at_once["displacement at detection p50 mm"] + 0.01 * spent_ms
+    assert late["displacement at detection p50 mm"] == pytest.approx(moved_mm)
     same = ("events", "misses", "precision", "recall", "false alarms per minute")
     assert [late[name] for name in same] == [at_once[name] for name in same]
 

@@ -1,14 +1,12 @@
 """The emulated BioTac on its bytes: golden vectors BT-4, the pause, every fault."""
 
-import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from tactbench.plugin import UsageError
-from tactbench.plugin.devices import EmulatorSettings
 from tactbench.sensors.biotac.codec import INDEX, decoded, sampling_command
-from tactbench.sensors.biotac.emulator import REST, BioTacFault, Emulator, build_emulator
+from tactbench.sensors.biotac.emulator import REST, BioTacFault, Emulator
 from tactbench.sensors.biotac.spec import SPEC
 
 COUNTS = {**REST, "E1": 1739.0, "PAC": 2021.0, "PDC": 2000.0, "TDC": 1500.0}
@@ -123,14 +121,6 @@ def test_faults_that_are_none_are_refused(text, said):
 def test_faults_as_a_rig_file_writes_them():
     fault = BioTacFault.parse("error-reply:channels=E5+PAC,start_s=1.5,every=3,error=0x57")
     assert fault == BioTacFault("error-reply", start_s=1.5, every=3, channels=frozenset({"E5", "PAC"}), error=0x57)
-
-
-@pytest.mark.parametrize("clock_hz", [500_000, 10_000_000])
-def test_a_built_emulator_keeps_the_pause_at_every_clock(clock_hz):
-    sensor = build_emulator(EmulatorSettings(lambda t_s: COUNTS, np.random.default_rng(1), {"select": 2}, ()))
-    for begin_s, pause_s, answer in ((0.0, 50e-6, b"\x6d\x58"), (0.5, 1e-6, b"\xa5\x2d")):
-        sensor.exchange(2, b"\xa2\x00", begin_s)
-        assert sensor.exchange(2, bytes(2), begin_s + 16 / clock_hz + pause_s) == answer
 
 
 @given(periods=st.lists(st.binary(max_size=5), max_size=20), pause_us=st.sampled_from([0, 60]))
