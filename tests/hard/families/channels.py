@@ -86,15 +86,14 @@ def any_environment(case: Case) -> None:
     Noise, drift and offsets from none to a million times what the spec states; a second to a century since power-on.
     """
     sensor = _sensor(case)
-    scale = [0.0 if case.chance(0.3) else case.decades(1e-3, 1e6) for _ in range(3)]
+    names = ("noise_scale", "drift_scale", "session_offset_scale")
+    scales = {name: 0.0 if case.chance(0.3) else case.decades(1e-3, 1e6) for name in names}
     environment = Environment(
         since_power_on=_q(0.0 if case.chance(0.2) else case.decades(1.0, 3e9), "s"),
-        noise_scale=scale[0],
-        drift_scale=scale[1],
-        session_offset_scale=scale[2],
         force_noise=_q(0.0 if case.chance(0.3) else case.decades(1e-6, 1e3), "N"),
+        **scales,
     )
-    case.says(noise_scale=scale[0], drift_scale=scale[1], session_offset_scale=scale[2])
+    case.says(**scales)
     _recorded(case, sensor, _scene(case, environment=environment), int(case.rng.integers(-(2**31), 2**31)))
 
 
