@@ -75,21 +75,18 @@ def test_data_replies(value, first, second):
     assert decoded(word) == (int(value), None)
 
 
-@pytest.mark.parametrize(
-    ("word", "value", "fault"),
-    [
-        *((f"A5{second:02X}", None, Fault.ERROR) for second in (0x45, 0x3F, 0x2E, 0x2D, 0x58, 0x5F, 0x52, 0x57)),
-        ("0000", None, Fault.NOT_CONNECTED),
-        ("FFFF", None, Fault.NOT_CONNECTED),
-        ("ED58", 3787, Fault.PARITY),
-        ("6D50", 1738, Fault.PARITY),
-        ("6D5A", 1739, Fault.PARITY),
-        ("6D5E", 1739, Fault.RESERVED),
-    ],
-    ids=lambda value: f"BT-3-{value}" if isinstance(value, str) and len(value) == 4 else None,
+BT3 = rows(
+    """
+    A545 - ERROR  A53F - ERROR  A52E - ERROR  A52D - ERROR  A558 - ERROR  A55F - ERROR  A552 - ERROR  A557 - ERROR
+    0000 - NOT_CONNECTED  FFFF - NOT_CONNECTED  ED58 3787 PARITY  6D50 1738 PARITY  6D5A 1739 PARITY  6D5E 1739 RESERVED
+    """,
+    3,
 )
+
+
+@pytest.mark.parametrize(("word", "value", "fault"), BT3, ids=[f"BT-3-{row[0]}" for row in BT3])
 def test_faulty_words_are_flagged(word, value, fault):
-    assert decoded(bytes.fromhex(word)) == (value, fault)
+    assert decoded(bytes.fromhex(word)) == (None if value == "-" else int(value), Fault[fault])
 
 
 def test_bt_5_default_frame():
@@ -100,20 +97,24 @@ def test_bt_5_default_frame():
     assert bytes(sampling_command(INDEX[name])[0] for name in DEFAULT_FRAME) == golden
 
 
+def numbers(table):
+    return [tuple(map(float, row)) for row in rows(table, 2)]
+
+
 def test_bt_6_conversions_by_the_spec_s_numbers():
     values = {name: SPEC.parameters[name].value for name in ("thermistor_p", "thermistor_q", "thermistor_b")}
-    for count, kilohm in ((645, 53.488), (877, 36.693), (1739, 13.548), (3039, 3.475), (3106, 3.184), (4095, 0.0)):
+    for count, kilohm in numbers("645 53.488 877 36.693 1739 13.548 3039 3.475 3106 3.184 4095 0"):
         # Printed with three decimals.
         ohm = (4095 / count - 1) * SPEC.parameters["reference_resistor"].to("ohm")
         assert ohm == pytest.approx(1e3 * kilohm, abs=0.5)
-    for count, degc in ((500, 13.982), (1000, 29.799), (1500, 40.317), (2000, 48.579), (3000, 61.839), (4095, 73.962)):
+    for count, degc in numbers("500 13.982 1000 29.799 1500 40.317 2000 48.579 3000 61.839 4095 73.962"):
         x = count / 4095
         logarithm = math.log((values["thermistor_p"] - values["thermistor_q"] * x) / x)
         assert values["thermistor_b"] / logarithm - 273.15 == pytest.approx(degc, abs=5e-4)
-    for kind, counts, pascal in (("dc_pressure", 100, 3650.0), ("dc_pressure", 4095, 149467.5),
-                                 ("ac_pressure", 100, 37.0), ("ac_pressure", 2048, 757.76)):  # fmt: skip
+    for kind, table in (("dc_pressure", "100 3650 4095 149467.5"), ("ac_pressure", "100 37 2048 757.76")):
         (channel,) = SPEC.channels(kind)
-        assert channel.scale.to("Pa/count") * counts == pytest.approx(pascal, rel=1e-12)
+        for counts, pascal in numbers(table):
+            assert channel.scale.to("Pa/count") * counts == pytest.approx(pascal, rel=1e-12)
     # The manual's formula for TAC lies outside its own range: it stays in counts.
     (tac,) = SPEC.channels("ac_temperature")
     assert tac.scale is tac.measures is None
