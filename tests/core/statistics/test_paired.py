@@ -61,15 +61,17 @@ def test_without_replicates_nothing_is_decided():
 
 
 @settings(max_examples=40, deadline=None)
-@given(seed=st.integers(0, 10_000), replicates=st.integers(5, 12))
+@given(seed=st.integers(0, 10_000), replicates=st.integers(5, 16))
 def test_exchanging_the_two_turns_everything_round_and_the_order_of_sessions_is_nothing(seed, replicates):
     a, b = np.random.default_rng(seed).gamma(4, 1, (2, replicates))
     one, back = difference(mae_row("a", a), mae_row("b", b)), difference(mae_row("b", b), mae_row("a", a))
     found, turned = ((x.value, x.low, x.high, x.effect, x.improved) for x in (one, back))
     assert turned == pytest.approx((-found[0], -found[2], -found[1], -found[3], 1 - found[4]), abs=1e-12)
-    assert (back.verdict, back.p) == ({"better": "worse", "worse": "better"}.get(one.verdict, one.verdict), one.p)
+    assert back.verdict == {"better": "worse", "worse": "better"}.get(one.verdict, one.verdict)
     other = difference(mae_row("a", a[::-1]), mae_row("b", b[::-1]))
-    assert (other.verdict, other.p) == (one.verdict, one.p)
+    if replicates <= 12:  # beyond, exchanges are drawn, and others for another order
+        assert one.p == back.p == other.p
+    assert other.verdict == one.verdict
     assert (other.low, other.high) == pytest.approx((one.low, one.high), abs=1e-12)
 
 
