@@ -35,27 +35,27 @@ class Case:
     right: Right = "answer"
     drawn: dict[str, Scalar] = field(default_factory=dict)
 
-    def says(self, **drawn: Scalar) -> None:
+    def says(self, **drawn):
         """Remember what was drawn, for whoever repeats the case."""
         self.drawn.update(drawn)
 
-    def uniform(self, low: float, high: float) -> float:
+    def uniform(self, low, high):
         """Draw between `low` and `high`."""
         return float(self.rng.uniform(low, high))
 
-    def decades(self, low: float, high: float) -> float:
+    def decades(self, low, high):
         """Draw between `low` and `high`, every decade alike."""
         return float(10 ** self.rng.uniform(math.log10(low), math.log10(high)))
 
-    def one_of(self, *choices: str) -> str:
+    def one_of(self, *choices):
         """Draw one name."""
         return str(self.rng.choice(choices))
 
-    def chance(self, share: float) -> bool:
+    def chance(self, share):
         """Draw whether."""
         return bool(self.rng.random() < share)
 
-    def holds(self, law: object, text: str) -> None:
+    def holds(self, law, text):
         """Raise WrongError unless `law` is true."""
         if not law:
             raise WrongError(text)
@@ -73,7 +73,7 @@ class Outcome:
     drawn: dict[str, Scalar]
 
 
-def judge(name: str, family: Family, seed: int, number: int) -> Outcome:
+def judge(name, family, seed, number):
     """Draw case `number` of a family and judge it; the same arguments give the same case on any machine."""
     case = Case(generator(seed, "hard case", name, str(number)))
     try:
@@ -96,7 +96,7 @@ def judge(name: str, family: Family, seed: int, number: int) -> Outcome:
     return Outcome("passed", "", case.drawn)
 
 
-def judged(job: tuple[str, int, int]) -> tuple[str, str, dict[str, Scalar], float]:
+def judged(job):
     """Return verdict, detail, what was drawn and the seconds of a case: family, seed and number."""
     from tests.hard.families import families
 

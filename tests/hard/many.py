@@ -22,7 +22,7 @@ from tests.hard.cases import judged
 from tests.hard.families import families
 
 
-def main(arguments: list[str] | None = None) -> int:
+def main(arguments=None):
     """Run and print."""
     # One thread a worker: the cases are small, and linear algebra on all cores would only wait for itself.
     os.environ.setdefault("OMP_NUM_THREADS", "1")

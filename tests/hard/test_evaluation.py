@@ -1,7 +1,5 @@
 """Hard recordings whose right answer is a number, or words."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """A few random cases of every family with every run of the tests, and the judge itself."""
 
-from __future__ import annotations
-
 import warnings
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Properties of the gap over random indenters."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,15 +1,12 @@
 """Every family of hard cases, by group; a family's docstring is the right answer."""
 
-from __future__ import annotations
-
 import functools
 
-from tests.hard.cases import Family
 from tests.hard.families import channels, contact, evaluation, memory, skins
 
 
 @functools.cache
-def families() -> dict[str, Family]:
+def families():
     """Return every family by its name, ``group: what is hard``: the twin's, and those of evaluation."""
     groups = {
         "contact": (*contact.FAMILIES, *skins.FAMILIES),

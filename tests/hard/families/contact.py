@@ -1,22 +1,18 @@
 """Hard contacts: radii, loads, edges and tilts at the ends of their ranges, on every installed skin."""
 
-from __future__ import annotations
-
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 
 import numpy as np
 
 from tactbench.plugin import load_registry
 from tactbench.plugin.simulation import FluidBackedShell, SkinState
-from tactbench.plugin.simulation import Skin as AnySkin
 from tactbench.rigs.twin.contact.core import with_core
 from tactbench.rigs.twin.contact.media import Medium
 from tactbench.rigs.twin.contact.press import Press
 from tactbench.rigs.twin.contact.pressing import medium_of
 from tactbench.rigs.twin.contact.validity import check_reach, remarks
 from tactbench.rigs.twin.geometry import Contact, check_contact, gap_mm, outer_radius_mm, pad_of, skin_grid
-from tests.hard.cases import Case, Family
 
 BALANCE = 1e-8
 """Relative force balance: a sum over thousands of cells rounds at 1e-13, and the law shall hold far from its edge."""
@@ -24,13 +20,13 @@ SOLVED = 1e-5
 """Relative error of a depth: ten times the solver's residual."""
 
 
-def skins() -> dict[str, AnySkin]:
+def skins():
     """Return the skin of every installed sensor that declares one."""
     found = {sensor.spec.name: sensor.spec.skin for sensor in load_registry().sensors}
     return {name: skin for name, skin in found.items() if skin is not None}
 
 
-def draw_skin(case: Case) -> AnySkin:
+def draw_skin(case):
     """Draw an installed skin."""
     known = skins()
     name = case.one_of(*sorted(known))
@@ -38,14 +34,14 @@ def draw_skin(case: Case) -> AnySkin:
     return known[name]
 
 
-def press_of(skin: AnySkin, contact: Contact, cells: tuple[int, int] | None = None) -> Press:
+def press_of(skin, contact, cells=None):
     """Return `skin` under an indenter, its core included; raises RigError where the contact cannot be."""
     grid = skin_grid(skin.sheet, cells)
     check_contact(grid, contact)
     core: Callable[[Medium], Medium] | None = None
     if isinstance(skin, FluidBackedShell):
 
-        def core(medium: Medium) -> Medium:
+        def core(medium):
             return with_core(medium, skin)
 
     sheet = skin.sheet
@@ -53,7 +49,7 @@ def press_of(skin: AnySkin, contact: Contact, cells: tuple[int, int] | None = No
     return Press(medium_of(skin, grid), gap, contact, core=core)
 
 
-def draw_contact(case: Case, skin: AnySkin, radius: float, *, margin: float = 0.25, tilt: float = 0.0) -> Contact:
+def draw_contact(case, skin, radius, *, margin=0.25, tilt=0.0):
     """Draw an apex; `margin` is the share of the sheet on each side that is left alone (negative: outside)."""
     sheet = skin.sheet
     low, high, arc = sheet.x_min.to("mm"), sheet.x_max.to("mm"), sheet.arc.to("mm")
@@ -64,7 +60,7 @@ def draw_contact(case: Case, skin: AnySkin, radius: float, *, margin: float = 0.
     return Contact(radius, x, s, *slopes)
 
 
-def lawful(case: Case, press: Press, loads: Sequence[float]) -> list[SkinState]:
+def lawful(case, press, loads):
     """Solve ascending loads; hold each against its laws and each pair against monotony."""
     case.says(loads_n=", ".join(f"{load:.4g}" for load in loads))
     dx, ds = press.medium.grid.cell_mm
@@ -89,16 +85,16 @@ def lawful(case: Case, press: Press, loads: Sequence[float]) -> list[SkinState]:
     return states
 
 
-def reaches(press: Press, skin: AnySkin, load: float) -> None:
+def reaches(press, skin, load):
     """Raise RigError where the indenter ends before the skin that it touches."""
     check_reach(press, load, outer_radius_mm(skin.sheet), skin.sheet.dome, skin.sheet.relief)
 
 
-def _loads(case: Case, low: float, high: float) -> list[float]:
+def _loads(case, low, high):
     return sorted(case.decades(low, high) for _ in range(3))
 
 
-def any_radius(case: Case) -> None:
+def any_radius(case):
     """Solve caps of 1e-4 mm to infinity; refuse them below a cell and past their rim.
 
     A cap of 3 mm or more under up to 5 N has an answer on every skin of ours.
@@ -118,7 +114,7 @@ def any_radius(case: Case) -> None:
     )
 
 
-def past_the_rim(case: Case) -> None:
+def past_the_rim(case):
     """Refuse a load under which the skin is touched where the cap has ended, and no other."""
     skin = draw_skin(case)
     press = press_of(skin, draw_contact(case, skin, case.uniform(0.5, 2.0)))
@@ -129,7 +125,7 @@ def past_the_rim(case: Case) -> None:
     reaches(press, skin, state.force_n)
 
 
-def a_cap_that_is_none(case: Case) -> None:
+def a_cap_that_is_none(case):
     """Refuse radii of zero, below zero and not a number."""
     skin = draw_skin(case)
     radius = (0.0, -case.decades(1e-3, 1e3), math.nan)[case.rng.integers(3)]
@@ -137,7 +133,7 @@ def a_cap_that_is_none(case: Case) -> None:
     press_of(skin, draw_contact(case, skin, radius))
 
 
-def unresolved_contact(case: Case) -> None:
+def unresolved_contact(case):
     """Agree with the same contact on cells half as wide to 5 %, or remark on it.
 
     Measured on the ideal grid: up to 2 % at three cells, and rising quickly below.
@@ -153,7 +149,7 @@ def unresolved_contact(case: Case) -> None:
     case.holds(abs(depth / wanted - 1) <= 0.05, f"depth {depth:g} mm against {wanted:g} mm, and no remark")
 
 
-def flat_is_a_huge_cap(case: Case) -> None:
+def flat_is_a_huge_cap(case):
     """Take R of 1e9 mm or more for a flat surface.
 
     The depth moves by no more than the gap does: the energy's minimiser is monotone in the gap and moves with it as a
@@ -171,7 +167,7 @@ def flat_is_a_huge_cap(case: Case) -> None:
     case.holds(abs(first - second) <= 2 * apart + SOLVED * first, f"{first!r} mm flat, {second!r} mm huge")
 
 
-def any_load(case: Case) -> None:
+def any_load(case):
     """Be at rest exactly at 0 N; finite, balanced and monotone from 1e-12 to 500 N, with a remark beyond 5 N."""
     skin = draw_skin(case)
     press = press_of(skin, draw_contact(case, skin, case.decades(5.0, 1e3)))
@@ -185,7 +181,7 @@ def any_load(case: Case) -> None:
     case.holds("remark load" in remarks(press, loads, outer_radius_mm(skin.sheet)), "500 N and no remark")
 
 
-def loads_that_are_none(case: Case) -> None:
+def loads_that_are_none(case):
     """Be at rest below 0 N; refuse a load that is infinite or no number."""
     skin = draw_skin(case)
     press = press_of(skin, draw_contact(case, skin, 10.0))
@@ -194,7 +190,7 @@ def loads_that_are_none(case: Case) -> None:
     press(math.nan if case.chance(0.5) else math.inf)
 
 
-def edge_and_tilt(case: Case) -> None:
+def edge_and_tilt(case):
     """Solve grazing, edge and tilted contacts; refuse them outside the skin and beyond 45 degrees.
 
     All skins are mirror images of themselves across s = 0, so that a mirrored contact is as deep.
@@ -219,7 +215,7 @@ def edge_and_tilt(case: Case) -> None:
     case.holds(not press.gap_mm.min(), "the approach has lost its origin")
 
 
-FAMILIES: tuple[Family, ...] = (
+FAMILIES = (
     any_radius, past_the_rim, a_cap_that_is_none, unresolved_contact, flat_is_a_huge_cap, any_load, loads_that_are_none,
     edge_and_tilt,
 )  # fmt: skip

@@ -4,8 +4,6 @@ The right answer of all of them: a finite score within a finite interval, or an 
 expected and the next step. Never NaN, never a hang, never a warning.
 """
 
-from __future__ import annotations
-
 import itertools
 import tempfile
 from collections.abc import Callable
@@ -46,7 +44,7 @@ class Made:
     annotated: np.ndarray | None = None
     """(n,) labels of rows instead of one for the recording."""
 
-    def keep(self, rows: int) -> None:
+    def keep(self, rows):
         """Leave the first rows; how many of those have a dropout is for the package to say."""
         for name in ("X", "force", "quality", "t_ns", "force_t_ns", "annotated"):
             values = getattr(self, name)
@@ -54,7 +52,7 @@ class Made:
         self.dropped = 0
 
 
-def families() -> dict[str, Family]:
+def families():
     """Return one family for each protocol and kind of estimator, of each kind of task that it can do."""
     found: dict[str, Family] = {}
     for protocol, one in itertools.product(PROTOCOLS, different_estimators()):
@@ -65,7 +63,7 @@ def families() -> dict[str, Family]:
     return found
 
 
-def different_estimators() -> list[EstimatorDescriptor]:
+def different_estimators():
     """Return the installed estimators, one of each code: ten trees and five hundred are the same code.
 
     Detectors of events answer no question of single samples: tests/core/evaluation/test_events.py has them.
@@ -83,7 +81,7 @@ def different_estimators() -> list[EstimatorDescriptor]:
     return list(first.values())
 
 
-def any_data(case: Case, *, protocol: str, name: str, kind: str) -> None:
+def any_data(case, *, protocol, name, kind):
     """Score hard data finitely, or say what is wrong with it."""
     recordings = _ordinary(case, kind, roles_only=PROTOCOLS[protocol].roles_only)
     hardships = [one for one in HARDSHIPS if case.chance(0.15)] or [HARDSHIPS[case.rng.integers(len(HARDSHIPS))]]
@@ -115,7 +113,7 @@ def any_data(case: Case, *, protocol: str, name: str, kind: str) -> None:
         case.holds(0 <= result.score <= 1, f"a score of {result.score}")
 
 
-def _ordinary(case: Case, kind: str, *, roles_only: bool) -> list[Made]:
+def _ordinary(case, kind, *, roles_only):
     """Return recordings of a press: roles and more than 600 rows where the protocol wants them."""
     taxels = int(case.rng.integers(1, 6))
     gain = case.rng.normal(0, 30, taxels)
@@ -135,7 +133,7 @@ def _ordinary(case: Case, kind: str, *, roles_only: bool) -> list[Made]:
     return made
 
 
-def _some(case: Case, recordings: list[Made]) -> list[Made]:
+def _some(case, recordings):
     """Return one recording, those of one role, or all of them."""
     which = case.rng.integers(3)
     if which == 0:
@@ -144,25 +142,25 @@ def _some(case: Case, recordings: list[Made]) -> list[Made]:
     return [made for made in recordings if which == 2 or made.role == role]
 
 
-def _taxel(case: Case, made: Made) -> int:
+def _taxel(case, made):
     return int(case.rng.integers(made.X.shape[1]))
 
 
-def constant_taxels(case: Case, recordings: list[Made]) -> None:
+def constant_taxels(case, recordings):
     """Hold a taxel, or all of them, at one number; 0.1 a million times has a rounding error for a deviation."""
     column = slice(None) if case.chance(0.3) else _taxel(case, recordings[0])
     for made in _some(case, recordings):
         made.X[:, column] = float(case.rng.choice([0.0, 0.1, 4095.0, -1e8]))
 
 
-def collinear_taxels(case: Case, recordings: list[Made]) -> None:
+def collinear_taxels(case, recordings):
     """Make a taxel the copy, or a multiple, of another."""
     a, b, factor = _taxel(case, recordings[0]), _taxel(case, recordings[0]), float(case.rng.choice([1.0, -1.0, 1e6]))
     for made in recordings:
         made.X[:, b] = factor * made.X[:, a]
 
 
-def saturated_taxels(case: Case, recordings: list[Made]) -> None:
+def saturated_taxels(case, recordings):
     """Clip at a converter's end and flag it."""
     for made in _some(case, recordings):
         end = np.quantile(made.X, case.uniform(0, 1))
@@ -170,7 +168,7 @@ def saturated_taxels(case: Case, recordings: list[Made]) -> None:
         np.minimum(made.X, end, out=made.X)
 
 
-def dropouts(case: Case, recordings: list[Made]) -> None:
+def dropouts(case, recordings):
     """Lose samples: NaN, infinity, or a number marked as missing; one row, some, nearly all, or a whole channel."""
     for made in _some(case, recordings):
         share = float(case.rng.choice([0.0, 0.05, 0.5, 0.99, 1.0], p=[0.3, 0.3, 0.2, 0.1, 0.1]))
@@ -184,19 +182,19 @@ def dropouts(case: Case, recordings: list[Made]) -> None:
         made.dropped = max(made.dropped, int(lost.sum()))
 
 
-def dropouts_of_force(case: Case, recordings: list[Made]) -> None:
+def dropouts_of_force(case, recordings):
     """Lose samples of the reference force."""
     for made in _some(case, recordings):
         made.force[case.rng.random(len(made.force)) < case.rng.choice([0.05, 0.9, 1.0])] = np.nan
 
 
-def huge_offsets(case: Case, recordings: list[Made]) -> None:
+def huge_offsets(case, recordings):
     """Put a unit signal on 1e8."""
     for made in recordings:
         made.X += case.rng.choice([1e8, -1e8, 1e10])
 
 
-def extreme_sizes(case: Case, recordings: list[Made]) -> None:
+def extreme_sizes(case, recordings):
     """Read in units from 1e-150 to 1e100."""
     factor = case.decades(1e-150, 1e100)
     column = slice(None) if case.chance(0.5) else _taxel(case, recordings[0])
@@ -204,7 +202,7 @@ def extreme_sizes(case: Case, recordings: list[Made]) -> None:
         made.X[:, column] *= factor
 
 
-def single_precision(case: Case, recordings: list[Made]) -> None:
+def single_precision(case, recordings):
     """Store as float32, perhaps on an offset of 1e4."""
     offset = float(case.rng.choice([0.0, 1e4, 1e7]))
     for made in recordings:
@@ -212,27 +210,27 @@ def single_precision(case: Case, recordings: list[Made]) -> None:
         made.dtype = "float32"
 
 
-def constant_labels(case: Case, recordings: list[Made]) -> None:
+def constant_labels(case, recordings):
     """Hold force and label still."""
     for made in _some(case, recordings):
         made.force[:] = float(case.rng.choice([0.0, 0.1, 5.0]))
         made.label = "class 0"
 
 
-def jumping_labels(case: Case, recordings: list[Made]) -> None:
+def jumping_labels(case, recordings):
     """Label single rows, some of them not at all."""
     for made in _some(case, recordings):
         made.annotated = case.rng.choice(np.array(["", "class 0", "class 1", "class 2"]), len(made.X))
 
 
-def few_rows(case: Case, recordings: list[Made]) -> None:
+def few_rows(case, recordings):
     """Leave one to ten rows, fewer than any window; under the paper's protocol one to ten after its first 600."""
     rows = int(case.rng.integers(1, 11))
     for made in _some(case, recordings):
         made.keep(rows + (600 if len(made.X) > 600 and case.chance(0.8) else 0))
 
 
-def every_row_an_outlier(case: Case, recordings: list[Made]) -> None:
+def every_row_an_outlier(case, recordings):
     """Let every row leave the three-sigma band in one channel of its own: none is left."""
     n = 12
     taxels = max(n, max(made.X.shape[1] for made in recordings))
@@ -247,7 +245,7 @@ def every_row_an_outlier(case: Case, recordings: list[Made]) -> None:
         made.X[-last:][np.arange(last), np.arange(last)] = 1e6
 
 
-def strange_clocks(case: Case, recordings: list[Made]) -> None:
+def strange_clocks(case, recordings):
     """Repeat time stamps, let them run backwards, shift the force's against the taxels', or leave the clock out."""
     which = int(case.rng.integers(5))
     for made in _some(case, recordings):
@@ -266,7 +264,7 @@ def strange_clocks(case: Case, recordings: list[Made]) -> None:
             made.t_ns = made.force_t_ns = None
 
 
-def one_kind_of_session(case: Case, recordings: list[Made]) -> None:
+def one_kind_of_session(case, recordings):
     """Give each session one class only, or all recordings one session."""
     one = case.chance(0.5)
     for made in recordings:
@@ -285,7 +283,7 @@ HARMLESS = frozenset(
 """What no regression may refuse: nothing that is asked for is missing."""
 
 
-def _written(made: Made, path: Path) -> Path:
+def _written(made, path):
     channels = tuple(ChannelSpec(name=f"t{place}", kind="taxel") for place in range(made.X.shape[1]))
     times = made.t_ns if made.force_t_ns is None else made.force_t_ns
     return write(

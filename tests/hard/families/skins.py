@@ -1,18 +1,14 @@
 """Hard skins: moduli over four decades, rubber that keeps its volume, foam gone solid, a film that closes."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np
 
 from tactbench.plugin.simulation import FluidBackedShell
-from tactbench.plugin.simulation import Skin as AnySkin
 from tactbench.rigs.twin.contact.foam import CUT_OVER, Foam
 from tactbench.rigs.twin.contact.press import Press
 from tactbench.rigs.twin.contact.pressing import medium_of
 from tactbench.rigs.twin.geometry import skin_grid
-from tests.hard.cases import Case, Family
 from tests.hard.families.contact import SOLVED, draw_contact, draw_skin, lawful, press_of, skins
 
 _STIFFNESSES = (
@@ -23,21 +19,21 @@ _STIFFNESSES = (
 _ABOVE_ZERO = ("young", "thickness", "mid_radius", "contact_stiffness", "densification")
 
 
-def _changed(skin: AnySkin, **values: float) -> AnySkin:
+def _changed(skin, **values):
     return skin.model_copy(
         update={name: getattr(skin, name).model_copy(update={"value": value}) for name, value in values.items()}
     )
 
 
-def _times(skin: AnySkin, factor: float, *names: str) -> AnySkin:
+def _times(skin, factor, *names):
     return _changed(skin, **{name: factor * getattr(skin, name).value for name in names})
 
 
-def _own(skin: AnySkin, names: tuple[str, ...] = _STIFFNESSES) -> list[str]:
+def _own(skin, names=_STIFFNESSES):
     return [name for name in names if hasattr(skin, name)]
 
 
-def scaled_moduli(case: Case) -> None:
+def scaled_moduli(case):
     """Give the same depth when all stiffnesses and the load are multiplied alike, over four decades."""
     skin = draw_skin(case)
     factor, load = case.decades(1e-2, 1e2), case.decades(1e-3, 5.0)
@@ -48,7 +44,7 @@ def scaled_moduli(case: Case) -> None:
     case.holds(abs(found / plain - 1) <= 2 * SOLVED, f"depth {found!r} mm, unscaled {plain!r} mm")
 
 
-def one_modulus(case: Case) -> None:
+def one_modulus(case):
     """Solve a skin one of whose stiffnesses is multiplied over four decades."""
     skin = draw_skin(case)
     name = case.one_of(*_own(skin))
@@ -59,7 +55,7 @@ def one_modulus(case: Case) -> None:
     lawful(case, press_of(_times(skin, factor, name), contact), loads)
 
 
-def any_poisson_ratio(case: Case) -> None:
+def any_poisson_ratio(case):
     """Solve rubber up to Poisson's ratio 1/2 exactly; refuse ratios above it and below 0.
 
     Within 1e-9 of 1/2 the layer is as deep as at 1/2, to 1 in 1000: the lubrication limit is met, not jumped to.
@@ -79,7 +75,7 @@ def any_poisson_ratio(case: Case) -> None:
         case.holds(abs(state.depth_mm / limit - 1) <= 1e-3, f"depth {state.depth_mm!r} mm, at 1/2 {limit!r} mm")
 
 
-def foam_gone_solid(case: Case) -> None:
+def foam_gone_solid(case):
     """Stay finite, balanced and monotone far beyond densification; keep the law convex, and its energy's slope."""
     skin = skins()["icub"]
     limit, thickness = case.decades(0.05, 1.0), case.decades(0.5, 5.0)
@@ -107,7 +103,7 @@ def foam_gone_solid(case: Case) -> None:
     case.holds(abs(found - slope) <= near, f"energy's slope {found!r}, not {slope!r}")
 
 
-def film_that_closes(case: Case) -> None:
+def film_that_closes(case):
     """Never thin the film below what asperities keep open, nor jump in depth, around touch-down.
 
     Below the load that closes it, the core changes nothing.
@@ -137,7 +133,7 @@ def film_that_closes(case: Case) -> None:
         )
 
 
-def impossible_skins(case: Case) -> None:
+def impossible_skins(case):
     """Refuse zero, less, infinity and no number where a skin needs one above zero."""
     skin = draw_skin(case)
     name = case.one_of(*_own(skin, _ABOVE_ZERO))
@@ -147,7 +143,7 @@ def impossible_skins(case: Case) -> None:
     press_of(_changed(skin, **{name: value}), draw_contact(case, skin, 10.0))(1.0)
 
 
-def half_stated_skins(case: Case) -> None:
+def half_stated_skins(case):
     """Refuse no number, infinity and less than zero where a skin allows zero: tension, shear, cover, clamp."""
     skin = draw_skin(case)
     name = case.one_of(*_own(skin, ("poisson", *_STIFFNESSES, "residual_film", "clamp_length")))
@@ -157,7 +153,7 @@ def half_stated_skins(case: Case) -> None:
     press_of(_changed(skin, **{name: value}), draw_contact(case, skin, 5.0, margin=0.45))(5.0)
 
 
-def impossible_sheets(case: Case) -> None:
+def impossible_sheets(case):
     """Refuse a sheet without area, without a radius or with hardly a cell."""
     skin = draw_skin(case)
     contact = draw_contact(case, skin, 10.0)
@@ -173,7 +169,7 @@ def impossible_sheets(case: Case) -> None:
     press_of(skin.model_copy(update={"sheet": skin.sheet.model_copy(update={name: wrong})}), contact)(1.0)
 
 
-FAMILIES: tuple[Family, ...] = (
+FAMILIES = (
     scaled_moduli, one_modulus, any_poisson_ratio, foam_gone_solid, film_that_closes, impossible_skins,
     half_stated_skins, impossible_sheets,
 )  # fmt: skip
