@@ -20,8 +20,8 @@ FIRST = LOCATION_SCENES[0].scene
 
 @pytest.fixture(scope="module", params=SENSORS)
 def presses(request, tmp_path_factory):
-    """Two training sessions and two test sessions: a third of the campaign."""
-    planned = [item for item in LOCATION_SCENES if item.scene.session in ("train-1", "train-2", "test-1", "test-2")]
+    """Two training sessions and one test session: a quarter of the campaign."""
+    planned = [item for item in LOCATION_SCENES if item.scene.session in ("train-1", "train-2", "test-1")]
     return recorded(request.param, tmp_path_factory.mktemp(request.param), planned)
 
 

@@ -20,7 +20,7 @@ def sequences(shared_data, tmp_path_factory):
 
 def test_slip_of_real_sequences_by_blocks_of_neighbours(sequences):
     """The notes of the data have 0.978 of eight blocks, 0.993 of shuffled folds and 0.752 of always 'slipped'."""
-    found = evaluated(slip_sequence.SPEC, sequences, "forest", params={"n_estimators": 20})
+    found = evaluated(slip_sequence.SPEC, sequences, "forest", params={"n_estimators": 10})
     assert found.split == "block", "nothing stricter is labelled: no object and one session"
     assert found.sizes.n_test == 137
     assert found.score >= 0.96
@@ -32,5 +32,5 @@ def test_slip_of_real_sequences_by_blocks_of_neighbours(sequences):
 def test_slip_of_real_sequences_has_no_official_test_and_no_time_to_cut(sequences):
     with pytest.raises(NotApplicable, match="cuts recordings in time"):
         evaluated(slip_sequence.SPEC, sequences, "forest", split="in-session")
-    first = evaluated(slip_sequence.SPEC, sequences, "forest", "first-frame", params={"n_estimators": 20})
+    first = evaluated(slip_sequence.SPEC, sequences, "forest", "first-frame", params={"n_estimators": 10})
     assert first.score < 0.85, "where a channel stands at the start does not name slip"
