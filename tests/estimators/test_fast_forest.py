@@ -1,6 +1,5 @@
 """The extra: skipped with its reason where it is missing, never plain scikit-learn under its name where it is not."""
 
-import subprocess
 import sys
 import warnings
 from collections import Counter
@@ -9,11 +8,8 @@ import numpy as np
 import pytest
 
 from tactbench.core.evaluation.fitting import fit
-from tactbench.core.matrix.plan import Cell
-from tactbench.core.matrix.solve import Job, solve, unanswered
 from tactbench.core.provenance.source import versions
 from tactbench.plugin import NotApplicable, load_object, load_registry
-from tests.core.evaluation.made import record
 
 REGISTRY = load_registry()
 FAST = REGISTRY.estimators["forest-fast"]
@@ -29,75 +25,38 @@ def cloud(n=400, seed=0):
     return X, (X[:, 0] * X[:, 1] > 0).astype(np.int64)
 
 
-def test_it_is_listed_without_being_imported():
-    code = "import sys; from tactbench.plugin import load_registry; load_registry(); print('sklearnex' in sys.modules)"
-    said = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert said.stdout.strip() == "False"
+@pytest.fixture
+def extra():
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", message="distutils Version classes", category=DeprecationWarning)
+        pytest.importorskip("sklearnex", reason="the extra [fast] is not installed")
 
 
 def test_without_the_extra_the_reason_names_the_command(monkeypatch):
+    """A cell that is not applicable is skipped with the reason, and is no failure."""
     monkeypatch.setitem(sys.modules, "sklearnex", None)
     monkeypatch.delitem(sys.modules, "sklearnex.ensemble", raising=False)
     with pytest.raises(NotApplicable, match=r"pip install 'tactbench\[fast\]'"):
         build()
 
 
-def test_a_cell_without_the_extra_is_skipped_with_the_reason_and_is_no_failure(tmp_path, monkeypatch):
-    monkeypatch.setitem(sys.modules, "sklearnex", None)
-    monkeypatch.delitem(sys.modules, "sklearnex.ensemble", raising=False)
-    rng = np.random.default_rng(0)
-    paths = tuple(
-        record(tmp_path / f"{name}-{radius}.h5", rng.normal(size=(50, 3)), session=name,
-               labels={"cap_radius_mm": radius})
-        for name in ("first", "second") for radius in (5.0, 40.0)
-    )  # fmt: skip
-    cell = Cell(
-        sensor="made", task="curvature", rig="replay", protocol="deployable", split="session", estimator="forest-fast",
-        params=(), baseline=False, repeat=1, repeats=1, seed=1,
-    )  # fmt: skip
-    with pytest.raises(NotApplicable) as reason:
-        solve(Job(cell, REGISTRY.tasks["curvature"].spec, FAST, paths, (), "", {}))
-    row = unanswered(cell, REGISTRY.tasks["curvature"].spec, reason.value, simulated=False)
-    assert row["status"] == "skipped", row["reason"]
-    assert "pip install 'tactbench[fast]'" in row["reason"]
-
-
 def test_a_cell_of_it_is_keyed_by_the_version_of_the_extra():
     assert set(versions(FAST.distributions)) - set(versions()) == {"scikit-learn-intelex", "daal"}
 
 
-class TestInstalled:
-    @pytest.fixture(autouse=True)
-    def _extra(self):
-        with warnings.catch_warnings():
-            warnings.filterwarnings("ignore", message="distutils Version classes", category=DeprecationWarning)
-            pytest.importorskip("sklearnex", reason="the extra [fast] is not installed")
+@pytest.mark.parametrize("kind", ["classification", "regression"])
+def test_one_row_and_many_give_the_same_answers_and_nothing_is_warned_of(extra, kind):
+    X, y = cloud()
+    counts = Counter()
+    model = build(kind, n_estimators=20)
+    fit(model, X, y if kind == "classification" else X[:, 0] ** 2, "forest-fast", counts)
+    assert counts == {}
+    single = np.array([model.predict(row[None])[0] for row in X[:50]])
+    # Sums over trees may be taken in another order for one row: the last bits of a mean.
+    np.testing.assert_allclose(single, model.predict(X)[:50], rtol=1e-12)
 
-    @pytest.mark.parametrize("kind", ["classification", "regression"])
-    def test_one_row_and_many_give_the_same_answers_and_nothing_is_warned_of(self, kind):
-        X, y = cloud()
-        counts = Counter()
-        model = build(kind, n_estimators=20)
-        fit(model, X, y if kind == "classification" else X[:, 0] ** 2, "forest-fast", counts)
-        assert counts == {}
-        many = model.predict(X)
-        single = np.array([model.predict(row[None])[0] for row in X[:50]])
-        # Sums over trees may be taken in another order for one row: the last bits of a mean.
-        np.testing.assert_allclose(single, many[:50], rtol=1e-12)
 
-    def test_it_is_about_as_right_as_the_plain_forest(self):
-        X, y = cloud(2000)
-        X_new, y_new = cloud(4000, seed=1)
-        right = []
-        for name in ("forest-100", "forest-fast-100"):
-            descriptor = REGISTRY.estimators[name]
-            model = load_object(descriptor.where)(kind="classification", seed=1, threads=1, **descriptor.params)
-            model.fit(X, y)
-            right.append(np.mean(model.predict(X_new) == y_new))
-        # About 0.98 right of 4000: the standard deviation of the difference is at most 0.003; four of them.
-        assert right[0] == pytest.approx(right[1], abs=0.012)
-
-    def test_what_falls_back_to_plain_scikit_learn_is_refused(self):
-        X, y = cloud(12)
-        with pytest.raises(NotApplicable, match="fell back to plain scikit-learn"):
-            build(n_estimators=6025, max_depth=1).fit(X, y)
+def test_what_falls_back_to_plain_scikit_learn_is_refused(extra):
+    X, y = cloud(12)
+    with pytest.raises(NotApplicable, match="fell back to plain scikit-learn"):
+        build(n_estimators=6025, max_depth=1).fit(X, y)

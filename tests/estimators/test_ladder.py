@@ -73,15 +73,6 @@ def test_what_is_not_linear_learns_a_ring(name, kind):
     assert np.mean((model.predict(X_new) - y_new) ** 2) < np.var(y_new) / 3
 
 
-@pytest.mark.parametrize("name", ["logistic", "lda"])
-def test_what_is_linear_does_not_learn_a_ring(name):
-    X, y = rings("classification", 4000)
-    model = build(name, "classification")
-    model.fit(X, y)
-    # A half is chance: its standard deviation over 4000 rows is 0.008; a plane's gain over it is five of them at most.
-    assert abs(np.mean(model.predict(X) == y) - 0.5) < 0.04
-
-
 @pytest.mark.parametrize("name", ["svm", "mlp"])
 def test_the_unit_of_the_target_changes_nothing_but_the_unit_of_the_answer(name):
     X, y = rings("regression", 300)
@@ -109,24 +100,6 @@ def test_support_vectors_are_taught_every_nth_row_and_no_more_than_stated():
     assert thinned.model.shape_fit_[0] == 121
 
 
-def test_a_forest_answers_the_same_whatever_its_threads():
-    X, y = rings("regression", 900)
-    one, four = build("forest-50", "regression"), build("forest-50", "regression", threads=4)
-    one.fit(X, y)
-    four.fit(X, y)
-    np.testing.assert_array_equal(one.predict(X), four.predict(X))
-
-
-def test_all_is_every_estimator_of_the_kind_with_the_tasks_baselines_where_they_were():
-    for task in ("force", "curvature"):
-        spec = REGISTRY.tasks[task].spec
-        choice = TaskChoice(name=task, estimators=(EstimatorChoice(name="all"),))
-        cells = plan_cells(MatrixSpec(repeats=1, tasks=(choice,)), ("biotac",), REGISTRY)
-        assert {cell.estimator for cell in cells} == {e.name for e in ESTIMATORS if spec.kind in e.kinds}
-        assert [cell.estimator for cell in cells if cell.baseline] == list(spec.baselines)
-        assert len({cell.name for cell in cells}) == len(cells)
-
-
 def test_all_leaves_the_first_baseline_of_the_task_first():
     """The first one is the `baseline` column, whatever others are installed and however they are called."""
     registry = load_registry()
@@ -135,6 +108,7 @@ def test_all_leaves_the_first_baseline_of_the_task_first():
     choice = TaskChoice(name="backwards", estimators=(EstimatorChoice(name="all"),))
     cells = plan_cells(MatrixSpec(repeats=1, tasks=(choice,)), ("biotac",), registry)
     assert [cell.estimator for cell in cells if cell.baseline] == ["time-index", "mean"]
+    assert {cell.estimator for cell in cells} == {one.name for one in ESTIMATORS if "regression" in one.kinds}
 
 
 def test_all_beside_a_name_with_parameters_keeps_both():

@@ -8,6 +8,7 @@ warning, a refusal where there is an answer, an answer where there is none, or a
 from __future__ import annotations
 
 import math
+import time
 import warnings
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -34,27 +35,27 @@ class Case:
     right: Right = "answer"
     drawn: dict[str, Scalar] = field(default_factory=dict)
 
-    def says(self, **drawn: Scalar) -> None:
+    def says(self, **drawn):
         """Remember what was drawn, for whoever repeats the case."""
         self.drawn.update(drawn)
 
-    def uniform(self, low: float, high: float) -> float:
+    def uniform(self, low, high):
         """Draw between `low` and `high`."""
         return float(self.rng.uniform(low, high))
 
-    def decades(self, low: float, high: float) -> float:
+    def decades(self, low, high):
         """Draw between `low` and `high`, every decade alike."""
         return float(10 ** self.rng.uniform(math.log10(low), math.log10(high)))
 
-    def one_of(self, *choices: str) -> str:
+    def one_of(self, *choices):
         """Draw one name."""
         return str(self.rng.choice(choices))
 
-    def chance(self, share: float) -> bool:
+    def chance(self, share):
         """Draw whether."""
         return bool(self.rng.random() < share)
 
-    def holds(self, law: object, text: str) -> None:
+    def holds(self, law, text):
         """Raise WrongError unless `law` is true."""
         if not law:
             raise WrongError(text)
@@ -72,7 +73,7 @@ class Outcome:
     drawn: dict[str, Scalar]
 
 
-def judge(name: str, family: Family, seed: int, number: int) -> Outcome:
+def judge(name, family, seed, number):
     """Draw case `number` of a family and judge it; the same arguments give the same case on any machine."""
     case = Case(generator(seed, "hard case", name, str(number)))
     try:
@@ -93,3 +94,12 @@ def judge(name: str, family: Family, seed: int, number: int) -> Outcome:
     if case.right == "refusal":
         return Outcome("failed", "answered although there is no answer", case.drawn)
     return Outcome("passed", "", case.drawn)
+
+
+def judged(job):
+    """Return verdict, detail, what was drawn and the seconds of a case: family, seed and number."""
+    from tests.hard.families import families
+
+    began = time.perf_counter()
+    outcome = judge(job[0], families()[job[0]], *job[1:])
+    return outcome.verdict, outcome.detail, outcome.drawn, time.perf_counter() - began

@@ -1,7 +1,5 @@
 """Properties of the gap over random indenters."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np
@@ -18,17 +16,21 @@ SHEET = SkinSheet(
     x_min=assumed(-10, "mm", "t"), x_max=assumed(10, "mm", "t"), arc=assumed(20, "mm", "t"), cells=(40, 50)
 )
 GRID = skin_grid(SHEET)
-RADII = st.one_of(st.just(math.inf), st.floats(-4, 15).map(lambda exponent: 10.0**exponent))
-PLACES = st.floats(-30, 30)
-SLOPES = st.floats(-2, 2)
-FINGERS = st.one_of(st.just(math.inf), st.floats(4, 100))
+INF = st.just(math.inf)
+FINGERS = st.one_of(INF, st.floats(4, 100))
+CAPS, PLACES, TILTS = st.floats(1, 1e9), st.floats(-9, 9), st.floats(-0.5, 0.5)
 
 
-@given(RADII, PLACES, PLACES, SLOPES, SLOPES, FINGERS)
-def test_a_contact_is_refused_or_has_a_finite_gap_of_at_least_zero(radius, x, s, slope_x, slope_s, finger):
-    contact = Contact(radius, x, s, slope_x, slope_s)
-    right = radius >= 0.5 and abs(x) <= 10 and abs(s) <= 10 and math.hypot(slope_x, slope_s) <= STEEPEST
-    if not right:
+@given(
+    st.builds(
+        Contact, st.one_of(INF, st.floats(-4, 15).map(lambda exponent: 10.0**exponent)), st.floats(-30, 30),
+        st.floats(-30, 30), st.floats(-2, 2), st.floats(-2, 2),
+    ),
+    FINGERS,
+)  # fmt: skip
+def test_a_contact_is_refused_or_has_a_finite_gap_of_at_least_zero(contact, finger):
+    on_the_sheet = abs(contact.x_mm) <= 10 and abs(contact.s_mm) <= 10
+    if contact.radius_mm < 0.5 or not on_the_sheet or math.hypot(contact.tilt_x, contact.tilt_s) > STEEPEST:
         with pytest.raises(RigError) as refused:
             check_contact(GRID, contact)
         assert refused.value.hint
@@ -39,17 +41,17 @@ def test_a_contact_is_refused_or_has_a_finite_gap_of_at_least_zero(radius, x, s,
     assert gap.min() >= 0
 
 
-@given(st.floats(1, 1e9), st.floats(1, 1e9), st.floats(-9, 9), st.floats(-9, 9), FINGERS)
+@given(CAPS, CAPS, PLACES, PLACES, FINGERS)
 def test_a_larger_cap_is_nowhere_further_away(first, second, x, s, finger):
     small, large = sorted((first, second))
-    gaps = [gap_mm(GRID, Contact(radius, x, s), finger) for radius in (small, large)]
+    near, far = (gap_mm(GRID, Contact(radius, x, s), finger) for radius in (large, small))
     # Where the smaller cap has ended, its gap is a number that stands for "never".
-    there = gaps[0] < small + BEYOND_MM
+    there = far < small + BEYOND_MM
     # Rounding of gaps of up to a few finger radii.
-    assert np.all(gaps[1][there] <= gaps[0][there] + 1e-12)
+    assert np.all(near[there] <= far[there] + 1e-12)
 
 
-@given(st.floats(1, 1e9), st.floats(-9, 9), st.floats(-9, 9), st.floats(-0.5, 0.5), st.floats(-0.5, 0.5), FINGERS)
+@given(CAPS, PLACES, PLACES, TILTS, TILTS, FINGERS)
 def test_a_mirrored_indenter_has_a_mirrored_gap(radius, x, s, slope_x, slope_s, finger):
     gap = gap_mm(GRID, Contact(radius, x, s, slope_x, slope_s), finger)
     mirrored = gap_mm(GRID, Contact(radius, x, -s, slope_x, -slope_s), finger)

@@ -1,7 +1,5 @@
 """The slip campaign: its scenes, what the twin makes of them, and labels against what the twin knows."""
 
-from __future__ import annotations
-
 import collections
 
 import numpy as np
@@ -10,28 +8,18 @@ from threadpoolctl import threadpool_limits
 
 from tactbench.core.events.labels import GROSS, INCIPIENT, STICK, UNDECIDED, slip_labels
 from tactbench.core.spec.events import THRESHOLDS
-from tactbench.plugin import RigContext, load_object, load_registry
 from tactbench.tasks.slip_scenes import DISTURBANCES, REFERENCE_HZ, SESSIONS, SLIP_SCENES
 
-REGISTRY = load_registry()
+from .made import REGISTRY, twin
+
 SCENES = {planned.scene.name: planned.scene for planned in SLIP_SCENES}
 TESTED = [planned.scene for planned in SLIP_SCENES if planned.role == "test"]
 
 
-@pytest.fixture(scope="module")
-def twin():
-    return load_object(REGISTRY.rigs["twin"].where)(RigContext(effects=tuple(REGISTRY.effects)))
-
-
-@pytest.fixture(scope="module")
-def record(twin):
-    def make(sensor, scene, **more):
-        scene = scene.model_copy(update=more)
-        # One thread, as the command line has it: threads that outnumber the cores make small solves slow.
-        with threadpool_limits(1), twin.open(REGISTRY.sensors[sensor], scene, seed=1) as acquisition:
-            return acquisition
-
-    return make
+def record(sensor, scene, **more):
+    # One thread, as the command line has it: threads that outnumber the cores make small solves slow.
+    with threadpool_limits(1), twin().open(REGISTRY.sensors[sensor], scene.model_copy(update=more), seed=1) as found:
+        return found
 
 
 def columns(acquisition, stream):
@@ -72,36 +60,7 @@ def test_no_clock_tells_when_a_slip_begins():
 
 
 @pytest.mark.parametrize("sensor", ["biotac", "icub"])
-def test_friction_and_vibration_are_planned_where_something_slides_and_nowhere_else(twin, sensor):
-    sensor = REGISTRY.sensors[sensor]
-    still = [
-        item.scene
-        for task in REGISTRY.tasks
-        for split in (None, *task.spec.campaigns)
-        for item in task.spec.scenes_for(split)
-        if item.scene.slide is None
-    ]
-    assert len(still) > 100
-    for scene in (*still, *SCENES.values()):
-        plan = {entry.effect: entry for entry in twin.plan(sensor, scene).entries}
-        for effect, why in (("friction", "slides at "), ("skin-vibration", "a profile of ")):
-            assert plan[effect].included == (scene.slide is not None)
-            expected = "no tangential motion: the scene does not slide" if scene.slide is None else why
-            assert plan[effect].reason.startswith(expected)
-
-
-@pytest.mark.parametrize("sensor", ["biotac", "icub"])
-def test_what_a_plan_says_of_a_slip_names_speed_load_friction_and_profile(twin, sensor):
-    rows = twin.explain(REGISTRY.sensors[sensor], SCENES["coarse-50mm-s-1.5N-test"])
-    said = {row.entry.effect: row.entry.reason for row in rows if row.entry.included}
-    assert said["friction"].startswith("slides at 50 mm/s from ")
-    assert said["friction"].endswith("under up to 1.5 N; friction 0.6 to 0.5")
-    assert said["skin-vibration"] == "a profile of 150 um rms passes, its spectrum even up to 50 Hz"
-    assert ("ac-pressure" in said) == (sensor == "biotac")
-
-
-@pytest.mark.parametrize("sensor", ["biotac", "icub"])
-def test_labels_agree_with_what_the_twin_knows(record, sensor):
+def test_labels_agree_with_what_the_twin_knows(sensor):
     """Frames by :func:`slip_labels` against the twin's own state: slipped yet, and its stick ratio.
 
     Where they may differ: the label of gross slip begins 0.1 mm after it (5 of 2300 samples at 10 mm/s), or before the
@@ -144,23 +103,23 @@ def band_rms(counts, low_hz, high_hz, rate_hz=2200.0):
     return float(np.sqrt(power[(f >= low_hz) & (f < high_hz)].sum()))
 
 
-def rest_and_slip(record, scene):
+def rest_and_slip(scene):
     t_ns, found = columns(record("biotac", scene), "vibration")
     counts, t_s, start = found["PAC"].astype(float), t_ns / 1e9, scene.slide.start.to("s")
     return counts[(t_s > 0.9) & (t_s < start)], counts[t_s > start + 0.2]
 
 
-@pytest.mark.parametrize("name", ["coarse-50mm-s-0.5N", "coarse-50mm-s-1.5N", "knit-50mm-s-0.5N"])
-def test_a_texture_that_passes_at_tens_of_hertz_is_heard_between_30_and_200(record, name):
-    rest, slip = rest_and_slip(record, SCENES[f"{name}-test"])
+@pytest.mark.parametrize("name", ["coarse-50mm-s-1.5N", "knit-50mm-s-0.5N"])
+def test_a_texture_that_passes_at_tens_of_hertz_is_heard_between_30_and_200(name):
+    rest, slip = rest_and_slip(SCENES[f"{name}-test"])
     # Hum and noise: 3.0 counts, known to 15 % from 0.8 s.
     assert band_rms(rest, 30, 200) == pytest.approx(3.0, rel=0.2)
     assert band_rms(slip, 30, 200) > 2 * band_rms(rest, 30, 200)
 
 
-def test_stick_slip_is_heard_where_it_repeats(record):
+def test_stick_slip_is_heard_where_it_repeats():
     acquisition = record("biotac", SCENES["default-10mm-s-1.5N-test"])
-    _, slip = rest_and_slip(record, SCENES["default-10mm-s-1.5N-test"])
+    _, slip = rest_and_slip(SCENES["default-10mm-s-1.5N-test"])
     per_s = 1 / np.median(np.diff(acquisition.run.sliding.let_go_s))
     assert 30 < per_s < 200
     assert np.fft.rfftfreq(slip.size, 1 / 2200)[heard(slip, 20)] == pytest.approx(per_s, rel=0.02)
@@ -173,15 +132,7 @@ def heard(counts, low_hz):
     return int(spectrum.argmax())
 
 
-def test_a_smooth_steady_slide_is_not_heard_there(record):
+def test_a_smooth_steady_slide_is_not_heard_there():
     # What the band does not show is part of the answer: nothing of this surface passes at 30 Hz and more.
-    rest, slip = rest_and_slip(record, SCENES["smooth-50mm-s-0.5N-test"])
+    rest, slip = rest_and_slip(SCENES["smooth-50mm-s-0.5N-test"])
     assert band_rms(slip, 30, 200) == pytest.approx(band_rms(rest, 30, 200), rel=0.25)
-
-
-def test_a_sensor_of_taxels_alone_has_nothing_faster_than_its_own_rate(record):
-    acquisition = record("icub", SCENES["knit-50mm-s-0.5N-test"])
-    assert [stream.name for stream in acquisition.streams] == ["taxels"]
-    t_ns, found = columns(acquisition, "taxels")
-    assert np.diff(t_ns).min() == 20_000_000
-    assert set(found) == {channel.name for channel in REGISTRY.sensors["icub"].spec.channels("taxel")}

@@ -74,18 +74,6 @@ def test_no_group_of_the_test_rows_is_in_training_nor_where_parameters_are_chose
         assert set(tested) == values(data, group, [np.ones(len(table.row), dtype=bool) for table in data.tables])
 
 
-@pytest.mark.parametrize("name", [name for name, task in TASKS.items() if "few-shot-10" in task.campaigns])
-def test_few_shots_train_on_nested_sets_and_test_on_the_same(loaded, name):
-    sets = {}
-    for number in (1, 2, 5, 10):
-        data = loaded(name, f"few-shot-{number}")
-        (fold,) = make_splits(data, f"few-shot-{number}", 0)
-        sets[number] = values(data, "recording", fold.train), values(data, "recording", fold.test)
-    assert all(sets[a][0] < sets[b][0] for a, b in ((1, 2), (2, 5), (5, 10)))
-    assert len({frozenset(test) for _, test in sets.values()}) == 1
-    assert len(sets[10][0]) == 10 * len(sets[1][0])
-
-
 def test_sessions_are_taken_in_order_of_their_numbers(tmp_path):
     (tmp_path / "test").mkdir()
     paths = sessions(tmp_path, ("day-10", "day-9", "day-2", "both"), ROWS, role="train")

@@ -57,29 +57,28 @@ def test_a_recording_is_one_answer_by_what_it_did_and_not_where_it_stood(tmp_pat
 
 
 def test_the_delay_of_an_answer_holds_the_recording_it_waits_for(tmp_path):
-    paths = sequences(tmp_path)
-    whole = run(task(), paths, latency=True)
-    assert whole.times.delay_parts_ms["window"] == pytest.approx(390.0)
-    assert whole.times.answer_delay_ms == pytest.approx(sum(whole.times.delay_parts_ms.values()))
-    assert whole.times.delay_parts_ms["features"] > 0
+    paths = sequences(tmp_path, number=8)
+    whole = run(task(), paths, estimator="logistic", latency=True).times
+    assert whole.delay_parts_ms["features"] > 0
+    assert whole.answer_delay_ms == pytest.approx(sum(whole.delay_parts_ms.values()))
     part = task(summaries=(Summary(measure="deviation", start=0.1, end=0.3, unit="s"),))
     half = task(summaries=(Summary(measure="deviation", end=0.5),))
-    for asked, window_ms in ((part, 200.0), (half, 195.0), (vote(), 390.0)):
-        assert run(asked, paths).times.delay_parts_ms["window"] == pytest.approx(window_ms)
+    for asked, window_ms in ((task(), 390.0), (part, 200.0), (half, 195.0), (vote(), 390.0)):
+        parts = run(asked, paths, estimator="logistic").times.delay_parts_ms
+        assert parts["window"] == pytest.approx(window_ms)
     assert "window" not in run(task(), paths, estimator="majority").times.delay_parts_ms
 
 
 def test_splits_keep_recordings_whole(tmp_path):
-    paths = sequences(tmp_path, object=lambda place: f"o{place % 4}")
+    paths = sequences(tmp_path)
     data = load_dataset(task(), paths)
-    for split in ("object", "recording", "shuffled"):
+    for split in ("recording", "shuffled"):
         for fold in make_splits(data, split, 1):
             for train, test in zip(fold.train, fold.test, strict=True):
                 assert (train == train[0]).all()
                 np.testing.assert_array_equal(test, ~train)
-    tested = [[int(data.tables[place].y[0]) for place, mask in enumerate(fold.test) if mask.any()]
-              for fold in make_splits(data, "shuffled", 1)]  # fmt: skip
-    assert {sum(one) for one in tested} <= {3, 4}, "16 of 24 are stable: folds have about equal shares"
+    tested = [np.flatnonzero([mask.any() for mask in fold.test]) for fold in make_splits(data, "shuffled", 1)]
+    assert {sum(data.tables[place].y[0] for place in fold) for fold in tested} <= {3, 4}, "16 of 24 are stable"
     assert "deals recordings at random" in run(task(), paths, "shuffled").stamps[0]
 
 
@@ -205,20 +204,6 @@ def test_frames_vote_and_of_equals_the_first_class_wins():
     assert (asked.recording.tolist(), asked.row.tolist()) == ([0, 2], [2, 4])
     _, mean = voted(part_of([0, 0, 1], [1.0, 1.0, 2.0]), np.array([1.0, 3.0, 5.0]), 0)
     assert mean.tolist() == [2.0, 5.0]
-
-
-def test_a_vote_scores_recordings_that_frames_alone_get_half_wrong(tmp_path):
-    """A class shifts readings by half their deviation: 60 % of the frames are answered rightly, and 60 frames agree."""
-    rng = np.random.default_rng(4)
-    paths = [record(tmp_path / f"s{place:02d}.h5", rng.normal(place % 2 * 0.5, 1, (120, 1)),
-                    labels={"slip": place % 2}) for place in range(20)]  # fmt: skip
-    frames = label_task("slip", splits=("recording",))
-    one, all_of_them = run(frames, paths, estimator="logistic"), run(vote(), paths, estimator="logistic")
-    assert one.score < 0.7
-    assert all_of_them.score > 0.9
-    assert (one.sizes.n_test, all_of_them.sizes.n_test, all_of_them.times.batch_rows) == (2400, 20, 2400)
-    assert one.sizes.n_train == all_of_them.sizes.n_train
-    assert all_of_them.interval.method.startswith("jackknife over 20 recordings ")
 
 
 def pushes(folder, number=18, n=60, seed=2):

@@ -22,7 +22,7 @@ def low_passed(rng, n, memory):
     return signal.lfilter([1.0], [1.0, -memory], white)[settled:]
 
 
-@pytest.mark.parametrize(("n", "memory"), [(600, 0.0), (120, 0.0), (12, 0.0), (600, 0.5), (600, 0.9), (120, 0.8)])
+@pytest.mark.parametrize(("n", "memory"), [(600, 0.0), (12, 0.0), (600, 0.9), (120, 0.8)])
 def test_the_variance_of_a_hold_is_unbiased_white_or_filtered_long_or_short(n, memory):
     """Over 400 recordings: 3 % of the deviation is 6 % of the variance."""
     rng = np.random.default_rng(11)
@@ -50,7 +50,7 @@ def asked(error, *, rows=4400, hold=600, recordings=1, seed=0, sigma=SIGMA):
     return answers, unit, Floor(holds)
 
 
-@pytest.mark.parametrize(("error", "recordings", "most"), [(0.5, 5, 0.06), (0.5, 8, 0.06), (2.0, 5, 0.03)])
+@pytest.mark.parametrize(("error", "recordings", "most"), [(0.5, 5, 0.06), (2.0, 5, 0.03)])
 def test_the_error_of_its_own_comes_out_from_below_the_noise(error, recordings, most):
     inside, scores = [], []
     for seed in range(60):

@@ -53,16 +53,6 @@ def test_classes_that_live_in_recordings_of_their_own_are_strata(tmp_path):
     assert kept["strata"] == [0] * 5 + [1] * 5
 
 
-def test_trials_of_one_session_stand_in_for_each_other(tmp_path):
-    paths = [
-        record(tmp_path / f"{place}.h5", *ramp(place, n=40), session="one", role="train" if place < 2 else "test")
-        for place in range(9)
-    ]
-    method = evaluated(force_task(), paths, "mean", split="roles").interval.method
-    assert method.startswith("jackknife over 7 recordings ")
-    assert method.endswith("): spread between sessions is not in it")
-
-
 def test_a_unit_is_found_for_each_row_by_its_number(tmp_path):
     """Rows that were left out must not shift the groups of those that follow."""
     X, force = ramp(0, n=60)

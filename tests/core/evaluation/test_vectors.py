@@ -51,16 +51,7 @@ def test_the_metric_is_the_mean_length_of_the_difference():
     assert METRICS["mean_euclidean_error"].of(y, p) == pytest.approx(np.mean(np.hypot(*(p - y).T)), rel=1e-12)
 
 
-def test_a_vector_is_answered_in_the_tasks_unit(tmp_path):
-    paths = presses(tmp_path)
-    result = run(place_task(), paths)
-    assert result.score < 1e-9, "taxels are linear in the place: rounding of millimetres is all that is left"
-    assert result.sets["test"].y_true.shape == result.sets["test"].y_pred.shape == (6 * 60, 2)
-    assert np.abs(result.sets["test"].y_true).max() > 1.0, "millimetres"
-    assert all(run(place_task(), paths, trivial).score > 1.0 for trivial in ("mean", "time-index"))
-
-
-@pytest.mark.parametrize("estimator", ["lasso", "svm", "boosting", "forest-10", "knn"])
+@pytest.mark.parametrize("estimator", ["lasso", "forest-10", "knn"])
 def test_each_component_is_learnt_as_if_it_were_asked_for_alone(tmp_path, estimator):
     """Parameters that are searched are fixed: a vector has one choice for all of its components."""
     paths = presses(tmp_path, noise=3.0)

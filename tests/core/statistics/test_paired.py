@@ -1,7 +1,5 @@
 """Two cells compared, over replicates and over folds, and several comparisons at once."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -63,23 +61,18 @@ def test_without_replicates_nothing_is_decided():
 
 
 @settings(max_examples=40, deadline=None)
-@given(seed=st.integers(0, 10_000), replicates=st.integers(5, 16), order=st.randoms(use_true_random=False))
-def test_exchanging_the_two_turns_everything_round_and_the_order_of_sessions_is_nothing(seed, replicates, order):
-    rng = np.random.default_rng(seed)
-    a, b = rng.gamma(4, 1, replicates), rng.gamma(4, 1, replicates)
+@given(seed=st.integers(0, 10_000), replicates=st.integers(5, 16))
+def test_exchanging_the_two_turns_everything_round_and_the_order_of_sessions_is_nothing(seed, replicates):
+    a, b = np.random.default_rng(seed).gamma(4, 1, (2, replicates))
     one, back = difference(mae_row("a", a), mae_row("b", b)), difference(mae_row("b", b), mae_row("a", a))
-    assert (back.value, back.low, back.high) == pytest.approx((-one.value, -one.high, -one.low), abs=1e-12)
-    assert back.effect == pytest.approx(-one.effect, abs=1e-12)
-    assert back.improved == pytest.approx(1 - one.improved)
-    turned = {"better": "worse", "worse": "better"}
-    assert back.verdict == turned.get(one.verdict, one.verdict)
+    found, turned = ((x.value, x.low, x.high, x.effect, x.improved) for x in (one, back))
+    assert turned == pytest.approx((-found[0], -found[2], -found[1], -found[3], 1 - found[4]), abs=1e-12)
+    assert back.verdict == {"better": "worse", "worse": "better"}.get(one.verdict, one.verdict)
+    other = difference(mae_row("a", a[::-1]), mae_row("b", b[::-1]))
     if replicates <= 12:  # beyond, exchanges are drawn, and others for another order
-        assert back.p == one.p
-        places = list(range(replicates))
-        order.shuffle(places)
-        other = difference(mae_row("a", a[places]), mae_row("b", b[places]))
-        assert replace(other, value=0, low=0, high=0, effect=0) == replace(one, value=0, low=0, high=0, effect=0)
-        assert other.low == pytest.approx(one.low, abs=1e-12)
+        assert one.p == back.p == other.p
+    assert other.verdict == one.verdict
+    assert (other.low, other.high) == pytest.approx((one.low, one.high), abs=1e-12)
 
 
 def test_classes_in_sessions_of_their_own_are_compared_within_classes():

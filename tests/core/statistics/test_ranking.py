@@ -40,12 +40,6 @@ def test_pairing_tells_apart_what_two_intervals_would_not():
     assert places([one, renamed(other)]) == [1, 1]
 
 
-@pytest.mark.parametrize(("same", "expected"), [(None, [1, 2]), (0.02, [1, 1]), (0.005, [1, 2])])
-def test_what_is_practically_the_same_shares_a_rank(same, expected):
-    means, near = np.linspace(1, 2, 8), np.linspace(0.009, 0.011, 8)
-    assert places([mae_row("a", means, equivalence=same), mae_row("b", means + near, equivalence=same)]) == expected
-
-
 @settings(max_examples=25, deadline=None)
 @given(seed=st.integers(0, 10_000), spread=st.sampled_from([0.01, 0.1, 1.0]), order=st.permutations(range(6)))
 def test_order_and_names_change_nothing(seed, spread, order):

@@ -1,7 +1,5 @@
 """Hard recordings: whole scenes through the twin, with numbers from the ends of what a scene can say."""
 
-from __future__ import annotations
-
 import math
 from functools import cache
 
@@ -13,31 +11,28 @@ from tactbench.plugin import (
     Indenter,
     Placement,
     Quality,
-    Quantity,
     RigContext,
     Scene,
-    SensorDescriptor,
     assumed,
     load_registry,
 )
 from tactbench.plugin.simulation import Environment
-from tactbench.rigs.twin.rig import REFERENCE_STREAM, Twin, TwinAcquisition, build
-from tests.hard.cases import Case, Family
+from tactbench.rigs.twin.rig import REFERENCE_STREAM, build
 
 _CAPS_MM = (5.0, 10.0, 40.0)
 
 
-def _q(value: float, unit: str) -> Quantity:
+def _q(value, unit):
     return assumed(value, unit, "a hard case")
 
 
 @cache
-def _twin() -> Twin:
+def _twin():
     effects = load_registry().effects
     return build(RigContext(effects=tuple(effects[name] for name in effects.names())))
 
 
-def _sensor(case: Case) -> SensorDescriptor:
+def _sensor(case):
     sensors = load_registry().sensors
     able = [name for name in sensors.names() if sensors[name].spec.skin is not None and sensors[name].transducer]
     name = case.one_of(*able)
@@ -45,7 +40,7 @@ def _sensor(case: Case) -> SensorDescriptor:
     return sensors[name]
 
 
-def _scene(case: Case, **changed: object) -> Scene:
+def _scene(case, **changed):
     """Return an ordinary scene in a few rows, of a contact that many cases share, with some things changed."""
     ordinary: dict[str, object] = {
         "name": "hard",
@@ -56,7 +51,7 @@ def _scene(case: Case, **changed: object) -> Scene:
     return Scene.model_validate({**ordinary, **changed})
 
 
-def _recorded(case: Case, sensor: SensorDescriptor, scene: Scene, seed: int) -> TwinAcquisition:
+def _recorded(case, sensor, scene, seed):
     """Carry out a scene and hold what comes out against what every recording promises."""
     with _twin().open(sensor, scene, seed=seed) as acquisition:
         blocks = list(acquisition)
@@ -80,25 +75,24 @@ def _recorded(case: Case, sensor: SensorDescriptor, scene: Scene, seed: int) -> 
     return acquisition
 
 
-def any_environment(case: Case) -> None:
+def any_environment(case):
     """Record finite readings in the converter's range, flagged where it stood at its end, whatever the nuisances.
 
     Noise, drift and offsets from none to a million times what the spec states; a second to a century since power-on.
     """
     sensor = _sensor(case)
-    scale = [0.0 if case.chance(0.3) else case.decades(1e-3, 1e6) for _ in range(3)]
+    names = ("noise_scale", "drift_scale", "session_offset_scale")
+    scales = {name: 0.0 if case.chance(0.3) else case.decades(1e-3, 1e6) for name in names}
     environment = Environment(
         since_power_on=_q(0.0 if case.chance(0.2) else case.decades(1.0, 3e9), "s"),
-        noise_scale=scale[0],
-        drift_scale=scale[1],
-        session_offset_scale=scale[2],
         force_noise=_q(0.0 if case.chance(0.3) else case.decades(1e-6, 1e3), "N"),
+        **scales,
     )
-    case.says(noise_scale=scale[0], drift_scale=scale[1], session_offset_scale=scale[2])
+    case.says(**scales)
     _recorded(case, sensor, _scene(case, environment=environment), int(case.rng.integers(-(2**31), 2**31)))
 
 
-def any_profile(case: Case) -> None:
+def any_profile(case):
     """Record ramps of any length: one row, all rest, up, down, level, a millisecond, eleven days; or nothing at all.
 
     Times ascend or repeat, the force follows the ramp, and zero force reads the same as rest.
@@ -120,7 +114,7 @@ def any_profile(case: Case) -> None:
     case.holds(force[0] == start, "the force does not start where it should")
 
 
-def any_force(case: Case) -> None:
+def any_force(case):
     """Record up to 500 N in range, with a remark beyond 5 N, or refuse a cap pressed past its rim."""
     sensor = _sensor(case)
     largest = float(case.rng.choice([20.0, 50.0, 500.0]))
@@ -130,7 +124,7 @@ def any_force(case: Case) -> None:
     case.holds("remark load" in acquisition.drawn, f"{largest:g} N and no remark")
 
 
-def same_seed_same_bits(case: Case) -> None:
+def same_seed_same_bits(case):
     """Give the same bits for the same seed, negative seeds and those beyond 64 bits included."""
     sensor, seed = _sensor(case), int(case.rng.integers(-(2**62), 2**62)) * int(case.rng.choice([1, 2**40]))
     scene = _scene(case, profile=ForceRamp(samples=30))
@@ -139,7 +133,7 @@ def same_seed_same_bits(case: Case) -> None:
         case.holds(np.array_equal(samples.data, second.samples[name].data), f"{name} differs with the same seed")
 
 
-def any_rung(case: Case) -> None:
+def any_rung(case):
     """Record on any rung of the ladder and to any tolerance, or refuse: a rung wrong for a skin, a bound none keeps."""
     sensor = _sensor(case)
     asked: dict[str, object] = {"rung": case.one_of("closed-form", "default", "fine", "no such rung")}
@@ -160,7 +154,7 @@ _UNITS = {"start": "N", "end": "N", "force_noise": "N", "tilt_x": "rad", "tilt_s
 _UNITS |= {"s": "mm", "scatter": "mm"}
 
 
-def impossible_scenes(case: Case) -> None:
+def impossible_scenes(case):
     """Refuse a scene in which a quantity is no number or infinite, or below zero where there is no such thing."""
     sensor, name = _sensor(case), case.one_of(*_NUMBERS)
     below_zero = name not in ("x", "s", "tilt_x", "tilt_s")
@@ -178,13 +172,13 @@ def impossible_scenes(case: Case) -> None:
     _recorded(case, sensor, scene, 1)
 
 
-def endless_scales(case: Case) -> None:
+def endless_scales(case):
     """Refuse scales of noise and drift that are infinite."""
     sensor, name = _sensor(case), case.one_of("noise_scale", "drift_scale", "session_offset_scale")
     case.right = "refusal"
     _recorded(case, sensor, _scene(case, environment=Environment().model_copy(update={name: math.inf})), 1)
 
 
-FAMILIES: tuple[Family, ...] = (
+FAMILIES = (
     any_environment, any_profile, any_force, any_rung, same_seed_same_bits, impossible_scenes, endless_scales,
 )  # fmt: skip

@@ -1,22 +1,18 @@
 """Hard contacts: radii, loads, edges and tilts at the ends of their ranges, on every installed skin."""
 
-from __future__ import annotations
-
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 
 import numpy as np
 
 from tactbench.plugin import load_registry
 from tactbench.plugin.simulation import FluidBackedShell, SkinState
-from tactbench.plugin.simulation import Skin as AnySkin
 from tactbench.rigs.twin.contact.core import with_core
 from tactbench.rigs.twin.contact.media import Medium
 from tactbench.rigs.twin.contact.press import Press
 from tactbench.rigs.twin.contact.pressing import medium_of
 from tactbench.rigs.twin.contact.validity import check_reach, remarks
 from tactbench.rigs.twin.geometry import Contact, check_contact, gap_mm, outer_radius_mm, pad_of, skin_grid
-from tests.hard.cases import Case, Family
 
 BALANCE = 1e-8
 """Relative force balance: a sum over thousands of cells rounds at 1e-13, and the law shall hold far from its edge."""
@@ -24,18 +20,13 @@ SOLVED = 1e-5
 """Relative error of a depth: ten times the solver's residual."""
 
 
-def skins() -> dict[str, AnySkin]:
+def skins():
     """Return the skin of every installed sensor that declares one."""
-    found = {}
-    sensors = load_registry().sensors
-    for name in sensors.names():
-        skin = sensors[name].spec.skin
-        if skin is not None:
-            found[name] = skin
-    return found
+    found = {sensor.spec.name: sensor.spec.skin for sensor in load_registry().sensors}
+    return {name: skin for name, skin in found.items() if skin is not None}
 
 
-def draw_skin(case: Case) -> AnySkin:
+def draw_skin(case):
     """Draw an installed skin."""
     known = skins()
     name = case.one_of(*sorted(known))
@@ -43,14 +34,14 @@ def draw_skin(case: Case) -> AnySkin:
     return known[name]
 
 
-def press_of(skin: AnySkin, contact: Contact, cells: tuple[int, int] | None = None) -> Press:
+def press_of(skin, contact, cells=None):
     """Return `skin` under an indenter, its core included; raises RigError where the contact cannot be."""
     grid = skin_grid(skin.sheet, cells)
     check_contact(grid, contact)
     core: Callable[[Medium], Medium] | None = None
     if isinstance(skin, FluidBackedShell):
 
-        def core(medium: Medium) -> Medium:
+        def core(medium):
             return with_core(medium, skin)
 
     sheet = skin.sheet
@@ -58,7 +49,7 @@ def press_of(skin: AnySkin, contact: Contact, cells: tuple[int, int] | None = No
     return Press(medium_of(skin, grid), gap, contact, core=core)
 
 
-def draw_contact(case: Case, skin: AnySkin, radius: float, *, margin: float = 0.25, tilt: float = 0.0) -> Contact:
+def draw_contact(case, skin, radius, *, margin=0.25, tilt=0.0):
     """Draw an apex; `margin` is the share of the sheet on each side that is left alone (negative: outside)."""
     sheet = skin.sheet
     low, high, arc = sheet.x_min.to("mm"), sheet.x_max.to("mm"), sheet.arc.to("mm")
@@ -69,19 +60,17 @@ def draw_contact(case: Case, skin: AnySkin, radius: float, *, margin: float = 0.
     return Contact(radius, x, s, *slopes)
 
 
-def lawful(case: Case, press: Press, loads: Sequence[float]) -> list[SkinState]:
+def lawful(case, press, loads):
     """Solve ascending loads; hold each against its laws and each pair against monotony."""
     case.says(loads_n=", ".join(f"{load:.4g}" for load in loads))
     dx, ds = press.medium.grid.cell_mm
     states: list[SkinState] = []
     for load in loads:
         state = press(load)
-        for what, values in (
-            ("deflection", state.deflection_mm), ("pressure", state.pressure_mpa), ("thickness", state.thickness_mm),
-            ("depth", state.depth_mm), ("fluid pressure", state.fluid_pressure_mpa),
-            ("radius", state.contact_radius_mm),
+        for what in (
+            "deflection_mm", "pressure_mpa", "thickness_mm", "depth_mm", "fluid_pressure_mpa", "contact_radius_mm"
         ):  # fmt: skip
-            case.holds(np.isfinite(values).all(), f"{what} at {load:g} N is not finite")
+            case.holds(np.isfinite(getattr(state, what)).all(), f"{what} at {load:g} N is not finite")
         case.holds(np.all(state.pressure_mpa >= 0), f"the indenter pulls at {load:g} N")
         carried = float(state.pressure_mpa.sum()) * dx * ds
         case.holds(abs(carried - load) <= BALANCE * load, f"{carried!r} N are carried of {load!r} N")
@@ -96,11 +85,16 @@ def lawful(case: Case, press: Press, loads: Sequence[float]) -> list[SkinState]:
     return states
 
 
-def _loads(case: Case, low: float, high: float) -> list[float]:
+def reaches(press, skin, load):
+    """Raise RigError where the indenter ends before the skin that it touches."""
+    check_reach(press, load, outer_radius_mm(skin.sheet), skin.sheet.dome, skin.sheet.relief)
+
+
+def _loads(case, low, high):
     return sorted(case.decades(low, high) for _ in range(3))
 
 
-def any_radius(case: Case) -> None:
+def any_radius(case):
     """Solve caps of 1e-4 mm to infinity; refuse them below a cell and past their rim.
 
     A cap of 3 mm or more under up to 5 N has an answer on every skin of ours.
@@ -112,7 +106,7 @@ def any_radius(case: Case) -> None:
     case.right = "refusal" if radius < cell else "either" if radius < 3.0 else "answer"
     press = press_of(skin, draw_contact(case, skin, radius))
     states = lawful(case, press, loads)
-    check_reach(press, loads[-1], outer_radius_mm(skin.sheet), skin.sheet.dome, skin.sheet.relief)
+    reaches(press, skin, loads[-1])
     told = remarks(press, loads, outer_radius_mm(skin.sheet), pad_of(skin.sheet, press.medium.grid))
     few = np.count_nonzero(states[-1].pressure_mpa) < math.pi * 3**2
     case.holds(
@@ -120,7 +114,7 @@ def any_radius(case: Case) -> None:
     )
 
 
-def past_the_rim(case: Case) -> None:
+def past_the_rim(case):
     """Refuse a load under which the skin is touched where the cap has ended, and no other."""
     skin = draw_skin(case)
     press = press_of(skin, draw_contact(case, skin, case.uniform(0.5, 2.0)))
@@ -128,19 +122,18 @@ def past_the_rim(case: Case) -> None:
     touched = press.gap_mm[state.pressure_mpa > 0]
     # Every gap under a cap is below its radius and the finger's fall; beyond it there are 50 mm more.
     case.right = "refusal" if touched.max() > 30.0 else "answer"
-    check_reach(press, state.force_n, outer_radius_mm(skin.sheet), skin.sheet.dome, skin.sheet.relief)
+    reaches(press, skin, state.force_n)
 
 
-def a_cap_that_is_none(case: Case) -> None:
+def a_cap_that_is_none(case):
     """Refuse radii of zero, below zero and not a number."""
+    skin = draw_skin(case)
+    radius = (0.0, -case.decades(1e-3, 1e3), math.nan)[case.rng.integers(3)]
     case.right = "refusal"
-    press_of(
-        skin := draw_skin(case),
-        draw_contact(case, skin, (0.0, -case.decades(1e-3, 1e3), math.nan)[case.rng.integers(3)]),
-    )
+    press_of(skin, draw_contact(case, skin, radius))
 
 
-def unresolved_contact(case: Case) -> None:
+def unresolved_contact(case):
     """Agree with the same contact on cells half as wide to 5 %, or remark on it.
 
     Measured on the ideal grid: up to 2 % at three cells, and rising quickly below.
@@ -156,7 +149,7 @@ def unresolved_contact(case: Case) -> None:
     case.holds(abs(depth / wanted - 1) <= 0.05, f"depth {depth:g} mm against {wanted:g} mm, and no remark")
 
 
-def flat_is_a_huge_cap(case: Case) -> None:
+def flat_is_a_huge_cap(case):
     """Take R of 1e9 mm or more for a flat surface.
 
     The depth moves by no more than the gap does: the energy's minimiser is monotone in the gap and moves with it as a
@@ -167,16 +160,14 @@ def flat_is_a_huge_cap(case: Case) -> None:
     huge = Contact(case.decades(1e9, 1e15), flat.x_mm, flat.s_mm)
     load = case.decades(1e-6, 100.0)
     first, second = (lawful(case, press_of(skin, one), [load])[0].depth_mm for one in (flat, huge))
-    grid = skin_grid(skin.sheet)
-    apart = float(
-        np.abs(gap_mm(grid, flat, outer_radius_mm(skin.sheet)) - gap_mm(grid, huge, outer_radius_mm(skin.sheet))).max()
-    )
+    grid, outer = skin_grid(skin.sheet), outer_radius_mm(skin.sheet)
+    apart = float(np.abs(gap_mm(grid, flat, outer) - gap_mm(grid, huge, outer)).max())
     r2 = grid.x_mm.size**2 * grid.cell_mm[0] ** 2 + grid.s_mm.size**2 * grid.cell_mm[1] ** 2
     case.holds(apart <= r2 / (2 * huge.radius_mm) * 1.01 + 1e-13, f"the cap sags by {apart!r} mm")
     case.holds(abs(first - second) <= 2 * apart + SOLVED * first, f"{first!r} mm flat, {second!r} mm huge")
 
 
-def any_load(case: Case) -> None:
+def any_load(case):
     """Be at rest exactly at 0 N; finite, balanced and monotone from 1e-12 to 500 N, with a remark beyond 5 N."""
     skin = draw_skin(case)
     press = press_of(skin, draw_contact(case, skin, case.decades(5.0, 1e3)))
@@ -186,11 +177,11 @@ def any_load(case: Case) -> None:
     states = lawful(case, press, loads)
     case.holds(0 < states[0].depth_mm < 1e-9, f"a piconewton presses {states[0].depth_mm:g} mm deep")
     case.right = "either"
-    check_reach(press, loads[-1], outer_radius_mm(skin.sheet), skin.sheet.dome, skin.sheet.relief)
+    reaches(press, skin, loads[-1])
     case.holds("remark load" in remarks(press, loads, outer_radius_mm(skin.sheet)), "500 N and no remark")
 
 
-def loads_that_are_none(case: Case) -> None:
+def loads_that_are_none(case):
     """Be at rest below 0 N; refuse a load that is infinite or no number."""
     skin = draw_skin(case)
     press = press_of(skin, draw_contact(case, skin, 10.0))
@@ -199,7 +190,7 @@ def loads_that_are_none(case: Case) -> None:
     press(math.nan if case.chance(0.5) else math.inf)
 
 
-def edge_and_tilt(case: Case) -> None:
+def edge_and_tilt(case):
     """Solve grazing, edge and tilted contacts; refuse them outside the skin and beyond 45 degrees.
 
     All skins are mirror images of themselves across s = 0, so that a mirrored contact is as deep.
@@ -224,7 +215,7 @@ def edge_and_tilt(case: Case) -> None:
     case.holds(not press.gap_mm.min(), "the approach has lost its origin")
 
 
-FAMILIES: tuple[Family, ...] = (
+FAMILIES = (
     any_radius, past_the_rim, a_cap_that_is_none, unresolved_contact, flat_is_a_huge_cap, any_load, loads_that_are_none,
     edge_and_tilt,
 )  # fmt: skip

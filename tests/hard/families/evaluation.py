@@ -4,12 +4,10 @@ The right answer of all of them: a finite score within a finite interval, or an 
 expected and the next step. Never NaN, never a hang, never a warning.
 """
 
-from __future__ import annotations
-
 import itertools
 import tempfile
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import partial
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
@@ -17,26 +15,12 @@ from typing import Any
 
 import numpy as np
 
-from tactbench.core.evaluation.cell import CellContext, evaluate_cell
 from tactbench.core.evaluation.protocols import PROTOCOLS
 from tactbench.core.plugins.registry import installed
-from tactbench.core.recording.writer import RecordingWriter
-from tactbench.core.spec.recording import RecordingMeta
-from tactbench.plugin import (
-    Block,
-    ChannelSpec,
-    ChannelTarget,
-    EstimatorDescriptor,
-    LabelTarget,
-    Quality,
-    SensorSpec,
-    Source,
-    StreamSpec,
-    TaskSpec,
-)
+from tactbench.plugin import Block, ChannelSpec, EstimatorDescriptor, Quality, StreamSpec
+from tests.core.evaluation.made import FORCE, evaluated, force_task, label_task, sensor_of, write
 from tests.hard.cases import Case, Family
 
-FORCE = StreamSpec(name="force_torque", channels=(ChannelSpec(name="fz", kind="force", unit="N"),))
 QUICK: dict[str, dict[str, Any]] = {"forest": {"n_estimators": 5}}
 """Parameters that make an estimator quick without making it another one."""
 ROLES = ("train", "validation", "test")
@@ -57,11 +41,18 @@ class Made:
     dtype: str = "float64"
     dropped: int = 0
     """Rows in which some taxel has no sample."""
-    annotated: np.ndarray | None = field(default=None)
+    annotated: np.ndarray | None = None
     """(n,) labels of rows instead of one for the recording."""
 
+    def keep(self, rows):
+        """Leave the first rows; how many of those have a dropout is for the package to say."""
+        for name in ("X", "force", "quality", "t_ns", "force_t_ns", "annotated"):
+            values = getattr(self, name)
+            setattr(self, name, None if values is None else values[:rows])
+        self.dropped = 0
 
-def families() -> dict[str, Family]:
+
+def families():
     """Return one family for each protocol and kind of estimator, of each kind of task that it can do."""
     found: dict[str, Family] = {}
     for protocol, one in itertools.product(PROTOCOLS, different_estimators()):
@@ -72,7 +63,7 @@ def families() -> dict[str, Family]:
     return found
 
 
-def different_estimators() -> list[EstimatorDescriptor]:
+def different_estimators():
     """Return the installed estimators, one of each code: ten trees and five hundred are the same code.
 
     Detectors of events answer no question of single samples: tests/core/evaluation/test_events.py has them.
@@ -90,7 +81,7 @@ def different_estimators() -> list[EstimatorDescriptor]:
     return list(first.values())
 
 
-def any_data(case: Case, *, protocol: str, name: str, kind: str) -> None:
+def any_data(case, *, protocol, name, kind):
     """Score hard data finitely, or say what is wrong with it."""
     recordings = _ordinary(case, kind, roles_only=PROTOCOLS[protocol].roles_only)
     hardships = [one for one in HARDSHIPS if case.chance(0.15)] or [HARDSHIPS[case.rng.integers(len(HARDSHIPS))]]
@@ -100,25 +91,18 @@ def any_data(case: Case, *, protocol: str, name: str, kind: str) -> None:
     # A probe refuses what changes within a recording, as a force does.
     answerable = kind == "regression" and HARMLESS.issuperset(hardships) and not PROTOCOLS[protocol].probe
     case.right = "answer" if answerable else "either"
-    estimator = installed().estimators[name]
+    asked = {"regression": force_task, "classification": label_task}[kind](
+        protocols=tuple(PROTOCOLS), splits=("roles", "session", "in-session", "shuffled"), baselines=("mean",)
+    )
     with tempfile.TemporaryDirectory() as folder:
         paths = [_written(made, Path(folder) / f"r{place}.h5") for place, made in enumerate(recordings)]
-        ticks = itertools.count()
         splits = [None] if PROTOCOLS[protocol].roles_only else [None, "in-session", "shuffled"]
         split = splits[case.rng.integers(len(splits))]
         case.says(split=str(split))
-        result = evaluate_cell(
-            CellContext(
-                _task(kind), estimator, QUICK.get(name, {}), protocol, split, seed=1, clock=lambda: next(ticks) * 1e-3
-            ),
-            paths,
-        )
-    for what, value in (("score", result.score), ("low end", result.interval.low), ("high end", result.interval.high)):
-        case.holds(np.isfinite(value), f"the {what} is {value}")
-    case.holds(
-        result.interval.low <= result.interval.high,
-        f"the interval runs from {result.interval.low} to {result.interval.high}",
-    )
+        result = evaluated(asked, paths, name, protocol, split, params=QUICK.get(name), latency=True)
+    low, high = result.interval.low, result.interval.high
+    case.holds(np.isfinite([result.score, low, high]).all(), f"the score is {result.score} in {low} to {high}")
+    case.holds(low <= high, f"the interval runs from {low} to {high}")
     case.holds(np.isfinite(list(result.scores.values())).all(), f"a score is none: {result.scores}")
     warned = [text for text in result.counts if "RuntimeWarning" in text]
     case.holds(not warned, f"{warned}")
@@ -129,7 +113,7 @@ def any_data(case: Case, *, protocol: str, name: str, kind: str) -> None:
         case.holds(0 <= result.score <= 1, f"a score of {result.score}")
 
 
-def _ordinary(case: Case, kind: str, *, roles_only: bool) -> list[Made]:
+def _ordinary(case, kind, *, roles_only):
     """Return recordings of a press: roles and more than 600 rows where the protocol wants them."""
     taxels = int(case.rng.integers(1, 6))
     gain = case.rng.normal(0, 30, taxels)
@@ -149,7 +133,7 @@ def _ordinary(case: Case, kind: str, *, roles_only: bool) -> list[Made]:
     return made
 
 
-def _some(case: Case, recordings: list[Made]) -> list[Made]:
+def _some(case, recordings):
     """Return one recording, those of one role, or all of them."""
     which = case.rng.integers(3)
     if which == 0:
@@ -158,25 +142,25 @@ def _some(case: Case, recordings: list[Made]) -> list[Made]:
     return [made for made in recordings if which == 2 or made.role == role]
 
 
-def _taxel(case: Case, made: Made) -> int:
+def _taxel(case, made):
     return int(case.rng.integers(made.X.shape[1]))
 
 
-def constant_taxels(case: Case, recordings: list[Made]) -> None:
+def constant_taxels(case, recordings):
     """Hold a taxel, or all of them, at one number; 0.1 a million times has a rounding error for a deviation."""
     column = slice(None) if case.chance(0.3) else _taxel(case, recordings[0])
     for made in _some(case, recordings):
         made.X[:, column] = float(case.rng.choice([0.0, 0.1, 4095.0, -1e8]))
 
 
-def collinear_taxels(case: Case, recordings: list[Made]) -> None:
+def collinear_taxels(case, recordings):
     """Make a taxel the copy, or a multiple, of another."""
     a, b, factor = _taxel(case, recordings[0]), _taxel(case, recordings[0]), float(case.rng.choice([1.0, -1.0, 1e6]))
     for made in recordings:
         made.X[:, b] = factor * made.X[:, a]
 
 
-def saturated_taxels(case: Case, recordings: list[Made]) -> None:
+def saturated_taxels(case, recordings):
     """Clip at a converter's end and flag it."""
     for made in _some(case, recordings):
         end = np.quantile(made.X, case.uniform(0, 1))
@@ -184,7 +168,7 @@ def saturated_taxels(case: Case, recordings: list[Made]) -> None:
         np.minimum(made.X, end, out=made.X)
 
 
-def dropouts(case: Case, recordings: list[Made]) -> None:
+def dropouts(case, recordings):
     """Lose samples: NaN, infinity, or a number marked as missing; one row, some, nearly all, or a whole channel."""
     for made in _some(case, recordings):
         share = float(case.rng.choice([0.0, 0.05, 0.5, 0.99, 1.0], p=[0.3, 0.3, 0.2, 0.1, 0.1]))
@@ -198,19 +182,19 @@ def dropouts(case: Case, recordings: list[Made]) -> None:
         made.dropped = max(made.dropped, int(lost.sum()))
 
 
-def dropouts_of_force(case: Case, recordings: list[Made]) -> None:
+def dropouts_of_force(case, recordings):
     """Lose samples of the reference force."""
     for made in _some(case, recordings):
         made.force[case.rng.random(len(made.force)) < case.rng.choice([0.05, 0.9, 1.0])] = np.nan
 
 
-def huge_offsets(case: Case, recordings: list[Made]) -> None:
+def huge_offsets(case, recordings):
     """Put a unit signal on 1e8."""
     for made in recordings:
         made.X += case.rng.choice([1e8, -1e8, 1e10])
 
 
-def extreme_sizes(case: Case, recordings: list[Made]) -> None:
+def extreme_sizes(case, recordings):
     """Read in units from 1e-150 to 1e100."""
     factor = case.decades(1e-150, 1e100)
     column = slice(None) if case.chance(0.5) else _taxel(case, recordings[0])
@@ -218,7 +202,7 @@ def extreme_sizes(case: Case, recordings: list[Made]) -> None:
         made.X[:, column] *= factor
 
 
-def single_precision(case: Case, recordings: list[Made]) -> None:
+def single_precision(case, recordings):
     """Store as float32, perhaps on an offset of 1e4."""
     offset = float(case.rng.choice([0.0, 1e4, 1e7]))
     for made in recordings:
@@ -226,56 +210,42 @@ def single_precision(case: Case, recordings: list[Made]) -> None:
         made.dtype = "float32"
 
 
-def constant_labels(case: Case, recordings: list[Made]) -> None:
+def constant_labels(case, recordings):
     """Hold force and label still."""
     for made in _some(case, recordings):
         made.force[:] = float(case.rng.choice([0.0, 0.1, 5.0]))
         made.label = "class 0"
 
 
-def jumping_labels(case: Case, recordings: list[Made]) -> None:
+def jumping_labels(case, recordings):
     """Label single rows, some of them not at all."""
     for made in _some(case, recordings):
         made.annotated = case.rng.choice(np.array(["", "class 0", "class 1", "class 2"]), len(made.X))
 
 
-def few_rows(case: Case, recordings: list[Made]) -> None:
+def few_rows(case, recordings):
     """Leave one to ten rows, fewer than any window; under the paper's protocol one to ten after its first 600."""
     rows = int(case.rng.integers(1, 11))
     for made in _some(case, recordings):
-        rows_kept = rows + (600 if len(made.X) > 600 and case.chance(0.8) else 0)
-        made.X, made.force, made.quality = made.X[:rows_kept], made.force[:rows_kept], made.quality[:rows_kept]
-        made.t_ns = None if made.t_ns is None else made.t_ns[:rows_kept]
-        made.force_t_ns = None if made.force_t_ns is None else made.force_t_ns[:rows_kept]
-        made.annotated = None if made.annotated is None else made.annotated[:rows_kept]
-        made.dropped = 0  # how many of those left is for the package to say
+        made.keep(rows + (600 if len(made.X) > 600 and case.chance(0.8) else 0))
 
 
-def every_row_an_outlier(case: Case, recordings: list[Made]) -> None:
+def every_row_an_outlier(case, recordings):
     """Let every row leave the three-sigma band in one channel of its own: none is left."""
     n = 12
     taxels = max(n, max(made.X.shape[1] for made in recordings))
     hit = _some(case, recordings)
     for made in recordings:
-        rows = len(made.X)
-        wide = np.ones((rows, taxels))
-        wide[:, : made.X.shape[1]] = made.X
-        quality = np.zeros(wide.shape, np.uint8)
-        quality[:, : made.X.shape[1]] = made.quality
-        made.X, made.quality = wide, quality
+        more = ((0, 0), (0, taxels - made.X.shape[1]))
+        made.X, made.quality = np.pad(made.X, more, constant_values=1.0), np.pad(made.quality, more)
     for made in hit:
-        keep = slice(0, (600 if len(made.X) > 600 else 0) + n)
-        made.X, made.quality, made.force = made.X[keep], made.quality[keep], made.force[keep]
-        made.t_ns = None if made.t_ns is None else made.t_ns[keep]
-        made.force_t_ns = None if made.force_t_ns is None else made.force_t_ns[keep]
-        made.annotated = None if made.annotated is None else made.annotated[keep]
+        made.keep((600 if len(made.X) > 600 else 0) + n)
         last = min(n, len(made.X))
         made.X[-last:] = 1.0
         made.X[-last:][np.arange(last), np.arange(last)] = 1e6
-        made.dropped = 0
 
 
-def strange_clocks(case: Case, recordings: list[Made]) -> None:
+def strange_clocks(case, recordings):
     """Repeat time stamps, let them run backwards, shift the force's against the taxels', or leave the clock out."""
     which = int(case.rng.integers(5))
     for made in _some(case, recordings):
@@ -294,7 +264,7 @@ def strange_clocks(case: Case, recordings: list[Made]) -> None:
             made.t_ns = made.force_t_ns = None
 
 
-def one_kind_of_session(case: Case, recordings: list[Made]) -> None:
+def one_kind_of_session(case, recordings):
     """Give each session one class only, or all recordings one session."""
     one = case.chance(0.5)
     for made in recordings:
@@ -313,32 +283,14 @@ HARMLESS = frozenset(
 """What no regression may refuse: nothing that is asked for is missing."""
 
 
-def _task(kind: str) -> TaskSpec:
-    regression = kind == "regression"
-    return TaskSpec(
-        name="hard", title="Hard", question="?", kind=kind,
-        target=ChannelTarget(kind="force") if regression else LabelTarget(name="kind"),
-        metric="rmse" if regression else "macro_f1", unit="N" if regression else "",
-        protocols=tuple(PROTOCOLS), estimators=("lasso",), splits=("roles", "session", "in-session", "shuffled"),
-        baselines=("mean",),
-    )  # fmt: skip
-
-
-def _written(made: Made, path: Path) -> Path:
+def _written(made, path):
     channels = tuple(ChannelSpec(name=f"t{place}", kind="taxel") for place in range(made.X.shape[1]))
-    stream = StreamSpec(name="taxels", channels=channels, dtype=made.dtype)
-    sensor = SensorSpec(
-        name="made", title="Made by hand", principle="none", streams=(stream,),
-        principle_source=Source(tag="assumed", reference="a hard case"),
+    times = made.t_ns if made.force_t_ns is None else made.force_t_ns
+    return write(
+        path, sensor_of(StreamSpec(name="taxels", channels=channels, dtype=made.dtype)),
+        Block("taxels", made.t_ns, made.X.astype(made.dtype), made.quality),
+        Block("force_torque", times, made.force[:, None]),
+        annotations={} if made.annotated is None else {"kind": made.annotated}, reference=(FORCE,),
+        clock="none" if made.t_ns is None else "device", role=made.role, session=made.session,
+        labels={"kind": made.label} if made.annotated is None else {},
     )  # fmt: skip
-    about = RecordingMeta(
-        name=path.stem, sensor=sensor, reference=(FORCE,), rig="made", clock="none" if made.t_ns is None else "device",
-        role=made.role, session=made.session, labels={} if made.annotated is not None else {"kind": made.label},
-    )  # fmt: skip
-    with RecordingWriter(path, about) as writer:
-        writer.append(Block("taxels", made.t_ns, made.X.astype(made.dtype), made.quality))
-        times = made.t_ns if made.force_t_ns is None else made.force_t_ns
-        writer.append(Block("force_torque", times, made.force[:, None]))
-        if made.annotated is not None:
-            writer.annotate("taxels", "kind", made.annotated)
-    return path

@@ -1,17 +1,13 @@
 """Hard times for the filters with memory: long steps, repeated and backward time stamps, clocks with a huge offset."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np
 
-from tactbench.plugin import FloatArray
 from tactbench.rigs.twin.effects.memory import lag, wandering
-from tests.hard.cases import Case, Family
 
 
-def _times(case: Case, tau: float, *, longest: float = 1e4, repeated: float = 0.2) -> FloatArray:
+def _times(case, tau, *, longest=1e4, repeated=0.2):
     """Draw ascending times whose steps are 1e-6 to `longest` time constants, some of them zero."""
     n = int(case.rng.integers(1, 200))
     steps = tau * 10 ** case.rng.uniform(-6, math.log10(longest), n)
@@ -20,7 +16,7 @@ def _times(case: Case, tau: float, *, longest: float = 1e4, repeated: float = 0.
     return np.asarray(np.cumsum(steps), dtype=np.float64)
 
 
-def lag_over_any_steps(case: Case) -> None:
+def lag_over_any_steps(case):
     """Lag exactly over steps from 1e-6 to 1e4 time constants, and never outside the load's range.
 
     The reference goes one sample after the other in extended precision, from the solution for a straight load.
@@ -46,7 +42,7 @@ def lag_over_any_steps(case: Case) -> None:
     case.holds(apart <= 1e-11, f"a lag is off by {apart:g} of 5 N")
 
 
-def lag_in_equilibrium(case: Case) -> None:
+def lag_in_equilibrium(case):
     """Reach a load held for 50 time constants or more to rounding, however long the step."""
     tau, length = case.decades(1e-6, 1e6), case.decades(50.0, 1e12)
     before, after = case.uniform(0, 5), case.uniform(0, 5)
@@ -55,7 +51,7 @@ def lag_in_equilibrium(case: Case) -> None:
     case.holds(abs(found[-1] - after) <= 1e-14, f"{found[-1]!r}, not {after!r}")
 
 
-def repeated_times(case: Case) -> None:
+def repeated_times(case):
     """Change nothing at a repeated time stamp: not the lag, not the drift, and not a sample after it.
 
     The doubling recurrence adds the same terms in another order: equal to rounding.
@@ -76,7 +72,7 @@ def repeated_times(case: Case) -> None:
     )
 
 
-def backward_times(case: Case) -> None:
+def backward_times(case):
     """Refuse a clock that runs backwards once, or says no number: no answer to it would be right."""
     tau = case.decades(1e-3, 1e3)
     t_s = np.append(_times(case, tau, repeated=0.0), np.nan)
@@ -92,13 +88,13 @@ def backward_times(case: Case) -> None:
         wandering(t_s, 1.0, tau, 2, case.rng)
 
 
-def no_time_constant(case: Case) -> None:
+def no_time_constant(case):
     """Refuse a time constant of zero, below zero or no number."""
     case.right = "refusal"
     lag(np.arange(3.0), np.ones(3), (0.0, -case.decades(1e-6, 1e6), math.nan, math.inf)[case.rng.integers(4)])
 
 
-def one_step_is_two(case: Case) -> None:
+def one_step_is_two(case):
     """Take one step of 2 dt as two of dt under a straight load, for dt from 1e-9 to 1e9 time constants."""
     tau, e = case.decades(1e-3, 1e3), case.decades(1e-9, 1e9)
     a, b = case.uniform(0, 5), case.uniform(0, 5)
@@ -109,7 +105,7 @@ def one_step_is_two(case: Case) -> None:
     case.holds(abs(long - short) <= 1e-11, f"{long!r} in one step, {short!r} in two")
 
 
-def clocks_far_from_zero(case: Case) -> None:
+def clocks_far_from_zero(case):
     """Lag alike whether times count from 1970 or from the first sample, as far as the clock resolves."""
     tau = case.decades(0.1, 100.0)
     t_s = np.cumsum(case.rng.uniform(0.001, 0.1, 100))
@@ -121,7 +117,7 @@ def clocks_far_from_zero(case: Case) -> None:
     case.holds(apart <= 100 * 5 * np.spacing(offset) / tau + 1e-12, f"the lag moves by {apart:g} of 5 N")
 
 
-def drift_over_any_steps(case: Case) -> None:
+def drift_over_any_steps(case):
     """Keep the drift's variance and its correlation ``exp(-dt/tau)`` at any step.
 
     Bounds are six standard errors of 20 000 pairs: one case in 1e9 fails by chance.
@@ -142,7 +138,7 @@ def drift_over_any_steps(case: Case) -> None:
     case.holds(abs(moved / wanted - 1) <= math.sqrt(2) * bound, f"mean square step {moved:g}, not {wanted:g}")
 
 
-FAMILIES: tuple[Family, ...] = (
+FAMILIES = (
     lag_over_any_steps, lag_in_equilibrium, repeated_times, backward_times, no_time_constant, one_step_is_two,
     clocks_far_from_zero, drift_over_any_steps,
 )  # fmt: skip

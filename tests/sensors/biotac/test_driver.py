@@ -1,7 +1,5 @@
 """The driver against the emulated sensor: through the bridge's frames on a pseudo-terminal, and in virtual time."""
 
-from __future__ import annotations
-
 import math
 import os
 from collections import deque
@@ -28,7 +26,6 @@ from tactbench.sensors.biotac.frames import DEFAULT_FRAME
 from tactbench.sensors.biotac.spec import SPEC
 from tests.links.ends import serving
 
-COLUMN = {channel.name: column for stream in SPEC.streams for column, channel in enumerate(stream.channels)}
 MISSING, SUSPECT = int(Quality.MISSING), int(Quality.SUSPECT)
 SERIAL = {
     "serial number": "BT-2P-02.2.0-B-11-E-0004",
@@ -47,8 +44,10 @@ class Sensed:
         self.words.append({n: 2000 + 1500 * math.sin((3 + k) * t_s + k) for k, n in enumerate(CHANNELS)})
         return self.words[-1]
 
-    def count(self, word):
-        return round(self.words[word][DEFAULT_FRAME[word % 44]])
+    def frames(self):
+        """Return what the words of whole frames read, (n, 44)."""
+        read = [round(word[DEFAULT_FRAME[n % 44]]) for n, word in enumerate(self.words)]
+        return np.reshape(read[: len(read) // 44 * 44], (-1, 44))
 
 
 def emulator(sensed, *faults, **options):
@@ -71,12 +70,12 @@ class Adapter(SpiLink):
     Replies to batches whose count since the beginning is in `lost` do not come.
     """
 
-    def __init__(self, exchange, clock, *, speed_hz=4_400_000, holds=4, begin_us=0, counter=True, lost=()):
+    def __init__(self, exchange, clock, *, speed_hz=4_400_000, holds=4, begin_us=0, lost=()):
         super().__init__("spi://virtual", clock)
         self.speed_hz, self.holds = speed_hz, holds
         self.sent = 0
         self.unplugged = False
-        self._exchange, self._begin_us, self._counter, self._lost = exchange, begin_us, counter, set(lost)
+        self._exchange, self._begin_us, self._lost = exchange, begin_us, set(lost)
         self._free_s = 0.0
         self._replies = deque()
 
@@ -88,7 +87,7 @@ class Adapter(SpiLink):
             data.append(self._exchange(step.select, step.data, now_s))
             now_s += 8 * len(step.data) / self.speed_hz + 1e-6 * step.pause_us
         self._free_s = now_s
-        counter_us = (int(1e6 * begin_s) + self._begin_us) % 2**32 if self._counter else None
+        counter_us = (int(1e6 * begin_s) + self._begin_us) % 2**32
         reply = None if self.sent in self._lost else SpiReply(number, tuple(data), round(1e9 * now_s), counter_us)
         self._replies.append((round(1e9 * now_s), reply))
         self.sent += 1
@@ -148,21 +147,16 @@ def read_frames(driver, frames, timeout_s=2.0):
     return joined(blocks)
 
 
-def assert_sensed(streams, sensed):
-    """Every sample that is not marked is what was sensed at its word."""
-    slow, fast = streams["electrodes"], streams["vibration"]
-    for row, frame in enumerate(slow["sequence"]):
-        for place, name in enumerate(DEFAULT_FRAME):
-            if name != "PAC" and slow["quality"][row, COLUMN[name]] == 0:
-                assert slow["data"][row, COLUMN[name]] == sensed.count(44 * frame + place), (frame, name)
-    for row, n in enumerate(fast["sequence"]):
-        assert fast["quality"][row, 0] or fast["data"][row, 0] == sensed.count(2 * n + 1), n
+def assert_sensed(streams, frames):
+    """Every sample that is not marked is what was sensed at its word, (n, 44)."""
+    places = [DEFAULT_FRAME.index(channel.name) for channel in SPEC.streams[0].channels]
+    sensed = {"electrodes": frames[:, places], "vibration": frames[:, 1::2].reshape(-1, 1)}
+    for name, stream in streams.items():
+        good = stream["quality"] == 0
+        assert np.array_equal(stream["data"][good], sensed[name][stream["sequence"]][good])
 
 
-# In virtual time
-
-
-@pytest.mark.parametrize("speed_hz", [1_000_000, 4_000_000, 4_400_000])
+@pytest.mark.parametrize("speed_hz", [1_000_000, 4_400_000])
 def test_the_mean_rate_is_4400_words_a_second(speed_hz):
     sensed = Sensed()
     with virtual(sensed, speed_hz=speed_hz) as (driver, _, clock):
@@ -173,14 +167,12 @@ def test_the_mean_rate_is_4400_words_a_second(speed_hz):
         assert driver.counts == {}
     fast = streams["vibration"]
     assert np.array_equal(fast["sequence"], np.arange(2200))
-    rate_hz = 1e9 * 2199 / (fast["device_ns"][-1] - fast["device_ns"][0])
-    assert rate_hz == pytest.approx(2200.0, rel=1e-4)
     # A pause is a whole microsecond, so is the counter.
     assert np.abs(np.diff(fast["device_ns"]) - 1e9 / 2200).max() <= 2000.0
     # When a reply came: the end of its frame, up to a microsecond that the counter left out.
     late_ns = fast["t_ns"][21::22] - fast["device_ns"][21::22]
     assert 0 < late_ns.min() <= late_ns.max() < 227_273 + 1000
-    assert_sensed(streams, sensed)
+    assert_sensed(streams, sensed.frames())
 
 
 def test_the_counter_is_counted_on_over_its_wraps():
@@ -201,7 +193,7 @@ def test_a_lost_reply_is_a_gap_and_the_next_frame_is_whole():
     assert streams["electrodes"]["sequence"].tolist() == [0, 1, 2, 5, 6, 7, 9]
     assert not streams["electrodes"]["quality"].any()
     assert len(streams["vibration"]["sequence"]) == 7 * 22
-    assert_sensed(streams, sensed)
+    assert_sensed(streams, sensed.frames())
 
 
 def test_when_no_reply_comes_it_gives_up_and_goes_on_in_time():
@@ -245,20 +237,6 @@ def test_a_host_that_is_late_by_less_than_what_is_under_way_loses_nothing():
         assert driver.counts == {}
 
 
-def test_an_adapter_without_a_counter_has_host_times_alone():
-    sensed = Sensed()
-    with virtual(sensed, counter=False, holds=1) as (driver, _, clock):
-        driver.start()
-        streams = read_frames(driver, 10)
-        assert driver.counts == {}
-    slow, fast = streams["electrodes"], streams["vibration"]
-    assert slow["device_ns"] is None
-    assert np.diff(slow["t_ns"]) == pytest.approx(1e7, abs=1000)
-    assert np.diff(fast["t_ns"]) == pytest.approx(1e9 / 2200, abs=1500)
-    assert fast["t_ns"].max() < clock.now_ns
-    assert_sensed(streams, sensed)
-
-
 def test_stopped_it_reads_nothing_and_begins_anew():
     with virtual(Sensed(), "parity:channels=E5") as (driver, link, _):
         assert driver.read(0.0) == []
@@ -287,38 +265,33 @@ def test_what_is_asked_while_it_samples_is_refused():
 
 
 def test_no_sensor_is_said():
-    with (
-        virtual(Sensed(), "not-connected") as (driver, _, _),
-        pytest.raises(
-            RigError, match="No BioTac answers at spi://virtual, select lines 0x1: its serial number reads ff ff"
-        ),
-    ):
+    said = "No BioTac answers at spi://virtual, select lines 0x1: its serial number reads ff ff"
+    with virtual(Sensed(), "not-connected") as (driver, _, _), pytest.raises(RigError, match=said):
         driver.identify()
 
 
-def test_another_sensor_is_no_biotac_and_a_version_that_is_no_text_is_shown():
+@contextmanager
+def emulated(exchange, speed_hz=4_400_000, **options):
+    """A driver of any device behind an adapter in virtual time."""
     clock = Clock()
-    for properties, said in [
-        ({"serial number": b"NT2P0220B11E0004", "flex version": b"BD", "software version": b"0238"}, None),
-        ({"serial number": b"BT2P0220B11E0004", "software version": b"\x00\x01\x02\x03"}, "00 01 02 03"),
-    ]:
-        link = Adapter(Emulator(properties=properties).exchange, clock)
-        with build(DriverSettings(lambda link=link: link, clock=clock)) as driver:
-            if said is None:
-                with pytest.raises(RigError, match="begins with BT"):
-                    driver.identify()
-            else:
-                assert driver.identify() == {**SERIAL, "flex version": "a5 3f", "software version": said}
+    link = Adapter(exchange, clock, speed_hz=speed_hz)
+    with build(DriverSettings(lambda: link, options=options, clock=clock)) as driver:
+        yield driver
+
+
+def test_another_sensor_is_no_biotac_and_a_version_that_is_no_text_is_shown():
+    other = {"serial number": b"NT2P0220B11E0004", "flex version": b"BD", "software version": b"0238"}
+    with emulated(Emulator(properties=other).exchange) as driver, pytest.raises(RigError, match="begins with BT"):
+        driver.identify()
+    odd = {"serial number": b"BT2P0220B11E0004", "software version": b"\x00\x01\x02\x03"}
+    with emulated(Emulator(properties=odd).exchange) as driver:
+        assert driver.identify() == {**SERIAL, "flex version": "a5 3f", "software version": "00 01 02 03"}
 
 
 def test_its_select_lines_are_used():
     with virtual(Sensed(), options={"select": 6}) as (driver, _, _):
         assert driver.identify() == SERIAL
-        driver.start()
-        assert not read_frames(driver, 2)["electrodes"]["quality"].any()
-    clock = Clock()
-    link = Adapter(emulator(Sensed(), select=2).exchange, clock)
-    with build(DriverSettings(lambda: link, clock=clock)) as driver:
+    with emulated(emulator(Sensed(), select=2).exchange) as driver:
         driver.start()
         assert (read_frames(driver, 2)["electrodes"]["quality"] == MISSING).all()
 
@@ -370,32 +343,21 @@ def test_an_unplugged_link_ends_the_reading_and_closes():
         ({"selct": 1}, "selct.*Did you mean 'select'"),
         ({"select": 0}, "'select'.*greater than or equal to 1"),
         ({"frame": "E1 E20"}, "names of channels"),
-        ({"frame": ""}, "names of channels"),
-        ({"resends": 1.5}, "'resends'"),
-        ({"batches_ahead": 1}, "'batches_ahead'"),
     ],
 )
-def test_options_that_are_none_are_refused(options, said):
-    def opened():
-        raise AssertionError("the link is not opened for options that are none")
-
+def test_options_that_are_none_are_refused_before_the_link_is_opened(options, said):
     with pytest.raises(UsageError, match=said):
-        build(DriverSettings(opened, options=options))
+        build(DriverSettings(lambda: pytest.fail("opened"), options=options))
 
 
 @pytest.mark.parametrize(
     ("speed_hz", "options", "said"),
-    [
-        (100_000, {}, "100000 Hz, a BioTac takes 500000 to 1e"),
-        (20_000_000, {}, "20000000 Hz"),
-        (500_000, {"resends": 1}, "64 bits at 500000 Hz"),
-    ],
+    [(100_000, {}, "100000 Hz, a BioTac takes 500000 to 1e"), (500_000, {"resends": 1}, "64 bits at 500000 Hz")],
 )
-def test_a_clock_that_is_none_for_it_is_refused(speed_hz, options, said):
-    clock = Clock()
-    link = Adapter(emulator(Sensed()).exchange, clock, speed_hz=speed_hz)
+def test_a_clock_that_is_none_for_it_is_refused_and_the_link_closed(speed_hz, options, said):
+    link = Adapter(emulator(Sensed()).exchange, Clock(), speed_hz=speed_hz)
     with pytest.raises(RigError, match=said):
-        build(DriverSettings(lambda: link, options=options, clock=clock))
+        build(DriverSettings(lambda: link, options=options))
     with pytest.raises(LinkError, match="closed"):
         link.receive(0.0)
 
@@ -405,136 +367,31 @@ def test_a_link_of_another_kind_is_refused():
         build(DriverSettings(lambda: open_link("loop://")))
 
 
-# Through the bridge, in real time: a machine too busy for it asks for fewer frames, which is counted and no loss
+@pytest.mark.skipif(os.name != "posix", reason="pseudo-terminals are POSIX")
+def test_a_second_at_full_rate_through_the_bridge():
+    """Every frame that was asked for is there, whole, as it was sensed.
 
-needs_pty = pytest.mark.skipif(os.name != "posix", reason="pseudo-terminals are POSIX")
-
-
-@contextmanager
-def bridged(sensed, *faults, options=None, model=BridgeEmulator, **bridge):
-    """A driver of the emulated sensor behind an emulated bridge on a pseudo-terminal, the bridge and the far end."""
-    options = {"batches_ahead": 16, **(options or {})}
-    model = model(emulator(sensed, *faults, **options).exchange, **{"holds": 16, **bridge})
-    with serving(model) as far:
-        settings = DriverSettings(lambda: open_link(f"spi://bridge/{far.name}?speed_hz=4400000"), SPEC.streams, options)
-        with build(settings) as driver:
-            yield driver, model, far
-
-
-def assert_nothing_lost(streams, counts, sensed):
-    """Every frame that was asked for is there, whole, as it was sensed."""
-    assert set(counts) <= {"batches late", "frames not asked for"}
+    In real time: a machine too busy for it asks for fewer frames, which is counted and no loss.
+    """
+    sensed = Sensed()
+    with (
+        serving(BridgeEmulator(emulator(sensed).exchange, holds=16)) as far,
+        build(DriverSettings(lambda: open_link(f"spi://bridge/{far.name}?speed_hz=4400000"), SPEC.streams,
+                             {"batches_ahead": 16})) as driver,
+    ):  # fmt: skip
+        assert driver.identify() == {**SERIAL, "adapter": "tactbench emulator"}
+        driver.start()
+        streams = read_frames(driver, 100)
+        counts = driver.counts
     slow, fast = streams["electrodes"], streams["vibration"]
+    assert np.median(np.diff(slow["device_ns"])) == pytest.approx(1e7, rel=1e-4)
+    assert (np.diff(slow["t_ns"]) >= 0).all()
+    assert set(counts) <= {"batches late", "frames not asked for"}
     rows, unasked = len(slow["sequence"]), counts.get("frames not asked for", 0)
-    assert slow["sequence"][0] == 0
-    assert slow["sequence"][-1] == rows - 1 + unasked
+    assert (slow["sequence"][0], slow["sequence"][-1]) == (0, rows - 1 + unasked)
     assert (np.diff(slow["sequence"]) >= 1).all()
     assert np.array_equal(fast["sequence"], (22 * slow["sequence"][:, None] + np.arange(22)).ravel())
     assert not slow["quality"].any()
     assert not fast["quality"].any()
     slow["sequence"], fast["sequence"] = np.arange(rows), np.arange(22 * rows)
-    assert_sensed(streams, sensed)
-
-
-@needs_pty
-def test_a_second_at_full_rate_through_the_bridge():
-    sensed = Sensed()
-    with bridged(sensed) as (driver, _, _):
-        assert driver.identify() == {**SERIAL, "adapter": "tactbench emulator"}
-        driver.start()
-        streams = read_frames(driver, 100)
-        counts = driver.counts
-    device_ns, t_ns = streams["electrodes"]["device_ns"], streams["electrodes"]["t_ns"]
-    assert np.median(np.diff(device_ns)) == pytest.approx(1e7, rel=1e-4)
-    assert (np.diff(t_ns) >= 0).all()
-    assert_nothing_lost(streams, counts, sensed)
-
-
-@needs_pty
-@pytest.mark.parametrize("fault", ["dropped", "damaged"])
-def test_replies_that_the_bridge_loses_are_gaps_and_the_next_frame_is_whole(fault):
-    sensed = Sensed()
-    with bridged(sensed, options={"batches_ahead": 4}) as (driver, model, _):
-        driver.start()
-        blocks = [block for _ in range(3) for block in driver.read(2.0)]
-        model.faults.add(fault)
-        while "batches lost" not in driver.counts:
-            blocks += driver.read(0.1)
-        model.faults.clear()
-        while not (new := driver.read(2.0)):
-            pass
-        streams = joined(blocks + new)
-        counts = driver.counts
-    slow = streams["electrodes"]
-    # Numbers from 0: replies that came, that were lost, and frames that nobody asked for meanwhile.
-    assert slow["sequence"][-1] + 1 == len(slow["sequence"]) + counts["batches lost"] + counts["frames not asked for"]
-    assert (np.diff(slow["sequence"]) >= 1).all()
-    assert not any(stream["quality"].any() for stream in streams.values())
-    frames = (slow["device_ns"] - slow["device_ns"][0]) / 1e7
-    assert np.abs(slow["sequence"] - slow["sequence"][0] - frames).max() <= 0.5 * (1 + counts["batches late"])
-
-
-class Stalling(BridgeEmulator):
-    """A bridge whose bytes wait in a buffer while it is stalled, as those of a stopped process do."""
-
-    stalled, waiting = False, b""
-
-    def feed(self, data, now_s):
-        self.waiting += data
-        if self.stalled:
-            return []
-        waiting, self.waiting = self.waiting, b""
-        return super().feed(waiting, now_s)
-
-
-@needs_pty
-def test_a_silence_of_the_bridge_is_a_counted_gap(monkeypatch):
-    """Batches that were given up and then carried out left no room: "full" ended the recording after 2 s of silence."""
-    monkeypatch.setattr("tactbench.sensors.biotac.driver.PATIENCE_S", 0.1)
-    with bridged(Sensed(), options={"batches_ahead": 4}, model=Stalling, holds=4) as (driver, model, _):
-        driver.start()
-        blocks = driver.read(2.0)
-        model.stalled = True
-        while driver.counts.get("batches lost", 0) < 8:
-            blocks += driver.read(0.02)
-        model.stalled = False
-        while not (new := driver.read(2.0)):
-            pass
-        counts = driver.counts
-    slow = joined(blocks + new)["electrodes"]
-    assert np.diff(slow["sequence"]).max() > 8
-    assert slow["sequence"][-1] + 1 == len(slow["sequence"]) + counts["batches lost"] + counts["frames not asked for"]
-
-
-@needs_pty
-def test_replies_that_the_bridge_doubles_are_taken_once():
-    sensed = Sensed()
-    with bridged(sensed) as (driver, model, _):
-        model.faults.add("doubled")
-        driver.start()
-        streams = read_frames(driver, 5)
-        counts = driver.counts
-    assert_nothing_lost(streams, counts, sensed)
-
-
-@needs_pty
-def test_a_pulled_bridge_ends_the_reading():
-    with bridged(Sensed()) as (driver, _, far):
-        driver.start()
-        assert driver.read(2.0)
-        far.unplug()
-        with pytest.raises(LinkUnplugged):
-            read_frames(driver, 20)
-        driver.stop()
-
-
-@needs_pty
-def test_a_bridge_that_takes_short_batches_only():
-    with (
-        bridged(Sensed(), largest_payload=300) as (driver, _, _),
-        pytest.raises(LinkError, match="the bridge takes 300"),
-    ):
-        driver.start()
-    with bridged(Sensed(), options={"batch_words": 20}, largest_payload=300) as (driver, _, _):
-        driver.start()
-        read_frames(driver, 3)
+    assert_sensed(streams, sensed.frames())

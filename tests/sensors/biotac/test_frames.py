@@ -1,7 +1,5 @@
 """Frames of the BioTac against its emulator: what was sensed comes back, and what was not is marked."""
 
-from __future__ import annotations
-
 from collections import Counter
 
 import numpy as np
@@ -10,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tactbench.plugin import Quality
-from tactbench.sensors.biotac.codec import CHANNELS, INDEX, RESEND, Fault, encoded, sampling_command
+from tactbench.sensors.biotac.codec import CHANNELS, Fault, encoded
 from tactbench.sensors.biotac.emulator import BioTacFault, Emulator
 from tactbench.sensors.biotac.frames import DEFAULT_FRAME, FrameBatches, FrameRows, streams_of
 from tactbench.sensors.biotac.spec import SPEC
@@ -23,21 +21,21 @@ GOOD, MISSING, SUSPECT, SATURATED = (
 COLUMN = {channel.name: column for stream in SPEC.streams for column, channel in enumerate(stream.channels)}
 
 
-def wave(t_s: float) -> dict[str, float]:
+def wave(t_s):
     """A level and a slope of each channel's own, inside the converter for half a second."""
     return {name: 300.0 + 100.0 * k + 1000.0 * t_s for k, name in enumerate(CHANNELS)}
 
 
-def carried_out(steps, sensor: Emulator, begin_s: float, speed_hz: int = SPEED_HZ):
+def carried_out(steps, sensor, begin_s):
     """What comes in during a batch, and when it is over."""
     data, now_s = [], begin_s
     for step in steps:
         data.append(sensor.exchange(step.select, step.data, now_s))
-        now_s += 8 * len(step.data) / speed_hz + 1e-6 * step.pause_us
+        now_s += 8 * len(step.data) / SPEED_HZ + 1e-6 * step.pause_us
     return data, now_s
 
 
-def run(batches: FrameBatches, sensor: Emulator, n: int) -> dict:
+def run(batches, sensor, n):
     """Carry out batches one after the other from 0 s, and return the streams' blocks by name."""
     now_s = 0.0
     for _ in range(n):
@@ -49,32 +47,12 @@ def run(batches: FrameBatches, sensor: Emulator, n: int) -> dict:
     return {block.stream: block for block in batches.blocks()}
 
 
-def expected(name: str, n: int) -> int:
+def expected(name, n):
     """What word n reads: pauses are whole microseconds, and the slope is 0.001 count in one."""
     return round(wave(n * PERIOD_S + 2 * 8 / SPEED_HZ)[name])
 
 
-def test_every_word_comes_back_as_a_sample_of_its_stream():
-    frames = 4
-    batches = FrameBatches(speed_hz=SPEED_HZ)
-    sensed = []
-    blocks = run(batches, Emulator(lambda t_s: sensed.append(wave(t_s)) or sensed[-1]), frames)
-    slow, fast = blocks["electrodes"], blocks["vibration"]
-    assert slow.data.shape == (frames, 22)
-    assert fast.data.shape == (frames * 22, 1)
-    for frame in range(frames):
-        for place, name in enumerate(DEFAULT_FRAME):
-            n = frame * 44 + place
-            got = fast.data[n // 2, 0] if name == "PAC" else slow.data[frame, COLUMN[name]]
-            assert got == round(sensed[n][name]), (frame, name)
-    assert slow.sequence.tolist() == list(range(frames))
-    assert fast.sequence.tolist() == list(range(22 * frames))
-    assert not slow.quality.any()
-    assert not fast.quality.any()
-    assert not any(batches.faults.values())
-
-
-@pytest.mark.parametrize("speed_hz", [500_000, 3_300_001, 4_000_000, 4_400_000, 10_000_000])
+@pytest.mark.parametrize("speed_hz", [500_000, 3_300_001, 10_000_000])
 @pytest.mark.parametrize("words", [None, 1, 17])
 def test_words_come_at_their_rate_whatever_the_clock(speed_hz, words):
     batches = FrameBatches(speed_hz=speed_hz, words=words)
@@ -84,10 +62,7 @@ def test_words_come_at_their_rate_whatever_the_clock(speed_hz, words):
         # Whole microseconds, rounded down.
         assert first / 4400 - 1e-6 - 1e-9 <= now_s <= first / 4400 + 1e-9
         length_s = sum(8 * len(step.data) / speed_hz + 1e-6 * step.pause_us for step in steps)
-        timing = batches.timing(first)
-        assert timing.end_ns == pytest.approx(1e9 * length_s, abs=2.0)
-        assert len(timing.sampled_ns) * 2 == len(steps)
-        assert timing.sampled_ns[0] == pytest.approx(16e9 / speed_hz, abs=1.0)
+        assert batches.timing(first).end_ns == pytest.approx(1e9 * length_s, abs=2.0)
         assert all(step.pause_us == 50 for step in steps[::2])
         assert all(step.pause_us >= 10 for step in steps[1::2])
         sent, now_s = sent + len(steps) // 2, now_s + length_s
@@ -121,23 +96,6 @@ def test_the_streams_keep_the_specs_order_and_type():
     for stream in SPEC.streams:
         assert blocks[stream.name].data.dtype == stream.dtype
     assert streams_of(DEFAULT_FRAME, 4400.0) == SPEC.streams
-    # TDC comes before TAC in the stream and after it in the frame.
-    assert DEFAULT_FRAME.index("TAC") < DEFAULT_FRAME.index("TDC")
-    assert COLUMN["TDC"] < COLUMN["TAC"]
-
-
-def test_blocks_are_handed_out_once_and_as_soon_as_they_are_whole():
-    batches, sensor, seen = FrameBatches(speed_hz=SPEED_HZ, words=1), Emulator(wave), Counter()
-    for n in range(3 * 44):
-        first, steps = batches.next()
-        assert first == n
-        batches.take(first, carried_out(steps, sensor, n * PERIOD_S)[0], t_ns=0)
-        for block in batches.blocks():
-            seen[block.stream] += len(block.data)
-        assert seen["vibration"] == (n + 1) // 2
-        assert seen["electrodes"] == (n + 1 + 1) // 44 if n >= 42 else seen["electrodes"] == 0
-    batches.close()
-    assert batches.blocks() == []
 
 
 def test_a_resend_that_is_bad_too_leaves_the_first_word_marked():
@@ -149,53 +107,19 @@ def test_a_resend_that_is_bad_too_leaves_the_first_word_marked():
     assert batches.resent.total() == 0
 
 
-def test_each_resend_follows_its_own_word():
-    first, steps = FrameBatches(("E1", "PAC"), speed_hz=SPEED_HZ, resends=1, select=4).next()
-    assert [step.data for step in steps[::2]] == [b"\xa2\x00", RESEND, b"\x80\x00", RESEND]
-    assert {step.select for step in steps} == {4}
-    assert (first, len(steps)) == (0, 8)
-    assert sum(8 * len(step.data) / SPEED_HZ + 1e-6 * step.pause_us for step in steps) == pytest.approx(
-        2 / 4400, abs=1e-6
-    )
-
-
-def test_bad_parity_is_marked_with_the_number_that_came():
+@pytest.mark.parametrize(("kind", "seen"), [("dropped-reply", Fault.NOT_CONNECTED), ("error-reply", Fault.ERROR)])
+def test_what_did_not_come_is_missing_and_nothing_else(kind, seen):
     batches = FrameBatches(speed_hz=SPEED_HZ)
-    faults = [BioTacFault("parity", channels=frozenset({"E5"}))]
-    block = run(batches, Emulator(lambda t_s: {**wave(t_s), "E5": 1739.0}, faults=faults), 16)["electrodes"]
-    column = COLUMN["E5"]
-    assert set(block.quality[:, column]) == {SUSPECT}
-    # One bit in turn, from the last: two parity bits and two reserved ones leave the number as it is.
-    off = block.data[:, column].astype(int) ^ 1739
-    assert sorted(off) == [0, 0, 0, 0] + [1 << bit for bit in range(12)]
-    assert batches.faults["E5"] == {Fault.PARITY: 16}
-    assert not np.delete(block.quality, column, axis=1).any()
-    assert {name for name, counts in batches.faults.items() if counts} == {"E5"}
-
-
-@pytest.mark.parametrize(
-    ("fault", "seen"),
-    [
-        (BioTacFault("dropped-reply", channels=frozenset({"E5", "PAC"}), every=3), Fault.NOT_CONNECTED),
-        (BioTacFault("error-reply", channels=frozenset({"E5", "PAC"}), every=3), Fault.ERROR),
-    ],
-    ids=lambda value: value.name if isinstance(value, BioTacFault) else None,
-)
-def test_what_did_not_come_is_missing_and_nothing_else(fault, seen):
-    batches = FrameBatches(speed_hz=SPEED_HZ, resends=1)
-    # A resend is another word of its channel that the fault could concern: it takes every third of both.
-    blocks = run(FrameBatches(speed_hz=SPEED_HZ), Emulator(wave, faults=[fault]), 9)
-    words = [name for name in DEFAULT_FRAME * 9 if name in ("E5", "PAC")]
-    lost = Counter(name for place, name in enumerate(words, start=1) if place % 3 == 0)
-    slow, fast = blocks["electrodes"], blocks["vibration"]
-    assert np.count_nonzero(slow.quality) == lost["E5"]
-    assert np.count_nonzero(slow.quality[:, COLUMN["E5"]] == MISSING) == lost["E5"]
-    assert np.count_nonzero(fast.quality == MISSING) == np.count_nonzero(fast.quality) == lost["PAC"]
-    assert len(slow.data) == 9
-    assert len(fast.data) == 9 * 22
-    run(batches, Emulator(wave, faults=[fault]), 9)
-    assert batches.resent.total() == 0
-    assert {fault for counts in batches.faults.values() for fault in counts} == {seen}
+    blocks = run(batches, Emulator(wave, faults=[BioTacFault(kind, channels=frozenset({"E5", "PAC"}), every=3)]), 9)
+    lost = Counter([name for name in DEFAULT_FRAME * 9 if name in ("E5", "PAC")][2::3])
+    for block, column, number in (
+        (blocks["electrodes"], COLUMN["E5"], lost["E5"]),
+        (blocks["vibration"], 0, lost["PAC"]),
+    ):
+        assert np.count_nonzero(block.quality) == np.count_nonzero(block.quality[:, column] == MISSING) == number
+    assert {name: counts for name, counts in batches.faults.items() if counts} == {
+        name: {seen: number} for name, number in lost.items()
+    }
 
 
 def test_a_doubled_reply_is_taken_for_the_next_channel():
@@ -207,15 +131,6 @@ def test_a_doubled_reply_is_taken_for_the_next_channel():
     assert slow.data[:, COLUMN["E5"]].tolist() == fast.data[3::22, 0].tolist()
     assert not slow.quality.any()
     assert not any(batches.faults.values())
-
-
-def test_a_sensor_that_is_not_connected_has_rows_of_missing_samples():
-    batches = FrameBatches(speed_hz=SPEED_HZ)
-    faults = [BioTacFault("not-connected", start_s=0.0099, end_s=0.0199)]  # after the last word of each
-    block = run(batches, Emulator(wave, faults=faults), 3)["electrodes"]
-    assert (block.quality == MISSING).all(axis=1).tolist() == [False, True, False]
-    assert not block.quality[[0, 2]].any()
-    assert sum(counts[Fault.NOT_CONNECTED] for counts in batches.faults.values()) == 44
 
 
 def test_the_ends_of_the_converter_are_marked_saturated():
@@ -261,28 +176,19 @@ def test_frames_that_are_none_are_refused():
 def test_any_replies_are_survived_and_the_next_frame_is_whole(replies, resends):
     batches = FrameBatches(speed_hz=SPEED_HZ, resends=resends, words=10 // (1 + resends))
     for reply in replies:
-        first, steps = batches.next()
-        batches.take(first, reply, t_ns=0)
-        assert len(reply) == len(steps)
+        batches.take(batches.next()[0], reply, t_ns=0)
     batches.blocks()
-    # What a sensor answers: the frame that was begun, one whole frame, and the beginning of the next.
-    sent = first + len(steps) // (2 + 2 * resends) if replies else 0
-    begun, whole = sent // 44, -(-sent // 44)
-    while sent < 44 * (whole + 1):
+    levels = {name: 1000.0 + number for number, name in enumerate(CHANNELS)}
+    sensor = Emulator(lambda t_s: levels)
+    first, steps = batches.next()
+    begun = first
+    while first < begun + 2 * 44:  # the frame that was begun, and a whole one
+        batches.take(first, carried_out(steps, sensor, first * PERIOD_S)[0], t_ns=0)
         first, steps = batches.next()
-        data = [b""] * len(steps)
-        for k in range(len(steps) // 2):
-            n = first + k // (1 + resends)
-            assert k % (1 + resends) or steps[2 * k].data == sampling_command(INDEX[DEFAULT_FRAME[n % 44]])
-            data[2 * k + 1] = encoded(1000 + n % 44)
-        batches.take(first, data, t_ns=0)
-        sent = first + len(steps) // (2 + 2 * resends)
-    batches.close()
-    blocks = {block.stream: block for block in batches.blocks()}
-    assert begun <= whole
-    (row,) = np.flatnonzero(blocks["electrodes"].sequence == whole)
-    assert not blocks["electrodes"].quality[row].any()
-    assert blocks["electrodes"].data[row, COLUMN["E2"]] == 1002
-    fast = np.isin(blocks["vibration"].sequence, np.arange(22 * whole, 22 * whole + 22))
-    assert blocks["vibration"].data[fast, 0].tolist() == [1001 + 2 * n for n in range(22)]
-    assert not blocks["vibration"].quality[fast].any()
+    whole = -(-begun // 44)
+    slow, fast = batches.blocks()
+    for block, rows in ((slow, slow.sequence == whole), (fast, fast.sequence // 22 == whole)):
+        (stream,) = (stream for stream in SPEC.streams if stream.name == block.stream)
+        expected = [levels[channel.name] for channel in stream.channels]
+        assert block.data[rows].tolist() == [expected] * (1 if block is slow else 22)
+        assert not block.quality[rows].any()

@@ -1,67 +1,51 @@
-"""Emulated boards at the far end of a link: in virtual time, and on buses in real time."""
-
-from __future__ import annotations
+"""Emulated boards at the far end of a link: in virtual time, and behind a CAN adapter in real time."""
 
 import os
 import select
 import threading
 import time
 from collections import deque
-from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from typing import Any, Protocol
 
 import numpy as np
 
-from tactbench.plugin.devices import (
-    CanFrame,
-    CanLink,
-    DeviceEmulator,
-    DriverSettings,
-    EmulatorSettings,
-    Link,
-    LinkTimeout,
-    Senses,
-    open_link,
-)
+from tactbench.plugin import Block
+from tactbench.plugin.devices import CanFrame, CanLink, DriverSettings, EmulatorSettings
 from tactbench.sensors.icub.channels import STREAMS
-from tactbench.sensors.icub.driver import FingertipDriver, build
-from tactbench.sensors.icub.emulator import Bus, build_emulator
-from tests.links.ends import Pty
+from tactbench.sensors.icub.driver import build
+from tactbench.sensors.icub.emulator import build_emulator
 
 NAMES = [channel.name for channel in STREAMS[0].channels]
 
 
-def rising(now_s: float) -> Mapping[str, float]:
-    """Counts that tell taxels and times apart: they fall by one in 20 ms."""
+def rising(now_s):
+    """Return counts that tell taxels and times apart: they fall by one in 20 ms."""
     return {name: 200.0 - number - (int(50 * now_s + 0.25) % 100) for number, name in enumerate(NAMES)}
 
 
-def emulator(senses: Senses = rising, faults: tuple[str, ...] = (), **options: Any) -> Bus:
+def emulator(senses=rising, faults=(), **options):
     return build_emulator(EmulatorSettings(senses, np.random.default_rng(1), options, faults))
 
 
 class VirtualLink(CanLink):
     """A bus whose time goes on while somebody waits for it."""
 
-    def __init__(self, bus: DeviceEmulator) -> None:
+    def __init__(self, bus):
         super().__init__("can://emulated", self.now_ns)
         self.bus = bus
         self.now_s = 0.0
-        self.seen: list[CanFrame] = []
+        self.seen = []
         """All frames on the bus, in order, with their times."""
-        self._waiting: deque[CanFrame] = deque()
+        self._waiting = deque()
 
-    def now_ns(self) -> int:
+    def now_ns(self):
         return round(1e9 * self.now_s)
 
-    def put(self, frame: CanFrame) -> None:
+    def put(self, frame):
         """Let somebody else on the bus send a frame now."""
-        frame = CanFrame(frame.id, frame.data, frame.extended, self.now_ns())
-        self.seen.append(frame)
-        self._waiting.append(frame)
+        self._take([(None, CanFrame(frame.id, frame.data, frame.extended, self.now_ns()))])
 
-    def receive(self, timeout_s: float) -> CanFrame:
+    def receive(self, timeout_s):
         self._usable(timeout_s)
         until_s = self.now_s + timeout_s
         while not self._waiting:
@@ -73,87 +57,53 @@ class VirtualLink(CanLink):
             self._take(self.bus.poll(self.now_s))
         return self._waiting.popleft()
 
-    def send(self, frame: CanFrame) -> None:
+    def send(self, frame):
         self._usable()
         self.seen.append(CanFrame(frame.id, frame.data, frame.extended, self.now_ns()))
         self._take(self.bus.feed(frame, self.now_s))
 
-    def _take(self, sent: Any) -> None:
+    def _take(self, sent):
         frames = [frame for _, frame in sent]
         self.seen += frames
         self._waiting += frames
 
-    def _release(self) -> None:
+    def _release(self):
         pass
 
 
-def in_virtual_time(
-    senses: Senses = rising, faults: tuple[str, ...] = (), **options: Any
-) -> tuple[FingertipDriver, VirtualLink]:
+def in_virtual_time(senses=rising, faults=(), **options):
     link = VirtualLink(emulator(senses, faults, **options))
     return build(DriverSettings(lambda: link, STREAMS, options, link.now_ns)), link
 
 
-class FarEnd(Protocol):
-    """Where an emulator speaks to a bus."""
-
-    def receive(self, timeout_s: float) -> CanFrame: ...
-
-    def send(self, frame: CanFrame) -> None: ...
-
-
-def serve(bus: DeviceEmulator, far: FarEnd, stop: threading.Event) -> None:
-    """Let an emulator speak in real time until `stop` is set or the link is closed."""
-    while not stop.is_set():
-        sent = []
-        try:
-            wait_s = min(max(bus.next_s() - time.monotonic(), 0.0), 0.05)
-            sent += bus.feed(far.receive(wait_s), time.monotonic())
-        except LinkTimeout:
-            pass
-        for _, frame in [*sent, *bus.poll(time.monotonic())]:
-            far.send(frame)
+def joined(blocks):
+    """Return blocks one after the other."""
+    return Block("taxels", *(np.concatenate([getattr(one, name) for one in blocks])
+                             for name in ("t_ns", "data", "quality")))  # fmt: skip
 
 
 @contextmanager
-def served(bus: DeviceEmulator, far: FarEnd) -> Iterator[None]:
+def served(bus, port):
+    """Let an emulator speak in real time, behind an adapter with Lawicel's commands that answers none of them."""
     stop = threading.Event()
-    thread = threading.Thread(target=serve, args=(bus, far, stop))
+
+    def serve():
+        buffer = b""
+        while not stop.is_set():
+            sent = []
+            if select.select([port.master], [], [], min(max(bus.next_s() - time.monotonic(), 0.0), 0.05))[0]:
+                *lines, buffer = (buffer + os.read(port.master, 4096)).split(b"\r")
+                for line in lines:
+                    if line[:1] == b"t":
+                        frame = CanFrame(int(line[1:4], 16), bytes.fromhex(line[5:].decode()))
+                        sent += bus.feed(frame, time.monotonic())
+            for _, frame in [*sent, *bus.poll(time.monotonic())]:
+                os.write(port.master, f"t{frame.id:03X}{len(frame.data)}{frame.data.hex().upper()}\r".encode())
+
+    thread = threading.Thread(target=serve)
     thread.start()
     try:
         yield
     finally:
         stop.set()
         thread.join()
-
-
-class LawicelAdapter:
-    """A CAN adapter with Lawicel's commands behind a pseudo-terminal; it answers none of them, python-can asks none."""
-
-    def __init__(self, port: Pty) -> None:
-        self._port = port
-        self._buffer = b""
-
-    def receive(self, timeout_s: float) -> CanFrame:
-        until_s = time.monotonic() + timeout_s
-        while True:
-            line, end, rest = self._buffer.partition(b"\r")
-            if end:
-                self._buffer = rest
-                if line[:1] == b"t":
-                    return CanFrame(int(line[1:4], 16), bytes.fromhex(line[5:].decode())[: int(line[4:5])])
-                continue
-            wait_s = max(0.0, until_s - time.monotonic())
-            if not select.select([self._port.master], [], [], wait_s)[0]:
-                raise LinkTimeout("no command")
-            self._buffer += os.read(self._port.master, 4096)
-
-    def send(self, frame: CanFrame) -> None:
-        os.write(self._port.master, f"t{frame.id:03X}{len(frame.data)}{frame.data.hex().upper()}\r".encode())
-
-
-def driver_on(address: str, **options: Any) -> FingertipDriver:
-    def opened() -> Link:
-        return open_link(address)
-
-    return build(DriverSettings(opened, STREAMS, options))

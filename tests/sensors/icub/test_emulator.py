@@ -1,53 +1,43 @@
 """A board that does what its firmware does. What each fault comes to is tested through the driver."""
 
-from __future__ import annotations
-
 import math
 
-import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tactbench.plugin import Quality, UsageError
+from tactbench.plugin import UsageError
 from tactbench.plugin.devices import CanFrame
 from tactbench.sensors.icub.codec import (
     BROADCAST,
     BoardSetup,
-    Command,
-    OldSetup,
-    OldSetup2,
-    Sample,
     SkinDecoder,
     Transmit,
     TriangleSetup,
-    VersionRequest,
     command_frame,
-    read_version,
-    skin_id,
 )
-from tactbench.sensors.icub.emulator import VERSION, BoardFault, Bus, frame_s
+from tactbench.sensors.icub.emulator import BoardFault, Bus
 
 PAIR_S = 270e-6
 """Two frames of 135 bits at 1 Mbit/s."""
 LEVEL = 200.0
 
 
-def bus_of(*faults: BoardFault, triangle: int = 3) -> Bus:
+def bus_of(*faults, triangle=3):
     return Bus(lambda _: {f"T{n}": LEVEL - n for n in range(1, 13)}, triangle=triangle, faults=faults)
 
 
-def told(bus: Bus, *commands: Command, to: int = 14, now_s: float = 0.0) -> list[CanFrame]:
+def told(bus, *commands, to=14, now_s=0.0):
     return [frame for command in commands for _, frame in bus.feed(command_frame(to, command), now_s)]
 
 
-def started(bus: Bus, *, now_s: float = 0.0) -> Bus:
+def started(bus, *, now_s=0.0):
     """As a host does it: set up the board, enable a triangle, start."""
     told(bus, BoardSetup(), TriangleSetup(3, 3), Transmit(True), now_s=now_s)
     return bus
 
 
-def samples_of(bus: Bus, until_s: float, period_s: float = 0.04) -> list[Sample]:
+def samples_of(bus, until_s, period_s=0.04):
     decoder = SkinDecoder(period_s)
     return [sample for _, frame in bus.poll(until_s) for sample in decoder.feed(frame)]
 
@@ -68,97 +58,10 @@ def test_it_sends_from_the_start_to_the_stop_at_its_period():
     assert bus.poll(30.0) == []
 
 
-def test_what_stops_it_and_what_starts_it_anew():
-    bus = bus_of()
-    told(bus, BoardSetup(), Transmit(True))
-    assert bus.poll(1.0) == []  # a board's set-up disables its triangles
-    started(bus, now_s=1.0)
-    told(bus, TriangleSetup(0, 2), now_s=1.1)
-    assert len(bus.poll(2.0)) == 0
-    told(bus, Transmit(True), BoardSetup(period_ms=20), TriangleSetup(3, 3), Transmit(True), now_s=2.0)
-    assert len(samples_of(bus, 2.11)) == 5
-    told(bus, TriangleSetup(3, 3, enabled=False), Transmit(True), now_s=2.11)
-    assert bus.poll(3.0) == []
-
-
-def test_a_board_that_was_not_set_up_has_the_firmware_s_defaults():
-    bus = bus_of()
-    told(bus, Transmit(True))
-    samples = samples_of(bus, 0.11, period_s=0.05)
-    assert [sample.triangle for sample in samples] == [*range(16)] * 2
-    for sample in samples:
-        if sample.triangle == 3:
-            assert sample.taxels == bytes(range(199, 187, -1))
-        else:  # no chip: nothing has changed, and the error word says so
-            assert (sample.taxels, sample.word) == (bytes([245] * 12), 0x0002)
-            assert set(sample.quality) == {Quality.MISSING}
-
-
-def test_the_old_set_up_starts_with_defaults_and_40_ms():
-    bus = bus_of()
-    told(bus, BoardSetup(1, 20, 240), OldSetup(), OldSetup2())
-    assert len(samples_of(bus, 0.09)) == 2 * 16
-
-
-def test_what_the_firmware_passes_over_changes_nothing():
-    bus = started(bus_of())
-    for identifier, data in (
-        (0x20E, "50 05 04 02 01 00 22"),  # triangles out of order
-        (0x20E, "50 00 10 02 01 00 22"),
-        (0x20E, ""),
-        (0x20D, "07 01"),  # another board's
-    ):
-        bus.feed(CanFrame(identifier, bytes.fromhex(data)), 0.0)
-    assert len(bus.poll(0.05)) == 2
-
-
-def test_the_version_is_answered_to_the_one_who_asks():
-    bus = bus_of()
-    bus.feed(command_frame(14, VersionRequest(2, 0), source=5), 1.0)
-    ((_, answer),) = bus.poll(1.001)
-    assert answer.id == 0x2E5
-    assert read_version(answer) == (14, VERSION)
-    bus.feed(command_frame(14, VersionRequest(2, 1)), 2.0)
-    ((_, answer),) = bus.poll(2.001)
-    found = read_version(answer)
-    assert found is not None
-    assert not found[1].fits
-
-
-def test_frames_take_their_time_on_the_bus_one_after_the_other():
-    bus = bus_of()
-    told(bus, BoardSetup(), TriangleSetup(0, 15), Transmit(True))
-    frames = [frame for _, frame in bus.poll(0.079)]
-    assert [frame.id for frame in frames] == [skin_id(14, triangle) for triangle in range(16) for _ in range(2)]
-    assert [frame.data[0] for frame in frames] == [0x40, 0xC0] * 16
-    ends_ns = [frame.t_ns for frame in frames]
-    assert ends_ns == pytest.approx(40e6 + 135e3 * np.arange(1, 33), abs=1)
-    # 2 frames of 135 bits, as SensorSpec.link_delay derives it; it states 10 microseconds.
-    assert 2 * frame_s(CanFrame(0x4E3, bytes(8))) == pytest.approx(PAIR_S, abs=1e-12)
-
-
-def test_an_unplugged_board_is_silent_and_has_forgotten_its_set_up():
-    bus = started(bus_of(BoardFault("unplugged", start_s=0.1, end_s=0.3)))
-    assert len(bus.poll(0.1)) == 4
-    assert told(bus, VersionRequest(), now_s=0.2) == bus.poll(0.4) == []
-    told(bus, Transmit(True), now_s=0.4)
-    assert len(samples_of(bus, 0.46, period_s=0.05)) == 16
-
-
-def test_faults_can_be_switched_while_it_runs():
-    bus = started(bus_of())
-    bus.poll(0.1)
-    bus.faults.append(BoardFault("not-connected"))
-    (ill,) = samples_of(bus, 0.13)
-    bus.faults.clear()
-    (well,) = samples_of(bus, 0.17)
-    assert (set(ill.quality), set(well.quality)) == ({Quality.MISSING}, {Quality.GOOD})
-
-
 @given(st.lists(st.floats(0.0, 0.5), max_size=20))
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=10, deadline=None)
 def test_how_often_it_is_polled_changes_nothing(times):
-    def fresh() -> Bus:
+    def fresh():
         faults = [
             BoardFault("dropped-frame", every=3),
             BoardFault("doubled-frame", half="head"),
@@ -168,13 +71,8 @@ def test_how_often_it_is_polled_changes_nothing(times):
         told(bus, Transmit(True))
         return bus
 
-    whole = fresh().poll(0.5)
     bus = fresh()
-    assert [frame for now_s in [*sorted(times), 0.5] for frame in bus.poll(now_s)] == whole
-    bus, stepped = fresh(), []
-    while (due_s := bus.next_s()) <= 0.5:
-        stepped += bus.poll(due_s)
-    assert stepped == whole
+    assert [frame for now_s in [*sorted(times), 0.5] for frame in bus.poll(now_s)] == fresh().poll(0.5)
 
 
 @given(
