@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from statistics import median
 from typing import Any
 
@@ -25,9 +25,6 @@ class Rank:
     """clearly worse than the cell next before it"""
     behind: bool = False
     """clearly worse than the cell with the best score"""
-    first_without: int = field(default=0, compare=False)
-    """without how many replicates, each left out alone, it is the best, of equal cells the one first in order; 0 for
-    all cells where replicates differ"""
 
 
 def beyond_floor(rows: Sequence[Row]) -> bool:

@@ -11,7 +11,7 @@ import numpy.typing as npt
 from tactbench.core.evaluation.interval import student_quantile
 from tactbench.core.evaluation.metrics import EXCESS, SUMMED
 from tactbench.core.samples import FloatArray, IntArray
-from tactbench.core.statistics.influence import PairableRows, scores_of, scores_without, together
+from tactbench.core.statistics.influence import PairableRows, scores_of, together
 from tactbench.core.statistics.rank import Rank, beyond_floor, excess_of
 
 Row = Mapping[str, Any]
@@ -60,10 +60,9 @@ def ranks(rows: Iterable[Row]) -> dict[str, Rank]:
     low = np.minimum(1 + better, places)
     high = np.maximum(len(entered) - worse, places)
     many = np.bincount(places)
-    without = best_without(entered, groups) or []
     return {
         row["cell"]: Rank(int(places[i]), int(low[i]), int(high[i]), bool(many[places[i]] > 1), bool(apart[i]),
-                          bool(behind[i]), without.count(i))
+                          bool(behind[i]))
         for i, row in enumerate(entered)
     }  # fmt: skip
 
@@ -119,22 +118,3 @@ def _differed(
             if "scores" in kept:
                 mean[place] = -SUMMED[metric].sign * scores_of(kept, metric).mean()
     return mean, deviation, freedom
-
-
-def best_without(rows: Sequence[Row], groups: Sequence[PairableRows]) -> list[int] | None:
-    """Return the place in `rows` of the best one without each replicate; None if they do not share replicates.
-
-    A first place that leaves with one replicate is no property of the sensor (Huang et al. 2025, Dropping just a
-    handful of preferences can change top large language model rankings).
-    """
-    metric = str(rows[0]["metric"])
-    if len(groups) != 1 or len(groups[0].places) != len(rows):
-        return None
-    kept = [row["replicates"] for row in rows]
-    if all("scores" in one for one in kept):
-        each = np.array([scores_of(one, metric) for one in kept])
-        without = np.array([np.median(np.delete(each, place, axis=1), axis=1) for place in range(each.shape[1])]).T
-    else:
-        n_classes = len(rows[0]["classes"])
-        without = scores_without(kept, metric, n_classes)
-    return np.argmax(SUMMED[metric].sign * without, axis=0).tolist()  # type: ignore[no-any-return]

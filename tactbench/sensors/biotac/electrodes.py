@@ -62,6 +62,3 @@ ELECTRODES: tuple[Electrode, ...] = (
 
 NAMES: tuple[str, ...] = tuple(f"E{number}" for number in range(1, len(ELECTRODES) + 1))
 """Their channels' names, in the same order."""
-
-MIRRORS: tuple[tuple[str, str], ...] = (*((f"E{left}", f"E{left + 10}") for left in range(1, 7)), ("E8", "E9"))
-"""Pairs that are mirror images in y."""

@@ -4,13 +4,16 @@ import numpy as np
 import pytest
 
 from tactbench.plugin import RigError
-from tactbench.sensors.biotac.electrodes import ELECTRODES, MIRRORS, NAMES
+from tactbench.sensors.biotac.electrodes import ELECTRODES, NAMES
 from tactbench.sensors.biotac.spec import SPEC
 from tactbench.sensors.biotac.transduction import build, prepared
 from tests.sensors.skin_states import dent, grid_of, state_of
 
 REST = np.array([channel.rest.value for channel in SPEC.channels("taxel")])
 GRID = grid_of(SPEC)
+
+MIRRORS = (*((f"E{left}", f"E{left + 10}") for left in range(1, 7)), ("E8", "E9"))
+"""Pairs of electrodes that are mirror images in y."""
 
 
 def reading(state, channels=NAMES):
