@@ -62,10 +62,6 @@ def test_several_protocols_and_splits_give_cells_for_every_pair(registry):
     assert len(cells) == 3 * len(ways(cells))
 
 
-def test_none_is_the_tasks_own_protocol_and_split(registry):
-    assert ways(plan(registry, TaskChoice(name="force", protocol=None, split=None))) == [("karl2016", None)]
-
-
 def test_few_shot_stands_for_all_of_a_tasks_few_shot_splits(registry):
     cells = plan(registry, TaskChoice(name="force", protocol="deployable", split=("few-shot", "few-shot-5", "unit")))
     assert [split for _, split in ways(cells)] == ["few-shot-1", "few-shot-2", "few-shot-5", "few-shot-10", "unit"]

@@ -90,9 +90,8 @@ def test_times_are_taken_in_the_first_replicate_alone_and_the_row_says_so(ran):
         assert row["wall_s"] > 0
 
 
-@pytest.mark.parametrize("choice", [IN_THIS_PROCESS, EngineChoice(jobs=1)], ids=["in-process", "one job"])
-def test_jobs_engine_and_order_change_no_score(ran, shelf, tmp_path, choice):
-    outcome = run_matrix(matrix(*ASKED[::-1]), Store(tmp_path), choice=choice, recordings=shelf)
+def test_jobs_engine_and_order_change_no_score(ran, shelf, tmp_path):
+    outcome = run_matrix(matrix(*ASKED[::-1]), Store(tmp_path), choice=IN_THIS_PROCESS, recordings=shelf)
     assert decided(outcome.rows) == decided(ran[0].rows)
 
 

@@ -65,10 +65,6 @@ def terminates():
     os.kill(os.getpid(), signal.SIGKILL)
 
 
-def kills():
-    os.killpg(0, signal.SIGKILL)
-
-
 def closes():
     os.closerange(3, 256)
 
