@@ -7,7 +7,7 @@ from tactbench.core.errors import UsageError
 from tactbench.core.plugins.force_profiles import force_path
 from tactbench.core.plugins.registry import installed
 from tactbench.core.spec.quantity import assumed
-from tactbench.plugin import sine, staircase
+from tactbench.plugin import staircase
 
 
 def path_of(name, **given):
@@ -27,17 +27,10 @@ def test_a_staircase_goes_up_and_down_in_equal_steps_and_a_press_is_held_and_rel
     assert path.corners == ((0.0, 1.0, 2.0, 7.0, 9.0, 12.0), (0.0, 0.0, 4.0, 4.0, 0.0, 0.0))
 
 
-def test_a_path_names_its_profile():
-    path = path_of("sine", mean=2, amplitude=1.0)
-    assert path.source.reference.startswith("a test: force profile sine (mean 2 N, amplitude 1 N, frequency 1 Hz")
-    assert path.model_copy(update={"source": sine().source}) == sine()
-
-
 @pytest.mark.parametrize(
     ("name", "given", "says"),
     [
         ("sine", {"amplitude": 9}, "amplitude is given as 9 N, and at most its mean, 2 N"),
-        ("sine", {"height": 1}, "'height'"),
         ("staircase", {"steps": 2.5}, "steps is given as 2.5, and a whole number"),
         ("press-hold-release", {"rise": 0}, "rise is given as 0 s, and 0.001 s or more"),
     ],
