@@ -102,3 +102,5 @@ def test_an_ordinary_viewer_finds_signal_axes_units_and_names(write):
         assert taxels.attrs["channel_names"].tolist() == ["t0", "t1", "t2"]
         assert (taxels["data"].compression, taxels["data"].shuffle) == ("gzip", True)
         assert (file.attrs["format"], file.attrs["complete"]) == ("tactbench-recording", True)
+        assert [list(dimension.keys()) for dimension in taxels["data"].dims] == [["t_ns"], ["channel"]]
+        assert taxels["channel"].asstr()[:].tolist() == ["t0", "t1", "t2"]
