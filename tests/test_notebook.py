@@ -1,7 +1,6 @@
 """What ``import tactbench`` gives: the same numbers as the command line and as scikit-learn, by fewer words."""
 
 import json
-import random
 import subprocess
 import sys
 
@@ -143,23 +142,6 @@ def test_a_result_has_what_a_row_has_and_shows_it(folder):
         assert shown in page
 
 
-class Clumsy:
-    """What nobody can import: defined where it is used."""
-
-    def fit(self, X, y):
-        self.mean = np.mean(y) + 0 * random.random()
-
-    def predict(self, X):
-        return np.full(len(X), self.mean)
-
-
-def test_an_object_of_this_process_is_scored_as_the_installed_one_that_does_the_same(folder):
-    before = random.getstate()
-    found = tactbench.evaluate(Clumsy(), "force", folder)
-    assert found.score == pytest.approx(found.trivial["mean"], rel=1e-12)
-    assert random.getstate() == before
-
-
 def test_an_installed_estimator_is_scored_by_its_name_as_the_verb_scores_it(folder, here, tmp_path):
     found = tactbench.evaluate("ridge", "force", folder)
     verbs = Verbs(tmp_path, here=True)
@@ -221,13 +203,3 @@ def test_objects_answer_every_replicate_of_a_simulation(here):
     assert own["simulated"]
     assert own["n_replicates"] == 2
     assert len(set(own["replicate_scores"])) == 2
-
-
-def test_a_script_needs_no_guard(folder, tmp_path):
-    script = tmp_path / "script.py"
-    script.write_text(
-        "import tactbench\n"
-        f"print(len(tactbench.run(task='force', recordings={str(folder)!r}, estimator='ols', out='mine', jobs=2)))\n"
-    )
-    done = subprocess.run([sys.executable, script.name], cwd=tmp_path, capture_output=True, text=True, timeout=100)
-    assert (done.returncode, done.stdout) == (0, "3\n"), done.stderr

@@ -30,7 +30,7 @@ def key(keys, cell=CELL, data=DATA):
     "change",
     [
         {"sensor": "icub"}, {"task": "shear-force"}, {"protocol": "karl2016"}, {"split": None}, {"estimator": "ridge"},
-        {"params": ()}, {"params": (("lambda_", 0.3),)}, {"params": (("lambda_", 1),)}, {"seed": 6}, {"timed": False},
+        {"params": ()}, {"seed": 6}, {"timed": False},
     ],
     ids=str,
 )  # fmt: skip

@@ -87,17 +87,14 @@ def test_what_hangs_is_ended_and_says_where_it_was_and_what_it_printed():
     assert after == "fine"
 
 
-def test_what_an_item_prints_is_kept_of_it_alone_and_cut_to_its_end(capfd):
-    printed, chattered, raised = together("prints", "chatters", "raises")
+def test_what_an_item_prints_is_kept_of_it_alone(capfd):
+    printed, raised = together("prints", "raises")
     assert printed.log.splitlines() == ["from Python", "from below", "from a child"]
-    assert len(chattered.log) == 2**16
-    assert chattered.log.endswith("the end\n")
     assert raised.log == ""
     assert capfd.readouterr() == ("", "")
 
 
-def test_items_of_a_piece_share_a_process_and_pieces_do_not():
-    assert len({*together("whoami 1", "whoami 2", "whoami 3")}) == 1
+def test_pieces_share_no_process():
     pids = [pid for _, pid in apart(Pool(2), ["whoami 1", "whoami 2", "whoami 3"])]
     assert len({*pids, os.getpid()}) == 4
 

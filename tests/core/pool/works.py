@@ -96,13 +96,6 @@ def prints():
     raise ValueError("printed")
 
 
-def chatters():
-    for _ in range(40):
-        os.write(1, b"x" * 2**17)
-    os.write(1, b"the end\n")
-    raise ValueError("chattered")
-
-
 def floods():
     while True:
         os.write(1, b"x" * 2**16)

@@ -63,16 +63,11 @@ def test_a_module_of_its_own_counts_and_what_it_imports_does_not(tmp_path, monke
 
 ROOMS = {
     "tasks/force.py": (True, False),
-    "core/evaluation/splits.py": (True, False),
     "core/matrix/solve.py": (True, False),
     "core/spec/row.py": (True, True),
-    "core/recording/reader.py": (True, True),
     "core/acquisition.py": (False, True),
     "rigs/twin/rig.py": (False, True),
     "core/matrix/run.py": (False, False),
-    "core/cli/run.py": (False, False),
-    "core/leaderboard/table.py": (False, False),
-    "core/report/making.py": (False, False),
     "sensors/icub.py": (False, False),
 }
 """Files of tactbench, and whether they count for an answer and for a recording by the twin."""

@@ -34,9 +34,7 @@ def test_versions_2_and_3(version, digest):
     assert (meta.streams["taxels"].gaps, meta.clocks["force_torque"].source) == (3, "host")
     clock = meta.clocks["taxels"]
     assert (clock.method, clock.delay_ns, clock.wraps, clock.breaks) == ("hull-1way", (200_000, 300_000), 1, 1)
-    assert [(line.run, line.middle_ns, line.offset_ns, line.bound_ns) for line in clock.segments] == [
-        (0, 495_000_000, 1_000_000_203_370, 531_587), (1, 395_000_000, 1_001_000_209_127, 1_103_530),
-    ]  # fmt: skip
+    assert [(line.run, line.offset_ns) for line in clock.segments] == [(0, 1_000_000_203_370), (1, 1_001_000_209_127)]
     assert np.array_equal(taxels.sequence, n)
     assert np.array_equal(taxels.device_ns, np.where(n < 100, n, n - 100) * 10_000_000)
     assert np.array_equal(taxels.t_ns, HostTimes(clock)(taxels.device_ns))
