@@ -1,4 +1,4 @@
-"""Cells, recordings and rigs that go wrong in every way that has been seen, through the real command line."""
+"""Cells, recordings and rigs that go wrong in every way that has been seen."""
 
 import json
 from collections import Counter
@@ -8,18 +8,15 @@ import pytest
 
 from tactbench.core.matrix.store import Store
 from tactbench.core.matrix.summary import SEED_DECIDES
-from tests.conftest import Shell, Verbs
+from tests.conftest import Verbs
 from tests.core.cost.test_ladder import presses
-from tests.core.pool.patience import processes_in, until
 
-LIMITS = ("--timeout", "4", "--memory", "400")
 ASKED = ("run", "--rig", "replay", "--recordings", "shelf", "--sensor", "made", "--task", "force", "--split", "session")
 ANY_SENSOR = (*ASKED[:5], "--task", "force", "--estimator", "ols", "--split", "session", "--format", "json")
 HONEST = ("ols", "mean", "time-index")
 ENDS = {
     "evil-raise": ("failed", None, "RuntimeError: out of breath"),
-    "evil-hang": ("timeout", None, "longer than 4 s"),
-    "evil-eat": ("out-of-memory", None, "more than 400 MB"),
+    "evil-eat": ("out-of-memory", None, "more than 200 MB"),
     "evil-import": ("crashed", 6, "SIGABRT"),
     "evil-patch": ("done", None, ""),
     "evil-built-elsewhere": ("done", None, ""),
@@ -36,7 +33,7 @@ def test_every_evil_cell_has_one_row_and_the_others_are_right(tmp_path):
     presses(tmp_path / "shelf")
     Verbs(tmp_path, here=True)(*ASKED, "--estimator", "ols", "--out", "honest")
     asked = [word for name in (*ENDS, "ols") for word in ("--estimator", name)]  # the honest ones come last
-    done = Shell(tmp_path)(*ASKED, *asked, *LIMITS, "--jobs", "2", "--out", "out", "--format", "json",
+    done = Verbs(tmp_path)(*ASKED, *asked, "--memory", "200", "--jobs", "2", "--out", "out", "--format", "json",
                            plugins=("evil",), code=1)  # fmt: skip
     listed = json.loads(done.stdout)
     assert Counter(row["estimator"] for row in listed) == Counter([*HONEST, *ENDS])
@@ -49,11 +46,9 @@ def test_every_evil_cell_has_one_row_and_the_others_are_right(tmp_path):
         if status != "done":
             assert f"  {status:<13}  {row['cell']}: " in done.stderr
     assert "in _raise" in kept["evil-raise"]["traceback"]
-    assert "in _hang" in kept["evil-hang"]["traceback"]
     there = decided(tmp_path / "out")
     assert {name: there[name] for name in HONEST} == decided(tmp_path / "honest")
     assert "Traceback" not in done.stderr
-    assert until(lambda: not processes_in(tmp_path)), processes_in(tmp_path)
 
 
 def test_a_file_that_cannot_be_read_costs_its_own_cells_only(tmp_path):
@@ -79,13 +74,13 @@ def test_a_shelf_that_cannot_be_read_at_all_has_rows_where_a_sensor_is_named(tmp
     [
         ("evil-unbuilt", "could not be built: OSError: no such port", 0),
         ("evil-dying", "signal 6 (SIGABRT)", 2),
-        ("evil-device", "longer than 3 s", 2),
+        ("evil-device", "longer than 2 s", 2),
     ],
 )
 def test_a_rig_that_cannot_record_gives_rows_that_say_so(tmp_path, rig, says, kept):
     asked = ("run", "--repeats", "1", "--rig", rig, "--sensor", "ideal", "--task", "force", "--protocol", "karl2016",
-             "--estimator", "ols", "--timeout", "3", "--jobs", "2", "--format", "json")  # fmt: skip
-    done = Shell(tmp_path)(*asked, plugins=("evil",), code=1)
+             "--estimator", "ols", "--timeout", "2", "--jobs", "2", "--format", "json")  # fmt: skip
+    done = Verbs(tmp_path)(*asked, plugins=("evil",), code=1)
     rows = json.loads(done.stdout)
     assert {row["estimator"] for row in rows} == set(HONEST)
     assert all(says in row["reason"] for row in rows), rows[0]["reason"]
@@ -93,4 +88,3 @@ def test_a_rig_that_cannot_record_gives_rows_that_say_so(tmp_path, rig, says, ke
     assert len(found) == kept, "the other scenes are kept"
     if rig == "evil-device":
         assert Path(tmp_path / "let-go-of").read_text().splitlines().count("flat-validation") == 1
-    assert until(lambda: not processes_in(tmp_path)), processes_in(tmp_path)
