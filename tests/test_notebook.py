@@ -1,6 +1,5 @@
 """What ``import tactbench`` gives: the same numbers as the command line and as scikit-learn, by fewer words."""
 
-import json
 import subprocess
 import sys
 
@@ -140,16 +139,6 @@ def test_a_result_has_what_a_row_has_and_shows_it(folder):
     for shown in ("StandardScaler+Ridge", "RMSE [N]", "95 % interval"):
         assert shown in text
         assert shown in page
-
-
-def test_an_installed_estimator_is_scored_by_its_name_as_the_verb_scores_it(folder, here, tmp_path):
-    found = tactbench.evaluate("ridge", "force", folder)
-    verbs = Verbs(tmp_path, here=True)
-    verbs("run", "--task", "force", "--recordings", str(folder), "--estimator", "ridge", "--out", "by-verb")
-    rows = json.loads(verbs("leaderboard", "by-verb", "--format", "json").stdout)
-    of_verb = next(row for row in rows if row["estimator"] == "ridge")
-    for key in ("score", "ci_low", "ci_high", "split", "baseline", "metric", "n_test", "chosen"):
-        assert found.row[key] == of_verb[key], key
 
 
 @pytest.mark.parametrize(

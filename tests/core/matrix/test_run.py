@@ -103,15 +103,6 @@ def test_a_second_run_computes_nothing_and_a_changed_number_of_repeats_is_no_cha
     assert {(row["repeat"], row["repeats"]) for row in Store(folder).rows()} == {(1, 1), (2, 2)}
 
 
-def test_without_latency_the_cell_is_another_one_with_the_same_score(ran, shelf):
-    ridge = matrix("ridge", repeats=1, latency=False)
-    outcome = run_matrix(ridge, Store(ran[-1]), choice=IN_THIS_PROCESS, recordings=shelf)
-    (row,) = [row for row in outcome.rows if row["estimator"] == "ridge"]
-    (timed,) = [row for row in ran[0].rows if row["estimator"] == "ridge" and row["repeat"] == 1]
-    assert (row["latency_n"], row["fit_s"]) == (None, None)
-    assert (row["key"] != timed["key"], row["score"]) == (True, timed["score"])
-
-
 @pytest.mark.parametrize(
     ("choice", "says"),
     [

@@ -11,7 +11,7 @@ from tactbench.core.errors import RecordingError, RigError, UnwritableError
 from tactbench.core.recording.reader import open_recording
 from tactbench.core.recording.salvage import REMARK, rescue, salvage
 from tactbench.core.recording.writer import RecordingWriter
-from tactbench.core.samples import Block, Quality
+from tactbench.core.samples import Block
 from tests.core.pool.patience import files_up_to
 from tests.core.recording.conftest import about
 
@@ -117,18 +117,6 @@ def test_a_block_that_does_not_fit_is_refused(tmp_path, wrong, says):
     with pytest.raises(RigError, match=says):
         record(tmp_path / "x.h5", about(), appending(**wrong))
     assert list(tmp_path.iterdir()) == []  # no row had come
-
-
-@pytest.mark.parametrize("rows", [ROWS, 20_000])  # fewer, and more, than are compressed at once
-def test_quality_that_comes_late_leaves_the_rows_before_and_after_it_good(tmp_path, rows):
-    bad = np.zeros((ROWS, 3), dtype=np.uint8)
-    bad[3, 1] = Quality.MISSING
-    late = appending(rows, quality=bad)
-    record(tmp_path / "x.h5", about(), appending(0, rows), late, appending(rows + ROWS, rows))
-    with open_recording(tmp_path / "x.h5") as recording:
-        quality = recording.read("taxels").quality
-    assert quality.shape == (2 * rows + ROWS, 3)
-    assert np.argwhere(quality).tolist() == [[rows + 3, 1]]
 
 
 @pytest.mark.parametrize(

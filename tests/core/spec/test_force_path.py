@@ -12,13 +12,6 @@ def path(times_s=(0.0, 0.5, 1.0, 2.0), forces_n=(0.0, 0.0, 3.0, 1.0)):
     return ForcePath(times_s=times_s, forces_n=forces_n, samples=100, source=WHY)
 
 
-def test_a_path_says_of_itself_what_a_ramp_says():
-    found = path()
-    assert found.corners == ((0.0, 0.5, 1.0, 2.0), (0.0, 0.0, 3.0, 1.0))
-    assert (found.start.to("N"), found.end.to("N"), found.largest_n) == (0.0, 1.0, 3.0)
-    assert (found.hold.to("s"), found.hold_s, found.duration.to("s")) == (0.5, 0.5, 2.0)
-
-
 def test_a_path_that_cannot_be_run_is_refused():
     nan = float("nan")
     for times_s, forces_n in (((0.0,), (0.0,)), ((0.1, 1.0), (0.0, 0.0)), ((0.0, 0.0), (0.0, 0.0)),

@@ -13,13 +13,6 @@ def _q(value, unit="mm"):
     return assumed(value, unit, "a test")
 
 
-def test_a_cap_and_a_flat_surface_are_stored_as_before_shapes():
-    stored = {"value": 5.0, "unit": "mm", "source": {"tag": "assumed", "reference": "a test"}}
-    assert Indenter(radius=_q(5)).model_dump(mode="json") == {"radius": stored}
-    assert Indenter().model_dump() == {"radius": None}
-    assert [str(one) for one in (Indenter(radius=_q(5)), Indenter())] == ["cap R 5 mm", "flat"]
-
-
 @pytest.mark.parametrize(
     ("given", "field"),
     [

@@ -108,14 +108,12 @@ def test_json_messages(tmp_path):
         for row in range(20):
             t_ns = START + row * 10**7
             stamp = {"sec": t_ns // 10**9, "nsec": t_ns % 10**9}
-            message = {"header": {"stamp": stamp}, "data": [row, None if row == 3 else 1, 2], "object": 1}
-            message["data"] = [float("nan") if one is None else one for one in message["data"]]
+            message = {"header": {"stamp": stamp}, "data": [row, 1, float("nan") if row == 3 else 2], "object": 1}
             writer.add_message(taxels, t_ns, json.dumps(message).encode(), t_ns)
             writer.add_message(force, t_ns, json.dumps({"force": {"z": row}, "t": row / 8}).encode(), t_ns)
         writer.finish()
-    time = {"column": "t", "unit": "s", "epoch": "start"}
-    streams = imported(tmp_path, tables__force__time=time)
-    assert np.isnan(streams["taxels"].data[3, 1])
+    streams = imported(tmp_path, tables__force__time={"column": "t", "unit": "s", "epoch": "start"})
+    assert np.isnan(streams["taxels"].data[3, 2])
     assert np.array_equal(streams["taxels"].t_ns, START + np.arange(20) * 10**7)
     assert np.array_equal(streams["force"].t_ns, np.arange(20) * 125_000_000)
 

@@ -120,19 +120,6 @@ def test_columns_by_name_ranges_and_combinations(tables):
     assert any("No clock" in remark for remark in meta.remarks)
 
 
-def test_several_lines_a_row(tables):
-    tables.put("ball_3.txt", "-10000\r\n1 2 \r\n3 4 5\r\n6 7\r\n8 9 10\r\n")
-    report = tables.run(
-        clock="none", tables__table={"files": "*.txt", "path": "(?P<object>[a-z]+)_(?P<trial>[0-9]+)",
-                                     "read": {"format": "records", "first_line": "-10000", "numbers_per_line": [2, 3]}},
-        recording={"name": "{file}", "session": "s", "trial": "{trial}", "labels": {"object": "{object}"}},
-        streams={"taxels": {"table": "table", "channels": [{**TAXELS, "columns": "2..4"}]}},
-    )  # fmt: skip
-    meta, streams = read(report)
-    assert streams["taxels"].data.tolist() == [[3, 4, 5], [8, 9, 10]]
-    assert (meta.trial, meta.labels) == ("3", {"object": "ball"})
-
-
 FORMATS = {
     "npz": lambda path, X: np.savez_compressed(path, X=X, y=np.arange(11) % 2),
     "mat": lambda path, X: scipy.io.savemat(path, {"X": X, "y": np.arange(11) % 2}, do_compression=True),
@@ -222,20 +209,6 @@ def test_one_file_of_several_sessions(tables):
     assert [(imported.name, imported.rows) for imported in report.recordings] == [("a-x", 5), ("a-y", 5)]
     meta, streams = read(report, 1)
     assert (meta.session, streams["taxels"].data[:, 1].tolist()) == ("y", [1, 3, 5, 7, 9])
-
-
-def test_roles_labels_and_excluded_files(tables):
-    for name in ("bad", "good"):
-        tables.put(f"{name}.csv", rows())
-    report = tables.run(
-        words={"role": {"of": "file", "values": {"bad": "train", "good": "test"}}},
-        recording={"name": "{file}", "session": "{file}", "role": "{role}",
-                   "labels": {"weight_g": 5, "object": "{file}"}},
-        exclude=[{"files": "bad*", "reason": "the author says so"}],
-    )  # fmt: skip
-    bad, good = (read(report, number)[0] for number in (0, 1))
-    assert (bad.role, bad.excluded, good.role, good.excluded) == ("train", "the author says so", "test", "")
-    assert (good.labels, report.excluded) == ({"weight_g": 5, "object": "good"}, {"the author says so": 1})
 
 
 def test_a_sentinel_that_nobody_named_is_refused(tables):
