@@ -91,19 +91,17 @@ def test_frames_have_channels_as_columns_and_no_number_where_there_is_no_sample(
         one.to_dataframe("taxel")
 
 
-@pytest.mark.parametrize("clock", [True, False])
-def test_xarray_opens_the_file_with_coordinates(tmp_path, clock):
+def test_xarray_opens_the_file_with_coordinates(tmp_path):
     xarray = pytest.importorskip("xarray")
     pytest.importorskip("h5netcdf")
     X, _ = ramp(1, n=60)
     notes = {"press": np.arange(60) // 10, "kind": np.repeat(["stable", "slipped"], 30)}
-    path = record(tmp_path / "a.h5", X, t_ns="regular" if clock else None, annotations=notes)
+    path = record(tmp_path / "a.h5", X, annotations=notes)
     (one,) = tactbench.open_recordings(path)
-    rows = "t_ns" if clock else "row"
     for found in (xarray.open_dataset(path, group="streams/taxels", engine="h5netcdf"), one.to_xarray()):
-        assert found["data"].dims == (rows, "channel")
+        assert found["data"].dims == ("t_ns", "channel")
         np.testing.assert_array_equal(found["data"].sel(channel="t1"), X[:, 1])
-        assert found[rows].values[1] == (10_000_000 if clock else 1)
+        assert found["t_ns"].values[1] == 10_000_000
     np.testing.assert_array_equal(one.to_xarray()["press"], notes["press"])
 
 

@@ -1,4 +1,4 @@
-"""Cells on a Dask cluster of two workers: the rows of a local run, and what may go wrong."""
+"""Cells on a Dask cluster: the rows of a local run, and what may go wrong."""
 
 import json
 
@@ -16,10 +16,10 @@ from tests.core.matrix.test_evil_cells import ASKED, HONEST, decided
 from tests.core.pool.patience import processes_in, until
 
 
-def test_two_workers_give_the_rows_of_a_local_run_and_a_cell_costs_itself_only(tmp_path):
+def test_a_worker_gives_the_rows_of_a_local_run_and_a_cell_costs_itself_only(tmp_path):
     presses(tmp_path / "shelf")
     Verbs(tmp_path, here=True)(*ASKED, "--estimator", "ols", "--out", "local")
-    done = Shell(tmp_path)(*ASKED, "--estimator", "evil-abort", "--estimator", "ols", "--engine", "dask", "--jobs", "2",
+    done = Shell(tmp_path)(*ASKED, "--estimator", "evil-abort", "--estimator", "ols", "--engine", "dask", "--jobs", "1",
                            "--out", "dask", "--format", "json", plugins=("evil",), code=1)  # fmt: skip
     ends = {row["estimator"]: (row["status"], row["signal"]) for row in json.loads(done.stdout)}
     assert ends == {"evil-abort": ("crashed", 6), **dict.fromkeys(HONEST, ("done", None))}

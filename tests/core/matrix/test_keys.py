@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tactbench.core.matrix.keys import Keys, differences
+from tactbench.core.matrix.keys import Keys
 from tactbench.core.matrix.plan import Cell
 from tactbench.core.plugins.registry import installed, load_registry
 from tactbench.core.provenance.source import source_digest
@@ -87,12 +87,3 @@ def test_a_recording_counts_who_makes_it_of_what_in_which_role(keys):
         for seed in (1, 2)
     }
     assert len(found) == 16
-
-
-def test_what_differs_is_said_in_words():
-    before = {"seed": 1, "params": {"alpha": 1.0}, "source": {"acme": "a", "gone": "b"}, "same": [1, 2]}
-    now = {"seed": 2, "params": {"alpha": 1.5, "beta": None}, "source": {"acme": "c"}, "same": (1, 2)}
-    said = ["params: alpha 1.0 -> 1.5", "seed 1 -> 2", "source: acme a -> c", "source: gone b -> nothing"]
-    assert differences(before, now) == said
-    assert differences(now, now) == []
-    assert len(differences({"text": "x" * 900}, {})[0]) < 90

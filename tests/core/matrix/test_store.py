@@ -138,12 +138,6 @@ def test_without_a_usable_index_the_rows_are_the_same(tmp_path, what):
     assert found.provenance(before[0]["made_by"]) == {"cpu": "a"}
 
 
-def test_reading_a_folder_that_is_not_there_makes_nothing(tmp_path):
-    store = Store(tmp_path / "none")
-    assert (store.rows(), store.finished(key(1)), store.answers(key(1))) == ([], None, {})
-    assert not (tmp_path / "none").exists()
-
-
 def test_what_is_no_plain_data_writes_nothing(tmp_path):
     with Store(tmp_path).hold() as store:
         with pytest.raises(ValueError, match="JSON"):

@@ -11,7 +11,7 @@ from importlib import metadata
 from pathlib import Path
 
 from tactbench.core.plugins.registry import installed, load_registry
-from tactbench.core.provenance.gather import _commit, foot, gather, host_id
+from tactbench.core.provenance.gather import _commit, gather, host_id
 from tactbench.core.provenance.source import source_digest
 from tests.conftest import ROOT
 from tests.core.matrix.plugin_packages import write_acme
@@ -64,11 +64,3 @@ def test_a_strangers_plugin_is_told_with_its_source(tmp_path, monkeypatch):
     (acme / "filters.py").write_text("LAW = 0.75\n")
     source_digest.cache_clear()
     assert gather(registry)["plugins"][0]["source"] != before["source"]
-
-
-def test_the_foot_says_each_thing_once():
-    one = gathered()
-    software, *_, place = foot([one, one])
-    assert f"numpy {one['distributions']['numpy']}" in software
-    assert one["host"] in place
-    assert foot([one, {**one, "host": "another"}]).count(software) == 1

@@ -34,7 +34,7 @@ def clocked(tmp_path_factory):
 
 
 @settings(max_examples=20, suppress_health_check=[HealthCheck.function_scoped_fixture])
-@given(st.integers(0, 2**32), st.integers(1, 50), st.integers(0, 4000), st.sampled_from([None, "host", "simulated"]))
+@given(st.integers(0, 2**32), st.integers(1, 50), st.integers(0, 4000), st.sampled_from([None, "host"]))
 def test_stored_times_are_exactly_recomputed_or_as_they_came_where_the_device_is_no_clock(
     clocked, seed, blocks, lost, source
 ):

@@ -54,7 +54,6 @@ def test_a_simulation_is_asked_with_nuisances_in_any_order():
     one = Simulation(nuisances={"noise_scale": 2, "drift_scale": 0.5})
     other = Simulation(nuisances={"drift_scale": 0.5, "noise_scale": 2.0})
     assert (one, hash(one)) == (other, hash(other))
-    assert one.model_dump(exclude_defaults=True) == {"nuisances": {"drift_scale": 0.5, "noise_scale": 2.0}}
     assert Simulation.model_validate_json(one.model_dump_json()) == one
     with pytest.raises(ValidationError):
         Simulation(nuisances={"noise_scale": math.nan})
