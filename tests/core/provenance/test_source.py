@@ -4,7 +4,7 @@ import importlib
 
 import pytest
 
-from tactbench.core.provenance.source import ANSWERING, RECORDING, source_digest, sources_of
+from tactbench.core.provenance.source import ANSWERING, RECORDING, source_digest, sources_of, versions
 from tests.conftest import ROOT
 from tests.core.matrix.plugin_packages import write_package
 
@@ -87,3 +87,7 @@ def test_each_place_of_tactbench_that_takes_part_is_there():
     for place in (*ANSWERING, *RECORDING):
         assert (ROOT / "tactbench" / place).exists(), place
         assert source_digest("tactbench", place) != source_digest("tactbench", "nowhere")
+
+
+def test_a_missing_distribution_says_so():
+    assert versions(("no-such-distribution",))["no-such-distribution"] == "missing"

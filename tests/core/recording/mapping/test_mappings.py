@@ -211,6 +211,20 @@ def test_one_file_of_several_sessions(tables):
     assert (meta.session, streams["taxels"].data[:, 1].tolist()) == ("y", [1, 3, 5, 7, 9])
 
 
+def test_roles_labels_and_excluded_files(tables):
+    for name in ("bad", "good"):
+        tables.put(f"{name}.csv", rows())
+    report = tables.run(
+        words={"role": {"of": "file", "values": {"bad": "train", "good": "test"}}},
+        recording={"name": "{file}", "session": "{file}", "role": "{role}",
+                   "labels": {"weight_g": 5, "object": "{file}"}},
+        exclude=[{"files": "bad*", "reason": "the author says so"}],
+    )  # fmt: skip
+    bad, good = (read(report, number)[0] for number in (0, 1))
+    assert (bad.role, bad.excluded, good.role, good.excluded) == ("train", "the author says so", "test", "")
+    assert (good.labels, report.excluded) == ({"weight_g": 5, "object": "good"}, {"the author says so": 1})
+
+
 def test_a_sentinel_that_nobody_named_is_refused(tables):
     """Leaving -1 in a force must be impossible by default."""
     tables.put("press.csv", rows(force=lambda row: -1 if row % 2 else row + 1))
@@ -231,6 +245,7 @@ def test_a_sentinel_that_nobody_named_is_refused(tables):
         ("0\t1\t2\t3\t4\n1\t1\t2\t3\t4\n", {}, "press.csv is separated by tabs"),
         (rows(), {"tables__table__read__header": True}, "'0.00' in column 0"),
         (rows(), {"streams__force__channels": [{**FORCE, "given_in": "mm"}]}, "'mm'"),
+        (rows(), {"tables__table__files": "*.tsv"}, "'*.tsv'"),
         (rows(), {"tables__table__path": "(?P<start>[0-9]+)_"}, "other.csv matches"),
         (rows(), {"recording__name": "{start}"}, "'start'"),
         (rows(), {"recording__name": "same"}, "other.csv and press.csv"),
