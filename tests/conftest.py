@@ -68,18 +68,13 @@ class Shell:
         self.folder = folder
 
     def __call__(
-        self,
-        *arguments: str,
-        plugins: tuple[str, ...] = (),
-        code: int | None = 0,
-        module: str = "tactbench",
-        timeout=100,
+        self, *arguments: str, plugins: tuple[str, ...] = (), code: int | None = 0
     ) -> subprocess.CompletedProcess[str]:
         path = os.pathsep.join([str(ROOT), *(str(THIRD_PARTY / name) for name in plugins)])
         env = {**os.environ, "PYTHONPATH": path, "COLUMNS": "200", "PYTHONWARNINGS": "error", "OMP_NUM_THREADS": "1"}
         done = subprocess.run(
             [sys.executable, "-m", "tactbench", *arguments],
-            cwd=self.folder, env=env, capture_output=True, text=True, timeout=timeout, stdin=subprocess.DEVNULL,
+            cwd=self.folder, env=env, capture_output=True, text=True, timeout=100, stdin=subprocess.DEVNULL,
         )  # fmt: skip
         if code is not None:
             assert done.returncode == code, f"exit {done.returncode}\n{done.stdout}\n{done.stderr}"

@@ -13,15 +13,6 @@ from tests.conftest import ROOT
 from tests.core.evaluation.made import sessions
 from tests.here import make_here
 
-COPIES = {"eflesh-normal": "eflesh", "eflesh-shear": "eflesh"}
-
-
-def imported(name, shared_data, folder):
-    """Return the recordings of a data set, imported from the copy beside this checkout."""
-    mapping = ROOT / "examples" / "mappings" / f"{name}.yaml"
-    import_tables(mapping, root=shared_data / COPIES[name], out=folder / name)
-    return tactbench.open_recordings(folder / name)
-
 
 @pytest.fixture
 def here(monkeypatch, tmp_path):
@@ -40,13 +31,9 @@ def execute(path):
     return names
 
 
-@pytest.mark.parametrize("real", [True, False])
-def test_the_notebook_runs(here, monkeypatch, request, tmp_path, real):
-    if real:
-        found = imported("eflesh-normal", request.getfixturevalue("shared_data"), tmp_path)
-    else:  # where the data are not
-        sessions(tmp_path / "made", n=400)
-        found = tactbench.open_recordings(tmp_path / "made")
+def test_the_notebook_runs(here, monkeypatch, tmp_path):
+    sessions(tmp_path, n=400)
+    found = tactbench.open_recordings(tmp_path)
     monkeypatch.setattr(tactbench, "dataset", lambda name, root: found, raising=False)
     names = execute(ROOT / "examples" / "first_look.ipynb")
     assert names["found"].score < names["found"].trivial["mean"]
@@ -55,13 +42,14 @@ def test_the_notebook_runs(here, monkeypatch, request, tmp_path, real):
     assert {"StandardScaler+PolynomialFeatures+Ridge", "ridge"} < {row["estimator"] for row in names["table"]}
 
 
-def test_a_forest_on_several_data_sets_is_a_short_script(here, monkeypatch, shared_data, tmp_path, capsys):
+def test_a_forest_on_data_sets_is_a_short_script(here, monkeypatch, shared_data, tmp_path, capsys):
     pytest.importorskip("pandas")
     path = ROOT / "examples" / "extra_trees.py"
-    monkeypatch.setattr(tactbench, "dataset", lambda name: imported(name, shared_data, tmp_path), raising=False)
-    monkeypatch.setattr(sys, "argv", [str(path), "eflesh-normal:force", "eflesh-shear:shear-force"])
+    import_tables(ROOT / "examples" / "mappings" / "eflesh-normal.yaml", root=shared_data / "eflesh", out=tmp_path)
+    monkeypatch.setattr(tactbench, "dataset", lambda name: tactbench.open_recordings(tmp_path), raising=False)
+    monkeypatch.setattr(sys, "argv", [str(path), "eflesh-normal:force"])
     frame = runpy.run_path(str(path))["lines"]
-    assert [line["data set"] for line in frame] == list(COPIES)
+    assert [line["data set"] for line in frame] == ["eflesh-normal"]
     assert all(line["ci_low"] < line["score"] < line["ci_high"] < line["baseline"] for line in frame)
     assert "ci_low" in capsys.readouterr().out
 

@@ -25,7 +25,7 @@ def try_lock(file: int) -> bool | None:
     return True
 
 
-def replace_file(path: Path, content: bytes, *, sync: bool = True) -> None:
+def replace_file(path: Path, content: bytes) -> None:
     """Write `content` aside, sync it and rename it to `path`: a reader sees the old file or the new one.
 
     Parameters
@@ -34,8 +34,6 @@ def replace_file(path: Path, content: bytes, *, sync: bool = True) -> None:
         The file.
     content
         What it is to hold.
-    sync
-        Whether it must survive a power cut, and not only the end of this process.
 
     Raises
     ------
@@ -46,9 +44,8 @@ def replace_file(path: Path, content: bytes, *, sync: bool = True) -> None:
     try:
         with aside.open("wb") as file:
             file.write(content)
-            if sync:
-                file.flush()
-                os.fsync(file.fileno())
+            file.flush()
+            os.fsync(file.fileno())
         aside.replace(path)
     except BaseException:
         aside.unlink(missing_ok=True)

@@ -185,12 +185,12 @@ def plan_run(
 ) -> tuple[list[Cell], RecordingPlan]:
     """Return the cells of `matrix`, and where their recordings come from.
 
-    A rig that cannot be built, or that lists its recordings badly, costs the cells that need it, not the run.
-
     Raises
     ------
     UsageError
         If the matrix asks for something that is not there.
+    TactbenchError
+        If a rig that is not simulated cannot be built, or cannot list its recordings.
     """
     recording_plan = RecordingPlan()
     rig_file = load_rig_file(Path(matrix.rig_file), registry).checked_for(matrix.rig) if matrix.rig_file else None
@@ -199,12 +199,7 @@ def plan_run(
         builder = InProcess() if registry.rigs.owned(matrix.rig).ours else Pool(1, limits)
         ((_, paths),) = builder.each(work, [matrix.rig])
         if isinstance(paths, BaseException):
-            users = isinstance(paths, TactbenchError) and paths.exit_code == UsageError.exit_code
-            if users or not matrix.sensors:
-                raise paths  # the user's to mend, or of cells that nobody can name
-            cells = plan_cells(matrix, matrix.sensors, registry)
-            recording_plan.troubles = {request_key(cell): paths for cell in cells}
-            return cells, recording_plan
+            raise paths
         if paths is not None:
             return _from_replay(matrix, registry, [Path(path) for path in paths], store)
     if not matrix.sensors:

@@ -30,14 +30,12 @@ from tactbench.core.plugins.declared import declared_in, with_declared
 from tactbench.core.plugins.interfaces import Operator
 from tactbench.core.plugins.registry import Registry, installed
 from tactbench.core.pool import UNLIMITED, Engine, InProcess, Limits, Pool, preload
-from tactbench.core.pool.limits import can_refuse_memory
 from tactbench.core.provenance.gather import gather, usable_cores
 from tactbench.core.spec.matrix import MatrixSpec
 from tactbench.core.spec.status import STOPPED
 from tactbench.core.spec.task import TaskSpec
 
 EngineName = Literal["in-process", "isolated", "dask"]
-MEASURED_MEMORY = "the limit of memory was held by measuring every 50 ms: this system cannot refuse memory"
 
 
 @dataclass(frozen=True)
@@ -303,8 +301,6 @@ class Run:
             return
         row, answers = outcome
         row |= {"key": job.key, "log": log, "recordings": [self.store.beside(Path(path)) for path in row["recordings"]]}
-        if self.choice.limits.memory_mb is not None and not can_refuse_memory():
-            row["remarks"].append(MEASURED_MEMORY)
         self._done(job.cell, self.store.keep(row, job.sections, answers))
 
     def _stopped(

@@ -17,7 +17,7 @@ from typing import Any
 
 from tactbench.core import errors
 from tactbench.core.errors import OutOfMemory, Raised, TactbenchError
-from tactbench.core.pool.limits import Limits, data_limit, resident_mb
+from tactbench.core.pool.limits import Limits, resident_mb
 
 LOG_BYTES = 2**16
 """Length of the end of a log that is kept."""
@@ -79,12 +79,12 @@ def _carry_out(work: Callable[[Any], Any], item: Any, limits: Limits) -> tuple[s
     if limits.timeout_s is not None:  # the stacks at the end of its time go to the log
         faulthandler.dump_traceback_later(limits.timeout_s)
     try:
-        with data_limit(limits.memory_mb):
-            return "value", work(item)
+        return "value", work(item)
     except _Terminated:
         os._exit(0)
     except MemoryError as error:
-        return "error", out_of_memory(limits, error)
+        where = "".join(traceback.format_exception(error))
+        return "error", OutOfMemory("Memory ran out.", hint="Run fewer at once (--jobs).", traceback_text=where)
     except BaseException as error:
         return "error", plain_error(error)
     finally:
@@ -123,15 +123,3 @@ def plain_error(error: BaseException) -> TactbenchError:
         error.traceback_text = error.traceback_text or where
         return error
     return Raised(f"{type(error).__name__}: {error}".rstrip(": "), traceback_text=where)
-
-
-def out_of_memory(limits: Limits, error: MemoryError | None = None) -> OutOfMemory:
-    """Return the error of an item that took more memory than it may, or found none left."""
-    where = "".join(traceback.format_exception(error)) if error else ""
-    if limits.memory_mb is None:
-        return OutOfMemory("Memory ran out.", hint="Run fewer at once (--jobs).", traceback_text=where)
-    return OutOfMemory(
-        f"It took more than {limits.memory_mb} MB of memory.",
-        hint="Allow more with --memory MB.",
-        traceback_text=where,
-    )

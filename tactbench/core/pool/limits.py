@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import suppress
 from dataclasses import dataclass
 
 import psutil
@@ -24,32 +23,6 @@ class Limits:
 
 
 UNLIMITED = Limits()
-
-
-def can_refuse_memory() -> bool:
-    """Return whether the system can refuse memory to a process; without that, memory is only measured."""
-    try:
-        import resource
-    except ImportError:
-        return False
-    return hasattr(resource, "RLIMIT_DATA") and hasattr(psutil.Process().memory_info(), "data")
-
-
-@contextmanager
-def data_limit(memory_mb: int | None) -> Iterator[None]:
-    """Let this process allocate `memory_mb` more MB: beyond that Python raises MemoryError."""
-    if memory_mb is None or not can_refuse_memory():
-        yield
-        return
-    import resource
-
-    soft, hard = resource.getrlimit(resource.RLIMIT_DATA)
-    wanted = psutil.Process().memory_info().data + memory_mb * MB
-    resource.setrlimit(resource.RLIMIT_DATA, (wanted if hard < 0 else min(wanted, hard), hard))
-    try:
-        yield
-    finally:
-        resource.setrlimit(resource.RLIMIT_DATA, (soft, hard))
 
 
 def resident_mb(pid: int) -> float:

@@ -18,8 +18,8 @@ from typing import Any, Self, TypeVar
 
 import psutil
 
-from tactbench.core.errors import CellStopped, Crashed, TimedOut
-from tactbench.core.pool.child import end_of, out_of_memory, plain_error, run_child
+from tactbench.core.errors import CellStopped, Crashed, OutOfMemory, TimedOut
+from tactbench.core.pool.child import end_of, plain_error, run_child
 from tactbench.core.pool.limits import UNLIMITED, Limits, resident_mb
 
 T = TypeVar("T")
@@ -217,7 +217,7 @@ class _Child:
             text = f"It was stopped: it took longer than {timeout_s:g} s."
             return TimedOut(text, hint="Allow more with --timeout SECONDS.")
         if memory_mb is not None and resident_mb(self._process.pid) - shared_mb > memory_mb:
-            return out_of_memory(self._limits)
+            return OutOfMemory(f"It took more than {memory_mb} MB of memory.", hint="Allow more with --memory MB.")
         return None
 
     def _crashed(self) -> Crashed:

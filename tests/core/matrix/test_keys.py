@@ -1,7 +1,5 @@
 """Keys: everything that may change a number changes them, and nothing else does."""
 
-import subprocess
-import sys
 from dataclasses import replace
 from pathlib import Path
 
@@ -9,12 +7,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tactbench.core.matrix.keys import Keys, differences
+from tactbench.core.matrix.keys import Keys
 from tactbench.core.matrix.plan import Cell
 from tactbench.core.plugins.registry import installed, load_registry
 from tactbench.core.provenance.source import source_digest
 from tactbench.core.spec.scene import Simulation
-from tests.conftest import ROOT
 
 CELL = Cell("ideal", "force", "twin", "deployable", "session", "lasso", (("lambda_", 0.2),), False, 1, 3, 5)
 DATA = {Path("flat.h5"): "d1", Path("round.h5"): "d2"}
@@ -33,7 +30,7 @@ def key(keys, cell=CELL, data=DATA):
     "change",
     [
         {"sensor": "icub"}, {"task": "shear-force"}, {"protocol": "karl2016"}, {"split": None}, {"estimator": "ridge"},
-        {"params": ()}, {"params": (("lambda_", 0.3),)}, {"params": (("lambda_", 1),)}, {"seed": 6}, {"timed": False},
+        {"params": ()}, {"seed": 6}, {"timed": False},
     ],
     ids=str,
 )  # fmt: skip
@@ -90,25 +87,3 @@ def test_a_recording_counts_who_makes_it_of_what_in_which_role(keys):
         for seed in (1, 2)
     }
     assert len(found) == 16
-
-
-def test_keys_are_the_same_in_another_process(keys):
-    text = (
-        "from tests.core.matrix.test_keys import CELL, DATA, Keys, installed; "
-        "print(Keys(installed()).of_cell(CELL, DATA)[0])"
-    )
-    found = {
-        subprocess.run([sys.executable, "-c", text], env={"PYTHONHASHSEED": seed}, capture_output=True, text=True,
-                       check=True, cwd=ROOT).stdout.strip()
-        for seed in ("1", "2")
-    }  # fmt: skip
-    assert found == {key(keys)}
-
-
-def test_what_differs_is_said_in_words():
-    before = {"seed": 1, "params": {"alpha": 1.0}, "source": {"acme": "a", "gone": "b"}, "same": [1, 2]}
-    now = {"seed": 2, "params": {"alpha": 1.5, "beta": None}, "source": {"acme": "c"}, "same": (1, 2)}
-    said = ["params: alpha 1.0 -> 1.5", "seed 1 -> 2", "source: acme a -> c", "source: gone b -> nothing"]
-    assert differences(before, now) == said
-    assert differences(now, now) == []
-    assert len(differences({"text": "x" * 900}, {})[0]) < 90

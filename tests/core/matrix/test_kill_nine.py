@@ -1,41 +1,26 @@
-"""kill -9 at random moments: the short version of the benchmark."""
+"""kill -9 of a run; the long version is benchmarks/kill_nine.py."""
 
 import subprocess
 import sys
 
-import pytest
-
 from tactbench.core.matrix.store import Store
-from tests.conftest import ROOT
+from tests.conftest import Verbs
+from tests.core.pool.patience import ending, processes_in, until
 
-from .made import kept, key
-
-
-def test_killed_runs_lose_only_cells_in_flight():
-    done = subprocess.run(
-        [sys.executable, str(ROOT / "benchmarks" / "kill_nine.py"), "--kills", "5", "--matrix", "trivial",
-         "--repeats", "30"],
-        capture_output=True, text=True, cwd=ROOT,
-    )  # fmt: skip
-    assert done.returncode == 0, done.stderr
-    assert "5 kills (3 of the group, 2 of the parent)" in done.stdout
+RUN = ("run", "--sensor", "ideal", "--task", "force", "--estimator", "ols", "--repeats", "2", "--jobs", "2",
+       "--out", "out")  # fmt: skip
 
 
-def test_the_check_of_the_benchmark_sees_damage(tmp_path, monkeypatch):
-    """A check that cannot fail would prove nothing."""
-    monkeypatch.syspath_prepend(ROOT / "benchmarks")
-    import kill_nine
-
-    with Store(tmp_path).hold() as store:
-        kept(store, "a")
-        kept(store, "b")
-    before = kill_nine.checked(tmp_path, {})
-    assert set(before) == {"a", "b"}
-    file = tmp_path / "cells" / f"{key('a')}.h5"
-    content = file.read_bytes()
-    file.write_bytes(content[:-1])
-    with pytest.raises(AssertionError):
-        kill_nine.checked(tmp_path, before)
-    file.unlink()
-    with pytest.raises(AssertionError, match="was lost"):
-        kill_nine.checked(tmp_path, before)
+def test_a_killed_run_leaves_no_process_and_loses_only_what_was_at_work(tmp_path):
+    out, nowhere = tmp_path / "out", subprocess.DEVNULL
+    with ending([sys.executable, "-m", "tactbench", *RUN], cwd=tmp_path, stdout=nowhere, stderr=nowhere) as run:
+        assert until(lambda: any((out / "cells").glob("[!.]*.h5")), 60)
+        run.kill()
+        run.wait()
+    assert until(lambda: not processes_in(tmp_path)), processes_in(tmp_path)
+    finished = {path: path.read_bytes() for path in out.rglob("[!.]*.h5")}
+    assert 0 < len(Store(out).rows()) < 6
+    Verbs(tmp_path, here=True)(*RUN)
+    assert {path: path.read_bytes() for path in finished} == finished
+    assert [row["status"] for row in Store(out).rows()] == ["done"] * 6
+    assert not [path for path in out.rglob("*") if path.suffix in (".partial", ".completing")]

@@ -15,7 +15,6 @@ NAMES = [f"{FOREST}/10", f"{FOREST}/2", f"{FOREST}/1", f"{FAST}/1", "b/t/twin/p/
         (f"{FOREST}/2", f"{FOREST}/2"),
         (FOREST, f"{FOREST}/1"),  # not forest-fast, whose name begins alike
         (FAST, f"{FAST}/1"),
-        ("a/t/twin/p/forest/", f"{FOREST}/1"),
         ("fast", f"{FAST}/1"),
         ("b/", "b/t/twin/p/forest/1"),
     ],

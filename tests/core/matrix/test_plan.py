@@ -38,8 +38,6 @@ def test_a_task_may_state_how_often_it_is_recorded_anew_and_the_matrix_overrules
     ("choice", "says"),
     [
         (TaskChoice(name="forse"), "'force'"),
-        (TaskChoice(name="force", protocol="karl2015"), "'karl2016'"),
-        (TaskChoice(name="force", estimators=(EstimatorChoice(name="laso"),)), "'lasso'"),
         (TaskChoice(name="force", estimators=(EstimatorChoice(name="forest", params={"trees": 5}),)), "n_estimators"),
         (TaskChoice(name="curvature", estimators=(EstimatorChoice(name="lasso"),)), "classification"),
     ],
@@ -60,10 +58,6 @@ def test_several_protocols_and_splits_give_cells_for_every_pair(registry):
     assert len({cell.name for cell in cells}) == len(cells)
     # Every pair has its baselines beside it.
     assert len(cells) == 3 * len(ways(cells))
-
-
-def test_none_is_the_tasks_own_protocol_and_split(registry):
-    assert ways(plan(registry, TaskChoice(name="force", protocol=None, split=None))) == [("karl2016", None)]
 
 
 def test_few_shot_stands_for_all_of_a_tasks_few_shot_splits(registry):

@@ -48,11 +48,10 @@ def drawn(file):
     return said
 
 
-@pytest.mark.parametrize(("channel", "sign"), [("fz", 1), ("fx", -1)])
-def test_the_force_sensor_feels_the_pressing_force_where_its_entry_says(channel, sign):
-    said = drawn(rig_file(force={"device": "scale", "link": "emulated", "channel": channel, "sign": sign}))
+def test_the_force_sensor_feels_the_pressing_force_where_its_entry_says():
+    said = drawn(rig_file(force={"device": "scale", "link": "emulated", "channel": "fx", "sign": -1}))
     assert said["pad"]["senses"] == pytest.approx({"T1": 1.0, "fz": 0.1})
-    assert said["force"]["senses"] == pytest.approx({channel: 0.1 * sign})
+    assert said["force"]["senses"] == pytest.approx({"fx": -0.1})
 
 
 def test_devices_draw_from_generators_of_their_own():
@@ -90,13 +89,9 @@ def test_drivers_read_what_the_emulators_sense():
 @pytest.mark.parametrize(
     ("changed", "sensor", "said"),
     [
-        ({}, "biotac", "biotac"),
         ({"sensors": {"pda": {"link": "emulated"}}}, "pda", "entry 'pda'.*'pad'"),
         ({"force": {"device": "scael", "link": "emulated"}}, "pad", "entry 'force'.*'scale'"),
-        ({"force": {"device": "screw", "link": "emulated"}}, "pad", "no force sensor"),
         ({}, "mute", "mute has no driver"),
-        ({"sensors": {"pad": {"link": "emulated", "options": {"board": 1}}}}, "pad", "entry 'pad'.*'board'"),
-        ({"sensors": {"pad": {"link": "udp:/1"}}}, "pad", "entry 'pad'.*not the address"),
         # An emulated scale has its unit; of a real one nobody knows it but the rig file.
         ({"force": {"device": "scale", "link": "udp://127.0.0.1:9"}}, "pad", "entry 'force'.*option 'unit'"),
     ],
@@ -159,7 +154,6 @@ def test_a_zero_is_the_mean_of_a_sensor_at_rest_and_its_rows_are_counted():
         (lambda t_s: 4.09 + noise(0.02), {}, "fz has a mean of 4.09 N, allowed are 2.5 N"),  # a hand on it
         (lambda t_s: 1.0 * t_s + noise(0.02), {}, "fz has a drift of 1.34 N, allowed are 0.25 N"),
         (lambda t_s: noise(0.1), {"noise_n": 0.02}, "fz has a spread of 0.101 N, allowed are 0.04 N"),
-        (lambda t_s: noise(2.0), {}, "fz has a spread of 2.01 N, allowed are 1.25 N"),
         (lambda t_s: np.where(t_s < 0.5, np.nan, 0.0), {}, "has no zero: 2000 rows in 2 s, 500 of them no numbers"),
     ],
 )
@@ -170,6 +164,4 @@ def test_a_sensor_that_is_not_at_rest_gets_no_zero(reading, entry, says):
 
 def test_what_is_allowed_of_a_zero_is_the_rig_files():
     assert zeroed(lambda t_s: 4.09 + noise(0.02), largest_zero_n=5.0)[0][0] == pytest.approx(4.09, abs=0.01)
-    assert zeroed(lambda t_s: 4.09 + noise(0.02), range_n=100.0)[0][0] == pytest.approx(4.09, abs=0.01)
     assert zeroed(lambda t_s: 4.09 + t_s, zero_s=0.0)[0].tolist() == [0.0, 0.0]  # the device keeps its own
-    assert zeroed(lambda t_s: noise(0.1), noise_n=0.1)[0][0] == pytest.approx(0.0, abs=0.01)

@@ -4,23 +4,21 @@ import h5py
 import numpy as np
 
 
-def recordings(shell, out, *more, plugins=("patching",)):
+def recordings(verbs, out, *more, plugins=("patching",)):
     """Return the readings of a run's recordings, by the names of the files, which hold the keys."""
-    shell(
-        "run", "--sensor", "icub", "--task", "force", "--estimator", "mean", "--repeats", "1",
-        "--out", out, *more, plugins=plugins,
-    )  # fmt: skip
+    asked = ("run", "--sensor", "icub", "--task", "force", "--estimator", "mean", "--repeats", "1")
+    verbs(*asked, "--out", out, *more, plugins=plugins)
     found = {}
-    for path in sorted((shell.folder / out / "recordings").rglob("*.h5")):
+    for path in sorted((verbs.folder / out / "recordings").rglob("*.h5")):
         with h5py.File(path) as file:
             found[path.name] = file["streams/taxels/data"][:]
     return found
 
 
-def test_an_effect_that_changes_numpy_when_it_is_imported_does_so_only_where_it_is_named(shell):
-    without, unnamed = recordings(shell, "without", plugins=()), recordings(shell, "unnamed")
+def test_an_effect_that_changes_numpy_when_it_is_imported_does_so_only_where_it_is_named(verbs):
+    without, unnamed = recordings(verbs, "without", plugins=()), recordings(verbs, "unnamed")
     assert without.keys() == unnamed.keys()
     assert all(np.array_equal(without[name], unnamed[name]) for name in without)
-    named = recordings(shell, "named", "--effects", "patching")
+    named = recordings(verbs, "named", "--effects", "patching")
     assert named.keys().isdisjoint(without)
     assert all(not np.array_equal(a, b) for a, b in zip(named.values(), without.values(), strict=True))

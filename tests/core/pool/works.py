@@ -65,10 +65,6 @@ def terminates():
     os.kill(os.getpid(), signal.SIGKILL)
 
 
-def kills():
-    os.killpg(0, signal.SIGKILL)
-
-
 def closes():
     os.closerange(3, 256)
 
@@ -98,13 +94,6 @@ def prints():
     os.write(1, b"from below\n")
     os.system("echo from a child")
     raise ValueError("printed")
-
-
-def chatters():
-    for _ in range(40):
-        os.write(1, b"x" * 2**17)
-    os.write(1, b"the end\n")
-    raise ValueError("chattered")
 
 
 def floods():

@@ -10,8 +10,9 @@ import time
 from importlib import metadata
 from pathlib import Path
 
-from tactbench.core.plugins.registry import installed
-from tactbench.core.provenance.gather import _commit, foot, gather, host_id
+from tactbench.core.plugins.registry import installed, load_registry
+from tactbench.core.provenance.gather import _commit, gather, host_id
+from tactbench.core.provenance.source import source_digest
 from tests.conftest import ROOT
 from tests.core.matrix.plugin_packages import write_acme
 
@@ -52,28 +53,14 @@ def test_equal_circumstances_give_equal_provenance_without_clock_person_host_or_
     assert found["threads"] == os.environ["OMP_NUM_THREADS"]
 
 
-def test_a_strangers_plugin_is_told_with_its_source_and_nothing_is_imported_for_it(tmp_path):
+def test_a_strangers_plugin_is_told_with_its_source(tmp_path, monkeypatch):
     acme = write_acme(tmp_path)
-    text = (
-        "import json, sys; from tactbench.core.plugins.registry import installed;"
-        "from tactbench.core.provenance.gather import gather; print(json.dumps(gather(installed())['plugins']));"
-        "assert 'numpy' not in sys.modules"
-    )
+    monkeypatch.syspath_prepend(tmp_path)
+    (point,) = metadata.Distribution.at(tmp_path / "acme_answers-1.0.dist-info").entry_points
 
-    def told():
-        env = {**os.environ, "PYTHONPATH": os.pathsep.join([str(tmp_path), str(ROOT)])}
-        done = subprocess.run([sys.executable, "-c", text], check=True, capture_output=True, text=True, env=env)
-        return json.loads(done.stdout)
-
-    (before,) = told()
+    registry = load_registry([point])
+    (before,) = gather(registry)["plugins"]
     assert (before["distribution"], before["version"], before["package"]) == ("acme-answers", "1.0", "acme")
     (acme / "filters.py").write_text("LAW = 0.75\n")
-    assert told()[0]["source"] != before["source"]
-
-
-def test_the_foot_says_each_thing_once():
-    one = gathered()
-    software, *_, place = foot([one, one])
-    assert f"numpy {one['distributions']['numpy']}" in software
-    assert one["host"] in place
-    assert foot([one, {**one, "host": "another"}]).count(software) == 1
+    source_digest.cache_clear()
+    assert gather(registry)["plugins"][0]["source"] != before["source"]

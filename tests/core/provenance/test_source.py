@@ -1,11 +1,9 @@
 """Real packages, edited: every byte of those that take part counts, and nothing else does."""
 
 import importlib
-from importlib import metadata
 
 import pytest
 
-from tactbench.core.provenance import source
 from tactbench.core.provenance.source import ANSWERING, RECORDING, source_digest, sources_of, versions
 from tests.conftest import ROOT
 from tests.core.matrix.plugin_packages import write_package
@@ -25,9 +23,7 @@ def digest(module="some_plugin.anything:at_all", own=()):
     return sources_of([module], own)
 
 
-@pytest.mark.parametrize(
-    "name", ["law.py", "more.py", "gains.npz", "deep/er/table.yaml", "_fast.cpython-311-x86_64-linux-gnu.so"]
-)
+@pytest.mark.parametrize("name", ["law.py", "gains.npz", "deep/er/table.yaml"])
 def test_every_byte_of_the_package_counts(package, name):
     before = digest()
     path = package / name
@@ -65,27 +61,13 @@ def test_a_module_of_its_own_counts_and_what_it_imports_does_not(tmp_path, monke
     assert digest("nobody_has_it:at_all") == digest("nobody_has_it:at_all")
 
 
-def test_of_a_namespace_every_portion_counts(tmp_path, monkeypatch):
-    for place in ("one", "two"):
-        write_package(tmp_path / place, "shared_name", {f"{place}/__init__.py": "LAW = 3\n"})
-        monkeypatch.syspath_prepend(str(tmp_path / place))
-    before = digest("shared_name.one:at_all")
-    (tmp_path / "two" / "shared_name" / "two" / "__init__.py").write_text("LAW = 4\n")
-    assert digest("shared_name.one:at_all") != before
-
-
 ROOMS = {
     "tasks/force.py": (True, False),
-    "core/evaluation/splits.py": (True, False),
     "core/matrix/solve.py": (True, False),
     "core/spec/row.py": (True, True),
-    "core/recording/reader.py": (True, True),
     "core/acquisition.py": (False, True),
     "rigs/twin/rig.py": (False, True),
     "core/matrix/run.py": (False, False),
-    "core/cli/run.py": (False, False),
-    "core/leaderboard/table.py": (False, False),
-    "core/report/making.py": (False, False),
     "sensors/icub.py": (False, False),
 }
 """Files of tactbench, and whether they count for an answer and for a recording by the twin."""
@@ -107,7 +89,5 @@ def test_each_place_of_tactbench_that_takes_part_is_there():
         assert source_digest("tactbench", place) != source_digest("tactbench", "nowhere")
 
 
-def test_versions_of_what_computes_are_there_and_missing_ones_say_so():
-    found = versions(("no-such-distribution",))
-    assert set(found) == {"python", *source.RELEVANT, "no-such-distribution"}
-    assert (found["no-such-distribution"], found["numpy"]) == ("missing", metadata.version("numpy"))
+def test_a_missing_distribution_says_so():
+    assert versions(("no-such-distribution",))["no-such-distribution"] == "missing"

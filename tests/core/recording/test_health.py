@@ -38,7 +38,6 @@ LOST = StreamCounts(received=N + 20, written=N, dropped=7, duplicates=2, gaps=5)
     [
         ({}, {}),
         ({"data": changed(1, slice(None), 77)}, {"stuck": "taxel t1 constant"}),
-        ({"data": changed([0, 2], slice(None), 77)}, {"stuck": "taxels t0 and t2 constant"}),
         ({"data": changed(2, slice(None), READINGS[:, 0])}, {"duplicated": "t0 and t2"}),
         (flagged(Quality.MISSING, slice(None), 0), {"dead": "t0"}),
         (flagged(Quality.MISSING, slice(12), 1), {"missing": f"t1 without a sample in 12 of {N} rows"}),

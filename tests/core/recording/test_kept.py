@@ -31,29 +31,21 @@ def test_versions_2_and_3(version, digest):
     meta, taxels, force = kept(version, digest)
     n = np.arange(180)
     assert (meta.clock, meta.emulation.time, meta.counts) == ("host", "real", {"pad parity errors": 1})
-    assert (meta.streams["taxels"].gaps, meta.clocks["force_torque"].source) == (3, "host")
     clock = meta.clocks["taxels"]
     assert (clock.method, clock.delay_ns, clock.wraps, clock.breaks) == ("hull-1way", (200_000, 300_000), 1, 1)
-    assert [(line.run, line.middle_ns, line.offset_ns, line.bound_ns) for line in clock.segments] == [
-        (0, 495_000_000, 1_000_000_203_370, 531_587), (1, 395_000_000, 1_001_000_209_127, 1_103_530),
-    ]  # fmt: skip
-    assert np.array_equal(taxels.sequence, n)
+    assert [(line.run, line.offset_ns) for line in clock.segments] == [(0, 1_000_000_203_370), (1, 1_001_000_209_127)]
     assert np.array_equal(taxels.device_ns, np.where(n < 100, n, n - 100) * 10_000_000)
     assert np.array_equal(taxels.t_ns, HostTimes(clock)(taxels.device_ns))
     assert np.argwhere(taxels.quality == Quality.GAP).tolist() == [[40, 0], [40, 1], [40, 2]]
-    assert taxels.quality[41].tolist() == [0, Quality.GAP | Quality.SUSPECT, 0]
     assert taxels.annotations["object"].tolist() == ["ball"] * 100 + ["Bär"] * 80
-    assert (force.host_ns, force.device_ns) == (None, None)
     assert np.array_equal(force.t_ns, 1_000_000_000_000 + n * 10_000_000)
 
 
 def test_version_1():
     meta, taxels, force = kept(1, "e0fe66813c781466c2ecb4453c79c0a95bfe3fb75e7b41a3bbd2aecb3db4640f")
     assert (meta.sensor.name, meta.session, meta.role, meta.labels["cap_radius_mm"]) == ("pad", "a", "train", 5.0)
-    assert meta.sensor.streams[0].channels[1].position_m == (0.001, 0.0, 0.0)
     assert np.array_equal(taxels.data, np.arange(18, dtype=np.uint16).reshape(6, 3))
     assert np.array_equal(taxels.t_ns, np.arange(6) * 10_000_000)
     assert np.argwhere(taxels.quality).tolist() == [[2, 1]]
     assert taxels.annotations["object"].tolist() == ["ball", "ball", "", "Bär", "cup", "cup"]
-    assert taxels.annotations["press"].tolist() == [0, 0, 0, 1, 1, 1]
     assert np.array_equal(force.data[:, 0], np.linspace(0, 2.5, 6))

@@ -10,7 +10,6 @@ from tactbench.core.spec.drive import ForceLoop
 from tactbench.core.spec.quantity import assumed
 from tactbench.core.spec.scene import NUISANCES, Scene, Simulation, Slide
 from tactbench.plugin import load_registry
-from tests.conftest import ROOT
 
 SCENE = Scene(name="a", drive=ForceLoop(), slide=Slide(speed=assumed(5.0, "mm/s", "test")))
 SENSORS = [load_registry().sensors[name].spec for name in ("biotac", "icub", "ideal")]
@@ -25,11 +24,6 @@ def test_every_nuisance_of_a_scene_is_set_alone_and_read_under_its_name(name):
     assert Scene.model_validate_json(changed.model_dump_json()) == changed
 
 
-def test_the_document_names_every_nuisance_of_a_scene():
-    text = (ROOT / "docs" / "twin.md").read_text(encoding="utf-8")
-    assert [name for name in NUISANCES if f"`{name}`" not in text] == []
-
-
 @pytest.mark.parametrize("spec", SENSORS, ids=lambda spec: spec.name)
 def test_every_nuisance_of_a_sensor_is_set_alone_and_read_under_its_name(spec):
     before = spec.settable()
@@ -42,18 +36,10 @@ def test_every_nuisance_of_a_sensor_is_set_alone_and_read_under_its_name(spec):
         assert changed.settable()[name].source.tag == "assumed"
 
 
-def test_what_is_of_somebody_else_is_passed_over():
-    assert SCENE.with_nuisances({"taxel_white_count": 1.0}) == SCENE
-    biotac, icub, _ = SENSORS
-    assert icub.with_nuisances({"dc_pressure_white_count": 1.0, "noise_scale": 2.0}) is icub
-    assert biotac.with_nuisances({"dc_pressure_white_count": 1.0}) != biotac
-
-
 @pytest.mark.parametrize(
     ("changed", "values", "says"),
     [
         (SCENE, {"placement_scatter_mm": -0.1}, "placement_scatter_mm = -0.1 is below 0"),
-        (SCENE, {"noise_scale": -1.0}, "noise_scale = -1 is below 0"),
         (SCENE, {"surface_kinetic_friction": 2.0}, "surface_kinetic_friction = 2: .*static >= kinetic"),
         (SENSORS[0], {"taxel_white_count": -1.0}, "taxel_white_count = -1 is below 0"),
         (SENSORS[2], {"taxel_warm_up_count": 5.0}, "warm_up_tau is needed"),
@@ -68,7 +54,6 @@ def test_a_simulation_is_asked_with_nuisances_in_any_order():
     one = Simulation(nuisances={"noise_scale": 2, "drift_scale": 0.5})
     other = Simulation(nuisances={"drift_scale": 0.5, "noise_scale": 2.0})
     assert (one, hash(one)) == (other, hash(other))
-    assert one.model_dump(exclude_defaults=True) == {"nuisances": {"drift_scale": 0.5, "noise_scale": 2.0}}
     assert Simulation.model_validate_json(one.model_dump_json()) == one
     with pytest.raises(ValidationError):
         Simulation(nuisances={"noise_scale": math.nan})
@@ -79,6 +64,5 @@ def test_a_scene_is_asked_as_a_simulation_says():
     assert asked.placement.scatter == assumed(0.3, "mm", "set for this run")
     assert asked.simulation.rung == "fine"
     assert asked.model_copy(update={"placement": SCENE.placement, "simulation": SCENE.simulation}) == SCENE
-    assert SCENE.simulated_as(Simulation()) is SCENE
     own = SCENE.model_copy(update={"simulation": Simulation(effects=("+creep",))})
     assert own.simulated_as(Simulation(effects=("-drift",))).simulation.effects == ("+creep", "-drift")

@@ -15,8 +15,6 @@ from tactbench.core.samples import Answers
 
 FORMAT = b"tactbench-cell 5 "
 _USER_BLOCK = 512
-_COMPRESSED_BYTES = 2**15
-"""Smaller tables are stored as they are: compressing them takes longer than it saves room."""
 _COLUMNS = tuple(column.name for column in fields(Answers))
 
 
@@ -55,9 +53,7 @@ class CellFile:
         with h5py.File(image, "w", userblock_size=_USER_BLOCK) as file:
             file["head"] = np.bytes_(text)
             for role, answers in self.answers.items():
-                table = _table(answers)
-                packed = {"shuffle": True, "compression": 4} if table.nbytes >= _COMPRESSED_BYTES else {}
-                file.create_dataset(f"answers/{role}", data=table, **packed)
+                file.create_dataset(f"answers/{role}", data=_table(answers), shuffle=True, compression=4)
         body = image.getvalue()[_USER_BLOCK:]
         return _opening(body).ljust(_USER_BLOCK, b"\0") + body
 

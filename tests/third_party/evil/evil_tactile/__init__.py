@@ -6,18 +6,9 @@ TACTBENCH_API = 2
 KINDS = ("regression", "classification")
 ESTIMATORS = {
     "evil-raise": "Raises",
-    "evil-exit": "Leaves by sys.exit",
-    "evil-interrupt": "Raises KeyboardInterrupt",
     "evil-abort": "Aborts, as in a segmentation fault",
-    "evil-vanish": "Ends its process without a word",
     "evil-hang": "Never comes back",
     "evil-eat": "Takes memory without end",
-    "evil-shape": "Answers with the wrong number of rows",
-    "evil-nan": "Answers with what is no number",
-    "evil-text": "Answers with text",
-    "evil-print": "Prints, at every level, and answers honestly",
-    "evil-fork": "Forks, and comes back twice",
-    "evil-kill": "Kills its whole group of processes",
     "evil-built-elsewhere": "Changes the working folder when it is built",
 }
 
@@ -46,10 +37,7 @@ def tactbench_rigs():
         RigDescriptor(name=f"evil-{name}", title=title, where=f"evil_tactile.rigs:{name}", simulated=simulated)
         for name, title, simulated in (
             ("unbuilt", "Raises when it is built", True),
-            ("leaving", "Leaves by sys.exit when it is built", True),
-            ("closed", "Will not open", True),
             ("dying", "Aborts in the second scene", True),
-            ("stuck", "Hangs in the second scene", True),
             ("device", "A device that hangs in the second scene and must be let go of", False),
         )
     ]

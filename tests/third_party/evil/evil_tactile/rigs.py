@@ -1,7 +1,6 @@
 """The code behind the rigs. All of them carry out a scene by yielding a ramp of force; if they come to it."""
 
 import os
-import sys
 import time
 from contextlib import contextmanager
 from pathlib import Path
@@ -9,7 +8,7 @@ from types import MappingProxyType
 
 import numpy as np
 
-from tactbench.plugin import Block, ChannelSpec, RigError, StreamSpec
+from tactbench.plugin import Block, ChannelSpec, StreamSpec
 
 FORCE = StreamSpec(name="force_torque", channels=(ChannelSpec(name="fz", kind="force", unit="N"),))
 SECOND = "flat-validation"
@@ -37,14 +36,13 @@ class Ramp:
 
 
 class Rig:
-    def __init__(self, happens=None):
+    def __init__(self, happens):
         self.happens = happens
 
     @contextmanager
     def open(self, sensor, scene, *, seed):
         try:
-            if self.happens is not None:
-                self.happens(scene)
+            self.happens(scene)
             yield Ramp(sensor, seed)
         finally:
             with Path("let-go-of").open("a") as file:
@@ -53,15 +51,6 @@ class Rig:
 
 def unbuilt(context):
     raise OSError("no such port: /dev/ttyEVIL0")
-
-
-def leaving(context):
-    print("good bye")
-    sys.exit(0)
-
-
-def _closed(scene):
-    raise RigError(f"{scene.name}: the door is locked.", hint="Find the key.")
 
 
 def _dying(scene):
@@ -75,16 +64,9 @@ def _stuck(scene):
         time.sleep(3600)
 
 
-def closed(context):
-    return Rig(_closed)
-
-
 def dying(context):
     return Rig(_dying)
 
 
-def stuck(context):
+def device(context):
     return Rig(_stuck)
-
-
-device = stuck
