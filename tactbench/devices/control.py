@@ -15,6 +15,7 @@ from types import FrameType
 
 from tactbench.core.errors import TactbenchError
 from tactbench.core.samples import Block
+from tactbench.devices.driver import error_text
 from tactbench.devices.guard_messages import Event, Limits, Report
 from tactbench.devices.guard_process import Guard
 from tactbench.devices.press import Press
@@ -141,7 +142,7 @@ class Control:
                 self._guard.advance(self._next_ns)
                 self._period()
         except Exception as error:
-            self.press.fail(_error_text(error))
+            self.press.fail(error_text(error))
             self.press.abandon()
 
     def _gather(self) -> None:
@@ -179,7 +180,7 @@ class Control:
         try:
             beat = press.step(self._report, raw, 1e-9 * now_ns)
         except TactbenchError as error:
-            press.fail(_error_text(error))
+            press.fail(error_text(error))
             beat = press.step(self._report, (), 1e-9 * now_ns)
         self._beats += 1
         number = self._report.force_sequence
@@ -204,8 +205,3 @@ def _interrupts_deferred() -> Iterator[None]:
         signal.signal(signal.SIGINT, handler)
     if came and callable(handler):
         handler(*came[0])
-
-
-def _error_text(error: Exception) -> str:
-    text = error.message if isinstance(error, TactbenchError) else f"{type(error).__name__}: {error}"
-    return text.rstrip(".")

@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 from types import TracebackType
 from typing import Any, Self
 
+from tactbench.core.errors import TactbenchError
 from tactbench.core.samples import Block
 from tactbench.core.spec.sensor import StreamSpec
 from tactbench.links.link import Clock, Link
@@ -101,3 +102,9 @@ class Driver(ABC):
         self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
     ) -> None:
         self.close()
+
+
+def error_text(error: Exception) -> str:
+    """Return what an error says, without a full stop; of one that is not the program's own with its kind."""
+    text = error.message if isinstance(error, TactbenchError) else f"{type(error).__name__}: {error}"
+    return text.rstrip(".")

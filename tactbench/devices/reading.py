@@ -9,11 +9,11 @@ from contextlib import suppress
 from types import TracebackType
 from typing import Self
 
-from tactbench.core.errors import LinkError, RigError, TactbenchError, UsageError
+from tactbench.core.errors import LinkError, RigError, UsageError
 from tactbench.core.samples import Block
 from tactbench.core.spec.recording import StreamCounts
 from tactbench.core.spec.sensor import StreamSpec
-from tactbench.devices.driver import Driver
+from tactbench.devices.driver import Driver, error_text
 from tactbench.devices.queue import BlockQueue
 from tactbench.devices.sequence import SequenceCheck
 from tactbench.links.link import Clock
@@ -256,8 +256,7 @@ class Reading:
         with self._lock:
             if self._error is None:
                 self._error = error
-                why = error.message if isinstance(error, TactbenchError) else f"{type(error).__name__}: {error}"
-                self._ended = f"{name}: {why.rstrip('.')}"
+                self._ended = f"{name}: {error_text(error)}"
         self._over.set()
 
     def _finish(self) -> None:
