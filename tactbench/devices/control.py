@@ -5,13 +5,11 @@ A beat is a step of the press, so a controller that hangs is a beat that does no
 
 from __future__ import annotations
 
-import signal
 import threading
 from collections import deque
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager, suppress
+from contextlib import suppress
 from dataclasses import replace
-from types import FrameType
 
 from tactbench.core.errors import TactbenchError
 from tactbench.core.samples import Block
@@ -23,8 +21,6 @@ from tactbench.links.link import Clock
 
 STOP_S = 10.0
 """The thread is waited for so long (assumed: a control period, and what a guard in another process takes to answer)."""
-COUNTED_NS = 250_000_000
-"""After which the guard's counts are asked for again."""
 
 
 class Control:
@@ -78,7 +74,6 @@ class Control:
         self._stop = ""
         self._thread: threading.Thread | None = None
         self._counts: Mapping[str, Mapping[str, int]] = {}
-        self._counted_ns = 0
 
     @property
     def report(self) -> Report:
@@ -96,16 +91,11 @@ class Control:
             yield self._events.popleft()
 
     def carry(self, until_ns: int) -> None:
-        """Let time go on until a nanosecond of the clock, beating whenever it is due: for virtual time.
-
-        A Ctrl-C is raised between two periods: within one, a command may be out whose answer would be another's.
-        """
+        """Let time go on until a nanosecond of the clock, beating whenever it is due: for virtual time."""
         while self._next_ns <= until_ns:
-            with _interrupts_deferred():
-                self._guard.advance(self._next_ns)
-                self._period()
-        with _interrupts_deferred():
-            self._guard.advance(until_ns)
+            self._guard.advance(self._next_ns)
+            self._period()
+        self._guard.advance(until_ns)
 
     def start(self) -> None:
         """Beat from a thread of its own, until :meth:`stop`: for real time."""
@@ -129,12 +119,10 @@ class Control:
             self._thread.join(STOP_S)
         with suppress(TactbenchError):  # a guard that is lost has nothing more to say
             self._gather()
-            self._counts = self._guard.counts()
 
     def counts(self) -> Mapping[str, Mapping[str, int]]:
-        """Return what guard, motor and force sensor have counted: beside the thread at most 0.25 s old."""
-        alone = self._thread is None and not self._over.is_set()
-        return self._guard.counts() if alone else self._counts
+        """Return what guard, motor and force sensor had counted in the last control period."""
+        return self._counts
 
     def _run(self) -> None:
         try:
@@ -152,9 +140,7 @@ class Control:
             self._raw += self._pressing(block)
         self._blocks.extend(self._guard.motor_blocks())
         self._events.extend(self._guard.events())
-        # Kept here: one thread alone may use the guard.
-        if self._thread is not None and self._clock() - self._counted_ns >= COUNTED_NS:
-            self._counts, self._counted_ns = self._guard.counts(), self._clock()
+        self._counts = self._guard.counts()
 
     def _pressing(self, block: Block) -> list[tuple[float, float]]:
         assert block.t_ns is not None
@@ -186,22 +172,3 @@ class Control:
         number = self._report.force_sequence
         beat = replace(beat, sequence=self._beats, t_ns=now_ns, state=str(press.state), force_sequence=number)
         self._report = self._guard.beat(beat)
-
-
-@contextmanager
-def _interrupts_deferred() -> Iterator[None]:
-    """Leave a Ctrl-C to its handler at the end; only the main thread handles any.
-
-    A signal mask would not do: another thread takes the signal, and Python calls the handler here all the same.
-    """
-    if threading.current_thread() is not threading.main_thread():
-        yield
-        return
-    came: list[tuple[int, FrameType | None]] = []
-    handler = signal.signal(signal.SIGINT, lambda *one: came.append(one))
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGINT, handler)
-    if came and callable(handler):
-        handler(*came[0])
