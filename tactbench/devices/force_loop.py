@@ -18,6 +18,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
@@ -246,23 +247,17 @@ class LoopModel:
     def largest_stiffness(self) -> float:
         """Return the least stiffness [N / length] at which the loop no longer settles; infinite: there is none.
 
-        Loop gains k (kp + ki T) from 1e-4 to 1e3 are scanned in steps of 2 %, then the crossing is halved to 1e-6 of
-        itself. Only k kp and k ki count, so the largest stable gains at another stiffness are in inverse proportion.
+        Loop gains k (kp + ki T) from 1e-4 to 1e3 are scanned in steps of 2 %. Only k kp and k ki count, so the largest
+        stable gains at another stiffness are in inverse proportion.
         """
+        from scipy.optimize import brentq
+
         law = self.law
-        softer = 1e-4 / (law.proportional + law.integral * law.period_s)
-        most = 1e7 * softer
-        while self.growth(softer) < 1:
-            stiffer = 1.02 * softer
-            if stiffer > most:
-                return math.inf
+        scanned = 1e-4 / (law.proportional + law.integral * law.period_s) * 1.02 ** np.arange(815)
+        for softer, stiffer in pairwise(scanned.tolist()):
             if self.growth(stiffer) >= 1:
-                while stiffer - softer > 1e-6 * softer:
-                    middle = 0.5 * (softer + stiffer)
-                    softer, stiffer = (middle, stiffer) if self.growth(middle) < 1 else (softer, middle)
-                return stiffer
-            softer = stiffer
-        return softer
+                return float(brentq(lambda stiffness: self.growth(stiffness) - 1, softer, stiffer, rtol=1e-6))
+        return math.inf
 
     def share_used(self, stiffness: float) -> float:
         """Return the part of the largest stable gain that the loop uses at a stiffness [N / length].
