@@ -12,8 +12,6 @@ import zlib
 from dataclasses import dataclass
 from enum import IntEnum
 
-from tactbench.links.link import Received
-
 VERSION = 1
 LARGEST_PAYLOAD = 0xFFFF
 
@@ -65,49 +63,15 @@ class FrameDecoder:
 
     def __init__(self) -> None:
         self.damaged = 0
-        self._pending = bytearray()
-        self._skipping = False
-        self._began_ns = 0
-
-    def stamped(self, received: Received) -> list[tuple[Frame, int]]:
-        """Return the frames that `received` completes, each with when its first byte was in the host [ns]."""
-        if not self.within_frame:
-            self._began_ns = received.t_ns
-        frames = []
-        for frame in self.feed(received.data):
-            frames.append((frame, self._began_ns))
-            self._began_ns = received.t_ns
-        if self.within_frame and b"\0" in received.data:
-            self._began_ns = received.t_ns
-        return frames
-
-    @property
-    def within_frame(self) -> bool:
-        """Whether bytes since the last zero byte wait for the next one."""
-        return bool(self._pending) or self._skipping
+        self._pending = b""
 
     def feed(self, data: bytes) -> list[Frame]:
         """Return the frames that `data` completes; what is no frame is counted."""
-        frames = []
-        *ended, rest = data.split(b"\0")
-        for part in ended:
-            stuffed = bytes(self._pending) + part
-            self._pending.clear()
-            if self._skipping:
-                self._skipping = False
-            elif stuffed:
-                frame = _frame_in(stuffed)
-                if frame is None:
-                    self.damaged += 1
-                else:
-                    frames.append(frame)
-        if not self._skipping:
-            self._pending += rest
-            if len(self._pending) > _LARGEST_FRAME:
-                self.damaged += 1
-                self._skipping = True
-                self._pending.clear()
-        return frames
+        *ended, rest = (self._pending + data).split(b"\0")
+        self._pending = rest[-_LARGEST_FRAME:]  # of a longer one the end, which is no frame
+        found = [_frame_in(stuffed) for stuffed in ended if stuffed]
+        self.damaged += found.count(None)
+        return [frame for frame in found if frame is not None]
 
 
 def _frame_in(stuffed: bytes) -> Frame | None:

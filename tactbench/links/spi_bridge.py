@@ -125,33 +125,22 @@ class SpiBridge(SpiLink):
                 return frame
 
     def _next(self, timeout_s: float, deadline: float) -> tuple[Frame, int]:
-        """Return the next frame and when its first byte was in the host."""
+        """Return the next frame and when its end was in the host."""
         while not self._frames:
             left_s = deadline - self.timer()
             try:
                 received = self._bytes.read(max(0.0, left_s))
             except LinkTimeout:
                 raise self._nothing_came(timeout_s) from None
-            self._frames.extend(self._decoder.stamped(received))
+            self._frames.extend((frame, received.t_ns) for frame in self._decoder.feed(received.data))
         return self._frames.popleft()
 
     def _submit(self, number: int, steps: Sequence[SpiStep]) -> None:
-        for step in steps:
-            if step.select & ~self.select_lines or step.select < 0:
-                raise LinkError(
-                    f"{self.address}: {step} was given, the bridge has select lines {self.select_lines:#x}.",
-                    hint="Select lines that it has.",
-                )
         payload = b"".join(STEP.pack(step.select, step.pause_us, len(step.data)) + step.data for step in steps)
         if len(payload) > self._largest:
             raise LinkError(
                 f"{self.address}: a batch of {len(payload)} bytes was given, the bridge takes {self._largest}.",
                 hint="Send it in parts.",
-            )
-        if len(self._waiting) >= self.holds:
-            raise LinkError(
-                f"{self.address}: the bridge holds {self.holds} batches, and that many wait for their replies.",
-                hint="Receive a reply first; where none comes, abandon them.",
             )
         self._bytes.write(encode_frame(Frame(Kind.BATCH, number, payload)))
         self._waiting[number] = tuple(len(step.data) for step in steps)
@@ -172,12 +161,8 @@ class SpiBridge(SpiLink):
                     break
             if len(frame.payload) != BEGIN.size + sum(lengths):
                 raise self._nonsense(frame)
-            data = []
-            place = BEGIN.size
-            for length in lengths:
-                data.append(frame.payload[place : place + length])
-                place += length
-            return SpiReply(frame.number, tuple(data), t_ns, BEGIN.unpack_from(frame.payload)[0])
+            begun_us, *data = struct.unpack("<I" + "".join(f"{length}s" for length in lengths), frame.payload)
+            return SpiReply(frame.number, tuple(data), t_ns, begun_us)
 
     def abandon(self) -> None:  # noqa: D102
         self._waiting.clear()

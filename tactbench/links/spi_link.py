@@ -34,7 +34,7 @@ class SpiReply:
     data: tuple[bytes, ...]
     """As many as the batch has steps, each as long as its step's data."""
     t_ns: int
-    """When the first of it was in the host, nanoseconds of the link's clock."""
+    """When it was in the host, nanoseconds of the link's clock."""
     device_us: int | None = None
     """When the batch began by the adapter's own counter of microseconds, modulo 2**32; None: it has none."""
 
@@ -70,16 +70,12 @@ class SpiLink(Link):
         """Return the next reply; `deadline` is when `timeout_s` ends, in seconds of :meth:`timer`."""
 
     def send(self, steps: Sequence[SpiStep]) -> int:
-        """Hand over a batch and return its number: 0, 1, 2, …, after 65535 again 0.
+        """Hand over a batch and return its number: 0, 1, 2, …, after 65535 again 0; at most `holds` at once.
 
-        Raises as every :class:`Link`, LinkError if it is empty, a step is not possible, or the adapter holds no more.
+        Raises as every :class:`Link`, LinkError if it is longer than the adapter takes. What else the adapter refuses,
+        :meth:`receive` raises.
         """
         self._usable()
-        if not steps:
-            raise LinkError(f"{self.address}: a batch without a step was given.", hint="Give at least one.")
-        for step in steps:
-            if not 0 <= step.pause_us < 1 << 16:
-                raise LinkError(f"{self.address}: {step} was given.", hint="A pause is 0 to 65535 us.")
         self._number = (self._number + 1) & 0xFFFF
         self._submit(self._number, steps)
         return self._number
@@ -140,8 +136,6 @@ class SpidevLink(SpiLink):
             raise cannot_open(self.address, error) from error
 
     def _submit(self, number: int, steps: Sequence[SpiStep]) -> None:
-        if any(step.select != 1 for step in steps):
-            raise LinkError(f"{self.address} has one select line.", hint="Give every step select=1.")
         data = []
         try:
             for step in steps:

