@@ -67,6 +67,8 @@ class EmulatedDevices:
     clock
         Nanoseconds since the devices began: what drivers and links are to use. Emulators, faults and senses see the
         same time in seconds.
+    addresses
+        By device: what a rig file says to open its link, also from another process; empty in virtual time.
 
     Raises
     ------
@@ -83,20 +85,16 @@ class EmulatedDevices:
     ) -> None:
         self._devices = dict(devices)
         self._virtual = VirtualTime() if time == "virtual" else None
-        self.clock: Clock = self._virtual if self._virtual is not None else _since_now()
+        began_ns = wall.monotonic_ns()
+        self.clock: Clock = self._virtual or (lambda: wall.monotonic_ns() - began_ns)
         self._lines = {
-            name: Line(
-                _on_its_line(device, real=self._virtual is None),
-                faults=device.faults,
-                keep_log=keep_log,
-            )
+            name: Line(_on_its_line(device, real=self._virtual is None), faults=device.faults, keep_log=keep_log)
             for name, device in self._devices.items()
-        }  # fmt: skip
-        self._addresses: dict[str, str] = {}
+        }
+        self.addresses: dict[str, str] = {}
         self._server: RealTimeServer | None = None
         if self._virtual is not None:
-            for line in self._lines.values():
-                self._virtual.add(line)
+            self._virtual.lines += self._lines.values()
             return
         with ExitStack() as opened:
             ends: dict[str, tuple[Line, End]] = {}
@@ -104,7 +102,7 @@ class EmulatedDevices:
                 end = _end_of(device)
                 opened.callback(end.close)
                 ends[name] = self._lines[name], end
-                self._addresses[name] = end.address
+                self.addresses[name] = end.address
             self._server = RealTimeServer(ends, self.clock)
             opened.pop_all()
         self._server.start()
@@ -123,11 +121,6 @@ class EmulatedDevices:
         """End the devices and give back the links of the system; once closed, this does nothing."""
         if self._server is not None:
             self._server.close()
-
-    @property
-    def addresses(self) -> Mapping[str, str]:
-        """By device: what a rig file says to open its link, also from another process; empty in virtual time."""
-        return self._addresses
 
     def advance(self, until_ns: int) -> None:
         """Let time go on until `clock` says so much: computed in virtual time, waited for in real time.
@@ -157,16 +150,11 @@ class EmulatedDevices:
         if name not in self._devices:
             raise UnknownNameError("emulated device", name, self._devices)
         if self._virtual is None:
-            return open_link(self._addresses[name], self.clock)
-        line = self._lines[name]
-        match self._devices[name].link:
-            case "bytes":
-                return VirtualByteLink(name, self._virtual, line)
-            case "can":
-                return VirtualCanLink(name, self._virtual, line)
-            case "datagram":
-                return VirtualDatagramLink(name, self._virtual, line)
-        return SpiBridge(VirtualByteLink(name, self._virtual, line), speed_hz=SPI_HZ)
+            return open_link(self.addresses[name], self.clock)
+        kinds = {"can": VirtualCanLink, "datagram": VirtualDatagramLink}
+        kind = self._devices[name].link
+        link = kinds.get(kind, VirtualByteLink)(name, self._virtual, self._lines[name])
+        return SpiBridge(link, speed_hz=SPI_HZ) if isinstance(link, VirtualByteLink) and kind == "spi" else link
 
     def opener(self, name: str) -> Callable[[], Link]:
         """Return what opens the host's end of a device's link, as drivers are given it."""
@@ -181,11 +169,6 @@ class EmulatedDevices:
             raise self._server.error
 
 
-def _since_now() -> Clock:
-    began_ns = wall.monotonic_ns()
-    return lambda: wall.monotonic_ns() - began_ns
-
-
 def _on_its_line(device: EmulatedDevice, *, real: bool) -> DeviceEmulator:
     """Return the device as its line sees it: an SPI bus behind a bridge, in real time a CAN bus behind an adapter."""
     emulator: Any = device.emulator  # which of the two protocols it has, the kind of link says
@@ -196,19 +179,16 @@ def _on_its_line(device: EmulatedDevice, *, real: bool) -> DeviceEmulator:
     return emulator  # type: ignore[no-any-return]
 
 
-def _baud_for(emulator: Any) -> int:
-    """Return the least usual baud rate that carries what a device sends, and a quarter more."""
-    needed = 1.25 * 10 * getattr(emulator, "bytes_per_s", 0.0)
-    return next((baud for baud in BAUDS if baud >= needed), BAUDS[-1])
-
-
 def _end_of(device: EmulatedDevice) -> End:
     match device.link:
-        case "bytes":
-            return PseudoTerminal(f"serial://{{}}?baud={device.baud or _baud_for(device.emulator)}")
-        case "spi":
-            return PseudoTerminal(f"spi://bridge/{{}}?speed_hz={SPI_HZ}")
         case "datagram":
             return UdpEnd()
+        case "bytes":
+            # The least usual rate that carries what it sends, and a quarter more.
+            needed = 1.25 * 10 * getattr(device.emulator, "bytes_per_s", 0.0)
+            baud = device.baud or next((baud for baud in BAUDS if baud >= needed), BAUDS[-1])
+            return PseudoTerminal(f"serial://{{}}?baud={baud}")
+        case "spi":
+            return PseudoTerminal(f"spi://bridge/{{}}?speed_hz={SPI_HZ}")
     # The bit rate is a statement; nothing here starts anew when its port is opened.
     return PseudoTerminal("can://slcan/{}?bitrate=1000000&sleep_after_open=0")

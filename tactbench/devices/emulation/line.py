@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections import Counter, deque
+from collections import deque
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import ClassVar, Literal, NamedTuple, TypeAlias
 
 from tactbench.devices.emulator import DeviceEmulator, Sent
-from tactbench.devices.fault import Fault, fault_concerns
+from tactbench.devices.fault import Fault
 from tactbench.links.can_link import CanFrame
 
 Piece: TypeAlias = bytes | CanFrame
@@ -42,11 +42,8 @@ def split_faults(faults: Iterable[str]) -> tuple[tuple[LinkFault, ...], tuple[st
         If a fault of the link has an unknown key or a wrong value.
     """
     given = tuple(faults)
-    of_link = tuple(fault.partition(":")[0] in LinkFault.known for fault in given)
-    return (
-        tuple(LinkFault.parse(fault) for fault, own in zip(given, of_link, strict=True) if own),
-        tuple(fault for fault, own in zip(given, of_link, strict=True) if not own),
-    )
+    of_link = tuple(fault for fault in given if fault.partition(":")[0] in LinkFault.known)
+    return tuple(map(LinkFault.parse, of_link)), tuple(fault for fault in given if fault not in of_link)
 
 
 class Passed(NamedTuple):
@@ -93,7 +90,6 @@ class Line:
         self.log: list[Passed] = []
         self._emulator = emulator
         self._faults = tuple(faults)
-        self._seen: Counter[Fault] = Counter()
         self._keep_log = keep_log
         self._unplugged_s = min((fault.start_s for fault in faults if fault.name == "unplug"), default=math.inf)
         self._next_s: float | None = None
@@ -141,6 +137,5 @@ class Line:
 
     def _send(self, sent: Sequence[Sent]) -> None:
         for left_s, piece in sent:
-            late = [one for one in self._faults if fault_concerns((one,), "late", left_s, self._seen)]
-            due_s = left_s + sum(one.delay_s for one in late)
+            due_s = left_s + sum(one.delay_s for one in self._faults if one.name == "late" and one.active(left_s))
             self._out.append((max(due_s, self._out[-1][0]) if self._out else due_s, piece))

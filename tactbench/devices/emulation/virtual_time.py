@@ -22,19 +22,17 @@ class VirtualTime:
     ----------
     now_s
         The same in seconds.
+    lines
+        The devices; what several do at one moment happens in their order.
     """
 
     def __init__(self) -> None:
         self.now_s = 0.0
-        self._lines: list[Line] = []
+        self.lines: list[Line] = []
 
     def __call__(self) -> int:
         """Return the present time, nanoseconds."""
         return round(self.now_s * 1e9)
-
-    def add(self, line: Line) -> None:
-        """Let a device live by this clock. What several do at one moment happens in the order of adding."""
-        self._lines.append(line)
 
     def advance(self, until_ns: int) -> None:
         """Let all devices go on up to and including `until_ns`; a time that is over changes nothing."""
@@ -49,11 +47,8 @@ class VirtualTime:
         bool
             Whether there was an event.
         """
-        due_s, line = math.inf, None
-        for one in self._lines:
-            next_s = one.next_s()
-            if next_s < due_s:
-                due_s, line = next_s, one
+        line = min(self.lines, key=Line.next_s, default=None)
+        due_s = math.inf if line is None else line.next_s()
         if line is None or due_s > until_s:
             self.now_s = max(self.now_s, until_s)
             return False
