@@ -44,11 +44,10 @@ class Driver(ABC):
         """What it reads, as it is set up now; rates as far as they are known."""
 
     @property
-    @abstractmethod
     def counts(self) -> Mapping[str, int]:
         """What was counted since it was opened, by name: parity errors, frames lost … An empty one: all was well."""
+        return {}
 
-    @abstractmethod
     def identify(self) -> Mapping[str, str]:
         """Return what the device says of itself (model, serial, firmware), to be asked before :meth:`start`.
 
@@ -57,6 +56,7 @@ class Driver(ABC):
         LinkTimeout, LinkUnplugged, RigError
             If it does not answer, or is another device.
         """
+        return {}
 
     @abstractmethod
     def start(self) -> None:

@@ -75,10 +75,6 @@ class RowDriver(Driver, Generic[L]):
         """What was counted, by name."""
         return dict(self.counted)
 
-    def identify(self) -> Mapping[str, str]:
-        """Nothing, unless a subclass asks the device."""
-        return {}
-
     def start(self) -> None:
         """Drop what came before, and :meth:`begin`."""
         self.link.discard()
