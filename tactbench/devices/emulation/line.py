@@ -6,7 +6,7 @@ import math
 from collections import deque
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import ClassVar, Literal, NamedTuple, TypeAlias
+from typing import ClassVar, TypeAlias
 
 from tactbench.devices.emulator import DeviceEmulator, Sent
 from tactbench.devices.fault import Fault
@@ -46,15 +46,6 @@ def split_faults(faults: Iterable[str]) -> tuple[tuple[LinkFault, ...], tuple[st
     return tuple(map(LinkFault.parse, of_link)), tuple(fault for fault in given if fault not in of_link)
 
 
-class Passed(NamedTuple):
-    """One piece that passed a line."""
-
-    t_s: float
-    """When the host sent it, or when it came out at the host's end; seconds of the emulators' clock."""
-    sender: Literal["host", "device"]
-    piece: Piece
-
-
 class Line:
     """An emulated device and its end of the link; who carries pieces to the host sets :attr:`deliver`.
 
@@ -64,8 +55,6 @@ class Line:
         The device.
     faults
         Of the link.
-    keep_log
-        Whether :attr:`log` holds what passed.
 
     Attributes
     ----------
@@ -74,23 +63,13 @@ class Line:
         that open, and it is dropped.
     gone
         Whether the link was unplugged by a fault.
-    log
-        What passed in both directions, in order.
     """
 
-    def __init__(
-        self,
-        emulator: DeviceEmulator,
-        *,
-        faults: Sequence[LinkFault] = (),
-        keep_log: bool = False,
-    ) -> None:
+    def __init__(self, emulator: DeviceEmulator, faults: Sequence[LinkFault] = ()) -> None:
         self.deliver: Callable[[float, Piece], None] | None = None
         self.gone = False
-        self.log: list[Passed] = []
         self._emulator = emulator
         self._faults = tuple(faults)
-        self._keep_log = keep_log
         self._unplugged_s = min((fault.start_s for fault in faults if fault.name == "unplug"), default=math.inf)
         self._next_s: float | None = None
         self._out: deque[tuple[float, Piece]] = deque()
@@ -100,8 +79,6 @@ class Line:
         self.poll(now_s)
         if self.gone:
             return
-        if self._keep_log:
-            self.log.append(Passed(now_s, "host", piece))
         self._send(self._emulator.feed(piece, now_s))
         self.poll(now_s)
 
@@ -114,8 +91,6 @@ class Line:
             self._send(self._emulator.poll(until_s))
         while self._out and self._out[0][0] <= now_s and self._out[0][0] < self._unplugged_s:
             t_s, piece = self._out.popleft()
-            if self._keep_log:
-                self.log.append(Passed(t_s, "device", piece))
             if self.deliver is not None:
                 self.deliver(t_s, piece)
         self.gone = now_s >= self._unplugged_s

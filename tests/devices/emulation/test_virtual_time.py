@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import contextlib
-import itertools
 import math
 
 import numpy as np
 import pytest
 
-from tactbench.core.errors import LinkClosed, LinkError, LinkTimeout, LinkUnplugged, UnknownNameError
+from tactbench.core.errors import LinkClosed, LinkError, LinkTimeout, LinkUnplugged
 from tactbench.devices.emulation.emulated_devices import EmulatedDevice, EmulatedDevices
 from tactbench.devices.emulation.line import LinkFault
 from tactbench.plugin.devices import ByteLink, CanFrame, CanLink, DatagramLink, SpiLink, SpiStep
@@ -63,14 +62,6 @@ def test_an_answer_comes_with_its_own_time_and_waits_are_virtual(kind):
         assert devices.clock() == due_ns
 
 
-def test_what_has_come_is_there_at_once_with_the_time_it_came(kind):
-    with EmulatedDevices({"a": answering(kind)}) as devices, devices.open_link("a") as link:
-        say(link)
-        devices.advance(1000 * MS)
-        came = hear(link, 5.0)
-        assert (came.t_ns < 201 * MS, devices.clock()) == (True, 1000 * MS)
-
-
 def test_a_closed_link_is_closed_and_may_be_opened_again(kind):
     with EmulatedDevices({"a": answering(kind)}) as devices:
         link = devices.open_link("a")
@@ -99,14 +90,6 @@ def test_an_unplugged_link_says_so_at_its_time_and_from_then_on(kind):
         link.close()
         with pytest.raises(LinkClosed):
             hear(link, 0.0)
-
-
-def test_a_late_link_is_late(kind):
-    with EmulatedDevices({"a": answering(kind, "late:delay_s=0.03")}) as devices, devices.open_link("a") as link:
-        begin_ns = devices.clock()
-        say(link)
-        device_s = 0.18 + 16 / 4.4e6 if kind == "spi" else 0.2
-        assert hear(link, 1.0).t_ns - begin_ns == pytest.approx(1e9 * (device_s + 0.03), abs=1)
 
 
 def test_a_bridge_that_does_not_answer_costs_no_real_time():
@@ -151,15 +134,8 @@ def test_pieces_that_have_come_keep_their_times():
             assert c.receive(0.0).t_ns == (number + 1) * 10 * MS
 
 
-def test_devices_are_asked_for_by_name():
-    with EmulatedDevices({"biotac": on("bytes", Answerer())}) as devices:
-        with pytest.raises(UnknownNameError, match="biotac"):
-            devices.open_link("biotack")
-        assert devices.addresses == {}
-
-
 def run(seed):
-    """Read four devices for three seconds, and return what passed on every line."""
+    """Read four devices for three seconds, and return what came."""
 
     def sensing(t_s):
         return {"a": 100 * math.sin(t_s)}
@@ -167,23 +143,20 @@ def run(seed):
     rngs = [np.random.default_rng([seed, number]) for number in range(4)]
     models = {
         "stream": EmulatedDevice("bytes", Recorder(0.02, sensing, rngs[0])),
-        "bus": on("can", Recorder(0.005, sensing, rngs[1], can=True), "late:every=7,delay_s=0.02"),
+        "bus": on("can", Recorder(0.005, sensing, rngs[1], can=True), "late:delay_s=0.02"),
         "datagrams": on("datagram", Recorder(0.001, sensing, rngs[2]), "unplug:start_s=2.5"),
         "spi": on("spi", Complement()),
     }
-    with EmulatedDevices(models, keep_log=True) as devices:
+    came = {name: [] for name in models}
+    with EmulatedDevices(models) as devices:
         links = {name: devices.open_link(name) for name in models}
-        for number in itertools.count():
+        while devices.clock() < 3000 * MS:
             for name, link in links.items():
                 if name == "spi":
-                    link.send([SpiStep(bytes([number & 0xFF]))])
-                    link.receive(1.0)
-                    continue
+                    link.send([SpiStep(bytes([len(came[name]) & 0xFF]))])
                 with contextlib.suppress(LinkTimeout, LinkUnplugged):
-                    hear(link, 0.004)
-            if devices.clock() > 3000 * MS:
-                break
-        return {name: list(devices.log_of(name)) for name in models}
+                    came[name].append(hear(link, 0.004))
+    return came
 
 
 def test_the_same_seed_gives_the_same_bytes_on_every_link_at_the_same_times():

@@ -228,7 +228,7 @@ def test_steps_are_sent_one_at_a_time_and_after_a_fresh_force(baud, tmp_path):
         assert press.phase == "over"
         assert any(report.early for report in press.reports)
         accepted = [report for report in press.reports if report.accepted and report.moving]
-        line = b"".join(p.piece for p in made.world.devices.log_of("motor") if p.sender == "host")
+        line = b"".join(piece for _, piece in made.world.motor.told)
         words = line.split(b"\r")
         moves = [n for n, word in enumerate(words) if word == b"M"]
         assert len(moves) > 20

@@ -82,8 +82,7 @@ def entries(log):
 
 def told(made, since_s):
     """Return what the motor was told since a second."""
-    log = made.world.devices.log_of("motor")
-    return b"".join(passed.piece for passed in log if passed.sender == "host" and passed.t_s >= since_s)
+    return b"".join(piece for at_s, piece in made.world.motor.told if at_s >= since_s)
 
 
 def test_an_error_of_a_driver_lets_the_motor_retreat(tmp_path, monkeypatch):
