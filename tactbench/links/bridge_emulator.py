@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 import struct
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 
 from tactbench.links.bridge_frame import VERSION, Frame, FrameDecoder, Kind, encode_frame
@@ -62,37 +62,35 @@ class BridgeEmulator:
         return self._due[0][0] if self._due else math.inf
 
     def _answered(self, frame: Frame, now_s: float) -> bytes:
-        if frame.version != VERSION:
-            return self._refusal(frame, f"version {frame.version} is unknown")
-        if len(frame.payload) > self.largest_payload:
-            return self._refusal(frame, f"payload above {self.largest_payload} bytes")
-        match frame.kind:
+        try:
+            return self._carried_out(frame, now_s)
+        except (ValueError, struct.error):
+            return encode_frame(Frame(Kind.ERROR.reply, frame.number, b"malformed or not possible"))
+
+    def _carried_out(self, frame: Frame, now_s: float) -> bytes:
+        """Return the reply, empty where it comes later; raises ValueError or struct.error where it is to be refused."""
+        if frame.version != VERSION or len(frame.payload) > self.largest_payload:
+            raise ValueError
+        match Kind(frame.kind):
             case Kind.HELLO:
                 about = HELLO.pack(VERSION, self.largest_payload, self.holds, self.select_lines) + b"tactbench emulator"
                 return encode_frame(Frame(Kind.HELLO.reply, frame.number, about))
             case Kind.SETUP:
-                return self._set_up(frame)
+                speed_hz, mode = SETUP.unpack(frame.payload)
+                if mode > 3 or not speed_hz:
+                    raise ValueError
+                self._speed_hz = min(speed_hz, self.fastest_hz)
+                return encode_frame(Frame(Kind.SETUP.reply, frame.number, SETUP.pack(self._speed_hz, mode)))
             case Kind.BATCH:
                 return self._batch(frame, now_s)
-        return self._refusal(frame, f"kind {frame.kind} is unknown")
-
-    def _set_up(self, frame: Frame) -> bytes:
-        if len(frame.payload) != SETUP.size:
-            return self._refusal(frame, "malformed payload")
-        speed_hz, mode = SETUP.unpack(frame.payload)
-        if mode > 3 or not speed_hz:
-            return self._refusal(frame, "clock or mode is not possible")
-        self._speed_hz = min(speed_hz, self.fastest_hz)
-        return encode_frame(Frame(Kind.SETUP.reply, frame.number, SETUP.pack(self._speed_hz, mode)))
+        raise ValueError
 
     def _batch(self, frame: Frame, now_s: float) -> bytes:
-        if not self._speed_hz:
-            return self._refusal(frame, "not set up")
         if len(self._due) >= self.holds:
-            return self._refusal(frame, FULL.decode())
-        steps = _steps(frame.payload)
-        if steps is None or any(select & ~self.select_lines for select, _, _ in steps):
-            return self._refusal(frame, "malformed payload")
+            return encode_frame(Frame(Kind.ERROR.reply, frame.number, FULL))
+        steps = list(_steps(frame.payload))
+        if not (self._speed_hz and steps) or any(select & ~self.select_lines for select, _, _ in steps):
+            raise ValueError
         begin_s = t_s = max(now_s, self._free_s)
         payload = BEGIN.pack(int(begin_s * 1e6) & 0xFFFFFFFF)
         for select, pause_us, data in steps:
@@ -107,23 +105,12 @@ class BridgeEmulator:
         self._due.append((t_s, times * reply))
         return b""
 
-    @staticmethod
-    def _refusal(frame: Frame, reason: str) -> bytes:
-        return encode_frame(Frame(Kind.ERROR.reply, frame.number, reason.encode("ascii")))
 
-
-def _steps(payload: bytes) -> list[tuple[int, int, bytes]] | None:
-    """Return select, pause in us and bytes of each step; None if the payload is no list of steps."""
-    steps = []
-    place = 0
-    while place < len(payload):
-        try:
-            select, pause_us, length = STEP.unpack_from(payload, place)
-        except struct.error:
-            return None
-        place += STEP.size
-        if place + length > len(payload):
-            return None
-        steps.append((select, pause_us, payload[place : place + length]))
-        place += length
-    return steps or None
+def _steps(payload: bytes) -> Iterator[tuple[int, int, bytes]]:
+    """Yield select, pause in us and bytes of each step; raises ValueError or struct.error if they are not whole."""
+    while payload:
+        select, pause_us, length = STEP.unpack_from(payload)
+        data, payload = payload[STEP.size : STEP.size + length], payload[STEP.size + length :]
+        if len(data) < length:
+            raise ValueError
+        yield select, pause_us, data

@@ -58,14 +58,7 @@ class SpiBridge(SpiLink):
         If nothing answers, or the bridge speaks another version or cannot do `mode`.
     """
 
-    def __init__(
-        self,
-        port: ByteLink,
-        *,
-        speed_hz: int,
-        mode: int = 0,
-        wake_s: float = 3.0,
-    ) -> None:
+    def __init__(self, port: ByteLink, *, speed_hz: int, mode: int = 0, wake_s: float = 3.0) -> None:
         super().__init__(f"spi://bridge/{port.address}")
         self._decoder = FrameDecoder()
         self._frames: deque[tuple[Frame, int]] = deque()
@@ -73,7 +66,10 @@ class SpiBridge(SpiLink):
         self._bytes = port
         try:
             self._greet(wake_s)
-            self._set_up(speed_hz, mode)
+            reply = self._answer(Kind.SETUP, SETUP.pack(speed_hz, mode), 1.0)
+            if len(reply.payload) != SETUP.size:
+                raise self._nonsense(reply)
+            self.speed_hz, _ = SETUP.unpack(reply.payload)
         except BaseException:
             self._bytes.close()
             raise
@@ -85,9 +81,8 @@ class SpiBridge(SpiLink):
     def _greet(self, wake_s: float) -> None:
         deadline = self.timer() + wake_s
         while True:
-            self._bytes.write(b"\0" + encode_frame(Frame(Kind.HELLO, 0)))
             try:
-                hello = self._answer(Kind.HELLO, min(_ASK_S, wake_s))
+                hello = self._answer(Kind.HELLO, b"", min(_ASK_S, wake_s))
                 break
             except LinkTimeout as error:
                 if self.timer() >= deadline:
@@ -95,22 +90,14 @@ class SpiBridge(SpiLink):
                         f"{self.address}: nothing there answered as an SPI bridge within {wake_s:g} s.",
                         hint="Is it the bridge's port, and does the bridge run the firmware of docs/links.md?",
                     ) from error
-        try:
-            self.firmware, self._largest, self.holds, self.select_lines = HELLO.unpack_from(hello.payload)
-        except struct.error as error:
-            raise self._nonsense(hello) from error
+        if len(hello.payload) < HELLO.size:
+            raise self._nonsense(hello)
+        self.firmware, self._largest, self.holds, self.select_lines = HELLO.unpack_from(hello.payload)
         self.name = hello.payload[HELLO.size :].decode("ascii", "replace")
 
-    def _set_up(self, speed_hz: int, mode: int) -> None:
-        self._bytes.write(encode_frame(Frame(Kind.SETUP, 0, SETUP.pack(speed_hz, mode))))
-        reply = self._answer(Kind.SETUP, 1.0)
-        try:
-            self.speed_hz, _ = SETUP.unpack(reply.payload)
-        except struct.error as error:
-            raise self._nonsense(reply) from error
-
-    def _answer(self, kind: Kind, timeout_s: float) -> Frame:
-        """Return the reply to a request that is no batch; what else comes is not looked at."""
+    def _answer(self, kind: Kind, payload: bytes, timeout_s: float) -> Frame:
+        """Send a request that is no batch, and return its reply; what else comes is not looked at."""
+        self._bytes.write(b"\0" + encode_frame(Frame(kind, 0, payload)))
         deadline = self.timer() + timeout_s
         while True:
             frame, _ = self._next(timeout_s, deadline)

@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-import math
 import os
 import select
 import socket
-import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from typing import NamedTuple
 
+from tactbench.devices.emulation.line import Line
+from tactbench.devices.emulation.real_time import PseudoTerminal, RealTimeServer
 from tactbench.links.bridge_emulator import BridgeEmulator
 from tactbench.plugin.devices import CanFrame, Link, SpiStep, open_link
 
@@ -76,42 +77,22 @@ def pty() -> Iterator[Pty]:
 
 
 @contextmanager
-def serving(emulator: BridgeEmulator) -> Iterator[Pty]:
+def serving(emulator: BridgeEmulator) -> Iterator[Served]:
     """A bridge emulator on a pseudo-terminal, in real time."""
-    with pty() as end:
-        stop, stopped = os.pipe()
+    end = PseudoTerminal("{}")
+    server = RealTimeServer({"bridge": (Line(emulator), end)}, time.monotonic_ns)
+    server.start()
+    try:
+        yield Served(end.address, server.close)
+    finally:
+        server.close()
 
-        def serve() -> None:
-            while True:
-                due = emulator.next_s()
-                wait_s = None if due == math.inf else max(0.0, due - time.monotonic())
-                ready, _, _ = select.select([end.master, stop], [], [], wait_s)
-                if stop in ready:
-                    return
-                try:
-                    data = os.read(end.master, 65536) if ready else b""
-                    for _, reply in emulator.feed(data, time.monotonic()):
-                        os.write(end.master, reply)
-                except OSError:
-                    return
 
-        thread = threading.Thread(target=serve)
-        thread.start()
-        unplug = end.unplug
+class Served(NamedTuple):
+    """Where a link finds what is served, and how that ends."""
 
-        def end_service() -> None:
-            os.write(stopped, b"x")
-            thread.join()
-            unplug()
-
-        end.unplug = end_service  # type: ignore[method-assign]
-        try:
-            yield end
-        finally:
-            end_service()
-            end.unplug = unplug  # type: ignore[method-assign]
-            os.close(stop)
-            os.close(stopped)
+    name: str
+    unplug: Callable[[], None]
 
 
 def loopback(select: int, data: bytes, now_s: float) -> bytes:

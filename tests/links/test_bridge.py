@@ -121,19 +121,20 @@ def test_a_batch_runs_by_the_bus_clock_and_its_pauses():
 
 
 @pytest.mark.parametrize(
-    ("frame", "reason"),
+    "frame",
     [
-        (Frame(Kind.HELLO, 9, version=2), "version 2 is unknown"),
-        (Frame(0x55, 9), "kind 85 is unknown"),
-        (Frame(Kind.SETUP, 9, SETUP.pack(1000, 4)), "clock or mode is not possible"),
-        (Frame(Kind.BATCH, 9, batch(SpiStep(b"abc"))[:-1]), "malformed payload"),
-        (Frame(Kind.BATCH, 9, batch(SpiStep(b"a", 0x80))), "malformed payload"),
-        (Frame(Kind.BATCH, 9, batch(SpiStep(bytes(200)))), "payload above 100 bytes"),
+        Frame(Kind.HELLO, 9, version=2),
+        Frame(0x55, 9),
+        Frame(Kind.SETUP, 9, SETUP.pack(1000, 4)),
+        Frame(Kind.BATCH, 9, batch(SpiStep(b"abc"))[:-1]),
+        Frame(Kind.BATCH, 9, batch(SpiStep(b"a", 0x80))),
+        Frame(Kind.BATCH, 9, batch(SpiStep(bytes(200)))),
     ],
 )
-def test_the_bridge_says_why_it_refuses(frame, reason):
+def test_the_bridge_refuses_what_it_cannot_do(frame):
     emulator, _ = ready(largest_payload=100, select_lines=0x07)
-    assert replies(emulator.feed(encode_frame(frame), 0.0)) == [Frame(0xFF, 9, reason.encode())]
+    (reply,) = replies(emulator.feed(encode_frame(frame), 0.0))
+    assert (reply.kind, reply.number) == (Kind.ERROR.reply, 9)
 
 
 def test_the_bridge_holds_so_many_batches():
@@ -183,7 +184,7 @@ def test_a_batch_that_the_bridge_refuses_is_an_error_and_the_link_goes_on(link):
     with pytest.raises(LinkError, match="the bridge takes 1000"):
         link.send([SpiStep(bytes(1000))])
     link.send([SpiStep(b"a", 8)])
-    with pytest.raises(LinkError, match="malformed payload"):
+    with pytest.raises(LinkError, match="refuses request 1: malformed"):
         link.receive(2.0)
     assert transfer(link, b"\xff") == b"\x00"
 
