@@ -164,7 +164,8 @@ class GuardProcess:
         self._settings = settings
         self._clock = settings.clock()
         self._limits: Limits | None = None
-        self._arming = self._closed = False
+        self._asked = ""
+        self._closed = False
         self._lost: GuardLostError | None = None
         self._streams: dict[str, StreamSpec] = {}
         self._blocks: dict[str, list[Block]] = {"force": [], "motor": []}
@@ -207,14 +208,12 @@ class GuardProcess:
 
     def arm(self, limits: Limits) -> Report:
         """Check, home, retract."""
-        self._limits, self._arming = limits, True
+        self._limits = limits
         try:
             return self._report("arm", ARM_S, limits)
         except GuardRefusesError:
             self._limits = None
             raise
-        finally:
-            self._arming = False
 
     def beat(self, beat: Beat) -> Report:
         """Send a beat and wait for its report, some milliseconds."""
@@ -275,20 +274,18 @@ class GuardProcess:
             raise GuardRefusesError("The guard is closed.", hint="Open a new one.")
 
     def _report(self, what: str, within_s: float, body: Limits | Beat | None = None) -> Report:
-        found = self._ask(what, within_s, None if body is None else asdict(body))
-        report: Report = _read(Report, found)
+        report: Report = _read(Report, self._ask(what, within_s, body and asdict(body)))
         return report
 
     def _ask(self, what: str, within_s: float, body: Any = None) -> Any:
         """Send a request and return its answer; raises what the process says that it raised, or GuardLostError."""
         self._present()
         until_ns = self._clock() + round(1e9 * within_s)
-        self._number += 1
+        self._number, self._asked = self._number + 1, what
         with suppress(OSError):  # what reads fails then, too
             self._socket.sendall(_line([self._number, what, body]))
         while (said := self._said()) is None or said["number"] != self._number:  # else to an interrupted request
-            left_s = 1e-9 * (until_ns - self._clock())
-            if said is None and not self._receive(max(0.0, left_s)):
+            if said is None and not self._receive(max(0.0, 1e-9 * (until_ns - self._clock()))):
                 self._fail(f"it has not answered within {within_s:.3f} s")
         if "error" in said:
             kind, message, hint = said["error"]
@@ -327,7 +324,7 @@ class GuardProcess:
         outcome, trigger = "no axis was armed, nothing was sent", Trigger.GUARD_LOST
         try:
             if self._limits is not None:
-                outcome = self._settings.rescue(self._clock, retreat=not self._arming)
+                outcome = self._settings.rescue(self._clock, retreat=self._asked != "arm")
         except TactbenchError as error:
             trigger = Trigger.RETREAT_FAILED
             outcome = f"RETREAT FAILED: {error.message} Stand clear, and cut the axes' supply"
@@ -348,7 +345,7 @@ def _read(kind: type, said: Any) -> Any:
 
 
 def _line(said: Any) -> bytes:
-    return json.dumps(said).encode() + b"\n"
+    return json.dumps(said, default=float).encode() + b"\n"  # numpy's numbers, too
 
 
 def _columns(block: Block) -> dict[str, Any]:
@@ -449,27 +446,18 @@ class _Server:
         guard = self._guard
         if guard is None:
             raise GuardRefusesError("The guard was not started.", hint="Use start().")
-        match what:
-            case "arm":
-                return asdict(guard.arm(_read(Limits, body)))
-            case "beat":
-                return asdict(guard.beat(_read(Beat, body)))
-            case "disarm":
-                return asdict(guard.disarm())
-        return None  # take: what every answer brings
+        if what == "take":  # what every answer brings
+            return None
+        given = [] if body is None else [_read({"arm": Limits, "beat": Beat}[what], body)]
+        return asdict(getattr(guard, what)(*given))
 
     def _start(self, settings: ProcessSettings) -> Any:
         self._clock = settings.clock()
         _log({"started": self._clock(), "unix_ns": time.time_ns(), "pid": os.getpid()})
         with ExitStack() as opened:
-            devices = {
-                name: opened.enter_context(device.open(self._clock))
-                for name, device in {**settings.axes, "force": settings.force}.items()
-            }
-            force = devices.pop("force")
             guard = LocalGuard(
-                devices,
-                force,
+                {name: opened.enter_context(axis.open(self._clock)) for name, axis in settings.axes.items()},
+                opened.enter_context(settings.force.open(self._clock)),
                 self._clock,
                 lambda until_ns: self._rest(1e-9 * (until_ns - self._clock())),
                 on_event=lambda event: _log(asdict(event)),
@@ -479,7 +467,6 @@ class _Server:
             opened.pop_all()
         self._guard = guard
         # What there is by now stays: collections have little to look at.
-        gc.collect()
         gc.freeze()
         streams = {"force": guard.force_stream, "motor": guard.motor_stream}
         return {"identity": identity, "streams": {name: one.model_dump(mode="json") for name, one in streams.items()}}

@@ -2,20 +2,14 @@
 
 from __future__ import annotations
 
-from itertools import pairwise
-
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 from tactbench.core.samples import Block, Quality
 from tactbench.devices import reading
 from tactbench.devices.reading import StreamQueue
 from tactbench.plugin import RigError
-from tactbench.plugin.devices import Unwrap
 from tests.devices.numbered import stream_of
-from tests.devices.test_sequence import arrivals
 
 STREAM = stream_of("s", 100.0, 2)
 
@@ -28,40 +22,6 @@ def queue_of(monkeypatch, seconds: float) -> StreamQueue:
 def rows_of(first: int, n: int, **more) -> Block:
     numbers = np.arange(first, first + n)
     return Block("s", 10 * numbers, np.stack([numbers, -numbers], 1).astype(np.int16), sequence=numbers, **more)
-
-
-@settings(max_examples=60)
-@given(arrivals(), st.lists(st.tuples(st.integers(1, 40), st.booleans()), min_size=1, max_size=40))
-def test_received_is_written_plus_dropped_plus_duplicates_plus_late(case, turns):
-    """Rows come in blocks, somebody takes some between them, at times too few."""
-    bits, came, _ = case
-    with pytest.MonkeyPatch.context() as patch:
-        unwrap, queue = Unwrap(bits), queue_of(patch, 0.5)
-    raw = np.array(came) % (1 << bits)
-    at, taken = 0, []
-    while at < len(came):
-        for put, take in turns:
-            numbers = unwrap(raw[at : at + put])
-            at += put
-            queue.put(Block("s", 10 * numbers, np.stack([numbers, numbers], 1), sequence=numbers), 1)
-            taken += queue.take() if take else []
-    queue.discard()
-    check = queue.check
-    assert check.received == len(came) == queue.written + queue.dropped + check.duplicates + check.late
-    written = [number for block in taken for number in block.sequence.tolist()]
-    assert len(written) == queue.written
-    marked = [
-        number
-        for block in taken
-        if block.quality is not None
-        for number, marks in zip(block.sequence.tolist(), block.quality, strict=True)
-        if (marks & Quality.GAP).all()
-    ]
-    # Marked are the rows after those that never came, and after those that were dropped here.
-    assert [number for number in marked if number != written[0]] == [b for a, b in pairwise(written) if b > a + 1]
-    for block in taken:
-        assert np.array_equal(block.data, np.stack([block.sequence] * 2, 1))
-        assert np.array_equal(block.t_ns, 10 * block.sequence)
 
 
 def test_a_full_queue_drops_the_newest_block_and_marks_the_next_row(monkeypatch):

@@ -72,19 +72,6 @@ def test_unplugged_is_said_each_time_until_closed(end):
         end.hear(0)
 
 
-def test_unplugged_is_noticed_on_sending(end):
-    if end.unplug is None:
-        pytest.skip("it has no far end that could go away")
-    end.unplug()
-
-    def tell_until_it_is_noticed():
-        for _ in range(100):  # a socket's first bytes go into its buffer
-            end.tell()
-
-    with pytest.raises(LinkUnplugged):
-        tell_until_it_is_noticed()
-
-
 @pytest.mark.parametrize("name", ENDS)
 @pytest.mark.parametrize("unplugged", [False, True])
 def test_closing_gives_everything_back(name, unplugged):

@@ -137,23 +137,6 @@ def test_the_bridge_refuses_what_it_cannot_do(frame):
     assert (reply.kind, reply.number) == (Kind.ERROR.reply, 9)
 
 
-def test_the_bridge_holds_so_many_batches():
-    emulator, _ = ready(holds=2)
-    data = emulator.feed(
-        b"".join(encode_frame(Frame(Kind.BATCH, n, batch(SpiStep(b"a", 1, 1000)))) for n in range(3)), 0.0
-    )
-    assert replies(data) == [Frame(0xFF, 2, b"full")]
-
-
-@settings(max_examples=40)
-@given(st.binary(max_size=400))
-def test_the_bridge_survives_any_bytes(noise):
-    emulator, _ = ready()
-    emulator.feed(noise + b"\0", 0.0)
-    (hello,) = replies(emulator.feed(encode_frame(Frame(Kind.HELLO, 1)), 0.0))
-    assert hello.kind == Kind.HELLO.reply
-
-
 needs_pty = pytest.mark.skipif(os.name != "posix", reason="pseudo-terminals are POSIX")
 
 

@@ -33,12 +33,6 @@ def test_every_byte_passes_unchanged_both_ways(far):
         assert data == ALL_BYTES
 
 
-def test_what_has_come_is_returned_at_once(far):
-    with SerialLink(far.name) as link:
-        far.write(b"abcdef")
-        assert link.read(2.0).data == b"abcdef"
-
-
 def test_stamp_is_taken_when_the_first_byte_is_there(far):
     """Not when the wait began: the clock stands at 1 until the far end writes, and at 2 from then on."""
     now = [1]

@@ -78,8 +78,8 @@ needs_pty = pytest.mark.skipif(os.name != "posix", reason="pseudo-terminals are 
 @needs_pty
 @pytest.mark.parametrize(
     "noise",
-    [b"\xff\xfe", b"t4E", b"tXYZ10", b"t4E0840", b"t4E01zz", b"b4E0"],
-    ids=["not-ascii", "short", "no-number", "few-bytes", "no-hex", "cut"],
+    [b"\xff\xfe", b"t4E", b"t4E0840", b"t4E01zz"],
+    ids=["not-ascii", "short", "few-bytes", "no-hex"],
 )
 def test_noise_on_slcan_costs_what_it_hit(noise):
     with pty() as far, open_link(f"can://slcan/{far.name}?bitrate=1000000&sleep_after_open=0") as link:
