@@ -15,8 +15,7 @@ from pydantic import Field, model_validator
 from tactbench.core.errors import LinkError, LinkTimeout, RigError
 from tactbench.core.samples import Block, Quality
 from tactbench.core.spec.sensor import ChannelSpec, StreamSpec
-from tactbench.devices.driver import Driver, DriverSettings
-from tactbench.devices.options import Options, open_for, read_options
+from tactbench.devices.driver import Driver, DriverSettings, Options, open_for, read_options
 from tactbench.links.byte_link import ByteLink
 from tactbench.links.link import Link
 

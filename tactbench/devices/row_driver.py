@@ -13,8 +13,7 @@ import numpy as np
 from tactbench.core.errors import LinkError, LinkTimeout, LinkUnplugged, UnknownNameError
 from tactbench.core.samples import Block
 from tactbench.core.spec.sensor import StreamSpec
-from tactbench.devices.driver import Driver, DriverSettings
-from tactbench.devices.options import open_for
+from tactbench.devices.driver import Driver, DriverSettings, open_for
 from tactbench.links.byte_link import ByteLink
 from tactbench.links.can_link import CanLink
 from tactbench.links.datagram_link import DatagramLink

@@ -11,8 +11,7 @@ from collections import deque
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 
-from tactbench.links.bridge_frame import VERSION, Frame, FrameDecoder, Kind, encode_frame
-from tactbench.links.spi_bridge import BEGIN, FULL, HELLO, SETUP, STEP
+from tactbench.links.spi_bridge import BEGIN, FULL, HELLO, SETUP, STEP, VERSION, Frame, FrameDecoder, Kind, encode_frame
 
 Exchange = Callable[[int, bytes, float], bytes]
 """What hangs on the bus: select mask, bytes out, second at which they begin -> as many bytes in."""

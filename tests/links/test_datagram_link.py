@@ -47,17 +47,6 @@ def test_a_local_port_can_be_asked_for_once(far):
         assert link.local_port == local_port
 
 
-def test_ipv6(far):
-    try:
-        six = socket.socket(socket.AF_INET6, socket.SOCK_DGRAM)
-        six.bind(("::1", 0))
-    except OSError as error:
-        pytest.skip(f"no IPv6 here: {error}")
-    with six, open_link(f"udp://[::1]:{six.getsockname()[1]}") as link:
-        link.send(b"x")
-        assert six.recv(10) == b"x"
-
-
 def test_what_is_too_long_is_refused_and_the_link_lives_on(far):
     with UdpLink("127.0.0.1", far.getsockname()[1]) as link:
         with pytest.raises(LinkError, match="65507"):

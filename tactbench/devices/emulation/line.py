@@ -8,8 +8,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import ClassVar, TypeAlias
 
-from tactbench.devices.emulator import DeviceEmulator, Sent
-from tactbench.devices.fault import Fault
+from tactbench.devices.emulator import DeviceEmulator, Fault, Sent
 from tactbench.links.can_link import CanFrame
 
 Piece: TypeAlias = bytes | CanFrame

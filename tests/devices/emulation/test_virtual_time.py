@@ -11,7 +11,7 @@ import pytest
 from tactbench.core.errors import LinkClosed, LinkError, LinkTimeout, LinkUnplugged
 from tactbench.devices.emulation.emulated_devices import EmulatedDevice, EmulatedDevices
 from tactbench.devices.emulation.line import LinkFault
-from tactbench.plugin.devices import ByteLink, CanFrame, CanLink, DatagramLink, SpiLink, SpiStep
+from tactbench.plugin.devices import ByteLink, CanFrame, CanLink, SpiLink, SpiStep
 from tests.devices.emulation.models import Answerer, Complement, Recorder
 
 MS = 1_000_000
@@ -118,20 +118,6 @@ def test_everything_happens_in_order_of_time_whoever_is_waited_for():
         devices.advance(100 * MS)
     assert seen == sorted(seen)
     assert len(seen) == 10 + 33
-
-
-def test_pieces_that_have_come_keep_their_times():
-    models = {"a": on("bytes", Recorder(0.01)), "b": on("datagram", Recorder(0.01)), "c": on("spi", Complement())}
-    devices = EmulatedDevices(models)
-    with devices.open_link("a") as a, devices.open_link("b") as b, devices.open_link("c") as c:
-        assert isinstance(b, DatagramLink)
-        for _ in range(3):
-            c.send([SpiStep(b"", pause_us=10_000)])
-        devices.advance(30 * MS)
-        for number in range(3):
-            for came in (a.read(0.0), b.receive(0.0)):
-                assert (came.data[0], came.t_ns) == (number, (number + 1) * 10 * MS)
-            assert c.receive(0.0).t_ns == (number + 1) * 10 * MS
 
 
 def run(seed):
