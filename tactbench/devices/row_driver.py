@@ -100,12 +100,11 @@ class RowDriver(Driver, Generic[L]):
         self.ask()
         times: list[int] = []
         found: list[Sample] = []
-        link: Any = self.link
-        receive = link.read if isinstance(link, ByteLink) else link.receive
+        link = self.link
         until_s = link.timer() + timeout_s
         for _ in range(AT_ONCE):
             try:
-                received = receive(0.0 if found else max(0.0, until_s - link.timer()))
+                received = link.receive(0.0 if found else max(0.0, until_s - link.timer()))
             except LinkTimeout:
                 break
             except LinkUnplugged:

@@ -46,9 +46,6 @@ class CanLink(Link):
         super().__init__(address, clock)
         self.counts: Counter[str] = Counter()
 
-    def _take(self, timeout_s: float) -> CanFrame:
-        return self.receive(timeout_s)
-
     @abstractmethod
     def receive(self, timeout_s: float) -> CanFrame:
         """Return the next data frame; raises as every :class:`Link`."""
@@ -58,8 +55,7 @@ class CanLink(Link):
         """Send a data frame; raises as every :class:`Link`, LinkTimeout also where no node acknowledges."""
 
     def _sendable(self, frame: CanFrame) -> None:
-        """Raise what `send` raises of a link that is closed or unplugged, and of what is no CAN frame."""
-        self._usable()
+        super()._sendable(frame)
         if not 0 <= frame.id < 1 << (29 if frame.extended else 11) or len(frame.data) > 8:
             raise LinkError(
                 f"{self.address}: {frame} is not a CAN frame.",

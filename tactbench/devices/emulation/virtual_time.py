@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 from collections import deque
+from dataclasses import replace
+from typing import Any
 
 from tactbench.core.errors import LinkError
 from tactbench.devices.emulation.line import Line, Piece
@@ -105,8 +107,14 @@ class _VirtualLink(Link):
             if not self._time.step(until_s):
                 raise self._nothing_came(timeout_s)
 
-    def _send(self, piece: Piece) -> None:
+    def receive(self, timeout_s: float) -> Any:
+        self._wait(timeout_s)
+        t_ns, piece = self._arrived.popleft()
+        return replace(piece, t_ns=t_ns) if isinstance(piece, CanFrame) else Received(piece, t_ns)
+
+    def send(self, piece: Any) -> None:
         """Hand a piece to the device; raises LinkUnplugged."""
+        self._sendable(piece)
         self._plugged()
         self._line.feed(piece, self._time.now_s)
 
@@ -119,48 +127,19 @@ class _VirtualLink(Link):
 
 
 class VirtualByteLink(_VirtualLink, ByteLink):
-    """A byte stream.
-
-    A read returns what came at one moment, so that every piece keeps its time.
-    """
+    """A byte stream; a read returns one piece, with its time."""
 
     def read(self, timeout_s: float) -> Received:  # noqa: D102  (inherited)
-        self._wait(timeout_s)
-        t_ns, data = self._arrived[0][0], b""
-        while self._arrived and self._arrived[0][0] == t_ns:
-            _, piece = self._arrived.popleft()
-            assert isinstance(piece, bytes)
-            data += piece
-        return Received(data, t_ns)
+        received: Received = self.receive(timeout_s)
+        return received
 
     def write(self, data: bytes) -> None:  # noqa: D102  (inherited)
-        self._usable()
-        self._send(bytes(data))
+        self.send(bytes(data))
 
 
 class VirtualCanLink(_VirtualLink, CanLink):
     """A CAN bus."""
 
-    def receive(self, timeout_s: float) -> CanFrame:  # noqa: D102  (inherited)
-        self._wait(timeout_s)
-        t_ns, frame = self._arrived.popleft()
-        assert isinstance(frame, CanFrame)
-        return CanFrame(frame.id, frame.data, frame.extended, t_ns)
-
-    def send(self, frame: CanFrame) -> None:  # noqa: D102  (inherited)
-        self._sendable(frame)
-        self._send(frame)
-
 
 class VirtualDatagramLink(_VirtualLink, DatagramLink):
     """Datagrams."""
-
-    def receive(self, timeout_s: float) -> Received:  # noqa: D102  (inherited)
-        self._wait(timeout_s)
-        t_ns, data = self._arrived.popleft()
-        assert isinstance(data, bytes)
-        return Received(data, t_ns)
-
-    def send(self, data: bytes) -> None:  # noqa: D102  (inherited)
-        self._sendable(data)
-        self._send(bytes(data))
