@@ -73,33 +73,6 @@ class ForceLaw:
             if wrong:
                 raise UsageError(f"The force loop cannot be stepped: {problem}.", hint="Correct its numbers.")
 
-    @classmethod
-    def of(cls, loop: ForceLoop, length: str = "m", *, period_s: float | None = None, **limits: Any) -> Self:
-        """Return the law of a declared loop with lengths in a unit.
-
-        Parameters
-        ----------
-        loop
-            Gains, filter and rate.
-        length
-            Unit of lengths.
-        period_s
-            T; None: the loop states its rate.
-        **limits
-            `speed`, `windup_s`, `travel` and `feed_forward`.
-        """
-        if period_s is None:
-            if loop.rate is None:
-                raise UsageError("The force loop's rate is not stated.", hint="State how often the motor is commanded.")
-            period_s = 1 / loop.rate.to("Hz")
-        return cls(
-            period_s=period_s,
-            proportional=loop.proportional.to(f"{length}/N"),
-            integral=loop.integral.to(f"{length}/N/s"),
-            cutoff_hz=None if loop.cutoff is None else loop.cutoff.to("Hz"),
-            **limits,
-        )
-
     def kept(self, passed_s: float) -> float:
         """Return a: what the filter keeps of its past after a time."""
         return 0.0 if self.cutoff_hz is None else math.exp(-2 * math.pi * self.cutoff_hz * passed_s)
@@ -206,9 +179,32 @@ class LoopModel:
 
     @classmethod
     def of(cls, loop: ForceLoop, length: str = "m", *, period_s: float | None = None, **limits: Any) -> Self:
-        """Return the model of a declared loop; parameters as those of :meth:`ForceLaw.of`."""
+        """Return the model of a declared loop with lengths in a unit.
+
+        Parameters
+        ----------
+        loop
+            Gains, filter, rate and motor.
+        length
+            Unit of lengths.
+        period_s
+            T; None: the loop states its rate.
+        **limits
+            `speed`, `windup_s`, `travel` and `feed_forward` of the law.
+        """
+        if period_s is None:
+            if loop.rate is None:
+                raise UsageError("The force loop's rate is not stated.", hint="State how often the motor is commanded.")
+            period_s = 1 / loop.rate.to("Hz")
+        law = ForceLaw(
+            period_s=period_s,
+            proportional=loop.proportional.to(f"{length}/N"),
+            integral=loop.integral.to(f"{length}/N/s"),
+            cutoff_hz=None if loop.cutoff is None else loop.cutoff.to("Hz"),
+            **limits,
+        )
         return cls.around(
-            ForceLaw.of(loop, length, period_s=period_s, **limits),
+            law,
             lag_s=loop.motor_lag.to("s"),
             delay_s=loop.delay.to("s"),
             speed=loop.speed.to(f"{length}/s"),

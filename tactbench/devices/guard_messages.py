@@ -142,9 +142,9 @@ class Limits:
 class Beat:
     """What a rig says once a control period: that it is there, and what shall be done."""
 
-    sequence: int
+    sequence: int = 0
     """One more than the one before; the first after `arm` is 1."""
-    t_ns: int
+    t_ns: int = 0
     """When it was made."""
     state: str = ""
     """Of the press, for the log."""

@@ -50,11 +50,6 @@ class PressState(StrEnum):
     """The motor is out, and :attr:`Press.ended` says why."""
 
 
-def _command(kind: CommandKind = CommandKind.NONE, **more: float) -> Beat:
-    """Return a beat that lacks its number, time and state."""
-    return Beat(0, 0, command=kind, **more)  # type: ignore[arg-type]
-
-
 @dataclass(frozen=True)
 class PressPlan:
     """The numbers of a press, in m, N and s."""
@@ -216,7 +211,7 @@ class Press:
             case PressState.CONTACT | PressState.RAMP:
                 return self._regulated(report, now_s)
             case PressState.RETREAT:
-                return _command(CommandKind.RETREAT)
+                return Beat(command=CommandKind.RETREAT)
         return self._asking(report, now_s)
 
     def _take(self, raw: Sequence[tuple[float, float]], now_s: float) -> None:
@@ -241,7 +236,7 @@ class Press:
         if report.state is not GuardState.RETREATING and not self.over:
             self.not_out = report.not_out
             self._enter(PressState.FAILED, now_s)
-        return _command()
+        return Beat()
 
     def _enter(self, state: PressState, now_s: float) -> None:
         self.state, self._since_s = state, now_s
@@ -251,15 +246,15 @@ class Press:
     # Moves ------------------------------------------------------------------------------------------------------------
 
     def _move(self, position_m: float, speed_m_s: float) -> None:
-        self._goal = _command(CommandKind.MOVE_TO, position_m=position_m, speed_m_s=speed_m_s)
+        self._goal = Beat(command=CommandKind.MOVE_TO, position_m=position_m, speed_m_s=speed_m_s)
         self._requested_s = None
 
     def _asking(self, report: Report, now_s: float) -> Beat:
         """Return the move that is to be begun, until the guard has accepted it; a stop at once."""
         if self._goal is None or self._requested_s is not None:
-            return _command()
+            return Beat()
         if report.moving and self._goal.command is not CommandKind.STOP:
-            return _command()
+            return Beat()
         self._requested_s = now_s
         if self._goal.command is CommandKind.MOVE_TO:
             way_m = abs(self._goal.position_m - report.position_m)
@@ -288,7 +283,7 @@ class Press:
         slowly = goal.position_m == plan.deepest_m
         if slowly and self._requested_s is not None and (report.touched or self.mean_n > plan.mean_n):
             # The guard has stopped it at a single touch; a mean that is reached is stopped here.
-            self._goal = None if report.touched else _command(CommandKind.STOP)
+            self._goal = None if report.touched else Beat(command=CommandKind.STOP)
             self._requested_s = None
         elif self._arrived(report, now_s):
             if not slowly:
@@ -344,15 +339,15 @@ class Press:
                 self._move(self.contact_m - plan.lift_m, plan.touch_speed_m_s)
                 return self._asking(report, now_s)
         elif not self._kept(controller.filtered_n, passed_s):
-            return _command(CommandKind.RETREAT)
+            return Beat(command=CommandKind.RETREAT)
         elif self._began_s is not None and now_s - self._began_s >= self._course.end_s:
             self._enter(PressState.UNLOAD, now_s)
             self._move(self.contact_m - plan.lift_m, plan.unload_speed_m_s)
             return self._asking(report, now_s)
         way = controller.target - report.target_m
         if report.moving or abs(way) < 0.5 * plan.resolution_m:
-            return _command()
-        return _command(CommandKind.STEP, distance_m=min(max(way, -plan.step_m), plan.step_m))
+            return Beat()
+        return Beat(command=CommandKind.STEP, distance_m=min(max(way, -plan.step_m), plan.step_m))
 
     def _kept(self, filtered_n: float, passed_s: float) -> bool:
         """Return whether force and contact are as they should be; else see to what follows."""

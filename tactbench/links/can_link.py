@@ -118,11 +118,14 @@ class CanBus(CanLink):
         import can
 
         deadline = self._usable(timeout_s)
-        left_s = timeout_s
-        while True:
+        left_s, came = timeout_s, True
+        while came or left_s > 0:
             try:
-                message = self._bus.recv(left_s)
-                frame = None if message is None else _data_frame(message, self._stamp(message.timestamp), self.counts)
+                message = self._bus.recv(max(0.0, left_s))
+                came = message is not None
+                frame = _data_frame(message, self._stamp(message.timestamp), self.counts) if came else None
+                if frame is not None:
+                    return frame
             except (can.CanError, OSError, ValueError, IndexError) as error:
                 if os_error_in(error) is not None:
                     raise self._unplugged(error) from error
@@ -130,14 +133,8 @@ class CanBus(CanLink):
                 # own flush() would drop the frames behind them as well.
                 self.counts["unreadable frames"] += 1
                 getattr(self._bus, "_buffer", bytearray()).clear()
-                message = frame = None
-            if frame is not None:
-                return frame
             left_s = deadline - self.timer()
-            if left_s <= 0:
-                if message is None:
-                    raise self._nothing_came(timeout_s)
-                left_s = 0.0  # it was a frame of another kind: what lies behind it has come as well
+        raise self._nothing_came(timeout_s)
 
     def _stamp(self, timestamp: float) -> int:
         """Return when a message came by the link's clock, of python-can's seconds since 1970."""

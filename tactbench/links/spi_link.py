@@ -8,7 +8,6 @@ from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from tactbench.core.errors import LinkError
 from tactbench.links.link import Clock, Link, cannot_open
 
 
@@ -115,25 +114,19 @@ class SpidevLink(SpiLink):
         super().__init__(f"spi://spidev/{device}", clock)
         self.speed_hz = speed_hz
         self.holds = 1
-        bus, _, line = device.partition(".")
-        if not (bus.isdigit() and line.isdigit()):
-            raise LinkError(f"{self.address} does not name a bus and a line.", hint="Write spi://spidev/0.0.")
+        self._replies: deque[SpiReply] = deque()
         try:
             import spidev
-        except ImportError as error:
-            raise LinkError(
-                f"{self.address} needs the package spidev, which is not installed.",
-                hint="Install it: pip install 'tactbench[spi]' (Linux only; it is compiled).",
-            ) from error
-        self._replies: deque[SpiReply] = deque()
-        self._device = spidev.SpiDev()
-        try:
-            self._device.open(int(bus), int(line))
+
+            self._device = spidev.SpiDev()
+            self._device.open(*map(int, device.split(".")))
             self._device.max_speed_hz = speed_hz
             self._device.mode = mode
         except OSError as error:
-            self._device.close()
             raise cannot_open(self.address, error) from error
+        except (ImportError, ValueError, TypeError) as error:
+            hint = "Write spi://spidev/BUS.LINE; it needs pip install 'tactbench[spi]' (Linux only)."
+            raise cannot_open(self.address, error, hint=hint) from error
 
     def _submit(self, number: int, steps: Sequence[SpiStep]) -> None:
         data = []

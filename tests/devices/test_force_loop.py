@@ -183,4 +183,4 @@ def test_a_law_that_cannot_be_is_refused(changed):
     with pytest.raises(UsageError, match="cannot be stepped"):
         ForceLaw(**{"period_s": T, "proportional": 0.0, "integral": 1.0, **changed})
     with pytest.raises(UsageError, match="rate is not stated"):
-        ForceLaw.of(ForceLoop())
+        LoopModel.of(ForceLoop())

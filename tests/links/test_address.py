@@ -84,9 +84,7 @@ def test_any_text_is_an_address_or_a_usage_error(text):
         ("can://slcan/dev/there-is-none?bitrate=1000000", "can://slcan//dev/ttyACM0"),
         ("can://slcan//dev/there?bitrte=1000000", "Did you mean 'bitrate'"),
         ("can://pcan/PCAN_USBBUS1", "cannot be opened"),
-        ("spi://spidev/zero?speed_hz=1", "spi://spidev/0.0"),
-        # Without the package, or without the device.
-        ("spi://spidev/9.9?speed_hz=1", "spi"),
+        ("spi://spidev/zero?speed_hz=1", "pip install 'tactbench[spi]'"),
     ],
 )
 def test_what_does_not_open_says_what_to_do(address, said):
