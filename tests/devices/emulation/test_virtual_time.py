@@ -92,14 +92,6 @@ def test_an_unplugged_link_says_so_at_its_time_and_from_then_on(kind):
             hear(link, 0.0)
 
 
-def test_a_bridge_that_does_not_answer_costs_no_real_time():
-    """Asked for three seconds, that pass in virtual time only."""
-    with EmulatedDevices({"a": on("spi", Complement(), "late:delay_s=1000")}) as devices:
-        with pytest.raises(LinkError, match="within 3 s"):
-            devices.open_link("a")
-        assert devices.clock() * 1e-9 == pytest.approx(3.0, abs=0.3)
-
-
 def test_everything_happens_in_order_of_time_whoever_is_waited_for():
     """While one device is waited for, the others go on: at each moment nobody is behind."""
     seen = []
