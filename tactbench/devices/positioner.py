@@ -114,12 +114,13 @@ class PositionerOptions(Options):
 
     @model_validator(mode="after")
     def _consistent(self) -> Self:
-        if (self.lower_m is None) != (self.upper_m is None):
+        low, high = self.lower_m, self.upper_m
+        if (low is None) != (high is None):
             raise ValueError("give both lower_m and upper_m, or none")
-        if self.lower_m is not None and self.upper_m is not None:
-            if not self.lower_m < self.upper_m:
+        if low is not None and high is not None:
+            if not low < high:
                 raise ValueError("lower_m is below upper_m")
-            if self.retreat_m is not None and not self.lower_m <= self.retreat_m <= self.upper_m:
+            if self.retreat_m is not None and not low <= self.retreat_m <= high:
                 raise ValueError("retreat_m is between lower_m and upper_m")
         return self
 

@@ -400,7 +400,7 @@ def test_random_faults_end_as_they_must(seed):
     ("change", "message"),
     [
         ({"force_ceiling_n": 0.0}, "not positive"),
-        ({"force_ceiling_n": math.inf}, "not finite"),
+        ({"force_ceiling_n": math.inf}, "not positive"),
         ({"touch_n": 7.0}, "not below the ceiling"),
         ({"travel_m": (1e-3, 1e-3)}, "ends before it begins"),
         ({"travel_ceiling_n": 7.0}, "above that of pressing"),
