@@ -63,7 +63,8 @@ class Control:
         """Control periods that began more than one period late."""
         self._guard, self._limits, self._received, self._clock = guard, limits, received, clock
         self._period_ns, self._stale_ns = round(1e9 * period_s), round(1e9 * stale_s)
-        self._report = armed
+        self.report = armed
+        """What the guard answered last."""
         self._beats = 0
         self._rows, self._rows_ns = -1, clock()
         self._next_ns = self._rows_ns + self._period_ns
@@ -74,11 +75,6 @@ class Control:
         self._stop = ""
         self._thread: threading.Thread | None = None
         self._counts: Mapping[str, Mapping[str, int]] = {}
-
-    @property
-    def report(self) -> Report:
-        """What the guard answered last."""
-        return self._report
 
     def blocks(self) -> Iterator[Block]:
         """Yield what force sensor and motor have sent and was not yet yielded."""
@@ -164,11 +160,11 @@ class Control:
         if now_ns - self._rows_ns > self._stale_ns:
             press.fail(f"the sensor has sent nothing for {1e-6 * (now_ns - self._rows_ns):.0f} ms")
         try:
-            beat = press.step(self._report, raw, 1e-9 * now_ns)
+            beat = press.step(self.report, raw, 1e-9 * now_ns)
         except TactbenchError as error:
             press.fail(error_text(error))
-            beat = press.step(self._report, (), 1e-9 * now_ns)
+            beat = press.step(self.report, (), 1e-9 * now_ns)
         self._beats += 1
-        number = self._report.force_sequence
+        number = self.report.force_sequence
         beat = replace(beat, sequence=self._beats, t_ns=now_ns, state=str(press.state), force_sequence=number)
-        self._report = self._guard.beat(beat)
+        self.report = self._guard.beat(beat)

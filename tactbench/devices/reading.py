@@ -154,8 +154,10 @@ class Reading:
         self._readers: dict[str, threading.Thread] = {}
         self._over = threading.Event()
         self._lock = threading.Lock()
-        self._ended = ""
-        self._error: Exception | None = None
+        self.ended = ""
+        """Which device ended the reading, and why, without a full stop; empty: none did."""
+        self.error: Exception | None = None
+        """What was raised there, with its traceback."""
 
     def __enter__(self) -> Self:
         try:
@@ -183,16 +185,6 @@ class Reading:
         self._finish()
         for stream in self._streams.values():
             stream.discard()
-
-    @property
-    def ended(self) -> str:
-        """Which device ended the reading, and why, without a full stop; empty: none did."""
-        return self._ended
-
-    @property
-    def error(self) -> Exception | None:
-        """What was raised there, with its traceback."""
-        return self._error
 
     @property
     def stream_counts(self) -> Mapping[str, StreamCounts]:
@@ -302,9 +294,9 @@ class Reading:
     def _fail(self, name: str, error: Exception) -> None:
         """End the reading for `error`, unless another one has."""
         with self._lock:
-            if self._error is None:
-                self._error = error
-                self._ended = f"{name}: {error_text(error)}"
+            if self.error is None:
+                self.error = error
+                self.ended = f"{name}: {error_text(error)}"
         self._over.set()
 
     def _finish(self) -> None:
