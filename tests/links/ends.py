@@ -24,8 +24,6 @@ class End:
     link: Link
     say: Callable[[], None]
     """Makes the far end send something."""
-    hear: Callable[[float], object]
-    """Receives at the near end."""
     tell: Callable[[], object]
     """Sends at the near end."""
     unplug: Callable[[], None] | None = None
@@ -103,7 +101,7 @@ def loopback(select: int, data: bytes, now_s: float) -> bytes:
 @contextmanager
 def byte_stream(clock: Callable[[], int]) -> Iterator[End]:
     with pty() as far, open_link(f"serial://{far.name}?baud=115200", clock) as link:
-        yield End(link, lambda: far.write(b"a"), link.read, lambda: link.write(b"b"), far.unplug)
+        yield End(link, lambda: far.write(b"a"), lambda: link.write(b"b"), far.unplug)
 
 
 @contextmanager
@@ -113,7 +111,7 @@ def tcp(clock: Callable[[], int]) -> Iterator[End]:
         open_link(f"socket://127.0.0.1:{server.getsockname()[1]}", clock) as link,
         server.accept()[0] as far,
     ):
-        yield End(link, lambda: far.sendall(b"a"), link.read, lambda: link.write(b"b"), far.close)
+        yield End(link, lambda: far.sendall(b"a"), lambda: link.write(b"b"), far.close)
 
 
 @contextmanager
@@ -129,14 +127,14 @@ def datagrams(clock: Callable[[], int]) -> Iterator[End]:
             def say() -> None:
                 far.sendto(b"a", ("127.0.0.1", link.local_port))
 
-            yield End(link, say, link.receive, lambda: link.send(b"b"), unplug)
+            yield End(link, say, lambda: link.send(b"b"), unplug)
 
 
 @contextmanager
 def virtual_can(clock: Callable[[], int]) -> Iterator[End]:
     with open_link("can://virtual/alike", clock) as link, open_link("can://virtual/alike") as far:
         frame = CanFrame(0x4E0, b"\x40")
-        yield End(link, lambda: far.send(frame), link.receive, lambda: link.send(frame))
+        yield End(link, lambda: far.send(frame), lambda: link.send(frame))
 
 
 @contextmanager
@@ -146,7 +144,7 @@ def slcan(clock: Callable[[], int]) -> Iterator[End]:
         open_link(f"can://slcan/{far.name}?bitrate=1000000&sleep_after_open=0", clock) as link,
     ):
         frame = CanFrame(0x20E, b"\x4d")
-        yield End(link, lambda: far.write(b"t4E0140\r"), link.receive, lambda: link.send(frame), far.unplug)
+        yield End(link, lambda: far.write(b"t4E0140\r"), lambda: link.send(frame), far.unplug)
 
 
 @contextmanager
@@ -159,7 +157,7 @@ def spi_bridge(clock: Callable[[], int]) -> Iterator[End]:
         def send() -> object:
             return link.send([SpiStep(b"ab")])
 
-        yield End(link, send, link.receive, send, far.unplug)
+        yield End(link, send, send, far.unplug)
 
 
 ENDS = {

@@ -10,18 +10,15 @@ import pytest
 import serial
 
 from tactbench.core.errors import LinkError, LinkTimeout, LinkUnplugged
-from tactbench.devices.emulation.emulated_devices import EmulatedDevice, EmulatedDevices
+from tactbench.devices.emulation.emulated_devices import EmulatedDevices
 from tactbench.devices.emulation.line import Line, LinkFault
 from tactbench.devices.emulation.real_time import PseudoTerminal, RealTimeServer, SlcanAdapter
 from tactbench.plugin import ChannelSpec, StreamSpec
-from tactbench.plugin.devices import CanFrame, EmulatorSettings, RowEmulator, SpiStep, open_link
+from tactbench.plugin.devices import EmulatorSettings, RowEmulator, open_link
 from tests.devices.emulation.models import Answerer, Complement, Recorder
+from tests.devices.emulation.test_virtual_time import on, say
 
 needs_pty = pytest.mark.skipif(os.name != "posix", reason="pseudo-terminals are POSIX")
-
-
-def on(kind, emulator, *faults):
-    return EmulatedDevice(kind, emulator, tuple(LinkFault.parse(fault) for fault in faults))
 
 
 @needs_pty
@@ -65,23 +62,10 @@ def test_the_address_states_a_baud_rate_that_carries_what_is_sent(rate_hz, baud)
 def test_requests_are_answered_by_the_wall_clock(kind):
     emulator = Complement() if kind == "spi" else Answerer(after_s=0.05)
     with EmulatedDevices({"a": on(kind, emulator)}, time="real") as devices, devices.open_link("a") as link:
-        if kind == "spi":
-            link.send([SpiStep(b"\x01\x02", pause_us=1000)])
-            assert link.receive(5.0).data == (b"\xfe\xfd",)
-            return
         before_ns = devices.clock()
-        if kind == "can":
-            link.send(CanFrame(0x123, b"ab"))
-            came = link.receive(5.0)
-            assert (came.id, came.data) == (0x123, b"ab")
-        elif kind == "bytes":
-            link.write(b"a")
-            came = link.read(5.0)
-            assert came.data == b"a"
-        else:
-            link.send(b"ab")
-            came = link.receive(5.0)
-            assert came.data == b"ab"
+        say(link)
+        came = link.receive(5.0)
+        assert came.data == ((b"\x9e\x9d", b"", b"") if kind == "spi" else b"ab")
         # Never early; how late is the machine's.
         assert came.t_ns - before_ns >= 50e6 - 1
 

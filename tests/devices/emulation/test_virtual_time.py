@@ -43,22 +43,18 @@ def say(link):
         link.send(b"ab")
 
 
-def hear(link, timeout_s):
-    return link.read(timeout_s) if isinstance(link, ByteLink) else link.receive(timeout_s)
-
-
 def test_an_answer_comes_with_its_own_time_and_waits_are_virtual(kind):
     with EmulatedDevices({"a": answering(kind)}) as devices, devices.open_link("a") as link:
         say(link)
         with pytest.raises(LinkTimeout, match=r"within 0\.1 s"):
-            hear(link, 0.1)
+            link.receive(0.1)
         assert devices.clock() == 100 * MS
-        came = hear(link, 5.0)
+        came = link.receive(5.0)
         # On SPI: 180 ms of pauses and 16 bits at 4.4 MHz.
         due_ns = 180 * MS + round(16e9 / 4.4e6) if kind == "spi" else 200 * MS
         assert came.t_ns == devices.clock() == due_ns
         with pytest.raises(LinkTimeout):
-            hear(link, 0.0)
+            link.receive(0.0)
         assert devices.clock() == due_ns
 
 
@@ -69,27 +65,27 @@ def test_a_closed_link_is_closed_and_may_be_opened_again(kind):
             devices.open_link("a")
         link.close()
         link.close()
-        for call in (lambda: hear(link, 0.0), lambda: say(link)):
+        for call in (lambda: link.receive(0.0), lambda: say(link)):
             with pytest.raises(LinkClosed):
                 call()
         with devices.open_link("a") as again:
             say(again)
-            assert hear(again, 1.0).data
+            assert again.receive(1.0).data
 
 
 def test_an_unplugged_link_says_so_at_its_time_and_from_then_on(kind):
     with EmulatedDevices({"a": answering(kind, "unplug:start_s=1")}) as devices, devices.open_link("a") as link:
         say(link)
-        assert hear(link, 0.5).data
+        assert link.receive(0.5).data
         with pytest.raises(LinkUnplugged, match="is gone"):
-            hear(link, 60.0)
+            link.receive(60.0)
         assert devices.clock() == 1000 * MS
-        for call in (lambda: hear(link, 0.0), lambda: say(link)):
+        for call in (lambda: link.receive(0.0), lambda: say(link)):
             with pytest.raises(LinkUnplugged):
                 call()
         link.close()
         with pytest.raises(LinkClosed):
-            hear(link, 0.0)
+            link.receive(0.0)
 
 
 def test_everything_happens_in_order_of_time_whoever_is_waited_for():
@@ -133,7 +129,7 @@ def run(seed):
                 if name == "spi":
                     link.send([SpiStep(bytes([len(came[name]) & 0xFF]))])
                 with contextlib.suppress(LinkTimeout, LinkUnplugged):
-                    came[name].append(hear(link, 0.004))
+                    came[name].append(link.receive(0.004))
     return came
 
 
