@@ -91,7 +91,10 @@ def parse_address(text: str) -> LinkAddress:
     if kind not in KINDS:
         raise UnknownNameError("kind of link", kind, KINDS)
     if kind == "can":
-        _check_interface(target.partition("/")[0])
+        import can
+
+        if (interface := target.partition("/")[0]) not in can.VALID_INTERFACES:
+            raise UnknownNameError("kind of can:// link", interface, sorted(can.VALID_INTERFACES))
     if kind != "loop" and not (target.partition("/")[2] if kind == "can" else target):
         raise _wrong(text, kind, "does not say what to open")
     if kind in ("udp", "socket") and not all(_host_and_port(target)):
@@ -146,14 +149,9 @@ def _host_and_port(target: str) -> tuple[str, int]:
         return "", 0
 
 
-def _check_interface(name: str) -> None:
-    import can
-
-    if name not in can.VALID_INTERFACES:
-        raise UnknownNameError("kind of can:// link", name, sorted(can.VALID_INTERFACES))
-
-
 def _options(text: str, kind: str, query: str) -> dict[str, object]:
+    import yaml
+
     try:
         pairs = parse_qsl(query, keep_blank_values=True, strict_parsing=bool(query))
     except ValueError:
@@ -162,7 +160,7 @@ def _options(text: str, kind: str, query: str) -> dict[str, object]:
     if len(given) < len(pairs):
         raise _wrong(text, kind, "gives a key twice")
     if kind == "can":
-        return {key: _plain(value) for key, value in pairs}
+        return {key: yaml.safe_load(value) for key, value in pairs}
     model = KINDS[kind].options
     for key in given.keys() - model.model_fields.keys():
         raise UnknownNameError(f"key of a {kind} link", key, model.model_fields)
@@ -173,16 +171,6 @@ def _options(text: str, kind: str, query: str) -> dict[str, object]:
         key = str(first["loc"][0])
         problem = f"does not give {key}" if first["type"] == "missing" else f"gives {key}={given[key]}: {first['msg']}"
         raise _wrong(text, kind, problem) from None
-
-
-def _plain(text: str) -> int | float | str:
-    """Return a value as a number if it is one."""
-    for kind in (int, float):
-        try:
-            return kind(text)
-        except ValueError:
-            continue
-    return text
 
 
 def _wrong(text: str, kind: str, problem: str) -> UsageError:

@@ -207,10 +207,8 @@ def read_can_log(file: Path) -> tuple[list[CanFrame], Counter[str]]:
 
 
 def _hint(interface: str, channel: str, error: BaseException) -> str:
-    if "msgpack" in str(error):
-        return "Install it: pip install 'tactbench[multicast]'."
     if interface == "slcan" and not channel.startswith("/"):
         return "A port begins with a slash of its own: can://slcan//dev/ttyACM0."
     if os_error_in(error) is not None:
         return ""
-    return f"See python-can's page of the interface {interface} for its channels and options."
+    return f"See python-can's page of the interface {interface} for its channels, options and what it needs."

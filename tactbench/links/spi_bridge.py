@@ -227,7 +227,8 @@ class SpiBridge(SpiLink):
             self._frames.extend((frame, received.t_ns) for frame in self._decoder.feed(received.data))
         return self._frames.popleft()
 
-    def _submit(self, number: int, steps: Sequence[SpiStep]) -> None:
+    def send(self, steps: Sequence[SpiStep]) -> int:  # noqa: D102  (inherited)
+        number = self._next_number()
         payload = b"".join(STEP.pack(step.select, step.pause_us, len(step.data)) + step.data for step in steps)
         if len(payload) > self._largest:
             raise LinkError(
@@ -236,8 +237,10 @@ class SpiBridge(SpiLink):
             )
         self._bytes.write(encode_frame(Frame(Kind.BATCH, number, payload)))
         self._waiting[number] = tuple(len(step.data) for step in steps)
+        return number
 
-    def _collect(self, timeout_s: float, deadline: float) -> SpiReply:
+    def receive(self, timeout_s: float) -> SpiReply:  # noqa: D102  (inherited)
+        deadline = self._usable(timeout_s)
         while True:
             frame, t_ns = self._next(timeout_s, deadline)
             if frame.kind not in (Kind.BATCH.reply, Kind.ERROR.reply) or frame.number not in self._waiting:

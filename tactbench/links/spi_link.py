@@ -43,7 +43,7 @@ class SpiLink(Link):
 
     A batch is carried out without the host, so that pauses of some ten microseconds hold whatever the host does; and
     the next may be sent before the reply to the last one is here. An adapter of another kind is a subclass with
-    :meth:`_submit`, :meth:`_collect`, :meth:`_release` and, where replies can get lost, :meth:`abandon`.
+    :meth:`send`, :meth:`receive`, :meth:`_release` and, where replies can get lost, :meth:`abandon`.
 
     Attributes
     ----------
@@ -56,35 +56,27 @@ class SpiLink(Link):
     speed_hz: int
     holds: int = 2
 
-    def __init__(self, address: str, clock: Clock = time.monotonic_ns) -> None:
-        super().__init__(address, clock)
-        self._number = -1
+    _number = -1
 
     @abstractmethod
-    def _submit(self, number: int, steps: Sequence[SpiStep]) -> None:
-        """Hand over a batch."""
-
-    @abstractmethod
-    def _collect(self, timeout_s: float, deadline: float) -> SpiReply:
-        """Return the next reply; `deadline` is when `timeout_s` ends, in seconds of :meth:`timer`."""
-
     def send(self, steps: Sequence[SpiStep]) -> int:
         """Hand over a batch and return its number: 0, 1, 2, …, after 65535 again 0; at most `holds` at once.
 
         Raises as every :class:`Link`, LinkError if it is longer than the adapter takes. What else the adapter refuses,
         :meth:`receive` raises.
         """
-        self._usable()
-        self._number = (self._number + 1) & 0xFFFF
-        self._submit(self._number, steps)
-        return self._number
 
+    @abstractmethod
     def receive(self, timeout_s: float) -> SpiReply:
         """Return the next reply, raising as every :class:`Link`; where one was lost, its number is left out."""
-        return self._collect(timeout_s, self._usable(timeout_s))
 
     def abandon(self) -> None:
         """Wait no longer for replies to what was sent; those that come late are dropped. Raises nothing."""
+
+    def _next_number(self) -> int:
+        self._usable()
+        self._number = (self._number + 1) & 0xFFFF
+        return self._number
 
 
 class SpidevLink(SpiLink):
@@ -128,7 +120,8 @@ class SpidevLink(SpiLink):
             hint = "Write spi://spidev/BUS.LINE; it needs pip install 'tactbench[spi]' (Linux only)."
             raise cannot_open(self.address, error, hint=hint) from error
 
-    def _submit(self, number: int, steps: Sequence[SpiStep]) -> None:
+    def send(self, steps: Sequence[SpiStep]) -> int:  # noqa: D102  (inherited)
+        number = self._next_number()
         data = []
         try:
             for step in steps:
@@ -140,8 +133,10 @@ class SpidevLink(SpiLink):
         except OSError as error:
             raise self._unplugged(error) from error
         self._replies.append(SpiReply(number, tuple(data), self._clock()))
+        return number
 
-    def _collect(self, timeout_s: float, deadline: float) -> SpiReply:
+    def receive(self, timeout_s: float) -> SpiReply:  # noqa: D102  (inherited)
+        self._usable(timeout_s)
         if not self._replies:
             raise self._nothing_came(timeout_s)
         return self._replies.popleft()
