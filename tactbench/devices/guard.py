@@ -183,11 +183,12 @@ class LocalGuard:
         for name, axis in self._axes.items():
             try:
                 self._make_ready(name, axis, limits)
-            except (RigError, LinkError) as error:
+            except Exception as error:
                 self._home_anew.add(name)
                 if isinstance(error, GuardRefusesError):
                     raise
-                raise GuardRefusesError(f"{name} is not armed: {error.message}", hint=error.hint) from error
+                hint = getattr(error, "hint", "")
+                raise GuardRefusesError(f"{name} is not armed: {error_text(error)}.", hint=hint) from error
         self.state, self._limits = GuardState.ARMED, limits
         self._beats, self._refused, self._touched = 0, 0, False
         self._end_sequence = self._seen_force.sequence
@@ -399,8 +400,8 @@ class LocalGuard:
             else:
                 self._into_skin = press.state is not None and beat.position_m > press.state.target
                 press.move_to(beat.position_m, beat.speed_m_s)
-        except RigError as error:
-            return error.message, False
+        except Exception as error:  # of the axis' driver: whatever it is, it was not carried out
+            return error_text(error), False
         return "", False
 
     def _travel_reason(self, beat: Beat) -> str:
@@ -408,9 +409,7 @@ class LocalGuard:
         if not self._retracted or self._press.moving:
             return f"{self._name} is not retracted"
         for name, target in beat.targets.items():
-            if name not in self._others:
-                return f"{name} is no axis that travels"
-            low, high = self._others[name].facts.limits
+            low, high = self._others[name].facts.limits if name in self._others else (math.nan, math.nan)
             if not low <= target <= high:
                 return f"the target {target:g} m of {name} is outside its travel {low:g} to {high:g} m"
         return ""
@@ -439,8 +438,8 @@ class LocalGuard:
         """Halt an axis; what fails of it becomes a retreat."""
         try:
             axis.halt()
-        except TactbenchError as error:
-            self.trip(Trigger.AXIS_FAULT, error.message)
+        except Exception as error:
+            self.trip(Trigger.AXIS_FAULT, error_text(error))
 
     # Retreat ----------------------------------------------------------------------------------------------------------
 
@@ -554,8 +553,10 @@ class LocalGuard:
             self._say(None, f"homing {name}")
             try:
                 axis.home(stop)
-            except (RigError, LinkError) as error:
-                self._homing_failed(name, *(problem or (Trigger.HOMING, error.message)))
+            except Exception as error:
+                with suppress(Exception):
+                    axis.halt()
+                self._homing_failed(name, *(problem or (Trigger.HOMING, error_text(error))))
         axis.confirm()
         if not axis.enabled:
             axis.enable()

@@ -37,16 +37,6 @@ def test_a_full_queue_drops_the_newest_block_and_marks_the_next_row(monkeypatch)
     assert list(queue.take()) == []
 
 
-def test_rows_without_numbers_times_or_marks(monkeypatch):
-    queue = queue_of(monkeypatch, 0.1)
-    queue.put(Block("s", None, np.ones((11, 2))), 1)
-    queue.put(Block("s", None, np.ones((2, 2))), 1)
-    (block,) = queue.take()
-    assert (block.t_ns, block.sequence, block.device_ns) == (None, None, None)
-    assert block.quality.tolist() == [[Quality.GAP] * 2, [0, 0]]
-    assert queue.dropped == 11
-
-
 @pytest.mark.parametrize(
     "other",
     [
