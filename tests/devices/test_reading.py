@@ -268,11 +268,3 @@ def test_a_driver_that_takes_time_to_ask_does_not_hold_up_the_others(clock):
         assert 1_000_000_000 <= clock.now_ns < 1_030_000_000
     assert joined(blocks, "force")[0] == list(range(10))
     assert reading.stream_counts["wide"].written > 10
-
-
-def test_virtual_time_that_does_not_go_on_is_no_endless_wait(clock):
-    with (
-        numbered(WIDE, clock) as (_, driver),
-        Reading({"wide": driver}, clock=clock, advance=lambda to_ns: None) as reading,
-    ):
-        assert list(reading.blocks(1.0)) == []

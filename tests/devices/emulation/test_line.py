@@ -20,10 +20,6 @@ def carried(line, until_s):
     return out
 
 
-def test_pieces_pass_whole_and_at_once():
-    assert carried(Line(Recorder(period_s=0.5)), 1.0) == [(0.5, b"\0\0\0"), (1.0, b"\1\0\0")]
-
-
 def test_a_late_link_delays_what_the_device_sends_and_keeps_its_order():
     fault = LinkFault.parse("late:delay_s=0.7,start_s=1,end_s=2")
     found = carried(Line(Recorder(period_s=0.5), faults=[fault]), 3.0)
