@@ -168,7 +168,7 @@ class LocalGuard:
     def arm(self, limits: Limits) -> Report:
         """Check, home what is not homed, retract the pressing axis, and begin to expect beats.
 
-        The first beat is due within `heartbeat_s`, and its sequence is 1.
+        The first beat is due within `heartbeat_s`, and its sequence is 1. Samples from before are dropped.
 
         Raises
         ------
@@ -192,6 +192,9 @@ class LocalGuard:
         self.state, self._limits = GuardState.ARMED, limits
         self._beats, self._refused, self._touched = 0, 0, False
         self._end_sequence = self._seen_force.sequence
+        # What came while axes were homed may be a minute of samples: handing it over would take a beat's time.
+        self._seen_force.blocks.clear()
+        self._motor_blocks.clear()
         self._beat_ns = self._clock()
         self._say(None, "armed")
         return self._report(0)

@@ -220,6 +220,12 @@ def test_a_force_that_is_not_a_number(tmp_path):
         assert made.world.largest_n < 2.0
 
 
+def test_what_came_before_it_was_armed_is_not_handed_over_afterwards(made):
+    made.guard.advance(made.clock() + 10**9)
+    made.guard.arm(made.setting.limits)
+    assert made.guard.force_blocks() == made.guard.motor_blocks() == []
+
+
 @pytest.mark.parametrize("baud", [9600, 115200])
 def test_steps_are_sent_one_at_a_time_and_after_a_fresh_force(baud, tmp_path):
     """The step rule, on the motor's line: no increment before the drive has said that the one before has ended."""
