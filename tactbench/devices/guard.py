@@ -102,6 +102,11 @@ class LocalGuard:
         Called while axes are homed: whether they shall stand.
     """
 
+    force_stream: StreamSpec
+    """The force sensor's stream, once it is started."""
+    motor_stream: StreamSpec
+    """The pressing axis' stream, likewise."""
+
     def __init__(
         self,
         axes: Mapping[str, Positioner],
@@ -137,18 +142,6 @@ class LocalGuard:
 
     # What a rig asks for ----------------------------------------------------------------------------------------------
 
-    @property
-    def force_stream(self) -> StreamSpec:
-        """The force sensor's stream."""
-        (stream,) = self._force.streams
-        return stream
-
-    @property
-    def motor_stream(self) -> StreamSpec:
-        """The pressing axis' stream."""
-        (stream,) = self._press.streams
-        return stream
-
     def start(self) -> Mapping[str, Mapping[str, str]]:
         """Ask all devices who they are, and let them sample."""
         if len(self._force.streams) != 1:
@@ -161,6 +154,7 @@ class LocalGuard:
             except TactbenchError as error:
                 error.message = f"{name}: {error.message}"
                 raise
+        (self.force_stream,), (self.motor_stream,) = self._force.streams, self._press.streams
         self._watch = ForceWatch(self.force_stream)
         self._say(None, "started")
         return found

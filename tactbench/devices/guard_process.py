@@ -158,6 +158,11 @@ class GuardProcess:
         If this system is not POSIX.
     """
 
+    force_stream: StreamSpec
+    """The force sensor's stream, once it is started."""
+    motor_stream: StreamSpec
+    """The pressing axis' stream, likewise."""
+
     def __init__(self, settings: ProcessSettings) -> None:
         if os.name != "posix":
             raise UsageError("The guard's process needs sessions and signals of POSIX.", hint="Use Linux.")
@@ -167,7 +172,6 @@ class GuardProcess:
         self._asked = ""
         self._closed = False
         self._lost: GuardLostError | None = None
-        self._streams: dict[str, StreamSpec] = {}
         self._blocks: dict[str, list[Block]] = {"force": [], "motor": []}
         self._events: list[Event] = []
         self._counts: Mapping[str, Mapping[str, int]] = {}
@@ -189,20 +193,10 @@ class GuardProcess:
         """Number of the process."""
         return self._process.pid
 
-    @property
-    def force_stream(self) -> StreamSpec:
-        """The force sensor's stream."""
-        return self._streams["force"]
-
-    @property
-    def motor_stream(self) -> StreamSpec:
-        """The pressing axis' stream."""
-        return self._streams["motor"]
-
     def start(self) -> Mapping[str, Mapping[str, str]]:
         """Let the process open all devices."""
         found = self._ask("start", START_S, asdict(self._settings))
-        self._streams = {name: StreamSpec.model_validate(stream) for name, stream in found["streams"].items()}
+        self.force_stream, self.motor_stream = map(StreamSpec.model_validate, found["streams"])
         identity: Mapping[str, Mapping[str, str]] = found["identity"]
         return identity
 
@@ -312,7 +306,7 @@ class GuardProcess:
         self._rest = rest
         said = json.loads(line)
         for name, kept in self._blocks.items():
-            kept += [_block(self._streams[name], columns) for columns in said.get(name, ())]
+            kept += [_block(getattr(self, f"{name}_stream"), columns) for columns in said.get(name, ())]
         self._events += [_read(Event, event) for event in said.get("events", ())]
         self._counts = said.get("counts", self._counts)
         return said
@@ -468,8 +462,8 @@ class _Server:
         self._guard = guard
         # What there is by now stays: collections have little to look at.
         gc.freeze()
-        streams = {"force": guard.force_stream, "motor": guard.motor_stream}
-        return {"identity": identity, "streams": {name: one.model_dump(mode="json") for name, one in streams.items()}}
+        streams = guard.force_stream, guard.motor_stream
+        return {"identity": identity, "streams": [stream.model_dump(mode="json") for stream in streams]}
 
     def _flush(self) -> None:
         with suppress(OSError):  # full, or nobody there
