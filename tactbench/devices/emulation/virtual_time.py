@@ -93,22 +93,12 @@ class _VirtualLink(Link):
     def _arrive(self, t_s: float, piece: Piece) -> None:
         self._arrived.append((round(t_s * 1e9), piece))
 
-    def _wait(self, timeout_s: float) -> None:
-        """Let time go on until something has arrived, by `timeout_s` at most.
-
-        Raises
-        ------
-        LinkTimeout, LinkUnplugged, LinkClosed
-            As of every link.
-        """
+    def receive(self, timeout_s: float) -> Any:
         until_s = self._usable(timeout_s)
         while not self._arrived:
             self._plugged()
             if not self._time.step(until_s):
                 raise self._nothing_came(timeout_s)
-
-    def receive(self, timeout_s: float) -> Any:
-        self._wait(timeout_s)
         t_ns, piece = self._arrived.popleft()
         return replace(piece, t_ns=t_ns) if isinstance(piece, CanFrame) else Received(piece, t_ns)
 
