@@ -3,7 +3,7 @@
 :class:`GuardProcess` is what the rig holds. The process is spawned in a session of its own, so that Ctrl-C at the
 terminal does not reach it; SIGINT and SIGHUP are ignored, SIGTERM means: retreat, and leave. One thread takes requests
 of the rig, then looks once, and so on; it waits for the rig nowhere. Requests and answers are lines of JSON, numbered;
-every answer also has the samples and events since the last one.
+lines without a number bring samples and events as they come.
 
 When the rig dies, the process retreats, writes so to its log and leaves. It notices by the end of the socket, by its
 parent's number, or, whatever holds the socket open and whether the rig is dead or only hangs, by the age of the last
@@ -62,6 +62,8 @@ ARM_S = 180.0
 """Within which the axes are homed and retracted."""
 OPEN_S = 1.0
 """For so long a port is tried that another process still holds (assumed; free 5 ms after that was killed, measured)."""
+MOST_BYTES = 1 << 20
+"""Under way to a rig that does not take them: some 5 s of a force sensor at 1 kHz."""
 IDLE_S = 0.05
 """Wait for the rig's first words, and its last."""
 
@@ -145,7 +147,7 @@ _COLUMNS = {"t_ns": "int64", "data": "", "quality": "uint8", "sequence": "int64"
 class GuardProcess:
     """A guard in a process of its own, as its rig sees it: the same methods as :class:`~.guard.LocalGuard`.
 
-    Once it is lost, all that ask it raise GuardLostError. Samples, events and counts are those of its last answer.
+    Once it is lost, all that ask it raise GuardLostError. Samples, events and counts are those that have come.
 
     Parameters
     ----------
@@ -214,11 +216,14 @@ class GuardProcess:
         return self._report("beat", self._patience_s, beat)
 
     def advance(self, until_ns: int) -> None:
-        """Wait until the clock says so much; then take what has come."""
+        """Wait until the clock says so much, and take what comes meanwhile."""
         self._present()
-        while (left_ns := until_ns - self._clock()) > 0:
-            self._receive(1e-9 * left_ns)
-        self._ask("take", self._patience_s)
+        left_ns = 1
+        while left_ns > 0:
+            left_ns = until_ns - self._clock()
+            self._receive(max(0.0, 1e-9 * left_ns))
+            while self._said() is not None:
+                pass
 
     def force_blocks(self) -> list[Block]:
         """Return all force samples since the last call."""
@@ -278,7 +283,7 @@ class GuardProcess:
         self._number, self._asked = self._number + 1, what
         with suppress(OSError):  # what reads fails then, too
             self._socket.sendall(_line([self._number, what, body]))
-        while (said := self._said()) is None or said["number"] != self._number:  # else to an interrupted request
+        while (said := self._said()) is None or said.get("number") != self._number:
             if said is None and not self._receive(max(0.0, 1e-9 * (until_ns - self._clock()))):
                 self._fail(f"it has not answered within {within_s:.3f} s")
         if "error" in said:
@@ -299,7 +304,7 @@ class GuardProcess:
         return True
 
     def _said(self) -> Any:
-        """Return the next answer that has come, and keep what it brings; None: none has come whole."""
+        """Return the next line that has come, and keep what it brings; None: none has come whole."""
         line, end, rest = self._rest.partition(b"\n")
         if not end:
             return None
@@ -373,6 +378,7 @@ class _Server:
             guard = self._guard
             if guard is not None:
                 guard.look(LOOK_S)
+                self._bring(guard)
             else:
                 self._rest(IDLE_S)
             if self._left():
@@ -423,11 +429,21 @@ class _Server:
                 said["answer"] = self._answer(what, body)
             except TactbenchError as error:
                 said["error"] = type(error).__name__, error.message, error.hint
-            if (guard := self._guard) is not None:
-                said["force"] = list(map(_columns, guard.force_blocks()))
-                said["motor"] = list(map(_columns, guard.motor_blocks()))
-                said["events"] = list(map(asdict, guard.events()))
-                said["counts"] = guard.counts()
+            if self._guard is not None:
+                self._bring(self._guard)  # before the answer that may rest on it
+                said["counts"] = self._guard.counts()
+            self._out += _line(said)
+
+    def _bring(self, guard: LocalGuard) -> None:
+        """Send samples and events that have come; what a rig does not take stays with the guard."""
+        if len(self._out) > MOST_BYTES:
+            return
+        said = {
+            "force": list(map(_columns, guard.force_blocks())),
+            "motor": list(map(_columns, guard.motor_blocks())),
+            "events": list(map(asdict, guard.events())),
+        }
+        if any(said.values()):
             self._out += _line(said)
 
     def _answer(self, what: str, body: Any) -> Any:
@@ -440,8 +456,6 @@ class _Server:
         guard = self._guard
         if guard is None:
             raise GuardRefusesError("The guard was not started.", hint="Use start().")
-        if what == "take":  # what every answer brings
-            return None
         given = [] if body is None else [_read({"arm": Limits, "beat": Beat}[what], body)]
         return asdict(getattr(guard, what)(*given))
 

@@ -56,10 +56,12 @@ def test_a_press_goes_in_holds_and_comes_out(kind, tmp_path):
         assert press.phase == "over", press.reports[-1]
         assert press.reports[-1].state is GuardState.ARMED
         assert made.world.largest_n == pytest.approx(made.setting.setpoint_n, abs=0.3)
-        blocks, moved = made.guard.force_blocks(), made.guard.motor_blocks()
+        armed_ns = press.reports[0].t_ns
+        blocks = [block for block in made.guard.force_blocks() if block.t_ns[0] >= armed_ns]
+        moved = made.guard.motor_blocks()
         numbers = np.concatenate([block.sequence for block in blocks])
         forces = np.concatenate([block.data for block in blocks])
-        # Raw and whole: every sample since the start, in order, as the sensor gave them.
+        # Raw and whole: every sample since it was armed, in order, as the sensor gave them.
         assert (np.diff(numbers) == 1).all()
         assert forces.shape[1] == 6
         assert forces[:, 2].max() == pytest.approx(made.world.largest_n, abs=0.05)
