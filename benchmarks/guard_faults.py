@@ -101,6 +101,19 @@ class Setting:
         return float(limits.force_ceiling_n + self.stiffness_n_m * (limits.step_m + STATED["corridor_m"]) + 5 * NOISE_N)
 
 
+class ListeningMotor(MotorEmulator):
+    """Keeps what it is told, each piece with its second."""
+
+    def __init__(self, *given: Any, **more: Any) -> None:
+        super().__init__(*given, **more)
+        self.told: list[tuple[float, bytes]] = []
+
+    def feed(self, piece: Any, now_s: float) -> Any:
+        """Take what came from the host."""
+        self.told.append((now_s, piece))
+        return super().feed(piece, now_s)
+
+
 class Pressed:
     """A motor in front of a spring, a force sensor behind it, both emulated, and what they have been through.
 
@@ -123,7 +136,7 @@ class Pressed:
         self._places: deque[tuple[float, float]] = deque(maxlen=20_000)
         self.sensed: Callable[[list[float], float], list[float]] = lambda wrench, at_s: wrench
         rng = np.random.default_rng(setting.seed)
-        self.motor = MotorEmulator(
+        self.motor = ListeningMotor(
             self._load,
             np.random.default_rng(setting.seed + 1),
             profile=build_profile(),
@@ -148,7 +161,6 @@ class Pressed:
                 "force": EmulatedDevice("datagram", self.force, tuple(faults.get("force_link", ()))),
             },
             time=setting.time,
-            keep_log=True,
         )
         self.clock = self.devices.clock
 

@@ -217,11 +217,11 @@ def _watched(world: Any, since_s: float, most_s: float) -> tuple[float, float, b
         host_late_s = max(host_late_s, time.perf_counter() - asked_s - 2e-3)
         out = abs(world.position_m - faults.RETREAT_M) < 10e-6
     sent = b""
-    for passed in world.devices.log_of("motor"):
-        if passed.sender == "host" and passed.t_s >= since_s:
-            sent += passed.piece
+    for at_s, piece in world.motor.told:
+        if at_s >= since_s:
+            sent += piece
             if command.split(b"\r")[0] + b"\r" in sent:
-                late_s = passed.t_s - since_s
+                late_s = at_s - since_s
                 break
     return late_s, host_late_s, out
 

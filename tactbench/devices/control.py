@@ -5,16 +5,15 @@ A beat is a step of the press, so a controller that hangs is a beat that does no
 
 from __future__ import annotations
 
-import signal
 import threading
 from collections import deque
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager, suppress
+from contextlib import suppress
 from dataclasses import replace
-from types import FrameType
 
 from tactbench.core.errors import TactbenchError
 from tactbench.core.samples import Block
+from tactbench.devices.driver import error_text
 from tactbench.devices.guard_messages import Event, Limits, Report
 from tactbench.devices.guard_process import Guard
 from tactbench.devices.press import Press
@@ -22,8 +21,6 @@ from tactbench.links.link import Clock
 
 STOP_S = 10.0
 """The thread is waited for so long (assumed: a control period, and what a guard in another process takes to answer)."""
-COUNTED_NS = 250_000_000
-"""After which the guard's counts are asked for again."""
 
 
 class Control:
@@ -66,7 +63,8 @@ class Control:
         """Control periods that began more than one period late."""
         self._guard, self._limits, self._received, self._clock = guard, limits, received, clock
         self._period_ns, self._stale_ns = round(1e9 * period_s), round(1e9 * stale_s)
-        self._report = armed
+        self.report = armed
+        """What the guard answered last."""
         self._beats = 0
         self._rows, self._rows_ns = -1, clock()
         self._next_ns = self._rows_ns + self._period_ns
@@ -77,12 +75,6 @@ class Control:
         self._stop = ""
         self._thread: threading.Thread | None = None
         self._counts: Mapping[str, Mapping[str, int]] = {}
-        self._counted_ns = 0
-
-    @property
-    def report(self) -> Report:
-        """What the guard answered last."""
-        return self._report
 
     def blocks(self) -> Iterator[Block]:
         """Yield what force sensor and motor have sent and was not yet yielded."""
@@ -95,16 +87,11 @@ class Control:
             yield self._events.popleft()
 
     def carry(self, until_ns: int) -> None:
-        """Let time go on until a nanosecond of the clock, beating whenever it is due: for virtual time.
-
-        A Ctrl-C is raised between two periods: within one, a command may be out whose answer would be another's.
-        """
+        """Let time go on until a nanosecond of the clock, beating whenever it is due: for virtual time."""
         while self._next_ns <= until_ns:
-            with _interrupts_deferred():
-                self._guard.advance(self._next_ns)
-                self._period()
-        with _interrupts_deferred():
-            self._guard.advance(until_ns)
+            self._guard.advance(self._next_ns)
+            self._period()
+        self._guard.advance(until_ns)
 
     def start(self) -> None:
         """Beat from a thread of its own, until :meth:`stop`: for real time."""
@@ -128,12 +115,10 @@ class Control:
             self._thread.join(STOP_S)
         with suppress(TactbenchError):  # a guard that is lost has nothing more to say
             self._gather()
-            self._counts = self._guard.counts()
 
     def counts(self) -> Mapping[str, Mapping[str, int]]:
-        """Return what guard, motor and force sensor have counted: beside the thread at most 0.25 s old."""
-        alone = self._thread is None and not self._over.is_set()
-        return self._guard.counts() if alone else self._counts
+        """Return what guard, motor and force sensor had counted in the last control period."""
+        return self._counts
 
     def _run(self) -> None:
         try:
@@ -141,7 +126,7 @@ class Control:
                 self._guard.advance(self._next_ns)
                 self._period()
         except Exception as error:
-            self.press.fail(_error_text(error))
+            self.press.fail(error_text(error))
             self.press.abandon()
 
     def _gather(self) -> None:
@@ -151,9 +136,7 @@ class Control:
             self._raw += self._pressing(block)
         self._blocks.extend(self._guard.motor_blocks())
         self._events.extend(self._guard.events())
-        # Kept here: one thread alone may use the guard.
-        if self._thread is not None and self._clock() - self._counted_ns >= COUNTED_NS:
-            self._counts, self._counted_ns = self._guard.counts(), self._clock()
+        self._counts = self._guard.counts()
 
     def _pressing(self, block: Block) -> list[tuple[float, float]]:
         assert block.t_ns is not None
@@ -177,35 +160,11 @@ class Control:
         if now_ns - self._rows_ns > self._stale_ns:
             press.fail(f"the sensor has sent nothing for {1e-6 * (now_ns - self._rows_ns):.0f} ms")
         try:
-            beat = press.step(self._report, raw, 1e-9 * now_ns)
+            beat = press.step(self.report, raw, 1e-9 * now_ns)
         except TactbenchError as error:
-            press.fail(_error_text(error))
-            beat = press.step(self._report, (), 1e-9 * now_ns)
+            press.fail(error_text(error))
+            beat = press.step(self.report, (), 1e-9 * now_ns)
         self._beats += 1
-        number = self._report.force_sequence
+        number = self.report.force_sequence
         beat = replace(beat, sequence=self._beats, t_ns=now_ns, state=str(press.state), force_sequence=number)
-        self._report = self._guard.beat(beat)
-
-
-@contextmanager
-def _interrupts_deferred() -> Iterator[None]:
-    """Leave a Ctrl-C to its handler at the end; only the main thread handles any.
-
-    A signal mask would not do: another thread takes the signal, and Python calls the handler here all the same.
-    """
-    if threading.current_thread() is not threading.main_thread():
-        yield
-        return
-    came: list[tuple[int, FrameType | None]] = []
-    handler = signal.signal(signal.SIGINT, lambda *one: came.append(one))
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGINT, handler)
-    if came and callable(handler):
-        handler(*came[0])
-
-
-def _error_text(error: Exception) -> str:
-    text = error.message if isinstance(error, TactbenchError) else f"{type(error).__name__}: {error}"
-    return text.rstrip(".")
+        self.report = self._guard.beat(beat)

@@ -1,14 +1,17 @@
-"""What a driver is: one device behind one link, read in blocks."""
+"""What a driver is: one device behind one link, read in blocks; its options, and what its own tools have logged."""
 
 from __future__ import annotations
 
 import time
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from types import TracebackType
-from typing import Any, Self
+from pathlib import Path
+from typing import Any, Literal, Self, TypeVar
 
+from pydantic import BaseModel, ConfigDict, ValidationError
+
+from tactbench.core.errors import TactbenchError, UnknownNameError, UsageError
 from tactbench.core.samples import Block
 from tactbench.core.spec.sensor import StreamSpec
 from tactbench.links.link import Clock, Link
@@ -43,11 +46,10 @@ class Driver(ABC):
         """What it reads, as it is set up now; rates as far as they are known."""
 
     @property
-    @abstractmethod
     def counts(self) -> Mapping[str, int]:
         """What was counted since it was opened, by name: parity errors, frames lost … An empty one: all was well."""
+        return {}
 
-    @abstractmethod
     def identify(self) -> Mapping[str, str]:
         """Return what the device says of itself (model, serial, firmware), to be asked before :meth:`start`.
 
@@ -56,6 +58,7 @@ class Driver(ABC):
         LinkTimeout, LinkUnplugged, RigError
             If it does not answer, or is another device.
         """
+        return {}
 
     @abstractmethod
     def start(self) -> None:
@@ -97,7 +100,79 @@ class Driver(ABC):
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.close()
+
+
+def error_text(error: Exception) -> str:
+    """Return what an error says, without a full stop; of one that is not the program's own with its kind."""
+    text = error.message if isinstance(error, TactbenchError) else f"{type(error).__name__}: {error}"
+    return text.rstrip(".")
+
+
+class Options(BaseModel):
+    """Options of one device, the same for its driver and its emulator."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+
+
+_Model = TypeVar("_Model", bound=BaseModel)
+_Link = TypeVar("_Link", bound=Link)
+
+
+def read_options(kind: type[_Model], given: Mapping[str, Any], device: str) -> _Model:
+    """Return what is given as a model.
+
+    Raises
+    ------
+    UsageError
+        For an option that is not known, is missing, has no such value, or contradicts another.
+    """
+    for name in given:
+        if name not in kind.model_fields:
+            raise UnknownNameError(f"option of {device}", name, kind.model_fields)
+    try:
+        return kind.model_validate(dict(given))
+    except ValidationError as error:
+        first = error.errors(include_url=False)[0]
+        name = ".".join(map(str, first["loc"]))
+        what = f"The option {name!r} of {device}" if name else f"What is said of {device}"
+        problem = "is missing" if first["type"] == "missing" else f"is wrong: {first['msg']}"
+        raise UsageError(
+            f"{what} {problem.replace('Value error, ', '')}.", hint="See docs/hardware.md, The rig file."
+        ) from error
+
+
+def read_file(path: str, what: str) -> bytes:
+    """Return the bytes of a file that an option names; raises UsageError if it cannot be read."""
+    try:
+        return Path(path).expanduser().read_bytes()
+    except OSError as error:
+        raise UsageError(f"{what} cannot be read: {error}.", hint="Check the path in the rig file.") from error
+
+
+def open_for(settings: DriverSettings, device: str, kind: type[_Link], example: str) -> _Link:
+    """Return the open link of a driver; raises UsageError if it is of another kind, LinkError if it does not open."""
+    link = settings.open_link()
+    if not isinstance(link, kind):
+        link.close()
+        raise UsageError(f"{device} cannot be spoken to through {link.address}.", hint=f"Use a link like {example}.")
+    return link
+
+
+@dataclass(frozen=True)
+class DeviceLog:
+    """The contents of one log."""
+
+    streams: tuple[StreamSpec, ...]
+    """What `blocks` are of: the streams of the sensor's spec that the log has, perhaps with fewer channels."""
+    blocks: Sequence[Block]
+    """In time order within each stream."""
+    clock: Literal["device", "host", "nominal", "none"]
+    """Who made the times: the device, the host that wrote the log, row number by rate, or nobody."""
+    started: str = ""
+    """When the log was begun, as the file states it; empty if it does not."""
+    remarks: tuple[str, ...] = ()
+    """What a reader of a score from it must know."""
+    counts: Mapping[str, int] = field(default_factory=dict)
+    """What was counted on the way in, by name."""

@@ -2,10 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+import dataclasses
+import math
+from abc import ABC, abstractmethod
+from collections import Counter, deque
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, Protocol, TypeAlias
+from typing import TYPE_CHECKING, Any, ClassVar, Protocol, Self, TypeAlias
 
+from tactbench.core.errors import UnknownNameError, UsageError
+from tactbench.core.spec.sensor import StreamSpec
 from tactbench.links.can_link import CanFrame
 
 if TYPE_CHECKING:
@@ -51,4 +57,146 @@ class EmulatorSettings:
     options: Mapping[str, Any] = field(default_factory=dict)
     """Those of the rig file's entry, which the driver gets as well: board numbers, periods, rates."""
     faults: Sequence[str] = ()
-    """Faults, as :meth:`~tactbench.devices.fault.Fault.parse` reads them."""
+    """Faults, as :meth:`~tactbench.devices.emulator.Fault.parse` reads them."""
+
+
+@dataclass(frozen=True)
+class Fault:
+    """A fault from `start_s` until before `end_s`, seconds of the clock that the emulator is given.
+
+    A device's own faults are a frozen subclass with :attr:`known`, and fields of its own for their details.
+
+    Raises
+    ------
+    UsageError
+        For a name that the device does not have, or `every` below 1.
+    """
+
+    known: ClassVar[Mapping[str, str]] = {}
+    """Names of a device's faults, and what they do."""
+
+    name: str
+    start_s: float = -math.inf
+    end_s: float = math.inf
+    every: int = 1
+    """Of the words, frames, lines or datagrams that it could concern: each n-th."""
+
+    def __post_init__(self) -> None:
+        if self.name not in self.known:
+            raise UnknownNameError("fault", self.name, self.known)
+        if self.every < 1:
+            raise UsageError(f"The fault {self.name!r} cannot concern every {self.every}.", hint="Give 1 or more.")
+
+    @classmethod
+    def parse(cls, text: str) -> Self:
+        """Return the fault that ``name`` or ``name:key=value,key=value`` describes, as a rig file writes it.
+
+        Keys are the fields of the class, values are numbers or text; several values of one key are joined by ``+``.
+
+        Raises
+        ------
+        UsageError
+            If name or key is unknown, or a value is not what the field holds.
+        """
+        name, _, rest = text.partition(":")
+        fields = {one.name: str(one.type) for one in dataclasses.fields(cls) if one.name != "name"}
+        given: dict[str, Any] = {}
+        for key, _, value in (part.partition("=") for part in rest.split(",") if part):
+            if key not in fields:
+                raise UnknownNameError(f"key of the fault {name!r}", key, fields)
+            kind = fields[key].partition("[")[0]
+            try:
+                given[key] = _READERS.get(kind.partition(" ")[0], str)(value)
+            except ValueError:
+                raise UsageError(f"The fault {text!r} has {value!r} for {key}.", hint=f"{key} is {kind}.") from None
+        return cls(name, **given)
+
+    def active(self, now_s: float) -> bool:
+        """Return whether it is on."""
+        return self.start_s <= now_s < self.end_s
+
+
+_READERS: Mapping[str, Callable[[str], Any]] = {
+    "frozenset": lambda text: frozenset(text.split("+")),
+    "float": float,
+    "int": lambda text: int(text, 0),
+}
+"""By the annotation of a field: what reads its text."""
+
+
+def fault_concerns(faults: Iterable[Fault], name: str, now_s: float, seen: Counter[Fault]) -> bool:
+    """Return whether a fault `name` concerns the next word, line or datagram; `seen` counts those it could concern."""
+    concerned = [fault for fault in faults if fault.name == name and fault.active(now_s)]
+    seen.update(concerned)
+    return any(seen[fault] % fault.every == 0 for fault in concerned)
+
+
+class RowEmulator(ABC):
+    """The far end of a :class:`~tactbench.devices.row_driver.RowDriver`'s link; it knows no faults of its own.
+
+    Raises
+    ------
+    UsageError
+        For a fault.
+    """
+
+    stream: ClassVar[StreamSpec]
+    """What it senses."""
+    rate_hz: ClassVar[float] = 0.0
+    """Rows a second while it samples; 0: only when it is asked."""
+    from_power_on: ClassVar[bool] = False
+    """Whether it samples without being told to."""
+    answer_s: ClassVar[float] = 1e-3
+    """Seconds that an answer takes; above 0, or the time of a host that asks again at once would stand still."""
+
+    def __init__(self, settings: EmulatorSettings) -> None:
+        for fault in settings.faults:
+            Fault.parse(fault)
+        self.settings = settings
+        self._since_s = 0.0 if self.from_power_on else math.inf
+        self._rows = 0
+        self._answers: deque[Sent] = deque()
+
+    @abstractmethod
+    def sent(self, values: Sequence[float]) -> Iterable[bytes | CanFrame]:
+        """Return a row as it leaves the device: bytes, datagrams or CAN frames."""
+
+    def told(self, piece: bytes | CanFrame, now_s: float) -> Iterable[bytes | CanFrame]:
+        """Return the answer to what the host sent; :meth:`sample` may be called here."""
+        return ()
+
+    def sample(self, now_s: float, on: bool = True) -> None:
+        """Begin to sample now, or end."""
+        self._since_s, self._rows = (now_s if on else math.inf), 0
+
+    def sensed(self, now_s: float) -> list[float]:
+        """Return what the channels read: their rest level where nobody says more."""
+        felt = self.settings.senses(now_s)
+        return [felt.get(one.name, 0.0 if one.rest is None else one.rest.to(one.unit)) for one in self.stream.channels]
+
+    @property
+    def bytes_per_s(self) -> float:
+        """What it sends while it samples, by its rate and the length of a row: a baud rate must carry that."""
+        return self.rate_hz * sum(len(piece) for piece in self.sent(self.sensed(0.0)) if isinstance(piece, bytes))
+
+    def feed(self, piece: bytes | CanFrame, now_s: float) -> Sequence[Sent]:
+        """Take what came from the host."""
+        before = self.poll(now_s)
+        self._answers.extend((now_s + self.answer_s, answer) for answer in self.told(piece, now_s))
+        return before
+
+    def poll(self, now_s: float) -> Sequence[Sent]:
+        """Return the rows that are due."""
+        found: list[Sent] = []
+        while (due_s := self.next_s()) <= now_s:
+            if self._answers and self._answers[0][0] <= due_s:
+                found.append(self._answers.popleft())
+            else:
+                found += [(due_s, piece) for piece in self.sent(self.sensed(due_s))]
+                self._rows += 1
+        return found
+
+    def next_s(self) -> float:
+        """Return when the next row or answer is due."""
+        row_s = self._since_s + (self._rows + 1) / self.rate_hz if self.rate_hz else math.inf
+        return min(row_s, self._answers[0][0]) if self._answers else row_s

@@ -18,6 +18,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
@@ -71,33 +72,6 @@ class ForceLaw:
         ):
             if wrong:
                 raise UsageError(f"The force loop cannot be stepped: {problem}.", hint="Correct its numbers.")
-
-    @classmethod
-    def of(cls, loop: ForceLoop, length: str = "m", *, period_s: float | None = None, **limits: Any) -> Self:
-        """Return the law of a declared loop with lengths in a unit.
-
-        Parameters
-        ----------
-        loop
-            Gains, filter and rate.
-        length
-            Unit of lengths.
-        period_s
-            T; None: the loop states its rate.
-        **limits
-            `speed`, `windup_s`, `travel` and `feed_forward`.
-        """
-        if period_s is None:
-            if loop.rate is None:
-                raise UsageError("The force loop's rate is not stated.", hint="State how often the motor is commanded.")
-            period_s = 1 / loop.rate.to("Hz")
-        return cls(
-            period_s=period_s,
-            proportional=loop.proportional.to(f"{length}/N"),
-            integral=loop.integral.to(f"{length}/N/s"),
-            cutoff_hz=None if loop.cutoff is None else loop.cutoff.to("Hz"),
-            **limits,
-        )
 
     def kept(self, passed_s: float) -> float:
         """Return a: what the filter keeps of its past after a time."""
@@ -205,9 +179,32 @@ class LoopModel:
 
     @classmethod
     def of(cls, loop: ForceLoop, length: str = "m", *, period_s: float | None = None, **limits: Any) -> Self:
-        """Return the model of a declared loop; parameters as those of :meth:`ForceLaw.of`."""
+        """Return the model of a declared loop with lengths in a unit.
+
+        Parameters
+        ----------
+        loop
+            Gains, filter, rate and motor.
+        length
+            Unit of lengths.
+        period_s
+            T; None: the loop states its rate.
+        **limits
+            `speed`, `windup_s`, `travel` and `feed_forward` of the law.
+        """
+        if period_s is None:
+            if loop.rate is None:
+                raise UsageError("The force loop's rate is not stated.", hint="State how often the motor is commanded.")
+            period_s = 1 / loop.rate.to("Hz")
+        law = ForceLaw(
+            period_s=period_s,
+            proportional=loop.proportional.to(f"{length}/N"),
+            integral=loop.integral.to(f"{length}/N/s"),
+            cutoff_hz=None if loop.cutoff is None else loop.cutoff.to("Hz"),
+            **limits,
+        )
         return cls.around(
-            ForceLaw.of(loop, length, period_s=period_s, **limits),
+            law,
             lag_s=loop.motor_lag.to("s"),
             delay_s=loop.delay.to("s"),
             speed=loop.speed.to(f"{length}/s"),
@@ -246,23 +243,17 @@ class LoopModel:
     def largest_stiffness(self) -> float:
         """Return the least stiffness [N / length] at which the loop no longer settles; infinite: there is none.
 
-        Loop gains k (kp + ki T) from 1e-4 to 1e3 are scanned in steps of 2 %, then the crossing is halved to 1e-6 of
-        itself. Only k kp and k ki count, so the largest stable gains at another stiffness are in inverse proportion.
+        Loop gains k (kp + ki T) from 1e-4 to 1e3 are scanned in steps of 2 %. Only k kp and k ki count, so the largest
+        stable gains at another stiffness are in inverse proportion.
         """
+        from scipy.optimize import brentq
+
         law = self.law
-        softer = 1e-4 / (law.proportional + law.integral * law.period_s)
-        most = 1e7 * softer
-        while self.growth(softer) < 1:
-            stiffer = 1.02 * softer
-            if stiffer > most:
-                return math.inf
+        scanned = 1e-4 / (law.proportional + law.integral * law.period_s) * 1.02 ** np.arange(815)
+        for softer, stiffer in pairwise(scanned.tolist()):
             if self.growth(stiffer) >= 1:
-                while stiffer - softer > 1e-6 * softer:
-                    middle = 0.5 * (softer + stiffer)
-                    softer, stiffer = (middle, stiffer) if self.growth(middle) < 1 else (softer, middle)
-                return stiffer
-            softer = stiffer
-        return softer
+                return float(brentq(lambda stiffness: self.growth(stiffness) - 1, softer, stiffer, rtol=1e-6))
+        return math.inf
 
     def share_used(self, stiffness: float) -> float:
         """Return the part of the largest stable gain that the loop uses at a stiffness [N / length].

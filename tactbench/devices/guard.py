@@ -19,10 +19,10 @@ an axis whose controller does not answer, which ends its move by itself; a place
 from __future__ import annotations
 
 import math
-from collections import Counter
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager, suppress
-from typing import NoReturn
+from collections import Counter, deque
+from collections.abc import Callable, Mapping, MutableSequence
+from contextlib import suppress
+from typing import NoReturn, TypeVar
 
 from tactbench.core.errors import (
     LinkClosed,
@@ -34,8 +34,8 @@ from tactbench.core.errors import (
 )
 from tactbench.core.samples import Block
 from tactbench.core.spec.sensor import StreamSpec
-from tactbench.devices.driver import Driver
-from tactbench.devices.force_watch import ForceWatch, Problem
+from tactbench.devices.driver import Driver, error_text
+from tactbench.devices.force_watch import MOST_BLOCKS, ForceWatch, Problem
 from tactbench.devices.guard_messages import (
     Beat,
     CommandKind,
@@ -47,9 +47,12 @@ from tactbench.devices.guard_messages import (
     Trigger,
 )
 from tactbench.devices.positioner import Positioner, PositionerSilentError, power_off
-from tactbench.devices.sequence import SequenceCheck
 from tactbench.links.link import Clock
 
+T = TypeVar("T")
+
+FORCE = "force"
+"""What the force sensor is called beside the axes."""
 LOOK_S = 1e-3
 """Longest wait between two looks: the sampling period of the force."""
 SCHEDULING_S = 6e-3
@@ -92,12 +95,17 @@ class LocalGuard:
     clock
         That of all.
     advance
-        Lets time pass until a nanosecond of the clock; used only where no device's link can be waited for.
+        Lets time pass until a nanosecond of the clock; used only where the force sensor's link cannot be waited for.
     on_event
         Called with each event.
     interrupted
         Called while axes are homed: whether they shall stand.
     """
+
+    force_stream: StreamSpec
+    """The force sensor's stream, once it is started."""
+    motor_stream: StreamSpec
+    """The pressing axis' stream, likewise."""
 
     def __init__(
         self,
@@ -112,22 +120,20 @@ class LocalGuard:
         self.state = GuardState.IDLE
         self.trigger: Trigger | None = None
         self._axes = dict(axes)
-        self._name = next(iter(axes))
+        self._name, *others = axes
         self._press = axes[self._name]
-        self._others = {name: axis for name, axis in axes.items() if name != self._name}
+        self._others = {name: axes[name] for name in others}
         self._force, self._clock, self._advance = force, clock, advance
         self._on_event, self._interrupted = on_event, interrupted
         self._watch: ForceWatch | None = None
-        self._order = SequenceCheck()
         self._limits: Limits | None = None
-        self._force_blocks: list[Block] = []
-        self._motor_blocks: list[Block] = []
+        self._motor_blocks: deque[Block] = deque(maxlen=MOST_BLOCKS)
         self._events: list[Event] = []
         self._not_out = ""
         self._counts: Counter[str] = Counter()
         self._lost: set[str] = set()
         self._home_anew: set[str] = set()
-        self._force_lost = self._closed = False
+        self._closed = False
         self._beats = self._refused = 0
         self._beat_ns = 0
         self._end_sequence = -1
@@ -136,35 +142,27 @@ class LocalGuard:
 
     # What a rig asks for ----------------------------------------------------------------------------------------------
 
-    @property
-    def force_stream(self) -> StreamSpec:
-        """The force sensor's stream."""
-        (stream,) = self._force.streams
-        return stream
-
-    @property
-    def motor_stream(self) -> StreamSpec:
-        """The pressing axis' stream."""
-        (stream,) = self._press.streams
-        return stream
-
     def start(self) -> Mapping[str, Mapping[str, str]]:
         """Ask all devices who they are, and let them sample."""
         if len(self._force.streams) != 1:
             raise RigError("The guard needs a force sensor with one stream.")
         found = {}
-        for name, device in {**self._axes, "force": self._force}.items():
-            with _named(name):
+        for name, device in {**self._axes, FORCE: self._force}.items():
+            try:
                 found[name] = dict(device.identify())
                 device.start()
+            except TactbenchError as error:
+                error.message = f"{name}: {error.message}"
+                raise
+        (self.force_stream,), (self.motor_stream,) = self._force.streams, self._press.streams
         self._watch = ForceWatch(self.force_stream)
-        self._tell(None, "started")
+        self._say(None, "started")
         return found
 
     def arm(self, limits: Limits) -> Report:
         """Check, home what is not homed, retract the pressing axis, and begin to expect beats.
 
-        The first beat is due within `heartbeat_s`, and its sequence is 1.
+        The first beat is due within `heartbeat_s`, and its sequence is 1. Samples from before are dropped.
 
         Raises
         ------
@@ -179,16 +177,20 @@ class LocalGuard:
         for name, axis in self._axes.items():
             try:
                 self._make_ready(name, axis, limits)
-            except (RigError, LinkError) as error:
+            except Exception as error:
                 self._home_anew.add(name)
                 if isinstance(error, GuardRefusesError):
                     raise
-                raise GuardRefusesError(f"{name} is not armed: {error.message}", hint=error.hint) from error
+                hint = getattr(error, "hint", "")
+                raise GuardRefusesError(f"{name} is not armed: {error_text(error)}.", hint=hint) from error
         self.state, self._limits = GuardState.ARMED, limits
         self._beats, self._refused, self._touched = 0, 0, False
         self._end_sequence = self._seen_force.sequence
+        # What came while axes were homed may be a minute of samples: handing it over would take a beat's time.
+        self._seen_force.blocks.clear()
+        self._motor_blocks.clear()
         self._beat_ns = self._clock()
-        self._tell(None, "armed")
+        self._say(None, "armed")
         return self._report(0)
 
     def beat(self, beat: Beat) -> Report:
@@ -198,9 +200,8 @@ class LocalGuard:
             self._counts["beats"] += 1
             if beat.sequence != self._beats + 1:
                 expected = self._beats + 1
-                self._retreat(Trigger.BEAT_SEQUENCE, f"beat {beat.sequence} came, {expected} was expected")
-            elif beat.t_ns - self._beat_ns > 1e9 * limits.heartbeat_s:
-                self._retreat(*self._late(beat.t_ns, limits))
+                self.trip(Trigger.BEAT_SEQUENCE, f"beat {beat.sequence} came, {expected} was expected")
+            self._see_beat(beat.t_ns, limits)
             self._beats, self._beat_ns = beat.sequence, min(beat.t_ns, self._clock())
         self.look(0.0)
         # What this look has found stands before the command.
@@ -212,9 +213,9 @@ class LocalGuard:
         elif reason:
             self._counts["refused"] += 1
             self._refused += 1
-            self._tell(None, f"refused in {beat.state or 'no state'}: {reason}")
+            self._say(None, f"refused in {beat.state or 'no state'}: {reason}")
             if self._refused >= REFUSED:
-                self._retreat(Trigger.COMMANDS_REFUSED, f"{REFUSED} in a row, the last because {reason}")
+                self.trip(Trigger.COMMANDS_REFUSED, f"{REFUSED} in a row, the last because {reason}")
         elif beat.command is not CommandKind.NONE:
             self._refused = 0
         return self._report(beat.sequence, reason, early=early)
@@ -226,49 +227,40 @@ class LocalGuard:
 
     def force_blocks(self) -> list[Block]:
         """Return all force samples since the last call, but for those that came twice or after newer ones."""
-        found, self._force_blocks = self._force_blocks, []
-        return found
+        return [] if self._watch is None else taken(self._watch.blocks)
 
     def motor_blocks(self) -> list[Block]:
         """Return all states of the pressing axis since the last call."""
-        found, self._motor_blocks = self._motor_blocks, []
-        return found
+        return taken(self._motor_blocks)
 
     def events(self) -> list[Event]:
         """Return what has happened since the last call."""
-        found, self._events = self._events, []
-        return found
+        return taken(self._events)
 
     def counts(self) -> Mapping[str, Mapping[str, int]]:
-        """Return the drivers' counts, and the guard's ``beats``, ``early``, ``refused``, ``retreats_sent``.
+        """Return the drivers' counts, and the guard's ``beats``, ``early``, ``refused``.
 
         To the force sensor's the guard adds ``duplicates`` and ``late`` samples, kept out, and ``gaps``, missing.
         """
-        order = self._order
-        kept_out = {"duplicates": order.duplicates, "late": order.late, "gaps": order.gaps}
-        force = {**self._force.counts, **{name: count for name, count in kept_out.items() if count}}
+        force = Counter(self._force.counts)
+        if self._watch is not None:
+            order = self._watch.order
+            force.update(duplicates=order.duplicates, late=order.late, gaps=order.gaps)
         axes = {name: dict(axis.counts) for name, axis in self._axes.items()}
-        return {"force": force, **axes, "guard": dict(self._counts)}
+        return {FORCE: {name: count for name, count in force.items() if count}, **axes, "guard": dict(self._counts)}
 
     def disarm(self) -> Report:
         """Retreat if the pressing axis is not at its place, and expect no more beats; a fault is cleared."""
-        if self.state is GuardState.ARMED and (self._moving or not self._retracted):
-            self._retreat(Trigger.COMMANDED, "disarmed")
+        if self._moving or not self._retracted:
+            self.trip(Trigger.COMMANDED, "disarmed")
         while self.state is GuardState.RETREATING:
             self.look(LOOK_S)
         if self.state is not GuardState.IDLE:
             self.state = GuardState.IDLE
-            self._tell(None, "disarmed")
+            self._say(None, "disarmed")
         self._limits, self.trigger = None, None
         report, self._not_out = self._report(0), ""
         return report
-
-    def abandon(self) -> None:
-        """Close the axes' links and send nothing more: before :meth:`Positioner.rescue` by others."""
-        for name, axis in self._axes.items():
-            axis.close()
-            self._lost.add(name)
-        self.state = GuardState.FAULT
 
     def close(self) -> None:
         """Disarm, and close all devices; once closed, this does nothing."""
@@ -292,23 +284,16 @@ class LocalGuard:
         limits = self._limits
         if limits is None:
             return
-        if self.state is GuardState.ARMED:
-            now_ns = self._clock()
-            late = now_ns - self._beat_ns > 1e9 * limits.heartbeat_s
-            problem = problem or (self._late(now_ns, limits) if late else None)
-            if problem is not None:
-                self._retreat(*problem)
-            elif self._into_skin and self._press.moving and self._seen_force.touched(limits.touch_n):
-                self._into_skin, self._touched = False, True
-                self._halt(self._press)
-                self._tell(None, "touch: the axis holds")
+        if problem is not None:
+            self.trip(*problem)
+        self._see_beat(self._clock(), limits)
+        touched = self._into_skin and self._press.moving and self._seen_force.touched(limits.touch_n)
+        if self.state is GuardState.ARMED and touched:
+            self._into_skin, self._touched = False, True
+            self._halt(self._press)
+            self._say(None, "touch: the axis holds")
         if self.state is GuardState.RETREATING:
             self._carry_on()
-
-    def trip(self, trigger: Trigger, text: str) -> None:
-        """Retreat for a reason from outside; nothing if the guard is not armed."""
-        if self.state is GuardState.ARMED:
-            self._retreat(trigger, text)
 
     @property
     def _seen_force(self) -> ForceWatch:
@@ -324,54 +309,49 @@ class LocalGuard:
     def _retracted(self) -> bool:
         return self._press.at(self._press.facts.retreat)
 
-    def _late(self, now_ns: int, limits: Limits) -> Problem:
+    def _see_beat(self, now_ns: int, limits: Limits) -> None:
+        """Retreat if the last beat is too old."""
         age_s = 1e-9 * (now_ns - self._beat_ns)
-        return Trigger.BEAT_OLD, f"no beat for {1e3 * age_s:.1f} ms, {1e3 * limits.heartbeat_s:.1f} may be"
+        if age_s > limits.heartbeat_s:
+            self.trip(Trigger.BEAT_OLD, f"no beat for {1e3 * age_s:.1f} ms, {1e3 * limits.heartbeat_s:.1f} may be")
 
     def _seen(self, timeout_s: float, limits: Limits | None, *, travelling: bool) -> Problem | None:
         """Take what all devices have sent; return the first thing that is wrong, of the force first."""
         problem = self._take_force(timeout_s, limits, travelling=travelling)
-        wait_s = timeout_s if self._force_lost else 0.0
-        if wait_s and self._name in self._lost:
-            self._advance(self._clock() + round(1e9 * wait_s))
-            wait_s = 0.0
         for name, axis in self._axes.items():
-            found = self._take_axis(name, axis, wait_s if axis is self._press else 0.0, limits)
+            found = self._take_axis(name, axis, limits)
             problem = problem or found
         return problem
 
     def _take_force(self, timeout_s: float, limits: Limits | None, *, travelling: bool = True) -> Problem | None:
-        watch, problem = self._seen_force, None
-        if self._force_lost:
+        if FORCE in self._lost:
+            self._advance(self._clock() + round(1e9 * timeout_s))
             return None if limits is None else (Trigger.FORCE_LOST, "the force sensor is gone")
+        watch, problem = self._seen_force, None
         try:
             blocks = self._force.read(timeout_s)
-        except (LinkError, RigError) as error:
-            self._force_lost = True
-            return Trigger.FORCE_LOST, error.message
+        except Exception as error:
+            self._lost.add(FORCE)
+            return Trigger.FORCE_LOST, error_text(error)
         for block in blocks:
-            newer = self._order(block)
-            if newer is not None:
-                self._force_blocks.append(newer)
-            found = watch.take(block, newer, limits, travelling=travelling)
+            found = watch.take(block, limits, travelling=travelling)
             problem = problem or found
         return problem or (None if limits is None else watch.old(self._clock(), limits))
 
-    def _take_axis(self, name: str, axis: Positioner, timeout_s: float, limits: Limits | None) -> Problem | None:
+    def _take_axis(self, name: str, axis: Positioner, limits: Limits | None) -> Problem | None:
         if name in self._lost:
             return Trigger.AXIS_LOST, f"{name}: its link is gone"
         was_moving = axis.moving
         try:
-            blocks = axis.read(timeout_s)
-        except (LinkUnplugged, LinkClosed) as error:
-            self._lost.add(name)
-            return Trigger.AXIS_LOST, f"{name}: {error.message}"
-        except (PositionerSilentError, LinkTimeout) as error:
+            blocks = axis.read(0.0)
+        except Exception as error:
+            text = f"{name}: {error_text(error)}"
+            if isinstance(error, LinkUnplugged | LinkClosed):
+                self._lost.add(name)
+                return Trigger.AXIS_LOST, text
             self._home_anew.add(name)
-            return Trigger.AXIS_SILENT, f"{name}: {error.message}"
-        except RigError as error:
-            self._home_anew.add(name)
-            return Trigger.AXIS_FAULT, f"{name}: {error.message}"
+            silent = isinstance(error, PositionerSilentError | LinkTimeout)
+            return Trigger.AXIS_SILENT if silent else Trigger.AXIS_FAULT, text
         if axis is self._press:
             self._motor_blocks += blocks
             if was_moving and not axis.moving:
@@ -389,7 +369,7 @@ class LocalGuard:
             case CommandKind.NONE:
                 return "", False
             case CommandKind.RETREAT:
-                self._retreat(Trigger.COMMANDED, "the rig has commanded it")
+                self.trip(Trigger.COMMANDED, "the rig has commanded it")
                 return "", False
             case CommandKind.STOP:
                 self._into_skin = False
@@ -406,8 +386,8 @@ class LocalGuard:
             return "an axis is moving", True
         if min(beat.force_sequence, self._seen_force.changed) <= self._end_sequence:
             return "no force sample is known from after the last move", True
+        self._into_skin = self._touched = False
         press = self._press
-        before = press.state
         try:
             if beat.command is CommandKind.TRAVEL:
                 for name, target in beat.targets.items():
@@ -415,11 +395,10 @@ class LocalGuard:
             elif beat.command is CommandKind.STEP:
                 press.move_by(beat.distance_m)
             else:
+                self._into_skin = press.state is not None and beat.position_m > press.state.target
                 press.move_to(beat.position_m, beat.speed_m_s)
-        except RigError as error:
-            return error.message, False
-        into_skin = before is not None and beat.position_m > before.target
-        self._into_skin, self._touched = into_skin and beat.command is CommandKind.MOVE_TO, False
+        except Exception as error:  # of the axis' driver: whatever it is, it was not carried out
+            return error_text(error), False
         return "", False
 
     def _travel_reason(self, beat: Beat) -> str:
@@ -427,9 +406,7 @@ class LocalGuard:
         if not self._retracted or self._press.moving:
             return f"{self._name} is not retracted"
         for name, target in beat.targets.items():
-            if name not in self._others:
-                return f"{name} is no axis that travels"
-            low, high = self._others[name].facts.limits
+            low, high = self._others[name].facts.limits if name in self._others else (math.nan, math.nan)
             if not low <= target <= high:
                 return f"the target {target:g} m of {name} is outside its travel {low:g} to {high:g} m"
         return ""
@@ -442,66 +419,50 @@ class LocalGuard:
         is_step = beat.command is CommandKind.STEP
         target_m = state.target + beat.distance_m if is_step else beat.position_m
         low, high = limits.travel_m
-        longest_m = (self._steps(limits.step_m) + 0.5) * self._press.facts.resolution
-        for wrong, reason in (
-            (not low <= target_m <= high, f"the target {target_m:g} m is outside the travel {low:g} to {high:g} m"),
-            (
-                is_step and not abs(beat.distance_m) < longest_m,
-                f"a step of {beat.distance_m:g} m is longer than {limits.step_m:g} m",
-            ),
-            (
-                not is_step and not 0.0 < beat.speed_m_s <= limits.speed_m_s * (1 + 1e-9),
-                f"a speed of {beat.speed_m_s:g} m/s is not within {limits.speed_m_s:g} m/s",
-            ),
-            (
-                not is_step and target_m > state.target and not force_n < limits.touch_n,
-                f"it would move into the skin in contact, at {force_n:.3f} N",
-            ),
-        ):
-            if wrong:
-                return reason
+        if not low <= target_m <= high:
+            return f"the target {target_m:g} m is outside the travel {low:g} to {high:g} m"
+        if is_step:
+            resolution = self._press.facts.resolution
+            longest_m = (round(limits.step_m / resolution) + 0.5) * resolution
+            return "" if abs(beat.distance_m) < longest_m else f"a step of {beat.distance_m:g} m is longer than allowed"
+        if not 0.0 < beat.speed_m_s <= limits.speed_m_s * (1 + 1e-9):
+            return f"a speed of {beat.speed_m_s:g} m/s is not within {limits.speed_m_s:g} m/s"
+        if target_m > state.target and not force_n < limits.touch_n:
+            return f"it would move into the skin in contact, at {force_n:.3f} N"
         return ""
-
-    def _steps(self, distance_m: float) -> int:
-        """Return the whole steps of the pressing axis that a distance is rounded to."""
-        return round(abs(distance_m) / self._press.facts.resolution)
 
     def _halt(self, axis: Positioner) -> None:
         """Halt an axis; what fails of it becomes a retreat."""
         try:
             axis.halt()
-        except TactbenchError as error:
-            self._retreat(Trigger.AXIS_FAULT, error.message)
+        except Exception as error:
+            self.trip(Trigger.AXIS_FAULT, error_text(error))
 
     # Retreat ----------------------------------------------------------------------------------------------------------
 
-    def _retreat(self, trigger: Trigger, text: str) -> None:
-        """Begin a retreat; the first reason stands."""
-        if self._limits is None or self.state is not GuardState.ARMED:
+    def trip(self, trigger: Trigger, text: str) -> None:
+        """Begin a retreat, if the guard is armed; the first reason stands."""
+        if self.state is not GuardState.ARMED:
             return
         self.state, self.trigger = GuardState.RETREATING, trigger
         self._into_skin = False
         self._began_ns = self._clock()
         self._send_retreat()
-        self._tell(trigger, text)
+        self._say(trigger, text)
 
     def _send_retreat(self) -> None:
         """Halt the other axes that move, and send the pressing axis away from the skin."""
         self._sent_ns = self._clock()
-        self._counts["retreats_sent"] += 1
-        moving = [name for name, axis in self._others.items() if axis.moving]
-        for name in (*moving, self._name):
+        commands = {name: axis.halt for name, axis in self._others.items() if axis.moving}
+        for name, command in {**commands, self._name: self._press.retreat}.items():
             if name in self._lost:
                 continue
             try:
-                if name == self._name:
-                    self._press.retreat()
-                else:
-                    self._axes[name].halt()
+                command()
             except (LinkUnplugged, LinkClosed):
                 self._lost.add(name)
-            except TactbenchError:
-                self._counts["retreats_not_sent"] += 1
+            except Exception:  # it is sent again
+                continue
 
     def _carry_on(self) -> None:
         """See whether the pressing axis is there and the others stand; send it again, or end in a fault."""
@@ -509,7 +470,7 @@ class LocalGuard:
         took = f"{1e-9 * (now_ns - self._began_ns):.3f} s"
         fresh = press.state is not None and press.state.t_ns > self._sent_ns
         # An axis that is lost while it moves ends its move by itself, which nobody sees.
-        lost = sorted(name for name in self._lost if name == self._name or self._axes[name].moving)
+        lost = sorted(name for name in self._lost - {FORCE} if name == self._name or self._axes[name].moving)
         out = not press.moving and self._retracted and fresh
         others = any(axis.moving and name not in self._lost for name, axis in self._others.items())
         if lost and not others and (out or self._name in lost):
@@ -517,24 +478,19 @@ class LocalGuard:
         elif out and not others:
             self._end(None, f"out after {took}")
         elif now_ns > self._began_ns + 1e9 * retreat_seconds(press):
-            self._retreat_failed(took)
+            where = "nobody knows where" if math.isnan(press.position) else f"last seen at {press.position:g} m"
+            power = "power taken off" if power_off(press) else "left under power, since it may fall without"
+            self._end(Trigger.RETREAT_FAILED, f"RETREAT FAILED: not out after {took}, {where}; {power}: stand clear")
         elif not press.moving and now_ns - self._sent_ns > 1e9 * AGAIN_S:
             self._send_retreat()
-
-    def _retreat_failed(self, took: str) -> None:
-        place = self._press.position
-        where = "nobody knows where" if math.isnan(place) else f"last seen at {place:g} m"
-        taken = power_off(self._press)
-        power = "power taken off" if taken else "left under power, since it may fall without"
-        self._end(Trigger.RETREAT_FAILED, f"RETREAT FAILED: not out after {took}, {where}; {power}: stand clear")
 
     def _end(self, failed: Trigger | None, text: str) -> None:
         ordinary = failed is None and self.trigger in (Trigger.COMMANDED, Trigger.TERMINATED)
         self.state = GuardState.RETREATED if ordinary else GuardState.FAULT
         if failed is not None:
             self._home_anew.update(self._lost, [self._name])
-        self._not_out = "" if failed is None else text
-        self._tell(failed, text)
+            self._not_out = text
+        self._say(failed, text)
 
     # Arming -----------------------------------------------------------------------------------------------------------
 
@@ -556,7 +512,7 @@ class LocalGuard:
             (not low <= facts.retreat < high, "the place to retreat to is not within the travel, away from its end"),
             (facts.corridor > limits.step_m, "the axis' corridor is longer than a step"),
             (len(limits.zero) != len(channels), f"the force has {len(channels)} channels and {len(limits.zero)} zeros"),
-            (self._force_lost or self._lost, "a device is gone: close the guard and open a new one"),
+            (self._lost, "a device is gone: close the guard and open a new one"),
         ):
             if wrong:
                 raise GuardRefusesError(f"The guard does not arm: {problem}.", hint="See docs/hardware.md, Safety.")
@@ -574,7 +530,7 @@ class LocalGuard:
         while problem is None and self._clock() < until_ns:
             problem = self._take_force(LOOK_S, limits)
             for name, axis in self._axes.items():
-                self._take_axis(name, axis, 0.0, None)
+                self._take_axis(name, axis, None)
         if problem is not None:
             raise GuardRefusesError(
                 f"The guard does not arm: {problem[0]}: {problem[1]}.",
@@ -587,17 +543,17 @@ class LocalGuard:
 
         def stop() -> bool:
             nonlocal problem
-            problem = problem or self._take_force(0.0, limits)
-            if problem is None and self._interrupted():
-                problem = Trigger.TERMINATED, "interrupted"
+            problem = problem or self._take_force(0.0, limits) or self._interruption()
             return problem is not None
 
         if name in self._home_anew or not (axis.homed or axis.find_home()):
-            self._tell(None, f"homing {name}")
+            self._say(None, f"homing {name}")
             try:
                 axis.home(stop)
-            except (RigError, LinkError) as error:
-                self._homing_failed(name, *(problem or (Trigger.HOMING, error.message)))
+            except Exception as error:
+                with suppress(Exception):
+                    axis.halt()
+                self._homing_failed(name, *(problem or (Trigger.HOMING, error_text(error))))
         axis.confirm()
         if not axis.enabled:
             axis.enable()
@@ -611,30 +567,29 @@ class LocalGuard:
         deadline_ns = self._clock() + round(1e9 * retreat_seconds(press))
         press.retreat()
         sent_ns = self._clock()
-        while True:
-            problem = self._seen(LOOK_S, limits, travelling=True)
-            if problem is None and self._interrupted():
-                problem = Trigger.TERMINATED, "interrupted"
+        while press.moving or not self._retracted or press.state is None or press.state.t_ns <= sent_ns:
+            problem = self._seen(LOOK_S, limits, travelling=True) or self._interruption()
             if problem is None and self._clock() > deadline_ns:
                 problem = Trigger.HOMING, "it has not come to its place of retreat in its time"
             if problem is not None:
                 with suppress(TactbenchError):
                     press.halt()
                 self._homing_failed(self._name, *problem)
-            if not press.moving and self._retracted and press.state is not None and press.state.t_ns > sent_ns:
-                return
+
+    def _interruption(self) -> Problem | None:
+        return (Trigger.TERMINATED, "interrupted") if self._interrupted() else None
 
     def _homing_failed(self, name: str, trigger: Trigger, text: str) -> NoReturn:
         self.state, self.trigger = GuardState.FAULT, Trigger.HOMING
-        self._tell(Trigger.HOMING, f"{name}: {trigger}: {text}")
+        self._say(Trigger.HOMING, f"{name}: {trigger}: {text}")
         raise GuardRefusesError(
             f"{name} stands where it was homed or retracted: {trigger}: {text}",
             hint="See what the indenter touches; then disarm, and arm again.",
         )
 
-    # Telling ----------------------------------------------------------------------------------------------------------
+    # Saying -----------------------------------------------------------------------------------------------------------
 
-    def _tell(self, trigger: Trigger | None, text: str) -> None:
+    def _say(self, trigger: Trigger | None, text: str) -> None:
         force_n = math.nan if self._watch is None else self._watch.force_n
         event = Event(self._clock(), self.state, trigger, force_n, self._press.position, text)
         self._events.append(event)
@@ -667,11 +622,8 @@ def retreat_seconds(press: Positioner) -> float:
     return (high - low) / press.facts.retreat_speed + RETREAT_S
 
 
-@contextmanager
-def _named(name: str) -> Iterator[None]:
-    """Say which device an error is of: there may be several of a kind."""
-    try:
-        yield
-    except TactbenchError as error:
-        error.message = f"{name}: {error.message}"
-        raise
+def taken(kept: MutableSequence[T]) -> list[T]:
+    """Empty a list, and return what was in it."""
+    found = list(kept)
+    kept.clear()
+    return found

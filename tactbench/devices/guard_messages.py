@@ -125,12 +125,11 @@ class Limits:
         ]  # fmt: skip
         low, high = self.travel_m
         for wrong, problem in (
-            (not all(map(math.isfinite, [low, high, *self.zero, *positive])), "a number is not finite"),
-            (not all(value > 0 for value in positive), "a ceiling, step, speed or time is not positive"),
-            (not low < high, "the travel ends before it begins"),
+            (not all(0 < value < math.inf for value in positive), "a ceiling, step, speed or time is not positive"),
+            (not -math.inf < low < high < math.inf, "the travel ends before it begins"),
             (not self.touch_n < self.force_ceiling_n, "the touch's force is not below the ceiling"),
             (self.travel_ceiling_n > self.force_ceiling_n, "the ceiling of travel is above that of pressing"),
-            (not self.step_m <= high - low, "a step is longer than the travel"),
+            (not all(map(math.isfinite, self.zero)), "a zero is not finite"),
             (not 0 <= self.channel < len(self.zero), "the pressing channel has no zero"),
             (self.sign not in (-1, 1), "the sign is neither 1 nor -1"),
         ):
@@ -142,9 +141,9 @@ class Limits:
 class Beat:
     """What a rig says once a control period: that it is there, and what shall be done."""
 
-    sequence: int
+    sequence: int = 0
     """One more than the one before; the first after `arm` is 1."""
-    t_ns: int
+    t_ns: int = 0
     """When it was made."""
     state: str = ""
     """Of the press, for the log."""

@@ -1,9 +1,9 @@
 """The guard in a process of its own: it alone has the links of axes and force sensor, and outlives its rig.
 
 :class:`GuardProcess` is what the rig holds. The process is spawned in a session of its own, so that Ctrl-C at the
-terminal does not reach it; SIGINT and SIGHUP are ignored, SIGTERM means: retreat, and leave. One thread takes messages
-of the rig, then looks once, and so on. It waits for the rig nowhere; what the rig does not take is kept up to a bound,
-then dropped and counted.
+terminal does not reach it; SIGINT and SIGHUP are ignored, SIGTERM means: retreat, and leave. One thread takes requests
+of the rig, then looks once, and so on; it waits for the rig nowhere. Requests and answers are lines of JSON, numbered;
+lines without a number bring samples and events as they come.
 
 When the rig dies, the process retreats, writes so to its log and leaves. It notices by the end of the socket, by its
 parent's number, or, whatever holds the socket open and whether the rig is dead or only hangs, by the age of the last
@@ -11,7 +11,7 @@ beat. When the process dies or does not answer a beat within heartbeat_s, the ri
 and sends the same retreat, as long as the rig calls :meth:`GuardProcess.beat` or :meth:`GuardProcess.advance`. If both
 die, axes end the move that is out, and hold.
 
-Needs sessions, signals and packet sockets of Linux.
+Needs sessions and signals of POSIX.
 """
 
 from __future__ import annotations
@@ -20,28 +20,29 @@ import gc
 import json
 import math
 import os
-import pickle
+import pkgutil
 import select
 import signal
 import socket
 import subprocess
 import sys
 import time
-import traceback
-from collections import deque
 from collections.abc import Mapping
-from contextlib import suppress
+from contextlib import ExitStack, suppress
 from dataclasses import asdict, dataclass, field
 from functools import partial
-from importlib import import_module
 from pathlib import Path
-from typing import IO, Any, NoReturn, TypeAlias
+from typing import Any, NoReturn, TypeAlias
 
+import numpy as np
+from pydantic import TypeAdapter
+
+from tactbench.core import errors
 from tactbench.core.errors import LinkClosed, LinkError, RigError, TactbenchError, UsageError
 from tactbench.core.samples import Block
 from tactbench.core.spec.sensor import StreamSpec
 from tactbench.devices.driver import DriverSettings
-from tactbench.devices.guard import LOOK_S, LocalGuard, retreat_seconds
+from tactbench.devices.guard import LOOK_S, LocalGuard, retreat_seconds, taken
 from tactbench.devices.guard_messages import (
     Beat,
     Event,
@@ -61,13 +62,8 @@ ARM_S = 180.0
 """Within which the axes are homed and retracted."""
 OPEN_S = 1.0
 """For so long a port is tried that another process still holds (assumed; free 5 ms after that was killed, measured)."""
-MOST_BLOCKS = 50_000
-"""Of samples kept for a rig that does not take them: some 50 s of a force sensor at 1 kHz."""
-MOST_MESSAGES = 2000
-"""Reports and events kept for it."""
-ROWS = 1000
-"""The most rows of a packet."""
-PACKET = 1 << 18
+MOST_BYTES = 1 << 20
+"""Under way to a rig that does not take them: some 5 s of a force sensor at 1 kHz."""
 IDLE_S = 0.05
 """Wait for the rig's first words, and its last."""
 
@@ -84,8 +80,7 @@ class DeviceSettings:
 
     def open(self, clock: Clock) -> Any:
         """Return the driver."""
-        module, _, name = self.driver.partition(":")
-        build = getattr(import_module(module), name)
+        build = pkgutil.resolve_name(self.driver)
         return build(DriverSettings(partial(open_link, self.link, clock), options=self.options, clock=clock))
 
 
@@ -142,10 +137,17 @@ def _opened(settings: DeviceSettings, clock: Clock) -> Any:
             time.sleep(1e-3)
 
 
+_KINDS: dict[type, TypeAdapter[Any]] = {
+    kind: TypeAdapter(kind) for kind in (ProcessSettings, Limits, Beat, Report, Event)
+}
+_COLUMNS = {"t_ns": "int64", "data": "", "quality": "uint8", "sequence": "int64", "device_ns": "int64"}
+"""Of a block, and their types; that of `data` is the stream's."""
+
+
 class GuardProcess:
     """A guard in a process of its own, as its rig sees it: the same methods as :class:`~.guard.LocalGuard`.
 
-    Once it is lost, all raise GuardLostError.
+    Once it is lost, all that ask it raise GuardLostError. Samples, events and counts are those that have come.
 
     Parameters
     ----------
@@ -155,22 +157,29 @@ class GuardProcess:
     Raises
     ------
     UsageError
-        If this system has no packet sockets.
+        If this system is not POSIX.
     """
 
+    force_stream: StreamSpec
+    """The force sensor's stream, once it is started."""
+    motor_stream: StreamSpec
+    """The pressing axis' stream, likewise."""
+
     def __init__(self, settings: ProcessSettings) -> None:
-        if not hasattr(socket, "SOCK_SEQPACKET") or os.name != "posix":
-            raise UsageError("The guard's process needs sessions, signals and sockets of POSIX.", hint="Use Linux.")
+        if os.name != "posix":
+            raise UsageError("The guard's process needs sessions and signals of POSIX.", hint="Use Linux.")
         self._settings = settings
         self._clock = settings.clock()
         self._limits: Limits | None = None
-        self._arming = self._closed = False
+        self._asked = ""
+        self._closed = False
         self._lost: GuardLostError | None = None
-        self._streams: tuple[StreamSpec, StreamSpec] | None = None
-        self._answer: tuple[type[TactbenchError] | None, Any] | None = None
-        self._held: dict[str, list[Block]] = {"force": [], "motor": []}
+        self._blocks: dict[str, list[Block]] = {"force": [], "motor": []}
         self._events: list[Event] = []
-        self._socket, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+        self._counts: Mapping[str, Mapping[str, int]] = {}
+        self._number = 0
+        self._rest = b""
+        self._socket, theirs = socket.socketpair()
         with theirs, Path(settings.log).open("ab") as errors:
             self._process = subprocess.Popen(
                 [sys.executable, "-P", "-m", __name__, str(theirs.fileno())],
@@ -180,77 +189,61 @@ class GuardProcess:
                 stdout=errors,
                 stderr=errors,
             )
-        self._socket.setblocking(False)
 
     @property
     def pid(self) -> int:
         """Number of the process."""
         return self._process.pid
 
-    @property
-    def force_stream(self) -> StreamSpec:
-        """The force sensor's stream."""
-        return self._started()[0]
-
-    @property
-    def motor_stream(self) -> StreamSpec:
-        """The pressing axis' stream."""
-        return self._started()[1]
-
     def start(self) -> Mapping[str, Mapping[str, str]]:
         """Let the process open all devices."""
-        identity, self._streams = self._ask("start", START_S, self._settings, os.getpid())
-        found: Mapping[str, Mapping[str, str]] = identity
-        return found
+        found = self._ask("start", START_S, asdict(self._settings))
+        self.force_stream, self.motor_stream = map(StreamSpec.model_validate, found["streams"])
+        identity: Mapping[str, Mapping[str, str]] = found["identity"]
+        return identity
 
     def arm(self, limits: Limits) -> Report:
         """Check, home, retract."""
-        self._limits, self._arming = limits, True
+        self._limits = limits
         try:
-            report: Report = self._ask("arm", ARM_S, limits)
+            return self._report("arm", ARM_S, limits)
         except GuardRefusesError:
             self._limits = None
             raise
-        finally:
-            self._arming = False
-        return report
 
     def beat(self, beat: Beat) -> Report:
         """Send a beat and wait for its report, some milliseconds."""
-        report: Report = self._ask("beat", ARM_S if self._limits is None else self._limits.heartbeat_s, beat)
-        return report
+        return self._report("beat", self._patience_s, beat)
 
     def advance(self, until_ns: int) -> None:
-        """Wait until the clock says so much."""
+        """Wait until the clock says so much, and take what comes meanwhile."""
         self._present()
-        while (left_ns := until_ns - self._clock()) > 0:
-            self._take(1e-9 * left_ns)
+        left_ns = 1
+        while left_ns > 0:
+            left_ns = until_ns - self._clock()
+            self._receive(max(0.0, 1e-9 * left_ns))
+            while self._said() is not None:
+                pass
 
     def force_blocks(self) -> list[Block]:
         """Return all force samples since the last call."""
-        return self._kept("force")
+        return taken(self._blocks["force"])
 
     def motor_blocks(self) -> list[Block]:
         """Return all states of the pressing axis since the last call."""
-        return self._kept("motor")
+        return taken(self._blocks["motor"])
 
     def events(self) -> list[Event]:
         """Return what has happened since the last call."""
-        if self._lost is None and not self._closed:
-            self._take(0.0)
-        found, self._events = self._events, []
-        return found
+        return taken(self._events)
 
     def counts(self) -> Mapping[str, Mapping[str, int]]:
-        """Return the counts; of the guard also ``rows_dropped``: samples that this end did not take in time."""
-        found: Mapping[str, Mapping[str, int]] = self._ask(
-            "counts", START_S if self._limits is None else self._limits.heartbeat_s
-        )
-        return found
+        """Return the counts."""
+        return self._counts
 
     def disarm(self) -> Report:
         """Retreat if the pressing axis is not out, and expect no more beats."""
-        report: Report = self._ask("disarm", ARM_S)
+        report = self._report("disarm", ARM_S)
         self._limits = None
         return report
 
@@ -260,9 +253,8 @@ class GuardProcess:
             return
         self._closed = True
         with suppress(OSError):
-            self._socket.send(pickle.dumps(("close", ())))
+            self._socket.send(_line([0, "close", None]))
         try:
-            # What it still sends is not waited for: it drops it.
             self._process.wait(ARM_S)
         except subprocess.TimeoutExpired:
             self._process.kill()
@@ -270,10 +262,9 @@ class GuardProcess:
         finally:
             self._socket.close()
 
-    def _started(self) -> tuple[StreamSpec, StreamSpec]:
-        if self._streams is None:
-            raise GuardRefusesError("The guard was not started.", hint="Use start().")
-        return self._streams
+    @property
+    def _patience_s(self) -> float:
+        return START_S if self._limits is None else self._limits.heartbeat_s
 
     def _present(self) -> None:
         if self._lost is not None:
@@ -281,53 +272,49 @@ class GuardProcess:
         if self._closed:
             raise GuardRefusesError("The guard is closed.", hint="Open a new one.")
 
-    def _ask(self, kind: str, within_s: float, *body: Any) -> Any:
-        """Send a message and return its answer; raises what the process says that it raised, or GuardLostError."""
+    def _report(self, what: str, within_s: float, body: Limits | Beat | None = None) -> Report:
+        report: Report = _read(Report, self._ask(what, within_s, body and asdict(body)))
+        return report
+
+    def _ask(self, what: str, within_s: float, body: Any = None) -> Any:
+        """Send a request and return its answer; raises what the process says that it raised, or GuardLostError."""
         self._present()
-        self._answer = None
-        try:
-            # A full socket means that nobody reads at the other end.
-            self._socket.send(pickle.dumps((kind, body)))
-        except OSError as error:
-            self._fail(f"it does not take a message ({error})")
         until_ns = self._clock() + round(1e9 * within_s)
-        while self._answer is None:
-            left_s = 1e-9 * (until_ns - self._clock())
-            if left_s <= 0.0:
+        self._number, self._asked = self._number + 1, what
+        with suppress(OSError):  # what reads fails then, too
+            self._socket.sendall(_line([self._number, what, body]))
+        while (said := self._said()) is None or said.get("number") != self._number:
+            if said is None and not self._receive(max(0.0, 1e-9 * (until_ns - self._clock()))):
                 self._fail(f"it has not answered within {within_s:.3f} s")
-            self._take(left_s)
-        error_kind, found = self._answer
-        if error_kind is not None:
-            message, hint = found
-            raise error_kind(message, hint=hint)
-        return found
+        if "error" in said:
+            kind, message, hint = said["error"]
+            raise getattr(errors, kind, GuardRefusesError)(message, hint=hint)
+        return said["answer"]
 
-    def _take(self, timeout_s: float) -> None:
-        """Take what the process has sent, waiting for it at most so long; raises GuardLostError if it is gone."""
-        select.select([self._socket], [], [], timeout_s)
-        while True:
-            data = b""
-            try:
-                data = self._socket.recv(PACKET)
-            except BlockingIOError:
-                return
-            except ConnectionError:
-                pass
-            if not data:
-                self._fail("its socket is closed")
-            kind, body = pickle.loads(data)
-            if kind in self._held:
-                self._held[kind].append(body)
-            elif kind == "event":
-                self._events.append(body)
-            else:
-                self._answer = body
+    def _receive(self, timeout_s: float) -> bool:
+        """Take what comes within a time; return whether anything did; raises GuardLostError if the process is gone."""
+        if not select.select([self._socket], [], [], timeout_s)[0]:
+            return False
+        data = b""
+        with suppress(ConnectionError):
+            data = self._socket.recv(1 << 20)
+        if not data:
+            self._fail("its socket is closed")
+        self._rest += data
+        return True
 
-    def _kept(self, kind: str) -> list[Block]:
-        if self._lost is None and not self._closed:
-            self._take(0.0)
-        found, self._held[kind] = self._held[kind], []
-        return found
+    def _said(self) -> Any:
+        """Return the next line that has come, and keep what it brings; None: none has come whole."""
+        line, end, rest = self._rest.partition(b"\n")
+        if not end:
+            return None
+        self._rest = rest
+        said = json.loads(line)
+        for name, kept in self._blocks.items():
+            kept += [_block(getattr(self, f"{name}_stream"), columns) for columns in said.get(name, ())]
+        self._events += [_read(Event, event) for event in said.get("events", ())]
+        self._counts = said.get("counts", self._counts)
+        return said
 
     def _fail(self, why: str) -> NoReturn:
         """End the process and let the pressing axis retreat from here; raises GuardLostError, now and ever after."""
@@ -336,7 +323,7 @@ class GuardProcess:
         outcome, trigger = "no axis was armed, nothing was sent", Trigger.GUARD_LOST
         try:
             if self._limits is not None:
-                outcome = self._settings.rescue(self._clock, retreat=not self._arming)
+                outcome = self._settings.rescue(self._clock, retreat=self._asked != "arm")
         except TactbenchError as error:
             trigger = Trigger.RETREAT_FAILED
             outcome = f"RETREAT FAILED: {error.message} Stand clear, and cut the axes' supply"
@@ -352,21 +339,35 @@ Guard: TypeAlias = LocalGuard | GuardProcess
 """What a rig drives its axes through: in its own process, or in one of its own."""
 
 
+def _read(kind: type, said: Any) -> Any:
+    return _KINDS[kind].validate_python(said)
+
+
+def _line(said: Any) -> bytes:
+    return json.dumps(said, default=float).encode() + b"\n"  # numpy's numbers, too
+
+
+def _columns(block: Block) -> dict[str, Any]:
+    return {name: column.tolist() for name in _COLUMNS if (column := getattr(block, name)) is not None}
+
+
+def _block(stream: StreamSpec, columns: Mapping[str, Any]) -> Block:
+    types = {**_COLUMNS, "data": stream.dtype}
+    found: Any = {name: np.array(column, types[name]) for name, column in columns.items()}
+    return Block(stream.name, **{"t_ns": None, **found})
+
+
 class _Server:
     """The process' loop, around a guard."""
 
     def __init__(self, to_rig: socket.socket) -> None:
         self._socket = to_rig
         to_rig.setblocking(False)
-        self._messages: deque[bytes] = deque(maxlen=MOST_MESSAGES)
-        self._blocks: deque[bytes] = deque()
+        self._in = self._out = b""
         self._guard: LocalGuard | None = None
-        self._settings: ProcessSettings | None = None
         self._clock: Clock = time.monotonic_ns
-        self._log: IO[str] | None = None
-        self._parent: int | None = None
-        self._alone = self._over = self._said_why = self._arming = False
-        self._dropped_rows = 0
+        self._parent = os.getppid()
+        self._alone = self._over = False
         self.terminated = False
 
     def run(self) -> None:
@@ -375,165 +376,120 @@ class _Server:
             self._hear()
             self._flush()
             guard = self._guard
-            if guard is None:
-                if self._left():
-                    return
+            if guard is not None:
+                guard.look(LOOK_S)
+                self._bring(guard)
+            else:
                 self._rest(IDLE_S)
-                continue
-            guard.look(LOOK_S)
-            self._forward(guard)
             if self._left():
-                self._tell_why(guard)
+                if guard is None:
+                    return
+                if self.terminated:
+                    guard.trip(Trigger.TERMINATED, "the guard's process was told to end")
+                guard.trip(Trigger.RIG_LOST, "the rig's process has ended")
                 if guard.state not in (GuardState.ARMED, GuardState.RETREATING):
                     return
 
     def close(self) -> None:
-        """Close the devices and the log."""
+        """Close the devices."""
         if self._guard is not None:
             with suppress(TactbenchError):
                 self._guard.close()
-            self._write({"left": self._clock(), "rows_dropped": self._dropped_rows})
-        self._flush()
-        if self._log is not None:
-            self._log.close()
-
-    def rescue(self) -> None:
-        """After an error within the guard: write it down; armed, the pressing axis retreats, else all stand."""
-        self._write({"internal_error": traceback.format_exc()})
-        guard, settings = self._guard, self._settings
-        armed = guard is not None and guard.state in (GuardState.ARMED, GuardState.RETREATING)
-        if guard is None or settings is None or not (armed or self._arming):
-            return
-        guard.abandon()
-        with suppress(TactbenchError):
-            self._write({"rescued": settings.rescue(self._clock, retreat=armed and not self._arming)})
+            _log({"left": self._clock()})
 
     def _left(self) -> bool:
         """Return whether the process is to end."""
-        if self._parent is not None and os.getppid() != self._parent:
-            self._alone = True
+        self._alone |= os.getppid() != self._parent
         return self._alone or self.terminated
-
-    def _tell_why(self, guard: LocalGuard) -> None:
-        if self._said_why:
-            return
-        self._said_why = True
-        if self.terminated:
-            guard.trip(Trigger.TERMINATED, "the guard's process was told to end")
-        else:
-            guard.trip(Trigger.RIG_LOST, "the rig's process has ended")
-        self._write({"leaving": self._clock(), "terminated": self.terminated, "rig_lost": self._alone})
 
     def _rest(self, seconds: float) -> None:
         select.select([] if self._alone else [self._socket], [], [], max(0.0, seconds))
 
-    def _interrupted(self) -> bool:
-        """Return whether homing is to end: called between two answers of an axis."""
+    def _receive(self) -> None:
         with suppress(BlockingIOError):
             try:
-                self._alone |= self._socket.recv(1, socket.MSG_PEEK) == b""
+                while data := self._socket.recv(1 << 16):
+                    self._in += data
             except ConnectionError:
-                self._alone = True
+                pass
+            self._alone = True
+
+    def _interrupted(self) -> bool:
+        """Return whether homing is to end: called between two answers of an axis."""
+        self._receive()
         return self._left()
 
     def _hear(self) -> None:
-        while not self._alone:
+        self._receive()
+        *lines, self._in = self._in.split(b"\n")
+        for line in lines:
+            number, what, body = json.loads(line)
+            said: dict[str, Any] = {"number": number}
             try:
-                data = self._socket.recv(PACKET)
-            except BlockingIOError:
-                return
-            except ConnectionError:
-                data = b""
-            if not data:
-                self._alone = True
-                return
-            self._carry_out(*pickle.loads(data))
+                said["answer"] = self._answer(what, body)
+            except TactbenchError as error:
+                said["error"] = type(error).__name__, error.message, error.hint
+            if self._guard is not None:
+                self._bring(self._guard)  # before the answer that may rest on it
+                said["counts"] = self._guard.counts()
+            self._out += _line(said)
 
-    def _carry_out(self, kind: str, body: tuple[Any, ...]) -> None:
-        if kind == "close":
-            self._over = True
+    def _bring(self, guard: LocalGuard) -> None:
+        """Send samples and events that have come; what a rig does not take stays with the guard."""
+        if len(self._out) > MOST_BYTES:
             return
-        self._arming = kind == "arm"
-        if self._arming:
-            self._dropped_rows = 0  # of the time between two scenes
-        try:
-            if kind == "start":
-                found: Any = self._start(*body)
-            elif self._guard is None:
-                raise GuardRefusesError("The guard was not started.", hint="Use start().")
-            else:
-                found = getattr(self._guard, kind)(*body)
-            if kind == "counts":
-                found["guard"]["rows_dropped"] = self._dropped_rows
-        except TactbenchError as error:
-            self._say("answer", (type(error), (error.message, error.hint)))
-        else:
-            self._say("answer", (None, found))
-        self._arming = False
+        said = {
+            "force": list(map(_columns, guard.force_blocks())),
+            "motor": list(map(_columns, guard.motor_blocks())),
+            "events": list(map(asdict, guard.events())),
+        }
+        if any(said.values()):
+            self._out += _line(said)
 
-    def _start(self, settings: ProcessSettings, parent: int) -> Any:
-        self._parent, self._settings, self._clock = parent, settings, settings.clock()
-        self._log = Path(settings.log).open("a", encoding="utf-8", buffering=1)  # noqa: SIM115  (closed in `close`)
-        self._write({"started": self._clock(), "unix_ns": time.time_ns(), "pid": os.getpid()})
-        opened: dict[str, Any] = {}
-        try:
-            for name, device in {**settings.axes, "force": settings.force}.items():
-                opened[name] = device.open(self._clock)
-            force = opened["force"]
+    def _answer(self, what: str, body: Any) -> Any:
+        """Carry out a request; return what is answered."""
+        if what == "close":
+            self._over = True
+            return None
+        if what == "start":
+            return self._start(_read(ProcessSettings, body))
+        guard = self._guard
+        if guard is None:
+            raise GuardRefusesError("The guard was not started.", hint="Use start().")
+        given = [] if body is None else [_read({"arm": Limits, "beat": Beat}[what], body)]
+        return asdict(getattr(guard, what)(*given))
+
+    def _start(self, settings: ProcessSettings) -> Any:
+        self._clock = settings.clock()
+        _log({"started": self._clock(), "unix_ns": time.time_ns(), "pid": os.getpid()})
+        with ExitStack() as opened:
             guard = LocalGuard(
-                {name: opened[name] for name in settings.axes},
-                force,
+                {name: opened.enter_context(axis.open(self._clock)) for name, axis in settings.axes.items()},
+                opened.enter_context(settings.force.open(self._clock)),
                 self._clock,
                 lambda until_ns: self._rest(1e-9 * (until_ns - self._clock())),
-                on_event=self._event,
+                on_event=lambda event: _log(asdict(event)),
                 interrupted=self._interrupted,
             )
             identity = guard.start()
-        except TactbenchError:
-            for driver in opened.values():
-                driver.close()
-            raise
+            opened.pop_all()
         self._guard = guard
         # What there is by now stays: collections have little to look at.
-        gc.collect()
         gc.freeze()
-        return identity, (guard.force_stream, guard.motor_stream)
-
-    def _event(self, event: Event) -> None:
-        self._say("event", event)
-        self._write(asdict(event))
-
-    def _say(self, kind: str, body: Any) -> None:
-        self._messages.append(pickle.dumps((kind, body)))
-        self._flush()
-
-    def _forward(self, guard: LocalGuard) -> None:
-        guard.events()
-        blocks = [("force", block) for block in guard.force_blocks()]
-        blocks += [("motor", block) for block in guard.motor_blocks()]
-        # In pieces that fit into a packet.
-        for kind, block in blocks:
-            for first in range(0, len(block.data), ROWS):
-                piece = block.rows(slice(first, first + ROWS))
-                if len(self._blocks) < MOST_BLOCKS:
-                    self._blocks.append(pickle.dumps((kind, piece)))
-                else:
-                    self._dropped_rows += len(piece.data)
+        streams = guard.force_stream, guard.motor_stream
+        return {"identity": identity, "streams": [stream.model_dump(mode="json") for stream in streams]}
 
     def _flush(self) -> None:
         with suppress(OSError):  # full, or nobody there
-            for waiting in (self._messages, self._blocks):
-                while waiting and not self._alone:
-                    self._socket.send(waiting[0])
-                    waiting.popleft()
-
-    def _write(self, entry: Mapping[str, Any]) -> None:
-        if self._log is not None:
-            with suppress(OSError):
-                self._log.write(json.dumps(entry) + "\n")
+            self._out = self._out[self._socket.send(self._out) :] if self._out else b""
 
 
-def main() -> int:
+def _log(entry: Mapping[str, Any]) -> None:
+    with suppress(OSError):  # a full disk holds nobody up
+        print(json.dumps(entry), flush=True)
+
+
+def main() -> None:
     """Run the process: ``python -m … SOCKET``, the number of an open socket."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGHUP, signal.SIG_IGN)
@@ -543,18 +499,9 @@ def main() -> int:
         server.terminated = True
 
     signal.signal(signal.SIGTERM, terminate)
-    try:
-        server.run()
-    except Exception:
-        server.rescue()
-        return 1
-    finally:
-        server.close()
-    return 0
+    server.run()
+    server.close()
 
 
 if __name__ == "__main__":
-    # Pickled classes are those of the module, not of __main__.
-    from tactbench.devices.guard_process import main as run
-
-    sys.exit(run())
+    main()

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 from abc import abstractmethod
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any, ClassVar, Literal, Self
 
@@ -14,8 +15,7 @@ from pydantic import Field, model_validator
 from tactbench.core.errors import LinkError, LinkTimeout, RigError
 from tactbench.core.samples import Block, Quality
 from tactbench.core.spec.sensor import ChannelSpec, StreamSpec
-from tactbench.devices.driver import Driver, DriverSettings
-from tactbench.devices.options import Options, open_for, read_options
+from tactbench.devices.driver import Driver, DriverSettings, Options, open_for, read_options
 from tactbench.links.byte_link import ByteLink
 from tactbench.links.link import Link
 
@@ -57,8 +57,6 @@ class PositionerFacts:
     """Whether `halt` and `retreat` end a move that is under way."""
     holds_unpowered: bool
     """Whether it stays where it is without power: a horizontal axis, a brake, a counterweight, a self-locking screw."""
-    keeps_place: bool
-    """Whether the controller can tell after a restart of this program that it is homed."""
     retreat: float = math.nan
     """Where it is away from the skin; NaN: it retreats by standing still."""
     retreat_speed: float = math.nan
@@ -116,12 +114,13 @@ class PositionerOptions(Options):
 
     @model_validator(mode="after")
     def _consistent(self) -> Self:
-        if (self.lower_m is None) != (self.upper_m is None):
+        low, high = self.lower_m, self.upper_m
+        if (low is None) != (high is None):
             raise ValueError("give both lower_m and upper_m, or none")
-        if self.lower_m is not None and self.upper_m is not None:
-            if not self.lower_m < self.upper_m:
+        if low is not None and high is not None:
+            if not low < high:
                 raise ValueError("lower_m is below upper_m")
-            if self.retreat_m is not None and not self.lower_m <= self.retreat_m <= self.upper_m:
+            if self.retreat_m is not None and not low <= self.retreat_m <= high:
                 raise ValueError("retreat_m is between lower_m and upper_m")
         return self
 
@@ -169,9 +168,8 @@ class Positioner(Driver):
     resolution_m: ClassVar[float] = math.nan
     """Least step."""
     stop_latency_s: ClassVar[float] = math.nan
-    """See :attr:`PositionerFacts.stop_latency_s`; likewise the next two."""
+    """See :attr:`PositionerFacts.stop_latency_s`; likewise the next."""
     interruptible: ClassVar[bool] = True
-    keeps_place: ClassVar[bool] = False
     stream = "motor"
 
     def __init__(self, settings: DriverSettings) -> None:
@@ -179,7 +177,8 @@ class Positioner(Driver):
         """Nanoseconds of the host."""
         self.options: Any = read_options(self.options_kind, settings.options, self.device)
         self.facts = self.facts_of(self.options)
-        self._state: PositionerState | None = None
+        self.state: PositionerState | None = None
+        """What was last read; None: nothing yet."""
         self._unread: list[PositionerState] = []
         self._moving = self._retreats = False
         self._goal = math.nan
@@ -202,7 +201,6 @@ class Positioner(Driver):
             stop_latency_s=cls.stop_latency_s,
             interruptible=cls.interruptible,
             holds_unpowered=options.holds_unpowered,
-            keeps_place=cls.keeps_place,
             retreat=_or(options.retreat_m, math.nan),
             retreat_speed=_or(options.retreat_speed_m_s, math.nan),
         )
@@ -247,7 +245,7 @@ class Positioner(Driver):
     def find_home(self) -> bool:
         """Ask the controller whether it is homed already, and set :attr:`homed` then: after a restart of this program.
 
-        False, and nothing asked, where :attr:`PositionerFacts.keeps_place` is false.
+        False, and nothing asked, unless a subclass knows how.
         """
         return False
 
@@ -328,7 +326,7 @@ class Positioner(Driver):
 
     def note(self, state: PositionerState) -> None:
         """Keep a state that was read."""
-        self._state = state
+        self.state = state
         self._unread.append(state)
         del self._unread[:-1000]
 
@@ -357,20 +355,15 @@ class Positioner(Driver):
         return self._moving
 
     @property
-    def state(self) -> PositionerState | None:
-        """What was last read; None: nothing yet."""
-        return self._state
-
-    @property
     def position(self) -> float:
         """The last position; NaN: not read yet."""
-        return math.nan if self._state is None else self._state.position
+        return math.nan if self.state is None else self.state.position
 
     def move_by(self, distance: float) -> float:
         """Begin to move from the last target by a distance, to the nearest step; return the new target."""
-        if self._state is None or math.isnan(self._state.target):
+        if self.state is None or math.isnan(self.state.target):
             raise NotReadyError("The axis does not know its target.", hint="Read it once it is at rest.")
-        return self.move_to(self._state.target + distance)
+        return self.move_to(self.state.target + distance)
 
     def at(self, position: float) -> bool:
         """Whether it was last read at a place."""
@@ -386,15 +379,6 @@ class Positioner(Driver):
         )
         return (StreamSpec(name=self.stream, channels=channels),)
 
-    @property
-    def counts(self) -> Mapping[str, int]:
-        """An empty mapping, unless a subclass counts something."""
-        return {}
-
-    def identify(self) -> Mapping[str, str]:
-        """Return an empty mapping, unless a subclass asks the controller."""
-        return {}
-
     def start(self) -> None:
         """Read the state once; a subclass sets its controller up first."""
         self.update(0.0)
@@ -402,11 +386,9 @@ class Positioner(Driver):
     def read(self, timeout_s: float) -> list[Block]:
         """Return the states that were read since the last call, and carry a move on; raises as :meth:`update`."""
         until_ns = self.clock() + round(1e9 * timeout_s)
-        while True:
-            left_s = max(0.0, 1e-9 * (until_ns - self.clock()))
-            self.update(left_s)
-            if self._unread or left_s == 0.0:
-                break
+        self.update(timeout_s)
+        while not self._unread and (left_ns := until_ns - self.clock()) > 0:
+            self.update(1e-9 * left_ns)
         states, self._unread = self._unread, []
         if not states:
             return []
@@ -431,10 +413,8 @@ def _or(value: float | None, otherwise: float) -> float:
 
 def power_off(axis: Positioner) -> bool:
     """Take an axis' power where it holds without; return whether that was done. Raises nothing."""
-    if not axis.facts.holds_unpowered:
-        return False
-    try:
-        axis.disable()
-    except (LinkError, RigError):
-        return False
-    return True
+    with suppress(LinkError, RigError):
+        if axis.facts.holds_unpowered:
+            axis.disable()
+            return True
+    return False

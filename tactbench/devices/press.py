@@ -14,17 +14,16 @@ guard looks at the raw force by itself, and retreats by itself.
 from __future__ import annotations
 
 import math
-from collections import deque
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
+from statistics import fmean
 
 from tactbench.devices.force_loop import ForceController, ForceLaw
 from tactbench.devices.guard_messages import Beat, CommandKind, GuardState, Report
 
-SWINGS = 6
-"""Half swings of the error in a row, each above the band of errors, after which the loop is said to swing (assumed:
-three whole swings)."""
+OFF_S = 1.0
+"""The force may be out of the band of errors for so long, less half of the time within it: a swing counts, too."""
 SLOW = 1.5
 """How many times as long as its way takes a move may last, and `SLACK_S` longer."""
 SLACK_S = 2.0
@@ -49,11 +48,6 @@ class PressState(StrEnum):
     RETREAT = "retreat"
     FAILED = "failed"
     """The motor is out, and :attr:`Press.ended` says why."""
-
-
-def _command(kind: CommandKind = CommandKind.NONE, **more: float) -> Beat:
-    """Return a beat that lacks its number, time and state."""
-    return Beat(0, 0, command=kind, **more)  # type: ignore[arg-type]
 
 
 @dataclass(frozen=True)
@@ -85,7 +79,7 @@ class PressPlan:
     lift_m: float
     """How far the axis goes back from there for the unloaded hold."""
     error_band_n: float
-    """Filtered force this far from the wanted one for a second: retreat. Also the least height of a growing swing."""
+    """Filtered force this far from the wanted one for `OFF_S`: retreat."""
     band_n: float
     """Filtered forces below it count as no force."""
     lost_s: float
@@ -142,8 +136,7 @@ class Press:
         self.error_n = math.nan
         self.setpoint_n = 0.0
         self._plan, self._course = plan, course
-        self._raw: deque[tuple[float, float]] = deque()
-        self._sum_n = 0.0
+        self._raw: list[tuple[float, float]] = []
         self._force_n = math.nan
         self._controller: ForceController | None = None
         self._stepped_s = 0.0
@@ -151,8 +144,7 @@ class Press:
         self._requested_s: float | None = None
         self._since_s = self._due_s = 0.0
         self._began_s: float | None = None
-        self._band_since_s = self._error_since_s = math.nan
-        self._swings, self._peak_n = 0, 0.0
+        self._lost_s = self._off_s = 0.0
         self._go = False
 
     # What a rig says --------------------------------------------------------------------------------------------------
@@ -219,25 +211,22 @@ class Press:
             case PressState.CONTACT | PressState.RAMP:
                 return self._regulated(report, now_s)
             case PressState.RETREAT:
-                return _command(CommandKind.RETREAT)
+                return Beat(command=CommandKind.RETREAT)
         return self._asking(report, now_s)
 
     def _take(self, raw: Sequence[tuple[float, float]], now_s: float) -> None:
         """Keep the raw forces of the last moment, the newest, and the largest of a touch."""
-        for sample in raw:
-            self._raw.append(sample)
-            self._sum_n += sample[1]
-            self._force_n = sample[1]
-            if self.state in (PressState.APPROACH, PressState.CONTACT):
-                self.touch_n = max(self.touch_n, sample[1])
-        oldest = now_s - self._plan.mean_s
-        while self._raw and self._raw[0][0] < oldest:
-            self._sum_n -= self._raw.popleft()[1]
+        self._raw += raw
+        if raw:
+            self._force_n = raw[-1][1]
+        if self.state in (PressState.APPROACH, PressState.CONTACT):
+            self.touch_n = max(self.touch_n, *(force for _, force in raw), 0.0)
+        self._raw = [sample for sample in self._raw if sample[0] >= now_s - self._plan.mean_s]
 
     @property
     def mean_n(self) -> float:
-        """Mean of the raw forces of the last `mean_ms` [N]; NaN: there are none."""
-        return self._sum_n / len(self._raw) if self._raw else math.nan
+        """Mean of the raw forces of the last `mean_s` [N]; NaN: there are none."""
+        return fmean(force for _, force in self._raw) if self._raw else math.nan
 
     def _guarded(self, report: Report, now_s: float) -> Beat:
         """Note that the guard retreats, or has retreated."""
@@ -247,26 +236,25 @@ class Press:
         if report.state is not GuardState.RETREATING and not self.over:
             self.not_out = report.not_out
             self._enter(PressState.FAILED, now_s)
-        return _command()
+        return Beat()
 
     def _enter(self, state: PressState, now_s: float) -> None:
         self.state, self._since_s = state, now_s
         self._goal = self._requested_s = None
-        self._band_since_s = self._error_since_s = math.nan
-        self._swings, self._peak_n = 0, 0.0
+        self._lost_s = self._off_s = 0.0
 
     # Moves ------------------------------------------------------------------------------------------------------------
 
     def _move(self, position_m: float, speed_m_s: float) -> None:
-        self._goal = _command(CommandKind.MOVE_TO, position_m=position_m, speed_m_s=speed_m_s)
+        self._goal = Beat(command=CommandKind.MOVE_TO, position_m=position_m, speed_m_s=speed_m_s)
         self._requested_s = None
 
     def _asking(self, report: Report, now_s: float) -> Beat:
         """Return the move that is to be begun, until the guard has accepted it; a stop at once."""
         if self._goal is None or self._requested_s is not None:
-            return _command()
+            return Beat()
         if report.moving and self._goal.command is not CommandKind.STOP:
-            return _command()
+            return Beat()
         self._requested_s = now_s
         if self._goal.command is CommandKind.MOVE_TO:
             way_m = abs(self._goal.position_m - report.position_m)
@@ -287,25 +275,20 @@ class Press:
         return True
 
     def _approach(self, report: Report, now_s: float) -> None:
-        plan = self._plan
-        if self._goal is None:  # standing after a touch
-            if not report.moving:
+        plan, goal = self._plan, self._goal
+        if goal is None or goal.command is CommandKind.STOP:  # standing after a touch
+            if not report.moving and (goal is None or self._requested_s is not None):
                 self._begin_loop(PressState.CONTACT, report, now_s)
             return
-        slowly = self._goal.position_m == plan.deepest_m
+        slowly = goal.position_m == plan.deepest_m
         if slowly and self._requested_s is not None and (report.touched or self.mean_n > plan.mean_n):
             # The guard has stopped it at a single touch; a mean that is reached is stopped here.
-            self._goal = None if report.touched else _command(CommandKind.STOP)
+            self._goal = None if report.touched else Beat(command=CommandKind.STOP)
             self._requested_s = None
-            return
-        if self._goal.command is CommandKind.STOP:
-            if self._requested_s is not None and not report.moving:
-                self._goal = None
-            return
-        if self._arrived(report, now_s):
+        elif self._arrived(report, now_s):
             if not slowly:
                 self._move(plan.deepest_m, plan.touch_speed_m_s)
-            elif not report.touched:
+            else:
                 self.fail(f"no contact down to {1e3 * report.position_m:.3f} mm")
 
     def _on_the_way(self, report: Report, now_s: float) -> None:
@@ -343,57 +326,38 @@ class Press:
         return max(least, setpoint), self._course.slope_n_s if rising else 0.0
 
     def _regulated(self, report: Report, now_s: float) -> Beat:
-        controller = self._controller
+        controller, plan = self._controller, self._plan
         assert controller is not None
+        passed_s, self._stepped_s = now_s - self._stepped_s, now_s
         self.setpoint_n, slope = self._setpoint(now_s)
-        controller.step(self._force_n, report.position_m, now_s - self._stepped_s, self.setpoint_n, slope)
-        self._stepped_s = now_s
+        controller.step(self._force_n, report.position_m, passed_s, self.setpoint_n, slope)
         self.error_n = controller.filtered_n - self.setpoint_n
         if self.state is PressState.CONTACT:
-            if now_s - self._since_s >= self._plan.settle_s:
+            if now_s - self._since_s >= plan.settle_s:
                 self.contact_m = controller.target
                 self._enter(PressState.LIFT, now_s)
-                self._move(self.contact_m - self._plan.lift_m, self._plan.touch_speed_m_s)
+                self._move(self.contact_m - plan.lift_m, plan.touch_speed_m_s)
                 return self._asking(report, now_s)
-        elif not self._kept(controller, now_s):
-            return _command(CommandKind.RETREAT)
+        elif not self._kept(controller.filtered_n, passed_s):
+            return Beat(command=CommandKind.RETREAT)
         elif self._began_s is not None and now_s - self._began_s >= self._course.end_s:
             self._enter(PressState.UNLOAD, now_s)
-            self._move(self.contact_m - self._plan.lift_m, self._plan.unload_speed_m_s)
+            self._move(self.contact_m - plan.lift_m, plan.unload_speed_m_s)
             return self._asking(report, now_s)
-        if report.moving:
-            return _command()
         way = controller.target - report.target_m
-        if abs(way) < 0.5 * self._plan.resolution_m:
-            return _command()
-        return _command(CommandKind.STEP, distance_m=min(max(way, -self._plan.step_m), self._plan.step_m))
+        if report.moving or abs(way) < 0.5 * plan.resolution_m:
+            return Beat()
+        return Beat(command=CommandKind.STEP, distance_m=min(max(way, -plan.step_m), plan.step_m))
 
-    def _kept(self, controller: ForceController, now_s: float) -> bool:
+    def _kept(self, filtered_n: float, passed_s: float) -> bool:
         """Return whether force and contact are as they should be; else see to what follows."""
-        rules = self._plan
-        in_band = controller.filtered_n < rules.band_n and self.setpoint_n > 2 * rules.band_n
-        self._band_since_s = _since(self._band_since_s, in_band, now_s)
-        if now_s - self._band_since_s >= rules.lost_s:
+        plan = self._plan
+        contact_lost = filtered_n < plan.band_n and self.setpoint_n > 2 * plan.band_n
+        self._lost_s = self._lost_s + passed_s if contact_lost else 0.0
+        off = abs(self.error_n) > plan.error_band_n
+        self._off_s = max(0.0, self._off_s + (passed_s if off else -0.5 * passed_s))
+        if self._lost_s >= plan.lost_s:
             self.fail(f"contact was lost, at {self.setpoint_n:.2f} N")
-            return False
-        self._error_since_s = _since(self._error_since_s, abs(self.error_n) > rules.error_band_n, now_s)
-        if now_s - self._error_since_s >= 1.0:
-            self.fail(
-                f"the force was off by more than {rules.error_band_n:g} N for a second, at {self.setpoint_n:.2f} N"
-            )
-            return False
-        if self.error_n * self._peak_n < 0:
-            self._swings = self._swings + 1 if abs(self._peak_n) > rules.error_band_n else 0
-            self._peak_n = 0.0
-        self._peak_n = max(self._peak_n, self.error_n, key=abs)
-        if self._swings >= SWINGS:
-            self.fail(f"the force swings by more than {rules.error_band_n:g} N: lower the loop's gains")
-            return False
-        return True
-
-
-def _since(since_s: float, holds: bool, now_s: float) -> float:
-    """Return since when something holds; NaN: it does not."""
-    if not holds:
-        return math.nan
-    return now_s if math.isnan(since_s) else since_s
+        elif self._off_s >= OFF_S:
+            self.fail(f"the force was off by more than {plan.error_band_n:g} N, at {self.setpoint_n:.2f} N")
+        return not self.ended

@@ -6,20 +6,25 @@ import math
 import threading
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import suppress
-from types import TracebackType
-from typing import Self
+from dataclasses import replace
+from typing import Any, Self
 
-from tactbench.core.errors import LinkError, RigError, TactbenchError, UsageError
-from tactbench.core.samples import Block
+import numpy as np
+
+from tactbench.core.errors import LinkError, RigError, UsageError
+from tactbench.core.samples import Block, Quality
 from tactbench.core.spec.recording import StreamCounts
 from tactbench.core.spec.sensor import StreamSpec
-from tactbench.devices.driver import Driver
-from tactbench.devices.queue import BlockQueue
+from tactbench.devices.driver import Driver, error_text
 from tactbench.devices.sequence import SequenceCheck
 from tactbench.links.link import Clock
 
 QUEUE_S = 5.0
 """Of data that a caller may be behind [s]."""
+UNRATED_HZ = 10_000.0
+"""Taken for the rate of a stream that states none (assumed: above that of any tactile sensor's)."""
+COLUMNS = ("t_ns", "data", "quality", "sequence", "device_ns")
+"""Of a block."""
 BLOCK_S = 0.05
 """Between two blocks of a stream, about [s]; one of a caller who takes them too slowly holds all since."""
 READ_S = 0.05
@@ -31,36 +36,88 @@ STOP_S = 5.0
 """How long readers are waited for (assumed: a read, a stop and what they send, each within a link's time-outs)."""
 
 
-class _Stream:
-    """One stream on its way from driver to caller."""
+class StreamQueue:
+    """One stream on its way from driver to caller: bounded, first in, first out.
+
+    :meth:`put` never waits for room: a block that does not fit is dropped whole, its rows are counted, and the next row
+    that gets in is marked with :attr:`~tactbench.core.samples.Quality.GAP`. So the newest are lost, and what is kept
+    has no holes but the marked ones. One thread puts, another takes.
+
+    Attributes
+    ----------
+    check
+        What the rows' numbers say.
+    came_ns
+        When the last block came.
+    written, dropped
+        Rows that were taken, and that did not fit.
+    """
 
     def __init__(self, device: str, spec: StreamSpec) -> None:
-        self.device = device
-        self.rated = spec.rate_hz is not None
-        self.came_ns = 0
+        self.device, self.rated = device, spec.rate_hz is not None
         self.check = SequenceCheck()
-        self.queue = BlockQueue(spec, QUEUE_S)
-        self.written = 0
+        self.came_ns = self.written = self.dropped = 0
+        self._rows, self._room = 0, math.ceil(QUEUE_S * (spec.rate_hz or UNRATED_HZ))
+        self._blocks: list[Block] = []
+        self._layout: dict[str, tuple[int, ...]] = {}
+        self._lossy = False
+        self._lock = threading.Lock()
 
     def put(self, block: Block, now_ns: int) -> None:
+        """Add what is new of a block; raises RigError if it has other columns than the first one."""
         kept = self.check(block)
-        if kept is not None:
-            self.came_ns = now_ns
-            self.queue.put(kept)
+        if kept is None:
+            return
+        self.came_ns, rows = now_ns, len(kept.data)
+        kept = replace(kept, quality=np.zeros(kept.data.shape, np.uint8) if kept.quality is None else kept.quality)
+        found = {name: column for name in COLUMNS if (column := getattr(kept, name)) is not None}
+        layout = {name: column.shape[1:] for name, column in found.items()}
+        self._layout = self._layout or layout
+        if layout != self._layout or {len(column) for column in found.values()} != {rows}:
+            raise RigError(
+                f"A block of stream {block.stream!r} with {rows} rows has {layout}, the first one had {self._layout}.",
+                hint="Correct the driver: all blocks of a stream have the same columns, and one of each a row.",
+            )
+        with self._lock:
+            if self._rows + rows > self._room:
+                self._lose(rows)
+                return
+            if self._lossy and kept.quality is not None:
+                kept = replace(kept, quality=kept.quality.copy())
+                kept.quality[0] |= np.uint8(Quality.GAP)  # type: ignore[index]
+                self._lossy = False
+            self._blocks.append(kept)
+            self._rows += rows
 
     def take(self) -> Iterator[Block]:
-        """Yield what is in the queue now."""
-        block = self.queue.take()
-        if block is not None:
-            self.written += len(block.data)
-            yield block
+        """Remove what is in it and yield it as one block, if there is any."""
+        with self._lock:
+            found, self._blocks, self._rows = self._blocks, [], 0
+        if found:
+            joined: dict[str, Any] = {
+                name: np.concatenate([getattr(one, name) for one in found]) for name in self._layout
+            }
+            if not joined["quality"].any():
+                joined["quality"] = None
+            self.written += len(joined["data"])
+            yield replace(found[0], **joined)
+
+    def discard(self) -> None:
+        """Drop what is in it: nobody will take it."""
+        with self._lock:
+            self._lose(self._rows)
+            self._blocks, self._rows = [], 0
+
+    def _lose(self, rows: int) -> None:
+        self.dropped += rows
+        self._lossy |= rows > 0
 
 
 class Reading:
     """Reads devices from the ``with`` that it stands in: starts them, yields their blocks, stops them. Used once.
 
     In real time a thread reads each driver and puts its rows into a bounded queue a stream; a caller who takes them too
-    slowly loses the newest, which is counted and marked (:class:`~tactbench.devices.queue.BlockQueue`). In virtual time
+    slowly loses the newest, which is counted and marked (:class:`StreamQueue`). In virtual time
     there are no threads, and the caller cannot be too slow. The same data of the devices make the same rows in both;
     where blocks begin differs. Rows are passed on as they come: none is trimmed to the duration.
 
@@ -91,14 +148,16 @@ class Reading:
         self._clock = clock
         self._advance = advance
         self._silent_ns = 1e9 * silent_s
-        self._streams: dict[str, _Stream] = {}
+        self._streams: dict[str, StreamQueue] = {}
         self._counts: dict[str, Mapping[str, int]] = {name: {} for name in self._drivers}
         self._to_stop: list[str] = []
         self._readers: dict[str, threading.Thread] = {}
         self._over = threading.Event()
         self._lock = threading.Lock()
-        self._ended = ""
-        self._error: Exception | None = None
+        self.ended = ""
+        """Which device ended the reading, and why, without a full stop; empty: none did."""
+        self.error: Exception | None = None
+        """What was raised there, with its traceback."""
 
     def __enter__(self) -> Self:
         try:
@@ -111,33 +170,21 @@ class Reading:
                             f"The stream {spec.name!r} of {name} is there already, of another device.",
                             hint="Streams of one recording have different names.",
                         )
-                    self._streams[spec.name] = _Stream(name, spec)
+                    self._streams[spec.name] = StreamQueue(name, spec)
                 if self._advance is None:
                     # It is read at once: the next device may take longer to start than the link's buffers last.
                     threading.Thread(
                         target=self._read, args=(name, driver), name=f"reading {name}", daemon=True
                     ).start()
         except BaseException:
-            self.__exit__(None, None, None)
+            self.__exit__()
             raise
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self._finish()
         for stream in self._streams.values():
-            stream.queue.discard()
-
-    @property
-    def ended(self) -> str:
-        """Which device ended the reading, and why, without a full stop; empty: none did."""
-        return self._ended
-
-    @property
-    def error(self) -> Exception | None:
-        """What was raised there, with its traceback."""
-        return self._error
+            stream.discard()
 
     @property
     def stream_counts(self) -> Mapping[str, StreamCounts]:
@@ -150,7 +197,7 @@ class Reading:
             name: StreamCounts(
                 received=stream.check.received,
                 written=stream.written,
-                dropped=stream.queue.dropped,
+                dropped=stream.dropped,
                 duplicates=stream.check.duplicates,
                 late=stream.check.late,
                 gaps=stream.check.gaps,
@@ -174,7 +221,7 @@ class Reading:
             Asked at every block's time, whether or not a device has sent anything: true ends the reading too.
         """
         now_ns = began_ns = self._clock()
-        end_ns = now_ns + (math.inf if duration_s == math.inf else round(1e9 * duration_s))
+        end_ns = now_ns + 1e9 * duration_s
         while not (self._over.is_set() or is_over()) and now_ns < end_ns:
             until_ns = int(min(now_ns + round(1e9 * BLOCK_S), end_ns))
             if self._advance is None:
@@ -182,19 +229,12 @@ class Reading:
                 now_ns = self._clock()
             else:
                 now_ns = self._carry(self._advance, now_ns, until_ns)
-            yield from self._waiting()
-            self._listen(now_ns, began_ns)
+            for name, stream in self._streams.items():
+                yield from stream.take()
+                silent_ns = now_ns - max(began_ns, stream.came_ns)
+                if stream.rated and silent_ns > self._silent_ns:
+                    self._fail(stream.device, RigError(f"Nothing came of {name} for {1e-9 * silent_ns:.3g} s."))
         self._finish()
-        yield from self._waiting()
-
-    def _listen(self, now_ns: int, began_ns: int) -> None:
-        """End the reading if a stream has been silent for too long."""
-        for name, stream in self._streams.items():
-            silent_ns = now_ns - max(began_ns, stream.came_ns)
-            if stream.rated and silent_ns > self._silent_ns:
-                self._fail(stream.device, RigError(f"Nothing came of {name} for {1e-9 * silent_ns:.3g} s."))
-
-    def _waiting(self) -> Iterator[Block]:
         for stream in self._streams.values():
             yield from stream.take()
 
@@ -254,10 +294,9 @@ class Reading:
     def _fail(self, name: str, error: Exception) -> None:
         """End the reading for `error`, unless another one has."""
         with self._lock:
-            if self._error is None:
-                self._error = error
-                why = error.message if isinstance(error, TactbenchError) else f"{type(error).__name__}: {error}"
-                self._ended = f"{name}: {why.rstrip('.')}"
+            if self.error is None:
+                self.error = error
+                self.ended = f"{name}: {error_text(error)}"
         self._over.set()
 
     def _finish(self) -> None:

@@ -5,18 +5,18 @@ from __future__ import annotations
 from abc import abstractmethod
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
+from contextlib import suppress
 from typing import Any, ClassVar, Generic, NamedTuple, TypeVar
 
 import numpy as np
 
-from tactbench.core.errors import LinkError, LinkTimeout, LinkUnplugged, RigError, UnknownNameError
+from tactbench.core.errors import LinkError, LinkTimeout, LinkUnplugged, UnknownNameError
 from tactbench.core.samples import Block
 from tactbench.core.spec.sensor import StreamSpec
-from tactbench.devices.driver import Driver, DriverSettings
+from tactbench.devices.driver import Driver, DriverSettings, open_for
 from tactbench.links.byte_link import ByteLink
 from tactbench.links.can_link import CanLink
 from tactbench.links.datagram_link import DatagramLink
-from tactbench.links.link import Link
 
 L = TypeVar("L", ByteLink, CanLink, DatagramLink)
 
@@ -42,9 +42,7 @@ class RowDriver(Driver, Generic[L]):
     Raises
     ------
     UsageError
-        For an option that is not among `defaults`.
-    RigError
-        If the link is of another kind.
+        For an option that is not among `defaults`, or a link of another kind.
     LinkError
         If it cannot be opened.
     """
@@ -64,14 +62,7 @@ class RowDriver(Driver, Generic[L]):
         self.clock = settings.clock
         self.counted: Counter[str] = Counter()
         """What :attr:`counts` tells: subclasses count here what they leave out."""
-        link = settings.open_link()
-        if not isinstance(link, self.link_kind):
-            link.close()
-            raise RigError(
-                f"{link.address} is a {_kind(link)}, and this device is read over a {self.link_kind.__name__}.",
-                hint="Give another address: docs/links.md lists them.",
-            )
-        self.link: L = link
+        self.link: L = open_for(settings, type(self).__name__, self.link_kind, "those of docs/links.md")
 
     @property
     def streams(self) -> tuple[StreamSpec, ...]:
@@ -82,10 +73,6 @@ class RowDriver(Driver, Generic[L]):
     def counts(self) -> Mapping[str, int]:
         """What was counted, by name."""
         return dict(self.counted)
-
-    def identify(self) -> Mapping[str, str]:
-        """Nothing, unless a subclass asks the device."""
-        return {}
 
     def start(self) -> None:
         """Drop what came before, and :meth:`begin`."""
@@ -113,12 +100,11 @@ class RowDriver(Driver, Generic[L]):
         self.ask()
         times: list[int] = []
         found: list[Sample] = []
-        link: Any = self.link
+        link = self.link
         until_s = link.timer() + timeout_s
         for _ in range(AT_ONCE):
-            wait_s = 0.0 if found else max(0.0, until_s - link.timer())
             try:
-                received = link.read(wait_s) if isinstance(link, ByteLink) else link.receive(wait_s)
+                received = link.receive(0.0 if found else max(0.0, until_s - link.timer()))
             except LinkTimeout:
                 break
             except LinkUnplugged:
@@ -131,18 +117,14 @@ class RowDriver(Driver, Generic[L]):
         if not found:
             return []
         data = np.array([row.values for row in found]).astype(self.stream.dtype)
-        quality = None
-        if any(row.quality is not None for row in found):
-            good = [0] * data.shape[1]
-            quality = np.array([row.quality if row.quality is not None else good for row in found], dtype=np.uint8)
-        return [Block(self.stream.name, np.array(times, dtype=np.int64), data, quality)]
+        good = [0] * data.shape[1]
+        quality = np.array([good if row.quality is None else row.quality for row in found], dtype=np.uint8)
+        return [Block(self.stream.name, np.array(times, np.int64), data, quality if quality.any() else None)]
 
     def stop(self) -> None:
         """Nothing, unless :meth:`quiet` sends something; raises nothing if the device is gone."""
-        try:
+        with suppress(LinkError):
             self.quiet()
-        except LinkError:
-            return
 
     def quiet(self) -> None:
         """Nothing, unless the device can be told to stop."""
@@ -151,8 +133,3 @@ class RowDriver(Driver, Generic[L]):
         """Stop, and close the link."""
         self.stop()
         self.link.close()
-
-
-def _kind(link: Link) -> str:
-    known = (ByteLink, CanLink, DatagramLink)
-    return next((kind.__name__ for kind in known if isinstance(link, kind)), type(link).__name__)

@@ -7,7 +7,6 @@ from dataclasses import replace
 import numpy as np
 import numpy.typing as npt
 
-from tactbench.core.errors import UsageError
 from tactbench.core.samples import Block, IntArray, Quality
 
 
@@ -18,16 +17,9 @@ class Unwrap:
     up to 2^(bits-1) - 1 one after a gap of d - 1, above that a late one (derived: half of the range each way; for 32
     bits the same as pyNetFT's sequence.cpp). A late one gets the number it has, and the highest stays. Nothing of this
     holds once the counter may have advanced by more than half a wrap unseen: 32 bits at 7 kHz take 85 hours for that.
-
-    Raises
-    ------
-    UsageError
-        If `bits` is not 2 to 62.
     """
 
     def __init__(self, bits: int) -> None:
-        if not 2 <= bits <= 62:
-            raise UsageError(f"A counter of {bits} bits was given.", hint="Give 2 to 62 bits.")
         self._modulus = 1 << bits
         self._highest: int | None = None
 

@@ -8,57 +8,34 @@ from __future__ import annotations
 import math
 import struct
 from collections import deque
-from collections.abc import Callable
-from typing import Literal
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
 
-from tactbench.links.bridge_frame import VERSION, Frame, FrameDecoder, Kind, encode_frame
-from tactbench.links.spi_bridge import BEGIN, FULL, HELLO, SETUP, STEP
+from tactbench.links.spi_bridge import BEGIN, FULL, HELLO, SETUP, STEP, VERSION, Frame, FrameDecoder, Kind, encode_frame
 
 Exchange = Callable[[int, bytes, float], bytes]
 """What hangs on the bus: select mask, bytes out, second at which they begin -> as many bytes in."""
 
-BridgeFault = Literal["dropped", "doubled", "damaged"]
-"""``dropped``: batches are carried out, their replies are not sent. ``doubled``: replies are sent twice. ``damaged``:
-one bit of each reply is turned."""
 
-
+@dataclass
 class BridgeEmulator:
-    """A bridge with one SPI bus.
+    """A bridge with one SPI bus."""
 
-    Parameters
-    ----------
-    exchange
-        What hangs on the bus.
-    holds
-        Batches it can hold, the running one included.
-    largest_payload
-        Bytes of payload it can take.
-    select_lines
-        Mask of the lines it has.
-    fastest_hz
-        The highest clock it can run, hertz.
+    exchange: Exchange
+    """What hangs on the bus."""
+    holds: int = 4
+    """Batches it can hold, the running one included."""
+    largest_payload: int = 4096
+    """Bytes of payload it can take."""
+    select_lines: int = 0xFF
+    """Mask of the lines it has."""
+    fastest_hz: int = 10_000_000
+    """The highest clock it can run, hertz."""
+    faults: set[str] = field(default_factory=set)
+    """What goes wrong now: ``dropped`` (batches are carried out, their replies are not sent), ``doubled`` (replies are
+    sent twice), ``damaged`` (one bit of each reply is turned)."""
 
-    Attributes
-    ----------
-    faults
-        What goes wrong now; may be changed at any time.
-    """
-
-    def __init__(
-        self,
-        exchange: Exchange,
-        *,
-        holds: int = 4,
-        largest_payload: int = 4096,
-        select_lines: int = 0xFF,
-        fastest_hz: int = 10_000_000,
-    ) -> None:
-        self.faults: set[BridgeFault] = set()
-        self._exchange = exchange
-        self._holds = holds
-        self._largest = largest_payload
-        self._lines = select_lines
-        self._fastest_hz = fastest_hz
+    def __post_init__(self) -> None:
         self._speed_hz = 0
         self._free_s = 0.0
         self._decoder = FrameDecoder()
@@ -84,70 +61,55 @@ class BridgeEmulator:
         return self._due[0][0] if self._due else math.inf
 
     def _answered(self, frame: Frame, now_s: float) -> bytes:
-        if frame.version != VERSION:
-            return self._refusal(frame, f"version {frame.version} is unknown")
-        if len(frame.payload) > self._largest:
-            return self._refusal(frame, f"payload above {self._largest} bytes")
-        if frame.kind == Kind.HELLO:
-            about = HELLO.pack(VERSION, self._largest, self._holds, self._lines) + b"tactbench emulator"
-            return encode_frame(Frame(Kind.HELLO.reply, frame.number, about))
-        if frame.kind == Kind.SETUP:
-            return self._set_up(frame)
-        if frame.kind == Kind.BATCH:
-            return self._batch(frame, now_s)
-        return self._refusal(frame, f"kind {frame.kind} is unknown")
+        try:
+            return self._carried_out(frame, now_s)
+        except (ValueError, struct.error):
+            return encode_frame(Frame(Kind.ERROR.reply, frame.number, b"malformed or not possible"))
 
-    def _set_up(self, frame: Frame) -> bytes:
-        if len(frame.payload) != SETUP.size:
-            return self._refusal(frame, "malformed payload")
-        speed_hz, mode = SETUP.unpack(frame.payload)
-        if mode > 3 or not speed_hz:
-            return self._refusal(frame, "clock or mode is not possible")
-        self._speed_hz = min(speed_hz, self._fastest_hz)
-        return encode_frame(Frame(Kind.SETUP.reply, frame.number, SETUP.pack(self._speed_hz, mode)))
+    def _carried_out(self, frame: Frame, now_s: float) -> bytes:
+        """Return the reply, empty where it comes later; raises ValueError or struct.error where it is to be refused."""
+        if frame.version != VERSION or len(frame.payload) > self.largest_payload:
+            raise ValueError
+        match Kind(frame.kind):
+            case Kind.HELLO:
+                about = HELLO.pack(VERSION, self.largest_payload, self.holds, self.select_lines) + b"tactbench emulator"
+                return encode_frame(Frame(Kind.HELLO.reply, frame.number, about))
+            case Kind.SETUP:
+                speed_hz, mode = SETUP.unpack(frame.payload)
+                if mode > 3 or not speed_hz:
+                    raise ValueError
+                self._speed_hz = min(speed_hz, self.fastest_hz)
+                return encode_frame(Frame(Kind.SETUP.reply, frame.number, SETUP.pack(self._speed_hz, mode)))
+            case Kind.BATCH:
+                return self._batch(frame, now_s)
+        raise ValueError
 
     def _batch(self, frame: Frame, now_s: float) -> bytes:
-        if not self._speed_hz:
-            return self._refusal(frame, "not set up")
-        if len(self._due) >= self._holds:
-            return self._refusal(frame, FULL.decode())
-        steps = _steps(frame.payload)
-        if steps is None or any(select & ~self._lines for select, _, _ in steps):
-            return self._refusal(frame, "malformed payload")
+        if len(self._due) >= self.holds:
+            return encode_frame(Frame(Kind.ERROR.reply, frame.number, FULL))
+        steps = list(_steps(frame.payload))
+        if not (self._speed_hz and steps) or any(select & ~self.select_lines for select, _, _ in steps):
+            raise ValueError
         begin_s = t_s = max(now_s, self._free_s)
         payload = BEGIN.pack(int(begin_s * 1e6) & 0xFFFFFFFF)
         for select, pause_us, data in steps:
             if data:
-                payload += self._exchange(select, data, t_s)
+                payload += self.exchange(select, data, t_s)
             t_s += 8 * len(data) / self._speed_hz + pause_us * 1e-6
         self._free_s = t_s
         reply = encode_frame(Frame(Kind.BATCH.reply, frame.number, payload))
         if "damaged" in self.faults:
             reply = bytes([reply[0], reply[1] ^ 0x80]) + reply[2:]
-        if "doubled" in self.faults:
-            reply += reply
-        if "dropped" in self.faults:
-            reply = b""
-        self._due.append((t_s, reply))
+        times = 0 if "dropped" in self.faults else 2 if "doubled" in self.faults else 1
+        self._due.append((t_s, times * reply))
         return b""
 
-    @staticmethod
-    def _refusal(frame: Frame, reason: str) -> bytes:
-        return encode_frame(Frame(Kind.ERROR.reply, frame.number, reason.encode("ascii")))
 
-
-def _steps(payload: bytes) -> list[tuple[int, int, bytes]] | None:
-    """Return select, pause in us and bytes of each step; None if the payload is no list of steps."""
-    steps = []
-    place = 0
-    while place < len(payload):
-        try:
-            select, pause_us, length = STEP.unpack_from(payload, place)
-        except struct.error:
-            return None
-        place += STEP.size
-        if place + length > len(payload):
-            return None
-        steps.append((select, pause_us, payload[place : place + length]))
-        place += length
-    return steps or None
+def _steps(payload: bytes) -> Iterator[tuple[int, int, bytes]]:
+    """Yield select, pause in us and bytes of each step; raises ValueError or struct.error if they are not whole."""
+    while payload:
+        select, pause_us, length = STEP.unpack_from(payload)
+        data, payload = payload[STEP.size : STEP.size + length], payload[STEP.size + length :]
+        if len(data) < length:
+            raise ValueError
+        yield select, pause_us, data

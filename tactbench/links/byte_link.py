@@ -17,7 +17,8 @@ _PARITY = {"none": "N", "even": "E", "odd": "O"}
 class ByteLink(Link):
     """A byte stream in both directions: a :class:`SerialLink`, or an emulated device's."""
 
-    def _take(self, timeout_s: float) -> Received:
+    def receive(self, timeout_s: float) -> Received:
+        """Return what :meth:`read` does."""
         return self.read(timeout_s)
 
     @abstractmethod

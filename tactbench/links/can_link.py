@@ -1,22 +1,16 @@
-"""CAN: buses of python-can, and logs (Vector's ASC and BLF) that are read like one."""
+"""CAN: buses of python-can, and its logs."""
 
 from __future__ import annotations
 
 import errno
 import importlib
 import inspect
-import struct
 import time
-import zlib
 from abc import abstractmethod
 from collections import Counter
-from collections.abc import Iterable, Iterator
-from contextlib import ExitStack
 from dataclasses import dataclass
-from datetime import UTC, datetime
-from itertools import islice
 from pathlib import Path
-from typing import Any, Self
+from typing import Any
 
 from tactbench.core.errors import LinkError, UnknownNameError
 from tactbench.links.link import WRITE_TIMEOUT_S, Clock, Link, cannot_open, os_error_in
@@ -36,7 +30,7 @@ class CanFrame:
     """At most 8 bytes."""
     extended: bool = False
     t_ns: int = 0
-    """When the kernel or the adapter had it, nanoseconds of the link's clock; of a log: since its start. Not sent."""
+    """When the kernel or the adapter had it, nanoseconds of the link's clock; of a log: since its first. Not sent."""
 
 
 class CanLink(Link):
@@ -52,9 +46,6 @@ class CanLink(Link):
         super().__init__(address, clock)
         self.counts: Counter[str] = Counter()
 
-    def _take(self, timeout_s: float) -> CanFrame:
-        return self.receive(timeout_s)
-
     @abstractmethod
     def receive(self, timeout_s: float) -> CanFrame:
         """Return the next data frame; raises as every :class:`Link`."""
@@ -64,8 +55,7 @@ class CanLink(Link):
         """Send a data frame; raises as every :class:`Link`, LinkTimeout also where no node acknowledges."""
 
     def _sendable(self, frame: CanFrame) -> None:
-        """Raise what `send` raises of a link that is closed or unplugged, and of what is no CAN frame."""
-        self._usable()
+        super()._sendable(frame)
         if not 0 <= frame.id < 1 << (29 if frame.extended else 11) or len(frame.data) > 8:
             raise LinkError(
                 f"{self.address}: {frame} is not a CAN frame.",
@@ -128,11 +118,14 @@ class CanBus(CanLink):
         import can
 
         deadline = self._usable(timeout_s)
-        left_s = timeout_s
-        while True:
+        left_s, came = timeout_s, True
+        while came or left_s > 0:
             try:
-                message = self._bus.recv(left_s)
-                frame = None if message is None else _data_frame(message, self._stamp(message.timestamp), self.counts)
+                message = self._bus.recv(max(0.0, left_s))
+                came = message is not None
+                frame = _data_frame(message, self._stamp(message.timestamp), self.counts) if came else None
+                if frame is not None:
+                    return frame
             except (can.CanError, OSError, ValueError, IndexError) as error:
                 if os_error_in(error) is not None:
                     raise self._unplugged(error) from error
@@ -140,14 +133,8 @@ class CanBus(CanLink):
                 # own flush() would drop the frames behind them as well.
                 self.counts["unreadable frames"] += 1
                 getattr(self._bus, "_buffer", bytearray()).clear()
-                message = frame = None
-            if frame is not None:
-                return frame
             left_s = deadline - self.timer()
-            if left_s <= 0:
-                if message is None:
-                    raise self._nothing_came(timeout_s)
-                left_s = 0.0  # it was a frame of another kind: what lies behind it has come as well
+        raise self._nothing_came(timeout_s)
 
     def _stamp(self, timestamp: float) -> int:
         """Return when a message came by the link's clock, of python-can's seconds since 1970."""
@@ -182,25 +169,16 @@ class CanBus(CanLink):
             self._bus.serialPortOrig.close()
 
 
-class CanLog:
-    """The frames of a log, one after the other; use it in a ``with`` block.
+def read_can_log(file: Path) -> tuple[list[CanFrame], Counter[str]]:
+    """Return the data frames of a log in any format of python-can, and what was left out (:class:`CanLink`).
 
-    Stamps count from the log's start, which both formats keep: an ASC file's date has no time zone, a BLF file that was
-    written with times before 1990 has no date. BLF stamps come within 0.25 us, since python-can returns float64.
+    Stamps are nanoseconds since the log's first message. BLF stamps come within 0.25 us, since python-can returns
+    float64.
 
     Parameters
     ----------
     file
-        Ends in ``.asc`` or ``.blf``.
-
-    Attributes
-    ----------
-    started
-        The log's start as the file states it: ASC in the writer's local time, BLF in ISO 8601 as UTC; empty if it
-        does not.
-    counts
-        What was left out so far (:class:`CanLink`), and how many frames have an earlier stamp than the one before;
-        these are returned as they are.
+        Ends in ``.log`` (candump), ``.asc``, ``.blf``, ``.csv``, ``.trc`` …
 
     Raises
     ------
@@ -208,78 +186,29 @@ class CanLog:
         If the file cannot be read, is damaged, of another kind, or is an ASC file with times relative to the event
         before: events that are no frames carry part of the time, and python-can leaves them out.
     """
+    import can
 
-    def __init__(self, file: Path) -> None:
-        import can
-        from can.io.blf import BLFParseError
-
-        self._name = str(file)
-        self._start_s = 0.0
-        self.counts: Counter[str] = Counter()
-        if file.suffix.lower() not in (".asc", ".blf"):
-            raise LinkError(f"{file} is not a log that can be read.", hint="Give a file that ends in .asc or .blf.")
-        with ExitStack() as opened:
-            try:
-                if file.suffix.lower() == ".asc":
-                    text = opened.enter_context(file.open(encoding="utf-8", errors="replace"))
-                    self.started = _asc_start(self._name, text)
-                    text.seek(0)
-                    self._reader: Any = can.ASCReader(text, relative_timestamp=True)
-                else:
-                    self._reader = can.BLFReader(opened.enter_context(file.open("rb")))
-                    self._start_s = self._reader.start_timestamp
-                    self.started = datetime.fromtimestamp(self._start_s, UTC).isoformat() if self._start_s else ""
-            except (OSError, ValueError, BLFParseError, struct.error) as error:
-                raise cannot_open(self._name, error) from error
-            self._file = opened.pop_all()
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self._file.close()
-
-    def __iter__(self) -> Iterator[CanFrame]:
-        from can.io.blf import BLFParseError
-
-        number = last_ns = 0
-        try:
-            for number, message in enumerate(self._reader, 1):  # noqa: B007  (said where it is damaged)
-                t_ns = round((message.timestamp - self._start_s) * 1e9)
-                self.counts["times that go back"] += t_ns < last_ns
-                last_ns = t_ns
-                frame = _data_frame(message, t_ns, self.counts)
-                if frame is not None:
-                    yield frame
-        except (ValueError, LookupError, OSError, BLFParseError, struct.error, zlib.error) as error:
-            raise LinkError(
-                f"The log {self._name} is damaged after {number} frames: {error}.",
-                hint="Use the frames before, or export the log anew.",
-            ) from error
-
-
-def _asc_start(address: str, lines: Iterable[str]) -> str:
-    """Return the start that the head of an ASC file states."""
-    started = ""
-    for line in islice(lines, 50):
-        words = line.split()
-        if [word.lower() for word in words[:1]] == ["date"]:
-            started = " ".join(words[1:])
-        elif [word.lower() for word in words[:2]] == ["begin", "triggerblock"]:
-            return " ".join(words[2:])
-        elif [word.lower() for word in words[2:4]] == ["timestamps", "relative"]:
-            raise LinkError(
-                f"The times in {address} are relative to the event before, absolute ones were expected.",
-                hint="Export the log with absolute time stamps.",
-            )
-    return started
+    counts: Counter[str] = Counter()
+    frames: list[CanFrame] = []
+    number, began_s = 0, None
+    try:
+        if file.suffix.lower() == ".asc" and b"timestamps relative" in b" ".join(file.read_bytes()[:4096].split()):
+            raise ValueError("its times are relative to the event before; export it with absolute ones")
+        with can.LogReader(file) as log:
+            for number, message in enumerate(log, 1):  # noqa: B007  (said where it is damaged)
+                began_s = message.timestamp if began_s is None else began_s
+                frame = _data_frame(message, round((message.timestamp - began_s) * 1e9), counts)
+                frames += [] if frame is None else [frame]
+    except Exception as error:  # python-can's readers raise whatever their parsing runs into
+        raise LinkError(
+            f"The log {file} cannot be read after {number} frames: {error}.", hint="Export the log anew."
+        ) from error
+    return frames, counts
 
 
 def _hint(interface: str, channel: str, error: BaseException) -> str:
-    if "msgpack" in str(error):
-        return "Install it: pip install 'tactbench[multicast]'."
     if interface == "slcan" and not channel.startswith("/"):
         return "A port begins with a slash of its own: can://slcan//dev/ttyACM0."
     if os_error_in(error) is not None:
         return ""
-    return f"See python-can's page of the interface {interface} for its channels and options."
+    return f"See python-can's page of the interface {interface} for its channels, options and what it needs."

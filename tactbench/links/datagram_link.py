@@ -16,9 +16,6 @@ LARGEST_DATAGRAM = 65507
 class DatagramLink(Link):
     """Datagrams to and from one peer: a :class:`UdpLink`, or an emulated device's."""
 
-    def _take(self, timeout_s: float) -> Received:
-        return self.receive(timeout_s)
-
     @abstractmethod
     def receive(self, timeout_s: float) -> Received:
         """Return the next datagram, whole; raises as every :class:`Link`.
@@ -31,8 +28,7 @@ class DatagramLink(Link):
         """Send one datagram; raises as every :class:`Link`, LinkError if it is longer than UDP carries."""
 
     def _sendable(self, data: bytes) -> None:
-        """Raise what `send` raises of a link that is closed or unplugged, and of data that is too long."""
-        self._usable()
+        super()._sendable(data)
         if len(data) > LARGEST_DATAGRAM:
             raise LinkError(
                 f"{self.address}: a datagram of {len(data)} bytes was given, at most {LARGEST_DATAGRAM} go out.",

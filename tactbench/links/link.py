@@ -8,8 +8,7 @@ import time
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass
-from types import TracebackType
-from typing import Self
+from typing import Any, Self
 
 from tactbench.core.errors import LinkClosed, LinkError, LinkTimeout, LinkUnplugged
 
@@ -57,9 +56,7 @@ class Link(ABC):
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.close()
 
     def close(self) -> None:
@@ -76,13 +73,17 @@ class Link(ABC):
         """Drop what has come and was not read; what is still under way comes later. Raises as a read does."""
         for _ in range(MOST_DISCARDED):
             try:
-                self._take(0.0)
+                self.receive(0.0)
             except LinkTimeout:
                 return
 
-    def _take(self, timeout_s: float) -> object:
-        """Return what a read would, whatever it is called; a link of which nothing waits has nothing to take."""
-        raise self._nothing_came(timeout_s)
+    @abstractmethod
+    def receive(self, timeout_s: float) -> Any:
+        """Return the next that has come, waiting for it at most so long."""
+
+    def _sendable(self, piece: Any) -> None:
+        """Raise what sending raises of a link that is closed or unplugged, and of what cannot be sent."""
+        self._usable()
 
     @abstractmethod
     def _release(self) -> None:

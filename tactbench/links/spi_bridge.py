@@ -1,15 +1,120 @@
-"""SPI behind a microcontroller that speaks our bridge's frames over a serial port."""
+"""SPI behind a microcontroller that speaks our bridge's frames over a serial port.
+
+The format is this project's own, version 1; ``docs/links.md`` specifies it. Zero bytes stand between frames and nowhere
+else (consistent overhead byte stuffing, S. Cheshire and M. Baker, IEEE/ACM Transactions on Networking 7(2), 1999), so
+that a reader is in step again with the first frame after a fault.
+"""
 
 from __future__ import annotations
 
 import struct
+import zlib
 from collections import deque
 from collections.abc import Sequence
+from dataclasses import dataclass
+from enum import IntEnum
 
 from tactbench.core.errors import LinkError, LinkTimeout
-from tactbench.links.bridge_frame import VERSION, Frame, FrameDecoder, Kind, encode_frame
 from tactbench.links.byte_link import ByteLink
 from tactbench.links.spi_link import SpiLink, SpiReply, SpiStep
+
+VERSION = 1
+LARGEST_PAYLOAD = 0xFFFF
+
+_HEAD = struct.Struct("<BBHH")
+_CRC = struct.Struct("<I")
+_LARGEST_FRAME = (_HEAD.size + LARGEST_PAYLOAD + _CRC.size) * 255 // 254 + 2
+"""Bytes: stuffing adds one to each 254 and one more."""
+
+
+class Kind(IntEnum):
+    """What a frame of the SPI bridge is; a reply is its request's kind with the top bit set."""
+
+    HELLO = 0x01
+    SETUP = 0x02
+    BATCH = 0x03
+    ERROR = 0x7F
+
+    @property
+    def reply(self) -> int:
+        """The kind of the reply."""
+        return self | 0x80
+
+
+@dataclass(frozen=True, slots=True)
+class Frame:
+    """A frame whose length and CRC are right."""
+
+    kind: int
+    number: int
+    """Of the request; its reply has the same."""
+    payload: bytes = b""
+    version: int = VERSION
+
+
+def encode_frame(frame: Frame) -> bytes:
+    """Return the bytes of a frame, its closing zero included."""
+    body = _HEAD.pack(frame.version, frame.kind, frame.number, len(frame.payload)) + frame.payload
+    return _stuffed(body + _CRC.pack(zlib.crc32(body))) + b"\0"
+
+
+class FrameDecoder:
+    """Frames from bytes as they come.
+
+    Attributes
+    ----------
+    damaged
+        How many stretches between two zero bytes were no frame so far.
+    """
+
+    def __init__(self) -> None:
+        self.damaged = 0
+        self._pending = b""
+
+    def feed(self, data: bytes) -> list[Frame]:
+        """Return the frames that `data` completes; what is no frame is counted."""
+        *ended, rest = (self._pending + data).split(b"\0")
+        self._pending = rest[-_LARGEST_FRAME:]  # of a longer one the end, which is no frame
+        found = [_frame_in(stuffed) for stuffed in ended if stuffed]
+        self.damaged += found.count(None)
+        return [frame for frame in found if frame is not None]
+
+
+def _frame_in(stuffed: bytes) -> Frame | None:
+    body = _unstuffed(stuffed)
+    if body is None or len(body) < _HEAD.size + _CRC.size:
+        return None
+    version, kind, number, length = _HEAD.unpack_from(body)
+    payload = body[_HEAD.size : -_CRC.size]
+    if length != len(payload) or _CRC.unpack(body[-_CRC.size :])[0] != zlib.crc32(body[: -_CRC.size]):
+        return None
+    return Frame(kind, number, payload, version)
+
+
+def _stuffed(body: bytes) -> bytes:
+    out = bytearray()
+    for part in body.split(b"\0"):
+        while len(part) > 253:
+            out += b"\xff" + part[:254]
+            part = part[254:]
+        out += bytes([len(part) + 1]) + part
+    return bytes(out)
+
+
+def _unstuffed(stuffed: bytes) -> bytes | None:
+    out = bytearray()
+    place = 0
+    while place < len(stuffed):
+        code = stuffed[place]
+        end = place + code
+        if end > len(stuffed):
+            return None
+        out += stuffed[place + 1 : end]
+        if code < 0xFF and end < len(stuffed):
+            out.append(0)
+        place = end
+    return bytes(out)
+
 
 HELLO = struct.Struct("<HHBB")
 """Payload of the reply to HELLO, before the name: firmware, largest payload, batches held, select lines."""
@@ -58,14 +163,7 @@ class SpiBridge(SpiLink):
         If nothing answers, or the bridge speaks another version or cannot do `mode`.
     """
 
-    def __init__(
-        self,
-        port: ByteLink,
-        *,
-        speed_hz: int,
-        mode: int = 0,
-        wake_s: float = 3.0,
-    ) -> None:
+    def __init__(self, port: ByteLink, *, speed_hz: int, mode: int = 0, wake_s: float = 3.0) -> None:
         super().__init__(f"spi://bridge/{port.address}")
         self._decoder = FrameDecoder()
         self._frames: deque[tuple[Frame, int]] = deque()
@@ -73,7 +171,10 @@ class SpiBridge(SpiLink):
         self._bytes = port
         try:
             self._greet(wake_s)
-            self._set_up(speed_hz, mode)
+            reply = self._answer(Kind.SETUP, SETUP.pack(speed_hz, mode), 1.0)
+            if len(reply.payload) != SETUP.size:
+                raise self._nonsense(reply)
+            self.speed_hz, _ = SETUP.unpack(reply.payload)
         except BaseException:
             self._bytes.close()
             raise
@@ -85,9 +186,8 @@ class SpiBridge(SpiLink):
     def _greet(self, wake_s: float) -> None:
         deadline = self.timer() + wake_s
         while True:
-            self._bytes.write(b"\0" + encode_frame(Frame(Kind.HELLO, 0)))
             try:
-                hello = self._answer(Kind.HELLO, min(_ASK_S, wake_s))
+                hello = self._answer(Kind.HELLO, b"", min(_ASK_S, wake_s))
                 break
             except LinkTimeout as error:
                 if self.timer() >= deadline:
@@ -95,22 +195,14 @@ class SpiBridge(SpiLink):
                         f"{self.address}: nothing there answered as an SPI bridge within {wake_s:g} s.",
                         hint="Is it the bridge's port, and does the bridge run the firmware of docs/links.md?",
                     ) from error
-        try:
-            self.firmware, self._largest, self.holds, self.select_lines = HELLO.unpack_from(hello.payload)
-        except struct.error as error:
-            raise self._nonsense(hello) from error
+        if len(hello.payload) < HELLO.size:
+            raise self._nonsense(hello)
+        self.firmware, self._largest, self.holds, self.select_lines = HELLO.unpack_from(hello.payload)
         self.name = hello.payload[HELLO.size :].decode("ascii", "replace")
 
-    def _set_up(self, speed_hz: int, mode: int) -> None:
-        self._bytes.write(encode_frame(Frame(Kind.SETUP, 0, SETUP.pack(speed_hz, mode))))
-        reply = self._answer(Kind.SETUP, 1.0)
-        try:
-            self.speed_hz, _ = SETUP.unpack(reply.payload)
-        except struct.error as error:
-            raise self._nonsense(reply) from error
-
-    def _answer(self, kind: Kind, timeout_s: float) -> Frame:
-        """Return the reply to a request that is no batch; what else comes is not looked at."""
+    def _answer(self, kind: Kind, payload: bytes, timeout_s: float) -> Frame:
+        """Send a request that is no batch, and return its reply; what else comes is not looked at."""
+        self._bytes.write(b"\0" + encode_frame(Frame(kind, 0, payload)))
         deadline = self.timer() + timeout_s
         while True:
             frame, _ = self._next(timeout_s, deadline)
@@ -125,38 +217,30 @@ class SpiBridge(SpiLink):
                 return frame
 
     def _next(self, timeout_s: float, deadline: float) -> tuple[Frame, int]:
-        """Return the next frame and when its first byte was in the host."""
+        """Return the next frame and when its end was in the host."""
         while not self._frames:
             left_s = deadline - self.timer()
             try:
                 received = self._bytes.read(max(0.0, left_s))
             except LinkTimeout:
                 raise self._nothing_came(timeout_s) from None
-            self._frames.extend(self._decoder.stamped(received))
+            self._frames.extend((frame, received.t_ns) for frame in self._decoder.feed(received.data))
         return self._frames.popleft()
 
-    def _submit(self, number: int, steps: Sequence[SpiStep]) -> None:
-        for step in steps:
-            if step.select & ~self.select_lines or step.select < 0:
-                raise LinkError(
-                    f"{self.address}: {step} was given, the bridge has select lines {self.select_lines:#x}.",
-                    hint="Select lines that it has.",
-                )
+    def send(self, steps: Sequence[SpiStep]) -> int:  # noqa: D102  (inherited)
+        number = self._next_number()
         payload = b"".join(STEP.pack(step.select, step.pause_us, len(step.data)) + step.data for step in steps)
         if len(payload) > self._largest:
             raise LinkError(
                 f"{self.address}: a batch of {len(payload)} bytes was given, the bridge takes {self._largest}.",
                 hint="Send it in parts.",
             )
-        if len(self._waiting) >= self.holds:
-            raise LinkError(
-                f"{self.address}: the bridge holds {self.holds} batches, and that many wait for their replies.",
-                hint="Receive a reply first; where none comes, abandon them.",
-            )
         self._bytes.write(encode_frame(Frame(Kind.BATCH, number, payload)))
         self._waiting[number] = tuple(len(step.data) for step in steps)
+        return number
 
-    def _collect(self, timeout_s: float, deadline: float) -> SpiReply:
+    def receive(self, timeout_s: float) -> SpiReply:  # noqa: D102  (inherited)
+        deadline = self._usable(timeout_s)
         while True:
             frame, t_ns = self._next(timeout_s, deadline)
             if frame.kind not in (Kind.BATCH.reply, Kind.ERROR.reply) or frame.number not in self._waiting:
@@ -172,12 +256,8 @@ class SpiBridge(SpiLink):
                     break
             if len(frame.payload) != BEGIN.size + sum(lengths):
                 raise self._nonsense(frame)
-            data = []
-            place = BEGIN.size
-            for length in lengths:
-                data.append(frame.payload[place : place + length])
-                place += length
-            return SpiReply(frame.number, tuple(data), t_ns, BEGIN.unpack_from(frame.payload)[0])
+            begun_us, *data = struct.unpack("<I" + "".join(f"{length}s" for length in lengths), frame.payload)
+            return SpiReply(frame.number, tuple(data), t_ns, begun_us)
 
     def abandon(self) -> None:  # noqa: D102
         self._waiting.clear()

@@ -8,7 +8,6 @@ from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from tactbench.core.errors import LinkError
 from tactbench.links.link import Clock, Link, cannot_open
 
 
@@ -34,7 +33,7 @@ class SpiReply:
     data: tuple[bytes, ...]
     """As many as the batch has steps, each as long as its step's data."""
     t_ns: int
-    """When the first of it was in the host, nanoseconds of the link's clock."""
+    """When it was in the host, nanoseconds of the link's clock."""
     device_us: int | None = None
     """When the batch began by the adapter's own counter of microseconds, modulo 2**32; None: it has none."""
 
@@ -44,7 +43,7 @@ class SpiLink(Link):
 
     A batch is carried out without the host, so that pauses of some ten microseconds hold whatever the host does; and
     the next may be sent before the reply to the last one is here. An adapter of another kind is a subclass with
-    :meth:`_submit`, :meth:`_collect`, :meth:`_release` and, where replies can get lost, :meth:`abandon`.
+    :meth:`send`, :meth:`receive`, :meth:`_release` and, where replies can get lost, :meth:`abandon`.
 
     Attributes
     ----------
@@ -57,39 +56,27 @@ class SpiLink(Link):
     speed_hz: int
     holds: int = 2
 
-    def __init__(self, address: str, clock: Clock = time.monotonic_ns) -> None:
-        super().__init__(address, clock)
-        self._number = -1
+    _number = -1
 
     @abstractmethod
-    def _submit(self, number: int, steps: Sequence[SpiStep]) -> None:
-        """Hand over a batch."""
-
-    @abstractmethod
-    def _collect(self, timeout_s: float, deadline: float) -> SpiReply:
-        """Return the next reply; `deadline` is when `timeout_s` ends, in seconds of :meth:`timer`."""
-
     def send(self, steps: Sequence[SpiStep]) -> int:
-        """Hand over a batch and return its number: 0, 1, 2, …, after 65535 again 0.
+        """Hand over a batch and return its number: 0, 1, 2, …, after 65535 again 0; at most `holds` at once.
 
-        Raises as every :class:`Link`, LinkError if it is empty, a step is not possible, or the adapter holds no more.
+        Raises as every :class:`Link`, LinkError if it is longer than the adapter takes. What else the adapter refuses,
+        :meth:`receive` raises.
         """
-        self._usable()
-        if not steps:
-            raise LinkError(f"{self.address}: a batch without a step was given.", hint="Give at least one.")
-        for step in steps:
-            if not 0 <= step.pause_us < 1 << 16:
-                raise LinkError(f"{self.address}: {step} was given.", hint="A pause is 0 to 65535 us.")
-        self._number = (self._number + 1) & 0xFFFF
-        self._submit(self._number, steps)
-        return self._number
 
+    @abstractmethod
     def receive(self, timeout_s: float) -> SpiReply:
         """Return the next reply, raising as every :class:`Link`; where one was lost, its number is left out."""
-        return self._collect(timeout_s, self._usable(timeout_s))
 
     def abandon(self) -> None:
         """Wait no longer for replies to what was sent; those that come late are dropped. Raises nothing."""
+
+    def _next_number(self) -> int:
+        self._usable()
+        self._number = (self._number + 1) & 0xFFFF
+        return self._number
 
 
 class SpidevLink(SpiLink):
@@ -119,29 +106,22 @@ class SpidevLink(SpiLink):
         super().__init__(f"spi://spidev/{device}", clock)
         self.speed_hz = speed_hz
         self.holds = 1
-        bus, _, line = device.partition(".")
-        if not (bus.isdigit() and line.isdigit()):
-            raise LinkError(f"{self.address} does not name a bus and a line.", hint="Write spi://spidev/0.0.")
+        self._replies: deque[SpiReply] = deque()
         try:
             import spidev
-        except ImportError as error:
-            raise LinkError(
-                f"{self.address} needs the package spidev, which is not installed.",
-                hint="Install it: pip install 'tactbench[spi]' (Linux only; it is compiled).",
-            ) from error
-        self._replies: deque[SpiReply] = deque()
-        self._device = spidev.SpiDev()
-        try:
-            self._device.open(int(bus), int(line))
+
+            self._device = spidev.SpiDev()
+            self._device.open(*map(int, device.split(".")))
             self._device.max_speed_hz = speed_hz
             self._device.mode = mode
         except OSError as error:
-            self._device.close()
             raise cannot_open(self.address, error) from error
+        except (ImportError, ValueError, TypeError) as error:
+            hint = "Write spi://spidev/BUS.LINE; it needs pip install 'tactbench[spi]' (Linux only)."
+            raise cannot_open(self.address, error, hint=hint) from error
 
-    def _submit(self, number: int, steps: Sequence[SpiStep]) -> None:
-        if any(step.select != 1 for step in steps):
-            raise LinkError(f"{self.address} has one select line.", hint="Give every step select=1.")
+    def send(self, steps: Sequence[SpiStep]) -> int:  # noqa: D102  (inherited)
+        number = self._next_number()
         data = []
         try:
             for step in steps:
@@ -153,8 +133,10 @@ class SpidevLink(SpiLink):
         except OSError as error:
             raise self._unplugged(error) from error
         self._replies.append(SpiReply(number, tuple(data), self._clock()))
+        return number
 
-    def _collect(self, timeout_s: float, deadline: float) -> SpiReply:
+    def receive(self, timeout_s: float) -> SpiReply:  # noqa: D102  (inherited)
+        self._usable(timeout_s)
         if not self._replies:
             raise self._nothing_came(timeout_s)
         return self._replies.popleft()

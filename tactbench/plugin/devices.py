@@ -25,11 +25,19 @@ if TYPE_CHECKING:
         with_sensor,
     )
     from tactbench.devices.control import Control
-    from tactbench.devices.driver import Driver, DriverSettings
+    from tactbench.devices.driver import DeviceLog, Driver, DriverSettings, Options, open_for, read_file, read_options
     from tactbench.devices.emulation.emulated_devices import EmulatedDevice, EmulatedDevices
     from tactbench.devices.emulation.scene_samples import SceneSamples
-    from tactbench.devices.emulator import DeviceEmulator, EmulatorSettings, Senses, Sent, SpiDeviceEmulator
-    from tactbench.devices.fault import Fault, fault_concerns
+    from tactbench.devices.emulator import (
+        DeviceEmulator,
+        EmulatorSettings,
+        Fault,
+        RowEmulator,
+        Senses,
+        Sent,
+        SpiDeviceEmulator,
+        fault_concerns,
+    )
     from tactbench.devices.force_loop import ForceLaw, LoopModel
     from tactbench.devices.guard import LocalGuard, largest_force_n
     from tactbench.devices.guard_messages import (
@@ -42,8 +50,6 @@ if TYPE_CHECKING:
         Report,
     )
     from tactbench.devices.guard_process import DeviceSettings, Guard, GuardProcess, ProcessSettings
-    from tactbench.devices.log import DeviceLog
-    from tactbench.devices.options import Options, open_for, read_file, read_options
     from tactbench.devices.positioner import (
         NotReadyError,
         Positioner,
@@ -56,11 +62,10 @@ if TYPE_CHECKING:
     from tactbench.devices.press import Course, Press, PressPlan
     from tactbench.devices.reading import Reading
     from tactbench.devices.row_driver import RowDriver, Sample
-    from tactbench.devices.row_emulator import RowEmulator
     from tactbench.devices.sequence import Unwrap
     from tactbench.links.address import open_link
     from tactbench.links.byte_link import ByteLink
-    from tactbench.links.can_link import CanFrame, CanLink, CanLog
+    from tactbench.links.can_link import CanFrame, CanLink, read_can_log
     from tactbench.links.datagram_link import DatagramLink
     from tactbench.links.link import Clock, Link, Received
     from tactbench.links.spi_bridge import SpiBridge
@@ -72,7 +77,6 @@ __all__ = [
     "ByteLink",
     "CanFrame",
     "CanLink",
-    "CanLog",
     "CheckTable",
     "Clock",
     "CommandKind",
@@ -146,6 +150,7 @@ __all__ = [
     "open_for",
     "open_link",
     "physics_of",
+    "read_can_log",
     "read_file",
     "read_options",
     "with_sensor",

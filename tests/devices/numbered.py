@@ -1,20 +1,17 @@
-"""A device of the tests: rows with a counter, as datagrams over UDP, and its driver."""
+"""A device of the tests: rows with a counter, handed over by a queue, and its driver."""
 
 from __future__ import annotations
 
-import socket
-import struct
+import queue
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 
 import numpy as np
 
 from tactbench.plugin import Block, ChannelSpec, StreamSpec
-from tactbench.plugin.devices import Clock, DatagramLink, Driver, LinkTimeout, Unwrap, open_link
+from tactbench.plugin.devices import Clock, Driver, LinkUnplugged, Unwrap
 
-HEAD = struct.Struct("<I")
 BITS = 16
-_SOCKET_S = 10.0
 
 
 def stream_of(name: str, rate_hz: float, channels: int, dtype: str = "int16") -> StreamSpec:
@@ -27,49 +24,38 @@ class Far:
 
     def __init__(self, stream: StreamSpec) -> None:
         self.stream = stream
-        self.socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
-        self.socket.bind(("127.0.0.1", 0))
-        self.socket.settimeout(_SOCKET_S)
-        self.port = self.socket.getsockname()[1]
-        self.peer: tuple[str, int] | None = None
+        self.pieces: queue.Queue[np.ndarray | None] = queue.Queue()
 
     def send(self, first: int, rows: int) -> None:
         """Send rows first, first + 1 …; each channel reads the number of its row."""
-        numbers = np.arange(first, first + rows)
-        data = np.repeat(numbers[:, None], len(self.stream.channels), axis=1).astype(self.stream.dtype)
-        self.socket.sendto(HEAD.pack(first % (1 << BITS)) + data.tobytes(), self.peer)
+        self.pieces.put(np.arange(first, first + rows))
+
+    def unplug(self) -> None:
+        self.pieces.put(None)
 
     def taken(self) -> None:
-        """Wait until the reader has passed on the datagram before, and asks for the next one."""
-        self.socket.recv(16)
+        """Wait until the reader has passed on all pieces, and asks for the next one."""
+        self.pieces.join()
 
 
 class NumberedDriver(Driver):
-    """Reads one datagram a call, and says so to the device when it is called again."""
+    """Reads one piece a call, and says that it is done when it is called again."""
 
     def __init__(self, far: Far, clock: Clock) -> None:
-        link = open_link(f"udp://127.0.0.1:{far.port}", clock)
-        assert isinstance(link, DatagramLink)
-        self.link = link
-        self.link.send(b"here")
-        far.peer = far.socket.recvfrom(16)[1]
+        self.far, self.clock = far, clock
         self.sampling = False
         self.stops = 0
-        self._stream = far.stream
         self._unwrap = Unwrap(BITS)
-        self._datagrams = 0
+        self._pieces = 0
         self._owing = False
 
     @property
     def streams(self) -> tuple[StreamSpec, ...]:
-        return (self._stream,)
+        return (self.far.stream,)
 
     @property
     def counts(self) -> Mapping[str, int]:
-        return {"datagrams": self._datagrams}
-
-    def identify(self) -> Mapping[str, str]:
-        return {}
+        return {"pieces": self._pieces}
 
     def start(self) -> None:
         self.sampling = True
@@ -77,29 +63,27 @@ class NumberedDriver(Driver):
     def read(self, timeout_s: float) -> list[Block]:
         if self._owing:
             self._owing = False
-            self.link.send(b"taken")
+            self.far.pieces.task_done()
         try:
-            received = self.link.receive(timeout_s)
-        except LinkTimeout:
+            numbers = self.far.pieces.get(timeout_s > 0, timeout_s)
+        except queue.Empty:
             return []
-        self._datagrams += 1
+        if numbers is None:
+            raise LinkUnplugged("The other end is gone.")
+        self._pieces += 1
         self._owing = True
-        data = np.frombuffer(received.data, self._stream.dtype, offset=HEAD.size)
-        data = data.reshape(-1, len(self._stream.channels))
-        counts = HEAD.unpack_from(received.data)[0] + np.arange(len(data))
-        times = np.full(len(data), received.t_ns)
-        return [Block(self._stream.name, times, data, sequence=self._unwrap(counts))]
+        data = np.repeat(numbers[:, None], len(self.far.stream.channels), axis=1).astype(self.far.stream.dtype)
+        counts = self._unwrap(numbers % (1 << BITS))
+        return [Block(self.far.stream.name, np.full(len(numbers), self.clock()), data, sequence=counts)]
 
     def stop(self) -> None:
         self.sampling = False
         self.stops += 1
 
-    def close(self) -> None:
-        self.link.close()
+    def close(self) -> None: ...
 
 
 @contextmanager
 def numbered(stream: StreamSpec, clock: Clock, driver: type[NumberedDriver] = NumberedDriver) -> Iterator:
     far = Far(stream)
-    with far.socket, driver(far, clock) as near:
-        yield far, near
+    yield far, driver(far, clock)

@@ -5,8 +5,7 @@ from __future__ import annotations
 import os
 import signal
 import threading
-import tracemalloc
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 
 import numpy as np
 import pytest
@@ -97,25 +96,8 @@ def test_the_same_rows_in_virtual_and_in_real_time(read, clock):
     assert joined(blocks, "wide") == (NUMBERS, [65_603])
     counts = reading.stream_counts["wide"]
     assert counts == StreamCounts(received=1052, written=1051, duplicates=1, gaps=2)
-    assert reading.counts == {"device: datagrams": 6}
+    assert reading.counts == {"device: pieces": 6}
     assert reading.ended == ""
-
-
-def test_a_caller_that_stops_for_three_seconds_loses_nothing(clock):
-    with (
-        numbered(WIDE, clock) as (far, wide),
-        numbered(FORCE, clock) as (far_force, force),
-        Reading({"wide": wide, "force": force}, clock=clock) as reading,
-    ):
-        send(far, far_force, 0, 1)
-        blocks = reading.blocks(60.0)
-        first = next(blocks)
-        send(far, far_force, 1, 30)
-        clock.now_ns += 61_000_000_000
-        every = [first, *blocks]
-    assert joined(every, "wide") == (list(range(31 * 500)), [])
-    assert joined(every, "force") == (list(range(31 * 100)), [])
-    assert {c.dropped for c in reading.stream_counts.values()} == {0}
 
 
 def send(far: Far, far_force: Far, first: int, tenths: int) -> None:
@@ -128,23 +110,20 @@ def send(far: Far, far_force: Far, first: int, tenths: int) -> None:
 
 
 def test_a_caller_that_stops_for_ten_seconds_loses_what_is_counted(clock):
-    with numbered(WIDE, clock) as (far, wide), numbered(FORCE, clock) as (far_force, force):
-        tracemalloc.start()
-        try:
-            with Reading({"wide": wide, "force": force}, clock=clock) as reading:
-                send(far, far_force, 0, 1)
-                blocks = reading.blocks(60.0)
-                came = [next(blocks) for _ in range(2)]
-                assert [block.stream for block in came] == ["wide", "force"]
-                send(far, far_force, 1, 100)
-                grown = tracemalloc.get_traced_memory()[1]
-                came += [next(blocks) for _ in range(2)]
-                send(far, far_force, 101, 1)
-                clock.now_ns += 61_000_000_000
-                came += blocks
-        finally:
-            tracemalloc.stop()
-    assert grown < 10e6
+    with (
+        numbered(WIDE, clock) as (far, wide),
+        numbered(FORCE, clock) as (far_force, force),
+        Reading({"wide": wide, "force": force}, clock=clock) as reading,
+    ):
+        send(far, far_force, 0, 1)
+        blocks = reading.blocks(60.0)
+        came = [next(blocks) for _ in range(2)]
+        assert [block.stream for block in came] == ["wide", "force"]
+        send(far, far_force, 1, 100)
+        came += [next(blocks) for _ in range(2)]
+        send(far, far_force, 101, 1)
+        clock.now_ns += 61_000_000_000
+        came += blocks
     kept = [*range(51 * 500), *range(101 * 500, 102 * 500)]
     assert joined(came, "wide") == (kept, [101 * 500])
     assert joined(came, "force") == ([*range(51 * 100), *range(101 * 100, 102 * 100)], [101 * 100])
@@ -162,12 +141,11 @@ def test_a_device_that_is_gone_ends_the_reading(clock):
             far.send(0, 500)
             far_force.send(0, 100)
             far_force.taken()
-            far_force.socket.close()
-            force.link.send(b"is anybody there?")
+            far_force.unplug()
             blocks = list(reading.blocks(60.0))
         assert clock.now_ns == 0, "it ended before its time"
         assert not wide.sampling
-    assert reading.ended.startswith("force: The other end of udp://127.0.0.1:")
+    assert reading.ended == "force: The other end is gone"
     assert isinstance(reading.error, LinkUnplugged)
     assert joined(blocks, "force")[0] == list(range(100))
     assert joined(blocks, "wide")[0] == list(range(500))
@@ -178,37 +156,21 @@ class Broken(NumberedDriver):
         raise ZeroDivisionError("seven by nothing")
 
 
-def test_any_error_of_a_driver_is_carried_over(clock):
-    with numbered(WIDE, clock, Broken) as (_, driver):
-        with Reading({"wide": driver}, clock=clock) as reading:
-            assert list(reading.blocks(60.0)) == []
-        assert driver.stops == 1
-    assert reading.ended == "wide: ZeroDivisionError: seven by nothing"
-    assert reading.error.__traceback__ is not None
-
-
 class Unannounced(NumberedDriver):
     def read(self, timeout_s):
         return [Block("other", None, np.zeros((1, 1)))]
 
 
-def test_a_stream_that_was_not_announced_ends_the_reading(clock):
-    with numbered(WIDE, clock, Unannounced) as (_, driver), Reading({"wide": driver}, clock=clock) as reading:
-        list(reading.blocks(60.0))
-    assert "'other'" in reading.ended
-
-
-def consume(
-    reading: Reading, *, begun: Callable[[], None] = lambda: None, error: Exception | None = None, after: int = 0
-) -> None:
-    """Take blocks, once `begun` has been called; with `error`, raise it at the first one, once so many rows came."""
-    with reading:
-        begun()
-        for block in reading.blocks(60.0):
-            if error is not None:
-                while reading.stream_counts[block.stream].received < after:
-                    pass
-                raise error
+@pytest.mark.parametrize(
+    ("kind", "said"), [(Broken, "wide: ZeroDivisionError: seven by nothing"), (Unannounced, "'other'")]
+)
+def test_any_error_of_a_driver_ends_the_reading(kind, said, clock):
+    with numbered(WIDE, clock, kind) as (_, driver):
+        with Reading({"wide": driver}, clock=clock) as reading:
+            assert list(reading.blocks(60.0)) == []
+        assert driver.stops == 1
+    assert said in reading.ended
+    assert reading.error.__traceback__ is not None
 
 
 @pytest.mark.parametrize("when", ["starting", "waiting"])
@@ -226,24 +188,19 @@ def test_ctrl_c(when, clock):
         reading = Reading({"wide": driver}, clock=clock)
         if when == "starting":
             far.send(0, 100)
+
+        def consume():
+            with reading:
+                if when == "waiting":
+                    far.send(0, 100)
+                list(reading.blocks(60.0))
+
         with pytest.raises(KeyboardInterrupt):
-            consume(reading, begun=lambda: far.send(0, 100) if when == "waiting" else None)
+            consume()
         assert (driver.sampling, driver.stops) == (False, 1)
     counts = reading.stream_counts["wide"]
     assert counts.received == 100 == counts.written + counts.dropped
     assert reading.ended == ""
-
-
-def test_an_error_of_the_caller_stops_the_devices(clock):
-    with numbered(WIDE, clock) as (far, driver):
-        reading = Reading({"wide": driver}, clock=clock)
-        for first in range(0, 2000, 500):
-            far.send(first, 500)
-        with pytest.raises(OSError, match="disk"):
-            consume(reading, error=OSError("the disk is full"), after=2000)
-        assert driver.stops == 1
-    counts = reading.stream_counts["wide"]
-    assert (counts.received, counts.written + counts.dropped) == (2000, 2000)
 
 
 class Deaf(NumberedDriver):
@@ -298,7 +255,7 @@ def test_a_driver_that_takes_time_to_ask_does_not_hold_up_the_others(clock):
     class Asking(NumberedDriver):
         def read(self, timeout_s):
             clock.now_ns += 3_000_000
-            far.send(self._datagrams, 1)
+            far.send(self._pieces, 1)
             return super().read(timeout_s)
 
     def advance(to_ns: int) -> None:
@@ -311,11 +268,3 @@ def test_a_driver_that_takes_time_to_ask_does_not_hold_up_the_others(clock):
         assert 1_000_000_000 <= clock.now_ns < 1_030_000_000
     assert joined(blocks, "force")[0] == list(range(10))
     assert reading.stream_counts["wide"].written > 10
-
-
-def test_virtual_time_that_does_not_go_on_is_no_endless_wait(clock):
-    with (
-        numbered(WIDE, clock) as (_, driver),
-        Reading({"wide": driver}, clock=clock, advance=lambda to_ns: None) as reading,
-    ):
-        assert list(reading.blocks(1.0)) == []

@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-import math
 import os
 import select
 import socket
-import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from typing import NamedTuple
 
+from tactbench.devices.emulation.line import Line
+from tactbench.devices.emulation.real_time import PseudoTerminal, RealTimeServer
 from tactbench.links.bridge_emulator import BridgeEmulator
 from tactbench.plugin.devices import CanFrame, Link, SpiStep, open_link
 
@@ -23,8 +24,6 @@ class End:
     link: Link
     say: Callable[[], None]
     """Makes the far end send something."""
-    hear: Callable[[float], object]
-    """Receives at the near end."""
     tell: Callable[[], object]
     """Sends at the near end."""
     unplug: Callable[[], None] | None = None
@@ -76,42 +75,22 @@ def pty() -> Iterator[Pty]:
 
 
 @contextmanager
-def serving(emulator: BridgeEmulator) -> Iterator[Pty]:
+def serving(emulator: BridgeEmulator) -> Iterator[Served]:
     """A bridge emulator on a pseudo-terminal, in real time."""
-    with pty() as end:
-        stop, stopped = os.pipe()
+    end = PseudoTerminal("{}")
+    server = RealTimeServer({"bridge": (Line(emulator), end)}, time.monotonic_ns)
+    server.start()
+    try:
+        yield Served(end.address, server.close)
+    finally:
+        server.close()
 
-        def serve() -> None:
-            while True:
-                due = emulator.next_s()
-                wait_s = None if due == math.inf else max(0.0, due - time.monotonic())
-                ready, _, _ = select.select([end.master, stop], [], [], wait_s)
-                if stop in ready:
-                    return
-                try:
-                    data = os.read(end.master, 65536) if ready else b""
-                    for _, reply in emulator.feed(data, time.monotonic()):
-                        os.write(end.master, reply)
-                except OSError:
-                    return
 
-        thread = threading.Thread(target=serve)
-        thread.start()
-        unplug = end.unplug
+class Served(NamedTuple):
+    """Where a link finds what is served, and how that ends."""
 
-        def end_service() -> None:
-            os.write(stopped, b"x")
-            thread.join()
-            unplug()
-
-        end.unplug = end_service  # type: ignore[method-assign]
-        try:
-            yield end
-        finally:
-            end_service()
-            end.unplug = unplug  # type: ignore[method-assign]
-            os.close(stop)
-            os.close(stopped)
+    name: str
+    unplug: Callable[[], None]
 
 
 def loopback(select: int, data: bytes, now_s: float) -> bytes:
@@ -122,7 +101,7 @@ def loopback(select: int, data: bytes, now_s: float) -> bytes:
 @contextmanager
 def byte_stream(clock: Callable[[], int]) -> Iterator[End]:
     with pty() as far, open_link(f"serial://{far.name}?baud=115200", clock) as link:
-        yield End(link, lambda: far.write(b"a"), link.read, lambda: link.write(b"b"), far.unplug)
+        yield End(link, lambda: far.write(b"a"), lambda: link.write(b"b"), far.unplug)
 
 
 @contextmanager
@@ -132,13 +111,7 @@ def tcp(clock: Callable[[], int]) -> Iterator[End]:
         open_link(f"socket://127.0.0.1:{server.getsockname()[1]}", clock) as link,
         server.accept()[0] as far,
     ):
-        yield End(link, lambda: far.sendall(b"a"), link.read, lambda: link.write(b"b"), far.close)
-
-
-@contextmanager
-def loop(clock: Callable[[], int]) -> Iterator[End]:
-    with open_link("loop://", clock) as link:
-        yield End(link, lambda: link.write(b"a"), link.read, lambda: link.write(b"b"))
+        yield End(link, lambda: far.sendall(b"a"), lambda: link.write(b"b"), far.close)
 
 
 @contextmanager
@@ -154,14 +127,14 @@ def datagrams(clock: Callable[[], int]) -> Iterator[End]:
             def say() -> None:
                 far.sendto(b"a", ("127.0.0.1", link.local_port))
 
-            yield End(link, say, link.receive, lambda: link.send(b"b"), unplug)
+            yield End(link, say, lambda: link.send(b"b"), unplug)
 
 
 @contextmanager
 def virtual_can(clock: Callable[[], int]) -> Iterator[End]:
     with open_link("can://virtual/alike", clock) as link, open_link("can://virtual/alike") as far:
         frame = CanFrame(0x4E0, b"\x40")
-        yield End(link, lambda: far.send(frame), link.receive, lambda: link.send(frame))
+        yield End(link, lambda: far.send(frame), lambda: link.send(frame))
 
 
 @contextmanager
@@ -171,7 +144,7 @@ def slcan(clock: Callable[[], int]) -> Iterator[End]:
         open_link(f"can://slcan/{far.name}?bitrate=1000000&sleep_after_open=0", clock) as link,
     ):
         frame = CanFrame(0x20E, b"\x4d")
-        yield End(link, lambda: far.write(b"t4E0140\r"), link.receive, lambda: link.send(frame), far.unplug)
+        yield End(link, lambda: far.write(b"t4E0140\r"), lambda: link.send(frame), far.unplug)
 
 
 @contextmanager
@@ -184,13 +157,12 @@ def spi_bridge(clock: Callable[[], int]) -> Iterator[End]:
         def send() -> object:
             return link.send([SpiStep(b"ab")])
 
-        yield End(link, send, link.receive, send, far.unplug)
+        yield End(link, send, send, far.unplug)
 
 
 ENDS = {
     "pty": byte_stream,
     "socket": tcp,
-    "loop": loop,
     "udp": datagrams,
     "can-virtual": virtual_can,
     "can-slcan": slcan,

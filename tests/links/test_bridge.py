@@ -11,9 +11,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tactbench.links.bridge_emulator import BridgeEmulator
-from tactbench.links.bridge_frame import Frame, FrameDecoder, Kind, encode_frame
 from tactbench.links.byte_link import SerialLink
-from tactbench.links.spi_bridge import HELLO, SETUP
+from tactbench.links.spi_bridge import HELLO, SETUP, Frame, FrameDecoder, Kind, encode_frame
 from tactbench.plugin.devices import LinkError, LinkTimeout, SpiBridge, SpiStep
 from tests.links.ends import loopback, pty, serving
 
@@ -42,31 +41,22 @@ def test_vectors_of_the_format():
         assert sent(emulator.feed(request, 1.0) + emulator.poll(2.0)) == reply
 
 
-@settings(max_examples=100)
+@settings(max_examples=40)
 @given(st.lists(FRAMES, max_size=5), st.integers(1, 40))
 def test_frames_come_back_in_any_pieces(frames, piece):
     data = b"".join(map(encode_frame, frames))
     decoder = FrameDecoder()
     found = [frame for place in range(0, len(data), piece) for frame in decoder.feed(data[place : place + piece])]
-    assert (found, decoder.damaged, decoder.within_frame) == (frames, 0, False)
+    assert (found, decoder.damaged) == (frames, 0)
 
 
-@settings(max_examples=100)
+@settings(max_examples=40)
 @given(st.binary(max_size=300), FRAMES)
 def test_after_any_bytes_the_next_frame_but_one_is_whole(noise, frame):
     """One zero byte ends the noise; a frame right behind it without one is lost with it."""
     decoder = FrameDecoder()
     decoder.feed(noise)
     assert decoder.feed(encode_frame(frame) + encode_frame(frame))[-1] == frame
-
-
-def test_an_endless_frame_does_not_fill_the_memory():
-    decoder = FrameDecoder()
-    for _ in range(40):
-        assert decoder.feed(b"\x05" * 4096) == []
-    assert decoder.damaged == 1
-    assert len(decoder._pending) < 70_000
-    assert decoder.feed(b"\0" + encode_frame(Frame(1, 2)))[-1] == Frame(1, 2)
 
 
 class Told:
@@ -121,47 +111,19 @@ def test_a_batch_runs_by_the_bus_clock_and_its_pauses():
     assert reply == Frame(0x83, 5, (2_000_000).to_bytes(4, "little") + b"\x7e\xff\xff\xff")
 
 
-def test_the_next_batch_begins_when_the_last_is_over():
-    emulator, bus = ready()
-    request = [encode_frame(Frame(Kind.BATCH, n, batch(SpiStep(b"\0" * 125)))) for n in range(2)]  # 1 ms each
-    emulator.feed(request[0] + request[1], 1.0)
-    assert [t_s for *_, t_s in bus.told] == pytest.approx([1.0, 1.001], abs=1e-12)
-    assert [frame.number for frame in replies(emulator.poll(1.5))] == [0, 1]
-
-
 @pytest.mark.parametrize(
-    ("frame", "reason"),
+    "frame",
     [
-        (Frame(Kind.HELLO, 9, version=2), "version 2 is unknown"),
-        (Frame(0x55, 9), "kind 85 is unknown"),
-        (Frame(Kind.SETUP, 9, b"\0"), "malformed payload"),
-        (Frame(Kind.SETUP, 9, SETUP.pack(1000, 4)), "clock or mode is not possible"),
-        (Frame(Kind.BATCH, 9), "malformed payload"),
-        (Frame(Kind.BATCH, 9, batch(SpiStep(b"abc"))[:-1]), "malformed payload"),
-        (Frame(Kind.BATCH, 9, batch(SpiStep(b"a", 0x80))), "malformed payload"),
-        (Frame(Kind.BATCH, 9, batch(SpiStep(bytes(200)))), "payload above 100 bytes"),
+        Frame(Kind.HELLO, 9, version=2),
+        Frame(0x55, 9),
+        Frame(Kind.BATCH, 9, batch(SpiStep(b"abc"))[:-1]),
+        Frame(Kind.BATCH, 9, batch(SpiStep(b"a", 0x80))),
     ],
 )
-def test_the_bridge_says_why_it_refuses(frame, reason):
+def test_the_bridge_refuses_what_it_cannot_do(frame):
     emulator, _ = ready(largest_payload=100, select_lines=0x07)
-    assert replies(emulator.feed(encode_frame(frame), 0.0)) == [Frame(0xFF, 9, reason.encode())]
-
-
-def test_the_bridge_holds_so_many_batches():
-    emulator, _ = ready(holds=2)
-    data = emulator.feed(
-        b"".join(encode_frame(Frame(Kind.BATCH, n, batch(SpiStep(b"a", 1, 1000)))) for n in range(3)), 0.0
-    )
-    assert replies(data) == [Frame(0xFF, 2, b"full")]
-
-
-@settings(max_examples=100)
-@given(st.binary(max_size=400))
-def test_the_bridge_survives_any_bytes(noise):
-    emulator, _ = ready()
-    emulator.feed(noise + b"\0", 0.0)
-    (hello,) = replies(emulator.feed(encode_frame(Frame(Kind.HELLO, 1)), 0.0))
-    assert hello.kind == Kind.HELLO.reply
+    (reply,) = replies(emulator.feed(encode_frame(frame), 0.0))
+    assert (reply.kind, reply.number) == (Kind.ERROR.reply, 9)
 
 
 needs_pty = pytest.mark.skipif(os.name != "posix", reason="pseudo-terminals are POSIX")
@@ -190,66 +152,27 @@ def test_batches_are_answered_in_order(link):
 
 
 @needs_pty
-@pytest.mark.parametrize(
-    ("steps", "said"),
-    [
-        ([], "without a step"),
-        ([SpiStep(b"a", 8)], "select lines 0x7"),
-        ([SpiStep(b"a", pause_us=70000)], "65535 us"),
-        ([SpiStep(bytes(1000))], "the bridge takes 1000"),
-    ],
-)
-def test_impossible_batches_are_refused_before_they_are_sent(link, steps, said):
-    with pytest.raises(LinkError, match=said):
-        link.send(steps)
-    assert transfer(link, b"\xff") == b"\x00"
-
-
-@needs_pty
-def test_more_than_the_bridge_holds_is_refused(link):
-    for _ in range(3):
-        link.send([SpiStep(b"a")])
-    with pytest.raises(LinkError, match="Receive a reply first"):
-        link.send([SpiStep(b"a")])
-    for _ in range(3):
+def test_a_batch_that_the_bridge_refuses_is_an_error_and_the_link_goes_on(link):
+    with pytest.raises(LinkError, match="the bridge takes 1000"):
+        link.send([SpiStep(bytes(1000))])
+    link.send([SpiStep(b"a", 8)])
+    with pytest.raises(LinkError, match="refuses request 1: malformed"):
         link.receive(2.0)
     assert transfer(link, b"\xff") == b"\x00"
 
 
 @needs_pty
-@pytest.mark.parametrize("fault", ["dropped", "damaged"])
-def test_a_reply_that_does_not_come_is_a_timeout_and_then_a_gap(link, emulator, fault):
-    emulator.faults.add(fault)
-    first = link.send([SpiStep(b"a")])
-    with pytest.raises(LinkTimeout):
-        link.receive(0.1)
-    emulator.faults.clear()
-    second = link.send([SpiStep(b"\x01")])
-    reply = link.receive(2.0)
-    assert (reply.number, reply.data) == (second, (b"\xfe",)) == (first + 1, (b"\xfe",))
-
-
-@needs_pty
-def test_batches_that_are_abandoned_leave_room(link, emulator):
+def test_replies_that_do_not_come_are_a_timeout_then_a_gap_and_abandoned_leave_room(link, emulator):
     emulator.faults.add("dropped")
     assert link.holds == 3
-    for _ in range(3):
-        link.send([SpiStep(b"a")])
-    with pytest.raises(LinkError, match="abandon"):
-        link.send([SpiStep(b"a")])
+    numbers = [link.send([SpiStep(b"a")]) for _ in range(3)]
     with pytest.raises(LinkTimeout):
         link.receive(0.1)
     link.abandon()
     emulator.faults.clear()
-    assert transfer(link, b"\xff") == b"\x00"
-
-
-@needs_pty
-def test_a_doubled_reply_is_counted_once(link, emulator):
-    emulator.faults.add("doubled")
-    assert [transfer(link, bytes([n])) for n in range(3)] == [b"\xff", b"\xfe", b"\xfd"]
-    with pytest.raises(LinkTimeout):
-        link.receive(0.1)
+    assert link.send([SpiStep(b"\x01")]) == numbers[-1] + 1
+    reply = link.receive(2.0)
+    assert (reply.number, reply.data) == (numbers[-1] + 1, (b"\xfe",))
 
 
 @needs_pty
@@ -267,24 +190,3 @@ def test_a_bridge_of_another_version_is_refused():
 
     with serving(Newer(loopback)) as far, pytest.raises(LinkError, match="speaks version 2"):
         SpiBridge(SerialLink(far.name), speed_hz=1000)
-
-
-def test_stamp_of_a_reply_is_that_of_its_first_byte():
-    """A reply that comes in two pieces, the clock standing at 1 for the first, at 2 for the second."""
-    if os.name != "posix":
-        pytest.skip("pseudo-terminals are POSIX")
-    ticks = [0]
-    with (
-        serving(BridgeEmulator(loopback)) as far,
-        SpiBridge(SerialLink(far.name, clock=lambda: ticks[0]), speed_hz=1000) as link,
-    ):
-        reply = encode_frame(Frame(0x83, 0, bytes(4) + b"ab"))
-        link._waiting[0] = (2,)
-        for t_ns, part in ((1, reply[:5]), (2, reply[5:])):
-            ticks[0] = t_ns
-            far.write(part)
-            if t_ns == 1:
-                with pytest.raises(LinkTimeout):
-                    link.receive(0.05)
-        found = link.receive(2.0)
-        assert (found.t_ns, found.data) == (1, (b"ab",))

@@ -8,7 +8,7 @@ import threading
 import pytest
 
 from tactbench.links.byte_link import SerialLink
-from tactbench.plugin.devices import LinkError, LinkTimeout, open_link
+from tactbench.plugin.devices import LinkError, LinkTimeout
 from tests.links.ends import pty
 
 pytestmark = pytest.mark.skipif(os.name != "posix", reason="pseudo-terminals are POSIX")
@@ -31,12 +31,6 @@ def test_every_byte_passes_unchanged_both_ways(far):
         while len(data) < 256:
             data += link.read(2.0).data
         assert data == ALL_BYTES
-
-
-def test_what_has_come_is_returned_at_once(far):
-    with SerialLink(far.name) as link:
-        far.write(b"abcdef")
-        assert link.read(2.0).data == b"abcdef"
 
 
 def test_stamp_is_taken_when_the_first_byte_is_there(far):
@@ -62,10 +56,3 @@ def test_a_port_is_opened_by_one_only(far):
 def test_a_far_end_that_does_not_read_is_a_timeout(far):
     with SerialLink(far.name) as link, pytest.raises(LinkTimeout, match="did not take"):
         link.write(bytes(1 << 20))  # a pseudo-terminal holds some ten thousand
-
-
-def test_spy_shows_the_bytes_on_stderr(far, capsys):
-    with open_link(f"spy://{far.name}?baud=9600") as link:
-        link.write(b"POS\r")
-        assert far.read_until(b"\r") == b"POS\r"
-    assert "50 4F 53 0D" in capsys.readouterr().err

@@ -10,10 +10,9 @@ from itertools import pairwise
 import pytest
 
 from tactbench.core.errors import LinkTimeout
-from tactbench.links.bridge_frame import Frame, FrameDecoder, Kind, encode_frame
 from tactbench.links.byte_link import ByteLink
 from tactbench.links.link import Link, Received
-from tactbench.links.spi_bridge import SpiBridge
+from tactbench.links.spi_bridge import Frame, FrameDecoder, Kind, SpiBridge, encode_frame
 from tactbench.links.spi_link import SpiStep
 from tests.conftest import ROOT
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any, NamedTuple
@@ -19,13 +20,11 @@ from tactbench.core.spec.rig import RigDescriptor, SensorDescriptor
 from tactbench.core.spec.rig_file import RigFile
 from tactbench.core.spec.scene import Scene
 from tactbench.core.spec.sensor import ChannelSpec, StreamSpec
-from tactbench.devices.queue import BlockQueue
+from tactbench.devices.reading import COLUMNS
 
 BAD = Quality.MISSING | Quality.SUSPECT
 RATE_SHARE = 0.02
 """A rate further from its nominal one is a mistake (assumed: quartz is a hundred times better)."""
-LONGEST_S = 1e3
-"""That is read at once."""
 LEAST_ROWS = 20
 """From which a rate is told."""
 OFF_S = 1.0
@@ -84,18 +83,29 @@ def carried_out(
 
 def joined(where: str, streams: Sequence[StreamSpec], blocks: Iterable[Any]) -> dict[str, StreamData]:
     """Return what came of each stream, NaN where it means nothing; fail where blocks are not as blocks must be."""
-    queues = {spec.name: BlockQueue(spec, LONGEST_S) for spec in streams}
+    came: dict[str, list[Block]] = {spec.name: [] for spec in streams}
     for block in blocks:
-        if block.stream not in queues:
+        if block.stream not in came:
             fail(where, f"a block of {block.stream!r}, which is none of its streams")
-        queues[block.stream].put(block)
+        came[block.stream].append(replace(block, quality=marks_of(block)))
     found = {}
     for spec in streams:
-        nothing = Block(spec.name, None, np.empty((0, len(spec.channels))))
-        came = queues[spec.name].take() or nothing
-        if came.data.shape[1:] != nothing.data.shape[1:]:
-            fail(f"{where}: {spec.name}", f"it has {came.data.shape[1:]} columns for {len(spec.channels)} channels")
-        found[spec.name] = StreamData(spec, came.t_ns, came.data, came.quality, sequence=came.sequence)
+        width = (len(spec.channels),)
+        parts = came[spec.name] or [Block(spec.name, None, np.empty((0, *width)), np.empty((0, *width), np.uint8))]
+        given = [name for name in COLUMNS if getattr(parts[0], name) is not None]
+        for one in parts:
+            shapes = {name: np.shape(column) for name in COLUMNS if (column := getattr(one, name)) is not None}
+            if shapes["data"][1:] != width:
+                fail(f"{where}: {spec.name}", f"it has {shapes['data'][1:]} columns for {width[0]} channels")
+            if list(shapes) != given or len({shape[0] for shape in shapes.values()}) > 1:
+                fail(
+                    f"{where}: {spec.name}",
+                    f"a block has columns {shapes}, not those of the first, or not equally long",
+                )
+        whole = {name: np.concatenate([getattr(one, name) for one in parts]) for name in given}
+        found[spec.name] = StreamData(
+            spec, whole.get("t_ns"), whole["data"], whole["quality"], sequence=whole.get("sequence")
+        )
         are_finite(where, found[spec.name])
     return found
 

@@ -267,7 +267,7 @@ def drivers_of(
         If a link cannot be opened, or a device refuses. What was opened before is closed again.
     """
     from tactbench.devices.driver import DriverSettings
-    from tactbench.links.address import LinkAddress
+    from tactbench.links.address import open_link
 
     drivers: dict[str, Driver] = {}
     with ExitStack() as opened:
@@ -281,7 +281,7 @@ def drivers_of(
                         hint="A plugin's SensorDescriptor names one; see docs/plugins.md.",
                     )
                 if not entry.emulated:
-                    opener: Callable[[], Link] = partial(LinkAddress.parse(entry.link).open, clock)
+                    opener: Callable[[], Link] = partial(open_link, entry.link, clock)
                 elif name in links:
                     opener = links[name]
                 else:

@@ -16,7 +16,7 @@ from tactbench.core.recording.writer import RecordingWriter
 from tactbench.core.spec.recording import RecordingMeta, Scalar
 from tactbench.core.spec.rig import SensorDescriptor
 from tactbench.core.spec.scene import Role
-from tactbench.devices.log import DeviceLog
+from tactbench.devices.driver import DeviceLog
 
 
 @dataclass(frozen=True)

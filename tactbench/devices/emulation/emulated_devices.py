@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 import time as wall
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from contextlib import ExitStack
 from dataclasses import dataclass
 from functools import partial
-from types import TracebackType
 from typing import Any, Literal, Self
 
 from tactbench.core.errors import UnknownNameError
 from tactbench.core.spec.rig import EmulatedLink
-from tactbench.devices.emulation.line import Line, LinkFault, Passed
+from tactbench.devices.emulation.line import Line, LinkFault
 from tactbench.devices.emulation.real_time import End, PseudoTerminal, RealTimeServer, SlcanAdapter, UdpEnd
 from tactbench.devices.emulation.virtual_time import (
     VirtualByteLink,
@@ -59,14 +58,14 @@ class EmulatedDevices:
         `virtual`: time stands until a link's wait or :meth:`advance` lets it go on; one thread, no link of the system,
         and the same bytes each time. `real`: by the wall clock, in a thread of its own, on links of the system that
         other processes may open, too.
-    keep_log
-        Whether :meth:`log_of` has what passed.
 
     Attributes
     ----------
     clock
         Nanoseconds since the devices began: what drivers and links are to use. Emulators, faults and senses see the
         same time in seconds.
+    addresses
+        By device: what a rig file says to open its link, also from another process; empty in virtual time.
 
     Raises
     ------
@@ -79,24 +78,19 @@ class EmulatedDevices:
         devices: Mapping[str, EmulatedDevice],
         *,
         time: Literal["virtual", "real"] = "virtual",
-        keep_log: bool = False,
     ) -> None:
         self._devices = dict(devices)
         self._virtual = VirtualTime() if time == "virtual" else None
-        self.clock: Clock = self._virtual if self._virtual is not None else _since_now()
+        began_ns = wall.monotonic_ns()
+        self.clock: Clock = self._virtual or (lambda: wall.monotonic_ns() - began_ns)
         self._lines = {
-            name: Line(
-                _on_its_line(device, real=self._virtual is None),
-                faults=device.faults,
-                keep_log=keep_log,
-            )
+            name: Line(_on_its_line(device, real=self._virtual is None), device.faults)
             for name, device in self._devices.items()
-        }  # fmt: skip
-        self._addresses: dict[str, str] = {}
+        }
+        self.addresses: dict[str, str] = {}
         self._server: RealTimeServer | None = None
         if self._virtual is not None:
-            for line in self._lines.values():
-                self._virtual.add(line)
+            self._virtual.lines += self._lines.values()
             return
         with ExitStack() as opened:
             ends: dict[str, tuple[Line, End]] = {}
@@ -104,7 +98,7 @@ class EmulatedDevices:
                 end = _end_of(device)
                 opened.callback(end.close)
                 ends[name] = self._lines[name], end
-                self._addresses[name] = end.address
+                self.addresses[name] = end.address
             self._server = RealTimeServer(ends, self.clock)
             opened.pop_all()
         self._server.start()
@@ -112,9 +106,7 @@ class EmulatedDevices:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
-    ) -> None:
+    def __exit__(self, kind: object, error: BaseException | None, traceback: object) -> None:
         self.close()
         if error is None:
             self._whole()
@@ -123,11 +115,6 @@ class EmulatedDevices:
         """End the devices and give back the links of the system; once closed, this does nothing."""
         if self._server is not None:
             self._server.close()
-
-    @property
-    def addresses(self) -> Mapping[str, str]:
-        """By device: what a rig file says to open its link, also from another process; empty in virtual time."""
-        return self._addresses
 
     def advance(self, until_ns: int) -> None:
         """Let time go on until `clock` says so much: computed in virtual time, waited for in real time.
@@ -157,33 +144,19 @@ class EmulatedDevices:
         if name not in self._devices:
             raise UnknownNameError("emulated device", name, self._devices)
         if self._virtual is None:
-            return open_link(self._addresses[name], self.clock)
-        line = self._lines[name]
-        match self._devices[name].link:
-            case "bytes":
-                return VirtualByteLink(name, self._virtual, line)
-            case "can":
-                return VirtualCanLink(name, self._virtual, line)
-            case "datagram":
-                return VirtualDatagramLink(name, self._virtual, line)
-        return SpiBridge(VirtualByteLink(name, self._virtual, line), speed_hz=SPI_HZ)
+            return open_link(self.addresses[name], self.clock)
+        kinds = {"can": VirtualCanLink, "datagram": VirtualDatagramLink}
+        kind = self._devices[name].link
+        link = kinds.get(kind, VirtualByteLink)(name, self._virtual, self._lines[name])
+        return SpiBridge(link, speed_hz=SPI_HZ) if isinstance(link, VirtualByteLink) and kind == "spi" else link
 
     def opener(self, name: str) -> Callable[[], Link]:
         """Return what opens the host's end of a device's link, as drivers are given it."""
         return partial(self.open_link, name)
 
-    def log_of(self, name: str) -> Sequence[Passed]:
-        """Return what passed on a device's line so far, in both directions; empty without `keep_log`."""
-        return self._lines[name].log
-
     def _whole(self) -> None:
         if self._server is not None and self._server.error is not None:
             raise self._server.error
-
-
-def _since_now() -> Clock:
-    began_ns = wall.monotonic_ns()
-    return lambda: wall.monotonic_ns() - began_ns
 
 
 def _on_its_line(device: EmulatedDevice, *, real: bool) -> DeviceEmulator:
@@ -196,19 +169,16 @@ def _on_its_line(device: EmulatedDevice, *, real: bool) -> DeviceEmulator:
     return emulator  # type: ignore[no-any-return]
 
 
-def _baud_for(emulator: Any) -> int:
-    """Return the least usual baud rate that carries what a device sends, and a quarter more."""
-    needed = 1.25 * 10 * getattr(emulator, "bytes_per_s", 0.0)
-    return next((baud for baud in BAUDS if baud >= needed), BAUDS[-1])
-
-
 def _end_of(device: EmulatedDevice) -> End:
     match device.link:
-        case "bytes":
-            return PseudoTerminal(f"serial://{{}}?baud={device.baud or _baud_for(device.emulator)}")
-        case "spi":
-            return PseudoTerminal(f"spi://bridge/{{}}?speed_hz={SPI_HZ}")
         case "datagram":
             return UdpEnd()
+        case "bytes":
+            # The least usual rate that carries what it sends, and a quarter more.
+            needed = 1.25 * 10 * getattr(device.emulator, "bytes_per_s", 0.0)
+            baud = device.baud or next((baud for baud in BAUDS if baud >= needed), BAUDS[-1])
+            return PseudoTerminal(f"serial://{{}}?baud={baud}")
+        case "spi":
+            return PseudoTerminal(f"spi://bridge/{{}}?speed_hz={SPI_HZ}")
     # The bit rate is a statement; nothing here starts anew when its port is opened.
     return PseudoTerminal("can://slcan/{}?bitrate=1000000&sleep_after_open=0")

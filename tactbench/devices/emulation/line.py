@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections import Counter, deque
+from collections import deque
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import ClassVar, Literal, NamedTuple, TypeAlias
+from typing import ClassVar, TypeAlias
 
-from tactbench.devices.emulator import DeviceEmulator, Sent
-from tactbench.devices.fault import Fault, fault_concerns
+from tactbench.devices.emulator import DeviceEmulator, Fault, Sent
 from tactbench.links.can_link import CanFrame
 
 Piece: TypeAlias = bytes | CanFrame
@@ -42,20 +41,8 @@ def split_faults(faults: Iterable[str]) -> tuple[tuple[LinkFault, ...], tuple[st
         If a fault of the link has an unknown key or a wrong value.
     """
     given = tuple(faults)
-    of_link = tuple(fault.partition(":")[0] in LinkFault.known for fault in given)
-    return (
-        tuple(LinkFault.parse(fault) for fault, own in zip(given, of_link, strict=True) if own),
-        tuple(fault for fault, own in zip(given, of_link, strict=True) if not own),
-    )
-
-
-class Passed(NamedTuple):
-    """One piece that passed a line."""
-
-    t_s: float
-    """When the host sent it, or when it came out at the host's end; seconds of the emulators' clock."""
-    sender: Literal["host", "device"]
-    piece: Piece
+    of_link = tuple(fault for fault in given if fault.partition(":")[0] in LinkFault.known)
+    return tuple(map(LinkFault.parse, of_link)), tuple(fault for fault in given if fault not in of_link)
 
 
 class Line:
@@ -67,8 +54,6 @@ class Line:
         The device.
     faults
         Of the link.
-    keep_log
-        Whether :attr:`log` holds what passed.
 
     Attributes
     ----------
@@ -77,24 +62,13 @@ class Line:
         that open, and it is dropped.
     gone
         Whether the link was unplugged by a fault.
-    log
-        What passed in both directions, in order.
     """
 
-    def __init__(
-        self,
-        emulator: DeviceEmulator,
-        *,
-        faults: Sequence[LinkFault] = (),
-        keep_log: bool = False,
-    ) -> None:
+    def __init__(self, emulator: DeviceEmulator, faults: Sequence[LinkFault] = ()) -> None:
         self.deliver: Callable[[float, Piece], None] | None = None
         self.gone = False
-        self.log: list[Passed] = []
         self._emulator = emulator
         self._faults = tuple(faults)
-        self._seen: Counter[Fault] = Counter()
-        self._keep_log = keep_log
         self._unplugged_s = min((fault.start_s for fault in faults if fault.name == "unplug"), default=math.inf)
         self._next_s: float | None = None
         self._out: deque[tuple[float, Piece]] = deque()
@@ -104,8 +78,6 @@ class Line:
         self.poll(now_s)
         if self.gone:
             return
-        if self._keep_log:
-            self.log.append(Passed(now_s, "host", piece))
         self._send(self._emulator.feed(piece, now_s))
         self.poll(now_s)
 
@@ -118,8 +90,6 @@ class Line:
             self._send(self._emulator.poll(until_s))
         while self._out and self._out[0][0] <= now_s and self._out[0][0] < self._unplugged_s:
             t_s, piece = self._out.popleft()
-            if self._keep_log:
-                self.log.append(Passed(t_s, "device", piece))
             if self.deliver is not None:
                 self.deliver(t_s, piece)
         self.gone = now_s >= self._unplugged_s
@@ -141,6 +111,5 @@ class Line:
 
     def _send(self, sent: Sequence[Sent]) -> None:
         for left_s, piece in sent:
-            late = [one for one in self._faults if fault_concerns((one,), "late", left_s, self._seen)]
-            due_s = left_s + sum(one.delay_s for one in late)
+            due_s = left_s + sum(one.delay_s for one in self._faults if one.name == "late" and one.active(left_s))
             self._out.append((max(due_s, self._out[-1][0]) if self._out else due_s, piece))

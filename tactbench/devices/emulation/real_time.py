@@ -9,7 +9,7 @@ import selectors
 import socket
 import threading
 from collections.abc import Mapping, Sequence
-from contextlib import ExitStack, suppress
+from contextlib import suppress
 
 from tactbench.core.errors import UsageError
 from tactbench.devices.emulation.line import Line, Piece
@@ -17,6 +17,9 @@ from tactbench.devices.emulator import DeviceEmulator, Sent
 from tactbench.links.can_link import CanFrame
 from tactbench.links.datagram_link import LARGEST_DATAGRAM
 from tactbench.links.link import Clock
+
+STOP_S = 0.05
+"""Within which a server that has nothing to do notices that it is to end."""
 
 
 class PseudoTerminal:
@@ -169,15 +172,11 @@ class RealTimeServer:
 
     def __init__(self, served: Mapping[str, tuple[Line, End]], clock: Clock) -> None:
         self._clock = clock
-        self._ends = ExitStack()
-        self._open: dict[str, tuple[Line, End]] = {}
+        self._open = dict(served)
         # Waits to the microsecond; epoll's are rounded up to whole milliseconds.
-        self._selector = self._ends.enter_context(selectors.SelectSelector())
-        self._wake, self._woken = (self._ends.enter_context(end) for end in socket.socketpair())
-        self._selector.register(self._woken, selectors.EVENT_READ)
-        for name, (line, end) in served.items():
+        self._selector = selectors.SelectSelector()
+        for line, end in served.values():
             line.deliver = end.send
-            self._open[name] = line, end
             self._selector.register(end.fileno(), selectors.EVENT_READ)
         self._thread = threading.Thread(target=self._run, name="emulated devices", daemon=True)
         self._stop = False
@@ -192,11 +191,10 @@ class RealTimeServer:
         """End the service and close the links."""
         self._stop = True
         if self._thread.is_alive():
-            self._wake.send(b"x")
             self._thread.join()
         for name in list(self._open):
             self._unplug(name)
-        self._ends.close()
+        self._selector.close()
 
     def serve(self, at_s: float | None = None) -> float:
         """Carry what has come and what is due at `at_s` or now; return when something is due next, or infinity."""
@@ -219,8 +217,8 @@ class RealTimeServer:
     def _run(self) -> None:
         try:
             while not self._stop:
-                wait_s = max(0.0, self.serve() - self._clock() * 1e-9)
-                self._selector.select(None if wait_s == math.inf else wait_s)
+                wait_s = self.serve() - self._clock() * 1e-9
+                self._selector.select(min(max(0.0, wait_s), STOP_S))
         except BaseException as error:  # shown to whoever waits for the device
             self.error = error
             for name in list(self._open):

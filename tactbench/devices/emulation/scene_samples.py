@@ -4,14 +4,10 @@ from __future__ import annotations
 
 from bisect import bisect_right
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import Protocol
 
 from tactbench.core.samples import Block
 from tactbench.core.spec.sensor import StreamSpec
-
-if TYPE_CHECKING:
-    import numpy as np
-    import numpy.typing as npt
 
 PRESSING_FORCE = "fz"
 """Name under which a simulated rig gives the force with which the sensor is pressed, positive when pressing [N]."""
@@ -82,18 +78,16 @@ def _tracks(
     """Return times [ns], channels and rows of samples of each stream that has any."""
     import numpy as np
 
-    times: dict[str, list[npt.NDArray[np.int64]]] = {stream.name: [] for stream in streams}
-    samples: dict[str, list[npt.NDArray[Any]]] = {stream.name: [] for stream in streams}
+    found: dict[str, list[Block]] = {stream.name: [] for stream in streams}
     for block in blocks:
         if block.t_ns is not None:
-            times[block.stream].append(block.t_ns)
-            samples[block.stream].append(block.data)
+            found[block.stream].append(block)
     return [
         (
-            np.concatenate(times[stream.name]).tolist(),
+            np.concatenate([block.t_ns for block in several if block.t_ns is not None]).tolist(),
             tuple(channel.name for channel in stream.channels),
-            np.concatenate(samples[stream.name]).tolist(),
+            np.concatenate([block.data for block in several]).tolist(),
         )
         for stream in streams
-        if times[stream.name]
+        if (several := found[stream.name])
     ]

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 from collections import deque
+from dataclasses import replace
+from typing import Any
 
 from tactbench.core.errors import LinkError
 from tactbench.devices.emulation.line import Line, Piece
@@ -22,19 +24,17 @@ class VirtualTime:
     ----------
     now_s
         The same in seconds.
+    lines
+        The devices; what several do at one moment happens in their order.
     """
 
     def __init__(self) -> None:
         self.now_s = 0.0
-        self._lines: list[Line] = []
+        self.lines: list[Line] = []
 
     def __call__(self) -> int:
         """Return the present time, nanoseconds."""
         return round(self.now_s * 1e9)
-
-    def add(self, line: Line) -> None:
-        """Let a device live by this clock. What several do at one moment happens in the order of adding."""
-        self._lines.append(line)
 
     def advance(self, until_ns: int) -> None:
         """Let all devices go on up to and including `until_ns`; a time that is over changes nothing."""
@@ -49,11 +49,8 @@ class VirtualTime:
         bool
             Whether there was an event.
         """
-        due_s, line = math.inf, None
-        for one in self._lines:
-            next_s = one.next_s()
-            if next_s < due_s:
-                due_s, line = next_s, one
+        line = min(self.lines, key=Line.next_s, default=None)
+        due_s = math.inf if line is None else line.next_s()
         if line is None or due_s > until_s:
             self.now_s = max(self.now_s, until_s)
             return False
@@ -96,22 +93,18 @@ class _VirtualLink(Link):
     def _arrive(self, t_s: float, piece: Piece) -> None:
         self._arrived.append((round(t_s * 1e9), piece))
 
-    def _wait(self, timeout_s: float) -> None:
-        """Let time go on until something has arrived, by `timeout_s` at most.
-
-        Raises
-        ------
-        LinkTimeout, LinkUnplugged, LinkClosed
-            As of every link.
-        """
+    def receive(self, timeout_s: float) -> Any:
         until_s = self._usable(timeout_s)
         while not self._arrived:
             self._plugged()
             if not self._time.step(until_s):
                 raise self._nothing_came(timeout_s)
+        t_ns, piece = self._arrived.popleft()
+        return replace(piece, t_ns=t_ns) if isinstance(piece, CanFrame) else Received(piece, t_ns)
 
-    def _send(self, piece: Piece) -> None:
+    def send(self, piece: Any) -> None:
         """Hand a piece to the device; raises LinkUnplugged."""
+        self._sendable(piece)
         self._plugged()
         self._line.feed(piece, self._time.now_s)
 
@@ -124,48 +117,19 @@ class _VirtualLink(Link):
 
 
 class VirtualByteLink(_VirtualLink, ByteLink):
-    """A byte stream.
-
-    A read returns what came at one moment, so that every piece keeps its time.
-    """
+    """A byte stream; a read returns one piece, with its time."""
 
     def read(self, timeout_s: float) -> Received:  # noqa: D102  (inherited)
-        self._wait(timeout_s)
-        t_ns, data = self._arrived[0][0], b""
-        while self._arrived and self._arrived[0][0] == t_ns:
-            _, piece = self._arrived.popleft()
-            assert isinstance(piece, bytes)
-            data += piece
-        return Received(data, t_ns)
+        received: Received = self.receive(timeout_s)
+        return received
 
     def write(self, data: bytes) -> None:  # noqa: D102  (inherited)
-        self._usable()
-        self._send(bytes(data))
+        self.send(bytes(data))
 
 
 class VirtualCanLink(_VirtualLink, CanLink):
     """A CAN bus."""
 
-    def receive(self, timeout_s: float) -> CanFrame:  # noqa: D102  (inherited)
-        self._wait(timeout_s)
-        t_ns, frame = self._arrived.popleft()
-        assert isinstance(frame, CanFrame)
-        return CanFrame(frame.id, frame.data, frame.extended, t_ns)
-
-    def send(self, frame: CanFrame) -> None:  # noqa: D102  (inherited)
-        self._sendable(frame)
-        self._send(frame)
-
 
 class VirtualDatagramLink(_VirtualLink, DatagramLink):
     """Datagrams."""
-
-    def receive(self, timeout_s: float) -> Received:  # noqa: D102  (inherited)
-        self._wait(timeout_s)
-        t_ns, data = self._arrived.popleft()
-        assert isinstance(data, bytes)
-        return Received(data, t_ns)
-
-    def send(self, data: bytes) -> None:  # noqa: D102  (inherited)
-        self._sendable(data)
-        self._send(bytes(data))

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from tactbench.plugin import DataError, Source, UsageError
-from tactbench.plugin.devices import CanFrame, CanLog, DeviceLog, read_options
+from tactbench.plugin.devices import CanFrame, DeviceLog, read_can_log, read_options
 from tactbench.sensors.icub.channels import STREAMS
 from tactbench.sensors.icub.codec import (
     BROADCAST,
@@ -27,15 +27,16 @@ from tactbench.sensors.icub.options import LogOptions
 
 
 def read_log(path: Path, options: Mapping[str, Any]) -> DeviceLog:
-    """Read one fingertip's samples from a log in Vector's ASC or BLF format.
+    """Read one fingertip's samples from a log in a format of python-can: candump's, Vector's ASC and BLF, ...
 
-    Times count from the log's start. Samples are those that the driver makes of the same frames; one whose time is not
-    after that of the sample before it is kept out and counted. Buses of a log of several are not told apart.
+    Times count from the log's first message. Samples are those that the driver makes of the same frames; one whose
+    time is not after that of the sample before it is kept out and counted. Buses of a log of several are not told
+    apart.
 
     Parameters
     ----------
     path
-        Ends in ``.asc`` or ``.blf``.
+        Ends in ``.log``, ``.asc``, ``.blf`` ...
     options
         :class:`~tactbench.sensors.icub.options.LogOptions`.
 
@@ -52,15 +53,13 @@ def read_log(path: Path, options: Mapping[str, Any]) -> DeviceLog:
     classes = (OLD_SKIN, SKIN) if settings.old_ids else (SKIN,)
     halves: dict[tuple[int, int], list[CanFrame]] = {}
     commands = []
-    frames = 0
-    with CanLog(path) as log:
-        for frame in log:
-            frames += 1
-            if not frame.extended and frame.id >> 8 in classes and frame.data[:1] in (bytes([HEAD]), bytes([TAIL])):
-                halves.setdefault((frame.id >> 4 & 0xF, frame.id & 0xF), []).append(frame)
-            elif (found := read_command(frame)) is not None:
-                commands.append(found)
-    board, triangle = _chosen(path, settings, sorted(halves), frames)
+    frames, left_out = read_can_log(path)
+    for frame in frames:
+        if not frame.extended and frame.id >> 8 in classes and frame.data[:1] in (bytes([HEAD]), bytes([TAIL])):
+            halves.setdefault((frame.id >> 4 & 0xF, frame.id & 0xF), []).append(frame)
+        elif (found := read_command(frame)) is not None:
+            commands.append(found)
+    board, triangle = _chosen(path, settings, sorted(halves), len(frames))
     half = halves[board, triangle]
     period_s, rate = _period(path, settings, half)
     decoder = SkinDecoder(period_s, old_ids=settings.old_ids)
@@ -74,8 +73,8 @@ def read_log(path: Path, options: Mapping[str, Any]) -> DeviceLog:
     sent = [command for to, command in commands if to in (board, BROADCAST)]
     counts = {
         **decoder.counts[board, triangle].named(),
-        "frames of others": frames - len(half) - len(commands),
-        **log.counts,
+        "frames of others": len(frames) - len(half) - len(commands),
+        **left_out,
         "samples kept out, not after the one before": len(samples) - len(kept),
         "baselines taken": sum(isinstance(command, TriangleSetup) for command in sent),
     }
@@ -84,7 +83,6 @@ def read_log(path: Path, options: Mapping[str, Any]) -> DeviceLog:
         streams=(STREAMS[0].model_copy(update={"rate_hz": 1 / period_s, "rate_source": rate}),),
         blocks=(to_block(kept),),
         clock="host",
-        started=log.started,
         remarks=(
             f"Board {board}, triangle {triangle}, {rate.reference}.",
             *(

@@ -1,9 +1,6 @@
 """The loop that beats the guard, in a thread of its own: nobody else uses the guard meanwhile."""
 
-import signal
 import threading
-
-import pytest
 
 from tactbench.plugin.devices import Control, Press
 from tests.rigs.parallel_manipulator.presses import FAULTS
@@ -76,30 +73,4 @@ def test_a_sensor_that_sends_nothing_ends_the_press():
     assert control.press.ended == ""
     control.carry(world.clock() + 60_000_000)
     assert "the sensor has sent nothing for 1" in control.press.ended
-    guard.close()
-
-
-@pytest.mark.parametrize("at", range(20, 29))
-def test_ctrl_c_waits_for_the_end_of_a_control_period(at):
-    # In the middle of one, a command may be out whose answer nobody waits for: it would be taken for the next one's.
-    sensor = Sensor()
-    control, world, guard, _ = armed(sensor, stale_s=1e9)
-    feed, pieces = world.motor.feed, []
-
-    def feed_and_interrupt(piece, now_s):
-        sent = feed(piece, now_s)
-        pieces.append(piece)
-        if len(pieces) == at:
-            signal.raise_signal(signal.SIGINT)
-        return sent
-
-    world.motor.feed = feed_and_interrupt
-    with pytest.raises(KeyboardInterrupt):
-        control.carry(world.clock() + 2_000_000_000)
-    assert len(pieces) >= at
-    control.retreat("stopped by hand", 5.0)
-    *_, retreats, retreated = [event.text for event in control.events()]
-    assert retreats == "the rig has commanded it"
-    assert retreated.startswith("out after 0.")
-    assert {name: n for name, n in control.counts()["motor"].items() if n} == {}
     guard.close()

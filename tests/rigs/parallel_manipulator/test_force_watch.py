@@ -4,7 +4,6 @@ import numpy as np
 
 from tactbench.devices.force_watch import ForceWatch
 from tactbench.devices.guard_messages import Trigger
-from tactbench.devices.sequence import SequenceCheck
 from tactbench.plugin import Block
 from tactbench.rigs.parallel_manipulator.force_torque.wrench import stream
 from tests.rigs.parallel_manipulator.presses import FAULTS
@@ -18,7 +17,6 @@ class Watched:
 
     def __init__(self):
         self.watch = ForceWatch(stream(1000.0))
-        self.order = SequenceCheck()
         self.now_ns = 0
 
     def take(self, *samples):
@@ -31,7 +29,7 @@ class Watched:
             "force_torque", np.full(len(samples), self.now_ns), data, None,
             None if None in numbers else np.array(numbers),
         )  # fmt: skip
-        return self.watch.take(block, self.order(block), LIMITS)
+        return self.watch.take(block, LIMITS)
 
 
 def test_a_sample_that_comes_again_is_no_touch_and_no_news():

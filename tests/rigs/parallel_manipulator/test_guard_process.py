@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from tactbench.devices.guard_messages import Trigger
+from tactbench.devices.guard_messages import GuardRefusesError, Trigger
 from tactbench.plugin.devices import Beat, DriverSettings, GuardLostError, GuardState, LinkError
 from tactbench.rigs.parallel_manipulator.motor.driver import FaulhaberDriver, retreat_command
 from tactbench.rigs.parallel_manipulator.motor.exchange import MotorError
@@ -82,44 +82,32 @@ def entries(log):
 
 def told(made, since_s):
     """Return what the motor was told since a second."""
-    log = made.world.devices.log_of("motor")
-    return b"".join(passed.piece for passed in log if passed.sender == "host" and passed.t_s >= since_s)
+    return b"".join(piece for at_s, piece in made.world.motor.told if at_s >= since_s)
 
 
-def test_an_error_within_the_guard_lets_the_motor_retreat(tmp_path, monkeypatch):
+def test_an_error_of_a_driver_lets_the_motor_retreat(tmp_path, monkeypatch):
     monkeypatch.setenv("PYTHONPATH", str(ROOT))
     with rig("process", tmp_path, force_driver=RAISING) as made:
-
-        def change(beat, since_s):
-            if beat.state == "ramp":
-                # The rig looks on until the guard's process has ended by itself.
-                made.guard._process.wait(30.0)
-            return beat
-
-        with pytest.raises(GuardLostError, match="has retreated"):
-            made.press(change)
+        made.press()
+        report = made.ended()
+        assert (report.state, report.trigger) == (GuardState.FAULT, Trigger.FORCE_LOST)
         assert made.out
-        found = entries(made.log)
-        (error,) = [entry["internal_error"] for entry in found if "internal_error" in entry]
-        assert "a driver's own error" in error
-        (rescued,) = [entry["rescued"] for entry in found if "rescued" in entry]
-        where = float(re.search(r"motor has retreated to (\S+) m", rescued)[1])
-        assert where == pytest.approx(FAULTS.RETREAT_M, abs=1.01 * FAULTS.STATED["corridor_m"])
+        (event,) = [event for event in made.guard.events() if event.trigger is Trigger.FORCE_LOST]
+        assert event.text == "ZeroDivisionError: a driver's own error"
 
 
 def homed_to_a_switch_behind_the_skin(made):
     made.world.motor.drive._reference_switch_m = 8e-3
 
 
-def test_an_error_within_the_guard_while_homing_lets_the_motor_stand(tmp_path, monkeypatch):
+def test_an_error_of_a_driver_while_homing_lets_the_motor_stand(tmp_path, monkeypatch):
     monkeypatch.setenv("PYTHONPATH", str(ROOT))
     monkeypatch.setattr(FAULTS, "STATED", FAULTS.STATED | TO_A_SWITCH)
     # At 5 mm/s on 2 N/mm, 3 N are 0.3 s after the driver's error: what a busy machine may take.
     with rig("process", tmp_path, FAULTS.Setting(stiffness_n_m=2e3), force_driver=RAISING) as made:
         homed_to_a_switch_behind_the_skin(made)
-        with pytest.raises(GuardLostError, match="sent to stand"):
+        with pytest.raises(GuardRefusesError, match="stands where it was homed"):
             made.guard.arm(made.setting.limits)
-        assert [entry for entry in entries(made.log) if "sent to stand" in entry.get("rescued", "")]
         assert stands(made)
         assert 0.1 < made.world.force_n < 3.0
 
@@ -198,7 +186,7 @@ def test_a_blind_retreat_whatever_stands_on_the_line(half):
     guard.start()
     FAULTS.Press(guard, setting, world.clock).run(2.5)
     assert world.position_m > -1e-3
-    guard.abandon()
+    guard._press.close()
     link = world.devices.open_link("motor")
     link.write(half)
     link.close()

@@ -121,7 +121,7 @@ def test_a_loop_that_swings_ends_the_press():
     settings = settings_of(file_of(settings__force_loop__integral_mm_n_s=400.0, settings__force_loop__speed_mm_s=50.0,
                                    settings__press__error_band_n=0.3))  # fmt: skip
     plant = Plant(settings).begun().until(PressState.FAILED)
-    assert "swings" in plant.press.ended
+    assert "off by more than" in plant.press.ended
 
 
 def test_no_contact_down_to_the_depth_ends_the_press():

@@ -79,7 +79,8 @@ class Adapter(SpiLink):
         self._free_s = 0.0
         self._replies = deque()
 
-    def _submit(self, number, steps):
+    def send(self, steps):
+        number = self._next_number()
         assert len(self._replies) < self.holds
         begin_s = now_s = max(self._free_s, 1e-9 * self._clock())
         data = []
@@ -91,8 +92,10 @@ class Adapter(SpiLink):
         reply = None if self.sent in self._lost else SpiReply(number, tuple(data), round(1e9 * now_s), counter_us)
         self._replies.append((round(1e9 * now_s), reply))
         self.sent += 1
+        return number
 
-    def _collect(self, timeout_s, deadline):
+    def receive(self, timeout_s):
+        self._usable(timeout_s)
         if self.unplugged:
             raise self._unplugged(OSError("pulled"))
         until_ns = self._clock.now_ns + round(1e9 * timeout_s)

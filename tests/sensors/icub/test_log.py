@@ -52,7 +52,7 @@ def test_a_log_holds_what_the_driver_read(tmp_path, suffix):
     assert {int(mark) for mark in np.unique(live.quality)} >= {0, int(Quality.MISSING), int(Quality.SUSPECT)}
     assert np.abs(block.t_ns - live.t_ns).max() <= 1000
     assert log.counts == counts | {"baselines taken": 1}
-    assert (log.clock, bool(log.started)) == ("host", True)
+    assert log.clock == "host"
     (stream,) = log.streams
     assert stream.rate_hz == pytest.approx(50.0, rel=1e-3)
     assert stream.rate_source.tag == "measured"
@@ -102,7 +102,6 @@ def test_times_that_go_back_keep_samples_out(tmp_path):
     assert block.data[:, 0].tolist() == [100, 101, 102, 104, 105]
     assert (np.diff(block.t_ns) > 0).all()
     assert log.counts["samples kept out, not after the one before"] == 1
-    assert log.counts["times that go back"] == 1
 
 
 def test_what_cannot_be_read_is_refused(tmp_path):

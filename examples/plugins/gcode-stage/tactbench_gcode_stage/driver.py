@@ -19,7 +19,7 @@ class GcodeOptions(PositionerOptions):
 class GcodeStage(Positioner):
     """One axis; positions are its machine coordinates in m, times the sign, from `home_m` on."""
 
-    device, options_kind, keeps_place = "gcode-stage", GcodeOptions, True
+    device, options_kind = "gcode-stage", GcodeOptions
     resolution_m, stop_latency_s = 1e-6, 0.03  # GRBL's status has a micrometre
     address = "serial:///dev/ttyACM0?baud=115200"
     status = b""

@@ -104,7 +104,6 @@ class FaulhaberDriver(Positioner):
 
     device = "faulhaber"
     options_kind = FaulhaberOptions
-    keeps_place = True
 
     def __init__(self, settings: DriverSettings) -> None:
         super().__init__(settings)
