@@ -63,9 +63,7 @@ class Machine(faults.Pressed):
         own = {"motor": self.devices._devices["motor"], "force": self.devices._devices["force"]}
         for number, name in enumerate(RAILS):
             rng = np.random.default_rng([setting.seed, number])
-            self.rails[name] = MotorEmulator(
-                None, rng, profile=faults.build_profile(), baud=115200, faults=given.get(name, [])
-            )
+            self.rails[name] = MotorEmulator(None, rng, faults.build_options(), faults=given.get(name, []))
             own[name] = EmulatedDevice("bytes", self.rails[name], tuple(given.get(f"{name}_link", ())), 115200)
         self.devices = EmulatedDevices(own)
         self.clock = self.devices.clock
