@@ -34,7 +34,7 @@ from tactbench.plugin.devices import (
     Report,
     largest_force_n,
 )
-from tactbench.rigs.parallel_manipulator.force_torque.net_ft.driver import build as build_force
+from tactbench.rigs.parallel_manipulator.force_torque.net_ft.driver import NetFtDriver
 from tactbench.rigs.parallel_manipulator.motor.driver import FaulhaberDriver
 from tactbench.rigs.parallel_manipulator.motor.emulator import MotorEmulator, MotorFault
 
@@ -85,7 +85,7 @@ class Machine(faults.Pressed):
             for name, own in options.items()
         }
         force = self.settings()["force"]
-        driver = build_force(DriverSettings(self.devices.opener("force"), options=force, clock=self.clock))
+        driver = NetFtDriver(DriverSettings(self.devices.opener("force"), options=force, clock=self.clock))
         return LocalGuard(axes, driver, self.clock, self.devices.advance)
 
 

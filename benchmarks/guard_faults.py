@@ -32,7 +32,8 @@ from tactbench.plugin.devices import (
     LocalGuard,
     Report,
 )
-from tactbench.rigs.parallel_manipulator.force_torque.net_ft.driver import build as build_force
+from tactbench.rigs.parallel_manipulator.force_torque.net_ft.codec import NetFtOptions
+from tactbench.rigs.parallel_manipulator.force_torque.net_ft.driver import NetFtDriver
 from tactbench.rigs.parallel_manipulator.force_torque.net_ft.emulator import DatagramFault, RdtEmulator
 from tactbench.rigs.parallel_manipulator.motor.driver import FaulhaberDriver
 from tactbench.rigs.parallel_manipulator.motor.emulator import MotorEmulator, MotorFault
@@ -130,11 +131,8 @@ class Pressed:
             pressing = self.force_n + rng.normal(0, NOISE_N)
             return self.sensed([*rng.normal(0, NOISE_N, 2), pressing, *rng.normal(0, 1e-4, 3)], at_s)
 
-        self.force = RdtEmulator(
-            wrench,
-            rate_hz=self.rate_hz,
-            faults=faults.get("force", []),
-        )
+        options = NetFtOptions(**COUNTS, rate_hz=self.rate_hz)
+        self.force = RdtEmulator(wrench, options, faults=faults.get("force", []))
         self.devices = EmulatedDevices(
             {
                 "motor": EmulatedDevice("bytes", self.motor, tuple(faults.get("motor_link", ())), setting.baud),
@@ -168,7 +166,7 @@ class Pressed:
         """Return the options of both devices."""
         return {"motor": {**STATED, "baud": self.setting.baud}, "force": {**COUNTS, "rate_hz": self.rate_hz}}
 
-    def guard(self, force_driver: Callable[[DriverSettings], Any] = build_force) -> LocalGuard:
+    def guard(self, force_driver: Callable[[DriverSettings], Any] = NetFtDriver) -> LocalGuard:
         """Return a guard over drivers of both, in this process."""
         options = self.settings()
         motor = FaulhaberDriver(

@@ -151,7 +151,7 @@ def run(name: str, baud: int, seed: int, heartbeat_s: float | None = None) -> Re
         log = Path(folder) / "guard.log"
         settings = ProcessSettings(
             {"motor": DeviceSettings(f"{PACKAGE}.motor.driver:FaulhaberDriver", addresses["motor"], options["motor"])},
-            DeviceSettings(f"{PACKAGE}.force_torque.net_ft.driver:build", addresses["force"], options["force"]),
+            DeviceSettings(f"{PACKAGE}.force_torque.net_ft.driver:NetFtDriver", addresses["force"], options["force"]),
             str(log),
             zero_ns,
         )

@@ -129,7 +129,7 @@ def test_a_press_that_is_stopped_retreats_within_a_control_period():
         stopped_ns = acquisition.clock()
         assert acquisition.stop("stopped by hand") == ""
         assert acquisition.ended == "stopped by hand"
-        retreating, out = acquisition.said[-2:]
+        retreating, out = acquisition.events[-2:]
         assert (retreating.trigger, out.state) == (Trigger.COMMANDED, GuardState.RETREATED)
         # The next period of 10 ms, and the one in which it was stopped.
         assert 0 < retreating.t_ns - stopped_ns <= 20_000_000
@@ -137,7 +137,7 @@ def test_a_press_that_is_stopped_retreats_within_a_control_period():
 
 def test_no_contact_ends_with_a_retreat():
     # The skin of this seed is lower than the motor may go.
-    heights = {"settings__heights__surface_spread_mm": 0.4, "settings__heights__depth_mm": 0.01}
+    heights = {"settings__heights__tolerance_mm": 1.2, "settings__heights__depth_mm": 0.01}
     with pytest.raises(RigError, match="no contact down to"):
         on_spring(5.0, **{**RARER, **heights}, seed=2)
 
