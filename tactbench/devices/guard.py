@@ -287,15 +287,15 @@ class LocalGuard:
 
     def look(self, timeout_s: float) -> None:
         """Take what has come, waiting at most so long for a force sample, and act on it."""
+        began_ns = self._clock()  # where this look itself is held up, a beat may wait that nobody has heard yet
         watched = self._limits if self.state in (GuardState.ARMED, GuardState.RETREATING) else None
         problem = self._seen(timeout_s, watched, travelling=any(axis.moving for axis in self._others.values()))
         limits = self._limits
         if limits is None:
             return
         if self.state is GuardState.ARMED:
-            now_ns = self._clock()
-            late = now_ns - self._beat_ns > 1e9 * limits.heartbeat_s
-            problem = problem or (self._late(now_ns, limits) if late else None)
+            late = began_ns - self._beat_ns > 1e9 * limits.heartbeat_s
+            problem = problem or (self._late(began_ns, limits) if late else None)
             if problem is not None:
                 self._retreat(*problem)
             elif self._into_skin and self._press.moving and self._seen_force.touched(limits.touch_n):

@@ -293,9 +293,9 @@ class GuardProcess:
         until_ns = self._clock() + round(1e9 * within_s)
         while self._answer is None:
             left_s = 1e-9 * (until_ns - self._clock())
-            if left_s <= 0.0:
+            self._take(max(0.0, left_s))
+            if left_s <= 0.0 and self._answer is None:  # else this process was late itself
                 self._fail(f"it has not answered within {within_s:.3f} s")
-            self._take(left_s)
         error_kind, found = self._answer
         if error_kind is not None:
             message, hint = found

@@ -32,6 +32,9 @@ HOMING_S = 60.0
 AGAIN_S = 0.25
 """After which a rescue is sent once more where the motor does not come nearer (assumed)."""
 
+STANDING_NS = 20_000_000
+"""How often a motor that stands is looked at: its line, guard and host have time for others then (assumed)."""
+
 _FAULTS = OperationStatus.OVERVOLTAGE | OperationStatus.OVERTEMPERATURE
 _PROBLEMS = _FAULTS | OperationStatus.CURRENT_LIMITATION | OperationStatus.DEVIATION_ERROR
 _WATCHED = ("POS", "GRC", "OST")
@@ -61,9 +64,10 @@ def retreat_command(options: FaulhaberOptions) -> bytes:
 class FaulhaberDriver(Positioner):
     """A linear motor on a Faulhaber drive of the 300x RS generation.
 
-    Position and current are polled as fast as the line allows, some 30 to 40 times a second at 9600 baud and 200 at
-    115200. The time of a state is when the first byte of the position's answer was in the host; the drive has read it
-    a few bytes of line earlier. Every setting, limit and target is read back: the protocol has no checksum.
+    Position and current are polled as fast as the line allows while it moves, some 30 to 40 times a second at 9600 baud
+    and 200 at 115200, and 50 times where it stands. The time of a state is when the first byte of the position's answer
+    was in the host; the drive has read it a few bytes of line earlier. Every setting, limit and target is read back:
+    the protocol has no checksum.
     """
 
     device = "faulhaber"
@@ -77,7 +81,7 @@ class FaulhaberDriver(Positioner):
         self._exchange = Exchange(self.link, settings.clock, self._options.baud)
         self._identified = ""
         self._watching = self._confirming = False
-        self._turn = 0
+        self._turn = self._looked_ns = 0
         self._latest: dict[str, Answer] = {}
         self._move: _Move | None = None
         self._target: int | None = None
@@ -300,7 +304,6 @@ class FaulhaberDriver(Positioner):
 
     def _go(self, target: int, speed: int) -> float:
         """Send a move at once, without waiting for answers that are out; return where to [m]."""
-        self._forget()
         exchange, target_m = self._exchange, self._options.position_m(target)
         speed_m_s = max(1, speed) * self._options.speed_unit_m_s
         seconds = self.facts.seconds(target_m - self.position, speed_m_s) + 4.0 * exchange.answer_s
@@ -310,7 +313,6 @@ class FaulhaberDriver(Positioner):
             exchange.send("SP", speed, move)
         exchange.send("LA", target, move)
         exchange.send("M", None, move)
-        self._confirming = True
         return target_m
 
     def _forget(self) -> None:
@@ -397,6 +399,8 @@ class FaulhaberDriver(Positioner):
     def update(self, timeout_s: float = 0.0) -> None:
         """Send what is next, take what comes, waiting at most `timeout_s` for a byte of it; raise what is wrong."""
         self._ask_next()
+        if self._exchange.ready and self._watching:  # it stands: until the next look
+            timeout_s = min(timeout_s, max(0.0, 1e-9 * (self._looked_ns + STANDING_NS - self.clock())))
         try:
             for answer in self._exchange.pump(timeout_s):
                 self._take(answer)
@@ -407,8 +411,14 @@ class FaulhaberDriver(Positioner):
         self._ask_next()
 
     def _ask_next(self) -> None:
-        if self._exchange.ready and (self._confirming or self._watching):
-            self._exchange.send("TPOS" if self._confirming else _WATCHED[self._turn])
+        if not self._exchange.ready:
+            return
+        if self._confirming:
+            self._exchange.send("TPOS")
+        elif self._watching and (self._turn or self.moving or self.clock() >= self._looked_ns + STANDING_NS):
+            if self._turn == 0:
+                self._looked_ns = self.clock()
+            self._exchange.send(_WATCHED[self._turn])
 
     def _take(self, answer: Answer) -> None:
         """Take what became of a command that nobody waits for; raises what is wrong."""
@@ -425,7 +435,7 @@ class FaulhaberDriver(Positioner):
             answer.checked()
             if answer.name == "M":
                 move.due_ns = self.clock() + round(1e9 * move.seconds)
-                self._target = move.target
+                self._target, self._confirming = move.target, True
 
     def _check_target(self, answer: Answer) -> None:
         if answer.line is None or self._target is None:

@@ -29,9 +29,9 @@ MARK = "VER"
 """The question whose answer is known: the drive's version does not change."""
 IN_A_ROW = 3
 """Answers that did not come one after the other, after which the drive is said to be silent (assumed)."""
-HOST_S = 0.05
-"""Added to what the line takes: an adapter may hold bytes for 16 ms, a host may be late by 10 ms (measured elsewhere,
-docs/hardware.md)."""
+HOST_S = 0.15
+"""Added to what the line takes: an adapter may hold bytes for 16 ms, a busy host and an emulated drive be late by some
+60 ms (measured). A command whose answer is late was carried out or not: nothing else is sent meanwhile."""
 _HINTS = {
     UNKNOWN_COMMAND: "Is it a Faulhaber drive of the 300x RS generation?",
     INVALID_PARAMETER: "Check the options in the rig file against the drive's manual.",
