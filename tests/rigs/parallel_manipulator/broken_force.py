@@ -4,7 +4,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from tactbench.plugin.devices import LinkTimeout
 from tactbench.rigs.parallel_manipulator.force_torque.net_ft.driver import NetFtDriver
 
 
@@ -29,20 +28,9 @@ class RaisingDriver(NetFtDriver):
         return blocks
 
 
-class SilentDriver(NetFtDriver):
-    """Does not say who it is."""
-
-    def identify(self):
-        raise LinkTimeout("The force sensor did not answer.", hint="Switch it on.")
-
-
 def build(settings):
     return NanDriver(settings)
 
 
 def build_raising(settings):
     return RaisingDriver(settings)
-
-
-def build_silent(settings):
-    return SilentDriver(settings)

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import os
-import select
 import socket
 import threading
 import time
@@ -14,7 +12,6 @@ import numpy as np
 
 from tactbench.plugin import Block
 from tactbench.plugin.devices import ByteLink, DatagramLink, Link, LinkUnplugged, Received
-from tests.links.ends import pty
 
 
 class VirtualLink(ByteLink, DatagramLink):
@@ -141,24 +138,3 @@ def on_udp(emulator):
 
         with in_thread(serve):
             yield own.getsockname()[1]
-
-
-@contextmanager
-def on_pty(emulator):
-    """Serve an emulator on a pseudo-terminal in real time; yields the terminal."""
-    with pty() as end:
-
-        def serve(ended):
-            while not ended.is_set():
-                wait_s = min(max(emulator.next_s() - time.monotonic(), 0.0), LONGEST_WAIT_S)
-                try:
-                    ready, _, _ = select.select([end.master], [], [], wait_s)
-                    data = os.read(end.master, 65536) if ready else b""
-                    sent = emulator.feed(data, time.monotonic()) if data else emulator.poll(time.monotonic())
-                    if sent:
-                        os.write(end.master, b"".join(piece for _, piece in sent))
-                except (OSError, ValueError):
-                    return
-
-        with in_thread(serve):
-            yield end

@@ -211,15 +211,6 @@ def test_a_force_that_is_wrong(begin, trigger, made):
     force_goes_wrong(made, begin, trigger)
 
 
-def test_a_force_that_is_not_a_number(tmp_path):
-    with rig("local", tmp_path, force_driver="tests.rigs.parallel_manipulator.broken_force:build") as made:
-        made.press()
-        report = made.ended()
-        assert (report.state, report.trigger) == (GuardState.FAULT, Trigger.FORCE_NOT_A_NUMBER)
-        assert made.out
-        assert made.world.largest_n < 2.0
-
-
 @pytest.mark.parametrize("baud", [9600, 115200])
 def test_steps_are_sent_one_at_a_time_and_after_a_fresh_force(baud, tmp_path):
     """The step rule, on the motor's line: no increment before the drive has said that the one before has ended."""

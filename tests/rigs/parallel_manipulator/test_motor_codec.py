@@ -11,13 +11,10 @@ from tactbench.rigs.parallel_manipulator.motor.codec import (
     LONGEST_LINE,
     Command,
     CommandReader,
-    Configuration,
     Kind,
     Line,
     LineReader,
-    OperationStatus,
     encode,
-    line_time_s,
 )
 from tactbench.rigs.parallel_manipulator.motor.profile import FaulhaberOptions
 
@@ -119,22 +116,6 @@ def test_lines_cut_anywhere_have_the_time_of_their_first_byte():
     ]  # fmt: skip
 
 
-def test_status_words_of_the_vectors():
-    assert OperationStatus(65552) == OperationStatus.POSITION_ATTAINED | OperationStatus.CURRENT_LIMITATION
-    assert OperationStatus(65792) == OperationStatus.POSITION_ATTAINED | OperationStatus.INPUT_1
-    assert Configuration(9220) == (
-        Configuration.ACKNOWLEDGES | Configuration.POWER_STAGE | Configuration.POSITION_LIMITS
-    )
-
-
-@pytest.mark.parametrize(
-    ("n", "baud", "ms"),
-    [(4, 9600, 4.167), (11, 9600, 11.458), (11, 19200, 5.729), (11, 115200, 0.955), (34, 9600, 35.417)],
-)
-def test_line_times(n, baud, ms):
-    assert 1e3 * line_time_s(n, baud) == pytest.approx(ms, abs=5e-4)  # Digits printed.
-
-
 @given(st.lists(st.binary(max_size=40), max_size=12))
 @settings(max_examples=60)
 def test_any_bytes_are_survived_and_the_next_line_is_read(pieces):
@@ -147,12 +128,6 @@ def test_any_bytes_are_survived_and_the_next_line_is_read(pieces):
     assert drive.feed(b"\rLA1000\r")[-1] == Command("LA", 1000)
 
 
-@given(st.integers(-(10**18), 10**18), st.sampled_from(["LA", "V", "CORRIDOR"]))
-@settings(max_examples=40)
-def test_a_command_comes_back(argument, name):
-    assert CommandReader().feed(encode(name, argument)) == [Command(name, argument)]
-
-
 def test_a_line_without_end_is_given_up_in_bounded_memory():
     reader = LineReader()
     assert reader.feed(b"7" * 100_000) == []
@@ -162,15 +137,6 @@ def test_a_line_without_end_is_given_up_in_bounded_memory():
     assert reader.feed(b"1\r\n") == [Line(Kind.VALUE, "1")]
     drive = CommandReader()
     assert drive.feed(b"L" * 100_000 + b"\r") == [Command("")]
-
-
-@given(st.floats(-1.0, 1.0))
-@settings(max_examples=60)
-def test_a_position_comes_back_to_half_an_increment(position_m):
-    profile = FaulhaberOptions()
-    back = profile.position_m(profile.increments(position_m))
-    # Half of 6 um, and the rounding of a metre.
-    assert abs(back - position_m) <= 3e-6 + 1e-15
 
 
 def test_limits_are_rounded_down_and_never_to_nothing():

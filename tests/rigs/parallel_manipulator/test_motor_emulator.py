@@ -6,17 +6,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tactbench.rigs.parallel_manipulator.motor.codec import (
-    OVERTEMPERATURE,
-    Configuration,
     Kind,
     Line,
     LineReader,
-    OperationStatus,
     encode,
     line_time_s,
 )
 from tactbench.rigs.parallel_manipulator.motor.drive import Motion
-from tactbench.rigs.parallel_manipulator.motor.emulator import MotorEmulator, MotorFault
+from tactbench.rigs.parallel_manipulator.motor.emulator import MotorEmulator
 from tactbench.rigs.parallel_manipulator.motor.profile import FaulhaberOptions
 from tests.rigs.parallel_manipulator.test_motor_codec import ANSWERED_OK
 
@@ -25,11 +22,6 @@ STEP_M = 6e-6
 
 def nothing(position_m):
     return 0.0
-
-
-def wall(at_m, stiffness):
-    """Return a spring [N/m] that begins at a position."""
-    return lambda position_m: stiffness * max(0.0, position_m - at_m)
 
 
 def joined_bytes(sent):
@@ -64,15 +56,6 @@ class Host:
     def do(self, *texts):
         for text in texts:
             assert self.ask(text) == "OK", text
-
-    def go(self, target_m, seconds):
-        """Move to a position, in the time it is given."""
-        self.do(f"LA{round(target_m / STEP_M)}", "M")
-        self.wait(seconds)
-
-    @property
-    def status(self):
-        return OperationStatus(int(self.ask("OST")))
 
 
 SENT = [row for row in ANSWERED_OK if row[2].name not in ("LR", "NP", "NPOFF")]
@@ -112,44 +95,6 @@ def test_bytes_take_the_time_of_the_line():
     due_s = line_time_s(4, 19200) + 1e-3 + line_time_s(3, 19200)
     assert joined_bytes(host.emulator.poll(due_s - 25e-6)) == b"0"
     assert host.emulator.poll(due_s + 25e-6) == [(pytest.approx(due_s), b"\r\n")]
-
-
-def test_a_move_ends_on_its_target_and_says_so():
-    host = Host()
-    host.do("EN")
-    host.go(3e-3, 0.6)
-    assert host.ask("POS") == "500"
-    assert host.ask("TPOS") == "500"
-    assert host.status & OperationStatus.POSITION_ATTAINED
-
-
-def test_the_current_limit_bounds_the_force_and_is_said():
-    host = Host(wall(0.0, 80e3))
-    host.do("EN", "LPC400", "LCC400")
-    host.go(2e-3, 1.0)
-    assert host.ask("GRC") == "400"
-    assert host.emulator.drive.position_m == pytest.approx(0.4 * 6.5 / 80e3, rel=1e-3)
-    status = host.status
-    assert status & OperationStatus.CURRENT_LIMITATION
-    assert not status & OperationStatus.POSITION_ATTAINED
-
-
-@pytest.mark.parametrize("text", ["POR8", "GU", "SWS"])
-def test_what_is_not_modelled_is_not_pretended(text):
-    assert Host().ask(text) == "Unknown command"
-
-
-def test_a_motor_fault_takes_the_power_and_says_so():
-    host = Host(faults=[MotorFault("motor-fault", 0.5, 2.0)])
-    host.do("EN", "V10")
-    assert host.wait(0.5) == [Line(Kind.NOTICE, "f")]
-    assert host.status & OperationStatus.OVERTEMPERATURE
-    assert host.ask("EN") == OVERTEMPERATURE  # FH-2.20
-    assert host.ask("V10") == OVERTEMPERATURE
-    host.wait(1.5)
-    assert host.ask("GN") == "0"  # Without power it has run out.
-    assert not int(host.ask("CST")) & Configuration.POWER_STAGE  # The end of the fault alone does not move it.
-    host.do("EN")
 
 
 @given(st.lists(st.binary(max_size=30), max_size=8))

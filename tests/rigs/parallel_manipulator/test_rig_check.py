@@ -42,22 +42,6 @@ def test_a_file_without_a_ceiling_is_refused_with_its_line(tmp_path, capsys):
     assert f"rig.yaml:{line}: the key 'force_ceiling_n' is missing" in err
 
 
-@pytest.mark.parametrize("name", ["travel_mm", "heartbeat_ms", "retreat_mm", "retreat_speed_mm_s", "rated_force_n"])
-def test_every_limit_is_mandatory(name):
-    with pytest.raises(UsageError, match=f"'limits.{name}' of the rig file's settings is missing"):
-        settings_of(RigFile.model_validate(example(**{f"settings__limits__{name}": ...})))
-
-
-@pytest.mark.parametrize(
-    "command", [["record", "--sensor", "icub", "--out", "none.h5", "--rig-file"], ["doctor", "--rig-file"]]
-)
-def test_other_commands_refuse_it_as_well(tmp_path, capsys, command):
-    path = written(tmp_path, example(settings__limits__force_ceiling_n=...))
-    code, _, err = run([*command, str(path)], capsys)
-    assert code == 2
-    assert "force_ceiling_n" in err
-
-
 def problems(**changes):
     return check(RigFile.model_validate(example(**changes))).problems
 
@@ -168,13 +152,3 @@ def test_places_out_of_the_workspace_are_refused_before_anything_moves():
     assert any("is not permitted" in text for text in check(file).problems)
     with pytest.raises(UsageError, match="is not permitted"):
         build(RigContext(rig_file=file))
-
-
-def test_places_within_it_are_not_refused():
-    assert check(RigFile.model_validate(with_joints(settings__places__reach_x_mm=[-5.0, 5.0]))).problems == ()
-
-
-def test_rigs_that_move_nothing_have_nothing_to_check(capsys):
-    code, out, _ = run(["doctor", "--seconds", "0", "--rig-file", str(EXAMPLE.parent / "bench-emulated.yaml")], capsys)
-    assert code == 0
-    assert "Nothing was opened" in out

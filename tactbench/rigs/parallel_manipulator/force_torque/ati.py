@@ -6,11 +6,10 @@ public MATLAB script that quotes the file of a Nano17 FT8577).
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 from xml.etree.ElementTree import ParseError, fromstring
 
 import numpy as np
-import numpy.typing as npt
 
 from tactbench.plugin import UsageError
 
@@ -30,37 +29,15 @@ class AtiFileError(UsageError):
     """A file is not the ATI file that was expected."""
 
 
-class GaugeCalibration(NamedTuple):
-    """What a calibration file says, in SI units."""
-
-    serial: str
-    matrix: FloatArray
-    """(6 axes, 6 gauges): N/V for Fx, Fy, Fz and N*m/V for Tx, Ty, Tz."""
-    largest: FloatArray
-    """(6,) rated range of each axis, to both sides: N and N*m."""
-
-    def wrench(self, volts: npt.ArrayLike, bias: npt.ArrayLike = 0.0) -> FloatArray:
-        """Return forces and torques.
-
-        Parameters
-        ----------
-        volts
-            (…, 6) gauge voltages.
-        bias
-            (6,) voltages of the unloaded sensor.
-
-        Returns
-        -------
-        (…, 6) Fx, Fy, Fz [N], Tx, Ty, Tz [N*m].
-        """
-        loaded = np.asarray(volts, dtype=float) - np.asarray(bias, dtype=float)
-        # Not by a matrix product, whose last bit depends on how many rows it is given at once.
-        wrench: FloatArray = (loaded[..., None, :] * self.matrix).sum(axis=-1)
-        return wrench
-
-
-def read_calibration(data: bytes) -> GaugeCalibration:
+def read_calibration(data: bytes) -> tuple[FloatArray, FloatArray]:
     """Return what the bytes of a ``.cal`` file say.
+
+    Returns
+    -------
+    matrix : (6 axes, 6 gauges)
+        U: N/V for Fx, Fy, Fz and N*m/V for Tx, Ty, Tz.
+    largest : (6,)
+        Rated range of each axis, to both sides: N and N*m.
 
     Raises
     ------
@@ -75,6 +52,6 @@ def read_calibration(data: bytes) -> GaugeCalibration:
         matrix = np.array([[float(value) for value in rows[axis]["values"].split()] for axis in AXES]) * si[:, None]
         if matrix.shape != (6, 6) or not np.isfinite(matrix).all():
             raise ValueError("each UserAxis row needs 6 numbers")
-        return GaugeCalibration(sensor.attrib["Serial"], matrix, si * [float(rows[axis]["max"]) for axis in AXES])
+        return matrix, si * [float(rows[axis]["max"]) for axis in AXES]
     except (ParseError, LookupError, ValueError, StopIteration) as error:
         raise AtiFileError(f"This is no ATI calibration of six gauges: {error}.", hint="Is it a .cal file?") from error

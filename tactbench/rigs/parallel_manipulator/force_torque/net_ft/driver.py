@@ -39,8 +39,6 @@ QUIET_S = 0.05
 """After which a box that was stopped sends no more (assumed: a network of one cable, a busy host)."""
 ANSWER_S = 0.5
 """Within which a box answers, over the time its records take (assumed: a network of one cable)."""
-RESTARTED = 1000
-"""A number so far behind the highest is of a counter begun anew (assumed: no datagram is late by more)."""
 MOST_DATAGRAMS = 4096
 """In one block: 4 s at 1 kHz."""
 
@@ -54,7 +52,7 @@ class NetFtDriver(Driver):
 
     A saturated sensor marks all six channels SATURATED, any other error of the status word SUSPECT, and both both; a
     threshold set in the box is a warning: it is counted, its values are good. Nothing is asked for again where nothing
-    comes: `read` then returns nothing.
+    comes: `read` then returns nothing. A box that was without power counts anew, and stays silent until it is started.
 
     Raises
     ------
@@ -69,7 +67,7 @@ class NetFtDriver(Driver):
         self._counts: Counter[str] = Counter()
         self._kept: list[Received] = []
         self._sampling = False
-        self._numbers, self._ticks, self._newest = Unwrap(32), Unwrap(32), 0
+        self._numbers, self._ticks = Unwrap(32), Unwrap(32)
         self._link = open_for(settings, "net-ft", DatagramLink, "udp://192.168.1.1:49152")  # type: ignore[type-abstract]
 
     @property
@@ -119,7 +117,7 @@ class NetFtDriver(Driver):
         """
         self._silence()
         self._link.discard()
-        self._numbers, self._ticks, self._newest = Unwrap(32), Unwrap(32), 0
+        self._numbers, self._ticks = Unwrap(32), Unwrap(32)
         self._send(Command.START_REALTIME)
         self._sampling = True
         self._kept = [self._next()]
@@ -129,8 +127,6 @@ class NetFtDriver(Driver):
 
         Raises
         ------
-        RigError
-            If the box has begun to count anew.
         LinkUnplugged
             If the network says that nobody listens there.
         """
@@ -175,13 +171,6 @@ class NetFtDriver(Driver):
     def _block(self, came: list[Received]) -> Block:
         records = decode_records(b"".join(piece.data for piece in came))
         ticks, numbers = self._ticks(records["ft_sequence"]), self._numbers(records["rdt_sequence"])
-        if (numbers < np.maximum.accumulate(numbers) - RESTARTED).any() or numbers[0] < self._newest - RESTARTED:
-            raise RigError(
-                "The Net F/T box has begun to count its samples anew: it was without power, or another host commands "
-                "it.",
-                hint="Check power and network; start it again unloaded, since a bias set before may be lost.",
-            )
-        self._newest = max(self._newest, int(numbers.max()))
         return Block(
             stream=STREAM,
             t_ns=np.array([piece.t_ns for piece in came], dtype=np.int64),
