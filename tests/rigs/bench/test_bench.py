@@ -187,7 +187,7 @@ def test_losses_beyond_what_is_allowed_make_it_incomplete(tmp_path):
 def test_a_sensor_that_sends_nothing_is_told_and_the_recording_left_out_of_every_evaluation(tmp_path, monkeypatch):
     monkeypatch.setattr(Bus, "poll", lambda self, now_s: [])
     path = tmp_path / "press.h5"
-    error = press(path, rig_file())
+    error = press(path, rig_file().model_copy(update={"allowed": Allowed(silent_s=0.2)}))
     assert error is not None
     assert "Nothing came of taxels in the whole scene" in error.message
     assert "tactbench doctor" in error.hint

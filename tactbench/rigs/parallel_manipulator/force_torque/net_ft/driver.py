@@ -66,7 +66,7 @@ class NetFtDriver(Driver):
         self._options = read_options(NetFtOptions, settings.options, "net-ft")
         self._counts: Counter[str] = Counter()
         self._kept: list[Received] = []
-        self._sampling = False
+        self._sampling = self._silent = False
         self._numbers, self._ticks = Unwrap(32), Unwrap(32)
         self._link = open_for(settings, "net-ft", DatagramLink, "udp://192.168.1.1:49152")  # type: ignore[type-abstract]
 
@@ -115,7 +115,9 @@ class NetFtDriver(Driver):
         LinkTimeout
             If none comes.
         """
-        self._silence()
+        if not self._silent:  # else the other devices of a rig, which sample already, would wait for nothing
+            self._silence()
+        self._silent = False
         self._link.discard()
         self._numbers, self._ticks = Unwrap(32), Unwrap(32)
         self._send(Command.START_REALTIME)
@@ -164,6 +166,7 @@ class NetFtDriver(Driver):
         with suppress(LinkTimeout):
             for _ in range(MOST_DATAGRAMS):
                 self._link.receive(QUIET_S + 2 * self._options.every / SENSOR_RATE_HZ)
+        self._silent = True
 
     def _next(self) -> Received:
         return self._link.receive(ANSWER_S + 2 * self._options.every / SENSOR_RATE_HZ)
