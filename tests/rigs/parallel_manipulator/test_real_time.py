@@ -23,7 +23,8 @@ def impatient(tmp_path):
     """Return the example in real time, its moves quick, and late by whatever other work of this machine makes it."""
     said = yaml.safe_load(EXAMPLE.read_text(encoding="utf-8"))
     settings = said["settings"]
-    said["emulation"]["time"], said["force"]["zero_s"], said["allowed"] = "real", 0.3, {"lost_percent": 100.0}
+    said["emulation"]["time"], said["allowed"] = "real", {"lost_percent": 100.0}
+    said["force"] |= {"zero_s": 0.3, "range_n": 200.0}  # a short zero of the twin's noise drifts
     settings["limits"] |= {"force_age_ms": 1000.0, "heartbeat_ms": 2000.0, "rated_force_n": 2000.0}
     settings["touch"] |= {"settle_s": 0.3, "lift_mm": 0.3, "allowed_n": 10.0}
     settings["press"] |= {"stale_ms": 3000.0, "error_band_n": 6.0}
