@@ -34,7 +34,7 @@ from tactbench.plugin.devices import (
     Report,
     largest_force_n,
 )
-from tactbench.rigs.parallel_manipulator.force_torque.net_ft.driver import build as build_force
+from tactbench.rigs.parallel_manipulator.force_torque.net_ft.driver import NetFtDriver
 from tactbench.rigs.parallel_manipulator.motor.driver import FaulhaberDriver
 from tactbench.rigs.parallel_manipulator.motor.emulator import MotorEmulator, MotorFault
 
@@ -63,9 +63,7 @@ class Machine(faults.Pressed):
         own = {"motor": self.devices._devices["motor"], "force": self.devices._devices["force"]}
         for number, name in enumerate(RAILS):
             rng = np.random.default_rng([setting.seed, number])
-            self.rails[name] = MotorEmulator(
-                None, rng, profile=faults.build_profile(), baud=115200, faults=given.get(name, [])
-            )
+            self.rails[name] = MotorEmulator(None, rng, faults.build_options(), faults=given.get(name, []))
             own[name] = EmulatedDevice("bytes", self.rails[name], tuple(given.get(f"{name}_link", ())), 115200)
         self.devices = EmulatedDevices(own)
         self.clock = self.devices.clock
@@ -87,7 +85,7 @@ class Machine(faults.Pressed):
             for name, own in options.items()
         }
         force = self.settings()["force"]
-        driver = build_force(DriverSettings(self.devices.opener("force"), options=force, clock=self.clock))
+        driver = NetFtDriver(DriverSettings(self.devices.opener("force"), options=force, clock=self.clock))
         return LocalGuard(axes, driver, self.clock, self.devices.advance)
 
 

@@ -32,9 +32,9 @@ from tactbench.plugin.devices import (
     LocalGuard,
     Report,
 )
-from tactbench.rigs.parallel_manipulator.force_torque.net_ft.driver import build as build_force
+from tactbench.rigs.parallel_manipulator.force_torque.net_ft.codec import NetFtOptions
+from tactbench.rigs.parallel_manipulator.force_torque.net_ft.driver import NetFtDriver
 from tactbench.rigs.parallel_manipulator.force_torque.net_ft.emulator import DatagramFault, RdtEmulator
-from tactbench.rigs.parallel_manipulator.motor.drive import MotorModel
 from tactbench.rigs.parallel_manipulator.motor.driver import FaulhaberDriver
 from tactbench.rigs.parallel_manipulator.motor.emulator import MotorEmulator, MotorFault
 
@@ -50,7 +50,6 @@ STATED: dict[str, Any] = {
     "corridor_m": 2e-6,
     "increment_m": 1e-6,
     "peak_current_a": 1.6,
-    "continuous_current_a": 1.4,
     "homing": "here",
     "home_m": RETREAT_M,
     "retreat_m": RETREAT_M,
@@ -126,11 +125,8 @@ class Pressed:
     """
 
     def __init__(self, setting: Setting, **faults: list[Any]) -> None:
-        if setting.time == "real":
-            # The emulated motor needs it at the first touch; an import then would hold everything up.
-            import scipy.optimize  # noqa: F401
         # Emulators share the machine with whom they serve: in real time they are coarser, so as not to be late.
-        tick, self.rate_hz = (4.0, 250.0) if setting.time == "real" else (None, 1000.0)
+        self.rate_hz = 250.0 if setting.time == "real" else 1000.0
         self.setting = setting
         self.largest_n = 0.0
         self._places: deque[tuple[float, float]] = deque(maxlen=20_000)
@@ -139,9 +135,7 @@ class Pressed:
         self.motor = ListeningMotor(
             self._load,
             np.random.default_rng(setting.seed + 1),
-            profile=build_profile(),
-            model=MotorModel() if tick is None else MotorModel(tick_s=1e-3 * tick),
-            baud=setting.baud,
+            build_options(setting.baud),
             faults=faults.get("motor", []),
         )
 
@@ -150,11 +144,8 @@ class Pressed:
             pressing = self.force_n + rng.normal(0, NOISE_N)
             return self.sensed([*rng.normal(0, NOISE_N, 2), pressing, *rng.normal(0, 1e-4, 3)], at_s)
 
-        self.force = RdtEmulator(
-            wrench,
-            rate_hz=self.rate_hz,
-            faults=faults.get("force", []),
-        )
+        options = NetFtOptions(**COUNTS, rate_hz=self.rate_hz)
+        self.force = RdtEmulator(wrench, options, faults=faults.get("force", []))
         self.devices = EmulatedDevices(
             {
                 "motor": EmulatedDevice("bytes", self.motor, tuple(faults.get("motor_link", ())), setting.baud),
@@ -187,7 +178,7 @@ class Pressed:
         """Return the options of both devices."""
         return {"motor": {**STATED, "baud": self.setting.baud}, "force": {**COUNTS, "rate_hz": self.rate_hz}}
 
-    def guard(self, force_driver: Callable[[DriverSettings], Any] = build_force) -> LocalGuard:
+    def guard(self, force_driver: Callable[[DriverSettings], Any] = NetFtDriver) -> LocalGuard:
         """Return a guard over drivers of both, in this process."""
         options = self.settings()
         motor = FaulhaberDriver(
@@ -197,11 +188,11 @@ class Pressed:
         return LocalGuard({"motor": motor}, force, self.clock, self.devices.advance)
 
 
-def build_profile() -> Any:
-    """Return the units of the drive that the options state."""
+def build_options(baud: int = 115200) -> Any:
+    """Return the options of the drive."""
     from tactbench.rigs.parallel_manipulator.motor.profile import FaulhaberOptions
 
-    return FaulhaberOptions(**STATED)
+    return FaulhaberOptions(**STATED, baud=baud)
 
 
 @dataclass

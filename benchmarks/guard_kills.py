@@ -151,7 +151,7 @@ def run(name: str, baud: int, seed: int, heartbeat_s: float | None = None) -> Re
         log = Path(folder) / "guard.log"
         settings = ProcessSettings(
             {"motor": DeviceSettings(f"{PACKAGE}.motor.driver:FaulhaberDriver", addresses["motor"], options["motor"])},
-            DeviceSettings(f"{PACKAGE}.force_torque.net_ft.driver:build", addresses["force"], options["force"]),
+            DeviceSettings(f"{PACKAGE}.force_torque.net_ft.driver:NetFtDriver", addresses["force"], options["force"]),
             str(log),
             zero_ns,
         )
@@ -168,7 +168,7 @@ def run(name: str, baud: int, seed: int, heartbeat_s: float | None = None) -> Re
             numbers |= {who: said[0][who] for who in ("guard", "sibling")}
             time.sleep(rng.uniform(0.0, 0.4))
             now_s, deepest_m = 1e-9 * world.clock(), world.position_m
-            target_m = world.motor.drive._target_m + faults.RETREAT_M
+            target_m = world.motor.drive.target_m + faults.RETREAT_M
             for who in scenario.who:
                 os.kill(numbers[who], scenario.number)
             late_s, host_late_s, out = _watched(world, now_s, 3.0 if scenario.retreats else 0.5)

@@ -18,14 +18,14 @@ from tactbench.rigs.parallel_manipulator.force_torque.ati import AtiFileError, r
 from tactbench.rigs.parallel_manipulator.force_torque.net_ft.codec import (
     Command,
     DatagramError,
+    NetFtOptions,
     Record,
     Request,
     decode_records,
     encode_record,
     encode_request,
-    read_configuration,
 )
-from tactbench.rigs.parallel_manipulator.force_torque.net_ft.emulator import RdtEmulator
+from tactbench.rigs.parallel_manipulator.force_torque.net_ft.emulator import USUAL_COUNTS, RdtEmulator
 from tactbench.rigs.parallel_manipulator.motor.codec import CommandReader, Kind, Line, LineReader
 from tactbench.rigs.parallel_manipulator.motor.emulator import MotorEmulator
 
@@ -71,25 +71,24 @@ def main(count: int, seed: int) -> None:
             except DatagramError:
                 rejected += 1
         assert decode_records(encode_record(Record(5, 0, 0, (0,) * 6)))["rdt_sequence"] == 5
-    print(f"force-torque, codec: {whole} records, {rejected} datagrams rejected; {box.rejected} requests refused")
+    print(f"force-torque, codec: {whole} records, {rejected} datagrams rejected")
 
     files = 0
     for piece in pieces:
-        for read in (read_calibration, read_configuration):
-            with suppress(AtiFileError):
-                read(piece)
-                files += 1
-    print(f"force-torque, files: {2 * len(pieces)} read, {files} of them whole")
+        with suppress(AtiFileError):
+            read_calibration(piece)
+            files += 1
+    print(f"force-torque, files: {len(pieces)} read, {files} of them whole")
 
     for name, load in (("free", 0.0), ("pressing", 5000.0)):
-        motor = MotorEmulator(lambda x, _t, k=load: k * max(x, 0.0), rng)
+        motor = MotorEmulator(lambda x, k=load: k * max(x, 0.0), rng)
         motor.feed(b"EN\rLA300\rM\r", 0.0)
         begin = time.perf_counter()
         for n in range(1000):
             motor.feed(b"POS\r" if n % 20 == 0 else b"", 1e-3 * n)
         print(f"motor, {name}: {time.perf_counter() - begin:.3f} s for 1 s at a tick of 1 ms, polled at 1 kHz")
     for rate_hz in (1000.0, 7000.0):
-        box = RdtEmulator(lambda _t: (0.0,) * 6, rate_hz=rate_hz)
+        box = RdtEmulator(lambda _t: (0.0,) * 6, NetFtOptions(**USUAL_COUNTS, rate_hz=rate_hz))
         box.feed(encode_request(Request(Command.START_REALTIME)), 0.0)
         begin = time.perf_counter()
         sent = box.poll(1.0)

@@ -129,7 +129,6 @@ def test_the_generated_pages_have_every_verb_and_field():
         "rate_hz",
         "lower_m",
         "homing",
-        "windup_ms",
         "link_mm",
         "serial",
     ):

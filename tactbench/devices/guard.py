@@ -279,6 +279,7 @@ class LocalGuard:
 
     def look(self, timeout_s: float) -> None:
         """Take what has come, waiting at most so long for a force sample, and act on it."""
+        began_ns = self._clock()  # where this look itself is held up, a beat may wait that nobody has heard yet
         watched = self._limits if self.state in (GuardState.ARMED, GuardState.RETREATING) else None
         problem = self._seen(timeout_s, watched, travelling=any(axis.moving for axis in self._others.values()))
         limits = self._limits
@@ -286,7 +287,7 @@ class LocalGuard:
             return
         if problem is not None:
             self.trip(*problem)
-        self._see_beat(self._clock(), limits)
+        self._see_beat(began_ns, limits)
         touched = self._into_skin and self._press.moving and self._seen_force.touched(limits.touch_n)
         if self.state is GuardState.ARMED and touched:
             self._into_skin, self._touched = False, True

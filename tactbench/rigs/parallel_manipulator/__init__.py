@@ -21,7 +21,7 @@ def tactbench_devices() -> list[DeviceDescriptor]:
             name="net-ft",
             title="ATI force-torque sensor behind a Net F/T box, by UDP",
             kind="force",
-            driver=f"{here}.force_torque.net_ft.driver:build",
+            driver=f"{here}.force_torque.net_ft.driver:NetFtDriver",
             emulator=f"{here}.force_torque.net_ft.emulator:build",
             emulated_link="datagram",
             # Usual counts (sourced: netft/pyNetFT).
@@ -49,6 +49,6 @@ def tactbench_rigs() -> list[RigDescriptor]:
             where=f"{here}.rig:build",
             file=f"{here}.settings:ManipulatorFile",
             check=f"{here}.rig_check:check",
-            emulators=f"{here}.emulation:PressEmulators",
+            emulators=f"{here}.emulated_press:PressEmulators",
         )
     ]

@@ -1,4 +1,4 @@
-"""What emulated devices of this rig sense: an emulated motor presses the sensor of a simulated scene.
+"""The rig's emulated devices: a motor presses the sensor of a simulated scene, force sensor and sensor answer.
 
 Quasi-static. The motor's position gives the depth of the indenter, the simulated rig's press curve the force at that
 depth, and the sensor reads what it read in the simulated recording of the same scene at the moment at which the ramp
@@ -9,15 +9,19 @@ between motor and force sensor, what a quicker press would do to a skin with mem
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from tactbench.plugin import NotApplicable, PluginContractError, Scene
-from tactbench.plugin.devices import RigFile, SceneSamples
+from tactbench.plugin import Acquisition, NotApplicable, PluginContractError, Scene, SensorDescriptor, UsageError
+from tactbench.plugin.devices import RigEmulators, RigFile, SceneSamples, emulators_of, with_sensor
 from tactbench.plugin.simulation import SimulatedPress
-from tactbench.rigs.parallel_manipulator.settings import RigSettings
+from tactbench.rigs.parallel_manipulator.settings import MOTOR, axes_of, settings_of, with_limits
+
+if TYPE_CHECKING:
+    from tactbench.plugin.devices import EmulatedDevice
 
 FORCE = "fz"
 """Name under which a simulated rig gives the pressing force, and emulated force sensors are given it."""
@@ -42,10 +46,11 @@ def quiet(scene: Scene) -> Scene:
     profile = scene.profile
     if scene.slide is not None:
         raise NotApplicable(f"The scene {scene.name!r} slides, and this rig only presses.")
-    if profile.kind != "ramp":
-        raise NotApplicable(f"The scene {scene.name!r} states a path of forces, and this rig only raises one.")
-    if profile.start.to("N") != 0 or not profile.end.to("N") > 0 or not profile.duration.to("s") > profile.hold_s:
-        raise NotApplicable(f"The scene {scene.name!r} does not rise from 0 N, as this rig presses.")
+    rises = profile.kind == "ramp" and profile.start.to("N") == 0 < profile.end.to("N")
+    if not rises or not profile.duration.to("s") > profile.hold_s:
+        raise NotApplicable(
+            f"The scene {scene.name!r} is no rise of the force from 0 N, and this rig presses no other."
+        )
     environment = scene.environment.model_copy(update={"force_filter": None})
     return scene.model_copy(update={"drive": None, "environment": environment})
 
@@ -117,15 +122,59 @@ class EmulatedPress:
         return {**self._sensor(at_s), FORCE: force_n + noise_n + floor}
 
 
-def emulated_press(file: RigFile, settings: RigSettings, simulated: Any, scene: Scene, seed: int) -> EmulatedPress:
-    """Return what emulated devices of a rig file sense of a scene that was simulated; the skin's height is drawn."""
-    if not hasattr(simulated, "press_curve"):
-        raise PluginContractError(
-            f"The simulated rig {file.emulation.physics!r} has no press curves.",
-            hint="Its acquisition needs press_curve: see SimulatedPress in tactbench.plugin.simulation.",
-        )
-    heights = settings.heights
-    rng = np.random.default_rng([file.emulation.seed, seed, *b"skin", *scene.name.encode()])
-    off_mm = heights.surface_spread_mm * rng.standard_normal() + heights.cap_tolerance_mm * rng.uniform(-1, 1)
-    skin_m = settings.surface_m + 1e-3 * float(np.clip(off_mm, -heights.stand_off_mm / 2, heights.depth_mm / 2))
-    return EmulatedPress(simulated, scene, skin_m=skin_m, largest_n=1.5 * settings.limits.force_ceiling_n, rng=rng)
+class PressEmulators(RigEmulators):
+    """Emulators of a rig file's devices, those of all its sensors: the motor moves, the others sense what it presses.
+
+    Raises
+    ------
+    UsageError
+        If the file lacks something, or an emulated axis is none.
+    """
+
+    def __init__(self, file: RigFile, registry: Any) -> None:
+        self._file, self._settings = file, settings_of(file)
+        self.press: EmulatedPress | None = None
+        """The scene that is carried out; None: nothing is pressed."""
+        self._motor: Any = None
+        limited = with_limits(file, self._settings, registry)
+        devices: dict[str, EmulatedDevice] = {}
+        for sensor in file.sensors:
+            own = emulators_of(with_sensor(limited, sensor), registry, sensor, self._sensed)
+            devices |= {name: device for name, device in own.items() if name not in devices}
+        self.devices = devices
+        for name in axes_of(self._settings):
+            axis: Any = devices[name].emulator if name in devices else None
+            if axis is not None and not hasattr(axis, "press_against"):
+                raise UsageError(f"The emulated {name} is no axis.", hint="Its emulator lacks press_against.")
+            if axis is not None:  # the platform's weight is not modelled
+                axis.press_against(self._force_n if name == MOTOR else None)
+            if name == MOTOR:
+                self._motor = axis
+
+    def prepare(self, simulated: Acquisition, sensor: SensorDescriptor, scene: Scene, seed: int) -> None:
+        """Put the sensor of a scene before the motor; the height of its skin is drawn."""
+        press: Any = simulated
+        if not hasattr(press, "press_curve"):
+            raise PluginContractError(
+                f"The simulated rig {self._file.emulation.physics!r} has no press curves.",
+                hint="Its acquisition needs press_curve: see SimulatedPress in tactbench.plugin.simulation.",
+            )
+        settings, heights, scene = self._settings, self._settings.heights, quiet(scene)
+        rng = np.random.default_rng([self._file.emulation.seed, seed, *b"skin", *scene.name.encode()])
+        most_mm = heights.tolerance_mm
+        off_mm = float(np.clip(most_mm / 3 * rng.standard_normal(), -most_mm, min(most_mm, heights.depth_mm)))
+        largest_n = 1.5 * settings.limits.force_ceiling_n
+        skin_m = settings.surface_m + 1e-3 * off_mm
+        self.press = EmulatedPress(press, scene, skin_m=skin_m, largest_n=largest_n, rng=rng)
+
+    def begin(self, at_s: float) -> None:
+        """Let the scene's time begin."""
+        if self.press is not None:
+            self.press.start(at_s)
+
+    def _sensed(self, t_s: float) -> Mapping[str, float]:
+        position_m = -math.inf if self._motor is None else self._motor.position_m
+        return {} if self.press is None else self.press.sensed(t_s, position_m)
+
+    def _force_n(self, position_m: float) -> float:
+        return 0.0 if self.press is None else self.press.force_n(position_m)

@@ -89,6 +89,8 @@ class LinearDelta(BaseModel):
     joint_highest_mm: PerLeg
     branch: Literal[-1, 1] = 1
     """1: carriage ahead of the platform along its rail; -1: the other solution of each leg."""
+    sideways_deg: Annotated[FiniteFloat, Field(gt=0, lt=90)] = 30.0
+    """Largest angle of a link out of its leg's plane (assumed: rod ends of ordinary size)."""
     mode: Literal[-1, 1] = -1
     """Sign of det(p - c1, p - c2, p - c3): which way the machine is assembled; kept along every permitted move."""
 

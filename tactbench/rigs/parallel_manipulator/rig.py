@@ -1,13 +1,9 @@
-"""The rig: a linear motor on a parallel manipulator presses a sensor under force control, while both are read.
-
-Real devices: force sensor and axes are held by a guard in a process of its own. Emulated in virtual time: all in one
-process and one thread, a control period at a time.
-"""
+"""The rig: a linear motor on a parallel manipulator presses a sensor under force control, while both are read."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass, field
 from itertools import chain
@@ -48,7 +44,7 @@ from tactbench.plugin.devices import (
     read_options,
     with_sensor,
 )
-from tactbench.rigs.parallel_manipulator.emulated_press import EmulatedPress, emulated_press, quiet
+from tactbench.rigs.parallel_manipulator.emulated_press import quiet
 from tactbench.rigs.parallel_manipulator.rig_check import refuse
 from tactbench.rigs.parallel_manipulator.session import Session
 from tactbench.rigs.parallel_manipulator.settings import MOTOR, positioner_of, settings_of, with_limits
@@ -70,6 +66,7 @@ class PressAcquisition:
     plan: tuple[PlanEntry, ...]
     assumptions: Mapping[str, Scalar]
     about: Mapping[str, Scalar]
+    """What is known of the scene at its beginning."""
     force: PressingForce = field(repr=False)
     zero: Mapping[str, FloatArray] = field(repr=False)
     control: Control = field(repr=False)
@@ -77,26 +74,25 @@ class PressAcquisition:
     blocks: Iterator[Block] = field(repr=False)
     """The sensor's, from before the scene on."""
     clock: Clock = field(repr=False)
-    begin_ns: int
     duration_s: float
     retreat_s: float
     """A retreat takes at most."""
-    gaps: Mapping[str, int]
-    """By stream: rows that were missing before the scene."""
-    rows: dict[str, int] = field(default_factory=dict)
-    """By stream: rows of the scene."""
-    said: list[Event] = field(default_factory=list)
+    events: list[Event] = field(default_factory=list)
+
+    def __post_init__(self) -> None:
+        self.begin_ns = self.clock()
+        self._gaps_before = {name: one.gaps for name, one in self.reading.stream_counts.items()}
+        self._rows: dict[str, int] = {}
 
     def __iter__(self) -> Iterator[Block]:
         """Yield blocks of sensor, force sensor and motor until the scene is over; then unload, and retreat."""
-        press = self.control.press
         end_ns = self.begin_ns + round(1e9 * self.duration_s)
         for block in self.blocks:
             yield from self._within(chain((block,), self.control.blocks()), end_ns)
-            if press.over or (self.clock() >= end_ns and self.reading.ended):
+            if self.control.press.over or (self.clock() >= end_ns and self.reading.ended):
                 break
         yield from self._within(self.control.blocks(), end_ns)
-        self.said += self.control.events()
+        self.events += self.control.events()
 
     def _within(self, blocks: Iterator[Block], end_ns: int) -> Iterator[Block]:
         """Yield the rows that belong to the scene."""
@@ -104,7 +100,7 @@ class PressAcquisition:
             assert block.t_ns is not None
             first, last = np.searchsorted(block.t_ns, (self.begin_ns, end_ns)).tolist()
             if last > first:
-                self.rows[block.stream] = self.rows.get(block.stream, 0) + last - first
+                self._rows[block.stream] = self._rows.get(block.stream, 0) + last - first
                 yield self.force.turned(block.rows(slice(first, last)), self.zero)
 
     def stop(self, why: str) -> str:
@@ -117,7 +113,7 @@ class PressAcquisition:
             with suppress(KeyboardInterrupt):
                 self.control.retreat(why, self.retreat_s)
                 waiting = False
-        self.said += self.control.events()
+        self.events += self.control.events()
         return self.control.press.not_out
 
     @property
@@ -131,7 +127,7 @@ class PressAcquisition:
             "contact mm": 1e3 * press.contact_m,
             "late control periods": self.control.late,
         }
-        for number, event in enumerate(self.said, start=1):
+        for number, event in enumerate(self.events, start=1):
             at_s = 1e-9 * (event.t_ns - self.begin_ns)
             found[f"event {number}"] = f"{at_s:.3f} s, {event.state}: {event.text}"
         return found
@@ -141,14 +137,9 @@ class PressAcquisition:
         """By stream of the sensor: what became of the scene's rows; those of before and after are not counted."""
         found = {}
         for name, one in self.reading.stream_counts.items():
-            rows = self.rows.get(name, 0)
-            found[name] = one.model_copy(
-                update={
-                    "received": rows + one.dropped + one.duplicates + one.late,
-                    "written": rows,
-                    "gaps": one.gaps - self.gaps[name],
-                }
-            )
+            rows = self._rows.get(name, 0)
+            received, gaps = rows + one.dropped + one.duplicates + one.late, one.gaps - self._gaps_before[name]
+            found[name] = one.model_copy(update={"received": received, "written": rows, "gaps": gaps})
         return found
 
     @property
@@ -167,14 +158,15 @@ class PressAcquisition:
 class ParallelManipulator:
     """Devices of a rig file, and what presses them together.
 
-    What outlives a scene (guard, homes, emulated devices) is kept in a session: that of :meth:`session`; else, by the
-    clock, one that begins with the first scene and ends with this object, and in virtual time one for each scene, so
-    that a recording does not depend on those before it. An error ends it; the next scene begins another one.
+    Guard and homes outlive a scene: by the clock the session that keeps them begins with the first scene and ends with
+    this object or an error. In virtual time each scene has its own, so that a recording does not depend on those before
+    it.
 
     Parameters
     ----------
     file
-        Which devices, on which links, and the rig's settings.
+        Which devices, on which links, and the rig's settings. Emulated ones are in virtual time: those of real time run
+        in a process of their own, and are real ones here.
     operator
         Who mounts the caps; not needed where all devices are emulated.
     physics
@@ -187,34 +179,15 @@ class ParallelManipulator:
     """
 
     def __init__(self, file: RigFile, operator: Operator | None, physics: Rig | None) -> None:
-        self.settings = settings_of(file)
-        self._registry = load_registry()
-        self._file = with_limits(file, self.settings, self._registry)
-        self._operator, self._physics = operator, physics
+        self.settings, self._registry = settings_of(file), load_registry()
+        self._file, self._operator, self._physics = file, operator, physics
         self._session: Session | None = None
-        self._kept = not (file.emulated and file.emulation.time == "virtual")
-        kind, options = positioner_of(self._registry, MOTOR, self._file.devices[MOTOR])
+        motor = with_limits(file, self.settings, self._registry).devices[MOTOR]
+        kind, options = positioner_of(self._registry, MOTOR, motor)
         self._facts = kind.facts_of(read_options(kind.options_kind, options, MOTOR))
 
-    @contextmanager
-    def session(self) -> Iterator[None]:
-        """Keep devices and homes for all scenes that are opened inside."""
-        kept, self._kept = self._kept, True
-        try:
-            yield
-        finally:
-            self._kept = kept
-            self._end_session()
-
-    def _current_session(self, sensor: str) -> Session:
-        if self._session is None:
-            sensors: Collection[str] = self._file.sensors if self._kept else (sensor,)
-            self._session = session = Session(self._file, self.settings, self._registry, sensors)
-            # For a program that forgets this object, or ends.
-            self._finish = finalize(self, session.close)
-        return self._session
-
-    def _end_session(self) -> None:
+    def close(self) -> None:
+        """End the session, if there is one: disarm the guard and close all devices."""
         if self._session is not None:
             self._session = None
             self._finish()
@@ -234,94 +207,25 @@ class ParallelManipulator:
         LinkError
             If a link cannot be opened, or a device does not answer.
         """
-        scene = quiet(scene)
-        with_sensor(self._file, sensor.name)
+        scene, file = quiet(scene), with_sensor(self._file, sensor.name)
         xy_m = self._place_m(scene)
         try:
             with ExitStack() as stack:
-                senses = self._senses(stack, sensor, scene, seed)
-                yield self._opened(stack, self._current_session(sensor.name), sensor, scene, senses, xy_m)
+                simulated: Acquisition | None = None
+                if self._physics is not None and file.emulated:
+                    simulated = stack.enter_context(self._physics.open(sensor, scene, seed=seed))
+                if self._session is None:
+                    self._session = session = Session(file if file.emulated else self._file, self._registry)
+                    # For a program that forgets this object, or ends.
+                    self._finish = finalize(self, session.close)
+                if self._session.emulators is not None and simulated is not None:
+                    self._session.emulators.prepare(simulated, sensor, scene, seed)
+                yield self._pressing(stack, self._session, sensor, scene, simulated, xy_m)
         except BaseException:
-            self._end_session()
+            self.close()
             raise
-        if not self._kept:
-            self._end_session()
-
-    def _opened(
-        self,
-        stack: ExitStack,
-        session: Session,
-        sensor: SensorDescriptor,
-        scene: Scene,
-        senses: tuple[Acquisition, EmulatedPress] | None,
-        xy_m: tuple[float, float],
-    ) -> PressAcquisition:
-        """Return the scene, ready to begin; `stack` closes what is its own."""
-        settings, guard, clock = self.settings, session.guard, session.clock
-        file, placement = with_sensor(self._file, sensor.name), scene.placement
-        session.senses.press = None if senses is None else senses[1]
-        guard.disarm()  # of the scene before, if that ended in a fault
-        platform_m = session.travel(xy_m)
-        self._prompt(file, sensor, scene)
-        (driver,) = session.opened(sensor.name, sensor.name)
-        stack.callback(driver.close)
-        identity = {**session.identity, sensor.name: driver.identify()}
-        force, zero, limits = session.measured_limits()
-        press = Press(settings.press_plan(self._facts.resolution), self._course(scene))
-        control: Control | None = None
-
-        def carry(until_ns: int) -> None:
-            if control is not None:
-                control.carry(until_ns)
-
-        reading = stack.enter_context(
-            Reading({sensor.name: driver}, clock=clock, advance=carry if session.virtual else None)
-        )
-        stack.callback(_disarmed, session)
-        control = Control(
-            guard, limits, guard.arm(limits), press, lambda: _received(reading), clock,
-            period_s=settings.force_loop.period_s, stale_s=1e-3 * settings.press.stale_ms,
-        )  # fmt: skip
-        stack.callback(control.stop)
-        if not session.virtual:
-            control.start()
-        blocks = reading.blocks(math.inf, lambda: press.over)  # a sensor that is silent sends no block to look at
-        events = self._find_surface(control, blocks)
-        gaps = {name: one.gaps for name, one in reading.stream_counts.items()}
-        begin_ns = clock()
-        if senses is not None:
-            senses[1].start(1e-9 * begin_ns)
-        press.begin(1e-9 * begin_ns)
-        simulated = None if senses is None else senses[0]
-        return PressAcquisition(
-            streams=driver.streams,
-            reference=(*force.streams, guard.motor_stream),
-            plan=() if simulated is None else simulated.plan,
-            assumptions={} if simulated is None else simulated.assumptions,
-            about={
-                **({} if simulated is None else simulated.drawn),
-                **{f"{name} {key}": value for name, about in identity.items() for key, value in about.items()},
-                **force.about(zero),
-                "place x mm": placement.x.to("mm"),
-                "place s mm": placement.s.to("mm"),
-                **({} if platform_m is None else {"platform mm": ", ".join(f"{1e3 * x:.4f}" for x in platform_m)}),
-                **({} if senses is None else {"skin mm": 1e3 * senses[1].skin_m}),
-            },
-            force=force,
-            zero=zero,
-            control=control,
-            reading=reading,
-            blocks=blocks,
-            clock=clock,
-            begin_ns=begin_ns,
-            duration_s=scene.profile.duration.to("s"),
-            retreat_s=self._facts.seconds(self._facts.limits[1] - self._facts.limits[0], self._facts.retreat_speed)
-            + STOP_S,
-            gaps=gaps,
-            said=events,
-        )
-
-    # Before the press -------------------------------------------------------------------------------------------------
+        if file.emulated:
+            self.close()
 
     def _place_m(self, scene: Scene) -> tuple[float, float]:
         """Return the manipulator's x and y [m] for a scene."""
@@ -336,62 +240,125 @@ class ParallelManipulator:
                 )
         return places.place_m(x_mm, s_mm)
 
-    def _senses(
-        self, stack: ExitStack, sensor: SensorDescriptor, scene: Scene, seed: int
-    ) -> tuple[Acquisition, EmulatedPress] | None:
-        """Return the scene as the simulated rig carries it out, and what emulated devices sense of it."""
-        if self._physics is None or not self._file.emulated:
-            return None
-        simulated = stack.enter_context(self._physics.open(sensor, scene, seed=seed))
-        return simulated, emulated_press(self._file, self.settings, simulated, scene, seed)
-
-    def _prompt(self, file: RigFile, sensor: SensorDescriptor, scene: Scene) -> None:
-        profile = scene.profile
-        text = (
+    def _pressing(
+        self,
+        stack: ExitStack,
+        session: Session,
+        sensor: SensorDescriptor,
+        scene: Scene,
+        simulated: Acquisition | None,
+        xy_m: tuple[float, float],
+    ) -> PressAcquisition:
+        """Return the scene, ready to begin; `stack` closes what is its own."""
+        settings, guard, clock, profile = self.settings, session.guard, session.clock, scene.profile
+        guard.disarm()  # of the scene before, if that ended in a fault
+        platform_m = session.travel(xy_m)
+        duration_s = profile.duration.to("s")
+        ask_operator(
+            with_sensor(self._file, sensor.name),
+            self._operator,
+            "mount a cap",
             f"{scene.name}: {sensor.spec.title}. Mount the {scene.indenter}, take your hands out, and say so. Then it "
-            f"is pressed to {profile.largest_n:g} N within {profile.duration.to('s'):.0f} s; Ctrl-C retreats."
+            f"is pressed to {profile.largest_n:g} N within {duration_s:.0f} s; Ctrl-C retreats.",
         )
-        ask_operator(file, self._operator, "mount a cap", text)
+        (driver,) = session.opened(sensor.name, sensor.name)
+        stack.callback(driver.close)
+        identity = {**session.identity, sensor.name: driver.identify()}
+        force, zero, limits = session.measured_limits()
+        press = Press(settings.press_plan(self._facts.resolution), _course(scene))
+        control: Control | None = None
 
-    def _course(self, scene: Scene) -> Course:
-        profile = scene.profile
-        times, forces = profile.corners
-        end_s = profile.duration.to("s")
-        return Course(
-            setpoint_n=lambda at_s: float(np.interp(at_s, times, forces)),
-            slope_n_s=profile.end.to("N") / (end_s - profile.hold_s),
-            ramp_s=profile.hold_s,
-            end_s=end_s,
+        def carry(until_ns: int) -> None:
+            if control is not None:
+                control.carry(until_ns)
+
+        virtual = session.emulated is not None
+        reading = stack.enter_context(Reading({sensor.name: driver}, clock=clock, advance=carry if virtual else None))
+
+        def received() -> int:
+            return sum(one.received for one in reading.stream_counts.values())
+
+        stack.callback(_disarmed, session)
+        control = Control(
+            guard, limits, guard.arm(limits), press, received, clock,
+            period_s=1 / settings.force_loop.rate_hz, stale_s=1e-3 * settings.press.stale_ms,
+        )  # fmt: skip
+        stack.callback(control.stop)
+        if not virtual:
+            control.start()
+        blocks = reading.blocks(math.inf, lambda: press.over)  # a sensor that is silent sends no block to look at
+        events = _find_surface(control, blocks)
+        placement, facts = scene.placement, self._facts
+        skin_m = math.nan
+        if session.emulators is not None and session.emulators.press is not None:
+            skin_m = session.emulators.press.skin_m
+        found = PressAcquisition(
+            streams=driver.streams,
+            reference=(*force.streams, guard.motor_stream),
+            plan=() if simulated is None else simulated.plan,
+            assumptions={} if simulated is None else simulated.assumptions,
+            about={
+                **({} if simulated is None else simulated.drawn),
+                **{f"{name} {key}": value for name, about in identity.items() for key, value in about.items()},
+                **force.about(zero),
+                "place x mm": placement.x.to("mm"),
+                "place s mm": placement.s.to("mm"),
+                **({} if platform_m is None else {"platform mm": ", ".join(f"{1e3 * x:.4f}" for x in platform_m)}),
+                **({} if math.isnan(skin_m) else {"skin mm": 1e3 * skin_m}),
+            },
+            force=force,
+            zero=zero,
+            control=control,
+            reading=reading,
+            blocks=blocks,
+            clock=clock,
+            duration_s=duration_s,
+            retreat_s=facts.seconds(facts.limits[1] - facts.limits[0], facts.retreat_speed) + STOP_S,
+            events=events,
         )
-
-    def _find_surface(self, control: Control, blocks: Iterator[Block]) -> list[Event]:
-        """Let the press find the surface; return what happened meanwhile, whose rows nobody keeps."""
-        press = control.press
-        press.go()
-        for _ in blocks:
-            for _ in control.blocks():
-                pass
-            if press.ready or press.over:
-                break
-        events = list(control.events())
-        if not press.ready:
-            said = "; ".join(event.text for event in events if event.trigger is not None)
-            raise RigError(
-                f"The surface was not found: {press.ended or 'the sensor has ended'}{f' ({said})' if said else ''}.",
-                hint="Look at the rig: sensor, cap, heights in the rig file.",
-            )
-        return events
+        if session.emulators is not None:
+            session.emulators.begin(1e-9 * found.begin_ns)
+        press.begin(1e-9 * found.begin_ns)
+        return found
 
 
-def _received(reading: Reading) -> int:
-    return sum(one.received for one in reading.stream_counts.values())
+def _course(scene: Scene) -> Course:
+    profile = scene.profile
+    times, forces = profile.corners
+    end_s = profile.duration.to("s")
+    return Course(
+        setpoint_n=lambda at_s: float(np.interp(at_s, times, forces)),
+        slope_n_s=profile.end.to("N") / (end_s - profile.hold_s),
+        ramp_s=profile.hold_s,
+        end_s=end_s,
+    )
+
+
+def _find_surface(control: Control, blocks: Iterator[Block]) -> list[Event]:
+    """Let the press find the surface; return what happened meanwhile, whose rows nobody keeps."""
+    press = control.press
+    press.go()
+    for _ in blocks:
+        for _ in control.blocks():
+            pass
+        if press.ready or press.over:
+            break
+    events = list(control.events())
+    if not press.ready:
+        said = "; ".join(event.text for event in events if event.trigger is not None)
+        raise RigError(
+            f"The surface was not found: {press.ended or 'the sensor has ended'}{f' ({said})' if said else ''}.",
+            hint="Look at the rig: sensor, cap, heights in the rig file.",
+        )
+    return events
 
 
 def _disarmed(session: Session) -> None:
     """Let the guard expect no more beats; one that is lost has said so, and has retreated."""
     with suppress(GuardLostError):
         session.guard.disarm()
-    session.senses.press = None
+    if session.emulators is not None:
+        session.emulators.press = None
 
 
 def build(context: RigContext) -> ParallelManipulator:

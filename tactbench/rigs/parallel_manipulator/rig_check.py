@@ -6,18 +6,13 @@ from collections.abc import Callable, Mapping
 from functools import partial
 from typing import Any
 
+import numpy as np
+
 from tactbench.plugin import RigError, TactbenchError, UsageError, load_registry
-from tactbench.plugin.devices import (
-    CheckTable,
-    PositionerFacts,
-    RigCheck,
-    RigFile,
-    largest_force_n,
-    read_options,
-)
+from tactbench.plugin.devices import CheckTable, PositionerFacts, RigCheck, RigFile, largest_force_n, read_options
+from tactbench.rigs.parallel_manipulator.kinematics import LinearDelta
 from tactbench.rigs.parallel_manipulator.motor.codec import line_time_s
 from tactbench.rigs.parallel_manipulator.motor.profile import FaulhaberOptions
-from tactbench.rigs.parallel_manipulator.platform import Platform
 from tactbench.rigs.parallel_manipulator.settings import (
     JOINTS,
     MOTOR,
@@ -27,9 +22,11 @@ from tactbench.rigs.parallel_manipulator.settings import (
     settings_of,
     with_limits,
 )
+from tactbench.rigs.parallel_manipulator.workspace import check_move, way
 
-WATCH_S = 8e-3
-"""Age of the force at 1 kHz, a look of the guard, and scheduling: what a reaction has beside the axis' own latency."""
+LOOK_S = 7e-3
+"""A look of the guard, and by how much its scheduling is late: what a reaction has beside the age of the force and the
+axis' own latency."""
 INCREMENT_BYTES = 65
 """Of one increment and the look that confirms its end, and their answers: LA-12345, OK, M, OK, TPOS, -12345, POS,
 -12345, GRC, 1234, OST, 65536, each with CR, answers with LF as well."""
@@ -48,7 +45,7 @@ def refuse(file: RigFile) -> None:
 
 
 def check(file: RigFile) -> RigCheck:
-    """Return what axes, loop, forces and places come to, and what is refused.
+    """Return what axes, loop and forces come to, and what is refused.
 
     Raises
     ------
@@ -57,7 +54,9 @@ def check(file: RigFile) -> RigCheck:
     """
     settings, registry = settings_of(file), load_registry()
     file = with_limits(file, settings, registry)
-    tables, problems, facts = [], [], {}
+    problems: list[str] = []
+    facts: dict[str, PositionerFacts] = {}
+    axes: list[tuple[str, ...]] = []
 
     def refusing(do: Callable[[], object]) -> None:
         """Keep what `do` raises as a problem."""
@@ -74,26 +73,37 @@ def check(file: RigFile) -> RigCheck:
         except RigError as error:
             raise UsageError(f"{name}: {error.message}", hint=error.hint) from error
         problems += _axis_problems(settings, name, options)
-        tables.append(CheckTable(name, ("what", "value"), _axis_rows(options)))
+        axes.append((name, *_axis_row(options)))
         if name == MOTOR and isinstance(options, FaulhaberOptions):
             for speed_mm_s in settings.speeds_mm_s:
                 refusing(partial(options.speed, 1e-3 * speed_mm_s))
             problems += _line_problems(settings, options)
-    rows, found = _forces(settings, facts)
-    tables.append(CheckTable("largest forces", ("what", "value"), rows))
+    forces, found = _forces(settings, facts)
     problems += found
-    loop, greatest = settings.force_loop, 1e3 * settings.stiffness.greatest_n_mm
-    model = loop.model(loop.law(settings.limits.travel_mm))
-    share = f"{greatest / model.largest_stiffness():.2f}, at most 0.50"
-    tables.append(CheckTable("force loop", ("what", "value"), (("share of the largest stable gains", share),)))
+    greatest = 1e3 * settings.stiffness.greatest_n_mm
+    model = settings.force_loop.model(settings.limits.travel_mm)
     refusing(lambda: model.share_used(greatest))
-    platform = Platform.of(settings)
-    if platform is not None:
-        refusing(platform.check)
-        corners = ", ".join(f"({1e3 * x:g}, {1e3 * y:g})" for x, y in settings.places.corners_m())
-        own = (("manipulator", platform.workspace.delta.title), ("corners of what scenes may ask for", f"{corners} mm"))
-        tables.append(CheckTable("places", ("what", "value"), own))
-    return RigCheck(tuple(tables), tuple(problems))
+    share = ("share of the largest stable gains", f"{greatest / model.largest_stiffness():.2f}, at most 0.50")
+    delta = settings.manipulator
+    if isinstance(delta, LinearDelta):
+        refusing(partial(_check_places, delta, settings))
+    tables = (
+        CheckTable("axes", ("axis", "stands", "largest force of its drive", "units that are ASSUMED"), tuple(axes)),
+        CheckTable("largest forces, and the force loop", ("what", "value"), (*forces, share)),
+    )
+    return RigCheck(tables, tuple(problems))
+
+
+def _check_places(delta: LinearDelta, settings: RigSettings) -> None:
+    """Raise PlaceRefusedError unless presses at all corners of what may be asked for are permitted.
+
+    With straight rails the permitted places are convex, so the rectangle between the corners is as well.
+    """
+    heights, corners = settings.heights, settings.places.corners_m()
+    here = (*corners[0], heights.clearance_m)
+    check_move(delta, np.array(here), np.array(here))
+    for corner in (*corners, corners[0], corners[2]):
+        here = way(delta, here, corner, heights.clearance_m, heights.stand_off_m)[-1]
 
 
 def _axis_problems(settings: RigSettings, name: str, options: Any) -> list[str]:
@@ -122,57 +132,64 @@ def _axis_problems(settings: RigSettings, name: str, options: Any) -> list[str]:
     return problems
 
 
-def _axis_rows(options: Any) -> tuple[tuple[str, str], ...]:
-    """Return what an axis states."""
+def _axis_row(options: Any) -> tuple[str, ...]:
+    """Return how an axis stands, its largest force, and which units nobody has stated."""
     force_n = options.largest_force_n
     without = "holds without power" if options.holds_unpowered else "FALLS without power: it stays powered"
-    rows = [
-        ("stands", f"{options.orientation or 'not stated'}, {without}"),
-        ("largest force of its drive", "not stated" if force_n is None else f"{force_n:.1f} N"),
-    ]
     assumed = [name for name in _UNITS if name in type(options).model_fields and name not in options.model_fields_set]
-    if assumed:
-        rows.append(("units that are ASSUMED", ", ".join(f"{name} {getattr(options, name):g}" for name in assumed)))
-    return tuple(rows)
+    return (
+        f"{options.orientation or 'not stated'}, {without}",
+        "not stated" if force_n is None else f"{force_n:.1f} N",
+        ", ".join(f"{name} {getattr(options, name):g}" for name in assumed),
+    )
 
 
 def _line_problems(settings: RigSettings, options: FaulhaberOptions) -> list[str]:
     """Return what is wrong if an increment takes longer on the line than the loop is computed with."""
-    loop, exchange_s = settings.force_loop, line_time_s(INCREMENT_BYTES, options.baud)
-    if exchange_s <= loop.period_s + 1e-3 * loop.delay_ms:
+    loop, exchange_ms = settings.force_loop, 1e3 * line_time_s(INCREMENT_BYTES, options.baud)
+    allowed_ms = 1e3 / loop.rate_hz + loop.delay_ms
+    if exchange_ms <= allowed_ms:
         return []
     return [
-        f"One increment takes {1e3 * exchange_s:.1f} ms on the line; control period and declared delay are "
-        f"{1e3 * loop.period_s + loop.delay_ms:g} ms together. Lower rate_hz, state the delay, or raise baud."
+        f"One increment takes {exchange_ms:.1f} ms on the line; control period and declared delay are "
+        f"{allowed_ms:g} ms together. Lower rate_hz, state the delay, or raise baud."
     ]
 
 
-def _forces(
-    settings: RigSettings, facts: Mapping[str, PositionerFacts]
-) -> tuple[tuple[tuple[str, str], ...], list[str]]:
-    """Return how large the force may become, and what is wrong if that is more than is rated or allowed."""
+def _forces(settings: RigSettings, facts: Mapping[str, PositionerFacts]) -> tuple[list[tuple[str, str]], list[str]]:
+    """Return how large the force may become, and what is wrong if that is more than is rated or allowed.
+
+    A reaction is as late as the rig file allows: the force has the largest age that the guard accepts.
+    """
     limits, touch, stiffness, motor = settings.limits, settings.touch, settings.stiffness, facts[MOTOR]
-    react_s = WATCH_S + motor.stop_latency_s
+    age_s = 1e-3 * limits.force_age_ms
+    react_s = age_s + LOOK_S + motor.stop_latency_s
     slow, acceleration = 1e-3 * touch.touch_speed_mm_s, 1e-3 * touch.acceleration_mm_s2
     k, soft = 1e3 * stiffness.at_ceiling_n_mm, 1e3 * stiffness.at_touch_n_mm
     by_step = limits.force_ceiling_n + k * (settings.force_loop.step_m + motor.corridor)
     by_approach = largest_force_n(limits.force_ceiling_n, k, slow, acceleration, react_s)
-    # A control period, and the mean of a rising force is half its time behind.
-    behind_s = settings.force_loop.period_s + 0.5e-3 * touch.mean_ms
+    unguarded_s = 2e-3 * limits.heartbeat_ms + motor.stop_latency_s
+    # A control period, and the mean of a rising force is half its time behind; or three single samples.
+    behind_s = 1 / settings.force_loop.rate_hz + 0.5e-3 * touch.mean_ms
     first = min(
         largest_force_n(touch.mean_n, soft, slow, acceleration, react_s + behind_s),
         largest_force_n(touch.single_n, soft, slow, acceleration, react_s + 3e-3),
     )
     rails = [
-        largest_force_n(limits.travel_ceiling_n, k, one.speed, one.acceleration, WATCH_S + one.stop_latency_s)
+        largest_force_n(limits.travel_ceiling_n, k, one.speed, one.acceleration, age_s + LOOK_S + one.stop_latency_s)
         for name, one in facts.items()
         if name != MOTOR
     ]
     rows = [
-        ("reaction", f"{1e3 * react_s:.1f} ms, of which {1e3 * motor.stop_latency_s:.1f} of the motor and its line"),
+        (
+            "reaction",
+            f"{1e3 * react_s:.1f} ms, of which {1e3 * age_s:.1f} that the force may be old and "
+            f"{1e3 * motor.stop_latency_s:.1f} of the motor and its line",
+        ),
         ("under force control", f"{by_step:.2f} N: ceiling, one increment and the corridor"),
         ("in an approach that misses the touch", f"{by_approach:.2f} N: ceiling and reaction"),
         ("first touch", f"{first:.2f} N, {touch.allowed_n:g} N are allowed"),
+        ("way into the skin of an approach whose guard dies", f"{1e3 * slow * unguarded_s:.2f} mm: two heartbeats"),
         *([("of a rail that runs down on something", f"{max(rails):.2f} N")] if rails else ()),
     ]
     problems = []
@@ -180,11 +197,11 @@ def _forces(
     if not largest <= limits.rated_force_n:  # also refuses what is not a number
         problems.append(
             f"The force may come to {largest:.2f} N; the weakest part is rated for {limits.rated_force_n:.2f} N. Lower "
-            "the speed, the ceiling or the approach's threshold, or quicken the line."
+            "the speed, the ceiling, force_age_ms or the approach's threshold, or quicken the line."
         )
     if not first <= touch.allowed_n:
         problems.append(
             f"The first touch may come to {first:.2f} N; {touch.allowed_n:g} N are allowed. Lower touch_speed_mm_s, "
             "mean_n or mean_ms."
         )
-    return tuple(rows), problems
+    return rows, problems

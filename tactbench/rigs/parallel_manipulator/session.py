@@ -1,18 +1,16 @@
-"""What outlives a scene: the guard with all axes, homed once, and the emulated devices."""
+"""What outlives a scene: the guard with all axes, homed once, and the emulated devices in virtual time."""
 
 from __future__ import annotations
 
-import math
 import time
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Mapping
 from contextlib import ExitStack
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from tactbench.plugin import RigError, UsageError
+from tactbench.plugin import RigError
 from tactbench.plugin.devices import (
     FORCE,
     Beat,
@@ -20,85 +18,42 @@ from tactbench.plugin.devices import (
     DeviceSettings,
     Driver,
     EmulatedDevices,
-    ForceEntry,
     Guard,
     GuardProcess,
     GuardState,
     Limits,
     LocalGuard,
-    NamedDevice,
-    Positioner,
     PressingForce,
     ProcessSettings,
-    Report,
     RigFile,
     drivers_of,
-    emulators_of,
-    with_sensor,
 )
-from tactbench.rigs.parallel_manipulator.platform import NEAR_M, Platform
-from tactbench.rigs.parallel_manipulator.settings import JOINTS, MOTOR, RigSettings, axes_of
+from tactbench.rigs.parallel_manipulator.emulated_press import PressEmulators
+from tactbench.rigs.parallel_manipulator.kinematics import LinearDelta, forward
+from tactbench.rigs.parallel_manipulator.settings import JOINTS, axes_of, settings_of, with_limits
+from tactbench.rigs.parallel_manipulator.workspace import Place, way, way_points
 
 if TYPE_CHECKING:
     from tactbench.plugin import FloatArray
-    from tactbench.plugin.devices import Clock, EmulatedDevice, Link
-    from tactbench.rigs.parallel_manipulator.emulated_press import EmulatedPress
+    from tactbench.plugin.devices import Clock, Link
 
-
-class Senses:
-    """What emulated devices sense of the scene that is carried out; nothing between two scenes."""
-
-    def __init__(self) -> None:
-        self.press: EmulatedPress | None = None
-        self.motor: Any = None
-        """The emulated motor, with its `position_m` as its controller counts."""
-
-    def __call__(self, t_s: float) -> Mapping[str, float]:
-        """Return the value of every channel at a second of the devices' clock."""
-        position_m = -math.inf if self.motor is None else self.motor.position_m
-        return {} if self.press is None else self.press.sensed(t_s, position_m)
-
-    def force_n(self, position_m: float) -> float:
-        """Return the force of the skin [N] at a position of the motor [m]."""
-        return 0.0 if self.press is None else self.press.force_n(position_m)
-
-
-def coupled_emulators(
-    file: RigFile, settings: RigSettings, registry: Any, sensors: Collection[str], senses: Senses
-) -> dict[str, EmulatedDevice]:
-    """Return the emulated devices of a rig with some of its sensors: the motor moves, `senses` answer."""
-    found: dict[str, EmulatedDevice] = {}
-    for sensor in sensors:
-        own = emulators_of(with_sensor(file, sensor), registry, sensor, senses)
-        found |= {name: device for name, device in own.items() if name not in found}
-    for name in axes_of(settings):
-        if name not in found:
-            continue
-        axis: Any = found[name].emulator
-        if not hasattr(axis, "press_against"):
-            raise UsageError(f"The emulated {name} is no axis.", hint="Its emulator lacks press_against.")
-        # The platform's weight is not modelled.
-        axis.press_against(senses.force_n if name == MOTOR else None)
-        if name == MOTOR:
-            senses.motor = axis
-    return found
+NEAR_M = 0.2e-3
+"""How far the measured place may be from where it was sent (assumed: three rails, each within a drive's corridor)."""
 
 
 class Session:
     """Opens all devices but the sensor's, and keeps them until :meth:`close`.
 
-    Axes are homed at the first scene, in the order of `axes_of`, and keep their home as long as drive and session live.
+    Real devices: force sensor and axes are held by a guard in a process of its own. Emulated ones are in virtual time
+    here: all in this process and thread. Axes are homed at the first scene, in the order of `axes_of`, and keep their
+    home as long as drive and session live.
 
     Parameters
     ----------
     file
-        With the motor's limits.
-    settings
-        Of the rig.
+        The rig file; of its sensors all have their emulators here.
     registry
         Of the devices.
-    sensors
-        Whose emulators run in this session.
 
     Raises
     ------
@@ -106,98 +61,80 @@ class Session:
         If a link cannot be opened, or a device does not answer or is another.
     """
 
-    def __init__(self, file: RigFile, settings: RigSettings, registry: Any, sensors: Collection[str]) -> None:
-        self._file, self._settings, self._registry = file, settings, registry
-        self.senses = Senses()
-        self.virtual = file.emulated and file.emulation.time == "virtual"
-        self._stack = ExitStack()
+    def __init__(self, file: RigFile, registry: Any) -> None:
+        self.settings = settings_of(file)
+        self._registry, self._stack = registry, ExitStack()
+        self.emulators: PressEmulators | None = None
+        self.emulated: EmulatedDevices | None = None
+        self.clock: Clock = time.monotonic_ns
+        self._links: Mapping[str, Callable[[], Link]] = {}
+        self._file = with_limits(file, self.settings, registry).checked_for_one_clock()
         with ExitStack() as opening:
             opening.callback(self._stack.close)
-            emulators = coupled_emulators(file, settings, registry, sensors, self.senses) if file.emulated else {}
-            self.emulated: EmulatedDevices | None = None
-            self.clock: Clock = time.monotonic_ns
-            if emulators:
-                self.emulated = self._stack.enter_context(EmulatedDevices(emulators, time=file.emulation.time))
+            if file.emulated:
+                self.emulators = PressEmulators(file, registry)
+                self.emulated = self._stack.enter_context(EmulatedDevices(self.emulators.devices))
                 self.clock = self.emulated.clock
-            self._links: Mapping[str, Callable[[], Link]] = (
-                {} if self.emulated is None else {name: partial(self.emulated.open_link, name) for name in emulators}
-            )
-            self.guard: Guard = self._guard(next(iter(sensors)))
+                self._links = {name: self.emulated.opener(name) for name in self.emulators.devices}
+            self.guard = self._guard()
+            self._stack.callback(self.guard.close)
             self.identity = self.guard.start()
             opening.pop_all()
-        self.platform = Platform.of(settings)
 
     def close(self) -> None:
         """Disarm the guard and close all devices; axes hold where they are."""
         self._stack.close()
 
-    def opened(self, sensor: str, *names: str) -> list[Driver]:
-        """Open drivers of devices by name; the caller closes them."""
-        file = with_sensor(self._file, sensor).checked_for_one_clock()
-        drivers = drivers_of(file, self._registry, sensor, self._links, self.clock, names)
+    def opened(self, sensor: str, *names: str) -> list[Any]:
+        """Open drivers of devices by name, with one of the sensors; the caller closes them."""
+        drivers: dict[str, Driver] = drivers_of(self._file, self._registry, sensor, self._links, self.clock, names)
         return [drivers[name] for name in names]
 
-    def _guard(self, sensor: str) -> Guard:
-        """Return the guard of all axes and the force sensor; it is disarmed and closed with the session."""
-        names = axes_of(self._settings)
-        guard: LocalGuard | GuardProcess
-        if self.virtual:
-            assert self.emulated is not None
-            *axes, force = self.opened(sensor, *names, FORCE)
-            found = {name: axis for name, axis in zip(names, axes, strict=True) if isinstance(axis, Positioner)}
-            guard = LocalGuard(found, force, self.clock, self.emulated.advance)
-        else:
-            guard = GuardProcess(
-                ProcessSettings(
-                    axes={name: self._device(name) for name in names},
-                    force=self._device(FORCE),
-                    log=str(Path(self._settings.guard_log).expanduser().resolve()),
-                    clock_zero_ns=time.monotonic_ns() - self.clock(),
-                )
-            )
-        self._stack.callback(guard.close)
-        return guard
-
-    def _device(self, name: str) -> DeviceSettings:
-        """Return what the guard's process is told of a device."""
-        entry = self._file.entries()[name]
-        assert isinstance(entry, ForceEntry | NamedDevice)
-        descriptor = self._registry.devices[entry.device]
-        options = {**(descriptor.emulated_options if entry.emulated else {}), **entry.options}
-        addresses = {} if self.emulated is None else self.emulated.addresses
-        return DeviceSettings(driver=descriptor.driver, link=addresses.get(name, entry.link), options=options)
+    def _guard(self) -> Guard:
+        """Return the guard of all axes and the force sensor."""
+        names = axes_of(self.settings)
+        if self.emulated is not None:
+            *axes, force = self.opened(next(iter(self._file.sensors)), *names, FORCE)
+            return LocalGuard(dict(zip(names, axes, strict=True)), force, self.clock, self.emulated.advance)
+        entries: dict[str, Any] = {**self._file.devices, FORCE: self._file.force}
+        devices = {
+            name: DeviceSettings(self._registry.devices[entry.device].driver, entry.link, entry.options)
+            for name, entry in entries.items()
+            if name in (*names, FORCE)
+        }
+        log = str(Path(self.settings.guard_log).expanduser().resolve())
+        return GuardProcess(ProcessSettings({name: devices[name] for name in names}, devices[FORCE], log))
 
     # A scene's beginning ----------------------------------------------------------------------------------------------
 
     def measured_limits(self) -> tuple[PressingForce, dict[str, FloatArray], Limits]:
         """Take the force sensor's zero, nothing being armed; return it, and what the guard is to keep."""
         assert self._file.force is not None
-        guard, settings, stream = self.guard, self._settings, self.guard.force_stream
+        guard, settings, stream = self.guard, self.settings, self.guard.force_stream
         force = PressingForce(self._file.force, (stream,))
         since_ns = self.clock()
         guard.advance(since_ns + round(1e9 * self._file.force.zero_s))
         # Not what has waited since nobody took it.
         fresh = (block.rows(block.t_ns >= since_ns) for block in guard.force_blocks() if block.t_ns is not None)
         zero = force.zero(fresh)[stream.name]
-        limits, touch, loop = settings.limits, settings.touch, settings.force_loop
-        low, high = limits.travel_mm
+        limits, touch = settings.limits, settings.touch
         kept = Limits(
             force_ceiling_n=limits.force_ceiling_n,
             travel_ceiling_n=limits.travel_ceiling_n,
             torque_ceiling_nm=limits.torque_ceiling_nm,
             touch_n=touch.single_n,
-            travel_m=(1e-3 * low, 1e-3 * high),
-            step_m=loop.step_m,
+            travel_m=(1e-3 * limits.travel_mm[0], 1e-3 * limits.travel_mm[1]),
+            step_m=settings.force_loop.step_m,
             speed_m_s=1e-3 * max(touch.speed_mm_s, settings.press.unload_speed_mm_s),
             heartbeat_s=1e-3 * limits.heartbeat_ms,
-            force_age_s=limits.force_age_s(stream.rate_hz),
+            force_age_s=1e-3 * limits.force_age_ms,
             channel=force.column,
             sign=force.sign,
             zero=tuple(zero.tolist()),
         )
         return force, {stream.name: zero}, kept
 
-    def travel(self, xy_m: tuple[float, float]) -> tuple[float, float, float] | None:
+    def travel(self, xy_m: tuple[float, float]) -> Place | None:
         """Home what is not homed, and move the platform above a place; return where it is then, None: it is fixed.
 
         The guard is armed meanwhile: it watches the force, with the ceiling of travel, and stops all rails.
@@ -208,36 +145,36 @@ class Session:
             If the way is not permitted, the guard has stopped it, or the platform is not where it was sent.
         """
         _, _, limits = self.measured_limits()
-        report = self.guard.arm(limits)
-        if self.platform is None:
-            self.guard.disarm()
+        guard, delta, heights = self.guard, self.settings.manipulator, self.settings.heights
+        report = guard.arm(limits)
+        if not isinstance(delta, LinearDelta):
+            guard.disarm()
             return None
-        way = self.platform.way(self.platform.place_m(report.positions), xy_m)
+        places = way(delta, _place_m(delta, report.positions), xy_m, heights.clearance_m, heights.stand_off_m)
         beats = 0
-
-        def beat(report: Report, targets: Mapping[str, float] | None = None) -> Report:
-            nonlocal beats
-            beats += 1
-            kind = CommandKind.TRAVEL if targets else CommandKind.NONE
-            now_ns, number = self.clock(), report.force_sequence
-            report = self.guard.beat(Beat(beats, now_ns, "travel", kind, force_sequence=number, targets=targets or {}))
-            if report.state is not GuardState.ARMED or (report.reason and not report.early):
-                said = report.trigger or report.reason
-                raise RigError(f"The manipulator was stopped on its way: {said}.", hint="See what is in its way.")
-            self.guard.advance(now_ns + round(1e9 * self._settings.force_loop.period_s))
-            return report
-
-        for targets in self.platform.targets(way):
-            report = beat(report, targets)
-            while report.early:
-                report = beat(report, targets)
-            while report.moving:
-                report = beat(report)
-        place = self.platform.place_m(self.guard.disarm().positions)
-        off_m = float(np.linalg.norm(np.subtract(place, way[-1])))
+        for point in way_points(delta, places):
+            targets = dict(zip(JOINTS, point, strict=True))
+            while targets or report.moving:
+                beats += 1
+                now_ns, kind = self.clock(), CommandKind.TRAVEL if targets else CommandKind.NONE
+                report = guard.beat(
+                    Beat(beats, now_ns, "travel", kind, force_sequence=report.force_sequence, targets=targets)
+                )
+                if report.state is not GuardState.ARMED or (report.reason and not report.early):
+                    said = report.trigger or report.reason
+                    raise RigError(f"The manipulator was stopped on its way: {said}.", hint="See what is in its way.")
+                targets = targets if report.early else {}
+                guard.advance(now_ns + round(1e9 / self.settings.force_loop.rate_hz))
+        place = _place_m(delta, guard.disarm().positions)
+        off_m = float(np.linalg.norm(np.subtract(place, places[-1])))
         if not off_m <= NEAR_M:
             raise RigError(
                 f"The platform is {1e3 * off_m:.3f} mm from where it was sent.",
                 hint=f"Home {', '.join(JOINTS)}; check the geometry.",
             )
         return place
+
+
+def _place_m(delta: LinearDelta, positions: Mapping[str, float]) -> Place:
+    x, y, z = forward(delta, np.array([positions[name] for name in JOINTS])).tolist()
+    return x, y, z

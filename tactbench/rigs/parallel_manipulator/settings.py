@@ -14,7 +14,6 @@ from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, model_validator
 from tactbench.plugin import UsageError, load_object
 from tactbench.plugin.devices import ForceLaw, LoopModel, NamedDevice, Positioner, PressPlan, RigFile, read_options
 from tactbench.rigs.parallel_manipulator.kinematics import LinearDelta
-from tactbench.rigs.parallel_manipulator.workspace import Postures
 
 MOTOR = "motor"
 """Name of the pressing axis' entry under `devices:`."""
@@ -24,8 +23,8 @@ BEATS = 3
 """Control periods without a beat after which the guard retreats, at least (derived: rig practice of two to three)."""
 LEAST_HEARTBEAT_S = 0.02
 """Shorter limits trip falsely: sleeps on an ordinary kernel are late by up to 9.4 ms (measured)."""
-FORCE_AGE_S = 0.010
-"""Added to three sampling periods of the force sensor: how old a sample may be, unless it is stated."""
+WINDUP_S = 0.2
+"""Times the loop's speed is how far its target may be ahead of the measured position (assumed)."""
 
 Positive = Annotated[FiniteFloat, Field(gt=0)]
 NotNegative = Annotated[FiniteFloat, Field(ge=0)]
@@ -34,6 +33,12 @@ Range = tuple[FiniteFloat, FiniteFloat]
 
 class _Part(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid")
+
+
+def _rising(*numbers: float, said: str) -> None:
+    """Raise ValueError unless no number is below the one before."""
+    if list(numbers) != sorted(numbers):
+        raise ValueError(f"{said} do not rise in this order: {', '.join(f'{number:g}' for number in numbers)}")
 
 
 class SafetyLimits(_Part):
@@ -48,8 +53,9 @@ class SafetyLimits(_Part):
     """Norm of the raw torque; None: torque is not looked at."""
     rated_force_n: Positive
     """What the weakest part bears: skin, sensor, force sensor, cap. By its data sheet."""
-    force_age_ms: Positive | None = None
-    """How old a sample of the force may be; None: three sampling periods and 10 ms."""
+    force_age_ms: Positive = 30.0
+    """How old a sample of the force may be: three sampling periods of the force sensor, and by how much sender and
+    host are late (assumed: of 250 Hz or more, and an ordinary kernel)."""
     travel_mm: Range
     """Least and greatest position of the motor; 0 lies between them, where the drive keeps them."""
     heartbeat_ms: Positive
@@ -61,24 +67,17 @@ class SafetyLimits(_Part):
     @model_validator(mode="after")
     def _in_order(self) -> Self:
         low, high = self.travel_mm
+        _rising(low, self.retreat_mm, high, said="the motor's travel and its place of retreat")
         if not low < 0 < high:
             raise ValueError("the motor's travel goes from below 0 to above 0")
-        if not low <= self.retreat_mm < high:
-            raise ValueError("the motor retreats to a place outside its travel")
-        if not self.travel_ceiling_n <= self.force_ceiling_n < self.rated_force_n:
-            raise ValueError("ceiling of travel, ceiling of pressing and rated force do not rise in this order")
+        ceilings = (self.travel_ceiling_n, self.force_ceiling_n, self.rated_force_n)
+        _rising(*ceilings, said="ceiling of travel, ceiling of pressing and rated force")
         return self
-
-    def force_age_s(self, rate_hz: float | None) -> float:
-        """Return how old a sample of a force sensor with a rate may be [s]."""
-        return FORCE_AGE_S + 3 / (rate_hz or 1000.0) if self.force_age_ms is None else 1e-3 * self.force_age_ms
 
 
 class Stiffness(_Part):
     """How stiff skin, cap and machine in series are, N/mm; declared, since nobody can compute it beforehand."""
 
-    least_n_mm: Positive
-    """At the first touch of the softest cap."""
     at_touch_n_mm: Positive
     """The greatest up to the force that a first touch may have."""
     greatest_n_mm: Positive
@@ -88,8 +87,9 @@ class Stiffness(_Part):
 
     @model_validator(mode="after")
     def _in_order(self) -> Self:
-        if not self.least_n_mm <= self.at_touch_n_mm <= self.greatest_n_mm <= self.at_ceiling_n_mm:
-            raise ValueError("least, at a touch, greatest and at the ceiling rise in this order")
+        _rising(
+            self.at_touch_n_mm, self.greatest_n_mm, self.at_ceiling_n_mm, said="at a touch, greatest, at the ceiling"
+        )
         return self
 
 
@@ -99,7 +99,7 @@ class ForceControl(_Part):
     rate_hz: Positive
     """Control periods a second; each is a beat for the guard."""
     proportional_mm_n: NotNegative = 0.0
-    integral_mm_n_s: NotNegative
+    integral_mm_n_s: Positive
     cutoff_hz: Positive | None
     """Of the first-order low-pass on the regulated force; null: unfiltered."""
     delay_ms: NotNegative
@@ -108,37 +108,30 @@ class ForceControl(_Part):
     """Time constant of the drive's position loop."""
     speed_mm_s: Positive
     """Largest speed of the loop: 2 to 5 times what the ramp needs at the softest place."""
-    windup_ms: Positive = 200.0
-    """Times `speed_mm_s` is how far the target may be ahead of the measured position."""
     feed_forward_n_mm: Positive | None = None
     """Assumed stiffness for the ramp's feed-forward; null: none."""
-
-    @property
-    def period_s(self) -> float:
-        """Control period [s]."""
-        return 1 / self.rate_hz
 
     @property
     def step_m(self) -> float:
         """Largest increment in a control period [m]."""
         return 1e-3 * self.speed_mm_s / self.rate_hz
 
-    def model(self, law: ForceLaw) -> LoopModel:
-        """Return the loop on a linear skin."""
-        return LoopModel.around(law, lag_s=1e-3 * self.motor_lag_ms, delay_s=1e-3 * self.delay_ms)
-
     def law(self, travel_mm: Range) -> ForceLaw:
         """Return the law within a travel of the motor."""
         return ForceLaw(
-            period_s=self.period_s,
+            period_s=1 / self.rate_hz,
             proportional=1e-3 * self.proportional_mm_n,
             integral=1e-3 * self.integral_mm_n_s,
             cutoff_hz=self.cutoff_hz,
             speed=1e-3 * self.speed_mm_s,
-            windup_s=1e-3 * self.windup_ms,
+            windup_s=WINDUP_S,
             travel=(1e-3 * travel_mm[0], 1e-3 * travel_mm[1]),
             feed_forward=math.inf if self.feed_forward_n_mm is None else 1e3 * self.feed_forward_n_mm,
         )
+
+    def model(self, travel_mm: Range) -> LoopModel:
+        """Return the loop on a linear skin."""
+        return LoopModel.around(self.law(travel_mm), lag_s=1e-3 * self.motor_lag_ms, delay_s=1e-3 * self.delay_ms)
 
 
 class Touch(_Part):
@@ -189,10 +182,8 @@ class Heights(_Part):
 
     surface_mm: FiniteFloat
     """Height of the manipulator at which the retracted indenter would touch; 0 where it is fixed."""
-    surface_spread_mm: NotNegative
-    """Standard deviation of the surface's height."""
-    cap_tolerance_mm: NotNegative
-    """Of a cap's length, from cap to cap."""
+    tolerance_mm: NotNegative
+    """How far the surface may be from there: three times its spread, and what caps differ in length."""
     stand_off_mm: Positive
     """Between tip and expected surface before the motor approaches."""
     clearance_mm: Positive
@@ -202,11 +193,7 @@ class Heights(_Part):
 
     @model_validator(mode="after")
     def _in_order(self) -> Self:
-        least_mm = 3 * self.surface_spread_mm + self.cap_tolerance_mm
-        if least_mm > self.stand_off_mm:
-            raise ValueError(f"the stand-off is less than 3 spreads and the cap's tolerance, {least_mm:g} mm")
-        if self.clearance_mm < self.stand_off_mm:
-            raise ValueError("the clearance is less than the stand-off")
+        _rising(self.tolerance_mm, self.stand_off_mm, self.clearance_mm, said="tolerance, stand-off and clearance")
         return self
 
     @property
@@ -232,15 +219,6 @@ class Places(_Part):
     """Offsets that scenes may ask for along the sensor; all of the rectangle is tested beforehand."""
     reach_s_mm: Range = (0.0, 0.0)
     """Offsets along its arc; laid out flat."""
-    way_point_mm: Positive = 1.0
-    """The manipulator's line is kept by points at most so far apart, at each of which all rails come to rest."""
-
-    @model_validator(mode="after")
-    def _in_order(self) -> Self:
-        for low, high in (self.reach_x_mm, self.reach_s_mm):
-            if not low <= 0 <= high:
-                raise ValueError("reaches go from 0 or less to 0 or more")
-        return self
 
     def place_m(self, x_mm: float, s_mm: float) -> tuple[float, float]:
         """Return the manipulator's x and y [m] for offsets on the sensor."""
@@ -263,7 +241,6 @@ class RigSettings(_Part):
     """`fixed`: somebody puts the sensor below the indenter, and nothing but the motor moves."""
     heights: Heights
     places: Places = Places()
-    postures: Postures = Postures()
     stiffness: Stiffness
     force_loop: ForceControl
     touch: Touch
@@ -273,25 +250,17 @@ class RigSettings(_Part):
 
     @model_validator(mode="after")
     def _together(self) -> Self:
-        limits, loop, touch = self.limits, self.force_loop, self.touch
-        least = max(1e3 * BEATS * loop.period_s, 1e3 * LEAST_HEARTBEAT_S)
-        highest = limits.travel_mm[1]
-        for wrong, problem in (
-            (limits.heartbeat_ms < least, f"a heartbeat below {least:g} ms trips falsely at {loop.rate_hz:g} Hz"),
-            (touch.single_n >= limits.force_ceiling_n, "a touch is not below the ceiling"),
-            (touch.contact_n > touch.mean_n, "the force kept after a touch is not below that of a touch"),
-            (touch.mean_ms < 1e3 * loop.period_s, "the mean of a touch is shorter than a control period"),
-            (touch.touch_speed_mm_s > touch.speed_mm_s, "the touch is quicker than the way to it"),
-            (self.press.error_band_n <= self.press.band_n, "the band of errors is not above that of no force"),
-            (touch.lift_mm >= self.heights.stand_off_mm, "the lift is not within the stand-off"),
-            (loop.integral_mm_n_s == 0 and loop.proportional_mm_n == 0, "the force loop has no gain"),
-            (
-                limits.retreat_mm + self.heights.stand_off_mm + self.heights.depth_mm > highest,
-                "stand-off and depth below the place of retreat are beyond the motor's travel",
-            ),
-        ):
-            if wrong:
-                raise ValueError(problem)
+        limits, loop, touch, heights = self.limits, self.force_loop, self.touch, self.heights
+        least_ms = 1e3 * max(BEATS / loop.rate_hz, LEAST_HEARTBEAT_S)
+        deepest_mm = limits.retreat_mm + heights.stand_off_mm + heights.depth_mm
+        _rising(least_ms, limits.heartbeat_ms, said="three control periods (20 ms at least) and the heartbeat")
+        _rising(1e3 / loop.rate_hz, touch.mean_ms, said="a control period and the time of a touch's mean")
+        _rising(touch.contact_n, touch.mean_n, said="the force kept after a touch and that of a touch")
+        _rising(touch.single_n, limits.force_ceiling_n, said="a touch in a single sample and the ceiling")
+        _rising(touch.touch_speed_mm_s, touch.speed_mm_s, said="the speed of the touch and of the way to it")
+        _rising(touch.lift_mm, heights.stand_off_mm, said="lift and stand-off")
+        _rising(self.press.band_n, self.press.error_band_n, said="the band of no force and of errors")
+        _rising(deepest_mm, limits.travel_mm[1], said="retreat, stand-off and depth together, and the motor's travel")
         return self
 
     @property
@@ -312,13 +281,12 @@ class RigSettings(_Part):
 
     def press_plan(self, resolution_m: float) -> PressPlan:
         """Return the numbers of a press by an axis with a least step [m]."""
-        touch, press, heights = self.touch, self.press, self.heights
+        touch, press = self.touch, self.press
         return PressPlan(
             law=self.force_loop.law(self.limits.travel_mm),
             resolution_m=resolution_m,
             step_m=self.force_loop.step_m,
-            # Three spreads and a cap's tolerance above the expected surface.
-            near_m=self.surface_m - 1e-3 * (3 * heights.surface_spread_mm + heights.cap_tolerance_mm),
+            near_m=self.surface_m - 1e-3 * self.heights.tolerance_mm,
             deepest_m=self.deepest_m,
             speed_m_s=1e-3 * touch.speed_mm_s,
             touch_speed_m_s=1e-3 * touch.touch_speed_mm_s,
@@ -369,7 +337,7 @@ def positioner_of(registry: Any, name: str, entry: NamedDevice) -> tuple[type[Po
 
 
 def with_limits(file: RigFile, settings: RigSettings, registry: Any) -> RigFile:
-    """Return the file with the motor told the limits of the settings; raises UsageError if it was told others."""
+    """Return the file with the motor told the limits of the settings; raises UsageError if it was told some itself."""
     limits = settings.limits
     own = {
         "lower_m": 1e-3 * limits.travel_mm[0],
@@ -383,12 +351,11 @@ def with_limits(file: RigFile, settings: RigSettings, registry: Any) -> RigFile:
     kind, options = positioner_of(registry, MOTOR, entry)
     if "homing" in kind.options_kind.model_fields and options.get("homing", "here") == "here":
         own["home_m"] = own["retreat_m"]  # it stands at the place to which it retreats
-    for name, value in own.items():
-        if name in entry.options and not math.isclose(float(entry.options[name]), value, rel_tol=1e-9):
-            raise UsageError(
-                f"The motor's option {name} is {entry.options[name]}, and the rig's limits make it {value:g}.",
-                hint="State it once, under `settings: limits:` and `touch:`.",
-            )
-    motor = entry.model_copy(update={"options": {**entry.options, **own}})
+    if twice := [name for name in own if name in entry.options]:
+        raise UsageError(
+            f"The motor's {', '.join(twice)} is stated among its options.",
+            hint="The rig's limits say it: state it once, under `settings: limits:` and `touch:`.",
+        )
     read_options(kind.options_kind, {**options, **own}, entry.device)
+    motor = entry.model_copy(update={"options": {**entry.options, **own}})
     return file.model_copy(update={"devices": {**file.devices, MOTOR: motor}})

@@ -9,7 +9,6 @@ from tactbench.core.acquisition import acquire
 from tactbench.core.errors import DataError, RigError, UsageError
 from tactbench.core.evaluation.dataset import load_dataset
 from tactbench.core.plugins.emulators import running
-from tactbench.core.recording.health import examine
 from tactbench.core.recording.reader import open_recording
 from tactbench.core.spec.quantity import assumed
 from tactbench.core.spec.rig_file import Allowed, DeviceEntry, EmulationSettings
@@ -121,13 +120,8 @@ def marked(stream, quality):
 
 FAULTS = [
     ("icub", "dropped-frame:half=tail,every=10", "taxels", Quality.MISSING),
-    ("icub", "doubled-frame:half=head,every=10", "taxels", Quality.SUSPECT),
     ("icub", "not-connected:start_s=1.5", "taxels", Quality.MISSING),
-    ("icub", "no-ack:channels=T2,start_s=1.5,end_s=1.55", "taxels", Quality.SUSPECT),
     ("biotac", "parity:every=51", "electrodes", Quality.SUSPECT),
-    ("biotac", "dropped-reply:every=51", "electrodes", Quality.MISSING),
-    ("biotac", "not-connected:start_s=1.5", "electrodes", Quality.MISSING),
-    ("biotac", "error-reply:every=51", "electrodes", Quality.MISSING),
 ]
 
 
@@ -139,23 +133,6 @@ def test_faults_of_a_sensor_are_marked_and_counted_and_the_recording_is_valid(tm
     assert any(name.startswith(f"{sensor}: ") and count for name, count in meta.counts.items())
     assert meta.emulation.faults == (f"{sensor}: {fault}",)
     assert not meta.excluded
-
-
-def test_a_lost_sample_of_a_board_without_numbers_is_a_longer_interval(tmp_path):
-    assert press(tmp_path / "p.h5", rig_file(faults=("dropped-frame:start_s=1.5,end_s=1.6",))) is None
-    meta, streams = read(tmp_path / "p.h5")
-    assert np.diff(streams["taxels"].t_ns).max() > 90_000_000
-    assert meta.counts["icub: long intervals"] == 1
-
-
-def test_a_stuck_taxel_is_seen_by_nobody_but_as_a_constant_channel(tmp_path):
-    scene = SCENE.model_copy(update={"name": "stuck"})
-    assert press(tmp_path / "p.h5", rig_file(faults=("stuck-taxel:channels=T8",)), scene=scene) is None
-    _, streams = read(tmp_path / "p.h5")
-    taxels = streams["taxels"].data
-    assert len(np.unique(taxels[:, 7])) == 1 < len(np.unique(taxels[:, 6]))
-    with open_recording(tmp_path / "p.h5") as recording:
-        assert any("T8" in finding.channels and "constant" in finding.message for finding in examine(recording))
 
 
 @pytest.mark.parametrize(
@@ -171,12 +148,6 @@ def test_losses_of_the_force_sensor_are_counted_and_gaps_marked(tmp_path, fault,
     assert counts.written == len(force.data)
     assert marked(force, Quality.GAP) == counts.gaps
     assert np.all(np.diff(force.sequence) > 0)
-
-
-def test_a_saturated_force_sensor_marks_every_channel(tmp_path):
-    assert press(tmp_path / "p.h5", rig_file(force_faults=("saturated:start_s=2.0",))) is None
-    _, streams = read(tmp_path / "p.h5")
-    assert 0 < marked(streams["force_torque"], Quality.SATURATED) < len(streams["force_torque"].data)
 
 
 @pytest.mark.parametrize("part", ["sensor", "force"])
@@ -216,7 +187,7 @@ def test_losses_beyond_what_is_allowed_make_it_incomplete(tmp_path):
 def test_a_sensor_that_sends_nothing_is_told_and_the_recording_left_out_of_every_evaluation(tmp_path, monkeypatch):
     monkeypatch.setattr(Bus, "poll", lambda self, now_s: [])
     path = tmp_path / "press.h5"
-    error = press(path, rig_file())
+    error = press(path, rig_file().model_copy(update={"allowed": Allowed(silent_s=0.2)}))
     assert error is not None
     assert "Nothing came of taxels in the whole scene" in error.message
     assert "tactbench doctor" in error.hint

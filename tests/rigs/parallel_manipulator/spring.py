@@ -59,6 +59,10 @@ def example(**changes):
         "force__zero_s": 0.3,
         "force__options__rate_hz": 1000.0,
         "settings__limits__travel_ceiling_n": 0.2,
+        "settings__limits__force_age_ms": 13.0,
+        "settings__limits__heartbeat_ms": 60.0,
+        "settings__heights__clearance_mm": 10.0,
+        "settings__press__stale_ms": 100.0,
         "settings__limits__force_ceiling_n": 8.0,
         "settings__touch__single_n": 0.1,
         "settings__touch__mean_n": 0.1,
@@ -94,6 +98,8 @@ def with_joints(**changes):
     """Return the example with its joints: a linear delta whose platform is homed at (0, 0, -150) mm."""
     own = yaml.safe_load(EXAMPLE.read_text(encoding="utf-8"))
     kept = {"settings__manipulator": own["settings"]["manipulator"], "settings__heights__surface_mm": -152.0}
+    for name in JOINTS:
+        own["devices"][name]["options"] = own["devices"][name]["options"] | {"speed_m_s": 7e-3}
     return example(**{f"devices__{name}": own["devices"][name] for name in JOINTS}, **(kept | changes))
 
 

@@ -1,7 +1,5 @@
 """The devices by their names: what listings see, and drivers and emulators that fit each other."""
 
-import subprocess
-import sys
 from importlib.metadata import EntryPoint
 
 import numpy as np
@@ -20,23 +18,10 @@ def devices():
     return {device.name: device for device in registry.devices}
 
 
-def test_the_package_brings_a_force_sensor_and_a_motor():
-    found = {name: (device.kind, device.emulated_link) for name, device in devices().items()}
-    assert found == {"net-ft": ("force", "datagram"), "faulhaber": ("motor", "bytes")}
-
-
-def test_listing_them_imports_neither_numpy_nor_links():
-    code = (
-        "import sys; from tactbench.rigs.parallel_manipulator import tactbench_devices; tactbench_devices(); "
-        "assert not {'numpy', 'serial', 'tactbench.links.link'} & set(sys.modules)"
-    )
-    assert subprocess.run([sys.executable, "-c", code], check=False, timeout=60).returncode == 0
-
-
 @pytest.mark.parametrize("name", ["net-ft", "faulhaber"])
 def test_driver_and_emulator_take_the_same_options(name):
     descriptor = devices()[name]
-    own = {"net-ft": {"bias": True}, "faulhaber": {"peak_current_a": 0.5}}
+    own = {"net-ft": {"rate_hz": 500.0}, "faulhaber": {"peak_current_a": 0.5}}
     options = descriptor.emulated_options | own[name]
 
     def senses(time_s):
@@ -48,7 +33,6 @@ def test_driver_and_emulator_take_the_same_options(name):
         with load_object(descriptor.driver)(DriverSettings(lambda: link, options=options, clock=link.clock)) as driver:
             assert driver.identify()
             driver.start()
-            assert driver.tare() is (name != "faulhaber")
             block = read_for(driver, link, 2.0)
             assert [stream.name for stream in driver.streams] == [block.stream]
             assert block.data.shape[1] == len(driver.streams[0].channels)

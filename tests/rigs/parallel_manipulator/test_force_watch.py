@@ -5,7 +5,7 @@ import numpy as np
 from tactbench.devices.force_watch import ForceWatch
 from tactbench.devices.guard_messages import Trigger
 from tactbench.plugin import Block
-from tactbench.rigs.parallel_manipulator.force_torque.wrench import stream
+from tactbench.rigs.parallel_manipulator.force_torque.net_ft.codec import NetFtOptions
 from tests.rigs.parallel_manipulator.presses import FAULTS
 
 LIMITS = FAULTS.Setting().limits
@@ -16,7 +16,7 @@ class Watched:
     """A watch over a stream, a millisecond a call."""
 
     def __init__(self):
-        self.watch = ForceWatch(stream(1000.0))
+        self.watch = ForceWatch(NetFtOptions(counts_per_newton=1.0, counts_per_newton_metre=1.0).stream)
         self.now_ns = 0
 
     def take(self, *samples):

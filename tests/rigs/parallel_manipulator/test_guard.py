@@ -360,7 +360,7 @@ def test_a_motor_that_cannot_come_out_loses_its_power_loudly(made):
     texts = [event.text for event in made.guard.events() if event.trigger is Trigger.RETREAT_FAILED]
     assert len(texts) == 1
     assert "stand clear" in texts[0]
-    assert not made.world.motor.drive._enabled
+    assert not made.world.motor.drive.enabled
 
 
 def test_a_motor_that_would_fall_keeps_its_power(tmp_path, monkeypatch):
@@ -376,7 +376,7 @@ def test_a_motor_that_would_fall_keeps_its_power(tmp_path, monkeypatch):
         made.press(in_phase("ramp", block))
         report = made.ended(5.0)
         assert "left under power" in report.not_out
-        assert made.world.motor.drive._enabled
+        assert made.world.motor.drive.enabled
 
 
 def test_force_while_homing_stops_the_motor(tmp_path, monkeypatch):

@@ -73,7 +73,8 @@ def test_a_guard_that_is_lost_says_so_ever_after(tmp_path):
 
 NOT_A_NUMBER = "tests.rigs.parallel_manipulator.broken_force:build"
 RAISING = "tests.rigs.parallel_manipulator.broken_force:build_raising"
-TO_A_SWITCH = {"homing": "switch", "homing_speed_m_s": 5e-3, "home_m": 3e-3}
+# The end stop is 5 mm behind the skin.
+TO_A_STOP = {"homing": "end-stop", "homing_speed_m_s": 5e-3, "home_m": 5e-3}
 
 
 def entries(log):
@@ -96,16 +97,11 @@ def test_an_error_of_a_driver_lets_the_motor_retreat(tmp_path, monkeypatch):
         assert event.text == "ZeroDivisionError: a driver's own error"
 
 
-def homed_to_a_switch_behind_the_skin(made):
-    made.world.motor.drive._reference_switch_m = 8e-3
-
-
 def test_an_error_of_a_driver_while_homing_lets_the_motor_stand(tmp_path, monkeypatch):
     monkeypatch.setenv("PYTHONPATH", str(ROOT))
-    monkeypatch.setattr(FAULTS, "STATED", FAULTS.STATED | TO_A_SWITCH)
+    monkeypatch.setattr(FAULTS, "STATED", FAULTS.STATED | TO_A_STOP)
     # At 5 mm/s on 2 N/mm, 3 N are 0.3 s after the driver's error: what a busy machine may take.
     with rig("process", tmp_path, FAULTS.Setting(stiffness_n_m=2e3), force_driver=RAISING) as made:
-        homed_to_a_switch_behind_the_skin(made)
         with pytest.raises(GuardRefusesError, match="stands where it was homed"):
             made.guard.arm(made.setting.limits)
         assert stands(made)
@@ -113,9 +109,8 @@ def test_an_error_of_a_driver_while_homing_lets_the_motor_stand(tmp_path, monkey
 
 
 def test_a_guard_that_is_killed_while_homing_leaves_a_motor_that_stands(tmp_path, monkeypatch):
-    monkeypatch.setattr(FAULTS, "STATED", FAULTS.STATED | TO_A_SWITCH)
+    monkeypatch.setattr(FAULTS, "STATED", FAULTS.STATED | TO_A_STOP)
     with rig("process", tmp_path) as made:
-        homed_to_a_switch_behind_the_skin(made)
         killed = []
 
         def kill(wrench, at_s):
@@ -211,7 +206,7 @@ def test_a_motor_that_is_let_stand_blind(half):
     where_m = world.position_m
     world.devices.advance(world.clock() + 10**9)
     assert world.position_m == pytest.approx(where_m, abs=1e-6)
-    assert world.motor.drive._enabled
+    assert world.motor.drive.enabled
 
 
 def test_a_blind_retreat_that_ends_elsewhere_says_where():

@@ -6,17 +6,15 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tactbench.rigs.parallel_manipulator.motor.codec import (
-    OVERTEMPERATURE,
-    Configuration,
     Kind,
     Line,
     LineReader,
-    OperationStatus,
     encode,
     line_time_s,
 )
-from tactbench.rigs.parallel_manipulator.motor.drive import Profile
-from tactbench.rigs.parallel_manipulator.motor.emulator import MotorEmulator, MotorFault
+from tactbench.rigs.parallel_manipulator.motor.drive import Motion
+from tactbench.rigs.parallel_manipulator.motor.emulator import MotorEmulator
+from tactbench.rigs.parallel_manipulator.motor.profile import FaulhaberOptions
 from tests.rigs.parallel_manipulator.test_motor_codec import ANSWERED_OK
 
 STEP_M = 6e-6
@@ -24,11 +22,6 @@ STEP_M = 6e-6
 
 def nothing(position_m):
     return 0.0
-
-
-def wall(at_m, stiffness):
-    """Return a spring [N/m] that begins at a position."""
-    return lambda position_m: stiffness * max(0.0, position_m - at_m)
 
 
 def joined_bytes(sent):
@@ -44,8 +37,11 @@ class Host:
         self.now_s = 0.0
 
     def wait(self, seconds):
-        self.now_s += seconds
-        return self.reader.feed(joined_bytes(self.emulator.poll(self.now_s)))
+        end_s, found = self.now_s + seconds, []
+        while self.now_s < end_s:
+            self.now_s = min(max(self.emulator.next_s(), self.now_s), end_s)
+            found += self.reader.feed(joined_bytes(self.emulator.poll(self.now_s)))
+        return found
 
     def lines(self, text, seconds=0.1):
         """Send raw text and return all lines of some time: the line needs 36 ms for its longest answer at 9600."""
@@ -60,15 +56,6 @@ class Host:
     def do(self, *texts):
         for text in texts:
             assert self.ask(text) == "OK", text
-
-    def go(self, target_m, seconds):
-        """Move to a position, in the time it is given."""
-        self.do(f"LA{round(target_m / STEP_M)}", "M")
-        self.wait(seconds)
-
-    @property
-    def status(self):
-        return OperationStatus(int(self.ask("OST")))
 
 
 SENT = [row for row in ANSWERED_OK if row[2].name not in ("LR", "NP", "NPOFF")]
@@ -87,24 +74,12 @@ def test_ok(text, sent, command):
     [
         (["HO98956"], "POS", "98956"),
         (["HO-1500"], "POS", "-1500"),
-        ([], "2POS", "0"),
         (["HO98956"], "pos", "98956"),
         (["EN"], "OST", "65536"),
         (["EN", "APL1"], "CST", "9220"),
         ([], "XYZ", "Unknown command"),
         ([], "LPC-5", "Invalid parameter"),
-        ([], "GOHOSEQ", "Command not available"),
-    ],
-    ids=[
-        "FH-2.1",
-        "FH-2.2",
-        "FH-2.3",
-        "FH-2.4",
-        "FH-2.10",
-        "FH-2.16",
-        "FH-2.17",
-        "FH-2.18",
-        "FH-2.19",
+        ([], "M", "Command not available"),
     ],
 )
 def test_answers_of_the_vectors(before, asked, answer):
@@ -114,72 +89,12 @@ def test_answers_of_the_vectors(before, asked, answer):
 
 
 def test_bytes_take_the_time_of_the_line():
-    host = Host(baud=19200)
+    host = Host(options=FaulhaberOptions(baud=19200))
     host.emulator.feed(b"POS\r", 0.0)
     # 4 bytes, the drive's time of 1 ms, 3 bytes; half a bit of room on either side.
     due_s = line_time_s(4, 19200) + 1e-3 + line_time_s(3, 19200)
     assert joined_bytes(host.emulator.poll(due_s - 25e-6)) == b"0"
     assert host.emulator.poll(due_s + 25e-6) == [(pytest.approx(due_s), b"\r\n")]
-
-
-@pytest.mark.parametrize("ticks", [1, 7, 1000])
-def test_a_drive_that_stands_without_load_answers_as_if_each_tick_were_made(ticks):
-    """Ticks are left out where nothing moves: whether it is looked at between them changes nothing."""
-    made = {}
-    for skipped in (False, True):
-        host = Host(load=None if skipped else lambda _position_m: 0.0)
-        for text in ("EN", "LA500", "M"):
-            host.do(text)
-        host.wait(1.0)
-        assert host.emulator.drive.standing == skipped
-        host.wait(ticks * 1e-3)
-        host.do("LA480")
-        host.do("M")
-        host.wait(0.013)
-        place_m = host.emulator.drive.position_m
-        made[skipped] = (host.ask("POS"), host.ask("OST"), place_m, host.emulator._ticks)
-    assert made[True][:2] == made[False][:2]
-    # Positions to what a tick resolves, 1 nm/s for 1 ms and its decay over a second.
-    assert made[True][2] == pytest.approx(made[False][2], abs=2e-9)
-    assert made[True][3] == made[False][3]
-
-
-def test_a_move_ends_on_its_target_and_says_so():
-    host = Host()
-    host.do("EN")
-    host.go(3e-3, 0.6)
-    assert host.ask("POS") == "500"
-    assert host.ask("TPOS") == "500"
-    assert host.status & OperationStatus.POSITION_ATTAINED
-
-
-def test_the_current_limit_bounds_the_force_and_is_said():
-    host = Host(wall(0.0, 80e3))
-    host.do("EN", "LPC400", "LCC400")
-    host.go(2e-3, 1.0)
-    assert host.ask("GRC") == "400"
-    assert host.emulator.drive.position_m == pytest.approx(0.4 * 6.5 / 80e3, rel=1e-3)
-    status = host.status
-    assert status & OperationStatus.CURRENT_LIMITATION
-    assert not status & OperationStatus.POSITION_ATTAINED
-
-
-@pytest.mark.parametrize("text", ["POR8", "GU", "SWS"])
-def test_what_is_not_modelled_is_not_pretended(text):
-    assert Host().ask(text) == "Unknown command"
-
-
-def test_a_motor_fault_takes_the_power_and_says_so():
-    host = Host(faults=[MotorFault("motor-fault", 0.5, 2.0)])
-    host.do("EN", "V10")
-    assert host.wait(0.5) == [Line(Kind.NOTICE, "f")]
-    assert host.status & OperationStatus.OVERTEMPERATURE
-    assert host.ask("EN") == OVERTEMPERATURE  # FH-2.20
-    assert host.ask("V10") == OVERTEMPERATURE
-    host.wait(1.5)
-    assert host.ask("GN") == "0"  # Without power it has run out.
-    assert not int(host.ask("CST")) & Configuration.POWER_STAGE  # The end of the fault alone does not move it.
-    host.do("EN")
 
 
 @given(st.lists(st.binary(max_size=30), max_size=8))
@@ -197,29 +112,24 @@ def test_the_drive_survives_any_bytes(pieces):
     assert joined_bytes(emulator.poll(now_s + line_time_s(200, 9600))).endswith(b"OK\r\n321\r\n")
 
 
-@given(
-    target=st.floats(-0.02, 0.02),
-    tick=st.sampled_from([2e-4, 1e-3, 7e-3]),
-    speed=st.floats(5e-3, 1.0),
-    acceleration=st.floats(0.05, 50.0),
-    braking=st.floats(0.05, 50.0),
-)
-@settings(max_examples=50)
-def test_the_profile_keeps_its_limits_and_does_not_overshoot(target, tick, speed, acceleration, braking):
-    profile, before = Profile(0.0), 0.0
-    # The trapezoid in continuous time, at least as quick as its triangle; some ticks for its corners.
-    longest_s = abs(target) / speed + speed / acceleration + speed / braking
-    ticks = 0
-    while profile.position_m != target and ticks < longest_s / tick + 10:
-        profile.to_position(target, tick, speed, acceleration, braking)
-        room = 1 + 1e-9
-        assert abs(profile.speed_m_s) <= speed * room
-        change = abs(profile.speed_m_s) - abs(before)
-        assert change <= acceleration * tick * room + 1e-15
-        assert -change <= braking * tick * room + 1e-15
-        assert min(0.0, target) - 1e-12 <= profile.position_m <= max(0.0, target) + 1e-12
-        before = profile.speed_m_s
-        ticks += 1
-    assert profile.position_m == target
-    profile.to_position(target, tick, speed, acceleration, braking)
-    assert (profile.position_m, profile.speed_m_s) == (target, 0.0)
+some = st.floats(5e-3, 1.0)
+
+
+@given(st.floats(-0.02, 0.02), st.floats(-0.5, 0.5), some, st.floats(0.05, 50.0), st.floats(0.05, 50.0))
+@settings(max_examples=100)
+def test_a_motion_keeps_its_limits_and_ends_on_its_target(target, before, speed, acceleration, braking):
+    motion = Motion(0.0, 0.0, before)
+    motion.to_position(target, speed, acceleration, braking)
+    assert motion.at(motion.end_s) == motion.at(motion.end_s + 1.0) == (target, 0.0)
+    t_s = np.linspace(0.0, motion.end_s, 2000)
+    place, v = np.array([motion.at(at) for at in t_s]).T
+    # Place is the integral of speed, to what a trapezoid of one step hides of a corner.
+    step_s, largest = t_s[1], max(acceleration, braking)
+    assert np.abs(np.diff(place) - 0.5 * step_s * (v[1:] + v[:-1])).max() <= largest * step_s**2 + 1e-12
+    faster, slower = np.diff(np.abs(v)).max(initial=0.0), np.diff(np.abs(v)).min(initial=0.0)
+    assert faster <= acceleration * step_s + 1e-9
+    assert slower >= -braking * step_s - 1e-9
+    assert np.abs(v).max() <= max(speed, abs(before)) + 1e-12
+    # From rest it goes straight there.
+    if before == 0.0:
+        assert min(0.0, target) - 1e-12 <= place.min() <= place.max() <= max(0.0, target) + 1e-12

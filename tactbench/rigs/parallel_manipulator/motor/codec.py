@@ -1,6 +1,6 @@
 """Faulhaber ASCII over RS232: commands and answers as bytes, without input or output.
 
-A command is ``[node]NAME[argument]`` and CR; an answer is a line that ends with CR LF and names no node (sourced:
+A command is ``NAME[argument]`` and CR; an answer is a line that ends with CR LF and names no command (sourced:
 Faulhaber manual MCBL 3564K024B CS, chapter 5, published at manualshive.com). Between a command and its answer the drive
 may put notices: single letters on a line of their own. The protocol has no checksum: a digit that becomes another digit
 on the line is not noticed by anybody, so what matters (limits, position before a move) must be read twice.
@@ -13,16 +13,10 @@ import re
 from enum import Enum, IntFlag
 from typing import NamedTuple
 
-from tactbench.plugin.devices import Received
-
 BITS_PER_BYTE = 10
 """Start bit, 8 data bits, stop bit: 8N1 (sourced: the manual, page 13)."""
-BAUDS = (600, 1200, 2400, 4800, 9600, 19200, 38400, 57600, 115200)
-"""Selectable rates: from 600 to 115200 (sourced: the manual); the steps between are the usual ones (assumed)."""
-
 LONGEST_LINE = 128
 """Bytes after which a line without an end is given up (assumed)."""
-
 LONGEST_ANSWER = 34
 """Bytes of the longest answer in the sources, the refusal of a drive that is too hot."""
 
@@ -32,21 +26,18 @@ INVALID_PARAMETER = "Invalid parameter"
 NOT_AVAILABLE = "Command not available"
 OVERTEMPERATURE = "Overtemperature - drive disabled"
 """The manual typesets a dash; two public drivers match the hyphen (sourced)."""
-SAVED = "EEPROM writing done"
-FLASH_DEFECT = "Flash defect"
-REFUSALS = (UNKNOWN_COMMAND, INVALID_PARAMETER, NOT_AVAILABLE, OVERTEMPERATURE, FLASH_DEFECT)
-
+REFUSALS = (UNKNOWN_COMMAND, INVALID_PARAMETER, NOT_AVAILABLE, OVERTEMPERATURE)
 NOTICES = "pvrfhtwx"
 """Position reached, velocity reached, error (older drives), fault, edge at the analog input, inputs 3, 4 and 5.
 
 Sourced: KickdriveOliver/docklight, example Faulhaber_RS232; `r` from the manual of the 3564K024B C, page 52."""
-
-_QUERIES = """
-    POS TPOS GV GN GRC GCL GU GRU TEM VER GTYP GSER OST SWS CST GST GFS GAST GPL GNL GSP GAC GDEC GPC GCC GCORRIDOR
-    GSR GPOR GI GPP GPD GCI GDEV
-"""
-QUERIES = frozenset(_QUERIES.split())
-"""Commands answered by a value and nothing else (sourced: the manual; docklight; a public driver of three drives)."""
+ACKNOWLEDGED = frozenset(
+    ("EN", "DI", "LA", "LR", "M", "V", "HO", "NP", "NPOFF", "SP", "AC", "DEC", "LL", "APL", "LPC", "LCC", "CORRIDOR",
+     "ANSW", "SOR")
+)  # fmt: skip
+"""Commands that are answered ``OK`` (sourced: the manual)."""
+TEXTS = ("VER", "GTYP", "GSER")
+"""Queries answered by a text; all others by a number."""
 
 
 class Command(NamedTuple):
@@ -55,35 +46,15 @@ class Command(NamedTuple):
     name: str
     """Capital letters; empty: no command at all."""
     argument: int | None = None
-    node: int | None = None
-    """1 to 255; None: for every drive on the line."""
 
 
-def encode(name: str, argument: int | None = None, *, node: int | None = None) -> bytes:
-    """Return the bytes of a command.
-
-    Parameters
-    ----------
-    name
-        Letters, for example ``LA``.
-    argument
-        In the drive's own units.
-    node
-        Address on a line with several drives, 1 to 255.
-
-    Raises
-    ------
-    ValueError
-        If `name` has anything but ASCII letters, or `node` is out of range.
-    """
-    if not (name.isascii() and name.isalpha()):
-        raise ValueError(f"a command's name has letters only, not {name!r}")
-    if node is not None and not 1 <= node <= 255:
-        raise ValueError(f"a node is 1 to 255, not {node}")
-    return f"{'' if node is None else node}{name}{'' if argument is None else argument}\r".encode("ascii")
+def encode(name: str, argument: int | None = None) -> bytes:
+    """Return the bytes of a command: letters, for example ``LA``, and a number in the drive's own units."""
+    return f"{name}{'' if argument is None else argument}\r".encode("ascii")
 
 
-_COMMAND = re.compile(r"([0-9]{1,3})?([A-Z]+)([+-]?[0-9]{1,19})?", re.ASCII)
+_COMMAND = re.compile(r"[0-9]{0,3}([A-Z]+)([+-]?[0-9]{1,19})?", re.ASCII)
+"""Before the name the address of a drive on a line with several: there is one here, so it is not looked at."""
 
 
 class CommandReader:
@@ -102,14 +73,10 @@ class CommandReader:
                     self._line.append(byte)
                 continue
             text = self._line.decode("latin-1").replace(" ", "").upper()
-            overlong = len(self._line) > LONGEST_LINE
+            match = _COMMAND.fullmatch(text) if len(self._line) <= LONGEST_LINE else None
             self._line.clear()
-            match = None if overlong else _COMMAND.fullmatch(text)
-            if match is None:
-                found.append(Command(""))
-                continue
-            node, name, argument = match.groups()
-            found.append(Command(name, int(argument) if argument else None, int(node) if node else None))
+            name, argument = ("", None) if match is None else match.groups()
+            found.append(Command(name, int(argument) if argument else None))
         return found
 
 
@@ -120,7 +87,7 @@ class Kind(Enum):
     VALUE = "value"
     """An integer, or the 0s and 1s of GST and GFS."""
     TEXT = "text"
-    """Anything else that can be printed: VER, GTYP, GSER, and what SAVE answers."""
+    """Anything else that can be printed."""
     REFUSAL = "refusal"
     NOTICE = "notice"
     """Sent by the drive itself; never the answer to a command."""
@@ -133,36 +100,44 @@ class Line(NamedTuple):
 
     kind: Kind
     text: str
+    t_ns: int = 0
+    """When its first byte was in the host."""
 
-    @property
-    def value(self) -> int:
-        """The integer of a line of kind VALUE; raises ValueError for others."""
-        if self.kind is not Kind.VALUE:
-            raise ValueError(f"{self.text!r} is no value")
-        return int(self.text)
+    def answers(self, name: str) -> bool:
+        """Return whether it may be the answer to a command; a refusal answers any.
+
+        A late answer to an earlier command of the same kind passes: answers name no command.
+        """
+        if self.kind is Kind.REFUSAL:
+            return True
+        if name.upper() in ACKNOWLEDGED:
+            return self.kind is Kind.OK
+        return self.kind is Kind.VALUE or (self.kind is Kind.TEXT and name.upper() in TEXTS)
 
 
 _VALUE = re.compile(rb"[+-]?[0-9]{1,19}")
 _PRINTED = re.compile(rb"[\x20-\x7e]+")
 
 
-def read_line(raw: bytes) -> Line:
+def read_line(raw: bytes, t_ns: int = 0) -> Line:
     """Return what one line is; `raw` is without its CR LF. Raises nothing."""
     text = raw.decode("latin-1")
     if raw.startswith(b"Overtemperature"):
         # The character between the words differs among sources; the meaning does not.
-        return Line(Kind.REFUSAL, OVERTEMPERATURE)
+        return Line(Kind.REFUSAL, OVERTEMPERATURE, t_ns)
     if _PRINTED.fullmatch(raw) is None:
-        return Line(Kind.GARBLED, text)
-    if text == OK:
-        return Line(Kind.OK, text)
-    if text in REFUSALS:
-        return Line(Kind.REFUSAL, text)
-    if _VALUE.fullmatch(raw):
-        return Line(Kind.VALUE, text)
-    if len(raw) == 1:
-        return Line(Kind.NOTICE if text in NOTICES else Kind.GARBLED, text)
-    return Line(Kind.TEXT, text)
+        kind = Kind.GARBLED
+    elif text == OK:
+        kind = Kind.OK
+    elif text in REFUSALS:
+        kind = Kind.REFUSAL
+    elif _VALUE.fullmatch(raw):
+        kind = Kind.VALUE
+    elif len(raw) == 1:
+        kind = Kind.NOTICE if text in NOTICES else Kind.GARBLED
+    else:
+        kind = Kind.TEXT
+    return Line(kind, text, t_ns)
 
 
 class LineReader:
@@ -172,59 +147,31 @@ class LineReader:
         self._line = bytearray()
         self._began_ns = 0
 
-    def stamped(self, received: Received) -> list[tuple[Line, int]]:
-        """Return the lines that `received` completes, each with when its first byte was in the host [ns]."""
-        if not self._line:
-            self._began_ns = received.t_ns
-        found = []
-        for line in self.feed(received.data):
-            found.append((line, self._began_ns))
-            self._began_ns = received.t_ns
-        if b"\n" in received.data:
-            self._began_ns = received.t_ns
-        return found
-
-    def feed(self, data: bytes) -> list[Line]:
-        """Return the lines that `data` completes, notices among them; raises nothing."""
+    def feed(self, data: bytes, t_ns: int = 0) -> list[Line]:
+        """Return the lines that `data`, in the host at `t_ns`, completes, notices among them; raises nothing."""
         found = []
         for byte in data:
-            if byte != 0x0A:
-                # One byte more than allowed is kept, so that an overlong line is known as such.
-                if len(self._line) <= LONGEST_LINE + 1:
-                    self._line.append(byte)
-                continue
-            raw = bytes(self._line)
-            self._line.clear()
-            whole = raw.endswith(b"\r") and len(raw) <= LONGEST_LINE + 1
-            found.append(read_line(raw[:-1]) if whole else Line(Kind.GARBLED, raw.decode("latin-1")))
+            if not self._line:
+                self._began_ns = t_ns
+            # One byte more than allowed is kept, so that an overlong line is known as such.
+            if byte != 0x0A and len(self._line) <= LONGEST_LINE + 1:
+                self._line.append(byte)
+            if byte == 0x0A:
+                raw = bytes(self._line)
+                self._line.clear()
+                whole = raw.endswith(b"\r") and len(raw) <= LONGEST_LINE + 1
+                garbled = Line(Kind.GARBLED, raw.decode("latin-1"), self._began_ns)
+                found.append(read_line(raw[:-1], self._began_ns) if whole else garbled)
         return found
 
     def clear(self) -> None:
-        """Forget an unfinished line: after a time-out, or a change of rate or answer mode."""
+        """Forget an unfinished line: after a time-out, or a change of answer mode."""
         self._line.clear()
-
-
-def answers(line: Line, name: str) -> bool:
-    """Return whether `line` may be the answer to command `name` under ANSW2; a refusal answers any command.
-
-    A late answer to an earlier command of the same kind passes: answers name neither node nor command.
-    """
-    if line.kind is Kind.REFUSAL:
-        return True
-    name = name.upper()
-    if name in ("VER", "GTYP", "GSER"):
-        return line.kind in (Kind.TEXT, Kind.VALUE)
-    if name in QUERIES:
-        return line.kind is Kind.VALUE
-    if name in ("SAVE", "EEPSAV"):
-        return line == Line(Kind.TEXT, SAVED)
-    return line.kind is Kind.OK
 
 
 class OperationStatus(IntFlag):
     """Bits of what OST answers (sourced: the manual, page 68); it has more, of programs and further inputs."""
 
-    HOMING = 1 << 0
     CURRENT_LIMITATION = 1 << 4
     DEVIATION_ERROR = 1 << 5
     OVERVOLTAGE = 1 << 6

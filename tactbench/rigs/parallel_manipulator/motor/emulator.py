@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 from collections import Counter, deque
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
@@ -23,8 +23,15 @@ from tactbench.plugin.devices import (
     read_options,
 )
 from tactbench.rigs.parallel_manipulator.motor.codec import Command, CommandReader, line_time_s
-from tactbench.rigs.parallel_manipulator.motor.drive import Drive, Load, MotorModel, Refused
+from tactbench.rigs.parallel_manipulator.motor.drive import STOPS_M, Drive, Load, Refused
 from tactbench.rigs.parallel_manipulator.motor.profile import FaulhaberOptions
+
+ANSWER_S = 1e-3
+"""From the end of a command to the start of its answer (assumed)."""
+TICK_S = 1e-3
+"""How often a motor that moves is looked at."""
+BEYOND_M = 2e-3
+"""How far an emulated motor goes beyond the ends of travel that its options state (assumed)."""
 
 
 @dataclass(frozen=True)
@@ -40,14 +47,8 @@ class MotorFault(Fault):
     """Seven times the longest answer at 9600 baud."""
 
 
-BEYOND_M = 2e-3
-"""How far an emulated motor goes beyond the ends of travel that its options state (assumed)."""
-SWITCH_M = -8e-3
-"""Where an emulated drive of a rig file has its reference switch, 2 mm from its end stop (assumed)."""
-
-
 class MotorEmulator(DeviceEmulator):
-    """A drive with its motor, and its line's pace. The first call is power-on.
+    """A drive with its motor, and its line's pace.
 
     Parameters
     ----------
@@ -55,12 +56,10 @@ class MotorEmulator(DeviceEmulator):
         Force on the motor; None: none, ever.
     rng
         Draws the bytes of garbled lines.
-    profile, model
-        Units of the drive; mechanics of the motor.
-    reference_switch_m
-        Where GOHOSEQ finds its switch [m]; None: there is none, and GOHOSEQ is answered "Command not available".
-    baud
-        Of its line.
+    options
+        Units of the drive, rate of its line, and the place at which homing finds it.
+    stops_m
+        Mechanical ends, from the place at power-on.
     faults
         What is wrong with it; may be changed at any time.
     """
@@ -72,37 +71,33 @@ class MotorEmulator(DeviceEmulator):
         self,
         load: Load | None,
         rng: np.random.Generator,
+        options: FaulhaberOptions | None = None,
         *,
-        profile: FaulhaberOptions | None = None,
-        model: MotorModel | None = None,
-        reference_switch_m: float | None = None,
-        baud: int = 9600,
+        stops_m: tuple[float, float] = STOPS_M,
         faults: Iterable[MotorFault] = (),
     ) -> None:
-        model = model or MotorModel()
-        self.drive = Drive(load, profile or FaulhaberOptions(), model, reference_switch_m)
+        options = options or FaulhaberOptions()
+        self.drive = Drive(load, options, stops_m)
         self.faults = list(faults)
-        self.begins_m = 0.0
-        """Where the motor stands at power-on, as its driver counts once it has homed it."""
-        self._byte_s, self._tick_long_s, self._answer_time_s = line_time_s(1, baud), model.tick_s, model.answer_s
+        homed_at_m = stops_m[options.homes_towards() > 0] if options.homes_towards() else 0.0
+        self._begins_m = options.home_m - homed_at_m
+        self._byte_s = line_time_s(1, options.baud)
         self._rng = rng
         self._seen: Counter[Fault] = Counter()
         self._reader = CommandReader()
-        self._start_s: float | None = None
         self._now_s = self._in_free_s = self._out_free_s = -math.inf
-        self._ticks = 0
         self._in: deque[tuple[float, bytes]] = deque()
-        self._answers: deque[tuple[float, str]] = deque()
         self._out: deque[tuple[float, bytes]] = deque()
+        self._answered_s = -math.inf
 
     @property
     def position_m(self) -> float:
         """Where the motor is, as its driver counts once it has homed it [m]."""
-        return self.drive.position_m + self.begins_m
+        return self.drive.position_m + self._begins_m
 
     def press_against(self, force_n: Callable[[float], float] | None) -> None:
         """Let a force [N] at such a position act on the motor; None: none, ever."""
-        self.drive.load = None if force_n is None else lambda at_m: force_n(at_m + self.begins_m)
+        self.drive.load = None if force_n is None else lambda at_m: force_n(at_m + self._begins_m)
 
     def feed(self, piece: bytes | CanFrame, now_s: float) -> list[Sent]:
         """Take bytes that the host sends from `now_s` on, at the line's rate; return what `poll` returns.
@@ -110,8 +105,7 @@ class MotorEmulator(DeviceEmulator):
         Times do not go back: an earlier one counts as the latest seen.
         """
         assert isinstance(piece, bytes)
-        now_s = max(now_s, self._now_s)
-        self._in_free_s = max(self._in_free_s, now_s)
+        self._in_free_s = max(self._in_free_s, now_s, self._now_s)
         for part in piece.splitlines(keepends=True):
             self._in_free_s += len(part) * self._byte_s
             self._in.append((self._in_free_s, part))
@@ -119,8 +113,6 @@ class MotorEmulator(DeviceEmulator):
 
     def poll(self, now_s: float) -> list[Sent]:
         """Go on to `now_s`; return what has left the drive by then, of each line the first byte and the rest."""
-        if self._start_s is None:
-            self._start_s = now_s
         now_s = max(now_s, self._now_s)
         while self._in and self._in[0][0] <= now_s:
             at_s, part = self._in.popleft()
@@ -134,54 +126,20 @@ class MotorEmulator(DeviceEmulator):
         return found
 
     def next_s(self) -> float:
-        """Return when something may happen next: a command in, an answer, a line out, a tick; 0 before power-on."""
-        if self._start_s is None:
-            return 0.0
-        next_s = math.inf if self._standing else self._tick_s()
-        for queue in (self._in, self._answers, self._out):
-            if queue:
-                next_s = min(next_s, queue[0][0])
-        return next_s
-
-    @property
-    def _standing(self) -> bool:
-        """Whether a tick changes nothing until a command comes."""
-        return self.drive.standing and not any(fault.name == "motor-fault" for fault in self.faults)
-
-    def _tick_s(self) -> float:
-        """Return the time of the next tick."""
-        assert self._start_s is not None
-        return self._start_s + (self._ticks + 1) * self._tick_long_s
+        """Return when something may happen next: a command in, a line out, a fault; or the motor moves."""
+        faults_s = [fault.start_s for fault in self.faults if fault.start_s > self._now_s]
+        queues_s = [queue[0][0] for queue in (self._in, self._out) if queue]
+        return min([*queues_s, *faults_s, self._now_s + TICK_S if self.drive.moving else math.inf])
 
     def _go_to(self, now_s: float) -> None:
-        # Ticks stand on a grid of their own, and answers have their times: when it is asked for changes nothing.
-        while True:
-            tick_s = self._tick_s()
-            if tick_s <= now_s and self._standing:
-                assert self._start_s is not None
-                # One tick is left to be made: rounding then decides nothing.
-                self._ticks += max(0, math.floor((now_s - self._start_s) / self._tick_long_s) - 1 - self._ticks)
-                tick_s = self._tick_s()
-            if self._answers and self._answers[0][0] <= min(tick_s, now_s):
-                due_s, text = self._answers.popleft()
-                self._send(text, due_s)
-            elif tick_s <= now_s:
-                self._ticks += 1
-                self._heat(tick_s)
-                self.drive.tick()
-            else:
-                break
-        self._now_s = now_s
+        self._now_s = self.drive.now_s = now_s
+        hot = self._active("motor-fault", now_s) is not None
+        if hot and not self.drive.hot:
+            self._send("f", now_s)
+        self.drive.hot = hot
 
     def _active(self, name: str, at_s: float) -> MotorFault | None:
         return next((fault for fault in self.faults if fault.name == name and fault.active(at_s)), None)
-
-    def _heat(self, at_s: float) -> None:
-        hot = self._active("motor-fault", at_s) is not None
-        if hot and not self.drive.hot:
-            self.drive.overheat()
-            self._send("f", at_s)
-        self.drive.hot = hot
 
     def _carry_out(self, command: Command, at_s: float) -> None:
         try:
@@ -190,9 +148,9 @@ class MotorEmulator(DeviceEmulator):
             answer = str(refusal)
         if answer:
             late = self._active("late-answers", at_s)
-            due_s = at_s + self._answer_time_s + (late.delay_s if late else 0.0)
             # Answers keep the order of their commands, also when the fault ends between two of them.
-            self._answers.append((max(due_s, self._answers[-1][0]) if self._answers else due_s, answer))
+            self._answered_s = max(self._answered_s, at_s + ANSWER_S + (late.delay_s if late else 0.0))
+            self._send(answer, self._answered_s)
 
     def _send(self, text: str, at_s: float) -> None:
         line = bytearray(text.encode("ascii") + b"\r\n")
@@ -208,20 +166,10 @@ class MotorEmulator(DeviceEmulator):
 def build(settings: EmulatorSettings) -> MotorEmulator:
     """Return an emulated drive; raises UsageError for options or faults that are not known."""
     options = read_options(FaulhaberOptions, settings.options, "faulhaber")
-    model = MotorModel()
+    low, high = STOPS_M
     if options.homing == "here" and options.lower_m is not None and options.upper_m is not None:
         # It has the travel that is stated, counted from where it stands now, and a little more.
-        low, high = options.lower_m - options.home_m - BEYOND_M, options.upper_m - options.home_m + BEYOND_M
-        model = replace(model, stops_m=(min(low, model.stops_m[0]), max(high, model.stops_m[1])))
-    found = MotorEmulator(
-        None,
-        settings.rng,
-        profile=options,
-        model=model,
-        reference_switch_m=SWITCH_M if options.homing == "switch" else None,
-        baud=options.baud,
-        faults=[MotorFault.parse(text) for text in settings.faults],
-    )
-    homed_at_m = {"here": 0.0, "switch": SWITCH_M, "end-stop": model.stops_m[options.homes_towards() > 0]}
-    found.begins_m = options.home_m - homed_at_m[options.homing]
-    return found
+        low = min(low, options.lower_m - options.home_m - BEYOND_M)
+        high = max(high, options.upper_m - options.home_m + BEYOND_M)
+    faults = [MotorFault.parse(text) for text in settings.faults]
+    return MotorEmulator(None, settings.rng, options, stops_m=(low, high), faults=faults)

@@ -1,8 +1,8 @@
 """Commands and answers on the drive's line: in order, within their time, apart from notices.
 
-Answers name neither command nor drive and have no checksum; the drive answers in the order of commands (sourced as in
-``codec.py``). So one command is out at a time; and after an answer that did not come, nothing is believed until the
-drive has answered a question whose answer is known: what comes before is late.
+Answers name no command and have no checksum; the drive answers in the order of commands (sourced as in ``codec.py``).
+So after an answer that did not come nothing is believed until the drive has answered a question whose answer is known:
+what comes before is late.
 """
 
 from __future__ import annotations
@@ -11,9 +11,8 @@ from collections import Counter, deque
 from contextlib import suppress
 from typing import NamedTuple
 
-from tactbench.plugin.devices import ByteLink, Clock, LinkTimeout, PositionerError, PositionerSilentError, Received
+from tactbench.plugin.devices import ByteLink, Clock, LinkTimeout, PositionerError, PositionerSilentError
 from tactbench.rigs.parallel_manipulator.motor.codec import (
-    FLASH_DEFECT,
     INVALID_PARAMETER,
     LONGEST_ANSWER,
     NOT_AVAILABLE,
@@ -22,7 +21,6 @@ from tactbench.rigs.parallel_manipulator.motor.codec import (
     Kind,
     Line,
     LineReader,
-    answers,
     encode,
     line_time_s,
 )
@@ -31,15 +29,14 @@ MARK = "VER"
 """The question whose answer is known: the drive's version does not change."""
 IN_A_ROW = 3
 """Answers that did not come one after the other, after which the drive is said to be silent (assumed)."""
-HOST_S = 0.05
-"""Added to what the line takes: an adapter may hold bytes for 16 ms, a host may be late by 10 ms (measured elsewhere,
-docs/hardware.md)."""
+HOST_S = 0.15
+"""Added to what the line takes: an adapter may hold bytes for 16 ms, a busy host and an emulated drive be late by some
+60 ms (measured). A command whose answer is late was carried out or not: nothing else is sent meanwhile."""
 _HINTS = {
     UNKNOWN_COMMAND: "Is it a Faulhaber drive of the 300x RS generation?",
     INVALID_PARAMETER: "Check the options in the rig file against the drive's manual.",
     NOT_AVAILABLE: "Is the drive enabled, and does it have this command?",
     OVERTEMPERATURE: "Let it cool down, then enable it again.",
-    FLASH_DEFECT: "The drive cannot keep settings: ask its maker.",
 }
 
 
@@ -60,17 +57,15 @@ class Answer(NamedTuple):
 
     name: str
     argument: int | None
-    line: Line | None
-    """None: no answer came in time."""
-    t_ns: int
-    """When the first byte of its line was in the host; of a missing answer, when it was given up."""
-    of: object = None
+    of: object
     """What `send` was given with it."""
+    line: Line | None = None
+    """None: no answer came in time."""
 
     @property
     def value(self) -> int:
         """The integer; raises as :meth:`checked`."""
-        return self.checked().value
+        return int(self.checked().text)
 
     def checked(self) -> Line:
         """Return the line; raises MotorSilentError if none came, MotorRefusalError if the drive refuses."""
@@ -113,9 +108,9 @@ class Exchange:
         self.counts: Counter[str] = Counter()
         self._link, self._clock = link, clock
         self._reader = LineReader()
-        self._out: deque[tuple[str, int | None, object]] = deque()
+        self._out: deque[Answer] = deque()
         self._since_ns = 0
-        self._known = ""
+        self._version = ""
         self._marking = False
         self._missed = 0
 
@@ -129,7 +124,7 @@ class Exchange:
         if not self._out:
             self._since_ns = self._clock()
         self._link.write(encode(name, argument))
-        self._out.append((name, argument, of))
+        self._out.append(Answer(name, argument, of))
 
     def pump(self, timeout_s: float) -> list[Answer]:
         """Take what comes, and wait for the first of it at most so long; return what became of commands.
@@ -141,13 +136,14 @@ class Exchange:
         LinkUnplugged
             If the link is gone.
         """
-        wait_s = timeout_s
-        if not self.ready:
-            wait_s = min(wait_s, max(0.0, (self._due_ns() - self._clock()) * 1e-9))
+        due_ns = self._since_ns + round(1e9 * self.answer_s * (3 if self._marking else 1))
+        wait_s = timeout_s if self.ready else min(timeout_s, max(0.0, (due_ns - self._clock()) * 1e-9))
         found: list[Answer] = []
         with suppress(LinkTimeout):
-            found = self._taken(self._link.read(wait_s))
-        return found if found or self.ready or self._clock() < self._due_ns() else self._overdue()
+            received = self._link.read(wait_s)
+            for line in self._reader.feed(received.data, received.t_ns):
+                found += self._assigned(line)
+        return found if found or self.ready or self._clock() < due_ns else self._overdue()
 
     def greet(self) -> str:
         """Find the drive: end what stands in its line, and ask for its version until two answers are the same.
@@ -159,21 +155,19 @@ class Exchange:
         """
         self._link.write(b"\r")
         self.quiet()
-        before, self._known = None, ""
+        self._version, before = "", ""
         for _ in range(5):
             self.send(MARK)
-            line = None
-            while self._out:
-                for answer in self.pump(self.answer_s):
-                    line = answer.line
-                if self._marking:  # Not known yet: ask again instead.
-                    self._marking = False
-                    self.quiet()
-            if line is not None and line.kind is not Kind.REFUSAL:
-                if line.text == before:
-                    self._known = before
-                    return before
-                before = line.text
+            answers: list[Answer] = []
+            while not answers:
+                answers = self.pump(self.answer_s)
+            line = answers[0].line
+            if line is None:
+                self.quiet()
+            elif line.text == before and line.kind is not Kind.REFUSAL:
+                self._version = before
+                return before
+            before = "" if line is None else line.text
         raise LinkTimeout(
             f"No drive on {self._link.address} answers {MARK} twice with the same.",
             hint="Check power, cable (crossed or not) and baud: a drive that was never set up has 9600. Drives of the "
@@ -190,38 +184,28 @@ class Exchange:
         self._out.clear()
         self._marking, self._missed = False, 0
 
-    def _due_ns(self) -> int:
-        return self._since_ns + round(1e9 * self.answer_s * (3 if self._marking else 1))
-
-    def _taken(self, received: Received) -> list[Answer]:
-        return [answer for line in self._reader.stamped(received) for answer in self._routed(*line)]
-
-    def _routed(self, line: Line, t_ns: int) -> list[Answer]:
+    def _assigned(self, line: Line) -> list[Answer]:
         if line.kind is Kind.NOTICE:
             self.fault |= line.text in "fr"
         elif line.kind is Kind.GARBLED:
             self.counts["garbled"] += 1
         elif self._marking:
-            if line.text == self._known:
-                self._marking = False
-                self._since_ns = self._clock()
-            else:
-                self.counts["late"] += 1
-        elif self._out and answers(line, self._out[0][0]):
-            self.counts["refusals"] += int(line.kind is Kind.REFUSAL)
-            self._missed = 0
-            self._since_ns = self._clock()
-            name, argument, of = self._out.popleft()
-            return [Answer(name, argument, line, t_ns, of)]
+            self._marking = line.text != self._version
+            self.counts["late"] += self._marking
+            self._since_ns = self._since_ns if self._marking else self._clock()
+        elif self._out and line.answers(self._out[0].name):
+            self.counts["refusals"] += line.kind is Kind.REFUSAL
+            self._missed, self._since_ns = 0, self._clock()
+            return [self._out.popleft()._replace(line=line)]
         else:
             self.counts["unexpected"] += 1
         return []
 
     def _overdue(self) -> list[Answer]:
         """Give up what is out, and ask what is known; raises MotorSilentError."""
-        now_ns = self._clock()
-        lost = [Answer(name, argument, None, now_ns, of) for name, argument, of in self._out]
+        lost = list(self._out)
         self._out.clear()
+        self._reader.clear()
         self.counts["time_outs"] += len(lost)
         self._missed += 1
         if self._missed >= IN_A_ROW:
@@ -231,7 +215,7 @@ class Exchange:
                 f"{self.answer_s:.2f} s.",
                 hint="Check its power and cable. The motor, if it moves, ends its last move and holds.",
             )
-        self._marking, self._since_ns = True, now_ns
-        self._reader.clear()
-        self._link.write(encode(MARK))
+        if self._version:
+            self._marking, self._since_ns = True, self._clock()
+            self._link.write(encode(MARK))
         return lost

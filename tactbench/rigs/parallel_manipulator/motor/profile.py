@@ -7,22 +7,22 @@ motor: the defaults are assumed, and a rig states its own.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import Literal, Self
 
 from pydantic import Field, model_validator
 
 from tactbench.plugin import RigError
 from tactbench.plugin.devices import PositionerOptions
-from tactbench.rigs.parallel_manipulator.motor.codec import BAUDS
 
 LARGEST_POSITION, LARGEST_SPEED, LARGEST_ACCELERATION, LARGEST_CURRENT = 1_800_000_000, 10_000, 30_000, 12_000
-"""Arguments of LA and LR; SP and V; AC and DEC; LPC and LCC (assumed)."""
+"""Arguments of LA; SP and V; AC and DEC; LPC and LCC (assumed)."""
 
 
 class FaulhaberOptions(PositionerOptions):
     """What a rig file says of a motor and its drive; what it leaves out is as the drive has it."""
 
-    baud: int = 9600
+    baud: int = Field(default=9600, gt=0)
     """As in the link's address: time-outs go by it."""
     increment_m: float = Field(default=6e-6, gt=0.0)
     """Length of one increment (assumed: 3000 per 18 mm of magnet pitch, in no document read)."""
@@ -36,21 +36,17 @@ class FaulhaberOptions(PositionerOptions):
     """The drive takes a negative and a positive end of travel."""
     upper_m: float | None = Field(default=None, gt=0.0)
     peak_current_a: float | None = Field(default=None, gt=0.0)
-    continuous_current_a: float | None = Field(default=None, gt=0.0)
     force_constant_n_a: float | None = Field(default=None, gt=0.0)
     """Force per current: times the peak current it is the largest force."""
-    homing: Literal["here", "switch", "end-stop"] = "here"
-    """Where positions count from: the place at which it stands, the drive's reference switch, or an end stop that is
-    run against."""
+    homing: Literal["here", "end-stop"] = "here"
+    """Where positions count from: the place at which it stands, or an end stop that is run against."""
     homing_speed_m_s: float = 0.005
-    """Negative: towards negative positions; of a switch without sign."""
+    """Towards the end stop; negative: towards negative positions."""
     homing_current_a: float = Field(default=0.2, gt=0.0)
     """With which it runs against an end stop."""
 
     @model_validator(mode="after")
-    def _possible(self) -> Self:
-        if self.baud not in BAUDS:
-            raise ValueError(f"baud is one of {', '.join(map(str, BAUDS))}")
+    def _moves(self) -> Self:
         if self.homing_speed_m_s == 0.0:
             raise ValueError("a homing speed is not 0")
         return self
@@ -63,58 +59,43 @@ class FaulhaberOptions(PositionerOptions):
         return self.peak_current_a * self.force_constant_n_a
 
     def homes_towards(self) -> int:
-        """Return the sign of the homing speed against an end stop; 0: it stands, or the drive's set-up decides."""
+        """Return the sign of the homing speed against an end stop; 0: it stands."""
         return int(math.copysign(1, self.homing_speed_m_s)) if self.homing == "end-stop" else 0
 
-    # What the drive's integers mean -----------------------------------------------------------------------------------
+    # What the drive's integers mean; each raises RigError for what the drive does not take.
 
     def increments(self, position_m: float) -> int:
-        """Return the nearest position argument; raises RigError if the drive has no such position."""
-        found = _finite(position_m / self.increment_m, "position", position_m, "m")
-        return _within(round(found), LARGEST_POSITION, "position", position_m, "m")
+        """Return the nearest position argument."""
+        return _whole(position_m, self.increment_m, LARGEST_POSITION, "position", round)
 
     def position_m(self, increments: float) -> float:
         """Return a position in metres."""
         return increments * self.increment_m
 
     def speed(self, speed_m_s: float) -> int:
-        """Return the argument of SP or V: the largest that is not faster than asked for; its sign is that of V.
-
-        Raises
-        ------
-        RigError
-            If the drive cannot be so fast, or not so slow.
-        """
-        return _limit(speed_m_s, self.speed_unit_m_s, LARGEST_SPEED, "speed", "m/s")
+        """Return the argument of SP or V: the largest that is not faster than asked for; its sign is that of V."""
+        return _whole(speed_m_s, self.speed_unit_m_s, LARGEST_SPEED, "speed", _down)
 
     def acceleration(self, acceleration_m_s2: float) -> int:
-        """Return the argument of AC or DEC, rounded down; raises RigError as `speed` does."""
-        return _limit(acceleration_m_s2, self.acceleration_unit_m_s2, LARGEST_ACCELERATION, "acceleration", "m/s^2")
+        """Return the argument of AC or DEC, rounded down."""
+        return _whole(acceleration_m_s2, self.acceleration_unit_m_s2, LARGEST_ACCELERATION, "acceleration", _down)
 
     def current(self, current_a: float) -> int:
-        """Return the argument of LPC or LCC, rounded down; raises RigError as `speed` does."""
-        return _limit(current_a, self.current_unit_a, LARGEST_CURRENT, "current", "A")
+        """Return the argument of LPC or LCC, rounded down."""
+        return _whole(current_a, self.current_unit_a, LARGEST_CURRENT, "current", _down)
 
 
-def _limit(value: float, unit: float, largest: int, what: str, si: str) -> int:
-    found = _finite(value / unit, what, value, si)
+def _down(steps: float) -> int:
     # A quotient that is an integer but for rounding is that integer, not the one below.
-    steps = math.floor(abs(found) * (1.0 + 4e-16))
-    if steps == 0 and value != 0.0:
+    return int(steps * (1.0 + 4e-16))
+
+
+def _whole(value: float, unit: float, largest: int, what: str, rounded: Callable[[float], int]) -> int:
+    """Return a value in the drive's units; what is not 0 becomes 0 only where that is the nearest position."""
+    steps = rounded(value / unit) if math.isfinite(value) else largest + 1
+    if abs(steps) > largest or (steps == 0 != value and rounded is _down):
         raise RigError(
-            f"A {what} of {value:g} {si} is below the drive's unit of {unit:g} {si}.",
-            hint="Ask for more, or move in small steps of position.",
+            f"The drive has no {what} of {value:g}: its unit is {unit:g}, and it takes at most {largest} of them.",
+            hint="Check the rig file, its units of the drive among them.",
         )
-    return _within(int(math.copysign(steps, value)), largest, what, value, si)
-
-
-def _finite(found: float, what: str, value: float, si: str) -> float:
-    if not math.isfinite(found):
-        raise RigError(f"A {what} of {value:g} {si} is no number the drive can be sent.")
-    return found
-
-
-def _within(found: int, largest: int, what: str, value: float, si: str) -> int:
-    if abs(found) > largest:
-        raise RigError(f"A {what} of {value:g} {si} is {found} units; the drive takes at most {largest}.")
-    return found
+    return steps

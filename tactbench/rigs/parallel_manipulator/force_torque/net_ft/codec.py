@@ -13,22 +13,13 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import Field
 
-from tactbench.plugin import Quality, RigError
-from tactbench.plugin.devices import Options, read_file
-from tactbench.rigs.parallel_manipulator.force_torque.ati import (
-    FORCE_UNITS,
-    TORQUE_UNITS,
-    AtiFileError,
-    elements,
-    unit,
-)
+from tactbench.plugin import ChannelSpec, Quality, RigError, StreamSpec
+from tactbench.plugin.devices import Options
 
 if TYPE_CHECKING:
     from tactbench.plugin import FloatArray
-
-PORT = 49152
 
 _REQUEST = struct.Struct(">HHI")
 _RECORD = struct.Struct(">III6i")
@@ -42,40 +33,47 @@ LEAST_COUNT, GREATEST_COUNT = -(2**31), 2**31 - 1
 SENSOR_RATE_HZ = 7000
 """The box samples at 7 kHz and sends every n-th sample (sourced: ATI manual 9620-05-NET FT, section 4.7, as quoted in a
 public client)."""
+AXES = ("fx", "fy", "fz", "tx", "ty", "tz")
+STREAM = "force_torque"
 
 
 class NetFtOptions(Options):
-    """What a rig file says of a box."""
+    """What a rig file says of a box: all of it is on the box's web page."""
 
     rate_hz: float = Field(default=1000.0, gt=0.0, le=SENSOR_RATE_HZ)
     """Records a second that the box is set to send; its own web page sets them, no request does."""
-    counts_per_newton: float | None = Field(default=None, gt=0.0)
-    counts_per_newton_metre: float | None = Field(default=None, gt=0.0)
-    configuration: str = ""
-    """In place of the counts: a file that holds the box's ``netftapi2.xml``."""
-    bias: bool = False
-    """Whether starting takes the present reading as zero: the sensor must be unloaded then."""
-
-    @model_validator(mode="after")
-    def _one_scale(self) -> NetFtOptions:
-        counts = [self.counts_per_newton, self.counts_per_newton_metre]
-        if (None in counts) if not self.configuration else (counts != [None, None]):
-            raise ValueError(
-                "give counts_per_newton and counts_per_newton_metre, or else configuration, a file; the box's web page "
-                "shows them"
-            )
-        return self
+    counts_per_newton: float = Field(gt=0.0)
+    counts_per_newton_metre: float = Field(gt=0.0)
 
     @property
     def every(self) -> int:
         """Samples of the sensor from one record to the next."""
         return max(1, int(SENSOR_RATE_HZ // self.rate_hz))
 
-    def scale(self) -> CountScale:
-        """Return counts per unit."""
-        if self.counts_per_newton is None or self.counts_per_newton_metre is None:
-            return read_configuration(read_file(self.configuration, "The box's configuration"))
-        return CountScale(per_newton=self.counts_per_newton, per_newton_metre=self.counts_per_newton_metre)
+    @property
+    def stream(self) -> StreamSpec:
+        """Forces [N] and torques [N*m] in the sensor's own axes, at the rate as the box rounds it."""
+        channels = [
+            ChannelSpec(name=name, kind="force", unit="N") if name.startswith("f")
+            else ChannelSpec(name=name, kind="torque", unit="N*m")
+            for name in AXES
+        ]  # fmt: skip
+        return StreamSpec(name=STREAM, rate_hz=SENSOR_RATE_HZ / self.every, channels=tuple(channels))
+
+    def wrench(self, counts: npt.ArrayLike) -> FloatArray:
+        """Return (…, 6) Fx, Fy, Fz [N], Tx, Ty, Tz [N*m] of (…, 6) counts."""
+        wrench: FloatArray = np.asarray(counts, dtype=float) / self._divisors
+        return wrench
+
+    def counts(self, wrench: npt.ArrayLike) -> npt.NDArray[np.int64]:
+        """Return the (…, 6) nearest counts of a (…, 6) wrench [N, N*m], within the 32 bits of a record."""
+        counts = np.rint(np.asarray(wrench, dtype=float) * self._divisors)
+        # np.clip would take ten times as long for six.
+        return np.minimum(np.maximum(counts, LEAST_COUNT), GREATEST_COUNT).astype(np.int64)
+
+    @cached_property
+    def _divisors(self) -> FloatArray:
+        return np.repeat([self.counts_per_newton, self.counts_per_newton_metre], 3)
 
 
 class DatagramError(RigError, ValueError):
@@ -113,31 +111,24 @@ class Record(NamedTuple):
 
 
 def encode_request(request: Request) -> bytes:
-    """Return the 8 bytes of a request; raises ValueError for a count that 32 bits do not hold."""
-    if not 0 <= request.records < SEQUENCE_MODULUS:
-        raise ValueError(f"a count is 0 to 2^32 - 1, not {request.records}")
+    """Return the 8 bytes of a request."""
     return _REQUEST.pack(_HEADER, request.command, request.records)
 
 
 def decode_request(data: bytes) -> Request:
     """Return the request in a datagram; raises DatagramError if there is none."""
-    if len(data) != _REQUEST.size:
-        raise DatagramError(f"A request has {_REQUEST.size} bytes, not {len(data)}.")
-    header, command, count = _REQUEST.unpack(data)
-    if header != _HEADER:
-        raise DatagramError(f"A request begins with {_HEADER:04X}, not {header:04X}.")
     try:
-        return Request(Command(command), count)
-    except ValueError:
-        raise DatagramError(f"There is no command {command:04X}.") from None
+        header, command, count = _REQUEST.unpack(data)
+        if header == _HEADER:
+            return Request(Command(command), count)
+    except (struct.error, ValueError):
+        pass
+    raise DatagramError(f"A request has {_REQUEST.size} bytes, begins with {_HEADER:04X} and has a known command.")
 
 
 def encode_record(record: Record) -> bytes:
-    """Return the 36 bytes of a record; raises ValueError for numbers that 32 bits do not hold."""
-    try:
-        return _RECORD.pack(record.rdt_sequence, record.ft_sequence, record.status, *record.counts)
-    except struct.error as error:
-        raise ValueError(f"{record} does not fit its 32-bit fields: {error}") from error
+    """Return the 36 bytes of a record."""
+    return _RECORD.pack(record.rdt_sequence, record.ft_sequence, record.status, *record.counts)
 
 
 def decode_records(data: bytes) -> npt.NDArray[np.void]:
@@ -153,15 +144,6 @@ def decode_records(data: bytes) -> npt.NDArray[np.void]:
     return np.frombuffer(data, RECORDS)
 
 
-STATUS_BITS = (
-    "error summary", "CPU or RAM", "digital board", "analog board", "serial link", "program memory",
-    "halted configuration", "settings validation", "configuration does not fit", "network", "CAN", "RDT", "EtherNet/IP",
-    "DeviceNet", "saturation or converter", "condition latched", "", "watchdog timeout", "stack check", "serial EEPROM",
-    "serial flash", "analog board watchdog", "excitation too high", "excitation too low", "artificial ground",
-    "analog supply too high", "analog supply too low", "serial link data unavailable", "reference or power",
-    "temperature", "HTTP", "",
-)  # fmt: skip
-"""Of a record's status word, from the highest bit down (sourced: pyNetFT, status.cpp); empty: undefined."""
 ERROR_SUMMARY, SATURATION, CONDITION_LATCHED = 0x80000000, 0x00020000, 0x00010000
 WARNING = ERROR_SUMMARY | CONDITION_LATCHED
 """A threshold set in the sensor was passed: exactly this; its values are good (sourced: pyNetFT, status.cpp)."""
@@ -177,62 +159,3 @@ def quality(status: int) -> Quality:
         return Quality.GOOD
     marks = Quality.SATURATED if status & SATURATION else Quality.GOOD
     return marks | Quality.SUSPECT if status & ~(WARNING | SATURATION) or not marks else marks
-
-
-def status_text(status: int) -> str:
-    """Return what a status word says, in words."""
-    bits = [(name, 1 << (31 - place)) for place, name in enumerate(STATUS_BITS) if status >> (31 - place) & 1]
-    names = [name for name, _ in bits if name]
-    undefined = sum(bit for name, bit in bits if not name)
-    return ", ".join([*names, *([f"undefined bits {undefined:08X}"] if undefined else [])]) or "healthy"
-
-
-class CountScale(BaseModel):
-    """Counts per unit, as the sensor's configuration states them."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
-
-    per_newton: float = Field(gt=0.0, allow_inf_nan=False)
-    per_newton_metre: float = Field(gt=0.0, allow_inf_nan=False)
-    product: str = ""
-
-    def wrench(self, counts: npt.ArrayLike) -> FloatArray:
-        """Return (…, 6) Fx, Fy, Fz [N], Tx, Ty, Tz [N*m] of (…, 6) counts."""
-        wrench: FloatArray = np.asarray(counts, dtype=float) / self._divisors
-        return wrench
-
-    def counts(self, wrench: npt.ArrayLike) -> npt.NDArray[np.int64]:
-        """Return the (…, 6) nearest counts of a (…, 6) wrench [N, N*m], within the 32 bits of a record."""
-        counts = np.rint(np.asarray(wrench, dtype=float) * self._divisors)
-        # np.clip would take ten times as long for six.
-        return np.minimum(np.maximum(counts, LEAST_COUNT), GREATEST_COUNT).astype(np.int64)
-
-    @cached_property
-    def _divisors(self) -> FloatArray:
-        return np.repeat([self.per_newton, self.per_newton_metre], 3)
-
-
-def read_configuration(data: bytes) -> CountScale:
-    """Return the scale in the sensor's ``netftapi2.xml``.
-
-    Raises
-    ------
-    AtiFileError
-        If `data` is no such file, if a tag that is needed is not there exactly once, or for an unknown unit.
-    """
-    needed = ("prodname", "cfgcpf", "cfgcpt", "scfgfu", "scfgtu")
-    found = [(element.tag, (element.text or "").strip()) for element in elements(data) if element.tag in needed]
-    if sorted(tag for tag, _ in found) != sorted(needed):
-        raise AtiFileError(f"The sensor's configuration needs {', '.join(needed)} once each.")
-    texts = dict(found)
-    force_n, torque_nm = unit(FORCE_UNITS, texts["scfgfu"], "force"), unit(TORQUE_UNITS, texts["scfgtu"], "torque")
-    try:
-        return CountScale(
-            per_newton=float(texts["cfgcpf"]) / force_n,
-            per_newton_metre=float(texts["cfgcpt"]) / torque_nm,
-            product=texts["prodname"],
-        )
-    except ValueError as error:
-        raise AtiFileError(
-            f"Counts per unit are positive numbers, not {texts['cfgcpf']!r} and {texts['cfgcpt']!r}."
-        ) from error

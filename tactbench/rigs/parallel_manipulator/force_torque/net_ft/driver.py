@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections import Counter as Tally
+from collections import Counter
 from collections.abc import Mapping
 from contextlib import suppress
 
@@ -22,25 +22,23 @@ from tactbench.plugin.devices import (
     read_options,
 )
 from tactbench.rigs.parallel_manipulator.force_torque.net_ft.codec import (
+    AXES,
     RECORD_BYTES,
     SENSOR_RATE_HZ,
     SEQUENCE_MODULUS,
+    STREAM,
     Command,
     NetFtOptions,
     Request,
     decode_records,
     encode_request,
     quality,
-    status_text,
 )
-from tactbench.rigs.parallel_manipulator.force_torque.wrench import AXES, STREAM, stream
 
 QUIET_S = 0.05
 """After which a box that was stopped sends no more (assumed: a network of one cable, a busy host)."""
 ANSWER_S = 0.5
 """Within which a box answers, over the time its records take (assumed: a network of one cable)."""
-RESTARTED = 1000
-"""A number so far behind the highest is of a counter begun anew (assumed: no datagram is late by more)."""
 MOST_DATAGRAMS = 4096
 """In one block: 4 s at 1 kHz."""
 
@@ -54,27 +52,28 @@ class NetFtDriver(Driver):
 
     A saturated sensor marks all six channels SATURATED, any other error of the status word SUSPECT, and both both; a
     threshold set in the box is a warning: it is counted, its values are good. Nothing is asked for again where nothing
-    comes: `read` then returns nothing.
+    comes: `read` then returns nothing. A box that was without power counts anew, and stays silent until it is started.
+
+    Raises
+    ------
+    UsageError
+        For options that are not known or contradict each other, or a link that carries no datagrams.
+    LinkError
+        If the link does not open.
     """
 
     def __init__(self, settings: DriverSettings) -> None:
-        self._options = options = read_options(NetFtOptions, settings.options, "net-ft")
-        self._clock = settings.clock
-        self._counts: Tally[str] = Tally()
+        self._options = read_options(NetFtOptions, settings.options, "net-ft")
+        self._counts: Counter[str] = Counter()
         self._kept: list[Received] = []
         self._sampling = self._silent = False
-        self._numbers, self._ticks, self._newest = Unwrap(32), Unwrap(32), 0
+        self._numbers, self._ticks = Unwrap(32), Unwrap(32)
         self._link = open_for(settings, "net-ft", DatagramLink, "udp://192.168.1.1:49152")  # type: ignore[type-abstract]
-        try:
-            self._scale = options.scale()
-        except BaseException:
-            self._link.close()
-            raise
 
     @property
     def streams(self) -> tuple[StreamSpec, ...]:
         """`force_torque`, at the rate that the options state, as the box rounds it."""
-        return (stream(SENSOR_RATE_HZ / self._options.every),)
+        return (self._options.stream,)
 
     @property
     def counts(self) -> Mapping[str, int]:
@@ -85,7 +84,7 @@ class NetFtDriver(Driver):
         return {name: count for name, count in self._counts.items() if count}
 
     def identify(self) -> Mapping[str, str]:
-        """Ask for two records; return product, rate and status.
+        """Ask for two records; return rate and status.
 
         Raises
         ------
@@ -106,27 +105,21 @@ class NetFtDriver(Driver):
                 f"{self._options.every}th (rate_hz: {self._options.rate_hz:g}).",
                 hint=f"Set the RDT rate on its web page, or write rate_hz: {SENSOR_RATE_HZ / max(every, 1):.6g}.",
             )
-        return {
-            "model": self._scale.product or "Net F/T",
-            "rate_hz": f"{SENSOR_RATE_HZ / every:.6g}",
-            "status": status_text(int(second["status"])),
-        }
+        return {"rate_hz": f"{SENSOR_RATE_HZ / every:.6g}", "status": f"{int(second['status']):08X}"}
 
     def start(self) -> None:
-        """Take the bias if the options ask for it, let the box send, and wait for the first datagram.
+        """Let the box send, and wait for the first datagram.
 
         Raises
         ------
         LinkTimeout
             If none comes.
         """
-        if self._options.bias:
-            self.tare()
-        if not self._silent:
+        if not self._silent:  # else the other devices of a rig, which sample already, would wait for nothing
             self._silence()
         self._silent = False
         self._link.discard()
-        self._numbers, self._ticks, self._newest = Unwrap(32), Unwrap(32), 0
+        self._numbers, self._ticks = Unwrap(32), Unwrap(32)
         self._send(Command.START_REALTIME)
         self._sampling = True
         self._kept = [self._next()]
@@ -136,8 +129,6 @@ class NetFtDriver(Driver):
 
         Raises
         ------
-        RigError
-            If the box has begun to count anew.
         LinkUnplugged
             If the network says that nobody listens there.
         """
@@ -150,21 +141,16 @@ class NetFtDriver(Driver):
         except LinkUnplugged:
             if not came:
                 raise
-        good = [piece for piece in came if self._whole(piece.data)]
-        return [self._block(good)] if good else []
+        whole = [piece for piece in came if len(piece.data) == RECORD_BYTES]
+        self._counts["rejected"] += len(came) - len(whole)
+        return [self._block(whole)] if whole else []
 
     def stop(self) -> None:
         """Let the box send no more, and wait until nothing comes."""
         if self._sampling:
-            self._sampling = False
-            self._kept = []
+            self._sampling, self._kept = False, []
             with suppress(LinkError):
                 self._silence()
-
-    def tare(self) -> bool:
-        """Let the box take its present reading as zero; records already under way are still of the old zero."""
-        self._send(Command.SET_SOFTWARE_BIAS)
-        return True
 
     def close(self) -> None:
         """Stop, and close the link."""
@@ -185,48 +171,22 @@ class NetFtDriver(Driver):
     def _next(self) -> Received:
         return self._link.receive(ANSWER_S + 2 * self._options.every / SENSOR_RATE_HZ)
 
-    def _whole(self, datagram: bytes) -> bool:
-        whole = len(datagram) == RECORD_BYTES
-        self._counts["rejected"] += not whole
-        return whole
-
     def _block(self, came: list[Received]) -> Block:
         records = decode_records(b"".join(piece.data for piece in came))
-        marks = None
-        if records["status"].any():
-            words, which = np.unique(records["status"], return_inverse=True)
-            each = np.array([int(quality(int(word))) for word in words], dtype=np.uint8)[which]
-            marks = np.repeat(each[:, None], len(AXES), axis=1)
-            self._counts["errors"] += int((each != 0).sum())
-            self._counts["saturated"] += int(((each & Quality.SATURATED) != 0).sum())
-            self._counts["warnings"] += int(((records["status"] != 0) & (each == 0)).sum())
         ticks, numbers = self._ticks(records["ft_sequence"]), self._numbers(records["rdt_sequence"])
-        if (numbers < np.maximum.accumulate(numbers) - RESTARTED).any() or numbers[0] < self._newest - RESTARTED:
-            raise RigError(
-                "The Net F/T box has begun to count its samples anew: it was without power, or another host commands "
-                "it.",
-                hint="Check power and network; start it again unloaded, since a bias set before may be lost.",
-            )
-        self._newest = max(self._newest, int(numbers.max()))
         return Block(
             stream=STREAM,
             t_ns=np.array([piece.t_ns for piece in came], dtype=np.int64),
-            data=self._scale.wrench(records["counts"]),
-            quality=marks,
+            data=self._options.wrench(records["counts"]),
+            quality=self._marks(records["status"]) if records["status"].any() else None,
             sequence=numbers,
             # 10^9 / 7000 in whole numbers.
             device_ns=ticks * 1_000_000 // 7,
         )
 
-
-def build(settings: DriverSettings) -> NetFtDriver:
-    """Open the link.
-
-    Raises
-    ------
-    UsageError
-        For options that are not known or contradict each other, or a link that carries no datagrams.
-    LinkError
-        If the link does not open.
-    """
-    return NetFtDriver(settings)
+    def _marks(self, status: np.typing.NDArray[np.uint32]) -> np.typing.NDArray[np.uint8]:
+        marks = np.array([quality(word) for word in status.tolist()], dtype=np.uint8)
+        self._counts["errors"] += int((marks != 0).sum())
+        self._counts["saturated"] += int(((marks & Quality.SATURATED) != 0).sum())
+        self._counts["warnings"] += int(((status != 0) & (marks == 0)).sum())
+        return np.repeat(marks[:, None], len(AXES), axis=1)

@@ -21,22 +21,18 @@ from tactbench.plugin.devices import (
     read_options,
 )
 from tactbench.rigs.parallel_manipulator.force_torque.net_ft.codec import (
+    AXES,
     ERROR_SUMMARY,
-    GREATEST_COUNT,
-    LEAST_COUNT,
     SATURATION,
     SENSOR_RATE_HZ,
     SEQUENCE_MODULUS,
     Command,
-    CountScale,
     DatagramError,
     NetFtOptions,
     Record,
-    Request,
     decode_request,
     encode_record,
 )
-from tactbench.rigs.parallel_manipulator.force_torque.wrench import AXES, wrench_of
 
 
 @dataclass(frozen=True)
@@ -53,6 +49,8 @@ class DatagramFault(Fault):
 
 LARGEST = (25.0, 25.0, 35.0, 0.25, 0.25, 0.25)
 """Where the sensor saturates [N, N*m]: a Nano17 SI-25-0.25 (sourced: calibration file FT8577)."""
+USUAL_COUNTS = {"counts_per_newton": 1e6, "counts_per_newton_metre": 1e6}
+"""Sourced: pyNetFT."""
 
 
 class RdtEmulator(DeviceEmulator):
@@ -62,12 +60,8 @@ class RdtEmulator(DeviceEmulator):
     ----------
     wrench
         Fx, Fy, Fz [N], Tx, Ty, Tz [N*m] at a time [s].
-    scale
-        Counts per unit; the default is usual (sourced: pyNetFT).
-    rate_hz
-        Records a second; the box takes the next rate above that divides 7000.
-    first_sequence
-        Of records and samples, to begin near the wrap of the counters.
+    options
+        Counts per unit and rate of records; None: 1 kHz and usual ones.
     faults
         What is wrong with it; may be changed at any time.
     """
@@ -75,30 +69,21 @@ class RdtEmulator(DeviceEmulator):
     def __init__(
         self,
         wrench: Callable[[float], Sequence[float]],
+        options: NetFtOptions | None = None,
         *,
-        scale: CountScale | None = None,
-        rate_hz: float = 1000.0,
-        first_sequence: int = 1,
         faults: Iterable[DatagramFault] = (),
     ) -> None:
-        self.scale = scale or CountScale(per_newton=1e6, per_newton_metre=1e6, product="EMULATED Net F/T")
-        self.every = max(1, int(SENSOR_RATE_HZ // rate_hz))
-        """Samples of the sensor from one record to the next."""
-        self._wrench = wrench
-        self._first_sequence = first_sequence
+        self.options = options or NetFtOptions.model_validate(USUAL_COUNTS)
         self.faults = list(faults)
+        self._wrench = wrench
         self._seen: Counter[Fault] = Counter()
-        self._bias = [0] * len(AXES)
         self._now_s = 0.0
         self._next: int | None = None
-        self._left: int | None = None
-        self._sequence = first_sequence
+        """Number of the sensor's sample that is sent next; None: it is not sampling."""
+        self._left = 0
+        """Records that are still to be sent; 0: until it is stopped."""
+        self._sequence = 1
         self._held: bytes | None = None
-
-    @property
-    def rate_hz(self) -> float:
-        """Records a second as the box sends them."""
-        return SENSOR_RATE_HZ / self.every
 
     def feed(self, piece: bytes | CanFrame, now_s: float) -> list[Sent]:
         """Take one datagram of the host; return what `poll` returns.
@@ -111,7 +96,13 @@ class RdtEmulator(DeviceEmulator):
             request = decode_request(piece)
         except DatagramError:
             return sent
-        return sent + self._carry_out(request)
+        if request.command in (Command.START_REALTIME, Command.STOP):
+            sent += self._ended(self._now_s)
+        if request.command is Command.START_REALTIME:
+            self._left, self._sequence = request.records, 1
+            # The first sample after the request: a sample is not older than what asks for it.
+            self._next = math.floor(self._now_s * SENSOR_RATE_HZ) + 1
+        return sent
 
     def poll(self, now_s: float) -> list[Sent]:
         """Go on to `now_s`; return the datagrams that are due by then, each with its time."""
@@ -125,51 +116,21 @@ class RdtEmulator(DeviceEmulator):
         """Return when the next record is due; infinite while nothing is being sent."""
         return math.inf if self._next is None else self._next / SENSOR_RATE_HZ
 
-    def _carry_out(self, request: Request) -> list[Sent]:
-        match request.command:
-            case Command.START_REALTIME:
-                ended = self._ended(self._now_s)
-                self._left = request.records or None
-                self._sequence = self._first_sequence
-                # The first sample after the request: a sample is not older than what asks for it.
-                self._next = math.floor(self._now_s * SENSOR_RATE_HZ) + 1
-                return ended
-            case Command.STOP:
-                return self._ended(self._now_s)
-            case Command.SET_SOFTWARE_BIAS:
-                self._bias = self.scale.counts(self._sensed(self._now_s)[0]).tolist()
-        return []
-
-    def _sensed(self, at_s: float) -> tuple[list[float], bool]:
-        """Return what the sensor can read of the wrench, and whether it is at an end of its range."""
-        # Number by number: numpy would take longer for six, and this is done a thousand times a second.
-        wrench = list(zip(self._wrench(at_s), LARGEST, strict=True))
-        beyond = any(abs(value) >= end for value, end in wrench) or any(
-            fault.name == "saturated" and fault.active(at_s) for fault in self.faults
-        )
-        return [min(max(value, -end), end) for value, end in wrench], beyond
-
     def _one(self, sample: int) -> list[Sent]:
         at_s = sample / SENSOR_RATE_HZ
-        wrench, saturated = self._sensed(at_s)
-        fx, fy, fz, tx, ty, tz = (
-            min(max(count - zero, LEAST_COUNT), GREATEST_COUNT)
-            for count, zero in zip(self.scale.counts(wrench).tolist(), self._bias, strict=True)
+        # Number by number: numpy would take longer for six, and this is done a thousand times a second.
+        wrench = list(zip(self._wrench(at_s), LARGEST, strict=True))
+        saturated = any(abs(value) >= end for value, end in wrench) or any(
+            fault.name == "saturated" and fault.active(at_s) for fault in self.faults
         )
-        record = Record(
-            self._sequence,
-            (sample + self._first_sequence) % SEQUENCE_MODULUS,
-            SATURATION | ERROR_SUMMARY if saturated else 0,
-            (fx, fy, fz, tx, ty, tz),
-        )
+        fx, fy, fz, tx, ty, tz = self.options.counts([min(max(value, -end), end) for value, end in wrench]).tolist()
+        status = SATURATION | ERROR_SUMMARY if saturated else 0
+        record = Record(self._sequence, (sample + 1) % SEQUENCE_MODULUS, status, (fx, fy, fz, tx, ty, tz))
         self._sequence = (self._sequence + 1) % SEQUENCE_MODULUS
-        self._next = sample + self.every
+        self._next = sample + self.options.every
         sent = self._on_the_way(encode_record(record), at_s)
-        if self._left is not None:
-            self._left -= 1
-            if self._left == 0:
-                sent += self._ended(at_s)
-        return sent
+        self._left -= 1
+        return sent + self._ended(at_s) if self._left == 0 else sent
 
     def _ended(self, at_s: float) -> list[Sent]:
         """Stop sending; return what is still under way."""
@@ -194,17 +155,17 @@ class RdtEmulator(DeviceEmulator):
 
 
 def build(settings: EmulatorSettings) -> RdtEmulator:
-    """Return an emulated box that reads `settings.senses`: fx, fy, fz [N], tx, ty, tz [N*m].
+    """Return an emulated box that reads `settings.senses`: fx, fy, fz [N], tx, ty, tz [N*m]; the rest is 0.
 
     Raises
     ------
     UsageError
         For options or faults that are not known.
     """
+
+    def wrench(at_s: float) -> list[float]:
+        sensed = settings.senses(at_s)
+        return [sensed.get(name, 0.0) for name in AXES]
+
     options = read_options(NetFtOptions, settings.options, "net-ft")
-    return RdtEmulator(
-        lambda at_s: wrench_of(settings.senses(at_s)),
-        scale=options.scale(),
-        rate_hz=options.rate_hz,
-        faults=[DatagramFault.parse(text) for text in settings.faults],
-    )
+    return RdtEmulator(wrench, options, faults=[DatagramFault.parse(text) for text in settings.faults])
