@@ -130,7 +130,6 @@ def test_the_generated_pages_have_every_verb_and_field():
         "lower_m",
         "homing",
         "link_mm",
-        "serial",
     ):
         assert re.search(rf"^- `{name}: .*`: .", written, re.MULTILINE), name
 
