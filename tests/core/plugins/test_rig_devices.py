@@ -162,6 +162,14 @@ def test_a_sensor_that_is_not_at_rest_gets_no_zero(reading, entry, says):
         zeroed(reading, **entry)
 
 
+def test_noise_that_is_held_for_several_rows_is_no_drift():
+    """As the paper's force through an emulated sensor: 0.69 N at 83 Hz, read at 1 kHz."""
+    rng = np.random.default_rng(2)
+    for _ in range(400):
+        held = np.repeat(rng.normal(0.0, 0.69, 167), 12)[:2000]
+        zeroed(lambda t_s, held=held: held + rng.normal(0.0, 1e-3, 2000))
+
+
 def test_what_is_allowed_of_a_zero_is_the_rig_files():
     assert zeroed(lambda t_s: 4.09 + noise(0.02), largest_zero_n=5.0)[0][0] == pytest.approx(4.09, abs=0.01)
     assert zeroed(lambda t_s: 4.09 + t_s, zero_s=0.0)[0].tolist() == [0.0, 0.0]  # the device keeps its own
