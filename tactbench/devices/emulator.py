@@ -60,6 +60,13 @@ class EmulatorSettings:
     """Faults, as :meth:`~tactbench.devices.emulator.Fault.parse` reads them."""
 
 
+LINK_FAULTS = {
+    "unplug": "the link is gone from start_s on",
+    "late": "what the device sends comes later by delay_s, in the same order",
+}
+"""Faults that every emulated device has, and what they do."""
+
+
 @dataclass(frozen=True)
 class Fault:
     """A fault from `start_s` until before `end_s`, seconds of the clock that the emulator is given.
@@ -83,7 +90,7 @@ class Fault:
 
     def __post_init__(self) -> None:
         if self.name not in self.known:
-            raise UnknownNameError("fault", self.name, self.known)
+            raise UnknownNameError("fault", self.name, {*self.known, *LINK_FAULTS})
         if self.every < 1:
             raise UsageError(f"The fault {self.name!r} cannot concern every {self.every}.", hint="Give 1 or more.")
 

@@ -102,7 +102,7 @@ def pressed(subject: Subject, seed: int = 1) -> Recorded:
     elif subject.descriptor.simulated:
         descriptor, sensor, field, end_n = subject.descriptor, simulated_sensors(subject)[0], "where", FORCE_N
     else:
-        skip("it moves something real, or replays: `--rig-file FILE` presses with it")
+        skip("it moves something real, or replays: with `--rig-file FILE` other checks press with it")
     kinds = tuple(dict.fromkeys(channel.kind for channel in sensor.spec.channels()))
     with code_of(field, subject):
         if subject.kind == "rig":

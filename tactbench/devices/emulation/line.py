@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import ClassVar, TypeAlias
 
-from tactbench.devices.emulator import DeviceEmulator, Fault, Sent
+from tactbench.devices.emulator import LINK_FAULTS, DeviceEmulator, Fault, Sent
 from tactbench.links.can_link import CanFrame
 
 Piece: TypeAlias = bytes | CanFrame
@@ -24,10 +24,7 @@ whatever it answers."""
 class LinkFault(Fault):
     """A fault of the link itself, which every emulated device can have."""
 
-    known: ClassVar[Mapping[str, str]] = {
-        "unplug": "the link is gone from start_s on",
-        "late": "what the device sends comes later by delay_s, in the same order",
-    }
+    known: ClassVar[Mapping[str, str]] = LINK_FAULTS
     delay_s: float = 0.05
     """Five times the period of 100 Hz."""
 
