@@ -6,7 +6,6 @@ import time
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import Any, Literal, Self, TypeVar
 
 from pydantic import BaseModel, ConfigDict, ValidationError
@@ -141,14 +140,6 @@ def read_options(kind: type[_Model], given: Mapping[str, Any], device: str) -> _
         raise UsageError(
             f"{what} {problem.replace('Value error, ', '')}.", hint="See docs/hardware.md, The rig file."
         ) from error
-
-
-def read_file(path: str, what: str) -> bytes:
-    """Return the bytes of a file that an option names; raises UsageError if it cannot be read."""
-    try:
-        return Path(path).expanduser().read_bytes()
-    except OSError as error:
-        raise UsageError(f"{what} cannot be read: {error}.", hint="Check the path in the rig file.") from error
 
 
 def open_for(settings: DriverSettings, device: str, kind: type[_Link], example: str) -> _Link:

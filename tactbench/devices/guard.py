@@ -55,8 +55,6 @@ FORCE = "force"
 """What the force sensor is called beside the axes."""
 LOOK_S = 1e-3
 """Longest wait between two looks: the sampling period of the force."""
-SCHEDULING_S = 6e-3
-"""By which an ordinary kernel lets a process wait (a measured 99.9th percentile)."""
 ALIVE_S = 0.2
 """For so long the force is watched before anything moves (assumed: 200 samples at 1 kHz)."""
 AGAIN_S = 0.25
@@ -65,11 +63,6 @@ RETREAT_S = 1.0
 """Added to the way's time, after which a retreat has failed (assumed)."""
 REFUSED = 3
 """Refused commands in a row that end the rig's command (assumed)."""
-
-
-def reaction_s(axis: Positioner, force_age_s: float = LOOK_S) -> float:
-    """Return the time from a force to the braking of an axis: age of the force, one look, scheduling, the axis' own."""
-    return force_age_s + LOOK_S + SCHEDULING_S + axis.facts.stop_latency_s
 
 
 def largest_force_n(

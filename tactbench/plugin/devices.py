@@ -25,7 +25,7 @@ if TYPE_CHECKING:
         with_sensor,
     )
     from tactbench.devices.control import Control
-    from tactbench.devices.driver import DeviceLog, Driver, DriverSettings, Options, open_for, read_file, read_options
+    from tactbench.devices.driver import DeviceLog, Driver, DriverSettings, Options, open_for, read_options
     from tactbench.devices.emulation.emulated_devices import EmulatedDevice, EmulatedDevices
     from tactbench.devices.emulation.scene_samples import SceneSamples
     from tactbench.devices.emulator import (
@@ -151,7 +151,6 @@ __all__ = [
     "open_link",
     "physics_of",
     "read_can_log",
-    "read_file",
     "read_options",
     "with_sensor",
 ]

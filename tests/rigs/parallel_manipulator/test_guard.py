@@ -9,7 +9,6 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from tactbench.devices.guard import reaction_s
 from tactbench.devices.guard_messages import GuardRefusesError, Trigger
 from tactbench.plugin import UsageError
 from tactbench.plugin.devices import Beat, CommandKind, GuardState, largest_force_n
@@ -275,7 +274,7 @@ def test_a_touch_on_a_fast_approach_ends_it(made):
     while beat().moving:
         pass
     # Three samples at most, a look, the line and the braking, all at 5 mm/s and 20 N/mm.
-    bound_n = largest_force_n(0.1, 20e3, 5e-3, 1.0, 3e-3 + reaction_s(made.guard._press))
+    bound_n = largest_force_n(0.1, 20e3, 5e-3, 1.0, 4e-3 + made.guard._press.facts.stop_latency_s)
     assert 0.1 < made.world.largest_n < bound_n
     assert reports[-1].state is GuardState.ARMED
     # It holds where it was last known to be, which may be out of contact; a step is taken in, a move is not.
