@@ -12,7 +12,7 @@ from tactbench.core.plugins.checks import CheckTable, RigCheck
 from tactbench.core.plugins.interfaces import DeviceAcquisition, Operator
 from tactbench.core.spec.recording import StreamCounts
 from tactbench.core.spec.rig import DeviceDescriptor
-from tactbench.core.spec.rig_file import FORCE, ForceEntry, NamedDevice, RigFile
+from tactbench.core.spec.rig_file import FORCE, NamedDevice, RigFile
 
 if TYPE_CHECKING:
     from tactbench.core.plugins.emulators import RigEmulators, SceneEmulators
@@ -47,7 +47,6 @@ if TYPE_CHECKING:
         GuardLostError,
         GuardState,
         Limits,
-        Report,
     )
     from tactbench.devices.guard_process import DeviceSettings, Guard, GuardProcess, ProcessSettings
     from tactbench.devices.positioner import (
@@ -95,7 +94,6 @@ __all__ = [
     "EmulatorSettings",
     "Event",
     "Fault",
-    "ForceEntry",
     "ForceLaw",
     "Guard",
     "GuardLostError",
@@ -124,7 +122,6 @@ __all__ = [
     "ProcessSettings",
     "Reading",
     "Received",
-    "Report",
     "RigCheck",
     "RigEmulators",
     "RigFile",
