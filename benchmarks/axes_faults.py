@@ -21,8 +21,7 @@ import guard_faults as faults
 import numpy as np
 
 from tactbench.devices.emulation.line import LinkFault
-from tactbench.devices.guard import reaction_s
-from tactbench.devices.guard_messages import GuardRefusesError
+from tactbench.devices.guard_messages import GuardRefusesError, Report
 from tactbench.plugin.devices import (
     Beat,
     CommandKind,
@@ -31,7 +30,6 @@ from tactbench.plugin.devices import (
     EmulatedDevices,
     GuardState,
     LocalGuard,
-    Report,
     largest_force_n,
 )
 from tactbench.rigs.parallel_manipulator.force_torque.net_ft.driver import NetFtDriver
@@ -134,7 +132,8 @@ def travel_bound_n(setting: Any, names: list[str], guard: LocalGuard) -> float:
     """Return the largest force of a way, from what is stated and known before."""
     rail = guard._axes["joint-1"]
     speed, acceleration = RAIL["speed_m_s"], RAIL["acceleration_m_s2"]
-    seen_s = reaction_s(rail) + max([NOTICED_S.get(name, 0.0) for name in names], default=0.0)
+    # Age of the force and a look of the guard, 1 ms each; its scheduling, 6 ms (a measured 99.9th percentile).
+    seen_s = 8e-3 + rail.facts.stop_latency_s + max([NOTICED_S.get(name, 0.0) for name in names], default=0.0)
     moving = largest_force_n(TRAVEL_N, setting.stiffness_n_m, speed, acceleration, seen_s)
     if any(name.startswith("joint-1 ") for name in names):  # a rail that does not answer ends its move by itself
         moving += setting.stiffness_n_m * WAY_M

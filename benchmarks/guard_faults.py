@@ -19,7 +19,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from tactbench.devices.guard_messages import GuardRefusesError, Trigger
+from tactbench.devices.guard_messages import GuardRefusesError, Report, Trigger
 from tactbench.plugin.devices import (
     Beat,
     CommandKind,
@@ -30,7 +30,6 @@ from tactbench.plugin.devices import (
     GuardState,
     Limits,
     LocalGuard,
-    Report,
 )
 from tactbench.rigs.parallel_manipulator.force_torque.net_ft.codec import NetFtOptions
 from tactbench.rigs.parallel_manipulator.force_torque.net_ft.driver import NetFtDriver

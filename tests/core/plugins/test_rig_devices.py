@@ -10,10 +10,10 @@ import pytest
 
 from tactbench.core.errors import LinkError, RigError, UnknownNameError, UsageError
 from tactbench.core.plugins.registry import load_registry
+from tactbench.core.spec.rig_file import ForceEntry
 from tactbench.plugin import Block, ChannelSpec, Quality, StreamSpec
 from tactbench.plugin.devices import (
     EmulatedDevices,
-    ForceEntry,
     PressingForce,
     RigFile,
     drivers_of,

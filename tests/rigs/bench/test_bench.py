@@ -11,9 +11,9 @@ from tactbench.core.evaluation.dataset import load_dataset
 from tactbench.core.plugins.emulators import running
 from tactbench.core.recording.reader import open_recording
 from tactbench.core.spec.quantity import assumed
-from tactbench.core.spec.rig_file import Allowed, DeviceEntry, EmulationSettings
+from tactbench.core.spec.rig_file import Allowed, DeviceEntry, EmulationSettings, ForceEntry
 from tactbench.plugin import ForceRamp, Quality, RigContext, Scene, load_object, load_registry
-from tactbench.plugin.devices import EmulatedDevices, ForceEntry, NamedDevice, RigFile, emulators_of
+from tactbench.plugin.devices import EmulatedDevices, NamedDevice, RigFile, emulators_of
 from tactbench.sensors.icub.emulator import Bus
 
 REGISTRY = load_registry()

@@ -4,9 +4,9 @@ import math
 
 import pytest
 
-from tactbench.devices.guard_messages import Trigger
+from tactbench.devices.guard_messages import Report, Trigger
 from tactbench.devices.press import PressState
-from tactbench.plugin.devices import CommandKind, Course, GuardState, Press, Report
+from tactbench.plugin.devices import CommandKind, Course, GuardState, Press
 from tactbench.rigs.parallel_manipulator.settings import settings_of
 from tests.rigs.parallel_manipulator.spring import file_of
 
