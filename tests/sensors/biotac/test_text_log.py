@@ -123,9 +123,8 @@ def test_what_cannot_be_read_is_refused(log_of, tmp_path):
         log_of([])
     with pytest.raises(DataError, match="cannot be read"):
         read_log(tmp_path / "none.txt", {})
-    for options in ({"sensor": -1}, {"sensor": "left"}, {"speed": 1}, {"rate_hz": 0.0}):
-        with pytest.raises(UsageError, match=next(iter(options))):
-            log_of([], **options)
+    with pytest.raises(UsageError, match="rate_hz"):
+        log_of([], rate_hz=0.0)
 
 
 @settings(max_examples=15)

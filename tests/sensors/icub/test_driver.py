@@ -1,7 +1,4 @@
-"""The fingertip's driver against emulated boards: in virtual time, and behind an adapter in real time."""
-
-import sys
-import time
+"""The fingertip's driver against emulated boards, in virtual time."""
 
 import numpy as np
 import pytest
@@ -13,8 +10,6 @@ from tactbench.plugin.devices import (
     CanFrame,
     DriverSettings,
     LinkError,
-    LinkUnplugged,
-    open_link,
 )
 from tactbench.sensors.icub.channels import STREAMS
 from tactbench.sensors.icub.codec import (
@@ -27,7 +22,6 @@ from tactbench.sensors.icub.codec import (
     skin_frames,
 )
 from tactbench.sensors.icub.driver import SETTLE_S, build
-from tests.links.ends import pty
 from tests.sensors.icub.emulated import (
     NAMES,
     VirtualLink,
@@ -35,7 +29,6 @@ from tests.sensors.icub.emulated import (
     in_virtual_time,
     joined,
     rising,
-    served,
 )
 
 GOOD, MISSING, SATURATED, SUSPECT = Quality.GOOD, Quality.MISSING, Quality.SATURATED, Quality.SUSPECT
@@ -285,8 +278,6 @@ def test_its_own_frames_may_come_back():
 @pytest.mark.parametrize(
     ("options", "said"),
     [
-        ({"bord": 3}, "Did you mean 'board'"),
-        ({"board": 15}, "less than or equal to 14"),
         ({"skin_type": 7}, "0, 1, 2 or 8"),
         ({"old_setup": True, "period_ms": 20}, "old set-up has neither"),
     ],
@@ -296,32 +287,3 @@ def test_options_that_cannot_be_are_refused_before_the_link_is_opened(options, s
         build(DriverSettings(lambda: pytest.fail("opened"), STREAMS, options))
     with pytest.raises(UsageError, match=said):
         emulator(**options)
-
-
-def test_a_link_of_another_kind_is_refused():
-    with pytest.raises(UsageError, match="cannot be spoken to through loop"):
-        build(DriverSettings(lambda: open_link("loop://")))
-
-
-@pytest.mark.skipif(sys.platform == "win32", reason="pseudo-terminals are POSIX")
-def test_on_slcan_over_a_pseudo_terminal_until_it_is_unplugged():
-    """In real time; counts tell their own time, and fall by one in 20 ms."""
-    with pty() as port:
-        address = f"can://slcan/{port.name}?bitrate=1000000&sleep_after_open=0"
-        with build(DriverSettings(lambda: open_link(address), STREAMS, {})) as driver:
-            with served(emulator(), port):
-                assert driver.identify()["model"] == "MTB4"
-                driver.start()
-                blocks = []
-                until_s = time.monotonic() + 10.0
-                while sum(len(block.data) for block in blocks) < 10 and time.monotonic() < until_s:
-                    blocks += driver.read(0.5)
-            block = joined(blocks)
-            assert not block.quality.any()
-            first = block.data.astype(int)[:, 0]
-            assert (block.data == first[:, None] - np.arange(12)).all()
-            assert set(np.diff(first) % 100) == {99}
-            assert (np.diff(block.t_ns) > 0).all()
-            port.unplug()
-            with pytest.raises(LinkUnplugged):
-                list(map(driver.read, [0.1] * 100))  # what had come, and further
