@@ -19,7 +19,6 @@ ENDS = {
     "evil-eat": ("out-of-memory", None, "more than 200 MB"),
     "evil-import": ("crashed", 6, "SIGABRT"),
     "evil-patch": ("done", None, ""),
-    "evil-built-elsewhere": ("done", None, ""),
 }
 """Status, signal and a part of the reason of every evil cell."""
 
