@@ -102,16 +102,6 @@ def test_results_of_ones_own_are_chosen_from_before_those_that_came_along(verbs)
     assert "curvature" in verbs("choose", "tactbench-results", "--task", "curvature", code=2).stderr
 
 
-def test_a_choice_for_programs_has_the_wish_the_criteria_and_what_is_unknown(ran):
-    told = json.loads(ran("choose", "out", *WISH, "--score", "0.6", "--format", "json").stdout)
-    assert told["wish"] == {"max_delay_ms": 2, "range_n": 5, "rate_hz": 10, "score": 0.6}
-    (choice,) = told["choices"]
-    assert [one["sensor"] for one in choice["candidates"]] == ["icub", "biotac"]
-    for one in choice["candidates"]:
-        assert [criterion["wish"] for criterion in one["criteria"]] == ["answer delay", "force range", "rate", "score"]
-    assert choice["unknown"]
-
-
 def test_the_shipped_results_are_of_both_sensors_simulated():
     rows = json.loads(shipped_results().read_text(encoding="utf-8"))["rows"]
     asked = {(row["sensor"], row["task"], row["protocol"]) for row in rows if row["status"] == "done"}
