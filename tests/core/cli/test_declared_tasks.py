@@ -9,6 +9,7 @@ import pytest
 import yaml
 
 from tests.conftest import Verbs
+from tests.core.report.unrendered import unrendered
 
 PAD = """
 version: 1
@@ -83,6 +84,10 @@ def test_one_import_and_one_run_answer_a_question_of_a_table(pad):
     assert json.loads(row["declared_task"])["name"] == "where"
     assert "0 computed now" in pad(*run).stderr, "what was declared decides the key as a task does"
     pad("why", "where/replay/deployable/knn", "--again")
+    with unrendered():
+        pad("report")
+    drawn = {path.name for path in (pad.folder / "tactbench-results" / "report" / "figures").iterdir()}
+    assert "location-map-where-deployable-session-knn-replay.png" in drawn
     # Another question of the same recordings is another cell.
     declared = pad.folder / "rec" / "tasks.yaml"
     declared.write_text(declared.read_text().replace("unit: mm", "unit: um"))

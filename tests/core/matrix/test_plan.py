@@ -37,7 +37,6 @@ def test_a_task_may_state_how_often_it_is_recorded_anew_and_the_matrix_overrules
 @pytest.mark.parametrize(
     ("choice", "says"),
     [
-        (TaskChoice(name="forse"), "'force'"),
         (TaskChoice(name="force", estimators=(EstimatorChoice(name="forest", params={"trees": 5}),)), "n_estimators"),
         (TaskChoice(name="curvature", estimators=(EstimatorChoice(name="lasso"),)), "classification"),
     ],

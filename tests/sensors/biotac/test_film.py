@@ -3,9 +3,8 @@
 import numpy as np
 import pytest
 
-from tactbench.plugin.simulation import SkinGrid
 from tactbench.sensors.biotac.electrodes import ELECTRODES
-from tactbench.sensors.biotac.film import core_mm, mid_film_mm, refined, spectral_interpolation
+from tactbench.sensors.biotac.film import core_mm, mid_film_mm, spectral_interpolation
 from tactbench.sensors.biotac.meshes import CORE_MM, ELECTRODES_MM
 from tactbench.sensors.biotac.sheet import faces_between
 from tactbench.sensors.biotac.spec import SKIN
@@ -49,16 +48,6 @@ def test_a_curved_film_conducts_as_its_middle_is_long():
     # Chords of a fortieth of a radian, and a facet that begins at x = -0.07.
     np.testing.assert_allclose(faces.along_s, 1.0 / step, rtol=1e-3)
     np.testing.assert_allclose(faces.along_x, step, rtol=1e-3)
-
-
-def test_refined_cells_fill_the_same_sheet():
-    grid = SkinGrid((np.arange(64) + 0.5) * 0.4, (np.arange(64) - 31.5) * 0.4)
-    fine = refined(grid, 2)
-    assert (fine.x_mm.size, fine.s_mm.size) == (96, 66)
-    for coarse, cells in ((grid.x_mm, fine.x_mm), (grid.s_mm, fine.s_mm)):
-        step = cells[1] - cells[0]
-        assert step * cells.size == pytest.approx(64 * 0.4)
-        assert cells[0] - step / 2 == pytest.approx(coarse[0] - 0.2)
 
 
 @pytest.mark.parametrize(("n", "factor"), [(16, 4), (64, 3)])
