@@ -59,11 +59,6 @@ def test_several_protocols_and_splits_give_cells_for_every_pair(registry):
     assert len(cells) == 3 * len(ways(cells))
 
 
-def test_few_shot_stands_for_all_of_a_tasks_few_shot_splits(registry):
-    cells = plan(registry, TaskChoice(name="force", protocol="deployable", split=("few-shot", "few-shot-5", "unit")))
-    assert [split for _, split in ways(cells)] == ["few-shot-1", "few-shot-2", "few-shot-5", "few-shot-10", "unit"]
-
-
 def test_a_pair_that_does_not_go_together_is_refused_alone_and_planned_among_others(registry):
     with pytest.raises(UsageError, match="deployable"):
         plan(registry, TaskChoice(name="force", protocol="karl2016", split="unit"))
