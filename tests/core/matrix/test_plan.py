@@ -50,15 +50,6 @@ def ways(cells):
     return [(cell.protocol, cell.split) for cell in cells if not cell.baseline]
 
 
-def test_several_protocols_and_splits_give_cells_for_every_pair(registry):
-    protocols, splits = ("karl2016", "karl2016-training-scale", "deployable"), ("roles", "unit")
-    cells = plan(registry, TaskChoice(name="force", protocol=protocols, split=splits))
-    assert ways(cells) == [(protocol, split) for protocol in protocols for split in splits]
-    assert len({cell.name for cell in cells}) == len(cells)
-    # Every pair has its baselines beside it.
-    assert len(cells) == 3 * len(ways(cells))
-
-
 def test_a_pair_that_does_not_go_together_is_refused_alone_and_planned_among_others(registry):
     with pytest.raises(UsageError, match="deployable"):
         plan(registry, TaskChoice(name="force", protocol="karl2016", split="unit"))
