@@ -77,8 +77,6 @@ def test_two_sensors_are_compared_in_every_format(ran):
 
 
 def test_a_folder_against_itself_differs_nowhere_and_what_is_not_there_is_named(ran):
-    other = json.loads(ran("compare", "ols", "lasso", "--out", "out", "--format", "json").stdout)
-    assert not any(record["declared"] or record["p_holm"] for record in other)
     records = json.loads(ran("compare", "out", "out", "--format", "json").stdout)
     assert {(record["difference"], record["p"], record["paired"]) for record in records} == {(0.0, 1.0, True)}
     for words, nearest in (("biotack", "icub"), "biotac"), (("biotac", "icub", "--task", "forse"), "force"):

@@ -42,6 +42,7 @@ def assert_one_clear_screen(done, *says):
         (("run", "--effects", "drift"), "+drift or -drift"),
         (("run", "--set", "rung=defaut"), "'default'"),
         (("run", "--set", "placement_scater_mm=0.3"), "'placement_scatter_mm'"),
+        (("run", "--set", "placement_scatter_mm=0.3mm"), "'placement_scatter_mm=0.3mm'"),
         (("run", "--set", "noise_scale=-1"), "noise_scale = -1"),
         (("run", "--rig", "replay", "--recordings", ".", "--set", "noise_scale=2"), "simulated rigs"),
         (("leaderboard", os.devnull), os.devnull),
@@ -59,7 +60,9 @@ def test_wrong_words_are_answered_with_the_next_step(verbs, arguments, says):
     assert [path for path in verbs.folder.rglob("*") if path.is_file() and path.name != ".lock"] == []
 
 
-@pytest.mark.parametrize("words", [("list",), ("datasets",), ("show", "force", "biotac")])
+@pytest.mark.parametrize(
+    "words", [("list",), ("datasets",), ("show", "force", "biotac"), ("choose", "--task", "force")]
+)
 def test_a_list_for_programs_is_one_json_document(verbs, words):
     assert json.loads(verbs(*words, "--format", "json").stdout)
 

@@ -114,6 +114,7 @@ def _in_the_way(index, folder):
 INDEXES = {
     "lost": lambda index, _: index.unlink(),
     "damaged": lambda index, _: index.write_bytes(b"no database" * 1000),
+    "damaged in the middle": lambda index, _: index.write_bytes(index.read_bytes()[:4096] + b"\xff" * 4096 * 20),
     "older than the files": _older,
     "cannot be written": _in_the_way,
 }

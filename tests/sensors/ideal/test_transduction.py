@@ -7,6 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from tactbench.plugin import RigError
 from tactbench.sensors.ideal import SPEC
 from tactbench.sensors.ideal.transduction import build
 from tests.sensors.skin_states import dent, grid_of, state_of
@@ -51,3 +52,10 @@ def test_readings_add_and_scale_with_pressure_and_come_in_the_order_asked_for():
     together = reading(GRID, one + 3.0 * two)
     assert together == pytest.approx(reading(GRID, one) + 3.0 * reading(GRID, two), rel=1e-12)
     assert reading(GRID, one + 3.0 * two, ["T7", "T2"]) == pytest.approx(together[[6, 1]], rel=1e-12)
+
+
+def test_unknown_taxels_and_other_grids_are_refused():
+    with pytest.raises(RigError, match="T17"):
+        build(SPEC, GRID, ["T17"])
+    with pytest.raises(RigError, match="cells"):
+        build(SPEC, GRID, NAMES)(state_of(SPEC, FINE))
