@@ -60,11 +60,9 @@ def test_wrong_words_are_answered_with_the_next_step(verbs, arguments, says):
     assert [path for path in verbs.folder.rglob("*") if path.is_file() and path.name != ".lock"] == []
 
 
-@pytest.mark.parametrize(
-    "words", [("list",), ("datasets",), ("show", "force", "biotac"), ("choose", "--task", "force")]
-)
+@pytest.mark.parametrize("words", ["list", "datasets", "show force biotac", "choose --task force"])
 def test_a_list_for_programs_is_one_json_document(verbs, words):
-    assert json.loads(verbs(*words, "--format", "json").stdout)
+    assert json.loads(verbs(*words.split(), "--format", "json").stdout)
 
 
 def test_help_imports_no_verb_and_listing_loads_no_numerics():
