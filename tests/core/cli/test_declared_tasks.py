@@ -84,9 +84,6 @@ def test_one_import_and_one_run_answer_a_question_of_a_table(pad):
     assert json.loads(row["declared_task"])["name"] == "where"
     assert "0 computed now" in pad(*run).stderr, "what was declared decides the key as a task does"
     pad("why", "where/replay/deployable/knn", "--again")
-    asked = ("--sensor", "pad", "--task", "where", "--recordings", "rec", "--estimator", "knn", "--rounds", "1")
-    costs = {row["estimator"]: row for row in json.loads(pad("cost", *asked, "--format", "json").stdout)}
-    assert costs["knn"]["score"] < costs["mean"]["score"]
     with unrendered():
         pad("report")
     drawn = {path.name for path in (pad.folder / "tactbench-results" / "report" / "figures").iterdir()}
@@ -123,7 +120,6 @@ LINE = 1 + PAD.splitlines().index("tasks:")
     ("old", "new", "says"),
     [
         ("names: [x, y]", "names: [x, z]", "It has x, y"),
-        ("[session, recording]", "[sesion]", "asks for the split sesion"),
         ("[session, recording]", "[]", f"pad.yaml:{LINE + 4}"),
         ("source: vector, kind: position, names: [x, y], unit: mm", "source: label, name: colour", "the label colour"),
     ],

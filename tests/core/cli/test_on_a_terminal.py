@@ -109,8 +109,3 @@ def test_without_a_terminal_somebody_has_to_be_there(monkeypatch):
         monkeypatch.setattr(sys, "stdin", nothing)
         with pytest.raises(RigError, match=r"Somebody has to be there: Place the cap\..*--yes"):
             TerminalOperator().prompt("Place the cap.")
-
-
-def test_yes_goes_on(capsys):
-    TerminalOperator(yes=True).prompt("Place the cap.")
-    assert capsys.readouterr().err == "Place the cap.\n"

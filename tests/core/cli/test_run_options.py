@@ -12,7 +12,6 @@ from tactbench.plugin import load_registry
 from tests.conftest import Verbs
 from tests.core.evaluation.made import record
 from tests.core.evaluation.made_slip import campaign
-from tests.core.report.html import Reader
 from tests.core.report.unrendered import unrendered
 
 CHEAPEST = ("--set", "rung=closed-form")
@@ -75,12 +74,9 @@ def test_probes_say_whether_the_first_frame_tells(verbs):
     run = ("run", "--recordings", "grasps", "--task", "object-identity", "--estimator", "logistic", "--probe")
     for text in (verbs(*run).stdout, verbs("leaderboard").stdout):
         assert re.search(r"\bLEAK$", text, re.MULTILINE)
-    rows = json.loads((verbs.folder / "tactbench-results" / "leaderboard.json").read_text())
-    ways = [(row["protocol"], row["split"]) for row in rows if row["estimator"] == "logistic"]
-    assert ways == [("deployable", "trial"), ("first-frame", "trial"), ("deployable", "shuffled")]
 
 
-def test_events_in_time_go_from_the_row_to_tables_why_cost_and_report(verbs):
+def test_events_in_time_go_from_the_row_to_tables_why_and_cost(verbs):
     (verbs.folder / "made").mkdir()
     campaign(verbs.folder / "made")
     asked = ("--recordings", "made", "--task", "slip", "--estimator", "pac-band", "--estimator", "frame-difference")
@@ -95,13 +91,7 @@ def test_events_in_time_go_from_the_row_to_tables_why_cost_and_report(verbs):
     assert "Events, at the threshold" in verbs("leaderboard", "--wide").stdout
     assert re.search(r"false alarms per minute +0\n", verbs("why", "made/slip/replay/deployable/pac-band").stdout)
     with unrendered():
-        shown = verbs("cost", "--sensor", "made", *asked, "--rounds", "1").stdout
-        verbs("report")
-    (line,) = [line.split() for line in shown.splitlines() if line.strip().startswith("pac-band")]
-    folder = verbs.folder / "tactbench-results"
-    rows = json.loads((folder / "cost" / "made-slip.json").read_text())["rows"]
-    (parts,) = [one["delay_parts_ms"] for one in rows if one["estimator"] == "pac-band"]
+        assert "pac-band" in verbs("cost", "--sensor", "made", *asked, "--rounds", "1").stdout
+    costs = json.loads((verbs.folder / "tactbench-results" / "cost" / "made-slip.json").read_text())["rows"]
+    (parts,) = [one["delay_parts_ms"] for one in costs if one["estimator"] == "pac-band"]
     assert (parts["window"], parts["sampling"]) == (50.0, 10.0)
-    page = Reader((folder / "report" / "index.html").read_text())
-    assert page.wrong == []
-    assert " ".join(line) in page.text, "the page shows the ladder as the terminal does"

@@ -30,7 +30,7 @@ many = settings(max_examples=30)
 views = st.sampled_from((DEFAULT_VIEW, WHOLE, View(columns=("estimator", "score", "cell"))))
 
 
-def written(shape, rows, provenance=(), *, times=True):
+def written(shape, rows, *provenance, times=True):
     return rendered(build_table(rows, provenance, times=times), shape)
 
 
@@ -49,7 +49,7 @@ def test_json_csv_parquet_and_excel_hold_the_cells_of_the_table(rows, times):
     ]
     of_csv = list(csv.DictReader(io.StringIO(written("csv", rows, times=times).decode(), newline="")))
     assert [tuple(entry[f"shown_{name}"] for name in names) for entry in of_csv] == lines
-    read = pq.read_table(io.BytesIO(written("parquet", rows, [{"host": "one"}], times=times)))
+    read = pq.read_table(io.BytesIO(written("parquet", rows, {"host": "one"}, times=times)))
     assert list(zip(*(read[f"shown_{name}"].to_pylist() for name in names), strict=True)) == lines
     assert read["score"].to_pylist() == [one["score"] for one in table.rows]
     assert json.loads(read.schema.metadata[b"tactbench.provenance"]) == ([{"host": "one"}] if times else [])
@@ -90,7 +90,7 @@ def test_without_times_nothing_is_left_that_a_machine_decides():
     here = row(host="here", concurrency=4, made_by="x", key="k", delay_parts_ms={"prediction": 1.0})
     there = here | dict.fromkeys(OF_THE_MACHINE)
     for shape in ("json", "csv", "md", "latex", "parquet"):
-        one, other = (written(shape, [rows], [{"host": rows["host"]}], times=False) for rows in (here, there))
+        one, other = (written(shape, [rows], {"host": rows["host"]}, times=False) for rows in (here, there))
         assert one == other
         assert written(shape, [here]) != written(shape, [there]) or shape == "latex"
 

@@ -19,7 +19,6 @@ ENDS = {
     "evil-eat": ("out-of-memory", None, "more than 200 MB"),
     "evil-import": ("crashed", 6, "SIGABRT"),
     "evil-patch": ("done", None, ""),
-    "evil-built-elsewhere": ("done", None, ""),
 }
 """Status, signal and a part of the reason of every evil cell."""
 
@@ -58,15 +57,6 @@ def test_a_file_that_cannot_be_read_costs_its_own_cells_only(tmp_path):
     rows = json.loads(Verbs(tmp_path, here=True)(*ANY_SENSOR, code=1).stdout)
     ends = {(row["sensor"], row["status"], "flat.h5" in str(row["reason"])) for row in rows}
     assert ends == {("made", "done", False), ("icub", "failed", True)}
-
-
-def test_a_shelf_that_cannot_be_read_at_all_has_rows_where_a_sensor_is_named(tmp_path):
-    (tmp_path / "shelf").mkdir()
-    (tmp_path / "shelf" / "a.h5").write_bytes(b"no recording at all")
-    verbs = Verbs(tmp_path, here=True)
-    assert "a.h5" in verbs(*ANY_SENSOR, code=2).stderr
-    rows = json.loads(verbs(*ANY_SENSOR, "--sensor", "made", code=1).stdout)
-    assert [(row["status"], "a.h5" in row["reason"]) for row in rows] == [("failed", True)] * 3
 
 
 @pytest.mark.parametrize(

@@ -90,7 +90,6 @@ def refused(tmp_path, *folders) -> str:
     [
         ({"score": 2.0, "key": key(1)}, {"score": 2.0 * (1 + 1e-10), "key": key(2)}, None),  # its data differ in a bit
         ({"score": 2.0}, {"score": 2.0 * (1 + 1e-8)}, "score 2.0"),
-        ({"scores": {"mae": 1.0}}, {"scores": {"mae": 1.1}}, "scores"),
         ({"fit_s": 1.0, "peak_rss_mb": 90.0}, {"fit_s": 7.0, "peak_rss_mb": 80.0}, None),
         ({"sections": {**SECTIONS, "versions": {"numpy": "1.26"}}}, {}, "versions: numpy"),
         ({"sections": {**SECTIONS, "data": {"s": "other"}}}, {}, None),

@@ -37,7 +37,6 @@ def test_a_task_may_state_how_often_it_is_recorded_anew_and_the_matrix_overrules
 @pytest.mark.parametrize(
     ("choice", "says"),
     [
-        (TaskChoice(name="forse"), "'force'"),
         (TaskChoice(name="force", estimators=(EstimatorChoice(name="forest", params={"trees": 5}),)), "n_estimators"),
         (TaskChoice(name="curvature", estimators=(EstimatorChoice(name="lasso"),)), "classification"),
     ],
@@ -49,20 +48,6 @@ def test_a_choice_that_is_not_there_is_answered_with_what_is(registry, choice, s
 
 def ways(cells):
     return [(cell.protocol, cell.split) for cell in cells if not cell.baseline]
-
-
-def test_several_protocols_and_splits_give_cells_for_every_pair(registry):
-    protocols, splits = ("karl2016", "karl2016-training-scale", "deployable"), ("roles", "unit")
-    cells = plan(registry, TaskChoice(name="force", protocol=protocols, split=splits))
-    assert ways(cells) == [(protocol, split) for protocol in protocols for split in splits]
-    assert len({cell.name for cell in cells}) == len(cells)
-    # Every pair has its baselines beside it.
-    assert len(cells) == 3 * len(ways(cells))
-
-
-def test_few_shot_stands_for_all_of_a_tasks_few_shot_splits(registry):
-    cells = plan(registry, TaskChoice(name="force", protocol="deployable", split=("few-shot", "few-shot-5", "unit")))
-    assert [split for _, split in ways(cells)] == ["few-shot-1", "few-shot-2", "few-shot-5", "few-shot-10", "unit"]
 
 
 def test_a_pair_that_does_not_go_together_is_refused_alone_and_planned_among_others(registry):

@@ -3,6 +3,7 @@
 import pytest
 
 from tactbench.core.errors import UsageError
+from tactbench.core.matrix.progress import Progress
 from tactbench.core.matrix.run import EngineChoice, run_matrix
 from tactbench.core.matrix.solve import TIMED
 from tactbench.core.matrix.store import Store
@@ -21,7 +22,7 @@ def matrix(*estimators, repeats=2, **more):
     return MatrixSpec(rig="replay", sensors=("made",), tasks=(choice,), repeats=repeats, **more)
 
 
-class Heard:
+class Heard(Progress):
     """Receives what a run tells."""
 
     def __init__(self):
@@ -32,9 +33,6 @@ class Heard:
 
     def advance(self, what, *, stopped=False):
         self.steps.append(what)
-
-    def working(self, what):
-        raise AssertionError("a run tells steps")
 
     def show(self, rows):
         self.shown.append([row["cell"] for row in rows])

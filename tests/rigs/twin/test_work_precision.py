@@ -22,11 +22,11 @@ from tests.rigs.twin.conftest import TWIN, q
 @pytest.fixture
 def bonded(monkeypatch) -> SensorDescriptor:
     """A third party's pad: E 0.5 MPa, nu 0.45, 4 mm thick, contact stiffness 10 MPa/mm."""
-    monkeypatch.syspath_prepend(str(THIRD_PARTY / "bonded"))
-    import bonded_tactile
+    monkeypatch.syspath_prepend(str(THIRD_PARTY / "good"))
+    import acme_tactile
 
-    yield bonded_tactile.tactbench_sensors()[0]
-    for name in [name for name in sys.modules if name.partition(".")[0] == "bonded_tactile"]:
+    yield acme_tactile.tactbench_sensors()[0]
+    for name in [name for name in sys.modules if name.partition(".")[0] == "acme_tactile"]:
         del sys.modules[name]
 
 

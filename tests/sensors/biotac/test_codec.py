@@ -165,9 +165,3 @@ def test_any_bytes_are_read_and_only_true_words_pass(word):
         assert encoded(reply.value) == word
     elif reply.fault is Fault.PARITY:
         assert not all(parity_holds(byte) for byte in word)
-
-
-@given(raw=st.binary(max_size=100), name=st.sampled_from(["flex version", "software version", "serial number"]))
-def test_any_bytes_are_a_property_or_none(raw, name):
-    shown = property_text(name, raw)
-    assert shown is None or shown.isprintable()

@@ -131,9 +131,3 @@ def test_a_stretched_disc_is_the_disc_on_the_stretched_grid():
     plain = RimmedDiscs(x, x, [Disc(2.0, 3.1, 0.6)], [Disc(6.0, 5.0, 0.8)])
     squeezed = RimmedDiscs(x / 2, 4 * x, [Disc(1.0, 12.4, 0.6, (2.0, 0.25))], [Disc(3.0, 20.0, 0.8, (2.0, 0.25))])
     assert resistance(plain, film) == pytest.approx(resistance(squeezed, film), rel=1e-12)
-
-
-def test_a_disc_that_covers_no_cell_is_refused():
-    axis = np.arange(10) + 0.5
-    with pytest.raises(RigError, match="covers no cell"):
-        RimmedDiscs(axis, axis, [Disc(5.0, 5.0, 0.3)], [Disc(2.5, 2.5, 0.6)])

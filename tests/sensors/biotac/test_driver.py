@@ -231,15 +231,6 @@ def test_a_host_that_is_late_leaves_a_gap_as_long_as_the_pause():
     assert np.abs(after["sequence"] - frames).max() <= 0.5
 
 
-def test_a_host_that_is_late_by_less_than_what_is_under_way_loses_nothing():
-    with virtual(Sensed(), holds=16, options={"batches_ahead": 16}) as (driver, _, clock):
-        driver.start()
-        for _ in range(10):
-            clock.now_ns += 150_000_000
-            driver.read(0.0)
-        assert driver.counts == {}
-
-
 def test_stopped_it_reads_nothing_and_begins_anew():
     with virtual(Sensed(), "parity:channels=E5") as (driver, link, _):
         assert driver.read(0.0) == []
@@ -273,34 +264,14 @@ def test_no_sensor_is_said():
         driver.identify()
 
 
-@contextmanager
-def emulated(exchange, speed_hz=4_400_000, **options):
-    """A driver of any device behind an adapter in virtual time."""
-    clock = Clock()
-    link = Adapter(exchange, clock, speed_hz=speed_hz)
-    with build(DriverSettings(lambda: link, options=options, clock=clock)) as driver:
-        yield driver
-
-
-def test_another_sensor_is_no_biotac_and_a_version_that_is_no_text_is_shown():
-    other = {"serial number": b"NT2P0220B11E0004", "flex version": b"BD", "software version": b"0238"}
-    with emulated(Emulator(properties=other).exchange) as driver, pytest.raises(RigError, match="begins with BT"):
+def test_another_sensor_is_no_biotac():
+    link = Adapter(Emulator(properties={"serial number": b"NT2P0220B11E0004"}).exchange, Clock())
+    with build(DriverSettings(lambda: link)) as driver, pytest.raises(RigError, match="begins with BT"):
         driver.identify()
-    odd = {"serial number": b"BT2P0220B11E0004", "software version": b"\x00\x01\x02\x03"}
-    with emulated(Emulator(properties=odd).exchange) as driver:
-        assert driver.identify() == {**SERIAL, "flex version": "a5 3f", "software version": "00 01 02 03"}
 
 
-def test_its_select_lines_are_used():
-    with virtual(Sensed(), options={"select": 6}) as (driver, _, _):
-        assert driver.identify() == SERIAL
-    with emulated(emulator(Sensed(), select=2).exchange) as driver:
-        driver.start()
-        assert (read_frames(driver, 2)["electrodes"]["quality"] == MISSING).all()
-
-
-def test_another_frame_and_shorter_batches():
-    options = {"frame": "PAC PDC, E1", "batch_words": 7}
+def test_another_frame_select_and_shorter_batches():
+    options = {"frame": "PAC PDC, E1", "batch_words": 7, "select": 6}
     with virtual(Sensed(), options=options) as (driver, _, _):
         slow, fast = driver.streams
         assert [channel.name for channel in slow.channels] == ["E1", "PDC"]
@@ -340,17 +311,9 @@ def test_an_unplugged_link_ends_the_reading_and_closes():
         driver.close()
 
 
-@pytest.mark.parametrize(
-    ("options", "said"),
-    [
-        ({"selct": 1}, "selct.*Did you mean 'select'"),
-        ({"select": 0}, "'select'.*greater than or equal to 1"),
-        ({"frame": "E1 E20"}, "names of channels"),
-    ],
-)
-def test_options_that_are_none_are_refused_before_the_link_is_opened(options, said):
-    with pytest.raises(UsageError, match=said):
-        build(DriverSettings(lambda: pytest.fail("opened"), options=options))
+def test_options_that_are_none_are_refused_before_the_link_is_opened():
+    with pytest.raises(UsageError, match="names of channels"):
+        build(DriverSettings(lambda: pytest.fail("opened"), options={"frame": "E1 E20"}))
 
 
 @pytest.mark.parametrize(
@@ -363,11 +326,6 @@ def test_a_clock_that_is_none_for_it_is_refused_and_the_link_closed(speed_hz, op
         build(DriverSettings(lambda: link, options=options))
     with pytest.raises(LinkError, match="closed"):
         link.receive(0.0)
-
-
-def test_a_link_of_another_kind_is_refused():
-    with pytest.raises(RigError, match=r"loop:// was given, .* needs an SPI link"):
-        build(DriverSettings(lambda: open_link("loop://")))
 
 
 @pytest.mark.skipif(os.name != "posix", reason="pseudo-terminals are POSIX")
@@ -387,14 +345,9 @@ def test_a_second_at_full_rate_through_the_bridge():
         streams = read_frames(driver, 100)
         counts = driver.counts
     slow, fast = streams["electrodes"], streams["vibration"]
-    assert np.median(np.diff(slow["device_ns"])) == pytest.approx(1e7, rel=1e-4)
-    assert (np.diff(slow["t_ns"]) >= 0).all()
     assert set(counts) <= {"batches late", "frames not asked for"}
     rows, unasked = len(slow["sequence"]), counts.get("frames not asked for", 0)
     assert (slow["sequence"][0], slow["sequence"][-1]) == (0, rows - 1 + unasked)
-    assert (np.diff(slow["sequence"]) >= 1).all()
-    assert np.array_equal(fast["sequence"], (22 * slow["sequence"][:, None] + np.arange(22)).ravel())
-    assert not slow["quality"].any()
-    assert not fast["quality"].any()
+    assert not any(stream["quality"].any() for stream in streams.values())
     slow["sequence"], fast["sequence"] = np.arange(rows), np.arange(22 * rows)
     assert_sensed(streams, sensed.frames())

@@ -113,17 +113,3 @@ def test_a_stuck_channel_holds_what_it_read_and_lets_go():
 def test_faults_that_are_none_are_refused(text, said):
     with pytest.raises(UsageError, match=said):
         BioTacFault.parse(text)
-
-
-def test_faults_as_a_rig_file_writes_them():
-    fault = BioTacFault.parse("error-reply:channels=E5+PAC,start_s=1.5,every=3,error=0x57")
-    assert fault == BioTacFault("error-reply", start_s=1.5, every=3, channels=frozenset({"E5", "PAC"}), error=0x57)
-
-
-@given(periods=st.lists(st.binary(max_size=5), max_size=20), pause_us=st.sampled_from([0, 60]))
-def test_any_bytes_are_answered_by_as_many_and_the_next_exchange_is_whole(periods, pause_us):
-    sensor, now_s = Emulator(lambda t_s: COUNTS), 0.0
-    for data in periods:
-        assert len(sensor.exchange(1, data, now_s)) == len(data)
-        now_s += 1e-5 + 1e-6 * pause_us
-    assert exchange(sensor, b"\xa2\x00", at_s=now_s) == b"\x6d\x58"

@@ -3,9 +3,8 @@
 import numpy as np
 import pytest
 
-from tactbench.plugin.simulation import SkinGrid
 from tactbench.sensors.biotac.electrodes import ELECTRODES
-from tactbench.sensors.biotac.film import core_mm, mid_film_mm, refined, spectral_interpolation
+from tactbench.sensors.biotac.film import core_mm, mid_film_mm, spectral_interpolation
 from tactbench.sensors.biotac.meshes import CORE_MM, ELECTRODES_MM
 from tactbench.sensors.biotac.sheet import faces_between
 from tactbench.sensors.biotac.spec import SKIN
@@ -51,29 +50,14 @@ def test_a_curved_film_conducts_as_its_middle_is_long():
     np.testing.assert_allclose(faces.along_x, step, rtol=1e-3)
 
 
-def test_refined_cells_fill_the_same_sheet():
-    grid = SkinGrid((np.arange(64) + 0.5) * 0.4, (np.arange(64) - 31.5) * 0.4)
-    fine = refined(grid, 2)
-    assert (fine.x_mm.size, fine.s_mm.size) == (96, 66)
-    for coarse, cells in ((grid.x_mm, fine.x_mm), (grid.s_mm, fine.s_mm)):
-        step = cells[1] - cells[0]
-        assert step * cells.size == pytest.approx(64 * 0.4)
-        assert cells[0] - step / 2 == pytest.approx(coarse[0] - 0.2)
-
-
-@pytest.mark.parametrize(("n", "factor"), [(16, 4), (64, 3)])
-def test_waves_below_nyquist_arrive_unchanged(n, factor):
-    to_fine = spectral_interpolation(n, n * factor)
-    coarse, fine = ((np.arange(cells) + 0.5) / cells for cells in (n, n * factor))
-    for wave in (0, 1, n // 2 - 1):
+@pytest.mark.parametrize(
+    ("n", "finer", "mirrored", "phase", "waves"),
+    # A mirrored sample goes on as its own image: half waves, too, which a period of the same length does not hold.
+    [(16, 64, False, 0.7, (0, 1, 7)), (64, 192, False, 0.7, (0, 1, 31)), (64, 96, True, 0.0, (0, 0.5, 3.5, 31.5))],
+)
+def test_waves_below_nyquist_arrive_unchanged(n, finer, mirrored, phase, waves):
+    to_fine = spectral_interpolation(n, finer, mirrored=mirrored)
+    for wave in waves:
+        coarse, fine = (np.cos(2 * np.pi * wave * (np.arange(cells) + 0.5) / cells + phase) for cells in (n, finer))
         # Exact in exact arithmetic; n terms of rounding. A missing half-cell shift is off by pi*wave/(2n).
-        there = np.cos(2 * np.pi * wave * fine + 0.7)
-        assert to_fine @ np.cos(2 * np.pi * wave * coarse + 0.7) == pytest.approx(there, abs=1e-12)
-
-
-def test_a_mirrored_sample_goes_on_as_its_own_image():
-    coarse, fine = (np.arange(64) + 0.5) / 64, (np.arange(96) + 0.5) / 96
-    for wave in (0, 1, 7, 63):
-        # Half waves, too, which a period of the same length does not hold.
-        there = spectral_interpolation(64, 96, mirrored=True) @ np.cos(np.pi * wave * coarse)
-        assert there == pytest.approx(np.cos(np.pi * wave * fine), abs=1e-12)
+        assert to_fine @ coarse == pytest.approx(fine, abs=1e-12)

@@ -1,11 +1,7 @@
 """The maker's text log, written here as the maker's library prints it."""
 
-from contextlib import suppress
-
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 from tactbench.plugin import DataError, Quality, UsageError
 from tactbench.sensors.biotac.codec import INDEX, encoded, parity_holds
@@ -123,30 +119,5 @@ def test_what_cannot_be_read_is_refused(log_of, tmp_path):
         log_of([])
     with pytest.raises(DataError, match="cannot be read"):
         read_log(tmp_path / "none.txt", {})
-    for options in ({"sensor": -1}, {"sensor": "left"}, {"speed": 1}, {"rate_hz": 0.0}):
-        with pytest.raises(UsageError, match=next(iter(options))):
-            log_of([], **options)
-
-
-@settings(max_examples=15)
-@given(
-    junk=st.lists(
-        st.one_of(
-            st.text(max_size=20),
-            st.lists(st.one_of(st.integers(), st.floats(), st.integers(0, 40)), max_size=8).map(
-                lambda numbers: " ".join(map(str, numbers))
-            ),
-            st.binary(max_size=50).map(lambda data: data.decode("latin-1")),
-        ),
-        max_size=8,  # fewer than the good frames, whose order is the log's
-    )
-)
-def test_any_text_is_read_or_refused_and_the_frames_after_it_are_whole(tmp_path_factory, junk):
-    path = tmp_path_factory.mktemp("log") / "log.txt"
-    path.write_bytes("\n".join(junk).encode("utf-8", "surrogateescape"))
-    with suppress(DataError):
-        assert read_log(path, {"rate_hz": 4400.0}).blocks
-    path.write_text("\n".join([*junk, "", *printed(words(10))]), encoding="utf-8", errors="surrogateescape")
-    slow, fast = read_log(path, {}).blocks
-    assert not slow.quality[-9:].any()
-    assert not fast.quality[-198:].any()
+    with pytest.raises(UsageError, match="rate_hz"):
+        log_of([], rate_hz=0.0)

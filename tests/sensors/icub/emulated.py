@@ -1,11 +1,6 @@
-"""Emulated boards at the far end of a link: in virtual time, and behind a CAN adapter in real time."""
+"""Emulated boards at the far end of a link, in virtual time."""
 
-import os
-import select
-import threading
-import time
 from collections import deque
-from contextlib import contextmanager
 
 import numpy as np
 
@@ -80,30 +75,3 @@ def joined(blocks):
     """Return blocks one after the other."""
     return Block("taxels", *(np.concatenate([getattr(one, name) for one in blocks])
                              for name in ("t_ns", "data", "quality")))  # fmt: skip
-
-
-@contextmanager
-def served(bus, port):
-    """Let an emulator speak in real time, behind an adapter with Lawicel's commands that answers none of them."""
-    stop = threading.Event()
-
-    def serve():
-        buffer = b""
-        while not stop.is_set():
-            sent = []
-            if select.select([port.master], [], [], min(max(bus.next_s() - time.monotonic(), 0.0), 0.05))[0]:
-                *lines, buffer = (buffer + os.read(port.master, 4096)).split(b"\r")
-                for line in lines:
-                    if line[:1] == b"t":
-                        frame = CanFrame(int(line[1:4], 16), bytes.fromhex(line[5:].decode()))
-                        sent += bus.feed(frame, time.monotonic())
-            for _, frame in [*sent, *bus.poll(time.monotonic())]:
-                os.write(port.master, f"t{frame.id:03X}{len(frame.data)}{frame.data.hex().upper()}\r".encode())
-
-    thread = threading.Thread(target=serve)
-    thread.start()
-    try:
-        yield
-    finally:
-        stop.set()
-        thread.join()

@@ -2,7 +2,6 @@
 
 from dataclasses import replace
 
-import can
 import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
@@ -23,7 +22,6 @@ from tactbench.sensors.icub.codec import (
     read_version,
     reading,
     skin_frames,
-    skin_id,
     version_frame,
 )
 
@@ -67,10 +65,10 @@ MARKS = {"G": GOOD, "E": SATURATED, "R": SATURATED | SUSPECT, "S": SUSPECT, "M":
 
 WORDS = """
     0000: 0010:0 0020:1 0040:2 0080:3 0100:4 0200:5 0400:6 0800:7 1000:8 2000:9 4000:10 8000:11
-    0001: 0002: 0003: 8010:0,11 0801:7 FFF0:0,1,2,3,4,5,6,7,8,9,10,11 FFF2:0,1,2,3,4,5,6,7,8,9,10,11
+    0001: 0002: 0003: 0004: 0008: 8010:0,11 0801:7 FFF0:0,1,2,3,4,5,6,7,8,9,10,11 FFF2:0,1,2,3,4,5,6,7,8,9,10,11
     0550:0,2,4,6 00F0:0,1,2,3 0F00:4,5,6,7 F000:8,9,10,11
 """
-"""Bytes 6 and 7 of the tail, and the taxels out of range; 1 is no acknowledgement, 2 not connected."""
+"""Bytes 6 and 7 of the tail, and taxels out of range; 1 is no acknowledgement, 2 not connected, 4 and 8 reserved."""
 
 CHANGES = {
     (240, 2): "0 240, 1 240, 3 240, 4 239, 40 230, 400 140, 956 1, 959 1, 960 0, 1919 0, 1920 0*, -1 241, -4 241, "
@@ -99,18 +97,6 @@ def test_commands(text, command):
     wanted = frame(identifier, text[5:])
     assert command_frame(identifier & 0xF, command) == wanted
     assert read_command(wanted) == (identifier & 0xF, command)
-    bus = can.Bus(interface="slcan", channel="loop://", bitrate=1_000_000, sleep_after_open=0)
-    port = bus.serialPortOrig
-    try:
-        port.timeout = 30.0  # as a whole: a busy machine takes longer for a line than the millisecond it is by default
-        bus.send(can.Message(arbitration_id=wanted.id, data=wanted.data, is_extended_id=False))
-        said = []
-        while not said or not said[-1].startswith(b"t"):
-            said.append(port.read_until(b"\r").rstrip())
-        # What opens an adapter (IC-2), some of it twice, and then the command.
-        assert list(dict.fromkeys(filter(None, said))) == [b"C", b"S8", b"O", text.encode()]
-    finally:
-        bus.shutdown()
 
 
 @pytest.mark.parametrize("line", PAIRS.strip().splitlines(), ids=[f"IC-2.{n}" for n in range(1, 12)])
@@ -129,20 +115,6 @@ def test_pairs(line):
     assert sample.quality == tuple(MARKS[mark] for mark in marks)
 
 
-def test_short_tail_of_old_firmware_ic_2():
-    decoder = SkinDecoder(PERIOD_S)
-    (sample,) = fed(decoder, frame(0x4E3, HEAD), frame(0x4E3, TAIL))
-    assert (sample.taxels, sample.word, set(sample.quality)) == (bytes([240] * 12), None, {GOOD})
-    assert decoder.counts[14, 3].without_word == 1
-
-
-def test_no_skin_data_ic_2():
-    decoder = SkinDecoder(PERIOD_S)
-    assert fed(decoder, frame(0x4E3, "80" + HEAD[2:])) == []
-    assert decoder.foreign == 1
-    assert decoder.flush() == []
-
-
 @pytest.mark.parametrize("entry", WORDS.split(), ids=lambda entry: f"IC-3-{entry[:4]}")
 def test_error_words(entry):
     data, _, numbers = entry.partition(":")
@@ -154,7 +126,7 @@ def test_error_words(entry):
         assert set(sample.quality) == {MISSING}
     else:
         assert [taxel for taxel, mark in enumerate(sample.quality) if mark & SATURATED] == taxels
-        suspect = list(range(12)) if word & 1 else taxels
+        suspect = list(range(12)) if word & 0xD else taxels
         assert [taxel for taxel, mark in enumerate(sample.quality) if mark & SUSPECT] == suspect
     counts = decoder.counts[14, 3]
     assert counts.out_of_range == [int(taxel in taxels) for taxel in range(12)]
@@ -182,10 +154,8 @@ def test_version_as_the_firmware_lays_it_out():
 @pytest.mark.parametrize(
     "wrong",
     [
-        lambda: skin_id(-1, 0),
         lambda: command_frame(14, BoardSetup(period_ms=256)),
         lambda: command_frame(14, TriangleSetup(first=5, last=4)),
-        lambda: command_frame(14, TriangleSetup(cdc_offset=0x10000)),
         lambda: skin_frames(14, 3, [0] * 11),
         lambda: SkinDecoder(float("nan")),
     ],
@@ -204,16 +174,6 @@ def test_halves_pair_in_their_order_on_the_bus():
     assert decoder.counts[14, 3].named() == {"halves far apart": 1}
 
 
-def test_halves_of_different_samples_are_never_joined():
-    # The tail of the first and the head of the second are lost; values would join without a trace.
-    decoder = SkinDecoder(PERIOD_S)
-    first, second = fed(decoder, pair(0, 240)[0], pair(PERIOD_NS, 100)[1])
-    assert first.taxels[:7] == bytes([240] * 7)
-    assert first.quality[7:] == (MISSING,) * 5
-    assert second.taxels[7:] == bytes([100] * 5)
-    assert second.quality[:7] == (MISSING,) * 7
-
-
 def test_equal_samples_in_a_burst_are_not_doubled():
     # A host that was late reads several equal samples at one time.
     decoder = SkinDecoder(PERIOD_S)
@@ -225,16 +185,12 @@ def test_equal_samples_in_a_burst_are_not_doubled():
 def test_frames_of_wrong_length_and_kind_are_kept_out():
     decoder = SkinDecoder(PERIOD_S)
     head, tail = pair()
-    assert fed(decoder, replace(head, extended=True), CanFrame(0x4E3, b""), CanFrame(0x4E3, bytes([64]))) == []
-    assert fed(decoder, CanFrame(0x4E3, tail.data[:5])) == []
-    assert (decoder.foreign, decoder.counts[14, 3].malformed) == (2, 2)
+    wrong = (frame(0x4E3, "80" + HEAD[2:]), replace(head, extended=True), *(CanFrame(0x4E3, data) for data in (
+        b"", head.data[:1], tail.data[:5])))  # fmt: skip
+    assert fed(decoder, *wrong) == []
+    assert (decoder.foreign, decoder.counts[14, 3].malformed) == (3, 2)
     (sample,) = fed(decoder, head, tail)
     assert set(sample.quality) == {GOOD}
-
-
-def test_reserved_bits_make_a_sample_suspect():
-    (sample,) = fed(SkinDecoder(PERIOD_S), *pair(word=0x0004))
-    assert set(sample.quality) == {SUSPECT}
 
 
 frames = st.builds(

@@ -111,5 +111,3 @@ def test_what_cannot_be_read_is_refused(tmp_path):
     file = write(tmp_path / "log.asc", [CanFrame(0x4E0, b"\x40\x01"), CanFrame(0x4E0, b"\x40\x01", t_ns=20_000_000)])
     with pytest.raises(DataError, match="no whole frame"):
         read_log(file, {})
-    with pytest.raises(UsageError, match="Did you mean 'board'"):
-        read_log(file, {"bord": 1})

@@ -47,14 +47,6 @@ def test_gaussian_pressure_widens_the_influence(force, x, s):
     assert reading(FINE, pressure) == pytest.approx(by_hand, rel=5e-3, abs=S * force * 1e-5)
 
 
-def test_a_point_load_draws_the_influence():
-    pressure = np.zeros((192, 192))
-    pressure[100, 80] = 2.0 / np.prod(FINE.cell_mm)
-    # The mean of the Gaussian over the one loaded cell differs by r^2 dx^2 / (24 sigma^4): 0.5 % at the far corner.
-    expected = S * 2.0 * np.exp(-away2(FINE.x_mm[100], FINE.s_mm[80]) / (2 * SIGMA**2))
-    assert reading(FINE, pressure) == pytest.approx(expected, rel=1e-2)
-
-
 def test_readings_add_and_scale_with_pressure_and_come_in_the_order_asked_for():
     one, two = np.random.default_rng(5).random((2, 48, 48))
     together = reading(GRID, one + 3.0 * two)

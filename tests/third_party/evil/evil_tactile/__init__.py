@@ -5,29 +5,19 @@ from tactbench.plugin import EstimatorDescriptor, RigDescriptor, hookimpl
 TACTBENCH_API = 2
 KINDS = ("regression", "classification")
 ESTIMATORS = {
-    "evil-raise": "Raises",
-    "evil-abort": "Aborts, as in a segmentation fault",
-    "evil-hang": "Never comes back",
-    "evil-eat": "Takes memory without end",
-    "evil-built-elsewhere": "Changes the working folder when it is built",
+    "evil-raise": "answers:evil_raise",
+    "evil-abort": "answers:evil_abort",
+    "evil-eat": "answers:evil_eat",
+    "evil-import": "aborting:build",
+    "evil-patch": "patch:build",
 }
 
 
 @hookimpl
 def tactbench_estimators():
     return [
-        EstimatorDescriptor(name=name, title=title, kinds=KINDS, where=f"evil_tactile.answers:{name.replace('-', '_')}")
-        for name, title in ESTIMATORS.items()
-    ] + [
-        EstimatorDescriptor(
-            name="evil-import", title="Aborts when it is imported", kinds=KINDS, where="evil_tactile.aborting:build"
-        ),
-        EstimatorDescriptor(
-            name="evil-patch",
-            title="Patches NumPy and scikit-learn when it is imported",
-            kinds=KINDS,
-            where="evil_tactile.patch:build",
-        ),
+        EstimatorDescriptor(name=name, title=name, kinds=KINDS, where=f"evil_tactile.{where}")
+        for name, where in ESTIMATORS.items()
     ]
 
 

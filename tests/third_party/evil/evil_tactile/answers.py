@@ -1,7 +1,6 @@
 """The code behind the estimators. What they do, they do when they are taught; otherwise they answer the mean."""
 
 import os
-import time
 
 import numpy as np
 
@@ -22,17 +21,8 @@ class Mean:
         return np.full(len(X), self.value)
 
 
-def _estimator(teach):
-    return lambda *, kind, seed, threads: Mean(teach)
-
-
 def _raise():
     raise RuntimeError("out of breath\nand of words")
-
-
-def _hang():
-    while True:
-        time.sleep(3600)
 
 
 def _eat():
@@ -41,18 +31,13 @@ def _eat():
         eaten.append(np.ones(2**20))
 
 
-def _built(first):
-    """Return what does something when it is built, and answers honestly."""
-
-    def build(*, kind, seed, threads):
-        first()
-        return Mean()
-
-    return build
+def evil_raise(*, kind, seed, threads):
+    return Mean(_raise)
 
 
-evil_built_elsewhere = _built(lambda: os.chdir("/"))
-evil_raise = _estimator(_raise)
-evil_abort = _estimator(os.abort)
-evil_hang = _estimator(_hang)
-evil_eat = _estimator(_eat)
+def evil_abort(*, kind, seed, threads):
+    return Mean(os.abort)
+
+
+def evil_eat(*, kind, seed, threads):
+    return Mean(_eat)

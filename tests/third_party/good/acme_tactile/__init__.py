@@ -1,4 +1,4 @@
-"""A sensor maker's plugin: a flat pad of four taxels on a soft layer."""
+"""A sensor maker's plugin: four taxels on a thick, soft, nearly incompressible layer."""
 
 from tactbench.plugin import ChannelSpec, SensorDescriptor, SensorSpec, Source, StreamSpec, assumed, hookimpl
 from tactbench.plugin.simulation import BondedLayer, Nuisances, SkinSheet
@@ -37,9 +37,9 @@ SPEC = SensorSpec(
             x_min=assumed(-6, "mm", MINE), x_max=assumed(6, "mm", MINE), arc=assumed(12, "mm", MINE), cells=(32, 32)
         ),
         young=assumed(0.5, "MPa", MINE),
-        poisson=assumed(0.3, "1", MINE),
-        thickness=assumed(2, "mm", MINE),
-        contact_stiffness=assumed(15, "MPa/mm", MINE),
+        poisson=assumed(0.45, "1", MINE),
+        thickness=assumed(4, "mm", MINE),
+        contact_stiffness=assumed(10, "MPa/mm", MINE),
     ),
     nuisances={
         "taxel": Nuisances(

@@ -1,4 +1,4 @@
-"""Mean pressure over each taxel, 4000 counts a MPa."""
+"""Mean pressure over each taxel, 1000 counts a MPa."""
 
 import numpy as np
 
@@ -14,6 +14,6 @@ def build(sensor, grid, channel_names):
     stacked = np.array(weights)
 
     def transduce(state):
-        return 100.0 + 4000.0 * np.tensordot(stacked, state.pressure_mpa, 2)
+        return 100.0 + 1000.0 * np.tensordot(stacked, state.pressure_mpa, 2)
 
     return transduce

@@ -1,8 +1,4 @@
-"""Asked with ``id``, started with ``go``, stopped with ``stop``; each sample is a line of numbers, its own first."""
-
-from dataclasses import replace
-
-import numpy as np
+"""Asked with ``id``, started with ``go``, stopped with ``stop``; each sample is a line of numbers."""
 
 from tactbench.plugin import RigError
 from tactbench.plugin.devices import ByteLink, LinkTimeout, RowDriver, Sample
@@ -28,17 +24,7 @@ class LineDriver(RowDriver[ByteLink]):
     def rows(self, received):
         *lines, self._text = (self._text + received.data).split(b"\n")
         for line in lines:
-            try:
-                number, *values = map(float, line.split())
-            except ValueError:
-                self.counted["lines that are no samples"] += 1
-            else:
-                self._numbers.append(int(number))
-                yield Sample(values)
-
-    def read(self, timeout_s):
-        self._numbers = []
-        return [replace(block, sequence=np.array(self._numbers)) for block in super().read(timeout_s)]
+            yield Sample([*map(float, line.split())])
 
     def quiet(self):
         self.link.write(b"stop\n")

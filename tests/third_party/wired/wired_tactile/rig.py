@@ -1,6 +1,5 @@
-"""Records what the pad at WIRED_LINK sends, for as long as the scene lasts."""
+"""Records what the pad sends, for as long as the scene lasts."""
 
-import os
 import time
 from contextlib import contextmanager
 from functools import partial
@@ -14,11 +13,10 @@ class WiredRig:
 
     def __init__(self, context):
         self.assumptions = self.drawn = {}
-        self._link = os.environ.get("WIRED_LINK", "loop://")
 
     @contextmanager
     def open(self, sensor, scene, *, seed):
-        with build(DriverSettings(partial(open_link, self._link))) as self._driver:
+        with build(DriverSettings(partial(open_link, "loop://"))) as self._driver:
             self.streams = self._driver.streams
             self._seconds = scene.profile.duration.to("s")
             yield self
