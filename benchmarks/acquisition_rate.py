@@ -121,7 +121,7 @@ class SyntheticDriver(Driver):
     def __init__(self, device: Device, port: int) -> None:
         self._device = device
         self._link = open_link(f"udp://127.0.0.1:{port}")
-        self._unwrap = Unwrap(BITS, device.rate_hz)
+        self._unwrap = Unwrap(BITS)
         self._datagrams = 0
 
     @property
@@ -165,7 +165,7 @@ class SyntheticDriver(Driver):
                 self._device.name,
                 times,
                 data.reshape(-1, self._device.channels),
-                sequence=self._unwrap(counts, times),
+                sequence=self._unwrap(counts),
                 device_ns=device_ns.astype(np.int64),
             )
         ]
