@@ -11,15 +11,7 @@ from tactbench.core.evaluation.protocols import KARL2016
 from tactbench.core.evaluation.sets import FeatureScale, keep, moments, part
 from tactbench.core.evaluation.splits import make_splits
 
-from .made import evaluated, force_task, ramp, record
-
-ROLES = ("train", "validation", "test")
-
-
-def three(folder, make, **more):
-    return [record(folder / f"{role}.h5", *make(place), role=role, session=role, **more)
-            for place, role in enumerate(ROLES)]  # fmt: skip
-
+from .made import evaluated, force_task, ramp, record, roles
 
 def sets(paths, role):
     data = load_dataset(force_task(), paths)
@@ -37,7 +29,7 @@ def test_a_sample_goes_if_any_channel_is_beyond_three_sigma_of_its_set(tmp_path)
         force[800] -= 500.0
         return X, force
 
-    kept, _, counts = sets(three(tmp_path, with_outliers), "test")
+    kept, _, counts = sets(roles(tmp_path, with_outliers), "test")
     assert counts["test rows with force beyond three sigma"] == 1
     X, force = with_outliers(2)
     late = np.column_stack([X, force])[600:]
@@ -47,7 +39,7 @@ def test_a_sample_goes_if_any_channel_is_beyond_three_sigma_of_its_set(tmp_path)
 
 
 def test_each_set_is_scaled_by_its_own_mean_and_deviation_all_its_recordings_pooled(tmp_path):
-    paths = three(tmp_path, ramp)
+    paths = roles(tmp_path)
     paths.append(record(tmp_path / "test-b.h5", *ramp(9, gain=(10.0, 5.0, 1.0)), role="test", session="test"))
     kept, one, _ = sets(paths, "test")
     assert set(kept.recording.tolist()) == {2, 3}
@@ -64,7 +56,7 @@ def test_a_channel_that_never_changes_becomes_zero_and_is_reported(tmp_path):
         X[:, 2] = 243.7
         return X, force
 
-    paths = three(tmp_path, stuck)
+    paths = roles(tmp_path, stuck)
     _, one, _ = sets(paths, "train")
     assert not one.X[:, 2].any()
     result = run(paths)
@@ -78,7 +70,7 @@ def run(paths, estimator="lasso", **more):
 
 def test_lasso_on_one_perfect_feature_is_wrong_by_exactly_lambda(tmp_path):
     """Objective 1/2n |y - Xb|² + l |b|: b = sd(y) - l, so the error is l times a unit z-score."""
-    paths = three(tmp_path, lambda seed: ramp(seed, gain=(50.0,), noise=0.0))
+    paths = roles(tmp_path, lambda seed: ramp(seed, gain=(50.0,), noise=0.0))
     result = run(paths, params={"lambda_": 0.2})
     assert result.chosen["k"] == 0
     assert result.dagger
@@ -87,7 +79,7 @@ def test_lasso_on_one_perfect_feature_is_wrong_by_exactly_lambda(tmp_path):
 
 
 def test_hyper_parameters_are_chosen_on_validation_and_never_see_the_test_set(tmp_path):
-    paths = three(tmp_path, lambda seed: ramp(seed, label_noise=0.5))
+    paths = roles(tmp_path, lambda seed: ramp(seed, label_noise=0.5))
     X, force = ramp(2, label_noise=0.5)
     altered = record(tmp_path / "altered.h5", X + 1e3, force * 3 - 1e3, role="test", session="test")
     one, other = run(paths), run([*paths[:2], altered])
@@ -99,7 +91,7 @@ def test_hyper_parameters_are_chosen_on_validation_and_never_see_the_test_set(tm
 
 
 def test_it_needs_the_three_roles_and_no_other_split(tmp_path):
-    paths = three(tmp_path, ramp)
+    paths = roles(tmp_path)
     with pytest.raises(NotApplicable, match="by roles only"):
         run(paths, split="session")
     with pytest.raises(NotApplicable, match="deployable"):

@@ -17,7 +17,7 @@ S = 1_000_000_000
 @pytest.mark.parametrize("name", ["exponential", "burst"])
 def test_the_error_is_within_the_bound(monkeypatch, name):
     """Bounds from measured tables over 30 s stretches; studies/clock_fit.py runs a thousand of each."""
-    monkeypatch.syspath_prepend(ROOT / "benchmarks")
+    monkeypatch.syspath_prepend(ROOT / "studies")
     import clock_fit as simulated
 
     for seed in range(4):
