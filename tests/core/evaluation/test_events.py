@@ -137,9 +137,6 @@ def test_compute_time_delays_alarms_and_changes_no_hit(paths):
     spent_ms = parts["features"] + parts["prediction"]
     assert late["compute s per s of signal"] == pytest.approx(spent_ms / 10.0)
     assert late["onset latency p50 ms"] == pytest.approx(at_once["onset latency p50 ms"] + spent_ms)
-    # At 10 mm/s.
-    moved_mm = at_once["displacement at detection p50 mm"] + 0.01 * spent_ms
-    assert late["displacement at detection p50 mm"] == pytest.approx(moved_mm)
     same = ("events", "misses", "precision", "recall", "false alarms per minute")
     assert [late[name] for name in same] == [at_once[name] for name in same]
 
@@ -151,7 +148,6 @@ def test_states_are_answered_a_frame_and_shown_under_other_thresholds(paths):
     assert result.score > 0.4  # a third is chance
     names = {"balanced accuracy with label thresholds halved", "macro F1 with label thresholds doubled"}
     assert names <= result.scores.keys()
-    assert run(paths, "majority", asked).score == pytest.approx(1 / 3, abs=1e-9)
 
 
 def test_code_for_features_must_give_a_line_a_frame(paths):

@@ -11,13 +11,12 @@ REGISTRY = load_registry()
 TASK = label_task("object", splits=("recording", "shuffled"))
 
 
-def grasps(folder, *, offset, each=12, n=20, seed=3):
+def grasps(folder, *, offset, each=12):
     """Three objects, `each` recordings of each: contact from row 5 on, and offsets before it that name the object."""
-    rng = np.random.default_rng(seed)
+    rng = np.random.default_rng(3)
     paths = []
     for number in range(3 * each):
-        X = rng.normal(0.0, 0.1, (n, 3))
-        X += offset * np.eye(3)[number % 3]
+        X = rng.normal(0.0, 0.1, (20, 3)) + offset * np.eye(3)[number % 3]
         X[5:] += 5.0 * np.eye(3)[number % 3]
         paths.append(record(folder / f"g{number:02d}.h5", X, labels={"object": f"o{number % 3}"}, trial=str(number)))
     return paths

@@ -13,6 +13,7 @@ from tactbench.core.evaluation.splits import make_splits
 
 from .made import evaluated, force_task, ramp, record, roles
 
+
 def sets(paths, role):
     data = load_dataset(force_task(), paths)
     (assignment,) = make_splits(data, "roles", 0)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tactbench.core.errors import DataError, NotApplicable, PluginContractError, UsageError
+from tactbench.core.errors import NotApplicable, PluginContractError, UsageError
 from tactbench.core.evaluation.dataset import load_dataset
 from tactbench.core.evaluation.fitting import voted
 from tactbench.core.evaluation.protocols import protocol_called
@@ -23,19 +23,14 @@ def task(**more):
     })  # fmt: skip
 
 
-def vote(**more):
-    return task(summaries=(), vote="frames", **more)
-
-
-def sequences(folder, number=24, n=40, seed=5, **more):
+def sequences(folder, number=24, **more):
     """Recordings of which every third slips: it shakes three times as much, about an offset that tells nothing."""
-    rng = np.random.default_rng(seed)
+    rng = np.random.default_rng(5)
     paths = []
     for place in range(number):
-        slips = place % 3 == 0
-        X = rng.normal(0, 3.0 if slips else 1.0, (n, 2)) + rng.normal(0, 50.0, 2)
-        labels = {"slip": "slipped" if slips else "stable", **{name: each(place) for name, each in more.items()}}
-        paths.append(record(folder / f"s{place:02d}.h5", X, labels=labels, trial=str(place)))
+        shakes, label = (1.0, "stable") if place % 3 else (3.0, "slipped")
+        X = rng.normal(0, shakes, (40, 2)) + rng.normal(0, 50.0, 2)
+        paths.append(record(folder / f"s{place:02d}.h5", X, labels={"slip": label}, trial=str(place), **more))
     return paths
 
 
@@ -51,7 +46,6 @@ def test_a_recording_is_one_answer_by_what_it_did_and_not_where_it_stood(tmp_pat
     assert sorted(result.sets["test"].recording.tolist()) == list(range(24))
     # Deviations of 1 and 3 from 40 samples are known to 11 %: eight standard errors apart.
     assert result.score == 1.0
-    assert run(task(), paths, estimator="majority").scores["accuracy"] == pytest.approx(16 / 24)
     assert result.interval.method.startswith("jackknife over 24 recordings ")
     assert "one answer a recording, from deviation, mean-step" in result.remarks
 
@@ -63,7 +57,8 @@ def test_the_delay_of_an_answer_holds_the_recording_it_waits_for(tmp_path):
     assert whole.answer_delay_ms == pytest.approx(sum(whole.delay_parts_ms.values()))
     part = task(summaries=(Summary(measure="deviation", start=0.1, end=0.3, unit="s"),))
     half = task(summaries=(Summary(measure="deviation", end=0.5),))
-    for asked, window_ms in ((task(), 390.0), (part, 200.0), (half, 195.0), (vote(), 390.0)):
+    votes = task(summaries=(), vote="frames")
+    for asked, window_ms in ((task(), 390.0), (part, 200.0), (half, 195.0), (votes, 390.0)):
         parts = run(asked, paths, estimator="logistic").times.delay_parts_ms
         assert parts["window"] == pytest.approx(window_ms)
     assert "window" not in run(task(), paths, estimator="majority").times.delay_parts_ms
@@ -82,18 +77,15 @@ def test_splits_keep_recordings_whole(tmp_path):
     assert "deals recordings at random" in run(task(), paths, "shuffled").stamps[0]
 
 
-@pytest.mark.parametrize("asked", [task(), vote()])
-def test_splits_and_answers_that_cut_recordings_are_refused_with_words(tmp_path, asked):
-    rng = np.random.default_rng(0)
-    paths = [record(tmp_path / f"s{place}.h5", rng.normal(size=(20, 2)), labels={"slip": place % 2},
-                    annotations={"press": np.repeat([1, 2], 10)}) for place in range(6)]  # fmt: skip
+def test_splits_and_answers_that_cut_recordings_are_refused_with_words(tmp_path):
+    halves = {name: np.repeat([1, 2], 20) for name in ("slip", "press")}
     with pytest.raises(NotApplicable, match="'in-session' cuts recordings in time"):
-        run(asked, paths, "in-session")
+        run(task(), sequences(tmp_path), "in-session")
     with pytest.raises(UsageError, match="cannot be split by 'press'"):
-        run(asked, paths, "press")
-    changing = record(tmp_path / "c.h5", rng.normal(size=(20, 2)), annotations={"slip": np.repeat([0, 1], 10)})
+        run(task(), sequences(tmp_path / "b", annotations={"press": halves["press"]}), "press")
+    changing = record(tmp_path / "c.h5", np.ones((40, 2)), annotations=halves)
     with pytest.raises(NotApplicable, match="asks one answer of each recording, and slip changes within 'c'"):
-        run(asked, [changing])
+        run(task(), [changing])
 
 
 TWO = sensor_of(
@@ -142,12 +134,7 @@ def test_every_stream_is_summarised_on_its_own_clock(tmp_path):
     # The gain of the filter at 200 Hz is within 1 % of 1; noise of 0.1 puts less than 0.01 into the band.
     assert energies[1::2] == pytest.approx([0.5] * 6, abs=0.02)
     assert max(energies[::2]) < 0.01
-    deviations = [table.X[0, 4] for table in found.tables]
-    assert deviations[1::2] == pytest.approx([np.sqrt(0.51)] * 6, abs=0.01)
     assert run(FAST, paths).score == 1.0
-    with pytest.raises(NotApplicable, match="taxels of recording 's00' is sampled at 50 Hz"):
-        run(task(features=("taxel", "ac_pressure"),
-                 summaries=(Summary(measure="band-energy", band_hz=(150.0, 300.0)),)), paths)  # fmt: skip
 
 
 def test_the_hold_is_tared_on_and_left_out_of_every_stream(tmp_path):
@@ -172,10 +159,6 @@ def other_names(streams):
     return {f"first {streams[0].data[0, 0]}": 0.0}
 
 
-def too_large(streams):
-    return {"large": 1e200}
-
-
 def not_a_number(streams):
     return {"bad": float("nan")}
 
@@ -186,8 +169,6 @@ def test_a_task_may_name_code_for_features_of_its_own(tmp_path):
     both = task(features_by=f"{HERE}:crest_factor")
     names = summarised(load_dataset(both, paths), both, protocol_called("deployable")).features
     assert (len(names), names[4:]) == (6, ("crest", "spread"))
-    with pytest.raises(DataError, match="cannot be computed with"):
-        run(task(features_by=f"{HERE}:too_large"), paths)
     for name, words in (("other_names", "other features"), ("not_a_number", "no finite number")):
         with pytest.raises(PluginContractError, match=words):
             run(task(summaries=(), features_by=f"{HERE}:{name}"), paths)
@@ -206,27 +187,16 @@ def test_frames_vote_and_of_equals_the_first_class_wins():
     assert mean.tolist() == [2.0, 5.0]
 
 
-def pushes(folder, number=18, n=60, seed=2):
-    """Recordings that rise to a force of their own, which the first channel follows; what it rests at tells nothing."""
-    rng = np.random.default_rng(seed)
-    paths, forces = [], rng.uniform(1.0, 9.0, (number, 1)) * np.sin(np.linspace(0, np.pi, n))
-    for place, force in enumerate(forces):
-        X = np.column_stack([10 * force, rng.normal(size=n)]) + rng.normal(0, 50.0, 2)
-        paths.append(record(folder / f"p{place:02d}.h5", X, force, trial=str(place)))
-    return paths, forces
-
-
-def number_task(reduce):
-    return force_task(
-        target=ChannelTarget(kind="force", reduce=reduce), answer_per="recording",
-        summaries=(Summary(measure="range"),), splits=("recording",), protocols=("deployable",),
-    )  # fmt: skip
-
-
-def test_a_number_of_a_recording_is_a_channel_reduced(tmp_path):
-    paths, forces = pushes(tmp_path)
-    for reduce, expected in (("max", forces.max(axis=1)), ("mean", forces.mean(axis=1))):
-        result = run(number_task(reduce), paths, estimator="ols")
-        assert sorted(result.sets["test"].y_true) == pytest.approx(sorted(expected))
-        assert result.score < 0.1, "the range of the first channel is ten times the force; the second is noise"
-    assert run(number_task("max"), paths, estimator="mean").score > 1.0
+@pytest.mark.parametrize("reduce", ["max", "mean"])
+def test_a_number_of_a_recording_is_a_channel_reduced(tmp_path, reduce):
+    rng = np.random.default_rng(2)
+    forces = rng.uniform(1.0, 9.0, (6, 1)) * np.sin(np.linspace(0, np.pi, 60))
+    paths = [record(tmp_path / f"{n}.h5", force[:, None], force, trial=str(n)) for n, force in enumerate(forces)]
+    target = ChannelTarget(kind="force", reduce=reduce)
+    asked = force_task(
+        target=target, answer_per="recording", summaries=(Summary(measure="range"),), splits=("recording",)
+    )
+    result = run(asked, paths, estimator="ols")
+    tested = result.sets["test"]
+    assert tested.y_true == pytest.approx(getattr(forces, reduce)(axis=1)[tested.recording])
+    assert result.score < 1e-9, "the range is the largest force, and the mean a share of it: rounding only"

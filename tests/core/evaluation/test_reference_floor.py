@@ -10,7 +10,7 @@ from tactbench.core.evaluation.reference_floor import FEWEST, Floor, beyond_floo
 from tactbench.core.samples import Answers
 from tactbench.core.spec.drive import ForceLoop
 
-from .made import evaluated, force_task, held, record
+from .made import evaluated, force_task, held, roles
 
 SIGMA = 0.6875
 
@@ -72,19 +72,17 @@ def test_a_reference_without_noise_leaves_the_rmse_as_it_is():
         assert found.score == pytest.approx(METRICS["rmse"].of(answers.y_true, answers.y_pred), rel=1e-12)
 
 
-def result_of(folder, *, simulated=True, scenes=True, hold=7.2, samples=400, **how):
+def result_of(folder, *, simulated=True, hold=7.2, samples=400, **how):
     """What three recordings of 60 s come to, whose reference errs and whose taxels are the true force."""
     folder.mkdir()
-    rng = np.random.default_rng(5)
-    paths = []
     t_ns = (np.arange(samples) * 60 / samples * 1e9).astype(np.int64)
     true = np.interp(t_ns * 1e-9, [0, hold, 60], [0, 0, 5])
-    for role in ("train", "validation", "test"):
-        force = true + SIGMA * rng.standard_normal(samples)
-        X = true[:, None] * [1.0, 2.0, -1.0] + 1e-3 * rng.standard_normal((samples, 3))
-        scene = held(role, hold, samples=samples, **how) if scenes else None
-        paths.append(record(folder / f"{role}.h5", X, force, t_ns=t_ns, role=role, session=role, scene=scene,
-                            simulated=simulated))  # fmt: skip
+
+    def make(place):
+        noise = np.random.default_rng(place).standard_normal((samples, 4))
+        return true[:, None] * [1.0, 2.0, -1.0] + 1e-3 * noise[:, :3], true + SIGMA * noise[:, 3]
+
+    paths = roles(folder, make, t_ns=t_ns, scene=held("held", hold, samples=samples, **how), simulated=simulated)
     return evaluated(force_task(protocols=("deployable",), splits=("roles",)), paths, split="roles")
 
 
@@ -105,7 +103,6 @@ def test_a_cell_tells_its_floor_and_the_error_against_the_true_force(tmp_path):
 @pytest.mark.parametrize(
     ("how", "why"),
     [
-        ({"scenes": False}, "states no unloaded hold"),
         ({"hold": 0.0}, "states no unloaded hold"),
         ({"drive": ForceLoop()}, "force loop"),
         ({"hold": 2.0}, f"fewer than {FEWEST}"),

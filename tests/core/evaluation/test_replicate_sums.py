@@ -21,13 +21,11 @@ def again(result):
 
 
 @pytest.mark.parametrize("metric", ["rmse", "mae", "r2"])
-@pytest.mark.parametrize("names", [("a", "b", "c"), tuple("fedcba")])
-def test_the_score_of_a_number_follows_from_the_sums(tmp_path, metric, names):
-    result = evaluated(force_task(metric=metric), sessions(tmp_path, names, n=90))
+def test_the_score_of_a_number_follows_from_the_sums(tmp_path, metric):
+    result = evaluated(force_task(metric=metric), sessions(tmp_path, n=90))
     assert again(result) == pytest.approx(result.score, rel=1e-12)
-    if len(names) < 5:
-        kept = result.replicates
-        assert (kept["unit"], kept["names"], kept["strata"]) == ("recording", list(names), None)
+    kept = result.replicates
+    assert (kept["unit"], kept["names"], kept["strata"]) == ("recording", ["a", "b", "c"], None)
 
 
 @pytest.mark.parametrize("metric", ["accuracy", "balanced_accuracy", "macro_f1"])
