@@ -15,6 +15,7 @@ from tactbench.core.errors import MissingRecordingError, NotApplicable
 from tactbench.core.recording.datasets import DataSet, dataset_called, datasets
 from tests.conftest import ROOT, Verbs
 from tests.core.matrix.plugin_packages import write_metadata
+from tests.core.recording.mapping.made import write_mapping
 
 MAPPINGS = ROOT / "examples" / "mappings"
 PRESSES = {
@@ -54,6 +55,7 @@ class Handler(BaseHTTPRequestHandler):
 @pytest.fixture
 def server():
     with Server() as one:
+        one.files = {name: text.encode() for name, text in PRESSES.items()}
         Thread(target=one.serve_forever, kwargs={"poll_interval": 0.01}, daemon=True).start()
         yield one
         one.shutdown()
@@ -66,36 +68,21 @@ def kept(tmp_path, monkeypatch):
     return tmp_path / "cache"
 
 
-def described(folder, address, name="pad", **source):
+def described(folder, address="", name="pad"):
     """A data set of three recordings, one file each."""
-    text = {
-        "version": 1, "title": "pad", "clock": "none",
-        "sensor": {"name": name, "title": "pad", "principle": "resistive",
-                   "principle_source": {"tag": "assumed", "reference": "none"}},
-        "tables": {"taxels": {"files": "press_*.csv", "read": {"format": "csv", "header": False}}},
-        "recording": {"name": "{file}", "session": "1"},
-        "streams": {"taxels": {"table": "taxels", "channels": [
-            {"columns": "0..1", "name": "t{column}", "kind": "taxel", "unit": "count"}]}},
-        "source": {
-            "address": address, "licence": "MIT", "citation": "nobody", "measured": "nothing", "tasks": ["force"],
-            "bytes": 1, "files": {name: hashlib.sha256(text.encode()).hexdigest() for name, text in PRESSES.items()},
-            **source,
-        },
-    }  # fmt: skip
+    text = f"""
+        clock: none
+        tables: {{table: {{files: press_*.csv, read: {{format: csv, header: false}}}}}}
+        streams:
+          taxels: {{table: table, channels: [{{columns: 0..1, name: "t{{column}}", kind: taxel, unit: count}}]}}
+        source: {{address: "{address}", licence: MIT, citation: nobody, measured: nothing, tasks: [force], bytes: 1}}
+    """
     folder.mkdir(parents=True, exist_ok=True)
-    (folder / f"{name}.yaml").write_text(yaml.safe_dump(text))
-    return DataSet(folder / f"{name}.yaml")
-
-
-def placed(folder):
-    folder.mkdir(parents=True)
-    for name, text in PRESSES.items():
-        (folder / name).write_text(text)
-    return folder
+    files = {press: hashlib.sha256(text.encode()).hexdigest() for press, text in PRESSES.items()}
+    return DataSet(write_mapping(folder / f"{name}.yaml", text, sensor__name=name, source__files=files))
 
 
 def test_it_is_fetched_and_imported_once(tmp_path, server, kept):
-    server.files = {name: text.encode() for name, text in PRESSES.items()}
     pad = described(tmp_path, server.address)
     assert not pad.imported.is_dir()
     folder = pad.recordings()
@@ -110,7 +97,7 @@ def test_it_is_fetched_and_imported_once(tmp_path, server, kept):
 
 
 def test_a_file_with_another_digest_is_refused_and_named_and_not_kept(tmp_path, server):
-    server.files = {name: text.encode() for name, text in PRESSES.items()} | {"press_2.csv": b"1,2\n"}
+    server.files["press_2.csv"] = b"1,2\n"
     pad = described(tmp_path, server.address)
     with pytest.raises(MissingRecordingError, match=rf"{re.escape(server.address)}press_2\.csv is not the file"):
         pad.recordings()
@@ -119,7 +106,6 @@ def test_a_file_with_another_digest_is_refused_and_named_and_not_kept(tmp_path, 
 
 
 def test_what_was_interrupted_goes_on_where_it_stopped(tmp_path, server):
-    server.files = {name: text.encode() for name, text in PRESSES.items()}
     server.cut = "press_2.csv"
     pad = described(tmp_path, server.address)
     with pytest.raises(MissingRecordingError, match=r"press_2\.csv could not be fetched"):
@@ -141,27 +127,24 @@ def test_offline_the_address_the_folder_and_the_option_are_named(tmp_path, serve
     assert "--root" in found.value.hint
 
 
-def test_a_copy_is_used_and_checked_and_nothing_is_fetched(tmp_path, server):
-    placed(tmp_path / "copy" / "pad")
-    assert len(list(described(tmp_path, server.address).recordings(tmp_path / "copy").glob("*.h5"))) == 3
-    assert server.asked == []
-    (tmp_path / "copy" / "pad" / "press_3.csv").write_text("1,2\n")
-    other = described(tmp_path, "", name="other")
-    with pytest.raises(MissingRecordingError, match=r"copy.*press_3\.csv is not the file"):
-        other.recordings(tmp_path / "copy")
-
-
-def test_what_lies_at_no_address_needs_a_copy(tmp_path):
-    pad = described(tmp_path, "")
+def test_what_lies_at_no_address_needs_a_copy_which_is_checked(tmp_path, server):
+    pad, copy = described(tmp_path), tmp_path / "copy" / "pad"
     with pytest.raises(NotApplicable, match="no public address") as found:
         pad.recordings()
     assert "--root" in found.value.hint
-    assert pad.recordings(placed(tmp_path / "copy")).is_dir()
-    assert pad.recordings().is_dir(), "and is kept"
+    copy.mkdir(parents=True)
+    for name, text in (PRESSES | {"press_3.csv": "1,2\n"}).items():
+        (copy / name).write_text(text)
+    with pytest.raises(MissingRecordingError, match=r"copy.*press_3\.csv is not the file"):
+        pad.recordings(copy)
+    (copy / "press_3.csv").write_text(PRESSES["press_3.csv"])
+    assert pad.recordings(copy) == pad.recordings(), "it is imported once"
+    assert described(tmp_path, server.address, "other").recordings(copy.parent).is_dir()
+    assert server.asked == []
 
 
 def test_a_plugin_brings_data_sets_as_files(tmp_path, monkeypatch):
-    described(tmp_path / "brings_a_pad" / "datasets", "")
+    described(tmp_path / "brings_a_pad" / "datasets")
     (tmp_path / "brings_a_pad" / "__init__.py").write_text("raise RuntimeError('nobody needs me')")
     write_metadata(tmp_path, "brings-a-pad", "1", points="pad = brings_a_pad")
     monkeypatch.syspath_prepend(tmp_path)
@@ -190,20 +173,10 @@ def test_from_an_empty_cache_to_the_table_of_a_run(tmp_path, server, shared_data
     source = yaml.safe_load(text)["source"]
     server.files = {name: (shared_data / "eflesh" / name).read_bytes() for name in source["files"]}
     (tmp_path / "eflesh-normal.yaml").write_text(text.replace(source["address"], server.address))
-    described(tmp_path, "", name="pad")  # cannot be had, which costs its own rows only
+    described(tmp_path)  # cannot be had, which costs its own rows only
     verbs = Verbs(tmp_path, here=True)
-    asked = (
-        "run",
-        "--dataset",
-        "eflesh-normal.yaml",
-        "--dataset",
-        "pad.yaml",
-        "--task",
-        "force",
-        "--estimator",
-        "ridge",
-    )
-    rows = json.loads(verbs(*asked, "--format", "json").stdout)
+    asked = "run --dataset eflesh-normal.yaml --dataset pad.yaml --task force --estimator ridge --format json"
+    rows = json.loads(verbs(*asked.split()).stdout)
     assert {(row["sensor"], row["status"]) for row in rows} == {("eflesh", "done"), ("pad", "skipped")}
     (score,) = (row["score"] for row in rows if (row["estimator"], row["split"]) == ("ridge", "session"))
     assert score == pytest.approx(0.839, abs=0.0005)  # docs/real-recordings.md, three decimals

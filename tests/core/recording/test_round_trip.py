@@ -64,8 +64,8 @@ def test_round_trip(made):
             read = recording.read("taxels")
         # Bytes, not values: NaN and the sign of zero must survive too.
         assert (read.data.dtype, read.data.tobytes()) == (data.dtype, data.tobytes())
-        for came, given in ((read.t_ns, times), (read.quality, None if flags is None or not flags.any() else flags)):
-            assert (came is None) if given is None else np.array_equal(came, given)
+        assert np.array_equal(read.t_ns, times)  # of None too
+        assert np.array_equal(read.quality, flags if flags is not None and flags.any() else None)
         assert np.array_equal(read.annotations["object"], notes)
         assert np.array_equal(read.annotations["press"], np.arange(len(data)))
         assert sorted(one.name for one in Path(folder).iterdir()) == ["x.h5"]
@@ -97,6 +97,4 @@ def test_an_ordinary_viewer_finds_signal_axes_units_and_names(write):
         assert [one.attrs["units"] for one in (taxels["data"], taxels["t_ns"], force["data"])] == ["count", "ns", "N"]
         assert taxels.attrs["channel_names"].tolist() == ["t0", "t1", "t2"]
         assert (taxels["data"].compression, taxels["data"].shuffle) == ("gzip", True)
-        assert (file.attrs["format"], file.attrs["complete"]) == ("tactbench-recording", True)
         assert [list(dimension.keys()) for dimension in taxels["data"].dims] == [["t_ns"], ["channel"]]
-        assert taxels["channel"].asstr()[:].tolist() == ["t0", "t1", "t2"]

@@ -12,6 +12,7 @@ from tactbench.core.samples import Quality
 
 from .made import write_mapping
 
+
 class Tables:
     """Imports the tables in ``data`` into ``out``, by the base mapping with changes."""
 
