@@ -52,12 +52,9 @@ def test_cut_short_anywhere(good):
             read_all(good)
 
 
-def _put(name, value):
-    def change(file):
-        del file[name]
-        file[name] = value
-
-    return change
+def _wider(file):
+    del file["streams/taxels/data"]
+    file["streams/taxels/data"] = np.zeros((3000, 4), dtype=np.uint16)
 
 
 def _one_reading(file):
@@ -70,7 +67,7 @@ def _one_reading(file):
         (lambda file: file.attrs.update({"format_version": 4}), "newer tactbench"),
         (lambda file: file.attrs.update({"meta": file.attrs["meta"][:-1] + ',"colour":"red"}'}), "colour"),
         (lambda file: file.pop("streams/taxels/data"), "no data of type uint16"),
-        (_put("streams/taxels/data", np.zeros((3000, 4), dtype=np.uint16)), r"\(3000, 3\)"),
+        (_wider, r"\(3000, 3\)"),
         (_one_reading, "digest"),
     ],
 )
@@ -114,10 +111,8 @@ def test_a_journal_cut_or_damaged_anywhere_keeps_what_was_before(tmp_path, share
     n = np.arange(10 * sum(end <= place for end in ends))
     try:
         with salvage(tmp_path / "copy.partial") as recording:
-            meta, taxels = recording.meta, recording.read("taxels") if recording.stream_names else None
+            meta, taxels = recording.meta, recording.read("taxels")
     except RecordingError:
-        taxels = None
-    if taxels is None:
         assert not len(n)
         return
     assert (meta.labels, meta.counts) == ({"object": "ball"}, {"boards": 2})

@@ -30,14 +30,6 @@ def renamed(row):
     return row | {"replicates": row["replicates"] | {"names": names}}
 
 
-def test_pairing_tells_apart_what_two_intervals_would_not():
-    """The sessions differ by far more than the sensors do, and alike for both."""
-    session = np.linspace(1, 9, 8)
-    one, other = mae_row("a", session), mae_row("b", session + np.linspace(0.09, 0.11, 8))
-    assert places([one, other]) == [1, 2]
-    assert places([one, renamed(other)]) == [1, 1]
-
-
 @settings(max_examples=25, deadline=None)
 @given(seed=st.integers(0, 10_000), spread=st.sampled_from([0.01, 0.1, 1.0]), order=st.permutations(range(6)))
 def test_order_and_names_change_nothing(seed, spread, order):
