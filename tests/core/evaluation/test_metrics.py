@@ -47,9 +47,7 @@ def test_sessions_are_resampled_where_there_are_enough():
     y = rng.normal(size=600)
     p = y + 0.3 * rng.normal(size=12)[cluster] + 0.01 * rng.normal(size=600)
     by_session = interval(y, p, cluster, cluster)
-    assert "12 sessions" in by_session.method
-    within = interval(y, p, cluster, np.zeros(600, dtype=int))
-    assert "spread between sessions is not in it" in within.method
+    within = interval(y, p, cluster, 0 * cluster)
     assert within.high - within.low < by_session.high - by_session.low, "time alone does not see the sessions' spread"
 
 

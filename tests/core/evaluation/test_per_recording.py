@@ -43,7 +43,6 @@ def test_a_recording_is_one_answer_by_what_it_did_and_not_where_it_stood(tmp_pat
     paths = sequences(tmp_path)
     result = run(task(), paths)
     assert (result.split, result.sizes.n_train) == ("recording", 4 * 24)
-    assert sorted(result.sets["test"].recording.tolist()) == list(range(24))
     # Deviations of 1 and 3 from 40 samples are known to 11 %: eight standard errors apart.
     assert result.score == 1.0
     assert result.interval.method.startswith("jackknife over 24 recordings ")

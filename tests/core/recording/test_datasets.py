@@ -2,7 +2,6 @@
 
 import hashlib
 import json
-import re
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from threading import Thread
 
@@ -18,9 +17,8 @@ from tests.core.matrix.plugin_packages import write_metadata
 from tests.core.recording.mapping.made import write_mapping
 
 MAPPINGS = ROOT / "examples" / "mappings"
-PRESSES = {
-    f"press_{name}.csv": "".join(f"{row},{row * 3 % 7}\n" for row in range(20)) + f"99,{name}\n" for name in "123"
-}
+ROWS = "".join(f"{row},{row * 3 % 7}\n" for row in range(20))
+PRESSES = {f"press_{name}.csv": f"{ROWS}99,{name}\n".encode() for name in "123"}
 
 
 class Server(ThreadingHTTPServer):
@@ -55,7 +53,7 @@ class Handler(BaseHTTPRequestHandler):
 @pytest.fixture
 def server():
     with Server() as one:
-        one.files = {name: text.encode() for name, text in PRESSES.items()}
+        one.files = dict(PRESSES)
         Thread(target=one.serve_forever, kwargs={"poll_interval": 0.01}, daemon=True).start()
         yield one
         one.shutdown()
@@ -68,6 +66,10 @@ def kept(tmp_path, monkeypatch):
     return tmp_path / "cache"
 
 
+def digests(files):
+    return {name: hashlib.sha256(content).hexdigest() for name, content in files.items()}
+
+
 def described(folder, address="", name="pad"):
     """A data set of three recordings, one file each."""
     text = f"""
@@ -78,28 +80,23 @@ def described(folder, address="", name="pad"):
         source: {{address: "{address}", licence: MIT, citation: nobody, measured: nothing, tasks: [force], bytes: 1}}
     """
     folder.mkdir(parents=True, exist_ok=True)
-    files = {press: hashlib.sha256(text.encode()).hexdigest() for press, text in PRESSES.items()}
-    return DataSet(write_mapping(folder / f"{name}.yaml", text, sensor__name=name, source__files=files))
+    return DataSet(write_mapping(folder / f"{name}.yaml", text, sensor__name=name, source__files=digests(PRESSES)))
 
 
 def test_it_is_fetched_and_imported_once(tmp_path, server, kept):
     pad = described(tmp_path, server.address)
-    assert not pad.imported.is_dir()
     folder = pad.recordings()
-    assert sorted(path.stem for path in folder.glob("*")) == ["press_1", "press_2", "press_3"]
-    assert sorted(server.asked) == sorted(PRESSES)
-    assert pad.recordings() == folder
-    assert len(server.asked) == 3, "nothing is fetched twice"
+    assert kept in folder.parents
     first, *others = tactbench.dataset(str(pad.path))
     assert first.streams["taxels"].data[-1].tolist() == [99, 1]
     assert len(others) == 2
-    assert kept in folder.parents
+    assert sorted(server.asked) == sorted(PRESSES), "nothing is fetched twice"
 
 
 def test_a_file_with_another_digest_is_refused_and_named_and_not_kept(tmp_path, server):
     server.files["press_2.csv"] = b"1,2\n"
     pad = described(tmp_path, server.address)
-    with pytest.raises(MissingRecordingError, match=rf"{re.escape(server.address)}press_2\.csv is not the file"):
+    with pytest.raises(MissingRecordingError, match=r"press_2\.csv is not the file"):
         pad.recordings()
     assert sorted(path.name for path in pad.files.iterdir()) == ["press_1.csv"]
     assert not pad.imported.exists()
@@ -117,13 +114,11 @@ def test_what_was_interrupted_goes_on_where_it_stopped(tmp_path, server):
 
 
 def test_offline_the_address_the_folder_and_the_option_are_named(tmp_path, server):
-    address = server.address
+    pad = described(tmp_path, server.address)
     server.shutdown()
     server.server_close()
-    pad = described(tmp_path, address)
-    with pytest.raises(MissingRecordingError) as found:
+    with pytest.raises(MissingRecordingError, match=rf"{server.address}press_1.csv could not be fetched") as found:
         pad.recordings()
-    assert f"{address}press_1.csv could not be fetched: no connection" in str(found.value)
     assert "--root" in found.value.hint
 
 
@@ -133,11 +128,11 @@ def test_what_lies_at_no_address_needs_a_copy_which_is_checked(tmp_path, server)
         pad.recordings()
     assert "--root" in found.value.hint
     copy.mkdir(parents=True)
-    for name, text in (PRESSES | {"press_3.csv": "1,2\n"}).items():
-        (copy / name).write_text(text)
+    for name, content in (PRESSES | {"press_3.csv": b"1,2\n"}).items():
+        (copy / name).write_bytes(content)
     with pytest.raises(MissingRecordingError, match=r"copy.*press_3\.csv is not the file"):
         pad.recordings(copy)
-    (copy / "press_3.csv").write_text(PRESSES["press_3.csv"])
+    (copy / "press_3.csv").write_bytes(PRESSES["press_3.csv"])
     assert pad.recordings(copy) == pad.recordings(), "it is imported once"
     assert described(tmp_path, server.address, "other").recordings(copy.parent).is_dir()
     assert server.asked == []
@@ -164,7 +159,7 @@ def test_the_shipped_ones_are_those_of_the_copies(shared_data):
         first = next(iter(one.source.files))
         (root,) = (place for place in shared_data.iterdir() if (place / first).is_file())
         contents = {path: (root / path).read_bytes() for path in one.source.files}
-        assert one.source.files == {path: hashlib.sha256(text).hexdigest() for path, text in contents.items()}, name
+        assert one.source.files == digests(contents), name
         assert one.source.bytes == sum(map(len, contents.values())), name
 
 

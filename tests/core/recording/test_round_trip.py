@@ -77,16 +77,15 @@ def test_the_digest_is_of_what_is_said_not_of_the_file(tmp_path):
     def digest(name, data, step):
         later = {"provenance": {"host": name}, "drawn": {"solver_residual": 1e-9 * step}}
         with RecordingWriter(tmp_path / name, about(name=name, **later)) as writer:
-            for first in range(0, 100, step):
-                part = slice(first, first + step)
-                writer.append(Block("taxels", np.arange(100)[part] * 1000, data[part], np.zeros_like(data[part])))
+            for rows in np.array_split(np.arange(100), step):
+                writer.append(Block("taxels", rows * 1000, data[rows], np.zeros_like(data[rows])))
         return content_digest(tmp_path / name)
 
     data = np.arange(300, dtype=np.uint16).reshape(100, 3)
-    digests = {digest("a.h5", data, 100), digest("b.h5", data, 7)}
-    assert len(digests) == 1
+    whole = digest("a.h5", data, 1)
+    assert digest("b.h5", data, 7) == whole
     data[50, 1] ^= 1
-    assert digest("changed.h5", data, 100) not in digests
+    assert digest("changed.h5", data, 1) != whole
 
 
 def test_an_ordinary_viewer_finds_signal_axes_units_and_names(write):
@@ -96,5 +95,4 @@ def test_an_ordinary_viewer_finds_signal_axes_units_and_names(write):
         assert (taxels.attrs["signal"], taxels.attrs["axes"].tolist()) == ("data", ["t_ns", "."])
         assert [one.attrs["units"] for one in (taxels["data"], taxels["t_ns"], force["data"])] == ["count", "ns", "N"]
         assert taxels.attrs["channel_names"].tolist() == ["t0", "t1", "t2"]
-        assert (taxels["data"].compression, taxels["data"].shuffle) == ("gzip", True)
         assert [list(dimension.keys()) for dimension in taxels["data"].dims] == [["t_ns"], ["channel"]]
