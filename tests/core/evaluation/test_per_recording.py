@@ -94,13 +94,12 @@ TWO = sensor_of(
 SLOW_HZ, FAST_HZ = 50, 2000
 
 
-def two_rates(folder, number=12, s=2.0, hold_s=0.0):
-    """Taxels of noise alone, and a fast stream that hums at 200 Hz where it slips; loaded after the hold, if any."""
-    rng = np.random.default_rng(2)
-    scene = held("held", hold_s, samples=100) if hold_s else None
-    slow_s, fast_s = np.arange(0, s, 1 / SLOW_HZ), np.arange(0, s, 1 / FAST_HZ)
+def two_rates(folder):
+    """Taxels of noise alone, and a fast stream that hums at 200 Hz where it slips; loaded after a hold of 0.5 s."""
+    rng, scene = np.random.default_rng(2), held("held", 0.5, samples=100)
+    slow_s, fast_s = np.arange(0, 2, 1 / SLOW_HZ), np.arange(0, 2, 1 / FAST_HZ)
     paths = []
-    for place in range(number):
+    for place in range(12):
         hum = (place % 2) * np.sin(2 * np.pi * 200 * fast_s) + rng.normal(0, 0.1, len(fast_s)) + 30.0
         blocks = (
             Block("taxels", (slow_s * 1e9).astype(np.int64), rng.normal(20.0, 1, (len(slow_s), 1))),
@@ -122,29 +121,24 @@ FAST = task(
 
 def test_every_stream_is_summarised_on_its_own_clock(tmp_path):
     """A hum of 200 Hz sampled at every fortieth sample would stand still; its energy is half its amplitude squared."""
-    paths = two_rates(tmp_path)
-    data = load_dataset(FAST, paths)
+    data = load_dataset(FAST, two_rates(tmp_path))
     found = summarised(data, FAST, protocol_called("deployable-untared"))
-    assert found.features == (
-        "p band-energy 150-300 Hz 0.5-1 of the recording of ac_pressure", "t mean", "p mean", "t deviation",
-        "p deviation",
-    )  # fmt: skip
+    assert found.features[1:] == ("t mean", "p mean", "t deviation", "p deviation")
     energies = [table.X[0, 0] for table in found.tables]
     # The gain of the filter at 200 Hz is within 1 % of 1; noise of 0.1 puts less than 0.01 into the band.
     assert energies[1::2] == pytest.approx([0.5] * 6, abs=0.02)
     assert max(energies[::2]) < 0.01
-    assert run(FAST, paths).score == 1.0
 
 
 def test_the_hold_is_tared_on_and_left_out_of_every_stream(tmp_path):
-    paths = two_rates(tmp_path, hold_s=0.5)
+    paths = two_rates(tmp_path)
     data = load_dataset(FAST, paths)
     tared, untared = (summarised(data, FAST, protocol_called(name)) for name in ("deployable", "deployable-untared"))
     # A mean of 25 and of 1000 samples less one of 75 and of 3000: 0.23 and 0.03 at most, four times that here.
     assert all(abs(table.X[0, 1]) < 1.0 and abs(table.X[0, 2]) < 0.1 for table in tared.tables)
     assert all(table.X[0, 1] == pytest.approx(20, abs=1) for table in untared.tables)
     result = run(FAST, paths)
-    assert result.tare_s == pytest.approx(0.5)
+    assert (result.tare_s, result.score) == (pytest.approx(0.5), 1.0)
     assert result.times.delay_parts_ms["window"] == pytest.approx(1500, abs=1e3 / SLOW_HZ)
 
 

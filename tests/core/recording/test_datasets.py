@@ -93,22 +93,17 @@ def test_it_is_fetched_and_imported_once(tmp_path, server, kept):
     assert sorted(server.asked) == sorted(PRESSES), "nothing is fetched twice"
 
 
-def test_a_file_with_another_digest_is_refused_and_named_and_not_kept(tmp_path, server):
-    server.files["press_2.csv"] = b"1,2\n"
+def test_what_was_cut_short_or_is_another_file_is_not_kept_and_the_next_attempt_goes_on(tmp_path, server):
     pad = described(tmp_path, server.address)
-    with pytest.raises(MissingRecordingError, match=r"press_2\.csv is not the file"):
-        pad.recordings()
-    assert sorted(path.name for path in pad.files.iterdir()) == ["press_1.csv"]
-    assert not pad.imported.exists()
-
-
-def test_what_was_interrupted_goes_on_where_it_stopped(tmp_path, server):
     server.cut = "press_2.csv"
-    pad = described(tmp_path, server.address)
     with pytest.raises(MissingRecordingError, match=r"press_2\.csv could not be fetched"):
         pad.recordings()
-    assert sorted(path.name for path in pad.files.iterdir()) == ["press_1.csv"]
-    server.cut, server.asked = "", []
+    server.cut, server.files["press_2.csv"] = "", b"1,2\n"
+    with pytest.raises(MissingRecordingError, match=r"press_2\.csv is not the file"):
+        pad.recordings()
+    assert [path.name for path in pad.files.iterdir()] == ["press_1.csv"]
+    assert not pad.imported.exists()
+    server.files, server.asked = PRESSES, []
     pad.recordings()
     assert server.asked == ["press_2.csv", "press_3.csv"]
 
@@ -175,4 +170,3 @@ def test_from_an_empty_cache_to_the_table_of_a_run(tmp_path, server, shared_data
     assert {(row["sensor"], row["status"]) for row in rows} == {("eflesh", "done"), ("pad", "skipped")}
     (score,) = (row["score"] for row in rows if (row["estimator"], row["split"]) == ("ridge", "session"))
     assert score == pytest.approx(0.839, abs=0.0005)  # docs/real-recordings.md, three decimals
-    assert "no public address" in verbs("run", "--dataset", "pad.yaml", code=1).stderr

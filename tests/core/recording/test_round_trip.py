@@ -8,6 +8,7 @@ import h5py
 import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
 
 from tactbench.core.recording.reader import content_digest, open_recording
 from tactbench.core.recording.writer import RecordingWriter
@@ -23,22 +24,16 @@ scalar = st.one_of(text, st.integers(-(2**53), 2**53), st.floats(allow_nan=False
 def recordings(draw):
     """A meta, the whole of its one stream, and where it is cut into blocks."""
     rows, channels = draw(st.integers(0, 40)), draw(st.integers(1, 4))
-    dtype = np.dtype(draw(st.sampled_from(DTYPES)))
-    rng = np.random.default_rng(draw(st.integers(0, 2**32)))
-    if dtype.kind == "f":
-        data = rng.normal(0, 10.0 ** draw(st.integers(-30, 30)), (rows, channels)).astype(dtype)
-        data[rng.random(data.shape) < 0.1] = np.nan
-    else:
-        limits = np.iinfo(dtype)
-        data = rng.integers(limits.min, limits.max, (rows, channels), dtype=dtype, endpoint=True)
-    timed = draw(st.booleans())
-    flags = rng.integers(0, 16, data.shape).astype(np.uint8) if draw(st.booleans()) else None
+    dtype, timed = draw(st.sampled_from(DTYPES)), draw(st.booleans())
+    finite = {"allow_infinity": False} if "float" in dtype else None
+    data = draw(arrays(dtype, (rows, channels), elements=finite))
+    flags = draw(arrays(np.uint8, data.shape, elements=st.integers(0, 15))) if draw(st.booleans()) else None
     meta = about(
-        channels, dtype.name, clock="host" if timed else "none", reference=(), session=draw(text),
+        channels, dtype, clock="host" if timed else "none", reference=(), session=draw(text),
         labels=draw(st.dictionaries(text, scalar, max_size=3)), remarks=tuple(draw(st.lists(text, max_size=2))),
         drawn=draw(st.dictionaries(text, scalar, max_size=3)),
     )  # fmt: skip
-    times = np.cumsum(rng.integers(0, 2**40, rows)) if timed else None
+    times = np.cumsum(draw(arrays(np.int64, rows, elements=st.integers(0, 2**40)))) if timed else None
     cuts = [0, *sorted(draw(st.lists(st.integers(0, rows), max_size=3))), rows]
     notes = np.array(draw(st.lists(text, min_size=rows, max_size=rows)), dtype=np.str_)
     return meta, times, data, flags, cuts, notes
