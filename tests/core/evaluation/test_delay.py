@@ -1,18 +1,16 @@
 """The answer delay: its parts against the filter that is used, the sum, and what the row says of it."""
 
-from contextlib import nullcontext
 from dataclasses import replace
 from functools import partial
 
 import numpy as np
 import pytest
 
-from tactbench.core.acquisition import acquire
 from tactbench.core.evaluation.dataset import load_dataset
 from tactbench.core.evaluation.delay import NO_LINK, NO_RATE, answer_delay_ms, stated_delay_ms
 from tactbench.core.evaluation.protocols import PROTOCOLS, protocol_called
 from tactbench.core.plugins.registry import load_registry
-from tactbench.plugin import Block, ForceRamp, RigDescriptor, Scene, assumed
+from tactbench.plugin import assumed
 from tests.core.evaluation.made import evaluated, force_task, ramp, roles, sensor
 
 TASK = force_task(protocols=tuple(PROTOCOLS))
@@ -27,7 +25,6 @@ def pressed(folder, *, timed=True, own_hz=None):
     return roles(folder, partial(ramp, n=1000), t_ns=clock, own_rates_hz=own_hz or {})
 
 
-IDEAL = load_registry().sensors["ideal"]
 OLS = load_registry().estimators["ols"].model_copy(update={"window_grid": (K,)})
 
 
@@ -78,25 +75,3 @@ def test_the_delay_of_a_cell_is_the_sum_of_its_parts_on_a_clock_that_counts_read
     assert result.times.answer_delay_ms == pytest.approx(252.0 + 2 * tick_ms)
     assert result.times.latency_n == 200
     assert NO_LINK in result.remarks
-
-
-class SlowRig:
-    """Samples the ideal sensor at 25 Hz."""
-
-    streams = (IDEAL.spec.streams[0].model_copy(update={"rate_hz": 25.0}),)
-    reference, plan, assumptions, drawn = (), (), {}, {}
-
-    def open(self, sensor, scene, *, seed):
-        return nullcontext(self)
-
-    def __iter__(self):
-        t_ns = np.arange(10, dtype=np.int64) * 40_000_000
-        yield from (Block(one.name, t_ns, np.zeros((10, len(one.channels)))) for one in self.streams)
-
-
-def test_a_recording_keeps_the_rate_of_the_sensor_that_it_was_not_sampled_at(tmp_path):
-    rig = RigDescriptor(name="slow", title="slow", where="nowhere:none")
-    done = acquire(SlowRig(), IDEAL, rig, Scene(name="s", profile=ForceRamp()), role=None, seed=1,
-                   path=tmp_path / "x.h5", clock=lambda: 0.0, provenance={})  # fmt: skip
-    assert done.meta.own_rates_hz == {"taxels": 100.0}
-    assert done.meta.sensor.link_delay == IDEAL.spec.link_delay
