@@ -56,14 +56,14 @@ def test_what_an_estimator_warns_of_is_counted_and_what_it_refuses_is_an_error_u
 
 
 def test_a_score_that_is_undefined_is_left_out_or_refused_never_nan(tmp_path):
-    X, force = ramp(0, n=200)
+    X, force = ramp(0)
     paths = [
-        record(tmp_path / "a.h5", X, force, session="a", role="train"),
-        record(tmp_path / "b.h5", X, np.full(200, 2.0), session="b", role="test"),
+        record(tmp_path / f"{role}.h5", X, y, session=role, role=role)
+        for role, y in (("train", force), ("test", 0 * force + 2))
     ]
     result = evaluated(force_task(), paths, "mean", split="roles")
     assert "r2" not in result.scores
-    with pytest.raises(DataError, match="r2 of 200 test rows is undefined"):
+    with pytest.raises(DataError, match="r2 of 1600 test rows is undefined"):
         evaluated(force_task(metric="r2"), paths, "mean", split="roles")
 
 
@@ -101,10 +101,7 @@ def test_a_number_that_cannot_be_computed_with_is_named(tmp_path):
 
 
 def test_a_class_that_no_training_row_has_is_named(tmp_path):
-    paths = [
-        record(tmp_path / f"{name}.h5", ramp(n, n=200)[0], session=str(n), labels={"kind": name})
-        for n, name in enumerate("abc")
-    ]
+    paths = [record(tmp_path / f"{n}.h5", *ramp(n), session=f"{n}", labels={"kind": "abc"[n]}) for n in range(3)]
     result = evaluated(label_task(), paths, "logistic", split="session")
     assert result.score == 0.0
     assert "tested but never trained on: 'a' in 0; 'b' in 1; 'c' in 2" in result.remarks

@@ -46,10 +46,9 @@ def test_silence_is_missing(keep, says):
 
 
 def test_rows_without_a_number_or_marked_missing_are_silence():
-    broken = lambda t_s: np.where(t_s < 3.0, t_s, np.nan)[:, None]  # noqa: E731
-    assert lacking(force=broken) == ["force: nothing for 7 s from 2.99 s on"]
-    found, row = Completeness(Allowed(), (), (FORCE,)), np.arange(100)
-    found.add(Block("force", row * 10**8, row[:, None], Quality.MISSING * (row > 50).astype(np.uint8)[:, None]))
+    found, row = Completeness(Allowed(), (), (FORCE,)), np.arange(100)[:, None]
+    quality = Quality.MISSING * (row > 50).astype(np.uint8) * (row < 75)
+    found.add(Block("force", row[:, 0] * 10**8, np.where(row < 75, row, np.nan), quality))
     assert found.lacking({}) == ["force: nothing for 4.9 s from 5 s on"]
 
 

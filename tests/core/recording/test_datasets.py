@@ -21,26 +21,13 @@ ROWS = "".join(f"{row},{row * 3 % 7}\n" for row in range(20))
 PRESSES = {f"press_{name}.csv": f"{ROWS}99,{name}\n".encode() for name in "123"}
 
 
-class Server(ThreadingHTTPServer):
-    """Serves `files`; of `cut` it sends half and hangs up."""
-
-    def __init__(self):
-        super().__init__(("127.0.0.1", 0), Handler)
-        self.files, self.cut, self.asked = {}, "", []
-
-    @property
-    def address(self):
-        return f"http://127.0.0.1:{self.server_port}/"
-
-
 class Handler(BaseHTTPRequestHandler):
+    """Serves the server's `files`; of `cut` it sends half and hangs up."""
+
     def do_GET(self):
         name = self.path.removeprefix("/")
         self.server.asked.append(name)
-        body = self.server.files.get(name)
-        if body is None:
-            self.send_error(404)
-            return
+        body = self.server.files[name]
         self.send_response(200)
         self.send_header("Content-Length", str(len(body)))
         self.end_headers()
@@ -52,8 +39,9 @@ class Handler(BaseHTTPRequestHandler):
 
 @pytest.fixture
 def server():
-    with Server() as one:
-        one.files = dict(PRESSES)
+    with ThreadingHTTPServer(("127.0.0.1", 0), Handler) as one:
+        one.files, one.cut, one.asked = dict(PRESSES), "", []
+        one.address = f"http://127.0.0.1:{one.server_port}/"
         Thread(target=one.serve_forever, kwargs={"poll_interval": 0.01}, daemon=True).start()
         yield one
         one.shutdown()

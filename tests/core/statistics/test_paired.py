@@ -105,4 +105,3 @@ def test_the_corrected_test_takes_folds_by_name_and_one_fold_says_nothing():
     assert (found.mean, found.p) == pytest.approx((0.4, 2 * stats.t.sf(0.4 / deviation, 2)))
     assert found.high - found.mean == pytest.approx(stats.t.ppf(0.975, 2) * deviation, rel=1e-9)
     assert over_folds(folded("a", {"x": 1.0}), folded("b", {"x": 2.0})) is None
-    assert over_folds(one, mae_row("old", [1.0] * 5)) is None

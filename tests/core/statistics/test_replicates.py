@@ -75,12 +75,9 @@ def test_recordings_keep_the_interval_over_their_sessions_and_lose_one_that_is_n
 
 def test_errors_of_force_are_compared_beyond_their_floor():
     known = {"metric": "rmse", "unit": "N", "reference_floor": 0.3}
-    rows = [
-        one | known | {"score_beyond_floor": (one["score"] ** 2 - 0.09) ** 0.5, "sensor": sensor}
-        for sensor, shift in (("a", 0.2), ("b", 0.3))
-        for one in replicates([score + shift for score in SCORES], sensor)
-    ]
-    one, other = over_replicates(rows)
+    rows = replicates([score + 0.2 for score in SCORES]) + replicates([score + 0.3 for score in SCORES], "b")
+    beyond = [one | known | {"score_beyond_floor": (one["score"] ** 2 - 0.09) ** 0.5} for one in rows]
+    one, other = over_replicates(beyond)
     found = difference(one, other)
     assert "beyond the floor" in found.method
     own, others = (each["replicates"]["beyond"] for each in (one, other))

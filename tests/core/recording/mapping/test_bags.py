@@ -109,9 +109,9 @@ def test_json_messages(tmp_path):
         for row in range(20):
             t_ns = START + row * 10**7
             stamp = {"sec": t_ns // 10**9, "nsec": t_ns % 10**9}
-            message = {"header": {"stamp": stamp}, "data": [row, 1, float("nan") if row == 3 else 2], "object": 1}
-            writer.add_message(taxels, t_ns, json.dumps(message).encode(), t_ns)
-            writer.add_message(force, t_ns, json.dumps({"force": {"z": row}, "t": row / 8}).encode(), t_ns)
+            press = {"header": {"stamp": stamp}, "data": [row, 1, np.nan if row == 3 else 2], "object": 1}
+            for channel, message in ((taxels, press), (force, {"force": {"z": row}, "t": row / 8})):
+                writer.add_message(channel, t_ns, json.dumps(message).encode(), t_ns)
     streams = imported(tmp_path, tables__force__time={"column": "t", "unit": "s", "epoch": "start"})
     assert np.isnan(streams["taxels"].data[3, 2])
     assert np.array_equal(streams["taxels"].t_ns, START + np.arange(20) * 10**7)
