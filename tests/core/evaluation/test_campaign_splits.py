@@ -61,7 +61,6 @@ def test_no_group_of_the_test_rows_is_in_training_nor_where_parameters_are_chose
 
 
 def test_sessions_are_taken_in_order_of_their_numbers(tmp_path):
-    (tmp_path / "test").mkdir()
     paths = sessions(tmp_path, ("day-10", "day-9", "day-2", "both"), ROWS, role="train")
     data = load_dataset(force_task(), paths + sessions(tmp_path / "test", ("both", "last"), ROWS, role="test"))
     assert training_sessions(data) == ["day-2", "day-9", "day-10"], "a session with a test recording never trains"

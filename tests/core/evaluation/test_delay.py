@@ -20,7 +20,6 @@ K = 40
 
 def pressed(folder, *, timed=True, own_hz=None):
     """Three recordings, one a role, of a sensor without a rate or a link of its own."""
-    folder.mkdir()
     clock = np.arange(1000, dtype=np.int64) * STEP_NS if timed else None
     return roles(folder, partial(ramp, n=1000), t_ns=clock, own_rates_hz=own_hz or {})
 

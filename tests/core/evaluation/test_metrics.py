@@ -37,8 +37,7 @@ def test_classification_metrics_are_those_of_scikit_learn(seed, n, classes):
 
 
 def interval(y, p, recording, cluster, metric="rmse", n_classes=0, seed=0):
-    unit = ReplicateUnits("session", cluster, ())
-    return score_interval(METRICS[metric], y, p, recording, unit, n_classes, seed)
+    return score_interval(METRICS[metric], y, p, recording, ReplicateUnits("session", cluster, ()), n_classes, seed)
 
 
 def test_sessions_are_resampled_where_there_are_enough():

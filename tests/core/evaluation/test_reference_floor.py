@@ -73,7 +73,6 @@ def test_a_reference_without_noise_leaves_the_rmse_as_it_is():
 
 def result_of(folder, *, simulated=True, hold=7.2, samples=400, **how):
     """What three recordings of 60 s come to, whose reference errs and whose taxels are the true force."""
-    folder.mkdir()
     t_ns = (np.arange(samples) * 60 / samples * 1e9).astype(np.int64)
     true = np.interp(t_ns * 1e-9, [0, hold, 60], [0, 0, 5])
 

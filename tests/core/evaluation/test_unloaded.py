@@ -22,7 +22,6 @@ HOLD, ROWS = 40, 200
 
 def three(folder, offsets=(0.0, 0.0, 0.0), hold=0.4, start=0.0):
     """A ramp after a hold, in three roles, each with an offset of its own."""
-    folder.mkdir()
     force = np.concatenate([np.zeros(HOLD), np.linspace(0, 5, ROWS - HOLD)])
 
     def make(place):

@@ -42,7 +42,7 @@ def test_versions_2_and_3(version, digest):
 def test_version_1():
     meta, taxels, force = kept(1, "e0fe66813c781466c2ecb4453c79c0a95bfe3fb75e7b41a3bbd2aecb3db4640f")
     assert (meta.session, meta.labels["cap_radius_mm"]) == ("a", 5.0)
-    assert np.array_equal(taxels.data, np.arange(18, dtype=np.uint16).reshape(6, 3))
+    assert np.array_equal(taxels.data, np.arange(18).reshape(6, 3))
     assert np.array_equal(taxels.t_ns, np.arange(6) * 10_000_000)
     assert np.argwhere(taxels.quality).tolist() == [[2, 1]]
     assert taxels.annotations["object"].tolist() == ["ball", "ball", "", "Bär", "cup", "cup"]

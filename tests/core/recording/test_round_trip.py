@@ -89,5 +89,5 @@ def test_an_ordinary_viewer_finds_signal_axes_units_and_names(write):
         taxels, force = file["streams/taxels"], file["streams/force_torque"]
         assert (taxels.attrs["signal"], taxels.attrs["axes"].tolist()) == ("data", ["t_ns", "."])
         assert [one.attrs["units"] for one in (taxels["data"], taxels["t_ns"], force["data"])] == ["count", "ns", "N"]
-        assert taxels.attrs["channel_names"].tolist() == ["t0", "t1", "t2"]
         assert [list(dimension.keys()) for dimension in taxels["data"].dims] == [["t_ns"], ["channel"]]
+        assert taxels["channel"].asstr()[:].tolist() == ["t0", "t1", "t2"]

@@ -14,27 +14,21 @@ from tests.core.recording.conftest import about
 START = 1_700_000_000_000_000_000
 
 
-def clocked(path, seed, blocks, lost, **fields):
-    """Write taxels over 40 s whose device's counter may begin again; return its times and the receipts."""
-    rng = np.random.default_rng(seed)
-    device = np.arange(4000, dtype=np.int64) * 10_000_000 + int(rng.integers(0, 2**40))
-    host = device + START + (device - device[0]) * 37 // 1_000_000 + rng.exponential(500_000, 4000).astype(int)
-    device[lost:] -= device[lost] if 0 < lost < 4000 else 0
-    with RecordingWriter(path, about(**fields), replace=True) as writer:
-        for rows in np.array_split(np.arange(4000), blocks):
-            writer.append(Block("taxels", host[rows], np.full((len(rows), 3), 9), device_ns=device[rows]))
-    return device, host
-
-
 @settings(max_examples=20, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(st.integers(0, 2**32), st.integers(1, 50), st.integers(0, 4000), st.sampled_from([None, "host"]))
 def test_stored_times_are_exactly_recomputed_or_as_they_came_where_the_device_is_no_clock(
     tmp_path, seed, blocks, lost, source
 ):
+    """Taxels over 40 s; the device's counter may begin again."""
+    rng = np.random.default_rng(seed)
+    device = np.arange(4000, dtype=np.int64) * 10_000_000 + int(rng.integers(0, 2**40))
+    host = device + START + (device - device[0]) * 37 // 1_000_000 + rng.exponential(500_000, 4000).astype(int)
+    device[lost:] -= device[lost] if 0 < lost < 4000 else 0
     clocks = {"taxels": StreamClock(source=source)} if source else {}
-    path = tmp_path / "x.h5"
-    device, host = clocked(path, seed, blocks, lost, clocks=clocks)
-    with open_recording(path) as recording:
+    with RecordingWriter(tmp_path / "x.h5", about(clocks=clocks), replace=True) as writer:
+        for rows in np.array_split(np.arange(4000), blocks):
+            writer.append(Block("taxels", host[rows], np.full((len(rows), 3), 9), device_ns=device[rows]))
+    with open_recording(tmp_path / "x.h5") as recording:
         recording.verify()
         read, found = recording.read("taxels"), recording.meta.clocks
     assert np.array_equal(read.device_ns, device)
