@@ -153,7 +153,7 @@ def other_names(streams):
 
 
 def not_a_number(streams):
-    return {"bad": float("nan")}
+    return {"bad": np.nan}
 
 
 def test_a_task_may_name_code_for_features_of_its_own(tmp_path):

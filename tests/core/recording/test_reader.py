@@ -44,7 +44,7 @@ def test_a_file_that_is_not_there_or_no_recording(tmp_path, read):
 
 def test_cut_short_anywhere(good):
     whole = good.read_bytes()
-    for length in {0, 8, len(whole) - 1, *np.random.default_rng(1).integers(len(whole), size=15)}:
+    for length in (0, 8, len(whole) - 1, *np.random.default_rng(1).integers(len(whole), size=15)):
         good.write_bytes(whole[:length])
         with pytest.raises(FormatError):
             read_all(good)

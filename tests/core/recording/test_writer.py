@@ -81,7 +81,6 @@ def test_an_exception_leaves_the_old_file_alone_and_the_journal_of_a_real_device
 def test_each_attempt_has_its_own_journal_and_no_recording_is_overwritten_unasked(tmp_path):
     """A crash left a journal; a second attempt succeeds; a third one ends while a recording is there."""
     path = tmp_path / "x.h5"
-
     with pytest.raises(RigError):
         record(path, about(), appending(0, 3), failing)
     kept = (tmp_path / "x.h5.partial").read_bytes()
