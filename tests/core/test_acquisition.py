@@ -21,9 +21,10 @@ from tactbench.core.spec.sensor import ChannelSpec, StreamSpec
 from tests.core.evaluation.made import FORCE, ticking
 from tests.core.recording.conftest import sensor
 
-TAXELS = StreamSpec(name="taxels", dtype="uint16", channels=(ChannelSpec(name="t1", kind="taxel"),))
+TAXELS = StreamSpec(name="taxels", dtype="uint16", rate_hz=1e3, channels=(ChannelSpec(name="t1", kind="taxel"),))
 SOUND = StreamSpec(name="sound", channels=(ChannelSpec(name="pac", kind="ac_pressure"),))
-SENSOR = SensorDescriptor(spec=sensor().model_copy(update={"streams": (TAXELS, SOUND)}))
+FASTER = TAXELS.model_copy(update={"rate_hz": 2e3})
+SENSOR = SensorDescriptor(spec=sensor().model_copy(update={"streams": (FASTER, SOUND)}))
 SCENE = Scene(name="cap", session="b", labels={"cap_radius_mm": 5.0})
 
 
@@ -82,7 +83,7 @@ def test_everything_the_rig_says_is_kept(tmp_path):
     assert (meta.name, meta.session, meta.role, meta.seed) == ("cap", "b", "train", 7)
     assert (meta.rig, meta.simulated, meta.scene, meta.labels) == ("weights", True, SCENE, {"cap_radius_mm": 5.0})
     assert (meta.plan, meta.assumptions, meta.drawn) == (Weights.plan, {"weight_n": 0.5}, {"offset_mm": 0.25})
-    assert meta.sensor.streams == (TAXELS,)  # only what was recorded
+    assert (meta.sensor.streams, meta.own_rates_hz) == ((TAXELS,), {"taxels": 2e3})  # as it was recorded
     assert (meta.clock, meta.clocks, meta.streams, meta.emulation) == ("simulated", {}, {}, None)
     assert rig.closed
 

@@ -68,10 +68,16 @@ def ramp(seed, n=1600, gain=(50.0, -20.0, 7.0), noise=1.0, label_noise=0.0):
     return X, force + rng.normal(0, label_noise, n)
 
 
-def sessions(folder, names=("a", "b", "c"), n=200, **more):
-    """Ramps, one a session."""
-    return [record(folder / f"{name}.h5", *ramp(place, n=n), session=name, **more)
+def sessions(folder, names=("a", "b", "c"), n=200, make=ramp, **more):
+    """Recordings of what `make` gives for a seed and `n` rows, one a session."""
+    return [record(folder / f"{name}.h5", *make(place, n=n), session=name, **more)
             for place, name in enumerate(names)]  # fmt: skip
+
+
+def roles(folder, make=ramp, **more):
+    """Recordings of what `make` gives for a seed, one a role."""
+    return [record(folder / f"{role}.h5", *make(place), role=role, session=role, **more)
+            for place, role in enumerate(("train", "validation", "test"))]  # fmt: skip
 
 
 def grasps(folder, role=None, objects=12, each=20, seed=0):

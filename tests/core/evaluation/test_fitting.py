@@ -2,6 +2,7 @@
 
 import warnings
 from collections import Counter
+from functools import partial
 
 import numpy as np
 import pytest
@@ -9,11 +10,9 @@ import pytest
 from tactbench.core.errors import DataError, PluginContractError
 from tactbench.core.evaluation.cell import evaluate, load_task
 from tactbench.core.evaluation.fitting import answers, fit
-from tactbench.core.plugins.registry import load_registry
+from tactbench.core.plugins.registry import installed
 
 from .made import evaluated, force_task, label_task, ramp, record, sessions, ticking
-
-ESTIMATORS = load_registry().estimators
 
 
 class Answering:
@@ -39,7 +38,6 @@ class Answering:
         (np.zeros((3, 1)), 0, r"shape \(3, 1\)"),
         (np.array([0.0, np.nan, np.inf]), 0, "2 values that are NaN"),
         (np.array(["a", "b", "c"]), 3, "type"),
-        (np.array([0, 1, 3]), 3, "do not exist"),
         (np.array([0.0, 0.5, 1.0]), 3, "do not exist"),
     ],
 )
@@ -58,57 +56,52 @@ def test_what_an_estimator_warns_of_is_counted_and_what_it_refuses_is_an_error_u
 
 
 def test_a_score_that_is_undefined_is_left_out_or_refused_never_nan(tmp_path):
-    X, force = ramp(0, n=200)
+    X, force = ramp(0)
     paths = [
-        record(tmp_path / "a.h5", X, force, session="a", role="train"),
-        record(tmp_path / "b.h5", X, np.full(200, 2.0), session="b", role="test"),
+        record(tmp_path / f"{role}.h5", X, y, session=role, role=role)
+        for role, y in (("train", force), ("test", 0 * force + 2))
     ]
     result = evaluated(force_task(), paths, "mean", split="roles")
     assert "r2" not in result.scores
-    with pytest.raises(DataError, match="r2 of 200 test rows is undefined"):
+    with pytest.raises(DataError, match="r2 of 1600 test rows is undefined"):
         evaluated(force_task(metric="r2"), paths, "mean", split="roles")
 
 
 def test_folds_that_choose_differently_are_reported_each(tmp_path):
     """A middle value of two folds would be a penalty that nobody chose."""
-    rng = np.random.default_rng(0)
-    paths = []
-    for place, noise in enumerate((0.1, 3.0, 0.1, 3.0)):
-        X, force = ramp(place, n=300, noise=20.0 * noise)
-        paths.append(record(tmp_path / f"{place}.h5", X, force + rng.normal(0, noise, 300), session=str(place)))
-    result = evaluated(force_task(), paths, "ridge")
-    allowed = {"alpha": ESTIMATORS["ridge"].grid["alpha"], "k": ESTIMATORS["ridge"].window_grid}
+
+    def noisy(place, n):
+        noise = (0.1, 3.0)[place % 2]
+        return ramp(place, n, noise=20.0 * noise, label_noise=noise)
+
+    ridge = installed().estimators["ridge"]
+    result = evaluated(force_task(), sessions(tmp_path, "abcd", make=noisy), ridge)
+    allowed = {"alpha": ridge.grid["alpha"], "k": ridge.window_grid}
     assert any(" of fold " in name for name in result.chosen), result.chosen
-    for name, value in result.chosen.items():
-        assert value in allowed[name.split()[0]]
+    assert all(value in allowed[name.split()[0]] for name, value in result.chosen.items())
 
 
 def test_the_same_seed_gives_the_same_score_bit_by_bit_with_one_thread_or_two(tmp_path):
-    paths = [record(tmp_path / f"{name}.h5", *ramp(place, label_noise=0.5), session=name)
-             for place, name in enumerate("ab")]  # fmt: skip
-    results = [
+    paths = sessions(tmp_path, "ab", 1600, partial(ramp, label_noise=0.5))
+    first, second, other = (
         evaluated(force_task(), paths, "forest", params={"n_estimators": 20}, seed=seed, threads=threads)
         for seed, threads in ((0, 1), (0, 2), (1, 1))
-    ]
-    first, second, other = results
+    )
     assert np.array_equal(first.sets["test"].y_pred, second.sets["test"].y_pred)
     assert (first.score, first.interval) == (second.score, second.interval)
     assert other.score != first.score
 
 
-@pytest.mark.parametrize("what", ["t1", "the target"])
-def test_a_number_that_cannot_be_computed_with_is_named(tmp_path, what):
+def test_a_number_that_cannot_be_computed_with_is_named(tmp_path):
     X, force = ramp(0, n=200)
-    (X[:, 1] if what == "t1" else force)[100:] = 1e300
-    with pytest.raises(DataError, match=rf"In recording 'a', {what} reaches 1e\+300"):
-        load_task(force_task(), [record(tmp_path / "a.h5", X, force)], "deployable")
+    for column, name in ((force, "the target"), (X[:, 1], "t1")):
+        column[100:] = 1e300
+        with pytest.raises(DataError, match=rf"In recording '{name}', {name} reaches 1e\+300"):
+            load_task(force_task(), [record(tmp_path / f"{name}.h5", X, force)], "deployable")
 
 
 def test_a_class_that_no_training_row_has_is_named(tmp_path):
-    paths = [
-        record(tmp_path / f"{name}.h5", ramp(n, n=200)[0], session=str(n), labels={"kind": name})
-        for n, name in enumerate("abc")
-    ]
+    paths = [record(tmp_path / f"{n}.h5", *ramp(n), session=f"{n}", labels={"kind": "abc"[n]}) for n in range(3)]
     result = evaluated(label_task(), paths, "logistic", split="session")
     assert result.score == 0.0
     assert "tested but never trained on: 'a' in 0; 'b' in 1; 'c' in 2" in result.remarks

@@ -6,22 +6,19 @@ import pytest
 from .made import evaluated, force_task, ramp, record, sessions
 
 
-def stamps(paths, split="session"):
+def stamps(folder, make, split="session", roles=(None, None)):
+    """Return the stamps of recordings in sessions of their own; `make` gives the taxels and the force of each."""
+    paths = [record(folder / f"{n}.h5", *make(n), session=str(n), role=role) for n, role in enumerate(roles)]
     return evaluated(force_task(), paths, split=split).stamps
 
 
-def test_sessions_of_their_own_have_no_stamp(tmp_path):
-    paths = sessions(tmp_path)
-    assert stamps(paths) == ()
-    assert stamps(paths, "in-session") == ()
+def test_a_cut_in_time_has_no_stamp(tmp_path):
+    assert evaluated(force_task(), sessions(tmp_path), split="in-session").stamps == ()
 
 
-@pytest.mark.parametrize("split", ["session", "roles"])
-def test_one_recording_under_two_sessions_or_roles(tmp_path, split):
-    roles = ("train", "train", "test") if split == "roles" else (None,) * 3
-    seeds = (0, 1, 0)
-    paths = [record(tmp_path / f"{n}.h5", *ramp(seeds[n], n=200), session=str(n), role=roles[n]) for n in range(3)]
-    (stamp,) = stamps(paths, split)
+@pytest.mark.parametrize(("split", "roles"), [("session", (None,) * 3), ("roles", ("train", "train", "test"))])
+def test_one_recording_under_two_sessions_or_roles(tmp_path, split, roles):
+    (stamp,) = stamps(tmp_path, lambda n: ramp(n % 2, n=200), split, roles)
     assert stamp.startswith("leaks: 100% of the test rows of a fold are equal to training rows")
     assert "'2' repeats '0'" in stamp or "'0' repeats '2'" in stamp
 
@@ -29,24 +26,23 @@ def test_one_recording_under_two_sessions_or_roles(tmp_path, split):
 def test_a_piece_of_a_training_recording_at_another_time(tmp_path):
     one, other = ramp(0, n=200), ramp(1, n=200)
     mixed = [np.concatenate([theirs[:150], ours[100:150]]) for ours, theirs in zip(one, other, strict=True)]
-    paths = [record(tmp_path / "a.h5", *one, session="1"), record(tmp_path / "b.h5", *mixed, session="2")]
-    assert stamps(paths)[0].startswith("leaks: 25%")
+    assert stamps(tmp_path, (one, mixed).__getitem__)[0].startswith("leaks: 25%")
 
 
 def test_a_sensor_at_rest_repeats_itself_and_is_no_leak(tmp_path):
-    paths = []
-    for n in range(2):
+    def resting(n):
         X, force = ramp(n, n=400)
         X[:200], force[:200] = 7.0, 0.0
-        paths.append(record(tmp_path / f"{n}.h5", X, force, session=str(n)))
-    assert stamps(paths) == ()
+        return X, force
+
+    assert stamps(tmp_path, resting) == ()
 
 
 @pytest.mark.parametrize(("noise", "stamped"), [(0.0, True), (1e-3, False)])
 def test_a_channel_that_is_the_target_but_for_scale_and_offset(tmp_path, noise, stamped):
-    paths = []
-    for n in range(2):
+    def copied(n):
         X, force = ramp(n, n=200)
         X[:, 1] = 3.0 - 40.0 * (force + noise * np.random.default_rng(n).standard_normal(200))
-        paths.append(record(tmp_path / f"{n}.h5", X, force, session=str(n)))
-    assert any("is the target but for scale and offset" in stamp for stamp in stamps(paths)) == stamped
+        return X, force
+
+    assert any("is the target but for scale and offset" in stamp for stamp in stamps(tmp_path, copied)) == stamped

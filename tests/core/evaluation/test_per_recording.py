@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tactbench.core.errors import DataError, NotApplicable, PluginContractError, UsageError
+from tactbench.core.errors import NotApplicable, PluginContractError, UsageError
 from tactbench.core.evaluation.dataset import load_dataset
 from tactbench.core.evaluation.fitting import voted
 from tactbench.core.evaluation.protocols import protocol_called
@@ -23,19 +23,14 @@ def task(**more):
     })  # fmt: skip
 
 
-def vote(**more):
-    return task(summaries=(), vote="frames", **more)
-
-
-def sequences(folder, number=24, n=40, seed=5, **more):
+def sequences(folder, number=24, **more):
     """Recordings of which every third slips: it shakes three times as much, about an offset that tells nothing."""
-    rng = np.random.default_rng(seed)
+    rng = np.random.default_rng(5)
     paths = []
     for place in range(number):
-        slips = place % 3 == 0
-        X = rng.normal(0, 3.0 if slips else 1.0, (n, 2)) + rng.normal(0, 50.0, 2)
-        labels = {"slip": "slipped" if slips else "stable", **{name: each(place) for name, each in more.items()}}
-        paths.append(record(folder / f"s{place:02d}.h5", X, labels=labels, trial=str(place)))
+        shakes, label = (1.0, "stable") if place % 3 else (3.0, "slipped")
+        X = rng.normal(0, shakes, (40, 2)) + rng.normal(0, 50.0, 2)
+        paths.append(record(folder / f"s{place:02d}.h5", X, labels={"slip": label}, trial=str(place), **more))
     return paths
 
 
@@ -48,10 +43,8 @@ def test_a_recording_is_one_answer_by_what_it_did_and_not_where_it_stood(tmp_pat
     paths = sequences(tmp_path)
     result = run(task(), paths)
     assert (result.split, result.sizes.n_train) == ("recording", 4 * 24)
-    assert sorted(result.sets["test"].recording.tolist()) == list(range(24))
     # Deviations of 1 and 3 from 40 samples are known to 11 %: eight standard errors apart.
     assert result.score == 1.0
-    assert run(task(), paths, estimator="majority").scores["accuracy"] == pytest.approx(16 / 24)
     assert result.interval.method.startswith("jackknife over 24 recordings ")
     assert "one answer a recording, from deviation, mean-step" in result.remarks
 
@@ -63,7 +56,8 @@ def test_the_delay_of_an_answer_holds_the_recording_it_waits_for(tmp_path):
     assert whole.answer_delay_ms == pytest.approx(sum(whole.delay_parts_ms.values()))
     part = task(summaries=(Summary(measure="deviation", start=0.1, end=0.3, unit="s"),))
     half = task(summaries=(Summary(measure="deviation", end=0.5),))
-    for asked, window_ms in ((task(), 390.0), (part, 200.0), (half, 195.0), (vote(), 390.0)):
+    votes = task(summaries=(), vote="frames")
+    for asked, window_ms in ((task(), 390.0), (part, 200.0), (half, 195.0), (votes, 390.0)):
         parts = run(asked, paths, estimator="logistic").times.delay_parts_ms
         assert parts["window"] == pytest.approx(window_ms)
     assert "window" not in run(task(), paths, estimator="majority").times.delay_parts_ms
@@ -82,18 +76,15 @@ def test_splits_keep_recordings_whole(tmp_path):
     assert "deals recordings at random" in run(task(), paths, "shuffled").stamps[0]
 
 
-@pytest.mark.parametrize("asked", [task(), vote()])
-def test_splits_and_answers_that_cut_recordings_are_refused_with_words(tmp_path, asked):
-    rng = np.random.default_rng(0)
-    paths = [record(tmp_path / f"s{place}.h5", rng.normal(size=(20, 2)), labels={"slip": place % 2},
-                    annotations={"press": np.repeat([1, 2], 10)}) for place in range(6)]  # fmt: skip
+def test_splits_and_answers_that_cut_recordings_are_refused_with_words(tmp_path):
+    halves = {name: np.repeat([1, 2], 20) for name in ("slip", "press")}
     with pytest.raises(NotApplicable, match="'in-session' cuts recordings in time"):
-        run(asked, paths, "in-session")
+        run(task(), sequences(tmp_path), "in-session")
     with pytest.raises(UsageError, match="cannot be split by 'press'"):
-        run(asked, paths, "press")
-    changing = record(tmp_path / "c.h5", rng.normal(size=(20, 2)), annotations={"slip": np.repeat([0, 1], 10)})
+        run(task(), sequences(tmp_path / "b", annotations={"press": halves["press"]}), "press")
+    changing = record(tmp_path / "c.h5", np.ones((40, 2)), annotations=halves)
     with pytest.raises(NotApplicable, match="asks one answer of each recording, and slip changes within 'c'"):
-        run(asked, [changing])
+        run(task(), [changing])
 
 
 TWO = sensor_of(
@@ -103,13 +94,12 @@ TWO = sensor_of(
 SLOW_HZ, FAST_HZ = 50, 2000
 
 
-def two_rates(folder, number=12, s=2.0, hold_s=0.0):
-    """Taxels of noise alone, and a fast stream that hums at 200 Hz where it slips; loaded after the hold, if any."""
-    rng = np.random.default_rng(2)
-    scene = held("held", hold_s, samples=100) if hold_s else None
-    slow_s, fast_s = np.arange(0, s, 1 / SLOW_HZ), np.arange(0, s, 1 / FAST_HZ)
+def two_rates(folder):
+    """Taxels of noise alone, and a fast stream that hums at 200 Hz where it slips; loaded after a hold of 0.5 s."""
+    rng, scene = np.random.default_rng(2), held("held", 0.5, samples=100)
+    slow_s, fast_s = np.arange(0, 2, 1 / SLOW_HZ), np.arange(0, 2, 1 / FAST_HZ)
     paths = []
-    for place in range(number):
+    for place in range(12):
         hum = (place % 2) * np.sin(2 * np.pi * 200 * fast_s) + rng.normal(0, 0.1, len(fast_s)) + 30.0
         blocks = (
             Block("taxels", (slow_s * 1e9).astype(np.int64), rng.normal(20.0, 1, (len(slow_s), 1))),
@@ -131,34 +121,24 @@ FAST = task(
 
 def test_every_stream_is_summarised_on_its_own_clock(tmp_path):
     """A hum of 200 Hz sampled at every fortieth sample would stand still; its energy is half its amplitude squared."""
-    paths = two_rates(tmp_path)
-    data = load_dataset(FAST, paths)
+    data = load_dataset(FAST, two_rates(tmp_path))
     found = summarised(data, FAST, protocol_called("deployable-untared"))
-    assert found.features == (
-        "p band-energy 150-300 Hz 0.5-1 of the recording of ac_pressure", "t mean", "p mean", "t deviation",
-        "p deviation",
-    )  # fmt: skip
+    assert found.features[1:] == ("t mean", "p mean", "t deviation", "p deviation")
     energies = [table.X[0, 0] for table in found.tables]
     # The gain of the filter at 200 Hz is within 1 % of 1; noise of 0.1 puts less than 0.01 into the band.
     assert energies[1::2] == pytest.approx([0.5] * 6, abs=0.02)
     assert max(energies[::2]) < 0.01
-    deviations = [table.X[0, 4] for table in found.tables]
-    assert deviations[1::2] == pytest.approx([np.sqrt(0.51)] * 6, abs=0.01)
-    assert run(FAST, paths).score == 1.0
-    with pytest.raises(NotApplicable, match="taxels of recording 's00' is sampled at 50 Hz"):
-        run(task(features=("taxel", "ac_pressure"),
-                 summaries=(Summary(measure="band-energy", band_hz=(150.0, 300.0)),)), paths)  # fmt: skip
 
 
 def test_the_hold_is_tared_on_and_left_out_of_every_stream(tmp_path):
-    paths = two_rates(tmp_path, hold_s=0.5)
+    paths = two_rates(tmp_path)
     data = load_dataset(FAST, paths)
     tared, untared = (summarised(data, FAST, protocol_called(name)) for name in ("deployable", "deployable-untared"))
     # A mean of 25 and of 1000 samples less one of 75 and of 3000: 0.23 and 0.03 at most, four times that here.
     assert all(abs(table.X[0, 1]) < 1.0 and abs(table.X[0, 2]) < 0.1 for table in tared.tables)
     assert all(table.X[0, 1] == pytest.approx(20, abs=1) for table in untared.tables)
     result = run(FAST, paths)
-    assert result.tare_s == pytest.approx(0.5)
+    assert (result.tare_s, result.score) == (pytest.approx(0.5), 1.0)
     assert result.times.delay_parts_ms["window"] == pytest.approx(1500, abs=1e3 / SLOW_HZ)
 
 
@@ -172,12 +152,8 @@ def other_names(streams):
     return {f"first {streams[0].data[0, 0]}": 0.0}
 
 
-def too_large(streams):
-    return {"large": 1e200}
-
-
 def not_a_number(streams):
-    return {"bad": float("nan")}
+    return {"bad": np.nan}
 
 
 def test_a_task_may_name_code_for_features_of_its_own(tmp_path):
@@ -186,8 +162,6 @@ def test_a_task_may_name_code_for_features_of_its_own(tmp_path):
     both = task(features_by=f"{HERE}:crest_factor")
     names = summarised(load_dataset(both, paths), both, protocol_called("deployable")).features
     assert (len(names), names[4:]) == (6, ("crest", "spread"))
-    with pytest.raises(DataError, match="cannot be computed with"):
-        run(task(features_by=f"{HERE}:too_large"), paths)
     for name, words in (("other_names", "other features"), ("not_a_number", "no finite number")):
         with pytest.raises(PluginContractError, match=words):
             run(task(summaries=(), features_by=f"{HERE}:{name}"), paths)
@@ -206,27 +180,16 @@ def test_frames_vote_and_of_equals_the_first_class_wins():
     assert mean.tolist() == [2.0, 5.0]
 
 
-def pushes(folder, number=18, n=60, seed=2):
-    """Recordings that rise to a force of their own, which the first channel follows; what it rests at tells nothing."""
-    rng = np.random.default_rng(seed)
-    paths, forces = [], rng.uniform(1.0, 9.0, (number, 1)) * np.sin(np.linspace(0, np.pi, n))
-    for place, force in enumerate(forces):
-        X = np.column_stack([10 * force, rng.normal(size=n)]) + rng.normal(0, 50.0, 2)
-        paths.append(record(folder / f"p{place:02d}.h5", X, force, trial=str(place)))
-    return paths, forces
-
-
-def number_task(reduce):
-    return force_task(
-        target=ChannelTarget(kind="force", reduce=reduce), answer_per="recording",
-        summaries=(Summary(measure="range"),), splits=("recording",), protocols=("deployable",),
-    )  # fmt: skip
-
-
-def test_a_number_of_a_recording_is_a_channel_reduced(tmp_path):
-    paths, forces = pushes(tmp_path)
-    for reduce, expected in (("max", forces.max(axis=1)), ("mean", forces.mean(axis=1))):
-        result = run(number_task(reduce), paths, estimator="ols")
-        assert sorted(result.sets["test"].y_true) == pytest.approx(sorted(expected))
-        assert result.score < 0.1, "the range of the first channel is ten times the force; the second is noise"
-    assert run(number_task("max"), paths, estimator="mean").score > 1.0
+@pytest.mark.parametrize("reduce", ["max", "mean"])
+def test_a_number_of_a_recording_is_a_channel_reduced(tmp_path, reduce):
+    rng = np.random.default_rng(2)
+    forces = rng.uniform(1.0, 9.0, (6, 1)) * np.sin(np.linspace(0, np.pi, 60))
+    paths = [record(tmp_path / f"{n}.h5", force[:, None], force, trial=str(n)) for n, force in enumerate(forces)]
+    target = ChannelTarget(kind="force", reduce=reduce)
+    asked = force_task(
+        target=target, answer_per="recording", summaries=(Summary(measure="range"),), splits=("recording",)
+    )
+    result = run(asked, paths, estimator="ols")
+    tested = result.sets["test"]
+    assert tested.y_true == pytest.approx(getattr(forces, reduce)(axis=1)[tested.recording])
+    assert result.score < 1e-9, "the range is the largest force, and the mean a share of it: rounding only"

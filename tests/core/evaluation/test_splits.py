@@ -16,21 +16,17 @@ from tactbench.core.evaluation.splits import choose_split, inner_splits, make_sp
 from .made import evaluated, force_task, grasps, label_task, ramp, record, sessions
 
 
-def run(paths, split=None, task=None, estimator="forest", params=None, **more):
-    params = {"n_estimators": 10} if params is None else params
-    return evaluated(task or force_task(), paths, estimator, split=split, params=params, seed=0, **more)
+def run(paths, split=None):
+    return evaluated(force_task(), paths, split=split)
 
 
 @pytest.mark.parametrize("split", ["session", "in-session", "shuffled"])
 def test_training_and_test_rows_are_disjoint_and_every_free_row_is_tested_once(tmp_path, split):
     data = load_dataset(force_task(), sessions(tmp_path))
-    tested = [np.zeros(len(table.row), dtype=int) for table in data.tables]
-    for fold in make_splits(data, split, 0):
-        for count, train, test in zip(tested, fold.train, fold.test, strict=True):
-            assert not (train & test).any()
-            count += test
-    least = 0 if split == "in-session" else 1
-    assert all((least <= count).all() and (count <= 1).all() for count in tested)
+    folds = make_splits(data, split, 0)
+    train, test = (np.array([np.concatenate(getattr(fold, name)) for fold in folds]) for name in ("train", "test"))
+    assert not (train & test).any()
+    assert set(test.sum(axis=0)) == ({0, 1} if split == "in-session" else {1})
 
 
 def filtered(data, fold, k):
@@ -93,7 +89,8 @@ def test_a_shuffled_split_is_stamped_and_never_the_default(tmp_path):
 def test_an_official_test_set_is_touched_by_split_roles_only(tmp_path):
     paths = [grasps(tmp_path, "train", seed=1), grasps(tmp_path, "test", seed=2)]
     for split, tested in (("object", 0), ("roles", 1)):
-        assert set(run(paths, split, label_task()).sets["test"].recording.tolist()) == {tested}
+        result = evaluated(label_task(), paths, "logistic", split=split)
+        assert set(result.sets["test"].recording.tolist()) == {tested}
 
 
 def test_a_split_that_cannot_be_served_is_refused_with_those_that_can(tmp_path):
@@ -104,19 +101,14 @@ def test_a_split_that_cannot_be_served_is_refused_with_those_that_can(tmp_path):
         run(paths[:1], "session")
 
 
-def test_a_recording_that_its_source_calls_unreliable_is_left_out_and_counted(tmp_path):
-    paths = sessions(tmp_path)
-    paths.append(record(tmp_path / "bad.h5", *ramp(7), session="d", excluded="declared unreliable"))
-    result = run(paths)
-    assert result.sizes.n_recordings == 3
-    assert result.counts["recordings left out (declared unreliable)"] == 1
-
-
 def test_an_incomplete_recording_takes_no_part_unless_asked_for_and_the_row_says_so(tmp_path):
     why = "incomplete: force_torque: nothing for 4 s from 2 s on"
-    paths = [*sessions(tmp_path), record(tmp_path / "bad.h5", *ramp(7), session="d", excluded=why)]
+    paths = sessions(tmp_path)
+    for name, excluded in (("short", why), ("bad", "declared unreliable")):
+        paths.append(record(tmp_path / f"{name}.h5", *ramp(7), session=name, excluded=excluded))
     out = run(paths)
     assert out.sizes.n_recordings == 3
+    assert out.counts["recordings left out (declared unreliable)"] == 1
     assert f"1 of 4 recordings left out: {why}" in out.stamps
     taken = run(load_dataset(force_task(), paths, include_incomplete=True))
     assert taken.sizes.n_recordings == 4
@@ -132,17 +124,14 @@ def test_an_incomplete_recording_takes_no_part_unless_asked_for_and_the_row_says
     ],
 )
 def test_what_cannot_be_learned_from_is_refused_with_the_reason(tmp_path, spoil, error, says):
-    X, force = ramp(0, n=200)
-    paths = [record(tmp_path / f"{name}.h5", *spoil(X, force), session=name) for name in "ab"]
     with pytest.raises(error, match=says):
-        run(paths)
+        run(sessions(tmp_path, make=lambda seed, n: spoil(*ramp(seed, n))))
 
 
 def test_a_dropped_out_row_is_skipped_by_the_window_which_does_not_start_anew(tmp_path):
     X, force = ramp(0, n=100)
     X[50, 1] = np.nan
-    paths = [record(tmp_path / f"{name}.h5", X, force, session=name) for name in "ab"]
-    data = load_dataset(force_task(), paths)
+    data = load_dataset(force_task(), sessions(tmp_path, "ab", make=lambda *_, **__: (X, force)))
     one = filtered(data, make_splits(data, "session", 0)[0], 5)
     after = int(np.flatnonzero(one.row == 52)[0])
     np.testing.assert_allclose(one.X[after], X[[46, 47, 48, 49, 51, 52]].mean(axis=0), rtol=1e-12)

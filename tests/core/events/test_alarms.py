@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from tactbench.core.events.alarms import alarms, match
 from tactbench.core.spec.events import nanoseconds
-from tests.core.events.made import MS, clocks, policies, policy, seconds
+from tests.core.events.made import MS, clocks, policies, policy
 
 
 @st.composite
@@ -37,16 +37,6 @@ def one_by_one(clock, active, rules):
 @given(frames(), policies)
 def test_alarms_are_those_of_a_detector_that_sees_one_frame_at_a_time(given_frames, rules):
     assert alarms(*given_frames, rules).tolist() == one_by_one(*given_frames, rules)
-
-
-def test_the_policy_by_an_example():
-    clock = seconds(*(0.01 * np.arange(100)))
-    active = np.zeros(100, dtype=np.bool_)
-    active[[10, 11, 12, 15, 16, 50, 80, 81, 82, 83]] = True
-    assert alarms(clock, active, policy()).tolist() == seconds(0.10, 0.15, 0.50, 0.80).tolist()
-    rules = policy(merge=0.03, minimum=0.05)
-    assert alarms(clock, active, rules).tolist() == seconds(0.15).tolist()
-    assert alarms(clock, active, policy(refractory=0.4)).tolist() == seconds(0.10, 0.50).tolist()
 
 
 GRID_S = 2.0**-9

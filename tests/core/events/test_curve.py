@@ -16,7 +16,7 @@ from tests.core.events.made import policies, scored_recordings
 def test_the_curve_is_each_threshold_on_its_own(recordings, rules):
     curve = threshold_curve(recordings, rules)
     # Every score that occurs, between them, below and above all; the rows of the curve themselves.
-    for threshold in (-1.0, 0.0, 0.5, 1.0, 1.5, 2.0, 2.25, 2.5, 2.75, 3.0, 5.0, 7.0, 8.0, np.inf, *curve.threshold):
+    for threshold in (*np.arange(-1.0, 8.0, 0.25), np.inf, *curve.threshold):
         raised = [alarms(one.t_ns, one.score >= threshold, rules) for one in recordings]
         alone, row = score_events([one.truth for one in recordings], raised, rules), curve.at(threshold)
         assert (row.n_alarms, row.n_false_alarms, row.base_ns) == (alone.n_alarms, alone.n_false_alarms, alone.base_ns)

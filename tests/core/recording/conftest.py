@@ -5,22 +5,16 @@ import pytest
 
 from tactbench.core.recording.writer import RecordingWriter
 from tactbench.core.samples import Block
-from tactbench.core.spec.quantity import Source, assumed
+from tactbench.core.spec.quantity import assumed
 from tactbench.core.spec.recording import RecordingMeta
-from tactbench.core.spec.sensor import ChannelSpec, SensorSpec, StreamSpec
-from tests.core.evaluation.made import FORCE
+from tactbench.core.spec.sensor import ChannelSpec, StreamSpec
+from tests.core.evaluation.made import FORCE, sensor_of
 
 
 def sensor(channels=3, dtype="uint16"):
     rest = assumed(7, "count", "test")
     taxels = (ChannelSpec(name=f"t{n}", kind="taxel", lower=0, upper=4095, rest=rest) for n in range(channels))
-    return SensorSpec(
-        name="pad",
-        title="a pad",
-        principle="capacitive",
-        principle_source=Source(tag="assumed", reference="made up for a test"),
-        streams=(StreamSpec(name="taxels", dtype=dtype, channels=tuple(taxels)),),
-    )
+    return sensor_of(StreamSpec(name="taxels", dtype=dtype, channels=tuple(taxels)))
 
 
 def about(channels=3, dtype="uint16", **fields):
@@ -34,15 +28,14 @@ def write(tmp_path):
     """Writes a recording: ``write(data, force=None, t_ns=…, quality=None, notes={}, **meta)``."""
 
     def make(data, *, force=None, t_ns=None, quality=None, notes=None, **fields):
-        data = np.asarray(data)
-        times = np.arange(len(data), dtype=np.int64) * 10_000_000 if t_ns is None else np.asarray(t_ns)
         meta = about(data.shape[1], **fields)
+        times = np.arange(len(data)) * 10_000_000 if t_ns is None else t_ns
         timed = None if meta.clock == "none" else times
         path = tmp_path / f"{meta.name}.h5"
         with RecordingWriter(path, meta) as writer:
             writer.append(Block("taxels", timed, data, quality))
             if force is not None:
-                writer.append(Block("force_torque", timed, np.asarray(force, dtype=float)[:, None]))
+                writer.append(Block("force_torque", timed, force[:, None]))
             for label, values in (notes or {}).items():
                 writer.annotate("taxels", label, values)
         return path

@@ -2,7 +2,6 @@
 
 import hashlib
 import json
-import re
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from threading import Thread
 
@@ -15,33 +14,20 @@ from tactbench.core.errors import MissingRecordingError, NotApplicable
 from tactbench.core.recording.datasets import DataSet, dataset_called, datasets
 from tests.conftest import ROOT, Verbs
 from tests.core.matrix.plugin_packages import write_metadata
+from tests.core.recording.mapping.made import write_mapping
 
 MAPPINGS = ROOT / "examples" / "mappings"
-PRESSES = {
-    f"press_{name}.csv": "".join(f"{row},{row * 3 % 7}\n" for row in range(20)) + f"99,{name}\n" for name in "123"
-}
-
-
-class Server(ThreadingHTTPServer):
-    """Serves `files`; of `cut` it sends half and hangs up."""
-
-    def __init__(self):
-        super().__init__(("127.0.0.1", 0), Handler)
-        self.files, self.cut, self.asked = {}, "", []
-
-    @property
-    def address(self):
-        return f"http://127.0.0.1:{self.server_port}/"
+ROWS = "".join(f"{row},{row * 3 % 7}\n" for row in range(20))
+PRESSES = {f"press_{name}.csv": f"{ROWS}99,{name}\n".encode() for name in "123"}
 
 
 class Handler(BaseHTTPRequestHandler):
+    """Serves the server's `files`; of `cut` it sends half and hangs up."""
+
     def do_GET(self):
         name = self.path.removeprefix("/")
         self.server.asked.append(name)
-        body = self.server.files.get(name)
-        if body is None:
-            self.send_error(404)
-            return
+        body = self.server.files[name]
         self.send_response(200)
         self.send_header("Content-Length", str(len(body)))
         self.end_headers()
@@ -53,7 +39,9 @@ class Handler(BaseHTTPRequestHandler):
 
 @pytest.fixture
 def server():
-    with Server() as one:
+    with ThreadingHTTPServer(("127.0.0.1", 0), Handler) as one:
+        one.files, one.cut, one.asked = dict(PRESSES), "", []
+        one.address = f"http://127.0.0.1:{one.server_port}/"
         Thread(target=one.serve_forever, kwargs={"poll_interval": 0.01}, daemon=True).start()
         yield one
         one.shutdown()
@@ -66,102 +54,75 @@ def kept(tmp_path, monkeypatch):
     return tmp_path / "cache"
 
 
-def described(folder, address, name="pad", **source):
+def digests(files):
+    return {name: hashlib.sha256(content).hexdigest() for name, content in files.items()}
+
+
+def described(folder, address="", name="pad"):
     """A data set of three recordings, one file each."""
-    text = {
-        "version": 1, "title": "pad", "clock": "none",
-        "sensor": {"name": name, "title": "pad", "principle": "resistive",
-                   "principle_source": {"tag": "assumed", "reference": "none"}},
-        "tables": {"taxels": {"files": "press_*.csv", "read": {"format": "csv", "header": False}}},
-        "recording": {"name": "{file}", "session": "1"},
-        "streams": {"taxels": {"table": "taxels", "channels": [
-            {"columns": "0..1", "name": "t{column}", "kind": "taxel", "unit": "count"}]}},
-        "source": {
-            "address": address, "licence": "MIT", "citation": "nobody", "measured": "nothing", "tasks": ["force"],
-            "bytes": 1, "files": {name: hashlib.sha256(text.encode()).hexdigest() for name, text in PRESSES.items()},
-            **source,
-        },
-    }  # fmt: skip
+    text = f"""
+        clock: none
+        tables: {{table: {{files: press_*.csv, read: {{format: csv, header: false}}}}}}
+        streams:
+          taxels: {{table: table, channels: [{{columns: 0..1, name: "t{{column}}", kind: taxel, unit: count}}]}}
+        source: {{address: "{address}", licence: MIT, citation: nobody, measured: nothing, tasks: [force], bytes: 1}}
+    """
     folder.mkdir(parents=True, exist_ok=True)
-    (folder / f"{name}.yaml").write_text(yaml.safe_dump(text))
-    return DataSet(folder / f"{name}.yaml")
-
-
-def placed(folder):
-    folder.mkdir(parents=True)
-    for name, text in PRESSES.items():
-        (folder / name).write_text(text)
-    return folder
+    return DataSet(write_mapping(folder / f"{name}.yaml", text, sensor__name=name, source__files=digests(PRESSES)))
 
 
 def test_it_is_fetched_and_imported_once(tmp_path, server, kept):
-    server.files = {name: text.encode() for name, text in PRESSES.items()}
     pad = described(tmp_path, server.address)
-    assert not pad.imported.is_dir()
     folder = pad.recordings()
-    assert sorted(path.stem for path in folder.glob("*")) == ["press_1", "press_2", "press_3"]
-    assert sorted(server.asked) == sorted(PRESSES)
-    assert pad.recordings() == folder
-    assert len(server.asked) == 3, "nothing is fetched twice"
+    assert kept in folder.parents
     first, *others = tactbench.dataset(str(pad.path))
     assert first.streams["taxels"].data[-1].tolist() == [99, 1]
     assert len(others) == 2
-    assert kept in folder.parents
+    assert sorted(server.asked) == sorted(PRESSES), "nothing is fetched twice"
 
 
-def test_a_file_with_another_digest_is_refused_and_named_and_not_kept(tmp_path, server):
-    server.files = {name: text.encode() for name, text in PRESSES.items()} | {"press_2.csv": b"1,2\n"}
+def test_what_was_cut_short_or_is_another_file_is_not_kept_and_the_next_attempt_goes_on(tmp_path, server):
     pad = described(tmp_path, server.address)
-    with pytest.raises(MissingRecordingError, match=rf"{re.escape(server.address)}press_2\.csv is not the file"):
-        pad.recordings()
-    assert sorted(path.name for path in pad.files.iterdir()) == ["press_1.csv"]
-    assert not pad.imported.exists()
-
-
-def test_what_was_interrupted_goes_on_where_it_stopped(tmp_path, server):
-    server.files = {name: text.encode() for name, text in PRESSES.items()}
     server.cut = "press_2.csv"
-    pad = described(tmp_path, server.address)
     with pytest.raises(MissingRecordingError, match=r"press_2\.csv could not be fetched"):
         pad.recordings()
-    assert sorted(path.name for path in pad.files.iterdir()) == ["press_1.csv"]
-    server.cut, server.asked = "", []
+    server.cut, server.files["press_2.csv"] = "", b"1,2\n"
+    with pytest.raises(MissingRecordingError, match=r"press_2\.csv is not the file"):
+        pad.recordings()
+    assert [path.name for path in pad.files.iterdir()] == ["press_1.csv"]
+    assert not pad.imported.exists()
+    server.files, server.asked = PRESSES, []
     pad.recordings()
     assert server.asked == ["press_2.csv", "press_3.csv"]
 
 
 def test_offline_the_address_the_folder_and_the_option_are_named(tmp_path, server):
-    address = server.address
+    pad = described(tmp_path, server.address)
     server.shutdown()
     server.server_close()
-    pad = described(tmp_path, address)
-    with pytest.raises(MissingRecordingError) as found:
+    with pytest.raises(MissingRecordingError, match=rf"{server.address}press_1.csv could not be fetched") as found:
         pad.recordings()
-    assert f"{address}press_1.csv could not be fetched: no connection" in str(found.value)
     assert "--root" in found.value.hint
 
 
-def test_a_copy_is_used_and_checked_and_nothing_is_fetched(tmp_path, server):
-    placed(tmp_path / "copy" / "pad")
-    assert len(list(described(tmp_path, server.address).recordings(tmp_path / "copy").glob("*.h5"))) == 3
-    assert server.asked == []
-    (tmp_path / "copy" / "pad" / "press_3.csv").write_text("1,2\n")
-    other = described(tmp_path, "", name="other")
-    with pytest.raises(MissingRecordingError, match=r"copy.*press_3\.csv is not the file"):
-        other.recordings(tmp_path / "copy")
-
-
-def test_what_lies_at_no_address_needs_a_copy(tmp_path):
-    pad = described(tmp_path, "")
+def test_what_lies_at_no_address_needs_a_copy_which_is_checked(tmp_path, server):
+    pad, copy = described(tmp_path), tmp_path / "copy" / "pad"
     with pytest.raises(NotApplicable, match="no public address") as found:
         pad.recordings()
     assert "--root" in found.value.hint
-    assert pad.recordings(placed(tmp_path / "copy")).is_dir()
-    assert pad.recordings().is_dir(), "and is kept"
+    copy.mkdir(parents=True)
+    for name, content in (PRESSES | {"press_3.csv": b"1,2\n"}).items():
+        (copy / name).write_bytes(content)
+    with pytest.raises(MissingRecordingError, match=r"copy.*press_3\.csv is not the file"):
+        pad.recordings(copy)
+    (copy / "press_3.csv").write_bytes(PRESSES["press_3.csv"])
+    assert pad.recordings(copy) == pad.recordings(), "it is imported once"
+    assert described(tmp_path, server.address, "other").recordings(copy.parent).is_dir()
+    assert server.asked == []
 
 
 def test_a_plugin_brings_data_sets_as_files(tmp_path, monkeypatch):
-    described(tmp_path / "brings_a_pad" / "datasets", "")
+    described(tmp_path / "brings_a_pad" / "datasets")
     (tmp_path / "brings_a_pad" / "__init__.py").write_text("raise RuntimeError('nobody needs me')")
     write_metadata(tmp_path, "brings-a-pad", "1", points="pad = brings_a_pad")
     monkeypatch.syspath_prepend(tmp_path)
@@ -181,7 +142,7 @@ def test_the_shipped_ones_are_those_of_the_copies(shared_data):
         first = next(iter(one.source.files))
         (root,) = (place for place in shared_data.iterdir() if (place / first).is_file())
         contents = {path: (root / path).read_bytes() for path in one.source.files}
-        assert one.source.files == {path: hashlib.sha256(text).hexdigest() for path, text in contents.items()}, name
+        assert one.source.files == digests(contents), name
         assert one.source.bytes == sum(map(len, contents.values())), name
 
 
@@ -190,21 +151,10 @@ def test_from_an_empty_cache_to_the_table_of_a_run(tmp_path, server, shared_data
     source = yaml.safe_load(text)["source"]
     server.files = {name: (shared_data / "eflesh" / name).read_bytes() for name in source["files"]}
     (tmp_path / "eflesh-normal.yaml").write_text(text.replace(source["address"], server.address))
-    described(tmp_path, "", name="pad")  # cannot be had, which costs its own rows only
+    described(tmp_path)  # cannot be had, which costs its own rows only
     verbs = Verbs(tmp_path, here=True)
-    asked = (
-        "run",
-        "--dataset",
-        "eflesh-normal.yaml",
-        "--dataset",
-        "pad.yaml",
-        "--task",
-        "force",
-        "--estimator",
-        "ridge",
-    )
-    rows = json.loads(verbs(*asked, "--format", "json").stdout)
+    asked = "run --dataset eflesh-normal.yaml --dataset pad.yaml --task force --estimator ridge --format json"
+    rows = json.loads(verbs(*asked.split()).stdout)
     assert {(row["sensor"], row["status"]) for row in rows} == {("eflesh", "done"), ("pad", "skipped")}
     (score,) = (row["score"] for row in rows if (row["estimator"], row["split"]) == ("ridge", "session"))
     assert score == pytest.approx(0.839, abs=0.0005)  # docs/real-recordings.md, three decimals
-    assert "no public address" in verbs("run", "--dataset", "pad.yaml", code=1).stderr

@@ -44,7 +44,6 @@ LOST = StreamCounts(received=N + 20, written=N, dropped=7, duplicates=2, gaps=5)
         (flagged(Quality.GAP, [20, 90], slice(None)), {"rows-before-lost": f"2 of {N} rows"}),
         (flagged(Quality.SUSPECT, 3, 0), {"suspect": "1 samples"}),
         (flagged(Quality.SATURATED, 20, 1, changed(1, slice(7), 4095)), {"saturated": f"t1 saturated in 8 of {N}"}),
-        ({"data": changed(1, slice(7), 0)}, {"saturated": f"t1 saturated in 7 of {N}"}),
         (late(150, 700_000_000), {"gaps": "0.71 s"}),
         ({"t_ns": JITTER}, {"irregular": "mean rate"}),
         (late(100, -50_000_000), {"backward": "row 100"}),

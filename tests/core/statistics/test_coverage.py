@@ -10,7 +10,6 @@ from scipy import stats
 
 from tactbench.core.evaluation.interval import ReplicateUnits, score_interval
 from tactbench.core.evaluation.metrics import METRICS
-from tactbench.core.statistics.paired import difference
 from tactbench.core.statistics.ranking import ranks
 
 TRIALS = 250
@@ -45,19 +44,6 @@ def test_the_interval_of_a_score_covers_the_truth(synthetic, metric, sessions):
         found = score_interval(METRICS[metric], y.ravel(), answered.ravel(), code, unit, k, 0)
         hits += found.low <= truth <= found.high
     assert hits >= FEWEST
-
-
-def test_differences_cover_the_truth_and_none_is_found_too_often(synthetic):
-    rng = np.random.default_rng(2)
-    cover = wrong = 0
-    for _ in range(TRIALS):
-        shared = rng.normal(size=(8, 1))
-        a, b = (synthetic.sums_of("rmse", *synthetic.numbers(rng, 8, 0.5, 1.0, shared)) for _ in range(2))
-        found = difference(synthetic.row_of("a", "rmse", a), synthetic.row_of("b", "rmse", b))
-        cover += found.low <= 0 <= found.high
-        wrong += found.p <= 0.05
-    assert cover >= FEWEST
-    assert wrong <= stats.binom.ppf(0.999, TRIALS, 0.05)
 
 
 def test_the_best_of_ten_and_all_others_have_their_rank_in_its_interval(synthetic):

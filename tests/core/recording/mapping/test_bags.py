@@ -1,14 +1,16 @@
 """MCAP bags, written by the library itself."""
 
 import json
+from contextlib import contextmanager
 
 import numpy as np
 import pytest
-import yaml
 
 from tactbench.core.errors import MappingError
 from tactbench.core.recording.mapping import import_tables
 from tactbench.core.recording.reader import open_recording
+
+from .made import write_mapping
 
 mcap_writer = pytest.importorskip("mcap.writer", reason="the extra mcap is not installed")
 ros2_writer = pytest.importorskip("mcap_ros2.writer", reason="the extra mcap is not installed")
@@ -50,40 +52,32 @@ def ros_bag(path, rows=200):
     return path
 
 
-def mapping(folder, **changes):
-    text = {
-        "version": 1, "title": "bag", "clock": "host",
-        "sensor": {"name": "pad", "title": "pad", "principle": "resistive",
-                   "principle_source": {"tag": "assumed", "reference": "none"}},
-        "tables": {
-            "taxels": {"files": "*.mcap", "read": {"format": "mcap", "topic": "/taxels"},
-                       "time": {"column": "header.stamp", "unit": "ns", "epoch": "unix"}},
-            "force": {"files": "*.mcap", "read": {"format": "mcap", "topic": "/force"},
-                      "time": {"column": "log_time", "unit": "ns", "epoch": "unix"}},
-        },
-        "join": {"by": "clock"},
-        "recording": {"name": "{file}", "session": "1"},
-        "streams": {
-            "taxels": {"table": "taxels", "dtype": "float32",
-                       "channels": [{"columns": "data.0..2", "name": "{column}", "kind": "taxel", "unit": "count"}],
-                       "annotations": {"object": {"column": "object"}}},
-            "force": {"table": "force", "of": "reference",
-                      "channels": [
-                          {"columns": "force.z", "name": "fz", "kind": "force", "unit": "N", "sentinels": []}]},
-        },
-    }  # fmt: skip
-    for path, value in changes.items():
-        *above, last = path.split("__")
-        place = text
-        for name in above:
-            place = place[name]
-        place[last] = value
-    (folder / "bag.yaml").write_text(yaml.safe_dump(text))
-    return folder / "bag.yaml"
+BAG = """
+tables:
+  taxels:
+    files: "*.mcap"
+    read: {format: mcap, topic: /taxels}
+    time: {column: header.stamp, unit: ns, epoch: unix}
+  force:
+    files: "*.mcap"
+    read: {format: mcap, topic: /force}
+    time: {column: log_time, unit: ns, epoch: unix}
+join: {by: clock}
+streams:
+  taxels:
+    table: taxels
+    dtype: float32
+    channels: [{columns: data.0..2, name: "{column}", kind: taxel, unit: count}]
+    annotations: {object: {column: object}}
+  force:
+    table: force
+    of: reference
+    channels: [{columns: force.z, name: fz, kind: force, unit: N, sentinels: []}]
+"""
 
 
 def imported(folder, **changes):
-    report = import_tables(mapping(folder, **changes), root=None, out=folder / "out")
+    report = import_tables(write_mapping(folder / "bag.yaml", BAG, **changes), root=None, out=folder / "out")
     with open_recording(report.recordings[0].path) as recording:
         return {name: recording.read(name) for name in recording.stream_names}
 
@@ -100,54 +94,50 @@ def test_topics_become_streams_with_clocks_of_their_own(tmp_path):
     assert force.data[:, 0] == pytest.approx(np.repeat(row, 10) + 0.1 * np.tile(np.arange(10), 200), abs=1e-12)
 
 
-def test_json_messages(tmp_path):
-    with (tmp_path / "press.mcap").open("wb") as opened:
+@contextmanager
+def plain_bag(folder):
+    with (folder / "press.mcap").open("wb") as opened:
         writer = mcap_writer.Writer(opened)
         writer.start()
+        yield writer
+        writer.finish()
+
+
+def test_json_messages(tmp_path):
+    with plain_bag(tmp_path) as writer:
         taxels, force = (writer.register_channel(topic, "json", 0) for topic in ("/taxels", "/force"))
         for row in range(20):
             t_ns = START + row * 10**7
             stamp = {"sec": t_ns // 10**9, "nsec": t_ns % 10**9}
-            message = {"header": {"stamp": stamp}, "data": [row, 1, float("nan") if row == 3 else 2], "object": 1}
-            writer.add_message(taxels, t_ns, json.dumps(message).encode(), t_ns)
-            writer.add_message(force, t_ns, json.dumps({"force": {"z": row}, "t": row / 8}).encode(), t_ns)
-        writer.finish()
+            press = {"header": {"stamp": stamp}, "data": [row, 1, np.nan if row == 3 else 2], "object": 1}
+            for channel, message in ((taxels, press), (force, {"force": {"z": row}, "t": row / 8})):
+                writer.add_message(channel, t_ns, json.dumps(message).encode(), t_ns)
     streams = imported(tmp_path, tables__force__time={"column": "t", "unit": "s", "epoch": "start"})
     assert np.isnan(streams["taxels"].data[3, 2])
     assert np.array_equal(streams["taxels"].t_ns, START + np.arange(20) * 10**7)
     assert np.array_equal(streams["force"].t_ns, np.arange(20) * 125_000_000)
 
 
-def flipped(whole, place):
-    return whole[:place] + bytes([whole[place] ^ 1]) + whole[place + 1 :]
-
-
-DAMAGES = {
-    "cut short": lambda whole: whole[: len(whole) // 5],
-    "without its last byte": lambda whole: whole[:-1],
-    "a byte changed": lambda whole: flipped(whole, len(whole) // 2),
-}
-
-
-@pytest.mark.parametrize("damage", DAMAGES)
-def test_a_damaged_bag_is_refused_and_nothing_is_left(tmp_path, damage):
+def test_a_damaged_bag_is_refused_and_nothing_is_left(tmp_path):
     path = ros_bag(tmp_path / "press.mcap")
-    path.write_bytes(DAMAGES[damage](path.read_bytes()))
-    with pytest.raises(MappingError, match=r"press\.mcap is no whole bag") as found:
-        imported(tmp_path)
-    assert "mcap recover" in found.value.hint
-    assert not (tmp_path / "out").exists()
+    whole = path.read_bytes()
+    middle = len(whole) // 2
+    for damaged in (whole[:middle], whole[:-1], whole[:middle] + bytes([whole[middle] ^ 1]) + whole[middle + 1 :]):
+        path.write_bytes(damaged)
+        with pytest.raises(MappingError, match=r"press\.mcap is no whole bag") as found:
+            imported(tmp_path)
+        assert "mcap recover" in found.value.hint
+        assert not (tmp_path / "out").exists()
 
 
 @pytest.mark.parametrize(
     ("changes", "says"),
     [
-        ({"tables__force__read": {"format": "mcap", "topic": "/forces"}}, r"no message of topic '/forces'"),
-        ({"streams__taxels__channels": [{"columns": "data.3", "name": "t", "kind": "taxel", "unit": "count"}]},
-         r"/taxels, message 0 has no 'data\.3'"),
-        ({"tables__taxels__time": {"column": "header.stamp", "unit": "ms", "epoch": "unix"}}, "is in nanoseconds"),
+        ({"tables__force__read__topic": "/forces"}, r"no message of topic '/forces'"),
+        ({"streams__taxels__channels__0__columns": "data.3"}, r"/taxels, message 0 has no 'data\.3'"),
+        ({"tables__taxels__time__unit": "ms"}, "is in nanoseconds"),
     ],
-)  # fmt: skip
+)
 def test_what_a_bag_does_not_have_is_named(tmp_path, changes, says):
     ros_bag(tmp_path / "press.mcap", rows=3)
     with pytest.raises(MappingError, match=says):
@@ -155,11 +145,8 @@ def test_what_a_bag_does_not_have_is_named(tmp_path, changes, says):
 
 
 def test_another_encoding_is_named(tmp_path):
-    with (tmp_path / "press.mcap").open("wb") as opened:
-        writer = mcap_writer.Writer(opened)
-        writer.start()
+    with plain_bag(tmp_path) as writer:
         channel = writer.register_channel("/taxels", "protobuf", writer.register_schema("pad.Taxels", "protobuf", b""))
         writer.add_message(channel, START, b"\x08\x01", START)
-        writer.finish()
     with pytest.raises(MappingError, match="'/taxels' is encoded as protobuf"):
         imported(tmp_path)

@@ -12,17 +12,15 @@ from tests.conftest import ROOT
 def test_icub_grasp(shared_data, tmp_path):
     """Three of its ten objects."""
     (tmp_path / "iCubGraspDataset").mkdir()
-    for name in ("full_coke", "empty_coke", "none"):
-        for path in (shared_data / "icub-grasp" / "iCubGraspDataset").glob(f"{name}_*.txt"):
+    for path in (shared_data / "icub-grasp" / "iCubGraspDataset").glob("*.txt"):
+        if path.name.startswith(("full_coke_", "empty_coke_", "none_")):
             (tmp_path / "iCubGraspDataset" / path.name).symlink_to(path)
     mapping = ROOT / "examples" / "mappings" / "icub-grasp.yaml"
     report = import_tables(mapping, root=tmp_path, out=tmp_path / "out")
-    assert (report.files_read, *report.excluded.values()) == (70, 27)
     trials = Counter()
     for one in report.recordings:
         with open_recording(one.path) as recording:
-            meta, taxels = recording.meta, recording.read("taxels").data
-        trials[meta.labels["object"]] += 1
-        assert bool(meta.excluded) == (meta.labels["object"] == "full_coke")
+            taxels = recording.read("taxels").data
+            trials[recording.meta.labels["object"], recording.meta.excluded != ""] += 1
         assert (taxels.shape[1], taxels.dtype) == (60, np.uint8)
-    assert trials == {"full_coke": 27, "empty_coke": 21, "none": 22}
+    assert trials == {("full_coke", True): 27, ("empty_coke", False): 21, ("none", False): 22}
