@@ -288,7 +288,10 @@ class GuardProcess:
                 self._fail(f"it has not answered within {within_s:.3f} s")
         if "error" in said:
             kind, message, hint = said["error"]
-            raise getattr(errors, kind, GuardRefusesError)(message, hint=hint)
+            found = getattr(errors, kind, GuardRefusesError)
+            error: TactbenchError = found.__new__(found)  # some are made of other arguments
+            TactbenchError.__init__(error, message, hint=hint)
+            raise error
         return said["answer"]
 
     def _receive(self, timeout_s: float) -> bool:

@@ -8,8 +8,18 @@ from pathlib import Path
 
 import pytest
 
+from tactbench.core.errors import UnknownNameError
 from tactbench.devices.guard_messages import GuardRefusesError, Trigger
-from tactbench.plugin.devices import Beat, DriverSettings, GuardLostError, GuardState, LinkError
+from tactbench.plugin.devices import (
+    Beat,
+    DeviceSettings,
+    DriverSettings,
+    GuardLostError,
+    GuardProcess,
+    GuardState,
+    LinkError,
+    ProcessSettings,
+)
 from tactbench.rigs.parallel_manipulator.motor.driver import FaulhaberDriver, retreat_command
 from tactbench.rigs.parallel_manipulator.motor.exchange import MotorError
 from tests.rigs.parallel_manipulator.presses import FAULTS, PATIENT, load, rig
@@ -69,6 +79,15 @@ def test_a_guard_that_is_lost_says_so_ever_after(tmp_path):
         (event,) = [event for event in made.guard.events() if event.trigger]
         assert event.trigger == "guard is gone"
         assert made.out
+
+
+def test_what_a_driver_refuses_is_raised_here_as_it_was_there(tmp_path):
+    motor = DeviceSettings(f"{FaulhaberDriver.__module__}:FaulhaberDriver", "loop://?baud=9600", {"sped": 1})
+    guard = GuardProcess(ProcessSettings({"motor": motor}, motor, str(tmp_path / "log")))
+    with pytest.raises(UnknownNameError, match="called 'sped'") as refused:
+        guard.start()
+    assert "speed_m_s" in refused.value.hint
+    guard.close()
 
 
 NOT_A_NUMBER = "tests.rigs.parallel_manipulator.broken_force:build"
