@@ -183,7 +183,8 @@ class Run:
         by_need: dict[RequestKey, list[Cell]] = {}
         for cell in cells:
             by_need.setdefault(request_key(cell), []).append(cell)
-        requests = (request for need in by_need for request in self.plan.requests.get(need, ()))
+        requests = [request for need in by_need for request in self.plan.requests.get(need, ())]
+        self._clear(requests)
         missing = {request.path: request for request in requests if not request.path.exists()}
         lacking = {need: missing.keys() & self.plan.paths.get(need, ()) for need in by_need}
         ready = [self._jobs(by_need[need]) for need, paths in lacking.items() if not paths]
@@ -224,12 +225,18 @@ class Run:
         grace_s = 0.0 if computed else GRACE_S
         return Pool(self.choice.processes if computed else 1, replace(self.choice.limits, grace_s=grace_s))
 
+    def _clear(self, requests: Iterable[RecordingRequest]) -> None:
+        """Remove what a simulation that was killed has left; what devices gave is never removed."""
+        computed = {request.path for request in requests if is_computed(request, self.registry)}
+        for folder in {path.parent for path in computed}:
+            for left in folder.glob("*.h5.*"):
+                if left.with_name(f"{left.name.partition('.h5.')[0]}.h5") in computed:
+                    left.unlink(missing_ok=True)
+
     def _submit_recordings(self, recorder: Engine, missing: Iterable[RecordingRequest], *, computed: bool) -> None:
         """Queue recordings: all of a real rig as one piece of work, simulated ones by seed and sensor."""
         pieces: dict[tuple[int, str], list[RecordingRequest]] = {}
         for request in missing:
-            for left in request.path.parent.glob(f"{request.path.name}.*") if computed else ():
-                left.unlink(missing_ok=True)  # of a simulation that was killed; what devices gave is never removed
             pieces.setdefault((request.seed, request.sensor) if computed else (0, ""), []).append(request)
         parts = self.choice.processes if computed and len(pieces) < self.choice.processes else 1
         for piece in pieces.values():

@@ -41,6 +41,8 @@ def test_ctrl_c_ends_it_with_one_sentence_and_the_next_run_continues(tmp_path):
     folder = tmp_path / str(attempt)
     finished = {path: path.read_bytes() for path in folder.rglob("*.h5")}
     assert finished
+    # As a process leaves it that is killed between the last two steps of a recording.
+    Path(f"{next(iter(finished))}.partial").touch()
     Verbs(folder, here=True)(*CURVATURE[2:])
     assert {path: path.read_bytes() for path in finished} == finished, "what was finished is reused, not made again"
     assert not [path for path in folder.rglob("*") if path.suffix in (".partial", ".completing")]
