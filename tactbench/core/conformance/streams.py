@@ -90,19 +90,16 @@ def joined(where: str, streams: Sequence[StreamSpec], blocks: Iterable[Any]) -> 
         came[block.stream].append(replace(block, quality=marks_of(block)))
     found = {}
     for spec in streams:
-        width = (len(spec.channels),)
-        parts = came[spec.name] or [Block(spec.name, None, np.empty((0, *width)), np.empty((0, *width), np.uint8))]
+        nothing = np.empty((0, len(spec.channels)))
+        parts = came[spec.name] or [Block(spec.name, None, nothing, nothing.astype(np.uint8))]
         given = [name for name in COLUMNS if getattr(parts[0], name) is not None]
-        for one in parts:
-            shapes = {name: np.shape(column) for name in COLUMNS if (column := getattr(one, name)) is not None}
-            if shapes["data"][1:] != width:
-                fail(f"{where}: {spec.name}", f"it has {shapes['data'][1:]} columns for {width[0]} channels")
-            if list(shapes) != given or len({shape[0] for shape in shapes.values()}) > 1:
-                fail(
-                    f"{where}: {spec.name}",
-                    f"a block has columns {shapes}, not those of the first, or not equally long",
-                )
-        whole = {name: np.concatenate([getattr(one, name) for one in parts]) for name in given}
+        try:
+            whole = {name: np.concatenate([getattr(one, name) for one in parts]) for name in given}
+        except ValueError as error:
+            fail(f"{where}: {spec.name}", f"its blocks do not fit each other: {error}")
+        shapes = {name: column.shape for name, column in whole.items()}
+        if shapes["data"][1:] != nothing.shape[1:] or len({shape[0] for shape in shapes.values()}) > 1:
+            fail(f"{where}: {spec.name}", f"its columns are {shapes}, for {len(spec.channels)} channels")
         found[spec.name] = StreamData(
             spec, whole.get("t_ns"), whole["data"], whole["quality"], sequence=whole.get("sequence")
         )
