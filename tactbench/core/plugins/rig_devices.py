@@ -26,6 +26,10 @@ if TYPE_CHECKING:
 
 LEAST_ROWS = 10
 """From which a zero is taken."""
+STRETCHES = 30
+"""In which a zero is cut to see by how much their means scatter."""
+STRETCH_S = 0.02
+"""Noise of a force may be alike so long (assumed: a sample of 50 Hz that is held). No drift is told within 0.6 s."""
 MOST_BAD = 0.1
 """Of the rows that a zero is taken from, the share that may be no numbers (assumed)."""
 _PRESSED = "normal"
@@ -111,16 +115,17 @@ class PressingForce:
         import numpy as np
 
         entry, third = self._entry, len(values) // 3
-        mean, spread = float(values.mean()), float(values.std())
-        drift = float(values[-third:].mean() - values[:third].mean())
-        # The means of stretches scatter by noise that is held or filtered, too; neighbours differ little by a drift.
-        stretches = min(30, len(values) // 2)
-        means = values[: len(values) // stretches * stretches].reshape(stretches, -1).mean(axis=1)
-        scatter = float(np.sqrt(np.mean(np.diff(means) ** 2) / 2))
-        largest = entry.largest_zero_n or 0.1 * entry.range_n
-        widest = 2 * entry.noise_n if entry.noise_n else 0.05 * entry.range_n
-        farthest = max(0.01 * entry.range_n, 5 * scatter * (2 / (stretches // 3)) ** 0.5)  # one zero in ten thousand
-        for what, value, most in (("mean", mean, largest), ("spread", spread, widest), ("drift", drift, farthest)):
+        found = [
+            ("mean", float(values.mean()), entry.largest_zero_n or 0.1 * entry.range_n),
+            ("spread", float(values.std()), 2 * entry.noise_n if entry.noise_n else 0.05 * entry.range_n),
+        ]
+        if entry.zero_s >= STRETCHES * STRETCH_S and len(values) >= STRETCHES:
+            drift = float(values[-third:].mean() - values[:third].mean())
+            # Means of stretches scatter by noise that is held or filtered, too; neighbours differ little by a drift.
+            means = values[: len(values) // STRETCHES * STRETCHES].reshape(STRETCHES, -1).mean(axis=1)
+            deviation = float(np.sqrt(np.mean(np.diff(means) ** 2) / 2 * 6 / STRETCHES))
+            found.append(("drift", drift, max(0.01 * entry.range_n, 5 * deviation)))  # one zero in ten thousand
+        for what, value, most in found:
             if abs(value) > most:
                 yield f"{name} has a {what} of {value:.3g} N, allowed are {most:.3g} N"
 
