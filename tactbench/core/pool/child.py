@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import faulthandler
+import io
 import multiprocessing
 import os
 import signal
@@ -96,6 +97,8 @@ def _redirect(log: str) -> None:
     for descriptor in (1, 2):
         os.dup2(opened, descriptor)
     os.close(opened)
+    if isinstance(sys.stdout, io.TextIOWrapper):
+        sys.stdout.reconfigure(line_buffering=True)  # what was printed before a crash is in the log, in its order
 
 
 class _Terminated(BaseException):
