@@ -36,7 +36,7 @@ def impatient(tmp_path):
 
 def test_presses_go_through_driver_guard_process_and_emulators_and_keep_their_home(tmp_path):
     """The sender of the force was a thread of the rig's process, which held it up for longer than the guard allows."""
-    file, icub, scene = impatient(tmp_path), REGISTRY.sensors["icub"], ramp(5.0, 0.5, 3.0)
+    file, icub, scene = impatient(tmp_path), REGISTRY.sensors["icub"], ramp(5.0, 0.5, 5.0)
     rig = build(RigContext(effects=tuple(REGISTRY.effects), rig_file=running(file)))
     for name in ("a.h5", "b.h5"):
         acquire(
@@ -51,7 +51,7 @@ def test_presses_go_through_driver_guard_process_and_emulators_and_keep_their_ho
     assert meta.assumptions["noise_scale"] == 1.0  # what the simulation said in its own process
     # It was pressed, the motor's way came back as force, and the sensor answered to it.
     at_s = 1e-9 * (force.t_ns - force.t_ns[0])
-    assert force.data[at_s > 2.7, 2].mean() > force.data[at_s < 0.5, 2].mean() + 1.5
+    assert force.data[at_s > 4.5, 2].mean() > force.data[at_s < 0.5, 2].mean() + 1.5
     assert abs(taxels.data[-10:].mean(axis=0) - taxels.data[:10].mean(axis=0)).max() > 5
     guard = rig._session.guard
     assert guard._process.poll() is None
