@@ -227,10 +227,11 @@ class Run:
 
     def _clear(self, requests: Iterable[RecordingRequest]) -> None:
         """Remove what a simulation that was killed has left; what devices gave is never removed."""
-        computed = {request.path for request in requests if is_computed(request, self.registry)}
-        for folder in {path.parent for path in computed}:
+        by_path = {request.path: request for request in requests}
+        for folder in {path.parent for path in by_path}:
             for left in folder.glob("*.h5.*"):
-                if left.with_name(f"{left.name.partition('.h5.')[0]}.h5") in computed:
+                request = by_path.get(left.with_name(f"{left.name.partition('.h5.')[0]}.h5"))
+                if request is not None and is_computed(request, self.registry):
                     left.unlink(missing_ok=True)
 
     def _submit_recordings(self, recorder: Engine, missing: Iterable[RecordingRequest], *, computed: bool) -> None:

@@ -167,7 +167,8 @@ def test_noise_that_is_held_for_several_rows_is_no_drift():
     rng = np.random.default_rng(2)
     for _ in range(400):
         held = np.repeat(rng.normal(0.0, 0.69, 167), 12)[:2000]
-        zeroed(lambda t_s, held=held: held + rng.normal(0.0, 1e-3, 2000))
+        zero, _ = zeroed(lambda t_s, held=held: held + rng.normal(0.0, 1e-3, 2000))
+        assert zero[0] == pytest.approx(held.mean(), abs=1e-3)
 
 
 def test_what_is_allowed_of_a_zero_is_the_rig_files():

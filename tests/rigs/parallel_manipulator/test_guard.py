@@ -346,14 +346,19 @@ def test_a_drive_that_has_forgotten_its_limits_is_not_armed(made):
         made.guard.arm(made.setting.limits)
 
 
-def test_a_motor_that_cannot_come_out_loses_its_power_loudly(made):
+def held(made):
+    """Return a change of a beat that ends the press, with something that holds the motor where it is."""
+
     def block(beat):
-        # Something holds it where it is.
         here = made.world.motor.drive.position_m
         made.world.motor.drive.stops = (here - 1e-9, here + 1e-9)
         return replace(beat, sequence=0)
 
-    made.press(in_phase("ramp", block))
+    return in_phase("ramp", block)
+
+
+def test_a_motor_that_cannot_come_out_loses_its_power_loudly(made):
+    made.press(held(made))
     report = made.ended(5.0)
     assert report.state is GuardState.FAULT
     texts = [event.text for event in made.guard.events() if event.trigger is Trigger.RETREAT_FAILED]
@@ -366,13 +371,7 @@ def test_a_motor_that_would_fall_keeps_its_power(tmp_path, monkeypatch):
     fallen = FAULTS.STATED | {"orientation": "vertical", "brake": False, "counterweight": False}
     monkeypatch.setattr(FAULTS, "STATED", fallen)
     with rig("local", tmp_path) as made:
-
-        def block(beat):
-            here = made.world.motor.drive.position_m
-            made.world.motor.drive.stops = (here - 1e-9, here + 1e-9)
-            return replace(beat, sequence=0)
-
-        made.press(in_phase("ramp", block))
+        made.press(held(made))
         report = made.ended(5.0)
         assert "left under power" in report.not_out
         assert made.world.motor.drive.enabled
