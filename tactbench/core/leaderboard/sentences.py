@@ -126,7 +126,7 @@ def _outcome(board: Board) -> str:
     alike = [row for row, rank in others if not rank.behind]
     if alike:
         return f"{where}{name} has {quality}; {_some(list(map(board.name, alike)))} cannot be told from it."
-    return f"{where}{name} is best: {_ahead(board, first, others[0][0])}."
+    return f"{where}{name} is best; closest is {_closest(board, first, [row for row, _ in others])}."
 
 
 def _too_few(rows: Sequence[Row]) -> str:
@@ -139,24 +139,25 @@ def _too_few(rows: Sequence[Row]) -> str:
     return f"{have}: too few for intervals and places, which need {FEWEST}{more}."
 
 
-def _ahead(board: Board, first: Row, second: Row) -> str:
-    """Return whom the best answer is better than, in how many campaigns, and by how much."""
+def _closest(board: Board, first: Row, others: Sequence[Row]) -> str:
+    """Return the answer that the best one is least better than, in how many campaigns, and by how much."""
     from tactbench.core.statistics.paired import difference  # numerics
 
-    found = difference(first, second)
-    name, unit, sign = board.name(second), first["unit"], -sign_of(first)
+    unit, sign = first["unit"], -sign_of(first)
+    found, second = min(((difference(first, row), row) for row in others), key=lambda pair: sign * pair[0].value)
+    name = board.name(second)
     if found.low is None or found.high is None or sign * found.value <= 0:
-        return f"better than {name}"
+        return name
     low, high = sorted((sign * found.low, sign * found.high))
     by = score_with_unit(sign * found.value, unit)
     ends = f"{percent(None, None)} {interval(low, high, unit)}"
     kept = [row.get("replicates") or {} for row in (first, second)]
     key = "beyond" if all("beyond" in one for one in kept) else "scores"
     if not found.paired or not all(key in one for one in kept):
-        return f"better than {name} by {by} ({ends})"
+        return f"{name}, worse by {by} ({ends})"
     wins = sum(sign * (one - other) > 0 for one, other in zip(*(one[key] for one in kept), strict=True))
     return (
-        f"better than {name} in {wins} of {counted(len(kept[0][key]), 'campaign')}; mean of the differences"
+        f"{name}, worse in {wins} of {counted(len(kept[0][key]), 'campaign')}; mean of the differences"
         f"{' beyond the floor' if key == 'beyond' else ''} within campaigns {by} ({ends})"
     )
 
@@ -190,8 +191,8 @@ def _published(board: Board) -> str:
         shown = [(row["sensor"] if alone else board.name(row), score(row["published"], row["unit"])) for row in members]
         verb = f" {'lies' if len(shown) == 1 else 'lie'}" if not parts else ""
         listed = ", ".join(f"{name} {value}" for name, value in shown)
-        parts.append(f"{listed}{verb} {where} {'its interval' if len(shown) == 1 else 'their intervals'}")
-    tail = "; a gap is an error of the simulation, not of a sensor" if rows[0]["simulated"] else ""
+        parts.append(f"{listed}{verb} {where} {'our interval' if len(shown) == 1 else 'our intervals'}")
+    tail = "; this concerns the simulation, not the sensors" if rows[0]["simulated"] else ""
     return f"Published values: {', '.join(parts)}{tail}."
 
 
@@ -228,7 +229,7 @@ def _marks(board: Board) -> Iterator[Note]:
     if stamps:
         yield Note(f"{STAMPED}  {'; '.join(stamps)}", printed=True)
     if any(rank.tied for _, rank in board.placed) and not board.unranked:
-        yield Note(f"{SHARED}  shared place: not all pairs of these rows can be told apart")
+        yield Note(f"{SHARED}  shared place: these rows cannot all be told apart")
     of_own = "better than the trivial answer of its own sensor"
     if board.unplaced and board.placed:
         yield Note(f"{NO_BETTER}  no {of_own} ({board.bars_of(board.unplaced)})", printed=True)
@@ -242,7 +243,7 @@ def _protocol(board: Board) -> Iterator[Note]:
     finished = (*board.answers, *board.trivial)
     protocol = next((row["protocol"] for row in finished if row["dagger"]), None)
     if protocol is not None:
-        text = f"Protocol {protocol} uses statistics of the test set, which are unknown in use"
+        text = f"Protocol {protocol} uses means and deviations of the test set, unknown in use"
         yield Note(text, "; `tactbench run --protocol deployable` does not.", printed=True)
 
 
@@ -277,7 +278,7 @@ def _how(board: Board) -> Iterator[Note]:
         parts.append(f"Interval: over {_counts([row['n_replicates'] for row in rows], unit)}")
     sentences = ["; ".join(parts)] if parts else []
     if board.times and any(row.get("answer_delay_ms") is not None for row in board.answers):
-        sentences.append("Delay: sampling, link, window, computing")
+        sentences.append("Delay: sampling, link, window, computing; training: the final fit")
     if sentences:
         yield Note(f"{'. '.join(sentences)}.")
 
