@@ -104,7 +104,9 @@ def _caption(block: Block) -> str:
         sentences.append(f"n = {'–'.join(map(whole, dict.fromkeys((counts[0], counts[-1]))))} test samples")
     if len(over) == 1:
         number, unit = over.pop()
-        sentences.append(f"Intervals are over {counted(number, 'campaign' if unit == 'replicate' else unit)}")
+        campaigns = unit == "replicate"  # a campaign has a score of its own
+        what = "Scores are medians, intervals" if campaigns else "Intervals are"
+        sentences.append(f"{what} over {counted(number, 'campaign' if campaigns else unit)}")
     if any(line.kind == "baseline" for line in block.lines):
         sentences.append("Below the rule: trivial answers")
     return " ".join(sentence if sentence.endswith("?") else f"{sentence}." for sentence in sentences)
