@@ -12,8 +12,8 @@ if TYPE_CHECKING:
 
 
 def is_results(folder: Path) -> bool:
-    """Return whether a folder is one that ``run --out`` has made."""
-    return (folder / "cells").is_dir()
+    """Return whether a folder holds cells that a run has ended."""
+    return any((folder / "cells").glob("*.h5"))
 
 
 def opened(folder: Path) -> Store:
