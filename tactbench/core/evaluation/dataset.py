@@ -101,7 +101,8 @@ def load_dataset(task: TaskSpec, recordings: Sequence[Path], *, include_incomple
     NotApplicable
         If the sensor has no channel of a kind the task needs, or no recording has the label it asks for.
     DataError
-        If a channel has no sample at all, the recordings disagree about their channels, or nothing is left.
+        If a channel has no sample at all, the recordings are of several sensors or disagree about their channels, one
+        is given twice, or nothing is left.
     """
     counts: Counter[str] = Counter()
     tables: list[Table] = []
@@ -114,11 +115,15 @@ def load_dataset(task: TaskSpec, recordings: Sequence[Path], *, include_incomple
                 counts[f"recordings left out ({excluded})"] += 1
                 continue
             names, table = _read(recording, task, counts)
-        if tables and names != features:
+        meta, first = table.meta, (tables or [table])[0].meta
+        if tables and (meta.sensor.name, names) != (first.sensor.name, features):
             raise DataError(
-                f"The recordings {tables[0].meta.name!r} and {table.meta.name!r} have different channels.",
+                f"The recordings {first.name!r} of {first.sensor.name} and {meta.name!r} of {meta.sensor.name} are not "
+                "of one sensor with the same channels.",
                 hint="Evaluate them apart.",
             )
+        if any(one.meta.name == meta.name and np.array_equal(one.X, table.X) for one in tables):
+            raise DataError(f"The recording {meta.name!r} is given twice: {path} holds it too.", hint="Leave one out.")
         features = names
         tables.append(table)
         paths.append(path)
