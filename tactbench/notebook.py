@@ -178,8 +178,10 @@ def open_recordings(path_or_paths: Recordings) -> list[Recording]:
     """
     if isinstance(path_or_paths, Recording):
         return [path_or_paths]
-    if not isinstance(path_or_paths, str | os.PathLike):
+    if isinstance(path_or_paths, Iterable) and not isinstance(path_or_paths, str):
         return list({one.path: one for each in path_or_paths for one in open_recordings(each)}.values())
+    if not isinstance(path_or_paths, str | os.PathLike):
+        raise UsageError(f"{path_or_paths!r} is no recording.", hint="Give files, folders, globs or recordings.")
     path = Path(path_or_paths).expanduser()
     if path.is_dir():
         replay: Any = rig_of("replay", installed(), path)
@@ -223,6 +225,8 @@ def _question(task: str | TaskSpec, recordings: Recordings, protocol: str) -> tu
     if isinstance(task, str):
         owned = registry.tasks.owned(task)
         task, declared = owned.descriptor.spec, owned.declared.model_dump_json() if owned.declared else ""
+    if not isinstance(task, TaskSpec):
+        raise UsageError(f"{task!r} is no task.", hint="Give its name, see `tactbench list tasks`, or a TaskSpec.")
     if protocol not in task.protocols and not is_probe(protocol):
         raise UnknownNameError(f"protocol of task {task.name!r}", protocol, task.protocols)
     return task, declared, paths

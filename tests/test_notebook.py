@@ -140,6 +140,8 @@ def test_a_result_has_what_a_row_has_and_shows_it(folder):
     ("call", "said"),
     [
         (lambda folder: tactbench.evaluate(Ridge, "force", folder), "no estimator"),
+        (lambda folder: tactbench.evaluate("force", Ridge(), folder), "no task"),
+        (lambda folder: tactbench.open_recordings([folder, 3]), "3 is no recording"),
         (lambda folder: tactbench.run(tasc="force"), "--task"),
         (lambda folder: tactbench.run(task="force", estimator={"ridge": Ridge()}), "one name"),
         (lambda folder: tactbench.results(folder / "nothing"), "no results"),

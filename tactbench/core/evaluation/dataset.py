@@ -136,7 +136,7 @@ def load_dataset(task: TaskSpec, recordings: Sequence[Path], *, include_incomple
     target = _target_name(task)
     if not any(table.labelled.any() for table in tables):
         raise NotApplicable(
-            f"Task {task.name!r} asks for {target}, and no recording has it.",
+            f"No recording has any {target}, which task {task.name!r} asks for.",
             hint="State it in the mapping, or choose another task.",
         )
     unlabelled = sum(int((~table.labelled).sum()) for table in tables)
@@ -338,7 +338,7 @@ def _target_name(task: TaskSpec) -> str:
     if isinstance(task.target, SlipTarget):
         return "slip of the reference"
     if isinstance(task.target, LabelTarget):
-        return task.target.name
+        return f"label {task.target.name!r}"
     if isinstance(task.target, VectorTarget):
         return f"{task.target.kind} samples called {' and '.join(map(repr, task.target.names))}"
     return f"{task.target.kind} sample" + (f" called {task.target.name!r}" if task.target.name else "")

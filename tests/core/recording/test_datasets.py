@@ -117,6 +117,8 @@ def test_what_lies_at_no_address_needs_a_copy_which_is_checked(tmp_path, server)
         pad.recordings(copy)
     (copy / "press_3.csv").write_bytes(PRESSES["press_3.csv"])
     assert pad.recordings(copy) == pad.recordings(), "it is imported once"
+    with pytest.raises(MissingRecordingError, match="no folder"):
+        pad.recordings(tmp_path / "cpoy")  # as before it was imported
     assert described(tmp_path, server.address, "other").recordings(copy.parent).is_dir()
     assert server.asked == []
 
