@@ -23,7 +23,7 @@ import numpy.typing as npt
 from tactbench.core.cli.config import default_matrix
 from tactbench.core.cli.results import opened, over_all, shown_rows, table_of
 from tactbench.core.cli.threads import keep_threads
-from tactbench.core.errors import FormatError, MissingRecordingError, UnknownNameError, UsageError
+from tactbench.core.errors import FormatError, MissingRecordingError, NotApplicable, UnknownNameError, UsageError
 from tactbench.core.evaluation.cell import PLAIN, TaskData
 from tactbench.core.evaluation.cell import load_task as folds_of
 from tactbench.core.evaluation.channels import numbers
@@ -34,6 +34,7 @@ from tactbench.core.leaderboard.pairwise import comparisons, record_of, tables_o
 from tactbench.core.leaderboard.table import Table, build_table
 from tactbench.core.leaderboard.view import best, grids
 from tactbench.core.matrix.installed import rig_of
+from tactbench.core.matrix.naming import cell_of
 from tactbench.core.matrix.plan import Cell, task_of
 from tactbench.core.matrix.solve import Job, read_dataset, solve, unanswered
 from tactbench.core.matrix.summary import fill_baselines
@@ -46,7 +47,6 @@ from tactbench.core.samples import Answers, FloatArray, StreamData
 from tactbench.core.spec.declared_task import FILE
 from tactbench.core.spec.matrix import EstimatorChoice, MatrixSpec
 from tactbench.core.spec.recording import RecordingMeta
-from tactbench.core.spec.scene import Simulation
 from tactbench.core.spec.sensor import ChannelSpec, SensorSpec
 from tactbench.core.spec.task import TaskSpec, VectorTarget
 from tactbench.core.statistics.replicates import over_replicates
@@ -460,7 +460,7 @@ def run(
     sensor: str | Sequence[str] = (),
     task: str | Sequence[str] = (),
     estimator: Estimators = (),
-    recordings: AnyPath | None = None,
+    recordings: Recordings | None = None,
     out: AnyPath = "tactbench-results",
     **options: Any,
 ) -> Results:
@@ -474,7 +474,7 @@ def run(
         Names and objects with ``fit`` and ``predict``, one or several; a mapping gives objects their names. Where there
         are objects alone, the tasks' trivial answers are run beside them, and no other estimators.
     recordings, out
-        Folder of recordings to replay; the result folder.
+        Folder of recordings to replay, or all recordings of one; the result folder.
     **options
         Every other option of the verb by its name, with ``_`` for ``-``: ``protocol="deployable"``, ``repeats=3``,
         ``probe=True``, ``rig_file="rig.yaml"``, ``config="beyond"``; lists for options that may be repeated.
@@ -495,18 +495,18 @@ def run(
         alone = [one.model_copy(update={"estimators": bar}) for one, bar in zip(matrix.tasks, bars, strict=True)]
         return matrix.model_copy(update={"tasks": tuple(alone)}) if objects and not names else matrix
 
-    asked = {"sensor": sensor, "task": task, "estimator": names, "recordings": recordings, "out": out} | options
+    asked = {"sensor": sensor, "task": task, "estimator": names, "recordings": _folder(recordings), "out": out}
     before = set(os.environ)
     keep_threads()  # of child processes; this one's libraries have read the environment already
     try:
-        store, outcome = carry_out(**_as_read_by_the_verb(asked), changed=trivial_beside_objects)
+        store, outcome = carry_out(**_as_read_by_the_verb(asked | options), changed=trivial_beside_objects)
     finally:
         for name in set(os.environ) - before:
             del os.environ[name]
     table = table_of(store, over_all(store, outcome.rows))
     write_tables(table.rows, store.folder, table.provenance, table)
-    alike = ("sensor", "task", "rig", "protocol", "split", "repeat")
-    each = {tuple(row[name] for name in alike): row for row in outcome.rows if row["status"] == "done"}
+    ended = sorted(outcome.rows, key=lambda row: bool(row["status"] == "done"))  # the last of a question counts below
+    each = {replace(cell_of(row), estimator="", params=(), baseline=False, timed=True): row for row in ended}
     beside = [_beside(row, name, given, store.folder) for name, given in objects.items() for row in each.values()]
     return Results(table_of(store, over_all(store, [*outcome.rows, *beside])) if beside else table)
 
@@ -515,6 +515,20 @@ def results(folder: AnyPath = "tactbench-results") -> Results:
     """Return the rows of a result folder, what ``tactbench leaderboard FOLDER`` shows; UsageError if there are none."""
     store = opened(Path(folder))
     return Results(table_of(store, shown_rows(store)))
+
+
+def _folder(recordings: Recordings | None) -> AnyPath | None:
+    """Return the folder that a run replays; raises UsageError for recordings that are not all of one folder."""
+    if recordings is None or isinstance(recordings, str | os.PathLike):
+        return recordings
+    paths = {one.path for one in open_recordings(recordings)}
+    folders = {path.parent for path in paths}
+    if len(folders) != 1 or {one.path for one in open_recordings(*folders)} != paths:
+        raise UsageError(
+            f"A run replays a folder of recordings, and the {len(paths)} given are not all of one.",
+            hint="Give a folder, or use `evaluate`.",
+        )
+    return folders.pop()
 
 
 def _named(estimator: Estimators) -> tuple[list[str], dict[str, Estimator]]:
@@ -556,10 +570,9 @@ def _as_read_by_the_verb(options: Mapping[str, Any]) -> dict[str, Any]:
 
 def _beside(row: Row, name: str, given: Estimator, folder: Path) -> Row:
     """Return the row of an object that answers what another row answered, from the same recordings."""
-    same = ("sensor", "task", "rig", "protocol", "split", "repeat", "repeats", "seed", "declared_task")
-    cell = Cell(
-        **{key: row[key] for key in same}, estimator=name, params=(), baseline=False, timed=row["fit_s"] is not None,
-        simulation=Simulation.model_validate(row["simulation"]),
-    )  # fmt: skip
-    paths = [folder / one for one in row["recordings"]]
-    return _ended(cell, task_of(cell.task_key, installed()), paths, given, row["simulated"])
+    cell = replace(cell_of(row), estimator=name, params=(), baseline=False)
+    task, paths = task_of(cell.task_key, installed()), [folder / one for one in row["recordings"]]
+    if not paths:  # no answer to this question was finished
+        reason = NotApplicable(f"{row['estimator']}: {row['reason']}")
+        return unanswered(cell, task, reason, simulated=row["simulated"])
+    return _ended(cell, task, paths, given, row["simulated"])

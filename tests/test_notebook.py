@@ -144,6 +144,7 @@ def test_a_result_has_what_a_row_has_and_shows_it(folder):
         (lambda folder: tactbench.open_recordings([folder, 3]), "3 is no recording"),
         (lambda folder: tactbench.run(tasc="force"), "--task"),
         (lambda folder: tactbench.run(task="force", estimator={"ridge": Ridge()}), "one name"),
+        (lambda folder: tactbench.run(task="force", recordings=tactbench.open_recordings(folder)[1:]), "all of one"),
         (lambda folder: tactbench.results(folder / "nothing"), "no results"),
     ],
 )
@@ -173,13 +174,22 @@ def test_a_run_is_that_of_the_verb_and_leaves_the_same_folder(folder, here, tmp_
 def test_objects_stand_in_the_table_and_not_in_the_folder(folder, here):
     models = {"mine": scaled(Ridge()), "other": scaled(Ridge(alpha=100.0)), "classes": LogisticRegression(),
               "ridge": "ridge"}  # fmt: skip
-    found = tactbench.run(task="force", recordings=folder, estimator=models, out="mine")
+    found = tactbench.run(task="force", recordings=tactbench.open_recordings(folder), estimator=models, out="mine")
     scores = {row["estimator"]: row["score"] for row in found}
     assert scores.keys() == {*models, "mean", "time-index"}
     assert [row["estimator"] for row in found if row["status"] == "failed"] == ["classes"]
+    assert "classes failed" in repr(found)
+    assert "tactbench why" not in repr(found), "no folder has its row"
     assert scores["mine"] == tactbench.evaluate(models["mine"], "force", folder).score
     assert found.compare("mine", "other")[0]["replicates"] == 5
     assert {row["estimator"] for row in tactbench.results("mine")} == {"ridge", "mean", "time-index"}
+
+
+def test_an_object_that_nothing_can_be_asked_of_is_a_row_all_the_same(folder, here):
+    found = tactbench.run(task="object-identity", recordings=folder, estimator=Ridge(), out="mine")
+    assert {(row["estimator"], row["status"]) for row in found} == {
+        (name, "skipped") for name in ("Ridge", "chance", "majority")
+    }
 
 
 def test_objects_answer_every_replicate_of_a_simulation(here):
