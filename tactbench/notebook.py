@@ -140,6 +140,7 @@ class Recording:
             found["quality"] = ((rows, "channel"), one.quality)
         names, units = zip(*((channel.name, channel.unit) for channel in one.channels), strict=True)
         coordinates = {rows: times, "channel": list(names), "unit": ("channel", list(units))}
+        coordinates |= {} if one.time_s is None else {"time_s": (rows, one.time_s)}
         made: xarray.Dataset = xr.Dataset(found, coordinates)
         return made
 
@@ -301,6 +302,14 @@ class Results(Rows):
     def __init__(self, table: Table) -> None:
         super().__init__((row for row, _ in records(table)), [*grids(table), *table.sections])
         self.table = table
+
+    def __getitem__(self, place: Any) -> Any:
+        """Return a row; of a slice the table with these rows, in their blocks; places stay those among all."""
+        if not isinstance(place, slice):
+            return super().__getitem__(place)
+        lines = self.table.lines[place]
+        found = [replace(one, lines=tuple(line for line in one.lines if line in lines)) for one in self.table.blocks]
+        return Results(replace(self.table, blocks=tuple(block for block in found if block.lines)))
 
     def best(self, count: int = 1) -> Results:
         """Return the first `count` answers of each sensor to each question; places stay those among all."""
@@ -505,7 +514,8 @@ def run(
             del os.environ[name]
     table = table_of(store, over_all(store, outcome.rows))
     write_tables(table.rows, store.folder, table.provenance, table)
-    ended = sorted(outcome.rows, key=lambda row: bool(row["status"] == "done"))  # the last of a question counts below
+    # Of the rows of a question a finished one counts, else a trivial answer's, whose reason is that of the recordings.
+    ended = sorted(outcome.rows, key=lambda row: (row["status"] == "done", row["is_baseline"]))
     each = {replace(cell_of(row), estimator="", params=(), baseline=False, timed=True): row for row in ended}
     beside = [_beside(row, name, given, store.folder) for name, given in objects.items() for row in each.values()]
     return Results(table_of(store, over_all(store, [*outcome.rows, *beside])) if beside else table)
@@ -573,6 +583,6 @@ def _beside(row: Row, name: str, given: Estimator, folder: Path) -> Row:
     cell = replace(cell_of(row), estimator=name, params=(), baseline=False)
     task, paths = task_of(cell.task_key, installed()), [folder / one for one in row["recordings"]]
     if not paths:  # no answer to this question was finished
-        reason = NotApplicable(f"{row['estimator']}: {row['reason']}")
-        return unanswered(cell, task, reason, simulated=row["simulated"])
+        whose = "" if row["status"] == "skipped" else f"{row['estimator']}: "
+        return unanswered(cell, task, NotApplicable(f"{whose}{row['reason']}"), simulated=row["simulated"])
     return _ended(cell, task, paths, given, row["simulated"])

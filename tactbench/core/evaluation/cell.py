@@ -122,7 +122,7 @@ PLAIN = EstimatorDescriptor.model_construct(name="estimator", title="", kinds=()
 """What is taken of an estimator that is only an object: it looks at all features, and has nothing to be chosen."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class TaskData:
     """What a task asks of recordings under a protocol: rows, and which of them train and test.
 
@@ -140,6 +140,10 @@ class TaskData:
     """which rows of each recording are for what, fold by fold"""
     held_back: bool = False
     """a share of the training groups is what thresholds are chosen on: no recording has the role validation"""
+
+    def __repr__(self) -> str:
+        counts = f"X {self.X.shape}, {len(self.assignments)} folds of {len(self.data.tables)} recordings"
+        return f"<TaskData {self.task.name} by {self.split}: {counts}>"
 
     @property
     def X(self) -> FloatArray:  # noqa: N802  (as in scikit-learn)

@@ -138,6 +138,11 @@ def test_the_board_asks_data_sets_that_there_are():
     assert named <= datasets().keys()
 
 
+def test_the_list_names_what_cannot_be_fetched(tmp_path):
+    lines = Verbs(tmp_path)("datasets").stdout.splitlines()
+    assert [line.split()[0] for line in lines if "--root" in line] == ["eflesh-slip"]
+
+
 def test_the_shipped_ones_are_those_of_the_copies(shared_data):
     assert len(datasets()) >= 6
     for name, one in datasets().items():
