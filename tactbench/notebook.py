@@ -1,19 +1,16 @@
-"""What ``import tactbench`` gives: recordings, tasks, scores and results in Python.
+"""What ``import tactbench`` gives beside recordings: tasks, scores and results in Python.
 
 The command line goes through the same functions, and :func:`evaluate` computes the row that a cell of a run has.
 """
 
 from __future__ import annotations
 
-import glob
 import os
 import random
 import shutil
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
-from functools import cached_property
-from importlib import import_module
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -23,17 +20,16 @@ import numpy.typing as npt
 from tactbench.core.cli.config import default_matrix
 from tactbench.core.cli.results import opened, over_all, shown_rows, table_of
 from tactbench.core.cli.threads import keep_threads
-from tactbench.core.errors import FormatError, MissingRecordingError, UnknownNameError, UsageError
+from tactbench.core.errors import NotApplicable, UnknownNameError, UsageError
 from tactbench.core.evaluation.cell import PLAIN, TaskData
 from tactbench.core.evaluation.cell import load_task as folds_of
-from tactbench.core.evaluation.channels import numbers
 from tactbench.core.evaluation.metrics import metric_called
 from tactbench.core.evaluation.protocols import is_probe
 from tactbench.core.leaderboard.formats import records, write_tables
 from tactbench.core.leaderboard.pairwise import comparisons, record_of, tables_of, with_declared
 from tactbench.core.leaderboard.table import Table, build_table
 from tactbench.core.leaderboard.view import best, grids
-from tactbench.core.matrix.installed import rig_of
+from tactbench.core.matrix.naming import cell_of
 from tactbench.core.matrix.plan import Cell, task_of
 from tactbench.core.matrix.solve import Job, read_dataset, solve, unanswered
 from tactbench.core.matrix.summary import fill_baselines
@@ -41,177 +37,20 @@ from tactbench.core.plugins.declared import declared_in
 from tactbench.core.plugins.declared import with_declared as with_declared_tasks
 from tactbench.core.plugins.interfaces import Estimator
 from tactbench.core.plugins.registry import installed
-from tactbench.core.recording.reader import open_recording, read_meta
-from tactbench.core.samples import Answers, FloatArray, StreamData
+from tactbench.core.samples import Answers
 from tactbench.core.spec.declared_task import FILE
 from tactbench.core.spec.matrix import EstimatorChoice, MatrixSpec
-from tactbench.core.spec.recording import RecordingMeta
-from tactbench.core.spec.scene import Simulation
-from tactbench.core.spec.sensor import ChannelSpec, SensorSpec
 from tactbench.core.spec.task import TaskSpec, VectorTarget
 from tactbench.core.statistics.replicates import over_replicates
 from tactbench.core.tables.html import html
 from tactbench.core.tables.terminal import plain_text
 from tactbench.core.tables.text_table import TextTable
+from tactbench.recordings import AnyPath, Recordings, library, open_recordings
 
 if TYPE_CHECKING:
     import pandas
-    import xarray
 
 Row = dict[str, Any]
-AnyPath = str | os.PathLike[str]
-
-
-@dataclass(frozen=True, repr=False)
-class Stream(StreamData):
-    """Channels of a recording that share a clock: `data` (n, channels) as stored, `quality`, `t_ns`, `annotations`."""
-
-    start_ns: int = 0
-    """When the recording's first sample was, of any stream."""
-
-    def __repr__(self) -> str:
-        return f"<Stream {self.spec.name}: {len(self.data)} rows of {', '.join(one.name for one in self.channels)}>"
-
-    @property
-    def channels(self) -> tuple[ChannelSpec, ...]:
-        """Return what is known of each channel: name, kind, unit, range, position."""
-        return self.spec.channels
-
-    @property
-    def time_s(self) -> FloatArray | None:
-        """Return (n,) seconds since the recording's first sample; None where it has no clock."""
-        return None if self.t_ns is None else np.asarray((self.t_ns - self.start_ns) * 1e-9)
-
-
-class Recording:
-    """A recording, by the `path` of its file. Meta and samples are read at first use and kept; no file stays open."""
-
-    def __init__(self, path: AnyPath) -> None:
-        self.path = Path(path)
-
-    def __repr__(self) -> str:
-        return f"<Recording {self.meta.name}: {self.sensor.name}>"
-
-    @cached_property
-    def meta(self) -> RecordingMeta:
-        """What the recording says about itself; raises FormatError if the file is no recording."""
-        return read_meta(self.path)
-
-    @property
-    def sensor(self) -> SensorSpec:
-        """Return the sensor's whole spec."""
-        return self.meta.sensor
-
-    @cached_property
-    def streams(self) -> Mapping[str, Stream]:
-        """The streams that hold data by name, the sensor's first, then the reference's."""
-        with open_recording(self.path) as file:
-            read = {name: file.read(name) for name in file.stream_names}
-        start_ns = min((int(one.t_ns[0]) for one in read.values() if one.t_ns is not None and len(one.t_ns)), default=0)
-        return {name: Stream(**vars(one), start_ns=start_ns) for name, one in read.items()}
-
-    @property
-    def reference(self) -> Mapping[str, Stream]:
-        """Return the streams that are not the sensor's own: force-torque sensor, probe."""
-        names = {spec.name for spec in self.meta.reference}
-        return {name: stream for name, stream in self.streams.items() if name in names}
-
-    def to_dataframe(self, stream: str | None = None) -> pandas.DataFrame:
-        """Return a stream (None: the sensor's first) as a pandas DataFrame: a column a channel, then labels of rows.
-
-        NaN is no sample. Raises FormatError if there is no such stream, UsageError if pandas is not installed.
-        """
-        pd, one = _library("pandas"), self._stream(stream)
-        index = None if one.time_s is None else pd.Index(one.time_s, name="time_s")
-        columns = dict(zip((channel.name for channel in one.channels), numbers(one).T, strict=True))
-        return pd.DataFrame({**columns, **one.annotations}, index=index)
-
-    def to_xarray(self, stream: str | None = None) -> xarray.Dataset:
-        """Return a stream as an xarray Dataset with time and channel coordinates.
-
-        It is what ``xarray.open_dataset(path, group="streams/NAME", engine="h5netcdf")`` reads of the file, with labels
-        of rows and units of channels beside. Raises as :meth:`to_dataframe`, UsageError if xarray is not installed.
-        """
-        xr, one = _library("xarray"), self._stream(stream)
-        rows, times = ("row", np.arange(len(one.data))) if one.t_ns is None else ("t_ns", one.t_ns)
-        found: dict[str, Any] = {name: (rows, values) for name, values in one.annotations.items()}
-        found["data"] = ((rows, "channel"), one.data)
-        if one.quality is not None:
-            found["quality"] = ((rows, "channel"), one.quality)
-        names, units = zip(*((channel.name, channel.unit) for channel in one.channels), strict=True)
-        coordinates = {rows: times, "channel": list(names), "unit": ("channel", list(units))}
-        made: xarray.Dataset = xr.Dataset(found, coordinates)
-        return made
-
-    def _stream(self, name: str | None) -> Stream:
-        found = self.streams.get(next(iter(self.streams), "") if name is None else name)
-        if found is None:
-            raise FormatError(f"{self.path} has no stream {name!r}.", hint=f"It has: {', '.join(self.streams)}.")
-        return found
-
-
-def _library(name: str) -> Any:
-    try:
-        return import_module(name)
-    except ImportError as error:
-        raise UsageError(
-            f"This needs {name}, which cannot be imported: {error}.", hint=f"Install it with `pip install {name}`."
-        ) from error
-
-
-Recordings = Recording | AnyPath | Iterable[Recording | AnyPath]
-"""What functions take as recordings: those of :func:`open_recordings`, files, folders or globs, one or several."""
-
-
-def open_recordings(path_or_paths: Recordings) -> list[Recording]:
-    """Open recordings; their samples are read when they are looked at.
-
-    Parameters
-    ----------
-    path_or_paths
-        A file, a folder (with all folders below it), a glob such as ``"recordings/**/*.h5"``, or several of these.
-
-    Returns
-    -------
-    list of Recording
-        Each file once, those of a folder or a glob in order of their paths; MissingRecordingError if there is none.
-    """
-    if isinstance(path_or_paths, Recording):
-        return [path_or_paths]
-    if not isinstance(path_or_paths, str | os.PathLike):
-        return list({one.path: one for each in path_or_paths for one in open_recordings(each)}.values())
-    path = Path(path_or_paths).expanduser()
-    if path.is_dir():
-        replay: Any = rig_of("replay", installed(), path)
-        return [Recording(one) for one in replay.recordings()]
-    if path.is_file():
-        return [Recording(path)]
-    paths = sorted(glob.glob(str(path), recursive=True))  # noqa: PTH207  (it takes absolute ones too)
-    if not paths:
-        raise MissingRecordingError(f"There is no recording {path}.", hint="Give a file, a folder or a glob.")
-    return open_recordings(paths)
-
-
-def dataset(name: str, root: AnyPath | None = None) -> list[Recording]:
-    """Return the recordings of a public data set; what is missing is fetched, checked, imported and kept.
-
-    Parameters
-    ----------
-    name
-        As ``tactbench datasets`` lists them, or a mapping file that states its source.
-    root
-        A folder that holds a copy, or whose sub-folder does.
-
-    Raises
-    ------
-    UnknownNameError
-        If there is no data set of that name.
-    MissingRecordingError, NotApplicable
-        If a file cannot be had, is not the one that is meant, or lies at no public address.
-    """
-    from tactbench.core.recording.datasets import dataset_called
-
-    return open_recordings(dataset_called(name).recordings(None if root is None else Path(root)))
 
 
 def _question(task: str | TaskSpec, recordings: Recordings, protocol: str) -> tuple[TaskSpec, str, tuple[Path, ...]]:
@@ -223,6 +62,8 @@ def _question(task: str | TaskSpec, recordings: Recordings, protocol: str) -> tu
     if isinstance(task, str):
         owned = registry.tasks.owned(task)
         task, declared = owned.descriptor.spec, owned.declared.model_dump_json() if owned.declared else ""
+    if not isinstance(task, TaskSpec):
+        raise UsageError(f"{task!r} is no task.", hint="Give its name, see `tactbench list tasks`, or a TaskSpec.")
     if protocol not in task.protocols and not is_probe(protocol):
         raise UnknownNameError(f"protocol of task {task.name!r}", protocol, task.protocols)
     return task, declared, paths
@@ -284,7 +125,7 @@ class Rows(list[dict[str, Any]]):
 
     def to_dataframe(self) -> pandas.DataFrame:
         """Return a pandas DataFrame, a line a row; raises UsageError if pandas is not installed."""
-        found: pandas.DataFrame = _library("pandas").DataFrame(list(self))
+        found: pandas.DataFrame = library("pandas").DataFrame(list(self))
         return found
 
 
@@ -297,6 +138,14 @@ class Results(Rows):
     def __init__(self, table: Table) -> None:
         super().__init__((row for row, _ in records(table)), [*grids(table), *table.sections])
         self.table = table
+
+    def __getitem__(self, place: Any) -> Any:
+        """Return a row; of a slice the table with these rows, in their blocks; places stay those among all."""
+        if not isinstance(place, slice):
+            return super().__getitem__(place)
+        lines = self.table.lines[place]
+        found = [replace(one, lines=tuple(line for line in one.lines if line in lines)) for one in self.table.blocks]
+        return Results(replace(self.table, blocks=tuple(block for block in found if block.lines)))
 
     def best(self, count: int = 1) -> Results:
         """Return the first `count` answers of each sensor to each question; places stay those among all."""
@@ -456,7 +305,7 @@ def run(
     sensor: str | Sequence[str] = (),
     task: str | Sequence[str] = (),
     estimator: Estimators = (),
-    recordings: AnyPath | None = None,
+    recordings: Recordings | None = None,
     out: AnyPath = "tactbench-results",
     **options: Any,
 ) -> Results:
@@ -470,7 +319,7 @@ def run(
         Names and objects with ``fit`` and ``predict``, one or several; a mapping gives objects their names. Where there
         are objects alone, the tasks' trivial answers are run beside them, and no other estimators.
     recordings, out
-        Folder of recordings to replay; the result folder.
+        Folder of recordings to replay, or all recordings of one; the result folder.
     **options
         Every other option of the verb by its name, with ``_`` for ``-``: ``protocol="deployable"``, ``repeats=3``,
         ``probe=True``, ``rig_file="rig.yaml"``, ``config="beyond"``; lists for options that may be repeated.
@@ -491,18 +340,19 @@ def run(
         alone = [one.model_copy(update={"estimators": bar}) for one, bar in zip(matrix.tasks, bars, strict=True)]
         return matrix.model_copy(update={"tasks": tuple(alone)}) if objects and not names else matrix
 
-    asked = {"sensor": sensor, "task": task, "estimator": names, "recordings": recordings, "out": out} | options
+    asked = {"sensor": sensor, "task": task, "estimator": names, "recordings": _folder(recordings), "out": out}
     before = set(os.environ)
     keep_threads()  # of child processes; this one's libraries have read the environment already
     try:
-        store, outcome = carry_out(**_as_read_by_the_verb(asked), changed=trivial_beside_objects)
+        store, outcome = carry_out(**_as_read_by_the_verb(asked | options), changed=trivial_beside_objects)
     finally:
         for name in set(os.environ) - before:
             del os.environ[name]
     table = table_of(store, over_all(store, outcome.rows))
     write_tables(table.rows, store.folder, table.provenance, table)
-    alike = ("sensor", "task", "rig", "protocol", "split", "repeat")
-    each = {tuple(row[name] for name in alike): row for row in outcome.rows if row["status"] == "done"}
+    # Of the rows of a question a finished one counts, else a trivial answer's, whose reason is that of the recordings.
+    ended = sorted(outcome.rows, key=lambda row: (row["status"] == "done", row["is_baseline"]))
+    each = {replace(cell_of(row), estimator="", params=(), baseline=False, timed=True): row for row in ended}
     beside = [_beside(row, name, given, store.folder) for name, given in objects.items() for row in each.values()]
     return Results(table_of(store, over_all(store, [*outcome.rows, *beside])) if beside else table)
 
@@ -511,6 +361,20 @@ def results(folder: AnyPath = "tactbench-results") -> Results:
     """Return the rows of a result folder, what ``tactbench leaderboard FOLDER`` shows; UsageError if there are none."""
     store = opened(Path(folder))
     return Results(table_of(store, shown_rows(store)))
+
+
+def _folder(recordings: Recordings | None) -> AnyPath | None:
+    """Return the folder that a run replays; raises UsageError for recordings that are not all of one folder."""
+    if recordings is None or isinstance(recordings, str | os.PathLike):
+        return recordings
+    paths = {one.path for one in open_recordings(recordings)}
+    folders = {path.parent for path in paths}
+    if len(folders) != 1 or {one.path for one in open_recordings(*folders)} != paths:
+        raise UsageError(
+            f"A run replays a folder of recordings, and the {len(paths)} given are not all of one.",
+            hint="Give a folder, or use `evaluate`.",
+        )
+    return folders.pop()
 
 
 def _named(estimator: Estimators) -> tuple[list[str], dict[str, Estimator]]:
@@ -552,10 +416,9 @@ def _as_read_by_the_verb(options: Mapping[str, Any]) -> dict[str, Any]:
 
 def _beside(row: Row, name: str, given: Estimator, folder: Path) -> Row:
     """Return the row of an object that answers what another row answered, from the same recordings."""
-    same = ("sensor", "task", "rig", "protocol", "split", "repeat", "repeats", "seed", "declared_task")
-    cell = Cell(
-        **{key: row[key] for key in same}, estimator=name, params=(), baseline=False, timed=row["fit_s"] is not None,
-        simulation=Simulation.model_validate(row["simulation"]),
-    )  # fmt: skip
-    paths = [folder / one for one in row["recordings"]]
-    return _ended(cell, task_of(cell.task_key, installed()), paths, given, row["simulated"])
+    cell = replace(cell_of(row), estimator=name, params=(), baseline=False)
+    task, paths = task_of(cell.task_key, installed()), [folder / one for one in row["recordings"]]
+    if not paths:  # no answer to this question was finished
+        whose = "" if row["status"] == "skipped" else f"{row['estimator']}: "
+        return unanswered(cell, task, NotApplicable(f"{whose}{row['reason']}"), simulated=row["simulated"])
+    return _ended(cell, task, paths, given, row["simulated"])

@@ -103,6 +103,8 @@ def test_xarray_opens_the_file_with_coordinates(tmp_path):
         np.testing.assert_array_equal(found["data"].sel(channel="t1"), X[:, 1])
         assert found["t_ns"].values[1] == 10_000_000
     np.testing.assert_array_equal(one.to_xarray()["press"], notes["press"])
+    assert one.to_xarray()["time_s"].dims == ("t_ns",)
+    assert one.to_xarray()["time_s"].values[1] == pytest.approx(0.01, rel=1e-12)  # rounding of 1e-9
 
 
 # Scores
@@ -118,6 +120,7 @@ def test_scikit_learns_own_loop_gives_the_score_of_each_fold(folder):
     assert data.feature_names == ("t0", "t1", "t2")
     assert data.X.shape == (600, 3)
     assert len(set(data.groups)) == len(data.folds) == 5
+    assert repr(data) == "<TaskData force by session: X (600, 3), 5 folds of 5 recordings>"
     errors = found.predictions["y_true"] - found.predictions["y_pred"]
     assert found.score == pytest.approx(np.sqrt(np.mean(errors**2)), rel=1e-12)  # rounding of the sum
     assert not hasattr(model[-1], "coef_"), "the object stays as it was given"
@@ -140,8 +143,11 @@ def test_a_result_has_what_a_row_has_and_shows_it(folder):
     ("call", "said"),
     [
         (lambda folder: tactbench.evaluate(Ridge, "force", folder), "no estimator"),
+        (lambda folder: tactbench.evaluate("force", Ridge(), folder), "no task"),
+        (lambda folder: tactbench.open_recordings([folder, 3]), "3 is no recording"),
         (lambda folder: tactbench.run(tasc="force"), "--task"),
         (lambda folder: tactbench.run(task="force", estimator={"ridge": Ridge()}), "one name"),
+        (lambda folder: tactbench.run(task="force", recordings=tactbench.open_recordings(folder)[1:]), "all of one"),
         (lambda folder: tactbench.results(folder / "nothing"), "no results"),
     ],
 )
@@ -162,6 +168,8 @@ def test_a_run_is_that_of_the_verb_and_leaves_the_same_folder(folder, here, tmp_
     assert list(again) == list(found)
     assert (tmp_path / "mine" / "leaderboard.csv").is_file()
     assert len(again.best()) == 1
+    assert list(again[1:3]) == [again[1], again[2]]
+    assert ["ridge" in repr(again[:1]), "ols" in repr(again[:1])] == [True, False]
     (compared,) = again.compare("ridge", "ols")
     assert (compared["a"], compared["b"], compared["replicates"]) == ("ridge", "ols", 5)
     with pytest.raises(UnknownNameError):
@@ -171,13 +179,23 @@ def test_a_run_is_that_of_the_verb_and_leaves_the_same_folder(folder, here, tmp_
 def test_objects_stand_in_the_table_and_not_in_the_folder(folder, here):
     models = {"mine": scaled(Ridge()), "other": scaled(Ridge(alpha=100.0)), "classes": LogisticRegression(),
               "ridge": "ridge"}  # fmt: skip
-    found = tactbench.run(task="force", recordings=folder, estimator=models, out="mine")
+    found = tactbench.run(task="force", recordings=tactbench.open_recordings(folder), estimator=models, out="mine")
     scores = {row["estimator"]: row["score"] for row in found}
     assert scores.keys() == {*models, "mean", "time-index"}
     assert [row["estimator"] for row in found if row["status"] == "failed"] == ["classes"]
+    assert "classes failed" in repr(found)
+    assert "tactbench why" not in repr(found), "no folder has its row"
     assert scores["mine"] == tactbench.evaluate(models["mine"], "force", folder).score
     assert found.compare("mine", "other")[0]["replicates"] == 5
     assert {row["estimator"] for row in tactbench.results("mine")} == {"ridge", "mean", "time-index"}
+
+
+def test_an_object_that_nothing_can_be_asked_of_is_a_row_all_the_same(folder, here):
+    found = tactbench.run(task="object-identity", recordings=folder, estimator=Ridge(), out="mine")
+    assert {row["estimator"] for row in found} == {"Ridge", "chance", "majority"}
+    ((status, reason),) = {(row["status"], row["reason"]) for row in found}
+    assert status == "skipped"
+    assert "no recording" in reason.lower()
 
 
 def test_objects_answer_every_replicate_of_a_simulation(here):

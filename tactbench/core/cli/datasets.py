@@ -25,10 +25,10 @@ def command(shape: str) -> None:
             {
                 "name": name, "sensor": one.mapping.sensor.name, "measured": source.measured,
                 "task": ", ".join(source.tasks), "MB": round(source.bytes / 1e6, 1), "files": len(source.files),
-                "from": source.address or "--root", "licence": source.licence, "citation": source.citation,
-                "cached": one.imported.is_dir(),
+                "from": source.address, "licence": source.licence, "citation": source.citation,
+                "cached": one.imported.is_dir(), "needs": "" if source.address or one.imported.is_dir() else "--root",
             }
         )  # fmt: skip
-    shown = ("name", "sensor", "measured", "task", "MB", "licence", "citation", "cached")
+    shown = ("name", "sensor", "measured", "task", "MB", "licence", "citation", "cached", "needs")
     print_records(records, shape, title="data sets", columns=shown)
     remark(f"Kept in {cache()}")

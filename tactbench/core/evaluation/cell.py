@@ -122,7 +122,7 @@ PLAIN = EstimatorDescriptor.model_construct(name="estimator", title="", kinds=()
 """What is taken of an estimator that is only an object: it looks at all features, and has nothing to be chosen."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class TaskData:
     """What a task asks of recordings under a protocol: rows, and which of them train and test.
 
@@ -140,6 +140,10 @@ class TaskData:
     """which rows of each recording are for what, fold by fold"""
     held_back: bool = False
     """a share of the training groups is what thresholds are chosen on: no recording has the role validation"""
+
+    def __repr__(self) -> str:
+        counts = f"X {self.X.shape}, {len(self.assignments)} folds of {len(self.data.tables)} recordings"
+        return f"<TaskData {self.task.name} by {self.split}: {counts}>"
 
     @property
     def X(self) -> FloatArray:  # noqa: N802  (as in scikit-learn)
@@ -212,7 +216,7 @@ def load_task(
     data = framed(recorded, task, rules, estimator) if frames else summarised(recorded, task, rules)
     assignments = make_splits(data, split, seed, max(estimator.window_grid), one_by_one=split in task.campaigns)
     if not assignments:
-        raise DataError("No fold could be made of these recordings.", hint="Choose another --split.")
+        raise DataError("No fold could be made of these recordings.", hint="Choose another split.")
     held_back = task.kind == "events" and estimator.threshold is None and assignments[0].validation is None
     if held_back:
         assignments = [with_validation(one, data) for one in assignments]
@@ -314,15 +318,13 @@ def _fit(
     fold = prepared(assignment, made, data.rules, k, counts)
     for what, part in (("training", fold.train), ("test", fold.test)):
         if len(part) == 0:
-            raise DataError(
-                f"The {what} set of fold {fold.name!r} has no labelled row.", hint="Choose another --split."
-            )
+            raise DataError(f"The {what} set of fold {fold.name!r} has no labelled row.", hint="Choose another split.")
     values = np.unique(fold.train.y, axis=0)
     if len(values) < 2:
         only = made.classes[int(values[0])] if made.classes else values[0]
         raise DataError(
             f"All training labels of fold {fold.name!r} are {only}: there is nothing to learn.",
-            hint="Choose another --split, or check the label column with `tactbench inspect`.",
+            hint="Choose another split, or check the label column with `tactbench inspect`.",
         )
     if made.vote:
         answerable = set(fold.test.recording.tolist())
@@ -330,7 +332,7 @@ def _fit(
             if place not in answerable and (mask & table.labelled).any():
                 raise DataError(
                     f"The protocol leaves no row of recording {table.meta.name!r}, which is to be answered as a whole.",
-                    hint="Use --protocol deployable-untared, or leave the recording out.",
+                    hint="Use protocol `deployable-untared`, or leave the recording out.",
                 )
     X = features_of(fold.train, descriptor)
     model = estimator.build(choice.params if choice else {})
@@ -558,7 +560,7 @@ def _refuse(estimator: str, metric: Metric, tested: Answers) -> None:
         )
     raise DataError(
         f"The {metric.name} of {len(tested)} test rows is undefined: their labels never change.",
-        hint="Choose another --split.",
+        hint="Choose another split.",
     )
 
 

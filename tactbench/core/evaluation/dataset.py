@@ -101,7 +101,8 @@ def load_dataset(task: TaskSpec, recordings: Sequence[Path], *, include_incomple
     NotApplicable
         If the sensor has no channel of a kind the task needs, or no recording has the label it asks for.
     DataError
-        If a channel has no sample at all, the recordings disagree about their channels, or nothing is left.
+        If a channel has no sample at all, the recordings are of several sensors or disagree about their channels, one
+        is given twice, or nothing is left.
     """
     counts: Counter[str] = Counter()
     tables: list[Table] = []
@@ -114,11 +115,15 @@ def load_dataset(task: TaskSpec, recordings: Sequence[Path], *, include_incomple
                 counts[f"recordings left out ({excluded})"] += 1
                 continue
             names, table = _read(recording, task, counts)
-        if tables and names != features:
+        meta, first = table.meta, (tables or [table])[0].meta
+        if tables and (meta.sensor.name, names) != (first.sensor.name, features):
             raise DataError(
-                f"The recordings {tables[0].meta.name!r} and {table.meta.name!r} have different channels.",
+                f"The recordings {first.name!r} of {first.sensor.name} and {meta.name!r} of {meta.sensor.name} are not "
+                "of one sensor with the same channels.",
                 hint="Evaluate them apart.",
             )
+        if any(one.meta.name == meta.name and np.array_equal(one.X, table.X) for one in tables):
+            raise DataError(f"The recording {meta.name!r} is given twice: {path} holds it too.", hint="Leave one out.")
         features = names
         tables.append(table)
         paths.append(path)
@@ -131,7 +136,7 @@ def load_dataset(task: TaskSpec, recordings: Sequence[Path], *, include_incomple
     target = _target_name(task)
     if not any(table.labelled.any() for table in tables):
         raise NotApplicable(
-            f"Task {task.name!r} asks for {target}, and no recording has it.",
+            f"No recording has any {target}, which task {task.name!r} asks for.",
             hint="State it in the mapping, or choose another task.",
         )
     unlabelled = sum(int((~table.labelled).sum()) for table in tables)
@@ -333,7 +338,7 @@ def _target_name(task: TaskSpec) -> str:
     if isinstance(task.target, SlipTarget):
         return "slip of the reference"
     if isinstance(task.target, LabelTarget):
-        return task.target.name
+        return f"label {task.target.name!r}"
     if isinstance(task.target, VectorTarget):
         return f"{task.target.kind} samples called {' and '.join(map(repr, task.target.names))}"
     return f"{task.target.kind} sample" + (f" called {task.target.name!r}" if task.target.name else "")

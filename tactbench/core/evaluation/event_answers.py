@@ -98,7 +98,7 @@ class EventRules:
             raise DataError(
                 "No threshold can be chosen: the validation recordings have no slip, or no disturbance to count false "
                 "alarms on.",
-                hint="Give validation recordings of both (label `event: disturbance`), or another --split.",
+                hint="Give validation recordings of both (label `event: disturbance`), or another split.",
             ) from error
         return chosen, tuple(bounds)
 

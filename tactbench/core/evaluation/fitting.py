@@ -116,7 +116,7 @@ def answers(
     elif not np.isfinite(given).all():
         wrong = f"{np.count_nonzero(~np.isfinite(given))} values that are NaN or infinite"
     elif n_classes and not np.isin(given, np.arange(n_classes)).all():
-        wrong = "classes that do not exist"
+        wrong = "numbers that are no class indices (is it a regressor?)"
     if wrong:
         expected = f"class indices below {n_classes}" if n_classes else "finite numbers"
         raise PluginContractError(

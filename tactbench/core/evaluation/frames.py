@@ -32,7 +32,7 @@ def framed(data: Dataset, task: TaskSpec, rules: ProtocolSpec, estimator: Estima
     if rules.three_sigma or rules.discard_samples or rules.first_row_only:
         raise NotApplicable(
             f"Protocol {rules.name!r} drops single samples; task {task.name!r} looks at windows of consecutive ones.",
-            hint="Use --protocol deployable.",
+            hint="Use protocol `deployable`.",
         )
     counts = Counter(data.counts)
     compute = frame_features(task, rules, estimator)

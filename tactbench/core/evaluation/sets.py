@@ -58,7 +58,7 @@ def tare_s(data: Dataset) -> float:
         raise NotApplicable(
             f"{sum(one > 0 for one in held)} of {len(held)} recordings state an unloaded hold to tare on; {name!r} "
             "states none.",
-            hint="Use --protocol deployable-untared, which tares none of them.",
+            hint="Use protocol `deployable-untared`, which tares none of them.",
         )
     return min(held, default=0.0)
 
@@ -119,7 +119,7 @@ def keep(data: Dataset, protocol: ProtocolSpec, masks: Sequence[Mask], what: str
         if not good.any():
             raise DataError(
                 f"The three-sigma rule of {protocol.name!r} leaves none of the {len(X)} rows of the {what} set.",
-                hint="Look at its channels with `tactbench inspect`, or use --protocol deployable.",
+                hint="Look at its channels with `tactbench inspect`, or use protocol `deployable`.",
             )
     if protocol.window_over == "consecutive samples":
         # `place` does not count rows with a dropped-out channel: a filter in use skips such a row and goes on. A jump

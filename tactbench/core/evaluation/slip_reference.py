@@ -69,11 +69,11 @@ def slip_reference(recording: Recording, target: SlipTarget, first_ns: int, coun
     found = {str(one.name): channels_for(recording, one) for one in _CHANNELS}
     missing = [called for called, there in found.items() if not there]
     if target.friction not in recording.meta.labels:
-        missing.append(f"the label {target.friction}")
+        missing.append(f"label {target.friction}")
     if missing:
         raise NotApplicable(
             f"Slip is labelled by the reference's normal, tangential and slip and by the label {target.friction}; "
-            f"recording {name!r} has no {', no '.join(missing)}.",
+            f"recording {name!r} has no {', '.join(missing)}.",
             hint="State them in the mapping, or choose another task.",
         )
     clock = recording.read(found["slip"][0][0])

@@ -58,19 +58,19 @@ def _split_for(task: TaskSpec, protocol: ProtocolSpec, data: Dataset, requested:
         if requested not in (None, "roles"):
             raise NotApplicable(
                 f"Protocol {protocol.name!r} splits by roles only; {requested!r} was asked for.",
-                hint="Use --protocol deployable for other splits.",
+                hint="Use protocol `deployable` for other splits.",
             )
         if not {"train", "validation", "test"} <= {meta.role for meta in data.metas}:
             raise NotApplicable(
                 f"Protocol {protocol.name!r} needs recordings with the roles train, validation and test; these have "
-                f"{', '.join(sorted({str(meta.role) for meta in data.metas}))}.",
-                hint="Use --protocol deployable.",
+                f"{', '.join(sorted({meta.role or 'no role' for meta in data.metas}))}.",
+                hint="Use protocol `deployable`.",
             )
         return "roles"
     if requested == "in-session" and data.whole:
         raise NotApplicable(
             f"Split 'in-session' cuts recordings in time; task {task.name!r} asks one answer of each as a whole.",
-            hint="Use a split that keeps recordings whole, such as --split recording.",
+            hint="Use a split that keeps recordings whole, such as `recording`.",
         )
     if requested is not None:
         if not _can(requested, data):
@@ -93,7 +93,7 @@ def _split_for(task: TaskSpec, protocol: ProtocolSpec, data: Dataset, requested:
 def _require_first_rows(task: TaskSpec, data: Dataset, split: str) -> None:
     """Raise NotApplicable for recordings whose first row stands for nothing that comes later."""
     asks = f"Protocol {FIRST_FRAME.name!r} asks whether the first row of a recording gives its answer away; "
-    why, hint = "", "Compare with --split shuffled instead."
+    why, hint = "", "Compare with split `shuffled` instead."
     changing = next((one for one in data.tables if len(np.unique(one.y[one.labelled], axis=0)) > 1), None)
     if changing is not None:
         why = f"the answer of task {task.name!r} changes within recording {changing.meta.name!r}"

@@ -39,7 +39,7 @@ def summarised(data: Dataset, task: TaskSpec, rules: ProtocolSpec) -> Dataset:
         raise NotApplicable(
             f"Protocol {rules.name!r} drops single samples; task {task.name!r} summarises whole recordings, and a "
             "summary over what is left would be of another signal.",
-            hint="Use --protocol deployable.",
+            hint="Use protocol `deployable`.",
         )
     compute = recording_features(task, rules)
     rows = [compute(table) for table in data.tables]

@@ -219,7 +219,7 @@ def _ended(board: Board, stopped: bool) -> Iterator[Note]:
     names = list(dict.fromkeys(f"{row['sensor']}/{answer_name(row)}" for row in alike))
     others = f"; {len(rows) - len(alike)} more ended otherwise" if len(rows) > len(alike) else ""
     text = f"{_some(names)} {rows[0]['status']}{others}: {str(rows[0]['reason']).rstrip('.')}."
-    yield Note(text, " `tactbench why CELL` tells more." if stopped else "")
+    yield Note(text, " `tactbench why CELL` tells more." if stopped and all(row["made_by"] for row in rows) else "")
 
 
 def _marks(board: Board) -> Iterator[Note]:

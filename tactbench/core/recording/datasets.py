@@ -106,16 +106,16 @@ class DataSet:
         Raises
         ------
         MissingRecordingError
-            If a file cannot be had, or its SHA-256 is another than the data set states.
+            If there is no `root`, a file cannot be had, or its SHA-256 is another than the data set states.
         NotApplicable
             If the files lie at no public address and no copy is named.
         MappingError, UnwritableError
             As :func:`~tactbench.core.recording.mapping.importing.import_tables` raises them.
         """
-        target = self.imported
+        target, copy = self.imported, _copy(root, next(iter(self.source.files)))
         if target.is_dir():
             return target
-        self._fetch(_copy(root, next(iter(self.source.files))), root, progress)
+        self._fetch(copy, root, progress)
 
         def step(done: int, total: int, what: str) -> None:
             if progress is not None:
@@ -143,7 +143,7 @@ class DataSet:
             if copy is None and not address and not (self.files / name).is_file():
                 raise NotApplicable(
                     f"{self.name}: {name} lies at no public address{f', nor in {root}' if root else ''}.",
-                    hint=f"Name a folder that holds it with --root DIR, or put it into {self.files}.",
+                    hint=f"Name a folder that holds it as `root` (--root DIR), or put it into {self.files}.",
                 )
             try:
                 there.fetch(name, downloader=download)
@@ -159,7 +159,7 @@ class DataSet:
                 raise MissingRecordingError(
                     f"{self.name}: {origin} could not be fetched{missed}: {_reason(error)}. "
                     f"Its files belong into {self.files}.",
-                    hint="Put them there by hand, or name a folder that holds a copy with --root DIR. "
+                    hint="Put them there by hand, or name a folder that holds a copy as `root` (--root DIR). "
                     "What was fetched before is kept.",
                 ) from error
             if progress is not None:
@@ -223,7 +223,7 @@ def _copy(root: Path | None, first: str) -> Path | None:
     if root is None:
         return None
     if not root.is_dir():
-        raise MissingRecordingError(f"There is no folder {root}.", hint="Name the folder of the copy with --root DIR.")
+        raise MissingRecordingError(f"There is no folder {root}.", hint="Name the folder of the copy.")
     places = (root, *sorted(path for path in root.iterdir() if path.is_dir()))
     return next((place for place in places if (place / first).is_file()), None)
 

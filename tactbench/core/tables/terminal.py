@@ -32,7 +32,10 @@ def plain_text(parts: Iterable[Part], width: int = 240) -> str:
     from rich.console import Console
 
     out = io.StringIO()
-    _print(parts, Console(file=out, width=width, color_system=None, force_terminal=False, legacy_windows=False))
+    console = Console(
+        file=out, width=width, color_system=None, force_terminal=False, force_jupyter=False, legacy_windows=False
+    )  # in a notebook it would display the text beside, and write none
+    _print(parts, console)
     return "".join(f"{line.rstrip()}\n" for line in out.getvalue().split("\n")[:-1])
 
 

@@ -26,14 +26,14 @@ from tactbench.plugin import (
 FORCE = StreamSpec(name="force_torque", channels=(ChannelSpec(name="fz", kind="force", unit="N"),))
 
 
-def sensor_of(*streams):
+def sensor_of(*streams, name="made"):
     source = Source(tag="assumed", reference="a test")
-    return SensorSpec(name="made", title="Made by hand", principle="none", principle_source=source, streams=streams)
+    return SensorSpec(name=name, title="Made by hand", principle="none", principle_source=source, streams=streams)
 
 
-def sensor(n_taxels=3):
+def sensor(n_taxels=3, name="made"):
     channels = tuple(ChannelSpec(name=f"t{place}", kind="taxel") for place in range(n_taxels))
-    return sensor_of(StreamSpec(name="taxels", channels=channels))
+    return sensor_of(StreamSpec(name="taxels", channels=channels), name=name)
 
 
 def write(path, sensor, *blocks, annotations=None, clock="device", **meta):
@@ -47,17 +47,18 @@ def write(path, sensor, *blocks, annotations=None, clock="device", **meta):
     return path
 
 
-def record(path, X, force=None, *, t_ns="regular", quality=None, **more):
+def record(path, X, force=None, *, t_ns="regular", quality=None, called="made", **more):
     """Write a recording with taxels `X` (n, p), a force (n,) and annotations; return its path."""
     X = np.asarray(X, dtype=np.float64)
     if isinstance(t_ns, str):
         t_ns = np.arange(len(X), dtype=np.int64) * 10_000_000
     more["clock"] = "none" if t_ns is None else "device"
     if force is None:
-        return write(path, sensor(X.shape[1]), Block("taxels", t_ns, X, quality), **more)
+        return write(path, sensor(X.shape[1], called), Block("taxels", t_ns, X, quality), **more)
     values = np.asarray(force, dtype=np.float64)[:, None]
     forces = Block("force_torque", t_ns, values, np.isnan(values).astype(np.uint8) * int(Quality.MISSING))
-    return write(path, sensor(X.shape[1]), Block("taxels", t_ns, X, quality), forces, reference=(FORCE,), **more)
+    taxels = Block("taxels", t_ns, X, quality)
+    return write(path, sensor(X.shape[1], called), taxels, forces, reference=(FORCE,), **more)
 
 
 def ramp(seed, n=1600, gain=(50.0, -20.0, 7.0), noise=1.0, label_noise=0.0):

@@ -1,5 +1,7 @@
 """A recording on one clock: what belongs together, what is missing, what it is called."""
 
+import shutil
+
 import numpy as np
 import pytest
 
@@ -73,3 +75,14 @@ def test_time_that_does_not_run_forward_is_refused(tmp_path):
         path = two_streams(tmp_path / f"{name}.h5", (slow, t), (slow, t), (reference, t))
         with pytest.raises(DataError, match=says):
             load_dataset(force_task(), [path])
+
+
+def test_several_sensors_and_copies_are_refused_by_name(tmp_path):
+    (path,) = sessions(tmp_path, "a", n=50)
+    other = record(tmp_path / "b.h5", *ramp(1, n=50), called="raw")
+    with pytest.raises(DataError, match="'a' of made and 'b' of raw"):
+        load_dataset(force_task(), [path, other])
+    (tmp_path / "again").mkdir()
+    copy = shutil.copy(path, tmp_path / "again")
+    with pytest.raises(DataError, match="'a' is given twice"):
+        load_dataset(force_task(), [path, copy])

@@ -38,7 +38,7 @@ class Answering:
         (np.zeros((3, 1)), 0, r"shape \(3, 1\)"),
         (np.array([0.0, np.nan, np.inf]), 0, "2 values that are NaN"),
         (np.array(["a", "b", "c"]), 3, "type"),
-        (np.array([0.0, 0.5, 1.0]), 3, "do not exist"),
+        (np.array([0.0, 0.5, 1.0]), 3, "regressor"),
     ],
 )
 def test_an_answer_that_cannot_be_scored_is_refused_naming_the_estimator(given, n_classes, says):

@@ -83,7 +83,7 @@ def test_splits_and_answers_that_cut_recordings_are_refused_with_words(tmp_path)
     with pytest.raises(UsageError, match="cannot be split by 'press'"):
         run(task(), sequences(tmp_path / "b", annotations={"press": halves["press"]}), "press")
     changing = record(tmp_path / "c.h5", np.ones((40, 2)), annotations=halves)
-    with pytest.raises(NotApplicable, match="asks one answer of each recording, and slip changes within 'c'"):
+    with pytest.raises(NotApplicable, match="asks one answer of each recording, and label 'slip' changes within 'c'"):
         run(task(), [changing])
 
 

@@ -117,6 +117,8 @@ def test_what_lies_at_no_address_needs_a_copy_which_is_checked(tmp_path, server)
         pad.recordings(copy)
     (copy / "press_3.csv").write_bytes(PRESSES["press_3.csv"])
     assert pad.recordings(copy) == pad.recordings(), "it is imported once"
+    with pytest.raises(MissingRecordingError, match="no folder"):
+        pad.recordings(tmp_path / "cpoy")  # as before it was imported
     assert described(tmp_path, server.address, "other").recordings(copy.parent).is_dir()
     assert server.asked == []
 
@@ -134,6 +136,11 @@ def test_the_board_asks_data_sets_that_there_are():
     named = {choice.dataset for choice in matrix_called("real").tasks}
     assert len(named) == 5
     assert named <= datasets().keys()
+
+
+def test_the_list_names_what_cannot_be_fetched(tmp_path):
+    lines = Verbs(tmp_path)("datasets").stdout.splitlines()
+    assert [line.split()[0] for line in lines if "--root" in line] == ["eflesh-slip"]
 
 
 def test_the_shipped_ones_are_those_of_the_copies(shared_data):

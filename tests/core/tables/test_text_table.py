@@ -1,5 +1,6 @@
 """Tables: what is sorted, what is left out, how they are rendered; text that would act is shown."""
 
+import builtins
 import math
 import shlex
 
@@ -23,6 +24,12 @@ def test_a_column_that_says_nothing_is_not_shown_and_markdown_escapes_what_would
     lines = markdown([table]).splitlines()
     assert lines[2:] == ["| a | n |", "|---|---:|", "| x\\|&lt;b> | 1 |", "", "- note"]
     assert plain_text([text_table("nothing", ("a",), [])]).startswith("nothing\n")
+
+
+def test_text_is_returned_in_a_notebook_too(monkeypatch):
+    shell = type("ZMQInteractiveShell", (), {})()  # what rich looks for in a Jupyter kernel
+    monkeypatch.setattr(builtins, "get_ipython", lambda: shell, raising=False)
+    assert plain_text([("note",)]) == " note\n"
 
 
 def test_a_narrow_terminal_leaves_columns_out_then_cuts_words_but_for_what_is_typed_elsewhere():

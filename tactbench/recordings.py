@@ -1,0 +1,185 @@
+"""Recordings in Python: what ``tactbench.open_recordings`` and ``tactbench.dataset`` give."""
+
+from __future__ import annotations
+
+import glob
+import os
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from importlib import import_module
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from tactbench.core.errors import FormatError, MissingRecordingError, UsageError
+from tactbench.core.evaluation.channels import numbers
+from tactbench.core.matrix.installed import rig_of
+from tactbench.core.plugins.registry import installed
+from tactbench.core.recording.reader import open_recording, read_meta
+from tactbench.core.samples import FloatArray, StreamData
+from tactbench.core.spec.recording import RecordingMeta
+from tactbench.core.spec.sensor import ChannelSpec, SensorSpec
+
+if TYPE_CHECKING:
+    import pandas
+    import xarray
+
+AnyPath = str | os.PathLike[str]
+
+
+@dataclass(frozen=True, repr=False)
+class Stream(StreamData):
+    """Channels of a recording that share a clock: `data` (n, channels) as stored, `quality`, `t_ns`, `annotations`."""
+
+    start_ns: int = 0
+    """When the recording's first sample was, of any stream."""
+
+    def __repr__(self) -> str:
+        return f"<Stream {self.spec.name}: {len(self.data)} rows of {', '.join(one.name for one in self.channels)}>"
+
+    @property
+    def channels(self) -> tuple[ChannelSpec, ...]:
+        """Return what is known of each channel: name, kind, unit, range, position."""
+        return self.spec.channels
+
+    @property
+    def time_s(self) -> FloatArray | None:
+        """Return (n,) seconds since the recording's first sample; None where it has no clock."""
+        return None if self.t_ns is None else np.asarray((self.t_ns - self.start_ns) * 1e-9)
+
+
+class Recording:
+    """A recording, by the `path` of its file. Meta and samples are read at first use and kept; no file stays open."""
+
+    def __init__(self, path: AnyPath) -> None:
+        self.path = Path(path)
+
+    def __repr__(self) -> str:
+        return f"<Recording {self.meta.name}: {self.sensor.name}>"
+
+    @cached_property
+    def meta(self) -> RecordingMeta:
+        """What the recording says about itself; raises FormatError if the file is no recording."""
+        return read_meta(self.path)
+
+    @property
+    def sensor(self) -> SensorSpec:
+        """Return the sensor's whole spec."""
+        return self.meta.sensor
+
+    @cached_property
+    def streams(self) -> Mapping[str, Stream]:
+        """The streams that hold data by name, the sensor's first, then the reference's."""
+        with open_recording(self.path) as file:
+            read = {name: file.read(name) for name in file.stream_names}
+        start_ns = min((int(one.t_ns[0]) for one in read.values() if one.t_ns is not None and len(one.t_ns)), default=0)
+        return {name: Stream(**vars(one), start_ns=start_ns) for name, one in read.items()}
+
+    @property
+    def reference(self) -> Mapping[str, Stream]:
+        """Return the streams that are not the sensor's own: force-torque sensor, probe."""
+        names = {spec.name for spec in self.meta.reference}
+        return {name: stream for name, stream in self.streams.items() if name in names}
+
+    def to_dataframe(self, stream: str | None = None) -> pandas.DataFrame:
+        """Return a stream (None: the sensor's first) as a pandas DataFrame: a column a channel, then labels of rows.
+
+        NaN is no sample. Raises FormatError if there is no such stream, UsageError if pandas is not installed.
+        """
+        pd, one = library("pandas"), self._stream(stream)
+        index = None if one.time_s is None else pd.Index(one.time_s, name="time_s")
+        columns = dict(zip((channel.name for channel in one.channels), numbers(one).T, strict=True))
+        return pd.DataFrame({**columns, **one.annotations}, index=index)
+
+    def to_xarray(self, stream: str | None = None) -> xarray.Dataset:
+        """Return a stream as an xarray Dataset with time and channel coordinates.
+
+        It is what ``xarray.open_dataset(path, group="streams/NAME", engine="h5netcdf")`` reads of the file, with labels
+        of rows and units of channels beside. Raises as :meth:`to_dataframe`, UsageError if xarray is not installed.
+        """
+        xr, one = library("xarray"), self._stream(stream)
+        rows, times = ("row", np.arange(len(one.data))) if one.t_ns is None else ("t_ns", one.t_ns)
+        found: dict[str, Any] = {name: (rows, values) for name, values in one.annotations.items()}
+        found["data"] = ((rows, "channel"), one.data)
+        if one.quality is not None:
+            found["quality"] = ((rows, "channel"), one.quality)
+        names, units = zip(*((channel.name, channel.unit) for channel in one.channels), strict=True)
+        coordinates = {rows: times, "channel": list(names), "unit": ("channel", list(units))}
+        coordinates |= {} if one.time_s is None else {"time_s": (rows, one.time_s)}
+        made: xarray.Dataset = xr.Dataset(found, coordinates)
+        return made
+
+    def _stream(self, name: str | None) -> Stream:
+        found = self.streams.get(next(iter(self.streams), "") if name is None else name)
+        if found is None:
+            raise FormatError(f"{self.path} has no stream {name!r}.", hint=f"It has: {', '.join(self.streams)}.")
+        return found
+
+
+def library(name: str) -> Any:
+    """Return a library that may be missing; raises UsageError where it is."""
+    try:
+        return import_module(name)
+    except ImportError as error:
+        raise UsageError(
+            f"This needs {name}, which cannot be imported: {error}.", hint=f"Install it with `pip install {name}`."
+        ) from error
+
+
+Recordings = Recording | AnyPath | Iterable[Recording | AnyPath]
+"""What functions take as recordings: those of :func:`open_recordings`, files, folders or globs, one or several."""
+
+
+def open_recordings(path_or_paths: Recordings) -> list[Recording]:
+    """Open recordings; their samples are read when they are looked at.
+
+    Parameters
+    ----------
+    path_or_paths
+        A file, a folder (with all folders below it), a glob such as ``"recordings/**/*.h5"``, or several of these.
+
+    Returns
+    -------
+    list of Recording
+        Each file once, those of a folder or a glob in order of their paths; MissingRecordingError if there is none.
+    """
+    if isinstance(path_or_paths, Recording):
+        return [path_or_paths]
+    if isinstance(path_or_paths, Iterable) and not isinstance(path_or_paths, str):
+        return list({one.path: one for each in path_or_paths for one in open_recordings(each)}.values())
+    if not isinstance(path_or_paths, str | os.PathLike):
+        raise UsageError(f"{path_or_paths!r} is no recording.", hint="Give files, folders, globs or recordings.")
+    path = Path(path_or_paths).expanduser()
+    if path.is_dir():
+        replay: Any = rig_of("replay", installed(), path)
+        return [Recording(one) for one in replay.recordings()]
+    if path.is_file():
+        return [Recording(path)]
+    paths = sorted(glob.glob(str(path), recursive=True))  # noqa: PTH207  (it takes absolute ones too)
+    if not paths:
+        raise MissingRecordingError(f"There is no recording {path}.", hint="Give a file, a folder or a glob.")
+    return open_recordings(paths)
+
+
+def dataset(name: str, root: AnyPath | None = None) -> list[Recording]:
+    """Return the recordings of a public data set; what is missing is fetched, checked, imported and kept.
+
+    Parameters
+    ----------
+    name
+        As ``tactbench datasets`` lists them, or a mapping file that states its source.
+    root
+        A folder that holds a copy, or whose sub-folder does.
+
+    Raises
+    ------
+    UnknownNameError
+        If there is no data set of that name.
+    MissingRecordingError, NotApplicable
+        If a file cannot be had, is not the one that is meant, or lies at no public address.
+    """
+    from tactbench.core.recording.datasets import dataset_called
+
+    return open_recordings(dataset_called(name).recordings(None if root is None else Path(root)))
