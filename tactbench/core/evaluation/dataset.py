@@ -122,7 +122,7 @@ def load_dataset(task: TaskSpec, recordings: Sequence[Path], *, include_incomple
                 "of one sensor with the same channels.",
                 hint="Evaluate them apart.",
             )
-        if any(one.meta.name == meta.name and np.array_equal(one.X, table.X) for one in tables):
+        if any(one.meta.name == meta.name and np.array_equal(one.X, table.X, equal_nan=True) for one in tables):
             raise DataError(f"The recording {meta.name!r} is given twice: {path} holds it too.", hint="Leave one out.")
         features = names
         tables.append(table)

@@ -221,7 +221,8 @@ BELOW = {
     r"–  no better than the trivial answer of its own sensor \((.*)\)":
         lambda t, b: t.bars(b, t.worse),
     r"\*  not shown to be better than the trivial answer of its own sensor \((.*)\)": lambda t, b: t.bars(b, t.unshown),
-    r"Protocol deployable uses means and deviations of the test set, .*": lambda t: any(one["dagger"] for one in t.rows),
+    r"Protocol deployable uses means and deviations of the test set, .*":
+        lambda t: any(one["dagger"] for one in t.rows),
     r"Beyond floor: the root of RMSE² − floor²(; places go by it)?\. Floor: .* \((?:[abc] 0\.1000(?:, )?)+\)\.":
         lambda t, by: bool(by) == (bool(t.better) and t.floor),
     r"(?:(Score(, interval)?: median over (.*? campaigns?), each simulated anew with its own seed[^=.]*|"
