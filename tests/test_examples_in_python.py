@@ -32,7 +32,7 @@ def execute(path):
 
 
 def test_the_notebook_runs(here, monkeypatch, tmp_path):
-    sessions(tmp_path, n=400)
+    sessions(tmp_path, "abcde", n=400)
     found = tactbench.open_recordings(tmp_path)
     monkeypatch.setattr(tactbench, "dataset", lambda name, root: found, raising=False)
     names = execute(ROOT / "examples" / "first_look.ipynb")
