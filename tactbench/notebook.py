@@ -234,7 +234,7 @@ def load_task(
     protocol: str = "deployable",
     split: str | None = None,
     *,
-    seed: int = 0,
+    seed: int = 1,
 ) -> TaskData:
     """Return what a task asks of recordings as `X`, `y`, `groups`, `feature_names` and `folds`.
 
@@ -378,7 +378,7 @@ def evaluate(
     protocol: str = "deployable",
     split: str | None = None,
     *,
-    seed: int = 0,
+    seed: int = 1,
 ) -> Result:
     """Score an estimator on recordings in this process, and the task's trivial answers beside it.
 

@@ -174,6 +174,11 @@ def test_a_run_is_that_of_the_verb_and_leaves_the_same_folder(folder, here, tmp_
         again.compare("ridge", "lasso")
 
 
+def test_what_draws_at_random_scores_the_same_by_evaluate_and_by_run(folder, here):
+    (row,) = tactbench.run(task="force", recordings=folder, estimator="forest-100").best()
+    assert tactbench.evaluate("forest-100", "force", folder).score == row["score"]
+
+
 def test_objects_stand_in_the_table_and_not_in_the_folder(folder, here):
     models = {"mine": scaled(Ridge()), "other": scaled(Ridge(alpha=100.0)), "classes": LogisticRegression(),
               "ridge": "ridge"}  # fmt: skip
