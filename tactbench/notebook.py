@@ -75,7 +75,7 @@ def load_task(
     protocol: str = "deployable",
     split: str | None = None,
     *,
-    seed: int = 0,
+    seed: int = 1,
 ) -> TaskData:
     """Return what a task asks of recordings as `X`, `y`, `groups`, `feature_names` and `folds`.
 
@@ -169,22 +169,25 @@ class Result(Results):
     score
         The metric over the test rows of all folds together.
     interval
-        Its ends; ``row["ci_method"]`` says over what. Of one simulated campaign the table shows none.
+        Its ends, None where the table shows none; ``row["ci_method"]`` says over what.
     trivial
         Scores of the task's trivial answers by name; None of one that could not answer.
     fold_scores
         By name of the fold, in the order of ``load_task(...).folds``.
     row
-        All that a result folder would hold: metric, unit, times, remarks …
+        All that the table knows of the estimator: metric, unit, times, remarks …
     answers
         Truth and predictions of the test rows as arrays; classes are indices.
     """
 
     def __init__(self, rows: Sequence[Row], answers: Answers, task: TaskSpec, names: Sequence[str]) -> None:
-        super().__init__(build_table(over_replicates(rows), questions={task.name: task.question}))
+        rows = over_replicates(rows)
+        super().__init__(build_table(rows, questions={task.name: task.question}))
         row = rows[0]
         self.score: float = row["score"]
-        self.interval: tuple[float, float] = row["ci_low"], row["ci_high"]
+        self.interval: tuple[float, float] | None = None
+        if row["ci_low"] is not None:
+            self.interval = row["ci_low"], row["ci_high"]
         self.trivial = {str(one["estimator"]): one["score"] for one in rows[1:]}
         self.fold_scores = {name.removeprefix("fold "): row["scores"].get(name) for name in row["fold_sizes"]}
         self.row, self.answers, self._task, self._names = row, answers, task, names
@@ -224,7 +227,7 @@ def evaluate(
     protocol: str = "deployable",
     split: str | None = None,
     *,
-    seed: int = 0,
+    seed: int = 1,
 ) -> Result:
     """Score an estimator on recordings in this process, and the task's trivial answers beside it.
 

@@ -139,6 +139,12 @@ def test_a_result_has_what_a_row_has_and_shows_it(folder):
     assert all("StandardScaler+Ridge" in shown for shown in (repr(found), found._repr_html_()))
 
 
+def test_a_result_has_no_interval_where_its_table_has_none(folder):
+    found = tactbench.evaluate(scaled(Ridge()), "force", tactbench.open_recordings(folder)[:3])
+    shown = next(row for row in found if row["estimator"] == "StandardScaler+Ridge")
+    assert shown["ci_low"] is found.interval is found.row["ci_low"] is None
+
+
 @pytest.mark.parametrize(
     ("call", "said"),
     [
@@ -174,6 +180,11 @@ def test_a_run_is_that_of_the_verb_and_leaves_the_same_folder(folder, here, tmp_
     assert (compared["a"], compared["b"], compared["replicates"]) == ("ridge", "ols", 5)
     with pytest.raises(UnknownNameError):
         again.compare("ridge", "lasso")
+
+
+def test_what_draws_at_random_scores_the_same_by_evaluate_and_by_run(folder, here):
+    (row,) = tactbench.run(task="force", recordings=folder, estimator="forest-100").best()
+    assert tactbench.evaluate("forest-100", "force", folder).score == row["score"]
 
 
 def test_objects_stand_in_the_table_and_not_in_the_folder(folder, here):

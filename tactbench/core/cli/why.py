@@ -123,7 +123,7 @@ def _facts(found: _Stored) -> dict[str, Any]:
 def _replicates(found: _Stored) -> Iterator[Field]:
     """Yield what the cell came to over its replicates, and what each of them scored."""
     from tactbench.core.statistics.replicates import counted, over_replicates, percent
-    from tactbench.core.tables.numbers import interval, score_with_unit
+    from tactbench.core.tables.numbers import delay, duration, interval, score_with_unit
 
     name = found.cell.name.removesuffix(f"/{found.cell.repeat}")
     (row,) = over_replicates([row for row in found.store.rows() if row["cell"].rpartition("/")[0] == name])
@@ -136,8 +136,8 @@ def _replicates(found: _Stored) -> Iterator[Field]:
     for seed, value in zip(row["seeds"], row["replicate_scores"], strict=True):
         yield f"score, seed {seed}", score_with_unit(value, unit)
     if row["delay_parts_ms"] and row["answer_delay_ms"] is not None:
-        yield "delay after touch", f"{row['answer_delay_ms']:.3g} ms"
-        yield from ((f"  {part}", f"{value:.3g} ms") for part, value in row["delay_parts_ms"].items())
+        yield "delay after touch", delay(row["answer_delay_ms"], row["delay_parts_ms"])
+        yield from ((f"  {part}", duration(value / 1e3)) for part, value in row["delay_parts_ms"].items())
 
 
 def _rests_on(row: Row) -> Iterator[Field]:
@@ -150,7 +150,7 @@ def _rests_on(row: Row) -> Iterator[Field]:
     yield from ((name, f"{value:.3g}") for name, value in {**row["scores"], **(row.get("events") or {})}.items())
     if row.get("chosen"):
         yield "chosen on validation data", picked(row)
-    yield "samples to train on", str(row["n_train"])
+    yield "samples to train on, all folds together", str(row["n_train"])
     yield "samples to test on", str(row["n_test"])
     yield "recordings", f"{row['n_recordings']} of {row['n_sessions']} sessions"
     yield from (("assumed", f"{name} {value}") for name, value in sorted((row.get("assumptions") or {}).items()))

@@ -27,6 +27,8 @@ Clock = Callable[[], float]
 RATE_TOLERANCE = 0.01
 """Relative difference of rates beyond which a remark says so: rates are stated to two or three digits."""
 
+SLOWEST_S = 1.0
+"""Rows further apart are single readings, such as one a press, and tell no sampling interval (assumed)."""
 NO_LINK = "link delay unknown: the answer delay is without it"
 NO_RATE = "answer delay unknown: the recordings do not tell their sampling rate"
 AT_LEAST, AT_MOST = 20, 200
@@ -131,14 +133,14 @@ def _used(meta: RecordingMeta, data: Dataset) -> list[StreamSpec]:
 def _row_interval_s(data: Dataset) -> float | None:
     """Return the interval between rows, the longest of all recordings: the median of the clock's steps.
 
-    Without a clock, by the rate that the stream states; None where a recording has neither.
+    Without a clock, or where rows are single readings, by the rate that the stream states; None where there is none.
     """
     found: list[float | None] = []
     for table in data.tables:
         timed = table.meta.clock != "none" and len(table.time_s) > 1
         step_s = float(np.median(np.diff(table.time_s))) if timed else 0.0
         rate_hz = _used(table.meta, data)[0].rate_hz
-        found.append(step_s or (1.0 / rate_hz if rate_hz else None))
+        found.append(step_s if 0 < step_s <= SLOWEST_S else 1.0 / rate_hz if rate_hz else None)
     return _largest(found)
 
 

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from tactbench.core.evaluation.metrics import Metric
+from tactbench.core.evaluation.metrics import Metric, confusion
 from tactbench.core.evaluation.time_blocks import RESAMPLES, block_length, circular_blocks
 from tactbench.core.samples import FloatArray, IntArray
 
@@ -87,14 +87,17 @@ def score_interval(
     -----
     With at least five units, each is left out in turn, those of one class standing in for each other only, and the
     interval is Student's over units [1]_, on a scale that suits the metric (:func:`transform_of`). Percentiles of
-    resampled units cover less than they say where there are few: ``benchmarks/coverage.py``. With fewer units, or
-    when a class is in fewer than five, time is resampled instead: circular blocks within each recording, whose length
-    follows from the autocorrelation of the loss (`time_blocks`). Such an interval knows nothing of the spread between
-    sessions and says so.
+    resampled units cover less than they say where there are few: ``benchmarks/coverage.py``. One wrong answer or none
+    does not tell how units differ: the lower end is then at most that of n units right out of n [2]_, however many rows
+    they have; of one right answer or none, the upper end alike. With fewer units, or when a class is in fewer than
+    five, time is resampled instead: circular blocks within each recording, whose length follows from the
+    autocorrelation of the loss (`time_blocks`). Such an interval knows nothing of the spread between sessions and says
+    so.
 
     References
     ----------
     .. [1] Cameron, Gelbach and Miller 2008, Bootstrap-based improvements for inference with clustered errors.
+    .. [2] Clopper and Pearson 1934, The use of confidence or fiducial limits illustrated in the case of the binomial.
     """
     rng = np.random.default_rng(np.random.SeedSequence([seed, 0xC1]))  # the same blocks for every figure of a cell
     rows = metric.rows(y, predicted, n_classes)
@@ -133,7 +136,14 @@ def _of_units(metric: Metric, rows: FloatArray, y: npt.NDArray[Any], unit: Repli
     over = f"{len(sums)} {plural(unit.name)}"
     method = f"jackknife over {over} (Student's t, {freedom} degrees of freedom, {scale.name}){unit.caveat}"
     deviation = float(np.sqrt((influences(without, strata) ** 2).sum()))
-    return _student(metric, score, deviation, freedom, scale, method)
+    found = _student(metric, score, deviation, freedom, scale, method)
+    if metric.kind == "regression":
+        return found
+    right, least = np.trace(confusion(sums.sum(axis=0), n_classes)), (0.5 - LEVEL / 2) ** (1 / len(sums))
+    alike = f"{method}; no surer than {over} all alike (Clopper and Pearson)"
+    if rows.sum() - right <= 1:
+        return Interval(min(found.low, least), found.high, alike)
+    return Interval(found.low, max(found.high, 1 - least), alike) if right <= 1 else found
 
 
 def _student(

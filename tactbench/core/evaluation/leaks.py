@@ -43,10 +43,11 @@ def leak_stamps(data: Dataset, assignments: Sequence[Assignment]) -> tuple[str, 
             learned = tuple(one | other for one, other in zip(fold.train, fold.validation, strict=True))
         known = [_blocks(hashes[mask])[0] for hashes, mask in zip(rows, learned, strict=True)]
         tested = [_blocks(hashes[mask]) for hashes, mask in zip(rows, fold.test, strict=True)]
-        everything = np.concatenate(known)
+        ends = np.cumsum([len(blocks) for blocks, _, _ in tested])
+        met = np.isin(np.concatenate([blocks for blocks, _, _ in tested]), np.concatenate(known))
         covered = [
-            np.unique(starts[np.isin(blocks, everything)][:, None] + np.arange(length)).size
-            for blocks, starts, length in tested
+            np.unique(starts[mine][:, None] + np.arange(length)).size
+            for (_, starts, length), mine in zip(tested, np.split(met, ends[:-1]), strict=True)
         ]
         share = sum(covered) / max(sum(int(mask.sum()) for mask in fold.test), 1)
         if share > worst:

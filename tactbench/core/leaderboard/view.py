@@ -162,7 +162,8 @@ def commands(table: Table, view: View = DEFAULT_VIEW) -> tuple[str, ...]:
         command_line("tactbench", "report", *where): "figures and every detail",
         command_line("tactbench", "leaderboard", *where, "--format", "latex"): paper,
     }
-    if not first["simulated"] and not any(is_probe(row["protocol"]) for row in table.rows):
+    unprobed = not any(is_probe(row["protocol"]) for row in table.rows)
+    if unprobed and not first["simulated"] and first["split"] != "in-session":
         found["tactbench run … --probe"] = "what the recordings give away"
     width = max(map(len, found))
     return tuple(

@@ -136,8 +136,13 @@ def with_probes(cells: Sequence[Cell], registry: Registry) -> list[Cell]:
 
     For every answer, and for its task's own trivial ones: the same under `deployable` with kept apart what the cell
     keeps apart, under `first-frame`, and with rows shuffled. A split in time keeps no recordings apart and is not
-    probed.
+    probed; UsageError where there is no other.
     """
+    if cells and all(cell.split == "in-session" for cell in cells):
+        raise UsageError(
+            "There is nothing to probe: a split in time keeps no recordings apart.",
+            hint="Give another --split, or leave --probe out.",
+        )
     every = dict.fromkeys(cells)
     planned = frozenset(every)
     for cell in cells:

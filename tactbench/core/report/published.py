@@ -33,9 +33,12 @@ class Reproduction:
 
     @property
     def title(self) -> str:
-        """What was published; of a number of no certain sensor, with that of our row."""
+        """What was published; of a number of no certain sensor or estimator, with that of our row."""
         title = self.published.title or f"{self.task.name}, {self.task.metric}"
-        return f"{title} ({self.row['sensor']})" if self.row and self.published.sensor is None else title
+        ours = [
+            str(self.row[key]) for key in ("sensor", "estimator") if getattr(self.published, key) is None and self.row
+        ]
+        return f"{title} ({', '.join(ours)})" if ours else title
 
 
 def reproduce(registry: Registry, rows: Sequence[Row]) -> list[Reproduction]:
@@ -113,7 +116,7 @@ def published_table(registry: Registry, rows: Sequence[Row]) -> TextTable:
     titles: dict[str, list[str]] = {}
     for line in lines:
         if line.published.remark:
-            titles.setdefault(line.published.remark, []).append(line.title)
+            titles.setdefault(line.published.remark, []).append(line.published.title or line.title)
     notes = [f"{', '.join(dict.fromkeys(whose))}: {remark}." for remark, whose in titles.items()]
     return text_table(
         "Published numbers, and ours",

@@ -44,7 +44,8 @@ class Difference:
     effect: float | None
     """difference over the standard deviation of the replicates' differences"""
     improved: float | None
-    """probability that the first is better on a replicate; 0.5 is no difference"""
+    """share of replicates (not paired: of pairs of them) on which the first is better, ties half; None where the metric
+    of one replicate is undefined"""
     verdict: Verdict
     """of the first cell"""
     beyond: bool
@@ -110,13 +111,12 @@ def _paired(first: Row, second: Row, value: float, sign: float, group: PairableR
     over = f"paired over {counted(n, unit)}"
     if first["replicates"].get("of") == "beyond":
         over += ", of the errors beyond the floor"
-    own = value + carried * _to_own(group)
     return _difference(
         first, value, deviation, group.freedom,
         p=p,
         smallest_p=smallest,
         effect=value / (deviation * np.sqrt(n)) if deviation > 0 else None,
-        improved=float(np.mean((sign * own > 0) + 0.5 * (own == 0))),
+        improved=_share_better(sign * (_own_scores(first) - _own_scores(second))),
         replicates=n,
         unit=unit,
         paired=True,
@@ -135,16 +135,14 @@ def _unpaired(first: Row, second: Row, value: float, sign: float, groups: list[P
         )  # fmt: skip
     one, other = sorted(groups, key=lambda group: int(group.places[0]))
     deviation = float(np.sqrt((one.influence**2).sum() + (other.influence**2).sum()))
-    own = [row["score"] + group.influence[0] * _to_own(group) for row, group in ((first, one), (second, other))]
-    spread = float(np.sqrt((np.var(own[0], ddof=1) + np.var(own[1], ddof=1)) / 2))
-    pairs = sign * np.subtract.outer(own[0], own[1])
+    spread = float(np.sqrt(sum(len(group.names) * (group.influence**2).sum() for group in (one, other)) / 2))
     freedom = min(one.freedom, other.freedom)
     return _difference(
         first, value, deviation, freedom,
         p=two_sided_p(value / deviation, freedom) if deviation > 0 else None,
         smallest_p=0.0 if deviation > 0 else None,
         effect=value / spread if spread > 0 else None,
-        improved=float(np.mean((pairs > 0) + 0.5 * (pairs == 0))),
+        improved=_share_better(sign * np.subtract.outer(_own_scores(first), _own_scores(second))),
         replicates=min(len(one.names), len(other.names)),
         unit=unit,
         paired=False,
@@ -165,14 +163,17 @@ def _difference(first: Row, value: float, deviation: float, freedom: float, **mo
     return Difference(value, low, high, verdict=verdict, beyond=bool(low > region or high < -region), **more)
 
 
-def _to_own(group: PairableRows) -> FloatArray:
-    """Return (replicates,) what turns a replicate's influence on the whole into its own difference from the whole.
+def _own_scores(row: Row) -> FloatArray:
+    """Return (replicates,) the score of each replicate by itself; NaN where the metric of it is undefined."""
+    metric, kept, n_classes = METRICS[row["metric"]], row["replicates"], len(row["classes"])
+    if "scores" in kept:
+        return scores_of(kept, metric.name)
+    return metric.score(tables_of([kept], metric.name, n_classes)[0], n_classes)
 
-    The jackknife's pseudo-value: of a mean over n replicates, ``sqrt(n (n - 1))``, within each of several strata alike.
-    """
-    _, which, sizes = np.unique(group.strata, return_inverse=True, return_counts=True)
-    n = sizes[which].astype(np.float64)
-    return np.asarray(len(sizes) * np.sqrt(n * (n - 1)))
+
+def _share_better(apart: FloatArray) -> float | None:
+    """Return the share of differences above 0, of those that are 0 half; None where one is not finite."""
+    return float(np.mean((np.sign(apart) + 1) / 2)) if np.isfinite(apart).all() else None
 
 
 def exchanged(first: Row, second: Row) -> tuple[float, float]:

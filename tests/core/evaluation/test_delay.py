@@ -18,9 +18,9 @@ STEP_NS = 12_000_000  # 12 ms, as the paper's 5000 samples in 60 s
 K = 40
 
 
-def pressed(folder, *, timed=True, own_hz=None):
-    """Three recordings, one a role, of a sensor without a rate or a link of its own."""
-    clock = np.arange(1000, dtype=np.int64) * STEP_NS if timed else None
+def pressed(folder, *, step_ns=STEP_NS, own_hz=None):
+    """Three recordings, one a role, of a sensor without a rate or a link of its own; `step_ns` 0: without a clock."""
+    clock = np.arange(1000, dtype=np.int64) * step_ns if step_ns else None
     return roles(folder, partial(ramp, n=1000), t_ns=clock, own_rates_hz=own_hz or {})
 
 
@@ -56,9 +56,10 @@ def test_what_is_not_known_is_absent_and_said(tmp_path):
     parts, remarks = reading_delay_ms(data)
     assert set(parts) == {"sampling", "window"}
     assert remarks == (NO_LINK,)
-    timeless = load_dataset(TASK, pressed(tmp_path / "b", timed=False))
-    parts, remarks = reading_delay_ms(timeless)
-    assert (parts, remarks) == ({}, (NO_RATE,))
+    for step_ns in (0, 4_250_000_000):  # a row a press: the pause between presses is no sampling interval
+        timeless = load_dataset(TASK, pressed(tmp_path / f"{step_ns}", step_ns=step_ns))
+        parts, remarks = reading_delay_ms(timeless)
+        assert (parts, remarks) == ({}, (NO_RATE,))
     assert answer_delay_ms({**parts, "features": 0.1, "prediction": 0.1}, "features") is None
 
 

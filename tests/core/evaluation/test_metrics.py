@@ -81,10 +81,16 @@ def test_a_scale_and_back_is_where_it_began(metric, value):
     assert scale.back(scale.there(value)) == pytest.approx(value, rel=1e-9)
 
 
-def test_where_not_one_was_wrong_the_interval_has_width():
-    """A row of 1.000 from few sessions must not look as if nothing could go wrong."""
-    codes = np.repeat(np.arange(5), 60), np.repeat(np.arange(40), 600)
-    few, many = (interval(0 * code, 0 * code, code, code, "accuracy", 2) for code in codes)
-    assert few.high == 1.0
-    assert 0.9 < few.low < 0.99
-    assert few.low < many.low < 1
+@pytest.mark.parametrize("metric", [name for name, metric in METRICS.items() if metric.kind != "regression"])
+@given(st.integers(5, 40), st.integers(10, 200), st.randoms(use_true_random=False))
+def test_where_one_or_none_was_wrong_the_interval_depends_on_the_number_of_units(metric, units, rows, random):
+    """Rows of a unit may stand or fall together: a hundred from each are no surer than ten."""
+    code = np.repeat(np.arange(units), 2 * rows)
+    y = np.tile([0, 1], units * rows)
+    wrong = y.copy()
+    wrong[random.randrange(len(y))] ^= 1
+    perfect, none, one = (interval(y, p, code, code, metric, 2) for p in (y, 1 - y, wrong))
+    known = stats.binomtest(units, units).proportion_ci(0.95, "exact")
+    assert (perfect.low, perfect.high) == pytest.approx((known.low, 1.0))
+    assert (none.low, none.high) == pytest.approx((0.0, 1 - known.low))
+    assert one.low <= perfect.low

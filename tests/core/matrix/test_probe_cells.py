@@ -2,6 +2,7 @@
 
 import pytest
 
+from tactbench.core.errors import UsageError
 from tactbench.core.matrix.plan import plan_cells
 from tactbench.core.plugins.registry import load_registry
 from tactbench.core.spec.matrix import MatrixSpec
@@ -36,7 +37,7 @@ def test_three_more_ways_after_those_asked_for(registry):
     [
         (("deployable", "session"), [("first-frame", "session"), ("deployable", "shuffled")]),
         (("deployable", "shuffled"), [("deployable", None), ("first-frame", None)]),
-        (("deployable", "in-session"), []),  # a split in time keeps nothing apart
+        ((["deployable"], ["in-session", "shuffled"]), [("deployable", None), ("first-frame", None)]),
         ((["karl2016", "deployable"], None), [("first-frame", None), ("deployable", "shuffled")]),
     ],
 )
@@ -44,3 +45,8 @@ def test_probes_keep_apart_what_the_cell_keeps_apart(registry, asked, probes):
     protocol, split = asked
     choice = {"protocol": protocol, "split": split}
     assert ways(plan(registry, **choice)) == [*ways(plan(registry, probe=False, **choice)), *probes]
+
+
+def test_a_split_in_time_alone_cannot_be_probed(registry):
+    with pytest.raises(UsageError, match="nothing to probe"):
+        plan(registry, protocol="deployable", split="in-session")

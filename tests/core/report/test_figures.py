@@ -115,6 +115,16 @@ def test_folds_have_figures_of_their_test_sets(finished, tmp_path):
     assert len(said) == 2, "of training sets and of an embedding there are several"
 
 
+def test_without_a_published_number_the_best_estimator_is_shown(finished, tmp_path):
+    poor = {"name": "lasso", "params": {"lambda_": 50.0}}
+    force = {"name": "force", "protocol": "deployable", "split": "shuffled", "estimators": [poor, "ols"]}
+    matrix = MatrixSpec.model_validate({"rig": "replay", "sensors": ["icub"], "tasks": [force], "latency": False})
+    run_matrix(matrix, Store(tmp_path / "two"), choice=IN_THIS_PROCESS, recordings=finished / "recordings")
+    best = min((row for row in opened(tmp_path / "two").rows if not row["is_baseline"]), key=lambda row: row["score"])
+    assert best["estimator"] == "ols"
+    assert group_of(tmp_path / "two", "force").row["estimator"] == "ols"
+
+
 def drawn(make, group):
     with styled():
         return make.draw(group)

@@ -60,3 +60,11 @@ def test_rows_stand_beside_the_numbers_they_are_comparable_with_and_no_others():
         (0.6875, "force, RMSE of the time index (biotac)"),
         (0.6875, "force, RMSE of the time index (icub)"),
     ]
+
+
+def test_estimators_beside_one_published_number_are_told_apart():
+    asked = {"protocol": "deployable", "split": "in-session"}
+    rows = [force_row("eflesh", name, 0.3, **asked) for name in ("boosting", "forest-100")]
+    assert [line.title for line in beside(*rows)] == [
+        "normal force, RMSE, eFlesh (boosting)", "normal force, RMSE, eFlesh (forest-100)",
+    ]  # fmt: skip

@@ -71,6 +71,24 @@ def test_exchanging_the_two_turns_everything_round_and_the_order_of_sessions_is_
     assert (other.low, other.high) == pytest.approx((one.low, one.high), abs=1e-12)
 
 
+@given(seed=st.integers(0, 10_000), replicates=st.integers(5, 16))
+def test_the_share_of_replicates_on_which_the_first_is_better_is_of_their_own_scores(seed, replicates):
+    """Replicates are of unequal sizes, and many have no error: a perfect answer is never the worse one."""
+    rng = np.random.default_rng(seed)
+    rows = rng.integers(1, 40, replicates)
+    wrong = rng.integers(0, 2, (2, replicates)) * rng.integers(0, rows + 1, (2, replicates))
+    one, other = (
+        row(cell, np.column_stack([rows - w, w, 0 * w, 0 * w]), metric="accuracy", classes=2)
+        for cell, w in zip("ab", wrong, strict=True)
+    )
+    better, tied = wrong[0] < wrong[1], wrong[0] == wrong[1]
+    assert difference(one, other).improved == pytest.approx(np.mean(better + 0.5 * tied))
+    apart = {"replicates": other["replicates"] | {"names": [f"t{place}" for place in range(replicates)]}}
+    shares = wrong / rows
+    pairs = [1.0 if a < b else 0.5 * (a == b) for a in shares[0] for b in shares[1]]
+    assert difference(one, other | apart).improved == pytest.approx(np.mean(pairs))
+
+
 def test_classes_in_sessions_of_their_own_are_compared_within_classes():
     """What a class is harder than another must not count as spread between sessions."""
 

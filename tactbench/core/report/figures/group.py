@@ -5,13 +5,15 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from textwrap import fill
 from typing import TYPE_CHECKING, Any
 
+from tactbench.core.evaluation.metrics import METRICS
 from tactbench.core.leaderboard.names import METRIC_NAMES, answer_name
 from tactbench.core.matrix.store import Row
 from tactbench.core.report.figures.style import sensor_colours
+from tactbench.core.report.published import stands_beside
 from tactbench.core.report.results import Results
 from tactbench.core.samples import Answers
 from tactbench.core.spec.events import SlipTarget
@@ -131,8 +133,9 @@ def with_unit(words: str, unit: str) -> str:
 def groups(results: Results, remark: Callable[[str], None]) -> list[Group]:
     """Return the groups of finished cells, a figure's worth each.
 
-    Of several estimators the first that the task names for itself is shown, or else the first in the folder; of several
-    replicates the one whose answers the cell's row leads to. `remark` is called with a sentence on what is not shown.
+    Of several estimators the one that stands beside a published number is shown, or else the one with the best score
+    of any sensor; of several replicates the one whose answers the cell's row leads to. `remark` is called with a
+    sentence on what is not shown.
     """
     alike: dict[tuple[Any, ...], list[Row]] = {}
     for trouble in results.store.troubles:
@@ -150,7 +153,7 @@ def groups(results: Results, remark: Callable[[str], None]) -> list[Group]:
             )
             continue
         task = results.registry.tasks[name].spec
-        shown = next((one for one in task.estimators if one in names), names[0])
+        shown = answer_name(max(answers, key=partial(_order, task)))
         if len(names) > 1:
             others = ", ".join(one for one in names if one != shown)
             remark(f"Figures of {name} under {protocol}, split {split} show {shown}; not shown: {others}.")
@@ -158,6 +161,11 @@ def groups(results: Results, remark: Callable[[str], None]) -> list[Group]:
         if panels:
             found.append(Group(results, task, panels))
     return found
+
+
+def _order(task: TaskSpec, row: Row) -> tuple[bool, float]:
+    """Return what decides which of several estimators is shown: the greatest."""
+    return any(stands_beside(row, task, one) for one in task.published), METRICS[row["metric"]].sign * row["score"]
 
 
 def _panels(results: Results, rows: list[Row], remark: Callable[[str], None]) -> tuple[Panel, ...]:
