@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import inspect
 import os
-import re
 import subprocess
 import sys
 from collections.abc import Callable, Iterator
@@ -237,14 +236,3 @@ def _imported_with(module: str) -> list[str]:
     if done.returncode != 0:
         fail(module, f"it cannot be imported in a fresh interpreter: {done.stderr.strip().rpartition(chr(10))[2]}")
     return done.stdout.split()
-
-
-@check(*KINDS)
-def numbers_are_finite(subject: Subject) -> None:
-    """NaN in a spec passes every comparison, and shows as a score of NaN.
-
-    Leave the field out where nobody states the number.
-    """
-    found = re.search(r"name='([^']*)'[^()]*?(\w+)=(-?inf|nan)\b", repr(subject.descriptor))
-    if found is not None:
-        fail(f"{found[1]}.{found[2]}", f"it is {found[3]}")

@@ -14,9 +14,9 @@ Tag = Literal["sourced", "measured", "derived", "assumed"]
 
 
 class Frozen(BaseModel):
-    """A value object: immutable, no unknown fields."""
+    """A value object: immutable, no unknown fields, no number that is NaN or infinite: NaN passes every comparison."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid", defer_build=True)
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, defer_build=True)
 
 
 def _known(unit: str) -> str:

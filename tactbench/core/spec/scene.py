@@ -9,7 +9,6 @@ from pydantic import (
     BaseModel,
     BeforeValidator,
     Field,
-    FiniteFloat,
     SerializerFunctionWrapHandler,
     ValidationError,
     field_serializer,
@@ -225,7 +224,7 @@ class Simulation(Frozen):
     scenario: str | None = None
     """Name of one of the sensor's scenarios, whose nuisances take the place of the usual ones; None: the usual ones."""
 
-    nuisances: Annotated[tuple[tuple[str, FiniteFloat], ...], BeforeValidator(_pairs)] = ()
+    nuisances: Annotated[tuple[tuple[str, float], ...], BeforeValidator(_pairs)] = ()
     """Nuisances by name with another value than the scene or the sensor states, as ``placement_scatter_mm: 0.3``."""
 
     @field_serializer("nuisances")
