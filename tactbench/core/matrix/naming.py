@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
-from tactbench.core.errors import UsageError, nearest
+from tactbench.core.errors import UsageError, did_you_mean
 from tactbench.core.matrix.plan import Cell
 from tactbench.core.spec.scene import Simulation
 
@@ -44,10 +44,9 @@ def meant(given: str, names: Sequence[str]) -> str:
     if len({_parts(name)[0] for name in found}) == 1:
         return min(found, key=lambda name: _parts(name)[1])
     if not found:
-        close = " or ".join(repr(name) for name in nearest(given, names))
         raise UsageError(
             f"There is no cell called {given!r} among {len(names)}.",
-            hint=f"Did you mean {close}?" if close else "`tactbench leaderboard --format json` has their names.",
+            hint=did_you_mean(given, names).strip() or "`tactbench leaderboard --format json` has their names.",
         )
     more = f" and {len(found) - _SHOWN} more" if len(found) > _SHOWN else ""
     raise UsageError(

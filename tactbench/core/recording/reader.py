@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 from pydantic import ValidationError
 
-from tactbench.core.errors import FormatError, MissingRecordingError, UsageError
+from tactbench.core.errors import FormatError, MissingRecordingError, UsageError, complaint
 from tactbench.core.recording import format as layout
 from tactbench.core.samples import StreamData
 from tactbench.core.spec.recording import RecordingMeta
@@ -283,10 +283,7 @@ def parse_meta(path: Path, text: str) -> RecordingMeta:
     try:
         return RecordingMeta.model_validate(json.loads(text))
     except ValidationError as error:
-        first = error.errors(include_url=False)[0]
-        what = f"{'.'.join(str(part) for part in first['loc'])}: {first['msg']}"
-    except UsageError as error:
-        what = error.message
-    except (ValueError, RecursionError) as error:
+        what = complaint(error)
+    except (ValueError, UsageError) as error:
         what = str(error)
     raise FormatError(f"{path} says something about itself that cannot be: {what}.", hint=layout.SEE)

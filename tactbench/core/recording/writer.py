@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 from pydantic import ValidationError
 
-from tactbench.core.errors import RecordingError, RigError, TactbenchError
+from tactbench.core.errors import RecordingError, RigError, TactbenchError, complaint
 from tactbench.core.recording import format as layout
 from tactbench.core.recording import image
 from tactbench.core.recording.partial import Annotations, Columns, Partial, read_blocks
@@ -153,10 +153,8 @@ class RecordingWriter:
         try:
             self.meta = RecordingMeta.model_validate({**dict(self.meta), **changes})
         except ValidationError as error:
-            first = error.errors(include_url=False)[0]
-            where = ".".join(str(part) for part in first["loc"])
             raise RecordingError(
-                f"The recording {self.meta.name!r} cannot say {where}: {first['msg']}.", hint="Correct the rig."
+                f"The recording {self.meta.name!r} cannot say {complaint(error)}.", hint="Correct the rig."
             ) from error
         try:
             self._open.revise(self.meta.model_dump(mode="json", include=set(changes)))

@@ -16,7 +16,7 @@ from pydantic import (
     model_validator,
 )
 
-from tactbench.core.errors import UsageError
+from tactbench.core.errors import UsageError, complaint
 from tactbench.core.spec import units
 from tactbench.core.spec.drive import ForceLoop
 from tactbench.core.spec.profile import PAPER, ForceProfile, ForceRamp
@@ -325,7 +325,7 @@ def _with(model: M, way: tuple[str, ...], given: Mapping[str, float]) -> M:
         return type(model).model_validate({**dict(model), **change})
     except ValidationError as error:
         listed = ", ".join(f"{name} = {value:g}" for name, value in given.items())
-        raise UsageError(f"{listed}: {error.errors()[0]['msg']}.", hint="Give another value.") from error
+        raise UsageError(f"{listed}: {complaint(error)}.", hint="Give another value.") from error
 
 
 _PARTS: tuple[tuple[tuple[str, ...], type[Frozen]], ...] = (

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 from pydantic import ValidationError
 
-from tactbench.core.errors import MappingError
+from tactbench.core.errors import MappingError, complaint
 from tactbench.core.recording.mapping.model import ChannelGroup, Column, StreamSource
 from tactbench.core.recording.mapping.model import Mapping as MappingFile
 from tactbench.core.spec.quantity import Quantity
@@ -89,11 +89,8 @@ def sensor_of(mapping: MappingFile) -> tuple[SensorSpec, tuple[StreamSpec, ...],
             streams=tuple(stream.spec for stream in streams.values() if stream.source.of == "sensor"),
         )
     except ValidationError as error:
-        first = error.errors(include_url=False)[0]
-        where = ".".join(str(part) for part in first["loc"])
-        given = f" (given: {first['input']!r})" if isinstance(first["input"], str | int | float) else ""
         raise MappingError(
-            f"The mapping describes a sensor that cannot be: {where}: {first['msg']}{given}.", hint="Correct the name."
+            f"The mapping describes a sensor that cannot be: {complaint(error)}.", hint="Correct the name."
         ) from error
     reference = tuple(stream.spec for stream in streams.values() if stream.source.of == "reference")
     return sensor, reference, streams

@@ -12,9 +12,12 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from tactbench.core.errors import MappingError, nearest
+from tactbench.core.errors import MappingError, did_you_mean
 from tactbench.core.recording.mapping.model import Column
 from tactbench.core.samples import FloatArray, IntArray
+
+MOST_LISTED = 12
+"""Columns named in a message."""
 
 
 @dataclass(frozen=True)
@@ -109,11 +112,8 @@ class TextTable:
                 f"{self.shown} has {self.header.count(column)} columns called {column!r}.", hint="Give its place."
             )
         if column not in self.header:
-            close = nearest(column, self.header)
-            meant = f"Did you mean {' or '.join(repr(name) for name in close)}? " if close else ""
-            raise MappingError(
-                f"{self.shown} has no column {column!r}.", hint=f"{meant}It has: {_listing(self.header)}."
-            )
+            hint = f"{did_you_mean(column, self.header)}It has: {_listing(self.header)}."
+            raise MappingError(f"{self.shown} has no column {column!r}.", hint=hint)
         return self.header.index(column)
 
 
@@ -244,6 +244,6 @@ def _checked(shown: str, place: int, wide: int) -> int:
     return place
 
 
-def _listing(names: Sequence[str], most: int = 12) -> str:
-    shown = ", ".join(names[:most])
-    return f"{shown} … ({len(names)} in all)" if len(names) > most else shown
+def _listing(names: Sequence[str]) -> str:
+    shown = ", ".join(names[:MOST_LISTED])
+    return f"{shown} … ({len(names)} in all)" if len(names) > MOST_LISTED else shown
