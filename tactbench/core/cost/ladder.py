@@ -15,10 +15,10 @@ from tactbench.core.errors import NotApplicable, TactbenchError, UsageError
 from tactbench.core.evaluation.dataset import load_dataset
 from tactbench.core.evaluation.delay import answer_delay_ms, tail_ms
 from tactbench.core.evaluation.metrics import metric_called
-from tactbench.core.matrix.progress import Progress
 from tactbench.core.matrix.run import EngineChoice, Outcome, run_matrix
 from tactbench.core.matrix.store import Row, Store
 from tactbench.core.plugins.registry import Registry
+from tactbench.core.progress import Progress
 from tactbench.core.spec.matrix import MatrixSpec
 from tactbench.core.spec.rig import EstimatorDescriptor
 from tactbench.core.statistics.replicates import over_replicates

@@ -20,11 +20,11 @@ from tactbench.core.evaluation.protocols import shots
 from tactbench.core.matrix.installed import failing_as, rig_of
 from tactbench.core.matrix.keys import Keys
 from tactbench.core.matrix.plan import FEW_SHOT, Cell, plan_cells, serves, task_of
-from tactbench.core.matrix.progress import Progress
 from tactbench.core.matrix.store import Store
 from tactbench.core.plugins.registry import Registry
 from tactbench.core.plugins.rig_files import load_rig_file
 from tactbench.core.pool import UNLIMITED, InProcess, Limits, Pool
+from tactbench.core.progress import Progress
 from tactbench.core.spec.matrix import MatrixSpec
 from tactbench.core.spec.rig_file import RigFile
 from tactbench.core.spec.scene import Role, Scene, Simulation

@@ -10,11 +10,11 @@ from pathlib import Path
 from tactbench.core.matrix.keys import Keys, differences
 from tactbench.core.matrix.plan import Cell
 from tactbench.core.matrix.plan_recordings import RecordingPlan, request_key, requests_for
-from tactbench.core.matrix.progress import Progress
 from tactbench.core.matrix.run import EngineChoice, Run
 from tactbench.core.matrix.store import Row, Store
 from tactbench.core.matrix.summary import SEED_DECIDES
 from tactbench.core.plugins.registry import Registry
+from tactbench.core.progress import Progress
 
 
 @dataclass(frozen=True)

@@ -21,7 +21,6 @@ from tactbench.core.matrix.plan_recordings import (
     plan_parts,
     request_key,
 )
-from tactbench.core.matrix.progress import Progress
 from tactbench.core.matrix.record import GRACE_S, Recorder, is_computed
 from tactbench.core.matrix.solve import Job, published, solve, unanswered
 from tactbench.core.matrix.store import Row, Store
@@ -30,6 +29,7 @@ from tactbench.core.plugins.declared import declared_in, with_declared
 from tactbench.core.plugins.interfaces import Operator
 from tactbench.core.plugins.registry import Registry, installed
 from tactbench.core.pool import UNLIMITED, Engine, InProcess, Limits, Pool, preload
+from tactbench.core.progress import Progress
 from tactbench.core.provenance.gather import gather, usable_cores
 from tactbench.core.spec.matrix import MatrixSpec
 from tactbench.core.spec.status import STOPPED

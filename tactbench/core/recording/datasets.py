@@ -17,7 +17,7 @@ from functools import cached_property
 from importlib.metadata import entry_points
 from importlib.util import find_spec
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 import tactbench
 from tactbench.core.errors import (
@@ -28,6 +28,7 @@ from tactbench.core.errors import (
     UnknownNameError,
 )
 from tactbench.core.plugins import hookspecs
+from tactbench.core.progress import Progress
 from tactbench.core.recording.format import VERSION
 from tactbench.core.recording.mapping.importing import import_tables
 from tactbench.core.recording.mapping.model import DataSource, Mapping
@@ -36,16 +37,6 @@ from tactbench.core.spec.yaml_file import load_yaml
 CACHE = "TACTBENCH_CACHE"
 """Environment variable: where data sets are kept, in place of the user's folder for caches."""
 FOLDER = "datasets"
-
-
-class Steps(Protocol):
-    """Receives how far the work has come; :class:`~tactbench.core.matrix.progress.Progress` is one."""
-
-    def begin(self, stage: str, total: int) -> None:
-        """Start a stage of `total` steps."""
-
-    def advance(self, what: str) -> None:
-        """Finish one step, named `what`."""
 
 
 @dataclass(frozen=True)
@@ -93,7 +84,7 @@ class DataSet:
         stated = hashlib.sha256(self.path.read_bytes()).hexdigest()[:12]
         return cache() / self.name / f"recordings-{VERSION}-{stated}"
 
-    def recordings(self, root: Path | None = None, progress: Steps | None = None) -> Path:
+    def recordings(self, root: Path | None = None, progress: Progress | None = None) -> Path:
         """Return the folder of its recordings; what is missing is fetched, checked and imported.
 
         Parameters
@@ -115,30 +106,23 @@ class DataSet:
         target = self.imported
         if target.is_dir():
             return target
+        progress = progress or Progress()
         self._fetch(_copy(root, next(iter(self.source.files))), root, progress)
-
-        def step(done: int, total: int, what: str) -> None:
-            if progress is not None:
-                if done == 1:
-                    progress.begin(f"importing {self.name}", total)
-                progress.advance(what)
-
         with tempfile.TemporaryDirectory(prefix=".importing-", dir=target.parent) as aside:
             made = Path(aside, "recordings")
-            import_tables(self.path, root=self.files, out=made, progress=step)
+            import_tables(self.path, root=self.files, out=made, progress=progress)
             with suppress(OSError):  # another process was quicker
                 made.replace(target)
         return target
 
-    def _fetch(self, copy: Path | None, root: Path | None, progress: Steps | None) -> None:
+    def _fetch(self, copy: Path | None, root: Path | None, progress: Progress) -> None:
         import pooch
 
         address, files = self.source.address, self.source.files
         there = pooch.create(path=self.files, base_url=address or "file:///", registry=dict(files))
         pooch.get_logger().setLevel("WARNING")
         download = None if copy is None else _copying(copy)
-        if progress is not None:
-            progress.begin(f"{'fetching' if copy is None else 'copying'} {self.name}", len(files))
+        progress.begin(f"{'fetching' if copy is None else 'copying'} {self.name}", len(files))
         for name in files:
             if copy is None and not address and not (self.files / name).is_file():
                 raise NotApplicable(
@@ -162,8 +146,7 @@ class DataSet:
                     hint="Put them there by hand, or name a folder that holds a copy with --root DIR. "
                     "What was fetched before is kept.",
                 ) from error
-            if progress is not None:
-                progress.advance(name)
+            progress.advance(name)
 
 
 def cache() -> Path:

@@ -3,12 +3,12 @@
 import pytest
 
 from tactbench.core.errors import UsageError
-from tactbench.core.matrix.progress import Progress
 from tactbench.core.matrix.run import EngineChoice, run_matrix
 from tactbench.core.matrix.solve import TIMED
 from tactbench.core.matrix.store import Store
 from tactbench.core.matrix.summary import SEED_DECIDES
 from tactbench.core.pool import Limits
+from tactbench.core.progress import Progress
 from tactbench.core.spec.matrix import EstimatorChoice, MatrixSpec, TaskChoice
 from tests.core.cost.test_ladder import presses
 from tests.here import IN_THIS_PROCESS

@@ -5,7 +5,7 @@ from __future__ import annotations
 import fnmatch
 import re
 from collections import Counter
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from dataclasses import replace as replaced
@@ -17,6 +17,7 @@ from typing import cast, get_args
 import numpy as np
 
 from tactbench.core.errors import MappingError, RecordingError, UnwritableError
+from tactbench.core.progress import Progress
 from tactbench.core.recording.health import Finding, examine, is_copy
 from tactbench.core.recording.mapping.channels import MappedStream, device, fill, sensor_of
 from tactbench.core.recording.mapping.files import FileSet, RawRecording, find, read
@@ -36,9 +37,6 @@ RIG = "import"
 
 ENDING = ".h5"
 _FILE_NAME = re.compile(r"^[A-Za-z0-9][A-Za-z0-9._-]*$")
-
-Progress = Callable[[int, int, str], None]
-"""Told (files done, files in all, the last one)."""
 
 
 @dataclass(frozen=True)
@@ -105,7 +103,7 @@ def import_tables(
     out
         Folder of the recordings. It gets all of them or, if anything is wrong, none.
     progress
-        Told after every set of files.
+        Receives every set of files that is read.
     replace
         Replace recordings of the same name that hold something else; otherwise they are refused. One that holds the
         same already is left as it is.
@@ -125,14 +123,15 @@ def import_tables(
     tasks = tasks_text(loaded, mapping.name)
     sets = find(loaded, mapping.parent if root is None else root)
     made: list[Imported] = []
+    progress = progress or Progress()
+    progress.begin(f"importing {mapping.stem}", len(sets))
     with _aside(out) as folder:
-        for done, files in enumerate(sets, 1):
+        for files in sets:
             for raw in read(loaded, files):
                 meta = _meta(loaded, raw, sensor, reference)
                 _unique_name(meta, made)
                 made.append(_write(folder / f"{meta.name}{ENDING}", meta, loaded, raw, streams))
-            if progress is not None:
-                progress(done, len(sets), next(iter(files.files.values())).shown)
+            progress.advance(next(iter(files.files.values())).shown)
         check_tasks(out, tasks, replace=replace)
         placed = _place(made, out, replace=replace)
         place_tasks(out, folder, tasks)

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from tactbench.core.errors import TactbenchError
 from tactbench.core.files import replace_file
-from tactbench.core.matrix.progress import Progress
+from tactbench.core.progress import Progress
 from tactbench.core.report.figures import (
     confusion,
     embedding_map,
