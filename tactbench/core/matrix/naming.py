@@ -7,11 +7,9 @@ from dataclasses import replace
 from typing import Any
 
 from tactbench.core.errors import UsageError, did_you_mean
-from tactbench.core.matrix.plan import Cell
+from tactbench.core.matrix.plan import ALIKE, Cell
 from tactbench.core.spec.scene import Simulation
 
-_SAME = ("sensor", "task", "rig", "protocol", "split", "estimator", "repeat", "repeats", "seed")
-"""What a row and a cell call alike."""
 _SHOWN = 8
 """Cells named in a message."""
 
@@ -70,13 +68,11 @@ def _parts(name: str) -> tuple[str, int]:
 def cell_of(row: Mapping[str, Any]) -> Cell:
     """Return the cell that a row answers."""
     cell = Cell(
-        **{name: row[name] for name in _SAME},
+        **{name: row[name] for name in ALIKE},
         params=tuple(sorted(row["params"].items())),
         baseline=row["is_baseline"],
         timed=row["status"] != "done" or row["latency_n"] is not None,
         simulation=Simulation.model_validate(row["simulation"]),
-        declared_task=row["declared_task"],
-        include_incomplete=row.get("include_incomplete", False),
     )
     # A row says which split was taken; its name, whether that one was asked for or found.
     found = replace(cell, split=None)

@@ -22,6 +22,12 @@ FEW_SHOT = "few-shot"
 
 _AS_PLANNED = Simulation()
 
+ALIKE = (
+    "sensor", "task", "rig", "protocol", "split", "estimator", "repeat", "repeats", "seed", "declared_task",
+    "include_incomplete",
+)  # fmt: skip
+"""What a row and a cell call alike."""
+
 
 @dataclass(frozen=True)
 class Cell:

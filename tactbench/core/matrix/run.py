@@ -135,7 +135,7 @@ def run_matrix(
     FolderError
         If another run holds the folder, or the disk refuses; what was finished before is kept.
     """
-    choice = choice or EngineChoice()
+    choice, progress = choice or EngineChoice(), progress or Progress()
     choice.check()
     if choice.name == "dask":
         matrix = matrix.model_copy(update={"latency": False})  # a cluster's cells are never alone on their machine
@@ -148,7 +148,7 @@ def run_matrix(
         cells, plan = plan_parts(parts, registry, keys, store, choice.limits)
         provenance = gather(registry, seed=matrix.seed, engine=choice.name)
         store.begin(provenance)
-        run = Run(store, registry, keys, plan, choice, operator, progress or Progress(), shown, cells)
+        run = Run(store, registry, keys, plan, choice, operator, progress, shown, cells)
         run.carry_out([cell for cell in cells if cell.timed], alone=True)
         run.carry_out([cell for cell in cells if not cell.timed], alone=False)
     rows = tuple(run.rows[cell.name] for cell in cells)
@@ -183,10 +183,10 @@ class Run:
         by_need: dict[RequestKey, list[Cell]] = {}
         for cell in cells:
             by_need.setdefault(request_key(cell), []).append(cell)
-        requests = [request for need in by_need for request in self.plan.requests.get(need, ())]
+        requests = [request for need in by_need for request in self.plan[need].requests]
         self._clear(requests)
         missing = {request.path: request for request in requests if not request.path.exists()}
-        lacking = {need: missing.keys() & self.plan.paths.get(need, ()) for need in by_need}
+        lacking = {need: missing.keys() & self.plan[need].paths for need in by_need}
         ready = [self._jobs(by_need[need]) for need, paths in lacking.items() if not paths]
         later = [cell for need, paths in lacking.items() if paths for cell in by_need[need]]
         total = len(missing) + len(later) + sum(map(len, ready))
@@ -255,9 +255,9 @@ class Run:
 
                 journals = sorted(request.path.parent.glob(f"{request.path.name}*.partial"))
                 outcome.hint = " ".join([outcome.hint, *(recovery(one, request.path) for one in journals)]).strip()
-            for need, paths in self.plan.paths.items():
-                if request.path in paths:
-                    self.plan.troubles.setdefault(need, outcome)
+            for source in self.plan.values():
+                if request.path in source.paths:
+                    source.trouble = source.trouble or outcome
         self.recorded += not stopped
         self.progress.advance(f"{request.sensor} {request.scene.name}", stopped=stopped)
 
@@ -268,13 +268,11 @@ class Run:
         jobs = []
         for cell in cells:
             task = task_of(cell.task_key, self.registry)
-            need = request_key(cell)
+            source = self.plan[request_key(cell)]
             try:
-                trouble = self.plan.troubles.get(need)
-                if trouble is not None:
-                    raise trouble
-                paths = self.plan.paths[need]
-                digests = {path: self.store.about(path)["digest"] for path in paths}
+                if source.trouble is not None:
+                    raise source.trouble
+                digests = {path: self.store.about(path)["digest"] for path in source.paths}
                 key, sections = self.keys.of_cell(cell, digests)
             except Exception as error:
                 self._stopped(cell, task, error)
@@ -282,7 +280,7 @@ class Run:
             found = self.store.finished(key)
             if found is None:
                 estimator = self.registry.estimators[cell.estimator]
-                jobs.append(Job(cell, task, estimator, tuple(paths), tuple(digests.values()), key, sections))
+                jobs.append(Job(cell, task, estimator, tuple(digests), tuple(digests.values()), key, sections))
                 continue
             # Its key covers neither its number among the repeats nor what is published: they change no number.
             naming = {"cell": cell.name, "repeat": cell.repeat, "repeats": cell.repeats}

@@ -144,9 +144,9 @@ class Pool(Engine):
                 child = _Child(work, list(left), self.limits)
                 try:
                     while left and not child.over and not self._abandoned.is_set():
-                        outcome, log = child.outcome(self._abandoned)
-                        if outcome is not _ABANDONED:
-                            self._ended.put((left.popleft(), outcome, log))
+                        ended = child.outcome(self._abandoned)
+                        if ended is not None:
+                            self._ended.put((left.popleft(), *ended))
                 finally:
                     child.end(unfinished=bool(left))
         except Exception as error:  # it cannot be pickled, or the system starts no more processes
@@ -156,8 +156,6 @@ class Pool(Engine):
             self._ended.put(None)
 
 
-_ABANDONED = object()
-"""In place of an outcome: nobody waits for it."""
 _starting = threading.Lock()
 
 
@@ -184,8 +182,8 @@ class _Child:
         finally:
             theirs.close()
 
-    def outcome(self, abandoned: threading.Event) -> tuple[Any, str]:
-        """Wait for the next item; return its result or the error that stopped it, and what it printed."""
+    def outcome(self, abandoned: threading.Event) -> tuple[Any, str] | None:
+        """Return what came of the next item, or stopped it, and what it printed; None: nobody waits for it."""
         began_s, shared_mb = time.monotonic(), None
         while not abandoned.is_set():
             try:
@@ -203,7 +201,7 @@ class _Child:
                 self._kill(unfinished=True)
                 self.over = True
                 return _told(stopped, end_of(self._log), began_s)
-        return _ABANDONED, ""
+        return None
 
     def _beyond_limits(self, spent_s: float, shared_mb: float | None) -> CellStopped | None:
         """Return why the item at work must be ended; None if it need not."""

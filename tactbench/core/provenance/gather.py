@@ -34,7 +34,6 @@ def gather(registry: Registry, **circumstances: Any) -> dict[str, Any]:
         "commit": _commit(Path(tactbench.__file__).parent),
         "python": platform.python_version(),
         "platform": f"{platform.system()}-{platform.release()}-{platform.machine()}",
-        "machine": platform.machine(),
         "cpu": cpu_model(),
         "cores": os.cpu_count(),
         "memory_mb": psutil.virtual_memory().total // 2**20,
