@@ -14,13 +14,12 @@ import numpy as np
 import numpy.typing as npt
 
 from tactbench.core.conformance.check import fail
-from tactbench.core.samples import Block, FloatArray, Quality, StreamData
+from tactbench.core.samples import COLUMNS, Block, FloatArray, Quality, StreamData, join_blocks
 from tactbench.core.spec.recording import RecordingMeta
 from tactbench.core.spec.rig import RigDescriptor, SensorDescriptor
 from tactbench.core.spec.rig_file import RigFile
 from tactbench.core.spec.scene import Scene
 from tactbench.core.spec.sensor import ChannelSpec, StreamSpec
-from tactbench.devices.reading import COLUMNS
 
 BAD = Quality.MISSING | Quality.SUSPECT
 RATE_SHARE = 0.02
@@ -92,17 +91,14 @@ def joined(where: str, streams: Sequence[StreamSpec], blocks: Iterable[Any]) -> 
     for spec in streams:
         nothing = np.empty((0, len(spec.channels)))
         parts = came[spec.name] or [Block(spec.name, None, nothing, nothing.astype(np.uint8))]
-        given = [name for name in COLUMNS if getattr(parts[0], name) is not None]
         try:
-            whole = {name: np.concatenate([getattr(one, name) for one in parts]) for name in given}
+            whole = join_blocks(parts)
         except ValueError as error:
             fail(f"{where}: {spec.name}", f"its blocks do not fit each other: {error}")
-        shapes = {name: column.shape for name, column in whole.items()}
+        shapes = {name: column.shape for name in COLUMNS if (column := getattr(whole, name)) is not None}
         if shapes["data"][1:] != nothing.shape[1:] or len({shape[0] for shape in shapes.values()}) > 1:
             fail(f"{where}: {spec.name}", f"its columns are {shapes}, for {len(spec.channels)} channels")
-        found[spec.name] = StreamData(
-            spec, whole.get("t_ns"), whole["data"], whole["quality"], sequence=whole.get("sequence")
-        )
+        found[spec.name] = StreamData(spec, whole.t_ns, whole.data, whole.quality, sequence=whole.sequence)
         are_finite(where, found[spec.name])
     return found
 
