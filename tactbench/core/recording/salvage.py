@@ -9,9 +9,9 @@ from tempfile import TemporaryFile
 
 from tactbench.core.recording import format as layout
 from tactbench.core.recording import image
+from tactbench.core.recording.clock_fit import with_clock_fits
 from tactbench.core.recording.partial import Columns, Journal, read_journal
 from tactbench.core.recording.reader import Recording, parse_meta
-from tactbench.core.recording.times import with_clock_fits
 from tactbench.core.spec.recording import RecordingMeta
 
 REMARK = "Rescued: the recording broke off and is not whole."

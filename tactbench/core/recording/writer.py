@@ -15,8 +15,8 @@ from pydantic import ValidationError
 from tactbench.core.errors import RecordingError, RigError, TactbenchError, complaint
 from tactbench.core.recording import format as layout
 from tactbench.core.recording import image
+from tactbench.core.recording.clock_fit import with_clock_fits
 from tactbench.core.recording.partial import Annotations, Columns, Partial, read_blocks
-from tactbench.core.recording.times import with_clock_fits
 from tactbench.core.samples import Block, Quality
 from tactbench.core.spec.recording import RecordingMeta
 from tactbench.core.spec.sensor import StreamSpec
