@@ -45,7 +45,6 @@ def acquire(
     provenance: Mapping[str, Any],
     watch: Callable[[Block], None] | None = None,
     name: str = "",
-    replace: bool = False,
     complete_interrupted: bool = False,
     rig_file: RigFile | None = None,
 ) -> Acquired:
@@ -58,8 +57,9 @@ def acquire(
     ----------
     rig, descriptor
         The rig, and what it says about itself. If its acquisition is one of devices (DeviceAcquisition), what it says
-        of its counts is recorded too. If something moves in it (MovingAcquisition), it is stopped
-        before an interrupted recording is completed.
+        of its counts is recorded too. Where something moves in it by itself, it has ``stop(why)``, which is called
+        before an interrupted recording is completed: it ends that at once, and returns what is to be done where it
+        could not be ended, or an empty text.
     role
         What the recording is for, or None.
     clock
@@ -69,8 +69,6 @@ def acquire(
         Called with every block, once it is written.
     name
         Of the recording; empty: that of the scene.
-    replace
-        Whether a recording that is there already is replaced.
     complete_interrupted
         Whether a recording that was cut short on a real rig is completed, excluded from every evaluation, before the
         error goes on. Otherwise its journal stays, and the error names the command that makes a recording of it. Of a
@@ -108,7 +106,7 @@ def acquire(
             return _of_devices(acquisition, descriptor, sensor.name, rig_file, rows, cut_short=cut_short, factor=factor)
 
         key = "sim_s" if descriptor.simulated else "acquisition_s"
-        with RecordingWriter(path, meta, replace=replace) as writer:
+        with RecordingWriter(path, meta) as writer:
             try:
                 if control is not None:
                     control.begin()

@@ -312,7 +312,7 @@ def check_api_version(module: str, written_for: object) -> None:
         If they differ.
     """
     spoken = hookspecs.API_VERSION
-    if type(written_for) is int and written_for == spoken:
+    if written_for == spoken:
         return
     stated = "no TACTBENCH_API" if written_for is None else f"TACTBENCH_API = {written_for!r}"
     raise PluginContractError(

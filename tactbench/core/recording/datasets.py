@@ -124,6 +124,7 @@ class DataSet:
         download = None if copy is None else _copying(copy)
         progress.begin(f"{'fetching' if copy is None else 'copying'} {self.name}", len(files))
         for name in files:
+            origin = address + name if copy is None else str(copy / name)
             if copy is None and not address and not (self.files / name).is_file():
                 raise NotApplicable(
                     f"{self.name}: {name} lies at no public address{f', nor in {root}' if root else ''}.",
@@ -132,13 +133,11 @@ class DataSet:
             try:
                 there.fetch(name, downloader=download)
             except ValueError as error:  # pooch's word for a digest that differs
-                origin = address + name if copy is None else copy / name
                 raise MissingRecordingError(
                     f"{self.name}: {origin} is not the file that is meant: its SHA-256 is not {files[name]}.",
                     hint="It is not kept. Files of another state are imported with `tactbench import MAPPING`.",
                 ) from error
             except OSError as error:
-                origin = address + name if copy is None else str(copy / name)
                 missed = f" (not in {root} either)" if root is not None and copy is None else ""
                 raise MissingRecordingError(
                     f"{self.name}: {origin} could not be fetched{missed}: {_reason(error)}. "

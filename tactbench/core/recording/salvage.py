@@ -29,7 +29,6 @@ def salvage(path: Path) -> Recording:
     FormatError
         If it is not an unfinished recording.
     """
-    path = Path(path)
     journal = read_journal(path)
     meta, text = _fitted(journal, parse_meta(path, journal.text))
     behind = TemporaryFile()  # noqa: SIM115  (the recording closes it)
@@ -55,7 +54,6 @@ def rescue(path: Path, target: Path) -> None:
     RecordingError
         If `target` exists, or cannot be written.
     """
-    path, target = Path(path), Path(target)
     image.require_free(target)
     journal = read_journal(path)
     meta = parse_meta(path, journal.text)

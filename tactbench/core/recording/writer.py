@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
-from types import TracebackType
 from typing import Any
 
 import numpy as np
@@ -78,11 +77,9 @@ class RecordingWriter:
             raise image.cannot_write(self.path, error) from error
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, _kind: object, error: BaseException | None, _trace: object) -> None:
         try:
-            if kind is None:
+            if error is None:
                 self.complete()
         except BaseException as failure:
             self._leave(failure)
@@ -288,11 +285,9 @@ def _columns(block: Block, spec: StreamSpec) -> Columns:
 
 
 def _whole(numbers: npt.NDArray[Any], name: str, spec: StreamSpec) -> npt.NDArray[np.int64]:
-    if numbers.dtype.kind not in "iu" and not (
-        numbers.dtype.kind == "f" and np.array_equal(np.rint(numbers), numbers) and (np.abs(numbers) < 2.0**63).all()
-    ):
+    if numbers.dtype.kind not in "iu":
         raise RigError(
-            f"A block of stream {spec.name!r} has {name} that are no whole numbers, NaN perhaps.",
+            f"A block of stream {spec.name!r} has {name} that are no whole numbers: {numbers.dtype}.",
             hint="Give times as whole nanoseconds and sequence numbers as counted; never invent one.",
         )
     return numbers.astype(np.int64)

@@ -20,7 +20,7 @@ from tactbench.core.errors import MappingError, RecordingError, UnwritableError
 from tactbench.core.progress import Progress
 from tactbench.core.recording.health import Finding, examine, is_copy
 from tactbench.core.recording.mapping.channels import MappedStream, device, fill, sensor_of
-from tactbench.core.recording.mapping.files import FileSet, RawRecording, find, read
+from tactbench.core.recording.mapping.files import RawRecording, find, read
 from tactbench.core.recording.mapping.model import MUST_NAME_SENTINELS, Mapping, Word
 from tactbench.core.recording.mapping.samples import labels, samples, times
 from tactbench.core.recording.mapping.tasks import check_tasks, place_tasks, require_answerable, tasks_text
@@ -136,7 +136,8 @@ def import_tables(
         placed = _place(made, out, replace=replace)
         place_tasks(out, folder, tasks)
     names = tuple(task.name for task in loaded.tasks)
-    return ImportReport(loaded.title, tuple(placed), _count_files(sets), names)
+    shown = {file.shown for files in sets for file in files.files.values()}
+    return ImportReport(loaded.title, tuple(placed), len(shown), names)
 
 
 @contextmanager
@@ -161,10 +162,6 @@ def _aside(out: Path) -> Iterator[Path]:
             with suppress(OSError):
                 empty.rmdir()
         raise
-
-
-def _count_files(sets: Sequence[FileSet]) -> int:
-    return len({file.shown for files in sets for file in files.files.values()})
 
 
 def _write(
@@ -237,7 +234,10 @@ def _meta(mapping: Mapping, raw: RawRecording, sensor: SensorSpec, reference: tu
         session=fill(names.session, words, "recording.session"),
         trial=fill(names.trial, words, "recording.trial"),
         role=cast("Role | None", role),
-        labels={label: _label(label, value, words) for label, value in names.labels.items()},
+        labels={
+            label: fill(value, words, f"recording.labels.{label}") if isinstance(value, str) else value
+            for label, value in names.labels.items()
+        },
         excluded=_excluded(mapping, raw.files),
         remarks=(*mapping.remarks, *_clock_remarks(mapping)),
         origin=origin,
@@ -262,10 +262,6 @@ def _derived(name: str, word: Word, words: dict[str, Scalar], origin: str) -> st
             hint="Add it to `values`.",
         )
     return known[given]
-
-
-def _label(label: str, value: Scalar, words: dict[str, Scalar]) -> Scalar:
-    return fill(value, words, f"recording.labels.{label}") if isinstance(value, str) else value
 
 
 def _excluded(mapping: Mapping, files: Sequence[str]) -> str:

@@ -56,7 +56,7 @@ class TextTable:
         for row, cells in enumerate(self.cells):
             # Seconds since 1970 in float64 are exact to 0.2 µs only: the decimal text knows better.
             try:
-                times[row] = int((Decimal(cells[place].strip()) * per_unit).to_integral_value())
+                times[row] = _scaled(cells[place].strip(), per_unit)
             except OverflowError as error:
                 raise MappingError(
                     f"{self.where(row)}: column {column!r}: {cells[place]!r} is too far away for a time.",
@@ -131,11 +131,7 @@ class ArrayTable:
 
     def numbers(self, column: Column) -> FloatArray:
         """Return a column, (n,), with NaN where there is no sample; MappingError for what is no number."""
-        values = self._column(column).astype(np.float64)
-        if np.isinf(values).any():
-            row = int(np.flatnonzero(np.isinf(values))[0])
-            raise MappingError(f"{self.where(row)}: column {column}: infinite.", hint="Repair the archive.")
-        return values
+        return _without_infinities(self, column, self._column(column).astype(np.float64))
 
     def texts(self, column: Column) -> list[str]:
         """Return a column as texts, (n,)."""
@@ -147,7 +143,7 @@ class ArrayTable:
         if not np.isfinite(values).all():
             row = int(np.flatnonzero(~np.isfinite(values))[0])
             raise MappingError(f"{self.where(row)}: column {column}: not a time.", hint="Write `clock: none`.")
-        return np.array([int((Decimal(value) * per_unit).to_integral_value()) for value in values.tolist()], np.int64)
+        return np.array([_scaled(value, per_unit) for value in values.tolist()], np.int64)
 
     def take(self, rows: Sequence[int]) -> ArrayTable:
         """Return some of the rows."""
@@ -186,11 +182,7 @@ class BagTable:
 
     def numbers(self, column: Column) -> FloatArray:
         """Return a field, (n,), with NaN where there is no sample; MappingError for an infinite number."""
-        values = np.array(self.found[column], dtype=np.float64)
-        if np.isinf(values).any():
-            row = int(np.flatnonzero(np.isinf(values))[0])
-            raise MappingError(f"{self.where(row)}: {column}: infinite.", hint="Leave the field out.")
-        return values
+        return _without_infinities(self, column, np.array(self.found[column], dtype=np.float64))
 
     def texts(self, column: Column) -> list[str]:
         """Return a field as texts, (n,)."""
@@ -203,7 +195,7 @@ class BagTable:
             raise MappingError(f"{self.shown}: {column} is in nanoseconds.", hint="Write `unit: ns` under `time`.")
         if whole:
             return np.array(self.stamps, dtype=np.int64)
-        return np.array([int((Decimal(one) * per_unit).to_integral_value()) for one in self.stamps], dtype=np.int64)
+        return np.array([_scaled(one, per_unit) for one in self.stamps], dtype=np.int64)
 
     def take(self, rows: Sequence[int]) -> BagTable:
         """Return some of the rows."""
@@ -227,6 +219,17 @@ def plain(value: Any) -> str:
 
 Table = TextTable | ArrayTable | BagTable
 """Rows and columns of one recording."""
+
+
+def _scaled(value: Any, per_unit: int) -> int:
+    return int((Decimal(value) * per_unit).to_integral_value())
+
+
+def _without_infinities(table: Table, column: Column, values: FloatArray) -> FloatArray:
+    wrong = np.flatnonzero(np.isinf(values))
+    if len(wrong):
+        raise MappingError(f"{table.where(int(wrong[0]))}: column {column}: infinite.", hint="Leave the column out.")
+    return values
 
 
 def _is_number(cell: str) -> bool:
