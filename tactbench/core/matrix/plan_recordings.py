@@ -193,7 +193,7 @@ def plan_run(
     """
     rig_file = load_rig_file(Path(matrix.rig_file), registry).checked_for(matrix.rig) if matrix.rig_file else None
     if not registry.rigs[matrix.rig].simulated:  # a simulated one replays nothing: it is built when it has to record
-        work = partial(_replayed, registry=registry.only(rigs=[matrix.rig]), recordings=recordings, rig_file=rig_file)
+        work = partial(_replayed, registry=registry, recordings=recordings, rig_file=rig_file)
         builder = InProcess() if registry.rigs.owned(matrix.rig).ours else Pool(1, limits)
         ((_, paths),) = builder.each(work, [matrix.rig])
         if isinstance(paths, BaseException):

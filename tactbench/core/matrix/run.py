@@ -243,7 +243,7 @@ class Run:
         for piece in pieces.values():
             for part in range(min(parts, len(piece))):
                 requests = piece[part::parts]
-                recorder.submit(Recorder(requests, self.registry, self.operator), requests)
+                recorder.submit(Recorder(self.registry, self.operator), requests)
 
     def _recorded(self, request: RecordingRequest, outcome: Any) -> None:
         if isinstance(outcome, UnwritableError):

@@ -151,14 +151,6 @@ class Registry:
         """Return the families by the name of their hook's plural."""
         return {name: getattr(self, name) for name in _KINDS}
 
-    def only(self, **names: Iterable[str]) -> Registry:
-        """Return a registry of what is named, by family: what a child process needs of it."""
-        found = Registry()
-        for kind, several in names.items():
-            for name in several:
-                found.families()[kind].add(self.families()[kind].owned(name))
-        return found
-
     @property
     def failures(self) -> list[PluginRow]:
         """The plugins that could not be used."""

@@ -9,6 +9,7 @@ import time
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import replace
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -44,7 +45,6 @@ class Store:
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
-        self._index: Index | None = None
         self._last_ns = 0
         self._provenance: tuple[str, Mapping[str, Any]] = ("", {})
 
@@ -74,11 +74,9 @@ class Store:
         finally:
             os.close(lock)
 
-    @property
+    @cached_property
     def _files(self) -> Index:
-        if self._index is None:
-            self._index = Index(self.folder)
-        return self._index
+        return Index(self.folder)
 
     def begin(self, provenance: Mapping[str, Any]) -> str:
         """Have cells that are written from now on carry this provenance, and return its id."""
@@ -116,15 +114,15 @@ class Store:
 
     def _write(self, cell: CellFile) -> None:
         self._last_ns = max(time.time_ns(), self._last_ns + 1)
-        content = replace(cell, ended_ns=self._last_ns).content()
-        path = self.file_of(cell.row)
+        cell, path = replace(cell, ended_ns=self._last_ns), self.file_of(cell.row)
+        content = cell.content()
         with writing(self.folder):
             replace_file(path, content)
             for name, _key, status in self._files.files_of(cell.row["cell"]):
                 if status != "done" and name != path.name:  # superseded; what was finished stays for other versions
                     (path.parent / name).unlink(missing_ok=True)
                     self._files.drop(name)
-        self._files.put(path, replace(cell, ended_ns=self._last_ns))
+        self._files.put(path, cell)
 
     def file_of(self, row: Mapping[str, Any]) -> Path:
         """Return the file of a cell: named by its key, or by its name if it stopped before it had one."""
