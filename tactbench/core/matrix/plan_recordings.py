@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING
 from tactbench.core.errors import (
     MissingRecordingError,
     NotApplicable,
-    RecordingError,
     TactbenchError,
     UnknownNameError,
     UsageError,
@@ -189,7 +188,7 @@ def plan_run(
     UsageError
         If the matrix asks for something that is not there.
     TactbenchError
-        If a rig that is not simulated cannot be built, or cannot list its recordings.
+        If a rig that is not simulated cannot be built, cannot list its recordings, or one of them cannot be read.
     """
     rig_file = load_rig_file(Path(matrix.rig_file), registry).checked_for(matrix.rig) if matrix.rig_file else None
     if not registry.rigs[matrix.rig].simulated:  # a simulated one replays nothing: it is built when it has to record
@@ -217,36 +216,24 @@ def _from_replay(
     """Return the cells of recordings that exist.
 
     A recording of a scene that some task planned serves the campaigns that plan a scene of this name; one whose scene
-    nobody planned (an imported table) serves any task. One that cannot be read stops the cells of its sensor, after
-    which a folder above it is named, or else of every sensor.
+    nobody planned (an imported table) serves any task. Raises RecordingError if one cannot be read.
     """
     if not paths:
         raise MissingRecordingError("There are no recordings.", hint="Import recordings with `tactbench import`.")
     scenes: dict[str, dict[Path, str | None]] = {}
-    broken: dict[str, BaseException] = {}
     for path in paths:
-        try:
-            about = store.about(path)
-            scenes.setdefault(about["sensor"], {})[path] = about["scene"]
-        except RecordingError as error:
-            named = {*registry.sensors.names(), *matrix.sensors, *scenes}
-            owner = next((folder for folder in reversed(path.parent.parts) if folder in named), "")
-            broken.setdefault(owner, error)
-    known = sorted({*scenes, *broken} - {""}) or list(matrix.sensors)
-    if not known:
-        raise broken[""]
+        about = store.about(path)
+        scenes.setdefault(about["sensor"], {})[path] = about["scene"]
     for name in matrix.sensors:
-        if name not in known and "" not in broken:
-            raise UnknownNameError("sensor in these recordings", name, known)
-    cells = plan_cells(matrix, matrix.sensors or known, registry)
+        if name not in scenes:
+            raise UnknownNameError("sensor in these recordings", name, scenes)
+    cells = plan_cells(matrix, matrix.sensors or sorted(scenes), registry)
     plan: RecordingPlan = {}
     for key in dict.fromkeys(request_key(cell) for cell in cells):
         sensor, task, split, _ = key
         names = {planned.scene.name for planned in registry.tasks[task].spec.scenes_for(split)}
-        found = scenes.get(sensor, {})
-        fitting = [path for path, scene in found.items() if scene is None or not names or scene in names]
-        trouble = broken.get(sensor) or broken.get("") or (None if fitting else _no_scenes(key, matrix))
-        plan[key] = Source(fitting, trouble=trouble)
+        fitting = [path for path, scene in scenes[sensor].items() if scene is None or not names or scene in names]
+        plan[key] = Source(fitting, trouble=None if fitting else _no_scenes(key, matrix))
     return cells, plan
 
 

@@ -89,18 +89,15 @@ def _commit(folder: Path) -> str:
 
 
 def foot(several: Sequence[Mapping[str, Any]]) -> tuple[str, ...]:
-    """Return which software made some rows on which machines, each said once; keys of `gather` may be missing."""
-    return tuple(dict.fromkeys(text for one in several for text in _sentences(one)))
+    """Return which software made some rows on which machines, each said once; an empty one is passed over."""
+    return tuple(dict.fromkeys(text for one in filter(None, several) for text in _sentences(one)))
 
 
 def _sentences(one: Mapping[str, Any]) -> Iterator[str]:
-    if "tactbench" in one:
-        commit = f" ({one['commit']})" if one.get("commit") else ""
-        libraries = ", ".join(f"{name} {version}" for name, version in one.get("distributions", {}).items())
-        threads = f"BLAS threads: {one.get('threads', '?')}"
-        yield f"tactbench {one['tactbench']}{commit}, Python {one.get('python', '?')}, {libraries}, {threads}."
-    for plugin in one.get("plugins", ()):
+    commit = f" ({one['commit']})" if one["commit"] else ""
+    libraries = ", ".join(f"{name} {version}" for name, version in one["distributions"].items())
+    made_with = f"Python {one['python']}, {libraries}, BLAS threads: {one['threads']}"
+    yield f"tactbench {one['tactbench']}{commit}, {made_with}."
+    for plugin in one["plugins"]:
         yield f"Plugin {plugin['distribution']} {plugin['version']} (source {plugin['source'][:12]})."
-    if one.get("host"):
-        memory = f", {one['memory_mb'] / 1024:.0f} GiB" if one.get("memory_mb") else ""
-        yield f"Host {one['host']}: {one.get('cpu', 'unknown processor')}, {one.get('cores')} cores{memory}."
+    yield f"Host {one['host']}: {one['cpu']}, {one['cores']} cores, {one['memory_mb'] / 1024:.0f} GiB."

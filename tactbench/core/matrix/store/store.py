@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import errno
-import json
 import os
 import time
 from collections.abc import Iterator, Mapping
@@ -90,7 +89,7 @@ class Store:
     def keep(
         self, row: Mapping[str, Any], sections: Mapping[str, Any], answers: Mapping[str, Answers] | None = None
     ) -> Row:
-        """Write the file of a cell that has ended, and return its row as it will be read.
+        """Write the file of a cell that has ended, and return its row.
 
         Raises
         ------
@@ -99,10 +98,9 @@ class Store:
         ValueError, TypeError
             If the row is not plain data; nothing is written.
         """
-        row = {**row, "made_by": self._provenance[0]}
-        self._write(CellFile(row, sections, self._provenance[1], answers=answers or {}))
-        found: Row = json.loads(json.dumps(row))
-        return found
+        kept = {**row, "made_by": self._provenance[0]}
+        self._write(CellFile(kept, sections, self._provenance[1], answers=answers or {}))
+        return kept
 
     def reuse(self, row: Row) -> None:
         """Note that a finished cell was found again, under the name it has in `row`: it is the latest of that name."""
