@@ -46,7 +46,7 @@ class Dask(Engine):
         Address, as ``tcp://HOST:8786``; None: a scheduler and workers on this machine.
     """
 
-    def __init__(self, jobs: int, limits: Limits, scheduler: str | None = None) -> None:
+    def __init__(self, jobs: int, limits: Limits, scheduler: str | None) -> None:
         super().__init__()
         self._jobs, self._limits, self._scheduler = jobs, limits, scheduler
 

@@ -67,8 +67,6 @@ class Index:
         known = dict(self._all("SELECT file, size || ' ' || modified_ns FROM cells"))
         changed = {name: path for name, path in found.items() if known.get(name) != "{} {}".format(*signature(path))}
         lost = known.keys() - found.keys()
-        if not changed and not lost:
-            return
         for name in lost:
             self.drop(name)
         for name, path in sorted(changed.items()):

@@ -105,8 +105,8 @@ class Store:
     def reuse(self, row: Row) -> None:
         """Note that a finished cell was found again, under the name it has in `row`: it is the latest of that name."""
         latest = self._files.files_of(row["cell"])
-        known = self._files.finished(row["key"]) or {}
-        if not latest or latest[0][1] != row["key"] or any(known.get(name) != row[name] for name in NAMING):
+        known = self._files.finished(row["key"])
+        if not latest or latest[0][1] != row["key"] or known is None or known["repeats"] != row["repeats"]:
             cell = read_cell(self.file_of(row))
             self._write(replace(cell, row={**cell.row, **{name: row[name] for name in NAMING}}))
 
