@@ -122,8 +122,10 @@ def acquire(
                         whole.add(block)
                     if watch is not None:
                         watch(block)
-                _check_not_silent(acquisition, writer.rows)
-                lacking = _lacking(acquisition, whole)
+                lacking = ""
+                if has_devices:
+                    _check_not_silent(acquisition, writer.rows)
+                    lacking = _lacking(acquisition, whole)
             except BaseException as error:
                 ignore_interrupts()
                 alarm = _stopped(acquisition, error)
@@ -144,19 +146,15 @@ def acquire(
     return Acquired(writer.meta, writer.content_digest)
 
 
-def _lacking(acquisition: Acquisition, whole: Completeness) -> str:
+def _lacking(acquisition: Any, whole: Completeness) -> str:
     """Return why a recording of devices is incomplete, in one line; empty: it is not."""
-    if not hasattr(acquisition, "stream_counts"):
-        return ""
     ended = str(getattr(acquisition, "ended", ""))
     found = [f"ended before its time: {ended}"] if ended else []
     return "; ".join([*found, *whole.lacking(acquisition.stream_counts)])
 
 
 def _check_not_silent(acquisition: Acquisition, rows: Mapping[str, int]) -> None:
-    """Raise RigError if devices were read, and nothing came of the sensor or nothing of the reference."""
-    if not hasattr(acquisition, "stream_counts"):
-        return
+    """Raise RigError if nothing came of the sensor's devices or nothing of the reference's."""
     for streams in (acquisition.streams, acquisition.reference):
         names = [stream.name for stream in streams]
         if names and not any(rows.get(name) for name in names):

@@ -116,7 +116,7 @@ def device(sensor: SensorSpec, mapping: MappingFile, words: Mapping[str, Scalar]
 def columns_of(group: ChannelGroup) -> list[Column]:
     """Return the columns of a group, ranges spelled out."""
     given = group.columns if isinstance(group.columns, tuple) else (group.columns,)
-    return [_column(column) for text in given for column in expand(text)]
+    return [one if isinstance(one, int) else str(one) for text in given for one in expand(text)]
 
 
 def _channels(stream: str, group: ChannelGroup) -> Iterator[MappedChannel]:
@@ -153,7 +153,3 @@ def _names(stream: str, group: ChannelGroup, columns: list[Column]) -> Iterator[
     for column, values in zip(columns, combinations, strict=True):
         words = {"column": column, **dict(zip(group.over, values, strict=True))}
         yield fill(group.name, words, f"stream {stream}")
-
-
-def _column(value: Scalar) -> Column:
-    return value if isinstance(value, int) else str(value)

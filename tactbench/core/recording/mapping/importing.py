@@ -120,7 +120,7 @@ def import_tables(
     loaded = load_yaml(mapping, Mapping)
     sensor, reference, streams = sensor_of(loaded)
     require_answerable(loaded, streams, mapping)
-    tasks = tasks_text(loaded, mapping.name)
+    tasks = tasks_text(loaded)
     sets = find(loaded, mapping.parent if root is None else root)
     made: list[Imported] = []
     progress = progress or Progress()
