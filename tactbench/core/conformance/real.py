@@ -59,10 +59,8 @@ NOISY = 3.0
 def _read(subject: Subject) -> Recorded:
     if subject.recording is None:
         skip("no recording is given: `--recording FILE` reads one")
-    try:
+    with code_of(str(subject.recording), subject):
         return read_back(subject.recording)
-    except TactbenchError as error:
-        fail(str(subject.recording), str(error))
 
 
 @check("sensor", mode="recording")

@@ -52,8 +52,7 @@ def read_back(path: Path) -> Recorded:
 
     with open_recording(path) as recording:
         came = {name: recording.read(name) for name in recording.stream_names}
-        wrong = [] if recording.complete else ["it was cut short by a crash"]
-        wrong += [f"{one.stream}: {one.message}" for one in examine(recording) if one.severity == "error"]
+        wrong = [f"{one.stream}: {one.message}" for one in examine(recording) if one.severity == "error"]
         return Recorded(recording.meta, came, "".join(wrong[:1]))
 
 

@@ -138,11 +138,12 @@ def parts_of(matrix: MatrixSpec, recordings: Path | None, root: Path | None, pro
 
 
 def _from_dataset(matrix: MatrixSpec, dataset: DataSet, root: Path | None, progress: Progress) -> Part:
-    sensors = matrix.sensors or (dataset.mapping.sensor.name,)
+    matrix = matrix.model_copy(update={"rig": "replay"})
     try:
-        return Part(matrix.model_copy(update={"rig": "replay"}), dataset.recordings(root, progress))
+        return Part(matrix, dataset.recordings(root, progress))
     except TactbenchError as error:
-        return Part(matrix.model_copy(update={"rig": "replay", "sensors": sensors}), None, error)
+        sensors = matrix.sensors or (dataset.mapping.sensor.name,)
+        return Part(matrix.model_copy(update={"sensors": sensors}), None, error)
 
 
 def plan_parts(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib.util
+import os
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
@@ -46,8 +47,6 @@ class EngineChoice:
     jobs: int | None = None
     """Processes at once; None: one for each usable core."""
     limits: Limits = UNLIMITED
-    scheduler: str | None = None
-    """Address of a Dask scheduler; None: a cluster on this machine."""
 
     @property
     def processes(self) -> int:
@@ -61,8 +60,6 @@ class EngineChoice:
                 f"The engine in-process carries out one cell at a time; --jobs {self.jobs} was given.",
                 hint="Leave out --jobs, or use --engine isolated.",
             )
-        if self.scheduler is not None and self.name != "dask":
-            raise UsageError("A scheduler is for --engine dask.", hint="Add --engine dask, or leave it out.")
         if self.name == "dask" and importlib.util.find_spec("distributed") is None:
             raise UsageError(
                 "The Dask engine needs the library distributed, which is not installed.",
@@ -74,7 +71,7 @@ class EngineChoice:
         if self.name == "dask":
             from tactbench.core.matrix.dask import Dask
 
-            return Dask(self.processes, self.limits, self.scheduler)
+            return Dask(self.processes, self.limits, os.environ.get("DASK_SCHEDULER_ADDRESS"))
         return InProcess() if self.name == "in-process" else Pool(jobs, self.limits)
 
 

@@ -14,16 +14,13 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import suppress
 from pathlib import Path
 from queue import Empty, SimpleQueue
-from typing import Any, Self, TypeVar
+from typing import Any, Self
 
 import psutil
 
 from tactbench.core.errors import CellStopped, Crashed, OutOfMemory, TimedOut
 from tactbench.core.pool.child import end_of, plain_error, run_child
 from tactbench.core.pool.limits import UNLIMITED, Limits, resident_mb
-
-T = TypeVar("T")
-R = TypeVar("R")
 
 START_S = 60.0
 """Seconds within which a process must begin with its first item; with `spawn` it imports libraries first."""
@@ -58,7 +55,7 @@ class Engine:
         """Yield every submitted item with its result or the error that stopped it, in the order in which they end."""
         raise NotImplementedError
 
-    def each(self, work: Callable[[T], R], items: Iterable[T]) -> Iterator[tuple[T, R | BaseException]]:
+    def each(self, work: Callable[[Any], Any], items: Iterable[Any]) -> Iterator[tuple[Any, Any]]:
         """Carry out `work` for every item, as one piece, and yield outcomes."""
         with self:
             self.submit(work, list(items))

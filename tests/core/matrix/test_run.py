@@ -103,7 +103,6 @@ def test_a_second_run_computes_nothing_and_a_changed_number_of_repeats_is_no_cha
     ("choice", "says"),
     [
         (EngineChoice("in-process", jobs=2), "--jobs 2"),
-        (EngineChoice("isolated", scheduler="tcp://127.0.0.1:1"), "--engine dask"),
     ],
 )
 def test_choices_that_do_not_go_together_are_refused(tmp_path, choice, says):
