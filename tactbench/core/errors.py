@@ -77,6 +77,11 @@ def _rebuild(kind: type[TactbenchError], message: str, hint: str) -> TactbenchEr
     return error
 
 
+def error_text(error: BaseException) -> str:
+    """Return an error as text: its message, with the class where that is not one of tactbench's."""
+    return str(error) if isinstance(error, TactbenchError) else f"{type(error).__name__}: {error}".rstrip(": ")
+
+
 class UsageError(TactbenchError):
     """What was asked for cannot be carried out as asked."""
 

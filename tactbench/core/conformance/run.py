@@ -26,9 +26,8 @@ from tactbench.core.conformance.check import (
     Mode,
     Subject,
     line_in,
-    said,
 )
-from tactbench.core.errors import CellStopped, UnknownNameError
+from tactbench.core.errors import UnknownNameError, error_text
 from tactbench.core.plugins.interfaces import Operator
 from tactbench.core.plugins.registry import PluginRow, Registry
 from tactbench.core.pool import InProcess, Limits, Pool
@@ -148,8 +147,7 @@ def run_checks(
         engine = Pool(1, Limits(timeout_s=TIMEOUT_S)) if isolated else InProcess()
         for name, given in engine.each(_Trier(subject, dict(outcomes)), waiting):
             if isinstance(given, BaseException):  # it hung or crashed; what is left is tried in another process
-                text = str(given) if isinstance(given, CellStopped) else said(given)
-                outcomes[name] = CheckOutcome(name, "failed", subject.module, text)
+                outcomes[name] = CheckOutcome(name, "failed", subject.module, error_text(given))
                 break
             outcomes[name] = given
     here = _Trier(subject, outcomes)
@@ -185,5 +183,5 @@ class _Trier:
             return CheckOutcome(name, "skipped", "", str(reason))
         except (Exception, SystemExit) as error:
             line = line_in(self.subject.package, error.__traceback__) or self.subject.module
-            return CheckOutcome(name, "failed", line, said(error))
+            return CheckOutcome(name, "failed", line, error_text(error))
         return CheckOutcome(name, "passed")

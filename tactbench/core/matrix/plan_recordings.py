@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 from tactbench.core.errors import (
     MissingRecordingError,
     NotApplicable,
+    RecordingError,
     TactbenchError,
     UnknownNameError,
     UsageError,
@@ -217,24 +218,33 @@ def _from_replay(
     """Return the cells of recordings that exist.
 
     A recording of a scene that some task planned serves the campaigns that plan a scene of this name; one whose scene
-    nobody planned (an imported table) serves any task. Raises RecordingError if one cannot be read.
+    nobody planned (an imported table) serves any task. One that cannot be read stops the cells of the sensor that its
+    folder is named after; RecordingError if there is none.
     """
     if not paths:
         raise MissingRecordingError("There are no recordings.", hint="Import recordings with `tactbench import`.")
     scenes: dict[str, dict[Path, str | None]] = {}
+    broken: dict[str, BaseException] = {}
     for path in paths:
-        about = store.about(path)
-        scenes.setdefault(about["sensor"], {})[path] = about["scene"]
+        try:
+            about = store.about(path)
+            scenes.setdefault(about["sensor"], {})[path] = about["scene"]
+        except RecordingError as error:
+            if path.parent.name not in (*registry.sensors.names(), *matrix.sensors):
+                raise
+            broken.setdefault(path.parent.name, error)
+    known = sorted({*scenes, *broken})
     for name in matrix.sensors:
-        if name not in scenes:
-            raise UnknownNameError("sensor in these recordings", name, scenes)
-    cells = plan_cells(matrix, matrix.sensors or sorted(scenes), registry)
+        if name not in known:
+            raise UnknownNameError("sensor in these recordings", name, known)
+    cells = plan_cells(matrix, matrix.sensors or known, registry)
     plan: RecordingPlan = {}
     for key in dict.fromkeys(request_key(cell) for cell in cells):
         sensor, task, split, _ = key
         names = {planned.scene.name for planned in registry.tasks[task].spec.scenes_for(split)}
-        fitting = [path for path, scene in scenes[sensor].items() if scene is None or not names or scene in names]
-        plan[key] = Source(fitting, trouble=None if fitting else _no_scenes(key, matrix))
+        found = scenes.get(sensor, {})
+        fitting = [path for path, scene in found.items() if scene is None or not names or scene in names]
+        plan[key] = Source(fitting, trouble=broken.get(sensor) or (None if fitting else _no_scenes(key, matrix)))
     return cells, plan
 
 

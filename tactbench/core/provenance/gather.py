@@ -72,14 +72,12 @@ def _plugins(registry: Registry) -> Iterator[dict[str, str]]:
     packages = {row.module.partition(".")[0]: row for row in registry.plugins}
     for package, row in sorted(packages.items()):
         if package != PACKAGE:
-            source = {"package": package, "source": source_digest(package)}
-            yield {"distribution": row.distribution, "version": row.version, **source}
+            source = source_digest(package)
+            yield {"distribution": row.distribution, "version": row.version, "package": package, "source": source}
 
 
 def _commit(folder: Path) -> str:
     """Return the commit of the git checkout that holds `folder`, with ``+changes`` if files below it differ from it."""
-    if not any((place / ".git").exists() for place in folder.parents):
-        return ""
     asked = ["git", "-C", str(folder), "describe", "--always", "--abbrev=12", "--exclude=*", "--dirty=+changes"]
     try:
         found = subprocess.run(asked, capture_output=True, text=True, timeout=GIT_S, check=True)
