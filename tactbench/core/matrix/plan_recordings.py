@@ -19,7 +19,7 @@ from tactbench.core.errors import (
 from tactbench.core.evaluation.protocols import shots
 from tactbench.core.matrix.installed import failing_as, rig_of
 from tactbench.core.matrix.keys import Keys
-from tactbench.core.matrix.plan import FEW_SHOT, Cell, plan_cells, serves, task_of
+from tactbench.core.matrix.plan import Cell, plan_cells, serves, task_of
 from tactbench.core.matrix.store import Store
 from tactbench.core.plugins.registry import Registry
 from tactbench.core.plugins.rig_files import load_rig_file
@@ -204,8 +204,8 @@ def plan_run(
     if not matrix.sensors:
         raise UsageError("No sensor is named.", hint=f"Give --sensor; known: {', '.join(registry.sensors.names())}.")
     cells = plan_cells(matrix, [registry.sensors[name].name for name in matrix.sensors], registry, rig_file)
-    for task in {cell.task for cell in cells}:
-        _check_splits(registry.tasks[task].spec, [cell.split for cell in cells if cell.task == task])
+    for cell in cells:
+        _check_split(registry.tasks[cell.task].spec, cell.split)
     return cells, {
         key: Source([request.path for request in made], made, None if made else _no_scenes(key, matrix))
         for key, made in requests_for(cells, registry, keys, store).items()
@@ -264,11 +264,9 @@ def _replayed(name: str, registry: Registry, recordings: Path | None, rig_file: 
         return [Path(path) for path in rig.recordings()]
 
 
-def _check_splits(task: TaskSpec, splits: Sequence[str | None]) -> None:
+def _check_split(task: TaskSpec, split: str | None) -> None:
     """Refuse a split that no recording of this task's scenes can be asked for, before any is made."""
     labels = {label for planned in task.scenes for label in planned.scene.labels}
-    few = (FEW_SHOT,) if any(shots(name) for name in task.splits) else ()
-    known = {*ACQUIRED_SPLITS, *task.splits, *task.campaigns, *labels, *few}
-    for split in splits:
-        if split is not None and split not in known and shots(split) is None:
-            raise UnknownNameError(f"split of task {task.name!r}", split, known)
+    known = {*ACQUIRED_SPLITS, *task.splits, *task.campaigns, *labels}
+    if split is not None and split not in known and shots(split) is None:
+        raise UnknownNameError(f"split of task {task.name!r}", split, known)

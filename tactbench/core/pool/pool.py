@@ -72,9 +72,7 @@ class InProcess(Engine):
             for item in items:
                 try:
                     outcome = work(item)
-                except KeyboardInterrupt:
-                    raise
-                except BaseException as error:
+                except (Exception, SystemExit) as error:
                     outcome = plain_error(error)
                 yield item, outcome
 
