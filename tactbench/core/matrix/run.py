@@ -319,8 +319,6 @@ class Run:
         if not (computed and self._begun):
             return
         self.progress.advance(cell.name, stopped=row["status"] in STOPPED)
-        if self.shown is None or any(one.name not in self.rows for one in self.cells if one.repeat == cell.repeat):
-            return
         left = {one.repeat for one in self.cells if one.name not in self.rows}
-        if left:
+        if self.shown is not None and left and cell.repeat not in left:
             self.shown([self.rows[one.name] for one in self.cells if one.repeat not in left])

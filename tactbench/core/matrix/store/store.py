@@ -44,7 +44,6 @@ class Store:
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
-        self._last_ns = 0
         self._provenance: tuple[str, Mapping[str, Any]] = ("", {})
 
     @contextmanager
@@ -111,8 +110,7 @@ class Store:
             self._write(replace(cell, row={**cell.row, **{name: row[name] for name in NAMING}}))
 
     def _write(self, cell: CellFile) -> None:
-        self._last_ns = max(time.time_ns(), self._last_ns + 1)
-        cell, path = replace(cell, ended_ns=self._last_ns), self.file_of(cell.row)
+        cell, path = replace(cell, ended_ns=time.time_ns()), self.file_of(cell.row)
         content = cell.content()
         with writing(self.folder):
             replace_file(path, content)
