@@ -58,19 +58,17 @@ class DataSet:
 
     @cached_property
     def mapping(self) -> Mapping:
-        """The mapping; raises ConfigError if the file is wrong or states no source."""
-        found = load_yaml(self.path, Mapping)
-        if found.source is None:
+        """The mapping; raises ConfigError if the file is wrong."""
+        return load_yaml(self.path, Mapping)
+
+    @property
+    def source(self) -> DataSource:
+        """Where the files lie; raises ConfigError if the mapping does not state it."""
+        if self.mapping.source is None:
             raise ConfigError(
                 str(self.path), None, "It states no source, so that it is no data set.",
                 hint=f"Add `source`, or import it: tactbench import {self.path}.",
             )  # fmt: skip
-        return found
-
-    @property
-    def source(self) -> DataSource:
-        """Where the files lie."""
-        assert self.mapping.source is not None  # `mapping` refuses that
         return self.mapping.source
 
     @property
@@ -170,11 +168,12 @@ def datasets() -> dict[str, DataSet]:
     found: dict[str, tuple[str, DataSet]] = {}
     for package, folder in _folders().items():
         for path in sorted(folder.glob("*.yaml"), key=lambda one: one.stem):
-            if load_yaml(path, Mapping).source is None:
+            one = DataSet(path)
+            if one.mapping.source is None:
                 continue
-            if path.stem in found:
-                raise DuplicateNameError("data set", path.stem, (found[path.stem][0], package))
-            found[path.stem] = package, DataSet(path)
+            if one.name in found:
+                raise DuplicateNameError("data set", one.name, (found[one.name][0], package))
+            found[one.name] = package, one
     return {name: one for name, (_, one) in found.items()}
 
 

@@ -41,7 +41,12 @@ class TextTable:
         values = np.empty(len(self.cells))
         for row, cells in enumerate(self.cells):
             cell = cells[place]
-            values[row] = math.nan if cell in self.no_sample else self._number(cell, row, column)
+            values[row] = math.nan if cell in self.no_sample else _number(cell)
+            if math.isinf(values[row]):
+                raise MappingError(
+                    f"{self.where(row)}: column {column!r}: {cell!r} is not a number.",
+                    hint="If such cells mean 'no sample', list the text under `no_sample` of the table.",
+                )
         return values
 
     def texts(self, column: Column) -> list[str]:
@@ -57,15 +62,10 @@ class TextTable:
             # Seconds since 1970 in float64 are exact to 0.2 µs only: the decimal text knows better.
             try:
                 times[row] = _scaled(cells[place].strip(), per_unit)
-            except OverflowError as error:
-                raise MappingError(
-                    f"{self.where(row)}: column {column!r}: {cells[place]!r} is too far away for a time.",
-                    hint="Correct the unit.",
-                ) from error
-            except (InvalidOperation, ValueError) as error:
+            except (InvalidOperation, ValueError, OverflowError) as error:
                 raise MappingError(
                     f"{self.where(row)}: column {column!r}: {cells[place]!r} is not a time.",
-                    hint="A row without a time cannot be kept; check the column, or write `clock: none`.",
+                    hint="A row without a time cannot be kept; check column and unit, or write `clock: none`.",
                 ) from error
         return times
 
@@ -78,24 +78,11 @@ class TextTable:
         """Return file and line of a row, for messages."""
         return f"{self.shown}:{self.lines[row]}"
 
-    def _number(self, cell: str, row: int, column: Column) -> float:
-        try:
-            # Python's float() also reads 1_000; no table in the world means that.
-            value = float(cell) if "_" not in cell else None
-        except ValueError:
-            value = None
-        if value is None or math.isinf(value):
-            raise MappingError(
-                f"{self.where(row)}: column {column!r}: {cell!r} is not a number.",
-                hint="If such cells mean 'no sample', list the text under `no_sample` of the table.",
-            )
-        return value
-
     def _place(self, column: Column) -> int:
         if isinstance(column, int):
             wide = len(self.cells[0]) if self.cells else len(self.header or ())
             place = _checked(self.shown, column, wide)
-            if self.header is not None and _is_number(self.header[place]):
+            if self.header is not None and math.isfinite(_number(self.header[place])):
                 raise MappingError(
                     f"{self.shown}: its header row has the number {self.header[place]!r} in column {column}: that looks"
                     " like a row of data, which `header: true` would drop.",
@@ -232,11 +219,13 @@ def _without_infinities(table: Table, column: Column, values: FloatArray) -> Flo
     return values
 
 
-def _is_number(cell: str) -> bool:
+def _number(cell: str) -> float:
+    """Return the number in a cell; infinity: there is none."""
     try:
-        return math.isfinite(float(cell))
+        # Python's float() also reads 1_000; no table in the world means that.
+        return math.inf if "_" in cell else float(cell)
     except ValueError:
-        return False
+        return math.inf
 
 
 def _checked(shown: str, place: int, wide: int) -> int:
