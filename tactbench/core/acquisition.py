@@ -43,6 +43,7 @@ def acquire(
     path: Path,
     clock: Callable[[], float],
     provenance: Mapping[str, Any],
+    opened: Callable[[Acquisition], None] | None = None,
     watch: Callable[[Block], None] | None = None,
     name: str = "",
     complete_interrupted: bool = False,
@@ -65,6 +66,8 @@ def acquire(
     clock
         Seconds, monotonic; its difference over the scene becomes ``provenance["sim_s"]`` for a simulated rig and
         ``provenance["acquisition_s"]`` otherwise. Writing the file is not counted.
+    opened
+        Called with the acquisition before its first block.
     watch
         Called with every block, once it is written.
     name
@@ -94,6 +97,8 @@ def acquire(
         _one_interrupt() as ignore_interrupts,
         rig.open(sensor, scene, seed=seed) as acquisition,
     ):
+        if opened is not None:
+            opened(acquisition)
         meta = _meta(acquisition, sensor, descriptor, scene, role, seed, name or scene.name, rig_file)
         spent = clock() - began
         allowed = Allowed() if rig_file is None else rig_file.allowed

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -58,7 +58,7 @@ def read_back(path: Path) -> Recorded:
 
 def carried_out(
     rig: Any, sensor: SensorDescriptor, descriptor: RigDescriptor, scene: Scene, seed: int = 1,
-    rig_file: RigFile | None = None,
+    rig_file: RigFile | None = None, opened: Callable[[Any], None] | None = None,
 ) -> Recorded:  # fmt: skip
     """Record a scene as `tactbench record` does it, and read it back; raises what the rig raises."""
     from tactbench.core.acquisition import acquire
@@ -67,7 +67,7 @@ def carried_out(
         path = Path(folder) / "check.h5"
         made = acquire(
             rig, sensor, descriptor, scene, role=None, seed=seed, path=path, clock=time.perf_counter, provenance={},
-            rig_file=rig_file,
+            rig_file=rig_file, opened=opened,
         )  # fmt: skip
         if made.meta.excluded:
             fail("recording", f"it is {made.meta.excluded}")
