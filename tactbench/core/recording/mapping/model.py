@@ -129,8 +129,8 @@ class TableSource(Frozen):
     @field_validator("files")
     @classmethod
     def _below_root(cls, files: str) -> str:
-        if files.startswith("/") or ".." in files.split("/"):
-            raise ValueError("the pattern must stay below the root folder")
+        if files.startswith("/"):
+            raise ValueError("the pattern starts below the root folder")
         return files
 
     @field_validator("path")
