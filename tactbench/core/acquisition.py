@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import AbstractContextManager, contextmanager, nullcontext
 from pathlib import Path
 from types import FrameType
-from typing import Any, NamedTuple
+from typing import Any
 
 from tactbench.core.errors import RigError
 from tactbench.core.plugins.emulators import EmulatorControl, running
@@ -23,13 +23,6 @@ from tactbench.core.spec.rig import RigDescriptor, SensorDescriptor
 from tactbench.core.spec.rig_file import Allowed, RigFile
 from tactbench.core.spec.scene import Role, Scene
 from tactbench.core.thread_limit import thread_limit
-
-
-class Acquired(NamedTuple):
-    """A finished recording."""
-
-    meta: RecordingMeta
-    content_digest: str
 
 
 def acquire(
@@ -48,8 +41,8 @@ def acquire(
     name: str = "",
     complete_interrupted: bool = False,
     rig_file: RigFile | None = None,
-) -> Acquired:
-    """Carry out `scene` and write what the rig yields to `path`.
+) -> RecordingMeta:
+    """Carry out `scene` and write what the rig yields to `path`; return what the recording says of itself.
 
     A recording of devices that ended before its time, or that lacks more than the rig file allows, is kept as an
     incomplete one: `excluded` begins with ``incomplete: `` and says why.
@@ -148,7 +141,7 @@ def acquire(
             )
     if alarm:
         raise RigError(f"The scene {scene.name!r} ended, and the rig is not as it should be: {alarm}.")
-    return Acquired(writer.meta, writer.content_digest)
+    return writer.meta
 
 
 def _lacking(acquisition: Any, whole: Completeness) -> str:

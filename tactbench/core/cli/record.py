@@ -86,7 +86,7 @@ def command(
                 view = stack.enter_context(LiveView(scene, f"{sensor} on {rig}{mark}, {scene.indenter}"))
                 opened, watch, paused = view.begin, view.watch, view.paused
             built = _built(registry, rig, devices, TerminalOperator(yes=yes, paused=paused))
-            made = acquire(
+            meta = acquire(
                 built, descriptor, registry.rigs[rig], scene, role=None, seed=seed, path=out, clock=time.perf_counter,
                 provenance=provenance, opened=opened, watch=watch, name=out.stem, complete_interrupted=True,
                 rig_file=devices,
@@ -97,7 +97,6 @@ def command(
         elif isinstance(error, KeyboardInterrupt):
             remark("\n".join(getattr(error, "__notes__", ())) or "Nothing is kept.")
         raise
-    meta = made.meta
     mark = " (EMULATED)" if meta.emulation else " (SIM)" if meta.simulated else ""
     click.echo(f"{out}: {meta.sensor.name} on {meta.rig}{mark}, {scene.indenter}")
     for name, value in meta.assumptions.items():

@@ -69,8 +69,8 @@ def carried_out(
             rig, sensor, descriptor, scene, role=None, seed=seed, path=path, clock=time.perf_counter, provenance={},
             rig_file=rig_file, opened=opened,
         )  # fmt: skip
-        if made.meta.excluded:
-            fail("recording", f"it is {made.meta.excluded}")
+        if made.excluded:
+            fail("recording", f"it is {made.excluded}")
         recorded = read_back(path)
     if recorded.wrong:
         fail("recording", f"it is not healthy: {recorded.wrong}")

@@ -17,7 +17,7 @@ GRACE_S = 5.0
 
 
 class Recorder:
-    """Makes one recording after the other; each rig is built once.
+    """Makes one recording after the other; the rig, the same of all of them, is built once.
 
     Parameters
     ----------
@@ -29,20 +29,19 @@ class Recorder:
 
     def __init__(self, registry: Registry, operator: Operator | None) -> None:
         self._operator = operator
-        self._rigs: dict[tuple[str, str], Any] = {}
+        self._built: Any = None
         self._registry = replace(registry, tasks=Family("task"))  # most of what a process would be sent
 
-    def __call__(self, request: RecordingRequest) -> str:
-        """Make a recording and return its content digest; raises whatever the rig raises."""
+    def __call__(self, request: RecordingRequest) -> None:
+        """Make a recording; raises whatever the rig raises."""
         from tactbench.core.acquisition import acquire
 
-        made = request.rig, request.rig_file
-        if made not in self._rigs:
+        if self._built is None:
             devices = RigFile.model_validate_json(request.rig_file) if request.rig_file else None
-            self._rigs[made] = devices, rig_of(request.rig, self._registry, rig_file=devices, operator=self._operator)
-        devices, built = self._rigs[made]
+            self._built = devices, rig_of(request.rig, self._registry, rig_file=devices, operator=self._operator)
+        devices, built = self._built
         rig = self._registry.rigs[request.rig]
-        acquired = acquire(
+        acquire(
             built,
             self._registry.sensors[request.sensor],
             rig,
@@ -55,7 +54,6 @@ class Recorder:
             provenance={},
             rig_file=devices,
         )
-        return acquired.content_digest
 
 
 def is_computed(request: RecordingRequest, registry: Registry) -> bool:
