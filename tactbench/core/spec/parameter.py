@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Mapping
 
 from pydantic import Field, model_validator
@@ -32,7 +33,7 @@ class Parameter(Frozen):
 
     def allows(self, value: float) -> bool:
         """Return whether `value`, in `unit`, may be given."""
-        return self.least <= value and (self.most is None or value <= self.most)
+        return math.isfinite(value) and self.least <= value and (self.most is None or value <= self.most)
 
     @property
     def range(self) -> str:

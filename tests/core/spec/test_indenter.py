@@ -31,6 +31,7 @@ def test_what_is_no_body_is_refused_by_field(given, field):
     [
         ({"length": _q(2)}, "'length'"),
         ({"radius": _q(2, "s")}, "radius is given as 2 s, and a number in mm"),
+        ({"radius": _q(float("nan"))}, "radius is given as nan mm"),
     ],
 )
 def test_a_dimension_that_cannot_be_is_named_with_what_is_expected(given, says):
