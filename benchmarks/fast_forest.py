@@ -22,10 +22,10 @@ from sklearn.ensemble import RandomForestClassifier
 
 from tactbench.core.cost.rounds import TimedEstimator, measure, timed_estimator
 from tactbench.core.evaluation.dataset import load_dataset
-from tactbench.core.matrix.progress import Progress
 from tactbench.core.matrix.run import run_matrix
 from tactbench.core.matrix.store import Store
 from tactbench.core.plugins.registry import load_object, load_registry
+from tactbench.core.progress import Progress
 from tactbench.core.spec.matrix import EstimatorChoice, MatrixSpec, TaskChoice
 
 TASK, PROTOCOL, TREES, SEEDS = "curvature", "karl2016", 500, (1, 2, 3, 4, 5)

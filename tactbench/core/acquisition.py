@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import AbstractContextManager, contextmanager, nullcontext
 from pathlib import Path
 from types import FrameType
-from typing import Any, NamedTuple
+from typing import Any
 
 from tactbench.core.errors import RigError
 from tactbench.core.plugins.emulators import EmulatorControl, running
@@ -25,13 +25,6 @@ from tactbench.core.spec.scene import Role, Scene
 from tactbench.core.thread_limit import thread_limit
 
 
-class Acquired(NamedTuple):
-    """A finished recording."""
-
-    meta: RecordingMeta
-    content_digest: str
-
-
 def acquire(
     rig: Rig,
     sensor: SensorDescriptor,
@@ -43,13 +36,13 @@ def acquire(
     path: Path,
     clock: Callable[[], float],
     provenance: Mapping[str, Any],
+    opened: Callable[[Acquisition], None] | None = None,
     watch: Callable[[Block], None] | None = None,
     name: str = "",
-    replace: bool = False,
     complete_interrupted: bool = False,
     rig_file: RigFile | None = None,
-) -> Acquired:
-    """Carry out `scene` and write what the rig yields to `path`.
+) -> RecordingMeta:
+    """Carry out `scene` and write what the rig yields to `path`; return what the recording says of itself.
 
     A recording of devices that ended before its time, or that lacks more than the rig file allows, is kept as an
     incomplete one: `excluded` begins with ``incomplete: `` and says why.
@@ -58,19 +51,20 @@ def acquire(
     ----------
     rig, descriptor
         The rig, and what it says about itself. If its acquisition is one of devices (DeviceAcquisition), what it says
-        of its counts is recorded too. If something moves in it (MovingAcquisition), it is stopped
-        before an interrupted recording is completed.
+        of its counts is recorded too. Where something moves in it by itself, it has ``stop(why)``, which is called
+        before an interrupted recording is completed: it ends that at once, and returns what is to be done where it
+        could not be ended, or an empty text.
     role
         What the recording is for, or None.
     clock
         Seconds, monotonic; its difference over the scene becomes ``provenance["sim_s"]`` for a simulated rig and
         ``provenance["acquisition_s"]`` otherwise. Writing the file is not counted.
+    opened
+        Called with the acquisition before its first block.
     watch
         Called with every block, once it is written.
     name
         Of the recording; empty: that of the scene.
-    replace
-        Whether a recording that is there already is replaced.
     complete_interrupted
         Whether a recording that was cut short on a real rig is completed, excluded from every evaluation, before the
         error goes on. Otherwise its journal stays, and the error names the command that makes a recording of it. Of a
@@ -96,6 +90,8 @@ def acquire(
         _one_interrupt() as ignore_interrupts,
         rig.open(sensor, scene, seed=seed) as acquisition,
     ):
+        if opened is not None:
+            opened(acquisition)
         meta = _meta(acquisition, sensor, descriptor, scene, role, seed, name or scene.name, rig_file)
         spent = clock() - began
         allowed = Allowed() if rig_file is None else rig_file.allowed
@@ -108,7 +104,7 @@ def acquire(
             return _of_devices(acquisition, descriptor, sensor.name, rig_file, rows, cut_short=cut_short, factor=factor)
 
         key = "sim_s" if descriptor.simulated else "acquisition_s"
-        with RecordingWriter(path, meta, replace=replace) as writer:
+        with RecordingWriter(path, meta) as writer:
             try:
                 if control is not None:
                     control.begin()
@@ -124,8 +120,10 @@ def acquire(
                         whole.add(block)
                     if watch is not None:
                         watch(block)
-                _check_not_silent(acquisition, writer.rows)
-                lacking = _lacking(acquisition, whole)
+                lacking = ""
+                if has_devices:
+                    _check_not_silent(acquisition, writer.rows)
+                    lacking = _lacking(acquisition, whole)
             except BaseException as error:
                 ignore_interrupts()
                 alarm = _stopped(acquisition, error)
@@ -143,22 +141,18 @@ def acquire(
             )
     if alarm:
         raise RigError(f"The scene {scene.name!r} ended, and the rig is not as it should be: {alarm}.")
-    return Acquired(writer.meta, writer.content_digest)
+    return writer.meta
 
 
-def _lacking(acquisition: Acquisition, whole: Completeness) -> str:
+def _lacking(acquisition: Any, whole: Completeness) -> str:
     """Return why a recording of devices is incomplete, in one line; empty: it is not."""
-    if not hasattr(acquisition, "stream_counts"):
-        return ""
     ended = str(getattr(acquisition, "ended", ""))
     found = [f"ended before its time: {ended}"] if ended else []
     return "; ".join([*found, *whole.lacking(acquisition.stream_counts)])
 
 
 def _check_not_silent(acquisition: Acquisition, rows: Mapping[str, int]) -> None:
-    """Raise RigError if devices were read, and nothing came of the sensor or nothing of the reference."""
-    if not hasattr(acquisition, "stream_counts"):
-        return
+    """Raise RigError if nothing came of the sensor's devices or nothing of the reference's."""
     for streams in (acquisition.streams, acquisition.reference):
         names = [stream.name for stream in streams]
         if names and not any(rows.get(name) for name in names):

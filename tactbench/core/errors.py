@@ -36,7 +36,10 @@ from __future__ import annotations
 
 import difflib
 from collections.abc import Iterable, Sequence
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
+
+if TYPE_CHECKING:
+    from pydantic import ValidationError
 
 
 class TactbenchError(Exception):
@@ -74,6 +77,11 @@ def _rebuild(kind: type[TactbenchError], message: str, hint: str) -> TactbenchEr
     return error
 
 
+def error_text(error: BaseException) -> str:
+    """Return an error as text: its message, with the class where that is not one of tactbench's."""
+    return str(error) if isinstance(error, TactbenchError) else f"{type(error).__name__}: {error}".rstrip(": ")
+
+
 class UsageError(TactbenchError):
     """What was asked for cannot be carried out as asked."""
 
@@ -88,15 +96,27 @@ def nearest(given: str, known: Iterable[str]) -> list[str]:
     return [folded[name] for name in close]
 
 
+def did_you_mean(given: str, known: Iterable[str]) -> str:
+    """Return a question for the names of `known` that look like `given`, and a blank; empty if none does."""
+    close = " or ".join(map(repr, nearest(given, known)))
+    return f"Did you mean {close}? " if close else ""
+
+
+def complaint(error: ValidationError) -> str:
+    """Return the first complaint of pydantic: where, what is wrong there, and what was given."""
+    first = error.errors(include_url=False)[0]
+    place, message = ".".join(map(str, first["loc"])), first["msg"].removeprefix("Value error, ")
+    given = f" (given: {first['input']!r})" if isinstance(first["input"], str | int | float) else ""
+    return f"{place}: {message}{given}" if place else message
+
+
 class UnknownNameError(UsageError):
     """No thing of this kind has this name."""
 
     def __init__(self, kind: str, given: str, known: Iterable[str]) -> None:
         names = sorted(known)
-        close = nearest(given, names)
-        meant = f"Did you mean {' or '.join(repr(name) for name in close)}? " if close else ""
         listing = f"Known: {', '.join(names)}." if names else f"No {kind} is installed."
-        super().__init__(f"There is no {kind} called {given!r}.", hint=f"{meant}{listing}")
+        super().__init__(f"There is no {kind} called {given!r}.", hint=did_you_mean(given, names) + listing)
 
 
 class ConfigError(UsageError):

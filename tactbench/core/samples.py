@@ -6,7 +6,7 @@ of one role) → ``Fold`` → predictions → score.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from enum import IntFlag
 from typing import TYPE_CHECKING, Any
@@ -68,8 +68,20 @@ class Block:
 
     def rows(self, which: slice | npt.NDArray[np.bool_]) -> Block:
         """Return some of its rows, by a slice or a mask."""
-        columns = ("t_ns", "data", "quality", "sequence", "device_ns")
-        return replace(self, **{name: one[which] for name in columns if (one := getattr(self, name)) is not None})
+        return replace(self, **{name: one[which] for name in COLUMNS if (one := getattr(self, name)) is not None})
+
+
+COLUMNS = ("t_ns", "data", "quality", "sequence", "device_ns")
+"""Of a block."""
+
+
+def join_blocks(blocks: Sequence[Block]) -> Block:
+    """Return blocks of one stream as one; raises ValueError if their columns do not fit each other."""
+    import numpy as np
+
+    given = [name for name in COLUMNS if getattr(blocks[0], name) is not None]
+    whole: dict[str, Any] = {name: np.concatenate([getattr(one, name) for one in blocks]) for name in given}
+    return replace(blocks[0], **whole)
 
 
 @dataclass(frozen=True)

@@ -7,12 +7,12 @@ import threading
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import suppress
 from dataclasses import replace
-from typing import Any, Self
+from typing import Self
 
 import numpy as np
 
 from tactbench.core.errors import LinkError, RigError, UsageError
-from tactbench.core.samples import Block, Quality
+from tactbench.core.samples import COLUMNS, Block, Quality, join_blocks
 from tactbench.core.spec.recording import StreamCounts
 from tactbench.core.spec.sensor import StreamSpec
 from tactbench.devices.driver import Driver, error_text
@@ -23,8 +23,6 @@ QUEUE_S = 5.0
 """Of data that a caller may be behind [s]."""
 UNRATED_HZ = 10_000.0
 """Taken for the rate of a stream that states none (assumed: above that of any tactile sensor's)."""
-COLUMNS = ("t_ns", "data", "quality", "sequence", "device_ns")
-"""Of a block."""
 BLOCK_S = 0.05
 """Between two blocks of a stream, about [s]; one of a caller who takes them too slowly holds all since."""
 READ_S = 0.05
@@ -94,13 +92,9 @@ class StreamQueue:
         with self._lock:
             found, self._blocks, self._rows = self._blocks, [], 0
         if found:
-            joined: dict[str, Any] = {
-                name: np.concatenate([getattr(one, name) for one in found]) for name in self._layout
-            }
-            if not joined["quality"].any():
-                joined["quality"] = None
-            self.written += len(joined["data"])
-            yield replace(found[0], **joined)
+            joined = join_blocks(found)
+            self.written += len(joined.data)
+            yield joined if np.any(joined.quality) else replace(joined, quality=None)
 
     def discard(self) -> None:
         """Drop what is in it: nobody will take it."""

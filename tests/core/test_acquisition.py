@@ -10,7 +10,7 @@ from threadpoolctl import threadpool_info, threadpool_limits
 
 from tactbench.core.acquisition import acquire
 from tactbench.core.errors import LinkUnplugged, RigError
-from tactbench.core.recording.reader import content_digest, open_recording
+from tactbench.core.recording.reader import open_recording
 from tactbench.core.recording.salvage import rescue
 from tactbench.core.samples import Block
 from tactbench.core.spec.recording import PlanEntry, StreamCounts
@@ -74,8 +74,7 @@ def opened(path):
 
 def test_everything_the_rig_says_is_kept(tmp_path):
     rig = Weights()
-    meta, digest = run(tmp_path / "r.h5", rig)
-    assert content_digest(tmp_path / "r.h5") == digest
+    meta = run(tmp_path / "r.h5", rig)
     read, taxels, force = opened(tmp_path / "r.h5")
     assert read == meta
     assert force.data[:, 0].tolist() == [0.0] * 10 + [0.5] * 10 + [1.0] * 10
@@ -181,7 +180,7 @@ def test_a_real_rig_is_stopped_and_then_what_it_had_recorded_is_kept(tmp_path, s
 def test_a_scene_that_a_device_ended_is_kept_as_incomplete(tmp_path):
     path = tmp_path / "r.h5"
     rig = Devices(path, "the force sensor is unplugged")
-    made, _ = run(path, rig, simulated=False)
+    made = run(path, rig, simulated=False)
     assert made.excluded == "incomplete: ended before its time: the force sensor is unplugged"
     assert rig.told == [("ended before its time: the force sensor is unplugged", False)]  # stopped before it is written
     meta, taxels, _ = opened(path)
@@ -196,15 +195,15 @@ def test_what_is_emulated_is_marked_by_the_rig_file_or_the_identity_of_a_device(
     late = {SENSOR.name: DeviceEntry(link="emulated", faults=("late",)), "other": DeviceEntry(link="emulated")}
     virtual = RigFile(rig="weights", sensors=late, devices={"motor": {"device": "faulhaber", "link": "emulated"}})
     rig = Devices(tmp_path / "r.h5")
-    made, _ = run(tmp_path / "virtual.h5", rig, simulated=False, rig_file=virtual)
+    made = run(tmp_path / "virtual.h5", rig, simulated=False, rig_file=virtual)
     assert (made.simulated, made.emulation.time) == (True, "virtual")
     assert made.emulation.faults == (f"{SENSOR.name}: late",)
     assert set(made.emulation.devices) == {SENSOR.name, "motor"}
     real = RigFile(rig="weights", sensors={SENSOR.name: DeviceEntry(link="can://virtual/there")})
-    made, _ = run(tmp_path / "real.h5", rig, simulated=False, rig_file=real)
+    made = run(tmp_path / "real.h5", rig, simulated=False, rig_file=real)
     assert (made.simulated, made.emulation) == (False, None)
     rig.identity = {f"{SENSOR.name} adapter": "tactbench emulator"}
-    made, _ = run(tmp_path / "said.h5", rig, simulated=False, rig_file=real)
+    made = run(tmp_path / "said.h5", rig, simulated=False, rig_file=real)
     assert made.emulation.devices == (SENSOR.name,)
 
 

@@ -11,7 +11,6 @@ from tactbench.core.matrix.plan import plan_cells
 from tactbench.core.matrix.plan_recordings import requests_for
 from tactbench.core.matrix.store import Store
 from tactbench.core.spec.matrix import MatrixSpec, TaskChoice
-from tactbench.core.spec.scene import Simulation
 from tactbench.core.spec.task import in_drawn_order
 from tactbench.plugin import ForceRamp
 
@@ -45,7 +44,7 @@ def test_campaigns_of_other_tasks_share_their_recordings(tmp_path):
         for name in ("force", "curvature", "inverse-radius")
     ))  # fmt: skip
     cells = plan_cells(matrix, ["icub"], REGISTRY)
-    orders = requests_for(cells, REGISTRY, Keys(REGISTRY), Store(tmp_path), Simulation())
+    orders = requests_for(cells, REGISTRY, Keys(REGISTRY), Store(tmp_path))
     paths = {key: {order.path for order in some} for key, some in orders.items()}
     every = set().union(*paths.values())
     for split in ("placement", "unit", "few-shot-1", "few-shot-2", "few-shot-5", "few-shot-10"):
@@ -124,7 +123,7 @@ def test_what_is_to_be_recorded_holds_the_drawn_order(tmp_path):
     """A recording keeps its scene."""
     choice = TaskChoice(name="curvature", protocol="karl2016")
     cells = plan_cells(MatrixSpec(seed=5, repeats=1, tasks=(choice,)), ["icub"], REGISTRY)
-    (orders,) = requests_for(cells, REGISTRY, Keys(REGISTRY), Store(tmp_path), Simulation()).values()
+    (orders,) = requests_for(cells, REGISTRY, Keys(REGISTRY), Store(tmp_path)).values()
     assert [order.scene.name for order in orders] == in_time("curvature", 5)
 
 

@@ -82,13 +82,7 @@ def _import_tables(mapping: Path, root: Path | None, out: Path | None, replace: 
 
     target = Path("recordings") / mapping.stem if out is None else out
     with progress() as display:
-
-        def tell(done: int, total: int, what: str) -> None:
-            if done == 1:
-                display.begin("importing", total)
-            display.advance(what)
-
-        report = import_tables(mapping, root=root, out=target, progress=tell, replace=replace)
+        report = import_tables(mapping, root=root, out=target, progress=display, replace=replace)
     print_fields(list(fields(report, target)))
     return _sound(finding for recording in report.recordings for finding in recording.findings)
 

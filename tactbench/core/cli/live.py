@@ -19,9 +19,8 @@ if TYPE_CHECKING:
     from rich.table import Table
     from rich.text import Text
 
-    from tactbench.core.plugins.interfaces import Acquisition, Rig
+    from tactbench.core.plugins.interfaces import Acquisition
     from tactbench.core.samples import Block
-    from tactbench.core.spec.rig import SensorDescriptor
     from tactbench.core.spec.scene import Scene
 
 REFRESHES_PER_S = 10
@@ -35,7 +34,7 @@ BAD = "bold red"
 class LiveView:
     """Shows on stderr what is being recorded, from when the rig knows its streams to the end of the ``with`` block.
 
-    Give the rig of :meth:`beside` and :meth:`watch` to `acquire`. rich draws in a thread of its own: a slow terminal
+    Give :meth:`begin` and :meth:`watch` to `acquire`. rich draws in a thread of its own: a slow terminal
     holds nothing back.
     """
 
@@ -57,10 +56,6 @@ class LiveView:
             )  # fmt: skip
         else:
             remark("stderr is no terminal that --live can draw on: nothing is shown.")
-
-    def beside(self, rig: Rig) -> Rig:
-        """Return a rig that does what `rig` does, and tells this view of its streams once they are known."""
-        return _ObservedRig(rig, self)
 
     def begin(self, acquisition: Acquisition) -> None:
         """Begin to draw."""
@@ -173,20 +168,6 @@ class LiveView:
         force_n, wanted_n, _ = self._force()
         texts = ("-" if value is None else f"{value:.2f} N" for value in (force_n, wanted_n))
         return "force {}, wanted {}".format(*texts) if self._reference else "no reference force"
-
-
-class _ObservedRig:
-    """A rig that tells a view of what it opens."""
-
-    def __init__(self, rig: Rig, view: LiveView) -> None:
-        self._rig = rig
-        self._view = view
-
-    @contextmanager
-    def open(self, sensor: SensorDescriptor, scene: Scene, *, seed: int) -> Iterator[Acquisition]:
-        with self._rig.open(sensor, scene, seed=seed) as acquisition:
-            self._view.begin(acquisition)
-            yield acquisition
 
 
 def _bad(state: StreamState, place: int) -> bool:

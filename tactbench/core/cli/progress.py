@@ -9,7 +9,7 @@ from contextlib import AbstractContextManager, contextmanager, nullcontext
 from typing import Any, TextIO
 
 from tactbench.core.cli.screen import remark
-from tactbench.core.matrix.progress import Progress
+from tactbench.core.progress import Progress
 
 
 class Display(Progress):

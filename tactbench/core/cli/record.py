@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
     from contextlib import AbstractContextManager
 
-    from tactbench.core.plugins.interfaces import Operator, Rig
+    from tactbench.core.plugins.interfaces import Acquisition, Operator, Rig
     from tactbench.core.plugins.registry import Registry
     from tactbench.core.samples import Block
     from tactbench.core.spec.rig_file import RigFile
@@ -75,6 +75,7 @@ def command(
     provenance = gather(registry)
     try:
         with ExitStack() as stack:
+            opened: Callable[[Acquisition], None] | None = None
             watch: Callable[[Block], None] | None = None
             paused: Callable[[], AbstractContextManager[None]] = nullcontext
             if live:
@@ -83,13 +84,11 @@ def command(
                 emulated = devices is not None and devices.emulated
                 mark = " (SIM)" if registry.rigs[rig].simulated else " (EMULATED)" if emulated else ""
                 view = stack.enter_context(LiveView(scene, f"{sensor} on {rig}{mark}, {scene.indenter}"))
-                watch, paused = view.watch, view.paused
+                opened, watch, paused = view.begin, view.watch, view.paused
             built = _built(registry, rig, devices, TerminalOperator(yes=yes, paused=paused))
-            if live:
-                built = view.beside(built)
-            made = acquire(
+            meta = acquire(
                 built, descriptor, registry.rigs[rig], scene, role=None, seed=seed, path=out, clock=time.perf_counter,
-                provenance=provenance, watch=watch, name=out.stem, complete_interrupted=True,
+                provenance=provenance, opened=opened, watch=watch, name=out.stem, complete_interrupted=True,
                 rig_file=devices,
             )  # fmt: skip
     except (KeyboardInterrupt, TactbenchError) as error:
@@ -98,7 +97,6 @@ def command(
         elif isinstance(error, KeyboardInterrupt):
             remark("\n".join(getattr(error, "__notes__", ())) or "Nothing is kept.")
         raise
-    meta = made.meta
     mark = " (EMULATED)" if meta.emulation else " (SIM)" if meta.simulated else ""
     click.echo(f"{out}: {meta.sensor.name} on {meta.rig}{mark}, {scene.indenter}")
     for name, value in meta.assumptions.items():

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -82,12 +81,11 @@ def carry_out(
         timeout_s=matrix.timeout_s if timeout is None else timeout,
         memory_mb=matrix.memory_mb if memory is None else memory,
     )
-    scheduler = os.environ.get("DASK_SCHEDULER_ADDRESS") if engine == "dask" else None
-    choice = EngineChoice(engine, jobs, limits, scheduler)
     store = Store(out)
     with progress() as display:
         outcome = run_matrix(
-            matrix, store, choice=choice, recordings=recordings, root=root, progress=display,
+            matrix, store, choice=EngineChoice(engine, jobs, limits), recordings=recordings, root=root,
+            progress=display,
             operator=TerminalOperator(yes=yes, paused=display.paused) if matrix.rig_file else None,
             shown=lambda rows: display.show(lambda: _so_far(rows)),
         )  # fmt: skip

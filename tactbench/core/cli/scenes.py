@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -93,7 +92,7 @@ def _ramp(given: Mapping[str, float]) -> ForceProfile:
     for name, value in given.items():
         if name not in ("force", "duration"):
             raise UnknownNameError("parameter of the ramp", name, ("force", "duration"))
-        if not 0 < value < math.inf:
+        if not value > 0:
             raise UsageError(f"{name} of the ramp is {value:g}.", hint="Give a number above 0.")
     if "force" in given:
         change["end"] = sourced(given["force"], "N", _BY)
@@ -107,6 +106,8 @@ def _ramp(given: Mapping[str, float]) -> ForceProfile:
 
 def _named(text: str) -> tuple[str, dict[str, float]]:
     """Return the name and the numbers of ``NAME:A=1,B=2``; raises UsageError naming what is none."""
+    from pydantic import FiniteFloat, TypeAdapter
+
     from tactbench.core.errors import UsageError
 
     name, _, rest = text.partition(":")
@@ -114,7 +115,7 @@ def _named(text: str) -> tuple[str, dict[str, float]]:
     for part in filter(None, rest.split(",")):
         field, _, number = part.partition("=")
         try:
-            given[field.strip()] = float(number)
+            given[field.strip()] = TypeAdapter(FiniteFloat).validate_python(number)
         except ValueError as error:
             raise UsageError(
                 f"{field.strip()} of {name!r} is given as {number!r}, and a number is expected.",

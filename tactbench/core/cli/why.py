@@ -89,7 +89,7 @@ def _find(out: Path, given: str) -> _Stored:
     row = rows[meant(given, list(rows))]
     cell = cell_of(row)
     if registry.rigs[cell.rig].simulated:
-        requests = requests_for([cell], registry, keys, store, cell.simulation)[request_key(cell)]
+        requests = requests_for([cell], registry, keys, store)[request_key(cell)]
         return _Stored(store, registry, keys, cell, row, tuple(request.path for request in requests))
     paths = []
     for path, file in store.recordings(row):

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import inspect
 import os
-import re
 import subprocess
 import sys
 from collections.abc import Callable, Iterator
@@ -16,7 +15,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, Literal, NamedTuple, NoReturn, get_args
 
-from tactbench.core.errors import NotApplicable, PluginError, TactbenchError
+from tactbench.core.errors import NotApplicable, PluginError, error_text
 from tactbench.core.plugins import hookspecs
 from tactbench.core.plugins.interfaces import Operator
 from tactbench.core.plugins.registry import Registry, ask_plugin, load_object
@@ -180,12 +179,7 @@ def code_of(field: str, subject: Subject) -> Iterator[None]:
         raise CheckSkipped(f"it says: {reason.message}") from reason
     except (Exception, SystemExit) as error:
         line = line_in(subject.package, error.__traceback__)
-        raise CheckFailed(f"{field} ({line})" if line else field, said(error)) from error
-
-
-def said(error: BaseException) -> str:
-    """Return an error as text: its message, with the class where that is not one of tactbench's."""
-    return str(error) if isinstance(error, TactbenchError) else f"{type(error).__name__}: {error}"
+        raise CheckFailed(f"{field} ({line})" if line else field, error_text(error)) from error
 
 
 def line_in(package: str, trace: TracebackType | None) -> str:
@@ -237,14 +231,3 @@ def _imported_with(module: str) -> list[str]:
     if done.returncode != 0:
         fail(module, f"it cannot be imported in a fresh interpreter: {done.stderr.strip().rpartition(chr(10))[2]}")
     return done.stdout.split()
-
-
-@check(*KINDS)
-def numbers_are_finite(subject: Subject) -> None:
-    """NaN in a spec passes every comparison, and shows as a score of NaN.
-
-    Leave the field out where nobody states the number.
-    """
-    found = re.search(r"name='([^']*)'[^()]*?(\w+)=(-?inf|nan)\b", repr(subject.descriptor))
-    if found is not None:
-        fail(f"{found[1]}.{found[2]}", f"it is {found[3]}")

@@ -7,8 +7,8 @@ Ctrl-C reaches the rig, and without a limit of time.
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager, suppress
+from collections.abc import Mapping
+from contextlib import suppress
 from functools import lru_cache, partial
 from typing import Any
 
@@ -59,10 +59,8 @@ NOISY = 3.0
 def _read(subject: Subject) -> Recorded:
     if subject.recording is None:
         skip("no recording is given: `--recording FILE` reads one")
-    try:
+    with code_of(str(subject.recording), subject):
         return read_back(subject.recording)
-    except TactbenchError as error:
-        fail(str(subject.recording), str(error))
 
 
 @check("sensor", mode="recording")
@@ -163,33 +161,20 @@ def _noise_is_as_stated(subject: Subject, stream: StreamData) -> None:
             fail(where, text if sd else f"it is constant at rest: is it connected? {hidden:.3g} (sd) are stated")
 
 
-class _Kept:
-    """A rig that keeps its last acquisition, to be asked after its end."""
-
-    def __init__(self, rig: Any) -> None:
-        self._rig = rig
-        self.last: Any = None
-
-    @contextmanager
-    def open(self, sensor: SensorDescriptor, scene: Any, *, seed: int) -> Iterator[Any]:
-        with self._rig.open(sensor, scene, seed=seed) as self.last:
-            yield self.last
-
-
 def _zeros(drawn: Mapping[str, Any]) -> list[float]:
     """Return what was taken off the reference's channels as their zero, as PressingForce.about says it."""
     texts = [str(text) for name, text in sorted(drawn.items()) if name.startswith("zero of ")]
     return [float(one) for text in texts for one in text.split(",")]
 
 
-def _built(subject: Subject) -> tuple[_Kept, SensorDescriptor, Any]:
+def _built(subject: Subject) -> tuple[Any, SensorDescriptor, Any]:
     """Return the rig, the first sensor of its file, and a slow press."""
     file = _file(subject)
     if file.rig != subject.name:
         skip(f"the rig file is for the rig {file.rig}")
     context = rig_context(subject.registry, rig_file=running(file), operator=subject.operator)
     scene = tiny_scene(profile=slow_ramp(FORCE_N, SECONDS, HOLD_S))
-    return _Kept(subject.code("where")(context)), subject.registry.sensors[next(iter(file.sensors))], scene
+    return subject.code("where")(context), subject.registry.sensors[next(iter(file.sensors))], scene
 
 
 @check("rig", mode="invasive", needs="code-names-resolve")
@@ -200,10 +185,11 @@ def real_rig_presses(subject: Subject) -> None:
     then at the gains of the force loop. Retreat at the end of each scene, also of one that failed; let `stop` retreat,
     wait for its end, and return "" or what is to be done by hand.
     """
+    first: list[Any] = []
     with code_of("where", subject):
         rig, sensor, scene = _built(subject)
-        made = carried_out(rig, sensor, subject.descriptor, scene, rig_file=_file(subject))
-    if not hasattr(rig.last, "stop"):
+        made = carried_out(rig, sensor, subject.descriptor, scene, rig_file=_file(subject), opened=first.append)
+    if not hasattr(first[0], "stop"):
         return  # nothing in it moves by itself: a hand presses
     _, force_n = pressing_force(made.came, made.meta.reference)
     force_is("reference", float(force_n[-max(1, len(force_n) // END) :].mean()), FORCE_N)
@@ -229,7 +215,7 @@ def real_rig_presses(subject: Subject) -> None:
         left = force(*came)[-5:]
     # The hold is the first fifth of the way to half of the force, or more.
     held = force(*rising)
-    off = np.subtract(_zeros(rig.last.drawn), _zeros(made.meta.drawn))
+    off = np.subtract(_zeros(acquisition.drawn), _zeros(made.meta.drawn))
     off_n = max([held[: max(1, len(held) // 5)].mean(), *off], key=abs)
     if abs(off_n) > FORCE_SHARE * FORCE_N:
         fail("open", f"the force or its zero is {off_n:.3g} N off when the next press begins, before anything touches")

@@ -26,9 +26,8 @@ from tactbench.core.conformance.check import (
     Mode,
     Subject,
     line_in,
-    said,
 )
-from tactbench.core.errors import CellStopped, UnknownNameError
+from tactbench.core.errors import UnknownNameError, error_text
 from tactbench.core.plugins.interfaces import Operator
 from tactbench.core.plugins.registry import PluginRow, Registry
 from tactbench.core.pool import InProcess, Limits, Pool
@@ -123,7 +122,6 @@ def run_checks(
     rig_file: Path | None = None,
     operator: Operator | None = None,
     isolated: bool = True,
-    timeout_s: float = TIMEOUT_S,
     without: Collection[str] = (),
 ) -> CheckReport:
     """Run the checks of one plugin, each within limits.
@@ -146,11 +144,10 @@ def run_checks(
     checks = [one for one in checks_of(subject.kind, *modes) if one.name not in without]
     outcomes: dict[str, CheckOutcome] = {}
     while waiting := [one.name for one in checks if one.mode != "invasive" and one.name not in outcomes]:
-        engine = Pool(1, Limits(timeout_s=timeout_s)) if isolated else InProcess()
+        engine = Pool(1, Limits(timeout_s=TIMEOUT_S)) if isolated else InProcess()
         for name, given in engine.each(_Trier(subject, dict(outcomes)), waiting):
             if isinstance(given, BaseException):  # it hung or crashed; what is left is tried in another process
-                text = str(given) if isinstance(given, CellStopped) else said(given)
-                outcomes[name] = CheckOutcome(name, "failed", subject.module, text)
+                outcomes[name] = CheckOutcome(name, "failed", subject.module, error_text(given))
                 break
             outcomes[name] = given
     here = _Trier(subject, outcomes)
@@ -160,30 +157,31 @@ def run_checks(
     return CheckReport(subject.kind, subject.name, tuple(modes), tuple(outcomes[one.name] for one in checks))
 
 
+@dataclass
 class _Trier:
     """Tries checks by name in one process, one after the other, and keeps what came of them."""
 
-    def __init__(self, subject: Subject, outcomes: dict[str, CheckOutcome]) -> None:
-        self._subject, self._outcomes = subject, outcomes
+    subject: Subject
+    outcomes: dict[str, CheckOutcome]
 
     def __call__(self, name: str) -> CheckOutcome:
-        self._outcomes[name] = self._tried(name)
-        return self._outcomes[name]
+        self.outcomes[name] = self._tried(name)
+        return self.outcomes[name]
 
     def _tried(self, name: str) -> CheckOutcome:
         (one,) = [one for one in CHECKS if one.name == name]
-        for before in filter(None, map(self._outcomes.get, one.needs)):
+        for before in filter(None, map(self.outcomes.get, one.needs)):
             if before.status != "passed":
                 text = before.text if before.status == "skipped" else f"not tried, for {before.check} has not passed"
                 return CheckOutcome(name, "skipped", "", text)
         try:
-            one.run(self._subject)
+            one.run(self.subject)
         except CheckFailed as failure:
             advice = "" if failure.__cause__ is not None else one.cure
             return CheckOutcome(name, "failed", failure.where, failure.text, advice)
         except CheckSkipped as reason:
             return CheckOutcome(name, "skipped", "", str(reason))
         except (Exception, SystemExit) as error:
-            line = line_in(self._subject.package, error.__traceback__) or self._subject.module
-            return CheckOutcome(name, "failed", line, said(error))
+            line = line_in(self.subject.package, error.__traceback__) or self.subject.module
+            return CheckOutcome(name, "failed", line, error_text(error))
         return CheckOutcome(name, "passed")

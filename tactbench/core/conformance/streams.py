@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -14,13 +14,12 @@ import numpy as np
 import numpy.typing as npt
 
 from tactbench.core.conformance.check import fail
-from tactbench.core.samples import Block, FloatArray, Quality, StreamData
+from tactbench.core.samples import COLUMNS, Block, FloatArray, Quality, StreamData, join_blocks
 from tactbench.core.spec.recording import RecordingMeta
 from tactbench.core.spec.rig import RigDescriptor, SensorDescriptor
 from tactbench.core.spec.rig_file import RigFile
 from tactbench.core.spec.scene import Scene
 from tactbench.core.spec.sensor import ChannelSpec, StreamSpec
-from tactbench.devices.reading import COLUMNS
 
 BAD = Quality.MISSING | Quality.SUSPECT
 RATE_SHARE = 0.02
@@ -53,14 +52,13 @@ def read_back(path: Path) -> Recorded:
 
     with open_recording(path) as recording:
         came = {name: recording.read(name) for name in recording.stream_names}
-        wrong = [] if recording.complete else ["it was cut short by a crash"]
-        wrong += [f"{one.stream}: {one.message}" for one in examine(recording) if one.severity == "error"]
+        wrong = [f"{one.stream}: {one.message}" for one in examine(recording) if one.severity == "error"]
         return Recorded(recording.meta, came, "".join(wrong[:1]))
 
 
 def carried_out(
     rig: Any, sensor: SensorDescriptor, descriptor: RigDescriptor, scene: Scene, seed: int = 1,
-    rig_file: RigFile | None = None,
+    rig_file: RigFile | None = None, opened: Callable[[Any], None] | None = None,
 ) -> Recorded:  # fmt: skip
     """Record a scene as `tactbench record` does it, and read it back; raises what the rig raises."""
     from tactbench.core.acquisition import acquire
@@ -69,10 +67,10 @@ def carried_out(
         path = Path(folder) / "check.h5"
         made = acquire(
             rig, sensor, descriptor, scene, role=None, seed=seed, path=path, clock=time.perf_counter, provenance={},
-            rig_file=rig_file,
+            rig_file=rig_file, opened=opened,
         )  # fmt: skip
-        if made.meta.excluded:
-            fail("recording", f"it is {made.meta.excluded}")
+        if made.excluded:
+            fail("recording", f"it is {made.excluded}")
         recorded = read_back(path)
     if recorded.wrong:
         fail("recording", f"it is not healthy: {recorded.wrong}")
@@ -92,17 +90,14 @@ def joined(where: str, streams: Sequence[StreamSpec], blocks: Iterable[Any]) -> 
     for spec in streams:
         nothing = np.empty((0, len(spec.channels)))
         parts = came[spec.name] or [Block(spec.name, None, nothing, nothing.astype(np.uint8))]
-        given = [name for name in COLUMNS if getattr(parts[0], name) is not None]
         try:
-            whole = {name: np.concatenate([getattr(one, name) for one in parts]) for name in given}
+            whole = join_blocks(parts)
         except ValueError as error:
             fail(f"{where}: {spec.name}", f"its blocks do not fit each other: {error}")
-        shapes = {name: column.shape for name, column in whole.items()}
+        shapes = {name: column.shape for name in COLUMNS if (column := getattr(whole, name)) is not None}
         if shapes["data"][1:] != nothing.shape[1:] or len({shape[0] for shape in shapes.values()}) > 1:
             fail(f"{where}: {spec.name}", f"its columns are {shapes}, for {len(spec.channels)} channels")
-        found[spec.name] = StreamData(
-            spec, whole.get("t_ns"), whole["data"], whole["quality"], sequence=whole.get("sequence")
-        )
+        found[spec.name] = StreamData(spec, whole.t_ns, whole.data, whole.quality, sequence=whole.sequence)
         are_finite(where, found[spec.name])
     return found
 

@@ -11,14 +11,14 @@ import numpy as np
 
 from tactbench.core.cost.precision import front
 from tactbench.core.cost.rounds import THREADS, TimedEstimator, Timing, measure, timed_estimator
-from tactbench.core.errors import NotApplicable, TactbenchError, UsageError
+from tactbench.core.errors import NotApplicable, UsageError, error_text
 from tactbench.core.evaluation.dataset import load_dataset
 from tactbench.core.evaluation.delay import answer_delay_ms, tail_ms
 from tactbench.core.evaluation.metrics import metric_called
-from tactbench.core.matrix.progress import Progress
 from tactbench.core.matrix.run import EngineChoice, Outcome, run_matrix
 from tactbench.core.matrix.store import Row, Store
 from tactbench.core.plugins.registry import Registry
+from tactbench.core.progress import Progress
 from tactbench.core.spec.matrix import MatrixSpec
 from tactbench.core.spec.rig import EstimatorDescriptor
 from tactbench.core.statistics.replicates import over_replicates
@@ -141,7 +141,7 @@ def opening(row: Row, descriptor: EstimatorDescriptor) -> Record:
 
 def stopped(error: Exception) -> Record:
     """Return what changes in a row whose estimator could not be timed: it was skipped, or failed, and why."""
-    reason = str(error) if isinstance(error, TactbenchError) else f"{type(error).__name__}: {error}"
+    reason = error_text(error)
     return {"status": "skipped" if isinstance(error, NotApplicable) else "failed", "reason": reason}
 
 

@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import Any, NamedTuple, TypeVar
 
 from tactbench.core.errors import TactbenchError
-from tactbench.core.matrix.progress import Progress
 from tactbench.core.plugins.cost import CostPoint, CostStudy
+from tactbench.core.progress import Progress
 
 P = TypeVar("P")
 SHARE = 1 / 3

@@ -21,8 +21,8 @@ from tactbench.core.evaluation.fitting import answers, builder, features_of, fit
 from tactbench.core.evaluation.metrics import Metric, metric_called
 from tactbench.core.evaluation.sets import prepared
 from tactbench.core.evaluation.summaries import without_windows
-from tactbench.core.matrix.progress import Progress
 from tactbench.core.plugins.interfaces import Estimator
+from tactbench.core.progress import Progress
 from tactbench.core.samples import FloatArray
 from tactbench.core.spec.rig import EstimatorDescriptor
 from tactbench.core.spec.task import TaskSpec

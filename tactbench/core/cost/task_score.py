@@ -7,10 +7,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from tactbench.core.errors import UsageError
-from tactbench.core.matrix.progress import Progress
 from tactbench.core.matrix.run import run_matrix
 from tactbench.core.matrix.store import Store
 from tactbench.core.plugins.registry import Registry
+from tactbench.core.progress import Progress
 from tactbench.core.spec.matrix import EstimatorChoice, MatrixSpec, TaskChoice
 from tactbench.core.spec.scene import Simulation
 

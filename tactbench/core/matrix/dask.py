@@ -18,7 +18,7 @@ from typing import Any
 from distributed import Client, KilledWorker, LocalCluster, as_completed  # noqa: TID253  (imported for this engine alone)
 from distributed.versions import VersionMismatchWarning  # noqa: TID253
 
-from tactbench.core.errors import Crashed, EngineError, UsageError
+from tactbench.core.errors import Crashed, EngineError, UsageError, error_text
 from tactbench.core.matrix.keys import differences
 from tactbench.core.matrix.solve import Job, check_content
 from tactbench.core.plugins.registry import installed
@@ -46,7 +46,7 @@ class Dask(Engine):
         Address, as ``tcp://HOST:8786``; None: a scheduler and workers on this machine.
     """
 
-    def __init__(self, jobs: int, limits: Limits, scheduler: str | None = None) -> None:
+    def __init__(self, jobs: int, limits: Limits, scheduler: str | None) -> None:
         super().__init__()
         self._jobs, self._limits, self._scheduler = jobs, limits, scheduler
 
@@ -107,7 +107,7 @@ class Dask(Engine):
                 yield of[future], Crashed(f"Workers ended while they carried it out: {error}.")
             except Exception as error:
                 lost = EngineError(
-                    f"The Dask cluster did not carry it out: {type(error).__name__}: {error}.",
+                    f"The Dask cluster did not carry it out: {error_text(error)}.",
                     hint="Give the same command again: what was finished is kept.",
                 )
                 yield of[future], lost

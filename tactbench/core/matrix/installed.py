@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from tactbench.core.errors import RigError, TactbenchError
+from tactbench.core.errors import RigError, TactbenchError, error_text
 from tactbench.core.plugins.emulators import running
 from tactbench.core.plugins.interfaces import Operator, ReplayRig, Rig
 from tactbench.core.plugins.registry import Registry, load_object
@@ -48,5 +48,6 @@ def failing_as(what: str) -> Iterator[None]:
     except TactbenchError:
         raise
     except (Exception, SystemExit) as error:
-        text = f"{what}: {type(error).__name__}: {error}".rstrip(": ")
-        raise RigError(text + ".", hint="See `tactbench list plugins` for who brings it.") from error
+        raise RigError(
+            f"{what}: {error_text(error)}.", hint="See `tactbench list plugins` for who brings it."
+        ) from error

@@ -99,7 +99,7 @@ def configuration_of(cell: Cell) -> Sections:
     """Return what a cell's key covers of its configuration. Its number among the repeats is not: the seed is."""
     return {
         "sensor": cell.sensor, "protocol": cell.protocol, "split": cell.split, "params": dict(cell.params),
-        "seed": cell.seed, "timed": cell.timed, **({"include incomplete": True} if cell.include_incomplete else {}),
+        "seed": cell.seed, "timed": cell.timed, "include incomplete": cell.include_incomplete,
     }  # fmt: skip
 
 
@@ -108,7 +108,7 @@ def differences(
     now: Mapping[str, Any],
     within: str = "",
     *,
-    same: Callable[[Any, Any], bool] | None = None,
+    same: Callable[[Any, Any], bool] = lambda old, new: _canonical(old) == _canonical(new),
 ) -> list[str]:
     """Return one sentence for everything in which two mappings differ.
 
@@ -117,7 +117,7 @@ def differences(
     within
         What each sentence begins with.
     same
-        Compares what is no mapping; None: as JSON.
+        Compares what is no mapping; by default as JSON.
     """
     found = []
     for name in sorted({*before, *now}):
@@ -125,7 +125,7 @@ def differences(
         place = f"{within}{name}"
         if isinstance(old, Mapping) and isinstance(new, Mapping):
             found += differences(old, new, f"{place}: ", same=same)
-        elif not (same(old, new) if same else _canonical(old) == _canonical(new)):
+        elif not same(old, new):
             found.append(f"{place} {_short(old)} -> {_short(new)}")
     return found
 

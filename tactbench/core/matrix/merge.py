@@ -79,7 +79,9 @@ def merge(folders: Sequence[Path], out: Path, *, also: Callable[[Path], None] | 
             other = kept.setdefault(row["cell"], (row, store))
             if "done" == row["status"] == other[0]["status"] and (found := _contradiction(other, (row, store))):
                 against.append(f"{row['cell']} in {other[1].folder} and in {store.folder}: {found}")
-            kept[row["cell"]] = min(other, (row, store), key=lambda one: _order(one[0]))
+            kept[row["cell"]] = min(
+                other, (row, store), key=lambda one: (STATUSES.index(one[0]["status"]), one[0]["host"], one[0]["key"])
+            )
     if against:
         more = f"; and {len(against) - _SHOWN} more" if len(against) > _SHOWN else ""
         raise FolderError(
@@ -97,10 +99,6 @@ def merge(folders: Sequence[Path], out: Path, *, also: Callable[[Path], None] | 
         if also is not None:
             also(aside)
     return Merged(tuple(row for row, _ in kept.values()), len(recordings), tuple(left_out))
-
-
-def _order(row: Row) -> tuple[int, str, str]:
-    return STATUSES.index(row["status"]), str(row["host"]), str(row["key"])
 
 
 def _contradiction(one: tuple[Row, Store], other: tuple[Row, Store]) -> str:

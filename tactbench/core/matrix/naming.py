@@ -6,12 +6,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
-from tactbench.core.errors import UsageError, nearest
-from tactbench.core.matrix.plan import Cell
+from tactbench.core.errors import UsageError, did_you_mean
+from tactbench.core.matrix.plan import ALIKE, Cell
 from tactbench.core.spec.scene import Simulation
 
-_SAME = ("sensor", "task", "rig", "protocol", "split", "estimator", "repeat", "repeats", "seed")
-"""What a row and a cell call alike."""
 _SHOWN = 8
 """Cells named in a message."""
 
@@ -44,10 +42,9 @@ def meant(given: str, names: Sequence[str]) -> str:
     if len({_parts(name)[0] for name in found}) == 1:
         return min(found, key=lambda name: _parts(name)[1])
     if not found:
-        close = " or ".join(repr(name) for name in nearest(given, names))
         raise UsageError(
             f"There is no cell called {given!r} among {len(names)}.",
-            hint=f"Did you mean {close}?" if close else "`tactbench leaderboard --format json` has their names.",
+            hint=did_you_mean(given, names).strip() or "`tactbench leaderboard --format json` has their names.",
         )
     more = f" and {len(found) - _SHOWN} more" if len(found) > _SHOWN else ""
     raise UsageError(
@@ -71,13 +68,11 @@ def _parts(name: str) -> tuple[str, int]:
 def cell_of(row: Mapping[str, Any]) -> Cell:
     """Return the cell that a row answers."""
     cell = Cell(
-        **{name: row[name] for name in _SAME},
+        **{name: row[name] for name in ALIKE},
         params=tuple(sorted(row["params"].items())),
         baseline=row["is_baseline"],
         timed=row["status"] != "done" or row["latency_n"] is not None,
         simulation=Simulation.model_validate(row["simulation"]),
-        declared_task=row["declared_task"],
-        include_incomplete=row.get("include_incomplete", False),
     )
     # A row says which split was taken; its name, whether that one was asked for or found.
     found = replace(cell, split=None)

@@ -17,10 +17,13 @@ from tactbench.core.spec.rig_file import RigFile
 from tactbench.core.spec.scene import Simulation
 from tactbench.core.spec.task import TaskSpec
 
-FEW_SHOT = "few-shot"
-"""Asks for all of a task's splits `few-shot-N`."""
-
 _AS_PLANNED = Simulation()
+
+ALIKE = (
+    "sensor", "task", "rig", "protocol", "split", "estimator", "repeat", "repeats", "seed", "declared_task",
+    "include_incomplete",
+)  # fmt: skip
+"""What a row and a cell call alike."""
 
 
 @dataclass(frozen=True)
@@ -186,8 +189,9 @@ def serves(protocol: str, split: str | None) -> bool:
 
 
 def _expanded(task: TaskSpec, split: str) -> tuple[str, ...]:
+    """Return the splits that are asked for: ``few-shot`` stands for all of a task's ``few-shot-N``."""
     few = tuple(name for name in task.splits if shots(name))
-    return few if split == FEW_SHOT and few else (split,)
+    return few if split == "few-shot" and few else (split,)
 
 
 def _estimators(task: TaskSpec, choice: TaskChoice, registry: Registry) -> list[EstimatorChoice]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -19,15 +19,15 @@ from tactbench.core.errors import (
 from tactbench.core.evaluation.protocols import shots
 from tactbench.core.matrix.installed import failing_as, rig_of
 from tactbench.core.matrix.keys import Keys
-from tactbench.core.matrix.plan import FEW_SHOT, Cell, plan_cells, serves, task_of
-from tactbench.core.matrix.progress import Progress
+from tactbench.core.matrix.plan import Cell, plan_cells, serves, task_of
 from tactbench.core.matrix.store import Store
 from tactbench.core.plugins.registry import Registry
 from tactbench.core.plugins.rig_files import load_rig_file
-from tactbench.core.pool import UNLIMITED, InProcess, Limits, Pool
+from tactbench.core.pool import InProcess, Limits, Pool
+from tactbench.core.progress import Progress
 from tactbench.core.spec.matrix import MatrixSpec
 from tactbench.core.spec.rig_file import RigFile
-from tactbench.core.spec.scene import Role, Scene, Simulation
+from tactbench.core.spec.scene import Role, Scene
 from tactbench.core.spec.task import TaskSpec, in_drawn_order
 
 if TYPE_CHECKING:
@@ -57,9 +57,9 @@ class RecordingRequest:
 
 
 def requests_for(
-    cells: Iterable[Cell], registry: Registry, keys: Keys, store: Store, simulation: Simulation
+    cells: Iterable[Cell], registry: Registry, keys: Keys, store: Store
 ) -> dict[RequestKey, list[RecordingRequest]]:
-    """Return the recordings needed, in the campaign's order, carried out as `simulation` asks.
+    """Return the recordings needed, in the campaign's order, carried out as the cells ask a simulation.
 
     Where the campaign leaves the order to be drawn, it is drawn with the cell's seed.
     Tasks and campaigns that ask for the same scene in the same role share the recording.
@@ -71,7 +71,7 @@ def requests_for(
             continue
         requests[needed] = []
         for planned in in_drawn_order(task_of(cell.task_key, registry).scenes_for(needed[2]), cell.seed):
-            scene = planned.scene.simulated_as(simulation)
+            scene = planned.scene.simulated_as(cell.simulation)
             key, _ = keys.of_recording(cell.sensor, cell.rig, scene, planned.role, cell.seed, cell.rig_file)
             path = store.folder / "recordings" / cell.sensor / f"{scene.name}-{key[:12]}.h5"
             requests[needed].append(
@@ -85,15 +85,18 @@ ACQUIRED_SPLITS = ("roles", "session", "recording", "unit", "in-session", "shuff
 
 
 @dataclass
-class RecordingPlan:
-    """Where the recordings of cells come from."""
+class Source:
+    """Where the recordings of some cells come from."""
 
-    requests: dict[RequestKey, list[RecordingRequest]] = field(default_factory=dict)
+    paths: Sequence[Path]
+    """Where they lie, or will lie."""
+    requests: Sequence[RecordingRequest] = ()
     """What a rig has to record."""
-    paths: dict[RequestKey, list[Path]] = field(default_factory=dict)
-    """Where the recordings lie, or will lie."""
-    troubles: dict[RequestKey, BaseException] = field(default_factory=dict)
+    trouble: BaseException | None = None
     """Why there are no recordings, or not all of them."""
+
+
+RecordingPlan = dict[RequestKey, Source]
 
 
 @dataclass(frozen=True)
@@ -106,9 +109,7 @@ class Part:
     """Why the data set is not there"""
 
 
-def parts_of(
-    matrix: MatrixSpec, recordings: Path | None, root: Path | None, progress: Progress | None = None
-) -> list[Part]:
+def parts_of(matrix: MatrixSpec, recordings: Path | None, root: Path | None, progress: Progress) -> list[Part]:
     """Return `matrix` in parts, one for each data set that its tasks name; what is missing is fetched and imported.
 
     A data set that cannot be had costs its own cells only.
@@ -137,12 +138,13 @@ def parts_of(
     return parts
 
 
-def _from_dataset(matrix: MatrixSpec, dataset: DataSet, root: Path | None, progress: Progress | None) -> Part:
-    sensors = matrix.sensors or (dataset.mapping.sensor.name,)
+def _from_dataset(matrix: MatrixSpec, dataset: DataSet, root: Path | None, progress: Progress) -> Part:
+    matrix = matrix.model_copy(update={"rig": "replay"})
     try:
-        return Part(matrix.model_copy(update={"rig": "replay"}), dataset.recordings(root, progress))
+        return Part(matrix, dataset.recordings(root, progress))
     except TactbenchError as error:
-        return Part(matrix.model_copy(update={"rig": "replay", "sensors": sensors}), None, error)
+        sensors = matrix.sensors or (dataset.mapping.sensor.name,)
+        return Part(matrix.model_copy(update={"sensors": sensors}), None, error)
 
 
 def plan_parts(
@@ -156,22 +158,20 @@ def plan_parts(
         If two parts ask one sensor the same question, beside what `plan_run` raises.
     """
     cells: dict[str, Cell] = {}
-    plan = RecordingPlan()
+    plan: RecordingPlan = {}
     for part in parts:
         if part.trouble is None:
             some, own = plan_run(part.matrix, registry, keys, store, part.recordings, limits)
         else:
-            some, own = plan_cells(part.matrix, part.matrix.sensors, registry), RecordingPlan()
-            own.troubles = {request_key(cell): part.trouble for cell in some}
+            some = plan_cells(part.matrix, part.matrix.sensors, registry)
+            own = {request_key(cell): Source((), trouble=part.trouble) for cell in some}
         for cell in some:
             if cells.setdefault(cell.name, cell) is not cell:
                 raise UsageError(
                     f"{cell.name} is asked of two places of recordings.",
                     hint="Run one of them at a time, each with --out.",
                 )
-        plan.requests |= own.requests
-        plan.paths |= own.paths
-        plan.troubles |= own.troubles
+        plan |= own
     return list(cells.values()), plan
 
 
@@ -181,7 +181,7 @@ def plan_run(
     keys: Keys,
     store: Store,
     recordings: Path | None,
-    limits: Limits = UNLIMITED,
+    limits: Limits,
 ) -> tuple[list[Cell], RecordingPlan]:
     """Return the cells of `matrix`, and where their recordings come from.
 
@@ -190,29 +190,26 @@ def plan_run(
     UsageError
         If the matrix asks for something that is not there.
     TactbenchError
-        If a rig that is not simulated cannot be built, or cannot list its recordings.
+        If a rig that is not simulated cannot be built, cannot list its recordings, or one of them cannot be read.
     """
-    recording_plan = RecordingPlan()
     rig_file = load_rig_file(Path(matrix.rig_file), registry).checked_for(matrix.rig) if matrix.rig_file else None
     if not registry.rigs[matrix.rig].simulated:  # a simulated one replays nothing: it is built when it has to record
-        work = partial(_replayed, registry=registry.only(rigs=[matrix.rig]), recordings=recordings, rig_file=rig_file)
+        work = partial(_replayed, registry=registry, recordings=recordings, rig_file=rig_file)
         builder = InProcess() if registry.rigs.owned(matrix.rig).ours else Pool(1, limits)
         ((_, paths),) = builder.each(work, [matrix.rig])
         if isinstance(paths, BaseException):
             raise paths
         if paths is not None:
-            return _from_replay(matrix, registry, [Path(path) for path in paths], store)
+            return _from_replay(matrix, registry, paths, store)
     if not matrix.sensors:
         raise UsageError("No sensor is named.", hint=f"Give --sensor; known: {', '.join(registry.sensors.names())}.")
     cells = plan_cells(matrix, [registry.sensors[name].name for name in matrix.sensors], registry, rig_file)
-    for task in {cell.task for cell in cells}:
-        _check_splits(registry.tasks[task].spec, [cell.split for cell in cells if cell.task == task])
-    recording_plan.requests = requests_for(cells, registry, keys, store, matrix.simulation)
-    for key, made in recording_plan.requests.items():
-        recording_plan.paths[key] = [request.path for request in made]
-        if not made:
-            recording_plan.troubles[key] = _no_scenes(key, matrix)
-    return cells, recording_plan
+    for cell in cells:
+        _check_split(registry.tasks[cell.task].spec, cell.split)
+    return cells, {
+        key: Source([request.path for request in made], made, None if made else _no_scenes(key, matrix))
+        for key, made in requests_for(cells, registry, keys, store).items()
+    }
 
 
 def _from_replay(
@@ -221,8 +218,8 @@ def _from_replay(
     """Return the cells of recordings that exist.
 
     A recording of a scene that some task planned serves the campaigns that plan a scene of this name; one whose scene
-    nobody planned (an imported table) serves any task. One that cannot be read stops the cells of its sensor, after
-    which a folder above it is named, or else of every sensor.
+    nobody planned (an imported table) serves any task. One that cannot be read stops the cells of the sensor that its
+    folder is named after; RecordingError if there is none.
     """
     if not paths:
         raise MissingRecordingError("There are no recordings.", hint="Import recordings with `tactbench import`.")
@@ -233,25 +230,21 @@ def _from_replay(
             about = store.about(path)
             scenes.setdefault(about["sensor"], {})[path] = about["scene"]
         except RecordingError as error:
-            named = {*registry.sensors.names(), *matrix.sensors, *scenes}
-            owner = next((folder for folder in reversed(path.parent.parts) if folder in named), "")
-            broken.setdefault(owner, error)
-    known = sorted({*scenes, *broken} - {""}) or list(matrix.sensors)
-    if not known:
-        raise broken[""]
+            if path.parent.name not in (*registry.sensors.names(), *matrix.sensors):
+                raise
+            broken.setdefault(path.parent.name, error)
+    known = sorted({*scenes, *broken})
     for name in matrix.sensors:
-        if name not in known and "" not in broken:
+        if name not in known:
             raise UnknownNameError("sensor in these recordings", name, known)
     cells = plan_cells(matrix, matrix.sensors or known, registry)
-    plan = RecordingPlan()
+    plan: RecordingPlan = {}
     for key in dict.fromkeys(request_key(cell) for cell in cells):
         sensor, task, split, _ = key
         names = {planned.scene.name for planned in registry.tasks[task].spec.scenes_for(split)}
         found = scenes.get(sensor, {})
-        plan.paths[key] = [path for path, scene in found.items() if scene is None or not names or scene in names]
-        trouble = broken.get(sensor) or broken.get("") or (None if plan.paths[key] else _no_scenes(key, matrix))
-        if trouble is not None:
-            plan.troubles[key] = trouble
+        fitting = [path for path, scene in found.items() if scene is None or not names or scene in names]
+        plan[key] = Source(fitting, trouble=broken.get(sensor) or (None if fitting else _no_scenes(key, matrix)))
     return cells, plan
 
 
@@ -262,20 +255,18 @@ def _no_scenes(key: RequestKey, matrix: MatrixSpec) -> NotApplicable:
     )
 
 
-def _replayed(name: str, registry: Registry, recordings: Path | None, rig_file: RigFile | None) -> list[str] | None:
+def _replayed(name: str, registry: Registry, recordings: Path | None, rig_file: RigFile | None) -> list[Path] | None:
     """Return the recordings of a rig that replays, None of one that records."""
     rig = rig_of(name, registry, recordings, rig_file)
     if not hasattr(rig, "recordings"):
         return None
     with failing_as(f"The recordings of rig {name!r} cannot be listed"):
-        return [str(path) for path in rig.recordings()]
+        return [Path(path) for path in rig.recordings()]
 
 
-def _check_splits(task: TaskSpec, splits: Sequence[str | None]) -> None:
+def _check_split(task: TaskSpec, split: str | None) -> None:
     """Refuse a split that no recording of this task's scenes can be asked for, before any is made."""
     labels = {label for planned in task.scenes for label in planned.scene.labels}
-    few = (FEW_SHOT,) if any(shots(name) for name in task.splits) else ()
-    known = {*ACQUIRED_SPLITS, *task.splits, *task.campaigns, *labels, *few}
-    for split in splits:
-        if split is not None and split not in known and shots(split) is None:
-            raise UnknownNameError(f"split of task {task.name!r}", split, known)
+    known = {*ACQUIRED_SPLITS, *task.splits, *task.campaigns, *labels}
+    if split is not None and split not in known and shots(split) is None:
+        raise UnknownNameError(f"split of task {task.name!r}", split, known)

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 from tactbench.core.matrix.installed import rig_of
 from tactbench.core.matrix.plan_recordings import RecordingRequest
 from tactbench.core.plugins.interfaces import Operator
-from tactbench.core.plugins.registry import Registry
-from tactbench.core.plugins.taking_part import taking_part
+from tactbench.core.plugins.registry import Family, Registry
 from tactbench.core.spec.rig_file import RigFile
 
 GRACE_S = 5.0
@@ -18,45 +17,31 @@ GRACE_S = 5.0
 
 
 class Recorder:
-    """Makes one recording after the other; each rig is built once.
-
-    It knows what `requests` name, and no other plugins' effects and indenters.
+    """Makes one recording after the other; the rig, the same of all of them, is built once.
 
     Parameters
     ----------
-    requests
-        What it will be asked for.
     registry
         Where sensors and rigs are looked up.
     operator
         Who stands at a rig of real devices.
     """
 
-    def __init__(self, requests: Sequence[RecordingRequest], registry: Registry, operator: Operator | None) -> None:
+    def __init__(self, registry: Registry, operator: Operator | None) -> None:
         self._operator = operator
-        self._rigs: dict[tuple[str, str], Any] = {}
-        effects = [taking_part(registry, registry.sensors[one.sensor], one.scene) for one in requests]
-        shapes = {one.scene.indenter.shape for one in requests}
-        self._registry = registry.only(
-            sensors=dict.fromkeys(one.sensor for one in requests),
-            rigs=dict.fromkeys(one.rig for one in requests),
-            effects=dict.fromkeys(owned.descriptor.name for some in effects for owned in some),
-            indenters=[name for name in registry.indenters.names() if name in shapes],
-            profiles=registry.profiles.names(),
-            devices=registry.devices.names(),
-        )
+        self._built: Any = None
+        self._registry = replace(registry, tasks=Family("task"))  # most of what a process would be sent
 
-    def __call__(self, request: RecordingRequest) -> str:
-        """Make a recording and return its content digest; raises whatever the rig raises."""
+    def __call__(self, request: RecordingRequest) -> None:
+        """Make a recording; raises whatever the rig raises."""
         from tactbench.core.acquisition import acquire
 
-        made = request.rig, request.rig_file
-        if made not in self._rigs:
+        if self._built is None:
             devices = RigFile.model_validate_json(request.rig_file) if request.rig_file else None
-            self._rigs[made] = devices, rig_of(request.rig, self._registry, rig_file=devices, operator=self._operator)
-        devices, built = self._rigs[made]
+            self._built = devices, rig_of(request.rig, self._registry, rig_file=devices, operator=self._operator)
+        devices, built = self._built
         rig = self._registry.rigs[request.rig]
-        acquired = acquire(
+        acquire(
             built,
             self._registry.sensors[request.sensor],
             rig,
@@ -69,7 +54,6 @@ class Recorder:
             provenance={},
             rig_file=devices,
         )
-        return acquired.content_digest
 
 
 def is_computed(request: RecordingRequest, registry: Registry) -> bool:

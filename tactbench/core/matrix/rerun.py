@@ -9,12 +9,12 @@ from pathlib import Path
 
 from tactbench.core.matrix.keys import Keys, differences
 from tactbench.core.matrix.plan import Cell
-from tactbench.core.matrix.plan_recordings import RecordingPlan, request_key, requests_for
-from tactbench.core.matrix.progress import Progress
+from tactbench.core.matrix.plan_recordings import Source, request_key, requests_for
 from tactbench.core.matrix.run import EngineChoice, Run
 from tactbench.core.matrix.store import Row, Store
 from tactbench.core.matrix.summary import SEED_DECIDES
 from tactbench.core.plugins.registry import Registry
+from tactbench.core.progress import Progress
 
 
 @dataclass(frozen=True)
@@ -47,11 +47,11 @@ def compute_again(
     """
     with tempfile.TemporaryDirectory(prefix="tactbench-rerun-") as place, Store(Path(place)).hold() as again:
         keys, need = Keys(registry), request_key(asked)
-        plan = RecordingPlan(paths={need: list(paths)})
+        source = Source(paths)
         if registry.rigs[asked.rig].simulated:
-            plan.requests = requests_for([asked], registry, keys, again, asked.simulation)
-            plan.paths = {need: [request.path for request in plan.requests[need]]}
-        run = Run(again, registry, keys, plan, EngineChoice("in-process"), None, progress, None, [asked])
+            requests = requests_for([asked], registry, keys, again)[need]
+            source = Source([request.path for request in requests], requests)
+        run = Run(again, registry, keys, {need: source}, EngineChoice("in-process"), None, progress, None, [asked])
         run.carry_out([asked], alone=True)
         row = run.rows[asked.name]
         done = row["status"] == before["status"] == "done"

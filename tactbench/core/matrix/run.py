@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib.util
+import os
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
@@ -21,7 +22,6 @@ from tactbench.core.matrix.plan_recordings import (
     plan_parts,
     request_key,
 )
-from tactbench.core.matrix.progress import Progress
 from tactbench.core.matrix.record import GRACE_S, Recorder, is_computed
 from tactbench.core.matrix.solve import Job, published, solve, unanswered
 from tactbench.core.matrix.store import Row, Store
@@ -30,6 +30,7 @@ from tactbench.core.plugins.declared import declared_in, with_declared
 from tactbench.core.plugins.interfaces import Operator
 from tactbench.core.plugins.registry import Registry, installed
 from tactbench.core.pool import UNLIMITED, Engine, InProcess, Limits, Pool, preload
+from tactbench.core.progress import Progress
 from tactbench.core.provenance.gather import gather, usable_cores
 from tactbench.core.spec.matrix import MatrixSpec
 from tactbench.core.spec.status import STOPPED
@@ -46,8 +47,6 @@ class EngineChoice:
     jobs: int | None = None
     """Processes at once; None: one for each usable core."""
     limits: Limits = UNLIMITED
-    scheduler: str | None = None
-    """Address of a Dask scheduler; None: a cluster on this machine."""
 
     @property
     def processes(self) -> int:
@@ -61,8 +60,6 @@ class EngineChoice:
                 f"The engine in-process carries out one cell at a time; --jobs {self.jobs} was given.",
                 hint="Leave out --jobs, or use --engine isolated.",
             )
-        if self.scheduler is not None and self.name != "dask":
-            raise UsageError("A scheduler is for --engine dask.", hint="Add --engine dask, or leave it out.")
         if self.name == "dask" and importlib.util.find_spec("distributed") is None:
             raise UsageError(
                 "The Dask engine needs the library distributed, which is not installed.",
@@ -74,7 +71,7 @@ class EngineChoice:
         if self.name == "dask":
             from tactbench.core.matrix.dask import Dask
 
-            return Dask(self.processes, self.limits, self.scheduler)
+            return Dask(self.processes, self.limits, os.environ.get("DASK_SCHEDULER_ADDRESS"))
         return InProcess() if self.name == "in-process" else Pool(jobs, self.limits)
 
 
@@ -135,7 +132,7 @@ def run_matrix(
     FolderError
         If another run holds the folder, or the disk refuses; what was finished before is kept.
     """
-    choice = choice or EngineChoice()
+    choice, progress = choice or EngineChoice(), progress or Progress()
     choice.check()
     if choice.name == "dask":
         matrix = matrix.model_copy(update={"latency": False})  # a cluster's cells are never alone on their machine
@@ -148,7 +145,7 @@ def run_matrix(
         cells, plan = plan_parts(parts, registry, keys, store, choice.limits)
         provenance = gather(registry, seed=matrix.seed, engine=choice.name)
         store.begin(provenance)
-        run = Run(store, registry, keys, plan, choice, operator, progress or Progress(), shown, cells)
+        run = Run(store, registry, keys, plan, choice, operator, progress, shown, cells)
         run.carry_out([cell for cell in cells if cell.timed], alone=True)
         run.carry_out([cell for cell in cells if not cell.timed], alone=False)
     rows = tuple(run.rows[cell.name] for cell in cells)
@@ -172,58 +169,45 @@ class Run:
     rows: dict[str, Row] = field(default_factory=dict)
     computed: int = 0
     recorded: int = 0
-    _begun: bool = False
-    """Whether a stage of the progress was begun."""
 
     def carry_out(self, cells: Sequence[Cell], *, alone: bool) -> None:
-        """Record what `cells` lack and evaluate them; `alone`: one cell at a time, with nothing else at work.
-
-        Else cells whose recordings are there are evaluated beside the recording of others.
-        """
+        """Record what `cells` lack, then evaluate them; `alone`: one cell at a time, with nothing else at work."""
         by_need: dict[RequestKey, list[Cell]] = {}
         for cell in cells:
             by_need.setdefault(request_key(cell), []).append(cell)
-        requests = [request for need in by_need for request in self.plan.requests.get(need, ())]
-        self._clear(requests)
-        missing = {request.path: request for request in requests if not request.path.exists()}
-        lacking = {need: missing.keys() & self.plan.paths.get(need, ()) for need in by_need}
-        ready = [self._jobs(by_need[need]) for need, paths in lacking.items() if not paths]
-        later = [cell for need, paths in lacking.items() if paths for cell in by_need[need]]
-        total = len(missing) + len(later) + sum(map(len, ready))
-        if not total:
+        self._record([request for need in by_need for request in self.plan[need].requests])
+        groups = [jobs for some in by_need.values() if (jobs := self._jobs(some))]
+        if not groups:
             return
-        self._begun = True
-        stage = "recording and evaluating" if missing else "evaluating"
-        self.progress.begin(f"{stage}, timed" if alone else stage, total)
+        self.progress.begin("evaluating, timed" if alone else "evaluating", sum(map(len, groups)))
         at_once = 1 if alone or self.choice.name == "in-process" else self.choice.processes
-        computed = all(is_computed(request, self.registry) for request in missing.values())
-        engine = self.choice.engine(at_once)
-        recorder = self._recorder(engine, beside_cells=computed and not alone, computed=computed)
-        with recorder, engine:
-            self._submit_recordings(recorder, missing.values(), computed=computed)
-            self._submit_cells(engine, ready, at_once)
-            first = () if recorder is engine else recorder.outcomes()
-            for item, outcome in chain(first, engine.outcomes()):
-                if isinstance(item, Job):
-                    self._evaluated(item, outcome, engine.log)
-                    continue
-                self._recorded(item, outcome)
-                for need, paths in lacking.items():
-                    if item.path in paths:
-                        paths.discard(item.path)
-                        if not paths:
-                            self._submit_cells(engine, [self._jobs(by_need[need])], at_once)
+        with self.choice.engine(at_once) as engine:
+            self._submit_cells(engine, groups, at_once)
+            for job, outcome in engine.outcomes():
+                self._evaluated(job, outcome, engine.log)
 
     # Recordings
 
-    def _recorder(self, engine: Engine, *, beside_cells: bool, computed: bool) -> Engine:
-        """Return what makes recordings: the engine itself where they may be made beside cells."""
-        if self.operator is not None and not computed:
-            return InProcess()  # the operator's terminal belongs to this process
-        if isinstance(engine, InProcess) or (isinstance(engine, Pool) and beside_cells):
-            return engine
-        grace_s = 0.0 if computed else GRACE_S
-        return Pool(self.choice.processes if computed else 1, replace(self.choice.limits, grace_s=grace_s))
+    def _record(self, requests: Sequence[RecordingRequest]) -> None:
+        """Make what is not there yet."""
+        self._clear(requests)
+        missing = {request.path: request for request in requests if not request.path.exists()}
+        if not missing:
+            return
+        self.progress.begin("recording", len(missing))
+        computed = all(is_computed(request, self.registry) for request in missing.values())
+        with self._recorder(computed=computed) as recorder:
+            self._submit_recordings(recorder, missing.values(), computed=computed)
+            for request, outcome in recorder.outcomes():
+                self._recorded(request, outcome)
+
+    def _recorder(self, *, computed: bool) -> Engine:
+        """Return what makes recordings, with time for real devices to be closed."""
+        # The operator's terminal belongs to this process.
+        if (self.operator is not None and not computed) or isinstance(self.choice.engine(1), InProcess):
+            return InProcess()
+        limits = self.choice.limits if computed else replace(self.choice.limits, grace_s=GRACE_S)
+        return Pool(self.choice.processes if computed else 1, limits)
 
     def _clear(self, requests: Iterable[RecordingRequest]) -> None:
         """Remove what a simulation that was killed has left; what devices gave is never removed."""
@@ -243,7 +227,7 @@ class Run:
         for piece in pieces.values():
             for part in range(min(parts, len(piece))):
                 requests = piece[part::parts]
-                recorder.submit(Recorder(requests, self.registry, self.operator), requests)
+                recorder.submit(Recorder(self.registry, self.operator), requests)
 
     def _recorded(self, request: RecordingRequest, outcome: Any) -> None:
         if isinstance(outcome, UnwritableError):
@@ -255,9 +239,9 @@ class Run:
 
                 journals = sorted(request.path.parent.glob(f"{request.path.name}*.partial"))
                 outcome.hint = " ".join([outcome.hint, *(recovery(one, request.path) for one in journals)]).strip()
-            for need, paths in self.plan.paths.items():
-                if request.path in paths:
-                    self.plan.troubles.setdefault(need, outcome)
+            for source in self.plan.values():
+                if request.path in source.paths:
+                    source.trouble = source.trouble or outcome
         self.recorded += not stopped
         self.progress.advance(f"{request.sensor} {request.scene.name}", stopped=stopped)
 
@@ -268,13 +252,11 @@ class Run:
         jobs = []
         for cell in cells:
             task = task_of(cell.task_key, self.registry)
-            need = request_key(cell)
+            source = self.plan[request_key(cell)]
             try:
-                trouble = self.plan.troubles.get(need)
-                if trouble is not None:
-                    raise trouble
-                paths = self.plan.paths[need]
-                digests = {path: self.store.about(path)["digest"] for path in paths}
+                if source.trouble is not None:
+                    raise source.trouble
+                digests = {path: self.store.about(path)["digest"] for path in source.paths}
                 key, sections = self.keys.of_cell(cell, digests)
             except Exception as error:
                 self._stopped(cell, task, error)
@@ -282,13 +264,13 @@ class Run:
             found = self.store.finished(key)
             if found is None:
                 estimator = self.registry.estimators[cell.estimator]
-                jobs.append(Job(cell, task, estimator, tuple(paths), tuple(digests.values()), key, sections))
+                jobs.append(Job(cell, task, estimator, tuple(digests), tuple(digests.values()), key, sections))
                 continue
             # Its key covers neither its number among the repeats nor what is published: they change no number.
             naming = {"cell": cell.name, "repeat": cell.repeat, "repeats": cell.repeats}
             row = {**found, **naming, **published(cell, task, found["split"])}
             self.store.reuse(row)
-            self._done(cell, row, computed=False)
+            self.rows[cell.name] = row
         return jobs
 
     def _submit_cells(self, engine: Engine, groups: Sequence[Sequence[Job]], at_once: int) -> None:
@@ -304,28 +286,25 @@ class Run:
                 engine.submit(work, piece)
 
     def _evaluated(self, job: Job, outcome: Any, log: str) -> None:
+        """Keep what came of a cell; show all complete replicates if it completes one."""
+        cell = job.cell
         if isinstance(outcome, BaseException):
-            self._stopped(job.cell, job.task, outcome, job.key, job.sections)
-            return
-        row, answers = outcome
-        row |= {"key": job.key, "log": log, "recordings": [self.store.beside(Path(path)) for path in row["recordings"]]}
-        self._done(job.cell, self.store.keep(row, job.sections, answers))
+            self._stopped(cell, job.task, outcome, job.key, job.sections)
+        else:
+            row, answers = outcome
+            paths = [self.store.beside(Path(path)) for path in row["recordings"]]
+            self.rows[cell.name] = self.store.keep(
+                {**row, "key": job.key, "log": log, "recordings": paths}, job.sections, answers
+            )
+            self.computed += 1
+        self.progress.advance(cell.name, stopped=self.rows[cell.name]["status"] in STOPPED)
+        left = {one.repeat for one in self.cells if one.name not in self.rows}
+        if self.shown is not None and left and cell.repeat not in left:
+            self.shown([self.rows[one.name] for one in self.cells if one.repeat not in left])
 
     def _stopped(
         self, cell: Cell, task: TaskSpec, why: BaseException, key: str = "", sections: Sections | None = None
     ) -> None:
         row = unanswered(cell, task, why, simulated=self.registry.rigs[cell.rig].simulated)
-        self._done(cell, self.store.keep({**row, "key": key}, sections or {}))
-
-    def _done(self, cell: Cell, row: Row, *, computed: bool = True) -> None:
-        """Take the row of a cell; show all complete replicates if it completes one."""
-        self.rows[cell.name] = row
-        self.computed += computed
-        if not (computed and self._begun):
-            return
-        self.progress.advance(cell.name, stopped=row["status"] in STOPPED)
-        if self.shown is None or any(one.name not in self.rows for one in self.cells if one.repeat == cell.repeat):
-            return
-        left = {one.repeat for one in self.cells if one.name not in self.rows}
-        if left:
-            self.shown([self.rows[one.name] for one in self.cells if one.repeat not in left])
+        self.rows[cell.name] = self.store.keep({**row, "key": key}, sections or {})
+        self.computed += 1

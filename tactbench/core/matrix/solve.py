@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from tactbench.core.errors import CellStopped, EngineError, NotApplicable
 from tactbench.core.matrix.keys import Sections
-from tactbench.core.matrix.plan import Cell
+from tactbench.core.matrix.plan import ALIKE, Cell
 from tactbench.core.plugins.registry import load_object
 from tactbench.core.pool.child import plain_error
 from tactbench.core.provenance.gather import host_id
@@ -157,14 +157,10 @@ def check_content(job: Job) -> None:
 def opening(cell: Cell, task: TaskSpec, *, simulated: bool = False) -> Row:
     """Return a row with what is known before anything is computed; every key of the format is there."""
     unknown = {name: field.get_default(call_default_factory=True) for name, field in RowModel.model_fields.items()}
-    alike = (
-        "sensor", "task", "rig", "protocol", "split", "estimator", "repeat", "repeats", "seed", "declared_task",
-        "include_incomplete",
-    )  # fmt: skip
     asked = ("answer_per", "answer_from", "metric", "unit", "equivalence")
     return {
         **unknown,
-        **{name: getattr(cell, name) for name in alike},
+        **{name: getattr(cell, name) for name in ALIKE},
         **{name: getattr(task, name) for name in asked},
         "cell": cell.name,
         "params": dict(cell.params),

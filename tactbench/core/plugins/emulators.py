@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import atexit
 import json
-import os
 import signal
 import socket
 import subprocess
@@ -204,35 +203,31 @@ class _Child:
 
     def __init__(self, file: RigFile) -> None:
         code = "from tactbench.core.plugins.emulators import main; main()"
-        self._process = subprocess.Popen([sys.executable, "-c", code], stdin=subprocess.PIPE, stdout=subprocess.PIPE)
-        assert self._process.stdin is not None
-        assert self._process.stdout is not None
-        self._process.stdin.write(file.model_dump_json().encode() + b"\n")
-        self._process.stdin.flush()
-        said = json.loads(self._process.stdout.readline() or '{"error": "its process ended", "hint": ""}')
+        self.process = subprocess.Popen([sys.executable, "-c", code], stdin=subprocess.PIPE, stdout=subprocess.PIPE)
+        assert self.process.stdin is not None
+        assert self.process.stdout is not None
+        self.process.stdin.write(file.model_dump_json().encode() + b"\n")
+        self.process.stdin.flush()
+        said = json.loads(self.process.stdout.readline() or '{"error": "its process ended", "hint": ""}')
         if "error" in said:
             self.close()
             raise RigError(f"The devices cannot be emulated: {said['error']}", hint=said["hint"])
         self.file = RigFile.model_validate(said)
 
-    @property
-    def alive(self) -> bool:
-        return self._process.poll() is None
-
     def close(self) -> None:
-        assert self._process.stdin is not None
-        assert self._process.stdout is not None
-        self._process.stdin.close()
+        assert self.process.stdin is not None
+        assert self.process.stdout is not None
+        self.process.stdin.close()
         try:
-            self._process.wait(10.0)
+            self.process.wait(10.0)
         except subprocess.TimeoutExpired:
-            self._process.kill()
-            self._process.wait()
-        self._process.stdout.close()
+            self.process.kill()
+            self.process.wait()
+        self.process.stdout.close()
 
 
-_children: dict[tuple[int, str], _Child] = {}
-"""By process and rig file; of a process at most one."""
+_children: dict[str, _Child] = {}
+"""By rig file; at most one."""
 
 
 def running(file: RigFile) -> RigFile:
@@ -248,9 +243,9 @@ def running(file: RigFile) -> RigFile:
     """
     if not file.emulated or file.emulation.time == "virtual":
         return file
-    key = os.getpid(), file.model_dump_json()
+    key = file.model_dump_json()
     child = _children.get(key)
-    if child is None or not child.alive:
+    if child is None or child.process.poll() is not None:
         end_running()
         child = _children[key] = _Child(file)
     return child.file
@@ -258,8 +253,8 @@ def running(file: RigFile) -> RigFile:
 
 def end_running() -> None:
     """End the emulators that run in a process of their own."""
-    for key in [key for key in _children if key[0] == os.getpid()]:
-        _children.pop(key).close()
+    while _children:
+        _children.popitem()[1].close()
 
 
 atexit.register(end_running)

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 from pydantic import ValidationError
 
-from tactbench.core.errors import PluginContractError
+from tactbench.core.errors import PluginContractError, complaint
 from tactbench.core.plugins.registry import load_object
 from tactbench.core.spec.profile import ForcePath
 from tactbench.core.spec.quantity import Quantity, Source
@@ -33,10 +33,8 @@ def force_path(descriptor: ProfileDescriptor, given: Mapping[str, Quantity], by:
     try:
         made = load_object(descriptor.where)(**values)
     except ValidationError as error:
-        first = error.errors()[0]
-        place = ".".join(map(str, first["loc"]))
         raise PluginContractError(
-            f"{what} makes no force path of {values}: {f'{place}: ' if place else ''}{first['msg']}.",
+            f"{what} makes no force path of {values}: {complaint(error)}.",
             hint="Its times ascend from 0 s, and its forces are finite and 0 N or more.",
         ) from error
     if not isinstance(made, ForcePath):

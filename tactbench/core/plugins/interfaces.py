@@ -77,19 +77,6 @@ class DeviceAcquisition(Acquisition, Protocol):
         """Why it ended before its time; empty: it did not. Its recording is then incomplete."""
 
 
-class MovingAcquisition(DeviceAcquisition, Protocol):
-    """An acquisition in which something moves by itself."""
-
-    def stop(self, why: str) -> str:
-        """End what moves, at once: the scene was interrupted, and its recording is about to be completed.
-
-        Returns
-        -------
-        str
-            What is to be done where it could not be ended; empty: it is as it should be.
-        """
-
-
 class Rig(Protocol):
     """Something that carries out scenes."""
 

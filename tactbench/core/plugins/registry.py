@@ -151,14 +151,6 @@ class Registry:
         """Return the families by the name of their hook's plural."""
         return {name: getattr(self, name) for name in _KINDS}
 
-    def only(self, **names: Iterable[str]) -> Registry:
-        """Return a registry of what is named, by family: what a child process needs of it."""
-        found = Registry()
-        for kind, several in names.items():
-            for name in several:
-                found.families()[kind].add(self.families()[kind].owned(name))
-        return found
-
     @property
     def failures(self) -> list[PluginRow]:
         """The plugins that could not be used."""
@@ -312,7 +304,7 @@ def check_api_version(module: str, written_for: object) -> None:
         If they differ.
     """
     spoken = hookspecs.API_VERSION
-    if type(written_for) is int and written_for == spoken:
+    if written_for == spoken:
         return
     stated = "no TACTBENCH_API" if written_for is None else f"TACTBENCH_API = {written_for!r}"
     raise PluginContractError(

@@ -17,7 +17,7 @@ from types import FrameType
 from typing import Any
 
 from tactbench.core import errors
-from tactbench.core.errors import OutOfMemory, Raised, TactbenchError
+from tactbench.core.errors import OutOfMemory, Raised, TactbenchError, error_text
 from tactbench.core.pool.limits import Limits, resident_mb
 
 LOG_BYTES = 2**16
@@ -125,4 +125,4 @@ def plain_error(error: BaseException) -> TactbenchError:
     if isinstance(error, TactbenchError) and getattr(errors, type(error).__name__, None) is type(error):
         error.traceback_text = error.traceback_text or where
         return error
-    return Raised(f"{type(error).__name__}: {error}".rstrip(": "), traceback_text=where)
+    return Raised(error_text(error), traceback_text=where)

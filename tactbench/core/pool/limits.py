@@ -7,8 +7,6 @@ from dataclasses import dataclass
 
 import psutil
 
-MB = 2**20
-
 
 @dataclass(frozen=True)
 class Limits:
@@ -33,4 +31,4 @@ def resident_mb(pid: int) -> float:
         for one in (process, *process.children(recursive=True)):
             with suppress(psutil.Error):
                 total += one.memory_info().rss
-    return total / MB
+    return total / 2**20

@@ -14,16 +14,13 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import suppress
 from pathlib import Path
 from queue import Empty, SimpleQueue
-from typing import Any, Self, TypeVar
+from typing import Any, Self
 
 import psutil
 
 from tactbench.core.errors import CellStopped, Crashed, OutOfMemory, TimedOut
 from tactbench.core.pool.child import end_of, plain_error, run_child
 from tactbench.core.pool.limits import UNLIMITED, Limits, resident_mb
-
-T = TypeVar("T")
-R = TypeVar("R")
 
 START_S = 60.0
 """Seconds within which a process must begin with its first item; with `spawn` it imports libraries first."""
@@ -58,7 +55,7 @@ class Engine:
         """Yield every submitted item with its result or the error that stopped it, in the order in which they end."""
         raise NotImplementedError
 
-    def each(self, work: Callable[[T], R], items: Iterable[T]) -> Iterator[tuple[T, R | BaseException]]:
+    def each(self, work: Callable[[Any], Any], items: Iterable[Any]) -> Iterator[tuple[Any, Any]]:
         """Carry out `work` for every item, as one piece, and yield outcomes."""
         with self:
             self.submit(work, list(items))
@@ -75,9 +72,7 @@ class InProcess(Engine):
             for item in items:
                 try:
                     outcome = work(item)
-                except KeyboardInterrupt:
-                    raise
-                except BaseException as error:
+                except (Exception, SystemExit) as error:
                     outcome = plain_error(error)
                 yield item, outcome
 
@@ -144,9 +139,9 @@ class Pool(Engine):
                 child = _Child(work, list(left), self.limits)
                 try:
                     while left and not child.over and not self._abandoned.is_set():
-                        outcome, log = child.outcome(self._abandoned)
-                        if outcome is not _ABANDONED:
-                            self._ended.put((left.popleft(), outcome, log))
+                        ended = child.outcome(self._abandoned)
+                        if ended is not None:
+                            self._ended.put((left.popleft(), *ended))
                 finally:
                     child.end(unfinished=bool(left))
         except Exception as error:  # it cannot be pickled, or the system starts no more processes
@@ -156,8 +151,6 @@ class Pool(Engine):
             self._ended.put(None)
 
 
-_ABANDONED = object()
-"""In place of an outcome: nobody waits for it."""
 _starting = threading.Lock()
 
 
@@ -184,8 +177,8 @@ class _Child:
         finally:
             theirs.close()
 
-    def outcome(self, abandoned: threading.Event) -> tuple[Any, str]:
-        """Wait for the next item; return its result or the error that stopped it, and what it printed."""
+    def outcome(self, abandoned: threading.Event) -> tuple[Any, str] | None:
+        """Return what came of the next item, or stopped it, and what it printed; None: nobody waits for it."""
         began_s, shared_mb = time.monotonic(), None
         while not abandoned.is_set():
             try:
@@ -203,7 +196,7 @@ class _Child:
                 self._kill(unfinished=True)
                 self.over = True
                 return _told(stopped, end_of(self._log), began_s)
-        return _ABANDONED, ""
+        return None
 
     def _beyond_limits(self, spent_s: float, shared_mb: float | None) -> CellStopped | None:
         """Return why the item at work must be ended; None if it need not."""

@@ -34,7 +34,6 @@ def gather(registry: Registry, **circumstances: Any) -> dict[str, Any]:
         "commit": _commit(Path(tactbench.__file__).parent),
         "python": platform.python_version(),
         "platform": f"{platform.system()}-{platform.release()}-{platform.machine()}",
-        "machine": platform.machine(),
         "cpu": cpu_model(),
         "cores": os.cpu_count(),
         "memory_mb": psutil.virtual_memory().total // 2**20,
@@ -73,14 +72,12 @@ def _plugins(registry: Registry) -> Iterator[dict[str, str]]:
     packages = {row.module.partition(".")[0]: row for row in registry.plugins}
     for package, row in sorted(packages.items()):
         if package != PACKAGE:
-            source = {"package": package, "source": source_digest(package)}
-            yield {"distribution": row.distribution, "version": row.version, **source}
+            source = source_digest(package)
+            yield {"distribution": row.distribution, "version": row.version, "package": package, "source": source}
 
 
 def _commit(folder: Path) -> str:
     """Return the commit of the git checkout that holds `folder`, with ``+changes`` if files below it differ from it."""
-    if not any((place / ".git").exists() for place in folder.parents):
-        return ""
     asked = ["git", "-C", str(folder), "describe", "--always", "--abbrev=12", "--exclude=*", "--dirty=+changes"]
     try:
         found = subprocess.run(asked, capture_output=True, text=True, timeout=GIT_S, check=True)
@@ -90,18 +87,15 @@ def _commit(folder: Path) -> str:
 
 
 def foot(several: Sequence[Mapping[str, Any]]) -> tuple[str, ...]:
-    """Return which software made some rows on which machines, each said once; keys of `gather` may be missing."""
-    return tuple(dict.fromkeys(text for one in several for text in _sentences(one)))
+    """Return which software made some rows on which machines, each said once; an empty one is passed over."""
+    return tuple(dict.fromkeys(text for one in filter(None, several) for text in _sentences(one)))
 
 
 def _sentences(one: Mapping[str, Any]) -> Iterator[str]:
-    if "tactbench" in one:
-        commit = f" ({one['commit']})" if one.get("commit") else ""
-        libraries = ", ".join(f"{name} {version}" for name, version in one.get("distributions", {}).items())
-        threads = f"BLAS threads: {one.get('threads', '?')}"
-        yield f"tactbench {one['tactbench']}{commit}, Python {one.get('python', '?')}, {libraries}, {threads}."
-    for plugin in one.get("plugins", ()):
+    commit = f" ({one['commit']})" if one["commit"] else ""
+    libraries = ", ".join(f"{name} {version}" for name, version in one["distributions"].items())
+    made_with = f"Python {one['python']}, {libraries}, BLAS threads: {one['threads']}"
+    yield f"tactbench {one['tactbench']}{commit}, {made_with}."
+    for plugin in one["plugins"]:
         yield f"Plugin {plugin['distribution']} {plugin['version']} (source {plugin['source'][:12]})."
-    if one.get("host"):
-        memory = f", {one['memory_mb'] / 1024:.0f} GiB" if one.get("memory_mb") else ""
-        yield f"Host {one['host']}: {one.get('cpu', 'unknown processor')}, {one.get('cores')} cores{memory}."
+    yield f"Host {one['host']}: {one['cpu']}, {one['cores']} cores, {one['memory_mb'] / 1024:.0f} GiB."

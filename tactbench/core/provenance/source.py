@@ -16,10 +16,10 @@ PACKAGE = "tactbench"
 RELEVANT = ("numpy", "scipy", "scikit-learn")
 """Distributions whose version may change a number in any cell."""
 
-_BOTH = ("core/spec", "core/recording", "core/samples.py", "core/plugins", "core/thread_limit.py")
-ANSWERING = (*_BOTH, "core/evaluation", "core/events", "core/statistics", "core/matrix/solve.py", "tasks", "estimators")
+_BOTH = ("core/spec", "core/recording", "core/samples", "core/plugins", "core/thread_limit")
+ANSWERING = (*_BOTH, "core/evaluation", "core/events", "core/statistics", "core/matrix/solve", "tasks", "estimators")
 """Sub-packages of tactbench that take part in every answer. Those that record do not: recordings count by content."""
-RECORDING = (*_BOTH, "core/acquisition.py", "links", "devices")
+RECORDING = (*_BOTH, "core/acquisition", "links", "devices")
 """Sub-packages of tactbench that take part in every recording, beside those of the sensor and the rig."""
 
 
@@ -59,8 +59,8 @@ def sources_of(modules: Iterable[str], own: Sequence[str]) -> dict[str, str]:
         places.add((package, "/".join(below[:2]) if package == PACKAGE else ""))
     found = {}
     for package, place in sorted(places):
-        folder = place if place.endswith(".py") or (Path(__file__).parents[2] / place).is_dir() else f"{place}.py"
-        name = f"{package}.{place.removesuffix('.py').replace('/', '.')}" if place else package
+        folder = place if (Path(__file__).parents[2] / place).is_dir() else f"{place}.py"
+        name = f"{package}.{place.replace('/', '.')}" if place else package
         found[name] = source_digest(package, folder if place else "")
     return found
 

@@ -5,18 +5,21 @@ that takes device times to host times lies below all stamps and touches those th
 convex hull, while a least-squares line follows the delays. Moon, Skelly and Towsley 1999 and Zhang, Liu and Xia 2002
 [sourced: abstracts]; that the edge over the middle is the line below all points with the least sum of distances is the
 dual of their linear program [derived].
+
+A recording stores the host's times, put there by such lines where the device has a clock of its own.
 """
 
 from __future__ import annotations
 
 import itertools
-from collections.abc import Sequence
+from collections.abc import Iterator
 
 import numpy as np
 
 from tactbench.core.errors import FormatError
+from tactbench.core.recording.partial import Blocks, Columns
 from tactbench.core.samples import FloatArray, IntArray
-from tactbench.core.spec.recording import ClockSegment, StreamClock
+from tactbench.core.spec.recording import ClockSegment, RecordingMeta, StreamClock
 
 STRETCH_NS = 30_000_000_000
 """Length of what one line is fitted to. Clocks wander: at 1 ppm with a period of 600 s one line over 600 s errs by
@@ -30,11 +33,9 @@ LOWEST = 10
 _SLACK_NS = 1e-3
 """A residual below minus this is below the line; float64 holds residuals of a stretch to 1e-5 ns [derived]."""
 
-Columns = tuple[IntArray, ...]
 
-
-def one_way(run: int, columns: Columns) -> ClockSegment:
-    """Return the line of a run below all of its (device_ns, host_ns), n >= 1, in order.
+def one_way(run: int, stamps: tuple[IntArray, IntArray] | IntArray) -> ClockSegment:
+    """Return the line of a run below all of its `stamps`, device_ns and host_ns, (2, n) with n >= 1, in order.
 
     Notes
     -----
@@ -43,9 +44,9 @@ def one_way(run: int, columns: Columns) -> ClockSegment:
     clock's wander the largest step of r1 between neighbouring windows on top [derived]. It is statistical: it assumes
     that delays sometimes come near their least value in each window. Below sixty points there is none.
     """
-    device, host = columns
-    x, middle = _centred(device)
-    y, first = _from_first(host - device)
+    device, host = stamps
+    middle, first = (int(device[0]) + int(device[-1])) // 2, int(host[0] - device[0])
+    x, y = (device - middle).astype(np.float64), (host - device - first).astype(np.float64)
     value, slope = _edge_below(x, y)
     bound = None
     if len(x) >= WINDOWS * LOWEST:
@@ -76,7 +77,7 @@ class ClockFit:
         self._runs = RunCounter()
         self._done: list[ClockSegment] = []
         self._run = 0
-        self._waiting: list[Columns] = []
+        self._waiting: list[IntArray] = []
         self._start_ns = 0
 
     @property
@@ -84,34 +85,32 @@ class ClockFit:
         """How often the device's times went back."""
         return self._runs.breaks
 
-    def add(self, *columns: IntArray) -> None:
+    def add(self, device_ns: IntArray, host_ns: IntArray) -> None:
         """Take further rows: (n,) times of the device and of the host, in order."""
-        run = self._runs.count(columns[0])
-        for cut in np.split(np.arange(len(run)), np.flatnonzero(np.diff(run)) + 1):
-            if len(cut):
-                self._extend(int(run[cut[0]]), tuple(column[cut[0] : cut[-1] + 1] for column in columns))
+        run = self._runs.count(device_ns)
+        for number in np.unique(run).tolist():
+            self._extend(number, np.stack((device_ns, host_ns))[:, run == number])
 
     def segments(self) -> tuple[ClockSegment, ...]:
         """Return the lines of all rows so far."""
         return (*self._done, *self._last())
 
     def _last(self) -> list[ClockSegment]:
-        return [one_way(self._run, _joined(self._waiting))] if self._waiting else []
+        return [one_way(self._run, np.concatenate(self._waiting, axis=1))] if self._waiting else []
 
-    def _extend(self, run: int, columns: Columns) -> None:
+    def _extend(self, run: int, stamps: IntArray) -> None:
         if run != self._run or not self._waiting:
             self._done += self._last()
-            self._run, self._waiting, self._start_ns = run, [], int(columns[0][0])
+            self._run, self._waiting, self._start_ns = run, [], int(stamps[0, 0])
         # Of rows that came together, the last one waited least.
-        last = np.append(columns[-1][1:] != columns[-1][:-1], True)
-        self._waiting.append(tuple(column[last] for column in columns))
-        while int(columns[0][-1]) - self._start_ns >= self._stretch_ns * 5 // 4:
-            waiting = _joined(self._waiting)
+        last = np.append(stamps[1, 1:] != stamps[1, :-1], True)
+        self._waiting.append(stamps[:, last])
+        while int(stamps[0, -1]) - self._start_ns >= self._stretch_ns * 5 // 4:
+            waiting = np.concatenate(self._waiting, axis=1)
             end = int(np.searchsorted(waiting[0], self._start_ns + self._stretch_ns))
-            self._done.append(one_way(self._run, tuple(column[:end] for column in waiting)))
+            self._done.append(one_way(self._run, waiting[:, :end]))
             self._start_ns += self._stretch_ns // 2
-            half = int(np.searchsorted(waiting[0], self._start_ns))
-            self._waiting = [tuple(column[half:] for column in waiting)]
+            self._waiting = [waiting[:, int(np.searchsorted(waiting[0], self._start_ns)) :]]
 
 
 class RunCounter:
@@ -184,20 +183,6 @@ def _on_lines(device: IntArray, middle: IntArray, offset: IntArray, drift: Float
     return np.asarray(device + offset[this] + np.rint((1 - share) * one + share * other).astype(np.int64))
 
 
-def _joined(pieces: Sequence[Columns]) -> Columns:
-    return tuple(np.concatenate(column) for column in zip(*pieces, strict=True))
-
-
-def _centred(device: IntArray) -> tuple[FloatArray, int]:
-    """Return times about the middle of the stretch, and the middle."""
-    middle = (int(device[0]) + int(device[-1])) // 2
-    return (device - middle).astype(np.float64), middle
-
-
-def _from_first(values: IntArray) -> tuple[FloatArray, int]:
-    return (values - values[0]).astype(np.float64), int(values[0])
-
-
 def _edge_below(x: FloatArray, y: FloatArray) -> tuple[float, float]:
     """Return value at 0 and slope of the edge of the lower convex hull over x = 0; x in order, about 0.
 
@@ -218,3 +203,33 @@ def _edge_below(x: FloatArray, y: FloatArray) -> tuple[float, float]:
             i = lowest
         else:
             j = lowest
+
+
+def with_clock_fits(meta: RecordingMeta, blocks: Blocks) -> RecordingMeta:
+    """Return `meta` with the lines of every stream in `blocks` that has a device clock.
+
+    A stream with times of its device has one unless `meta` says that its times are the host's. In virtual time, too:
+    what a device's link and its batches add to a time is added there as well.
+    """
+    otherwise = StreamClock(source="device")
+    fits: dict[str, ClockFit] = {}
+    for stream, columns in blocks:
+        if "device_ns" in columns and meta.clocks.get(stream, otherwise).source == "device":
+            fits.setdefault(stream, ClockFit()).add(columns["device_ns"], columns["t_ns"])
+    clocks = dict(meta.clocks)
+    for stream, fit in fits.items():
+        clocks[stream] = clocks.get(stream, otherwise).model_copy(
+            update={"method": "hull-1way", "segments": fit.segments(), "breaks": fit.breaks}
+        )
+    return meta.model_copy(update={"clocks": clocks})
+
+
+def on_host_clock(meta: RecordingMeta, blocks: Blocks) -> Iterator[tuple[str, Columns]]:
+    """Yield `blocks` as they are stored: by the lines in `meta`, with the stamps as they came in ``host_ns``."""
+    times: dict[str, HostTimes] = {}
+    for stream, columns in blocks:
+        clock = meta.clocks.get(stream)
+        if clock is not None and clock.segments and "device_ns" in columns:
+            of_host = times.setdefault(stream, HostTimes(clock))
+            columns = {**columns, "host_ns": columns["t_ns"], "t_ns": of_host(columns["device_ns"])}
+        yield stream, columns

@@ -97,10 +97,9 @@ class Completeness:
 
     def _silence(self, track: _Track, t_ns: npt.NDArray[np.int64]) -> None:
         before = self._begin_ns if track.last_ns is None else track.last_ns
-        times = np.concatenate((np.array([before], np.int64), t_ns))
-        steps = np.diff(times)
+        steps = np.diff(t_ns, prepend=before or 0)
         longest = int(steps.argmax())
-        track.silence = max(track.silence, (int(steps[longest]), int(times[longest])))
+        track.silence = max(track.silence, (int(steps[longest]), int(t_ns[longest] - steps[longest])))
         track.last_ns = int(t_ns[-1])
 
     def _stillness(self, track: _Track, still: _Stillness, t_ns: npt.NDArray[np.int64], data: npt.NDArray[Any]) -> None:

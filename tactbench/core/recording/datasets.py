@@ -17,7 +17,7 @@ from functools import cached_property
 from importlib.metadata import entry_points
 from importlib.util import find_spec
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 import tactbench
 from tactbench.core.errors import (
@@ -28,6 +28,7 @@ from tactbench.core.errors import (
     UnknownNameError,
 )
 from tactbench.core.plugins import hookspecs
+from tactbench.core.progress import Progress
 from tactbench.core.recording.format import VERSION
 from tactbench.core.recording.mapping.importing import import_tables
 from tactbench.core.recording.mapping.model import DataSource, Mapping
@@ -36,16 +37,6 @@ from tactbench.core.spec.yaml_file import load_yaml
 CACHE = "TACTBENCH_CACHE"
 """Environment variable: where data sets are kept, in place of the user's folder for caches."""
 FOLDER = "datasets"
-
-
-class Steps(Protocol):
-    """Receives how far the work has come; :class:`~tactbench.core.matrix.progress.Progress` is one."""
-
-    def begin(self, stage: str, total: int) -> None:
-        """Start a stage of `total` steps."""
-
-    def advance(self, what: str) -> None:
-        """Finish one step, named `what`."""
 
 
 @dataclass(frozen=True)
@@ -67,19 +58,17 @@ class DataSet:
 
     @cached_property
     def mapping(self) -> Mapping:
-        """The mapping; raises ConfigError if the file is wrong or states no source."""
-        found = load_yaml(self.path, Mapping)
-        if found.source is None:
+        """The mapping; raises ConfigError if the file is wrong."""
+        return load_yaml(self.path, Mapping)
+
+    @property
+    def source(self) -> DataSource:
+        """Where the files lie; raises ConfigError if the mapping does not state it."""
+        if self.mapping.source is None:
             raise ConfigError(
                 str(self.path), None, "It states no source, so that it is no data set.",
                 hint=f"Add `source`, or import it: tactbench import {self.path}.",
             )  # fmt: skip
-        return found
-
-    @property
-    def source(self) -> DataSource:
-        """Where the files lie."""
-        assert self.mapping.source is not None  # `mapping` refuses that
         return self.mapping.source
 
     @property
@@ -93,7 +82,7 @@ class DataSet:
         stated = hashlib.sha256(self.path.read_bytes()).hexdigest()[:12]
         return cache() / self.name / f"recordings-{VERSION}-{stated}"
 
-    def recordings(self, root: Path | None = None, progress: Steps | None = None) -> Path:
+    def recordings(self, root: Path | None = None, progress: Progress | None = None) -> Path:
         """Return the folder of its recordings; what is missing is fetched, checked and imported.
 
         Parameters
@@ -115,31 +104,25 @@ class DataSet:
         target, copy = self.imported, _copy(root, next(iter(self.source.files)))
         if target.is_dir():
             return target
+        progress = progress or Progress()
         self._fetch(copy, root, progress)
-
-        def step(done: int, total: int, what: str) -> None:
-            if progress is not None:
-                if done == 1:
-                    progress.begin(f"importing {self.name}", total)
-                progress.advance(what)
-
         with tempfile.TemporaryDirectory(prefix=".importing-", dir=target.parent) as aside:
             made = Path(aside, "recordings")
-            import_tables(self.path, root=self.files, out=made, progress=step)
+            import_tables(self.path, root=self.files, out=made, progress=progress)
             with suppress(OSError):  # another process was quicker
                 made.replace(target)
         return target
 
-    def _fetch(self, copy: Path | None, root: Path | None, progress: Steps | None) -> None:
+    def _fetch(self, copy: Path | None, root: Path | None, progress: Progress) -> None:
         import pooch
 
         address, files = self.source.address, self.source.files
         there = pooch.create(path=self.files, base_url=address or "file:///", registry=dict(files))
         pooch.get_logger().setLevel("WARNING")
         download = None if copy is None else _copying(copy)
-        if progress is not None:
-            progress.begin(f"{'fetching' if copy is None else 'copying'} {self.name}", len(files))
+        progress.begin(f"{'fetching' if copy is None else 'copying'} {self.name}", len(files))
         for name in files:
+            origin = address + name if copy is None else str(copy / name)
             if copy is None and not address and not (self.files / name).is_file():
                 raise NotApplicable(
                     f"{self.name}: {name} lies at no public address{f', nor in {root}' if root else ''}.",
@@ -148,13 +131,11 @@ class DataSet:
             try:
                 there.fetch(name, downloader=download)
             except ValueError as error:  # pooch's word for a digest that differs
-                origin = address + name if copy is None else copy / name
                 raise MissingRecordingError(
                     f"{self.name}: {origin} is not the file that is meant: its SHA-256 is not {files[name]}.",
                     hint="It is not kept. Files of another state are imported with `tactbench import MAPPING`.",
                 ) from error
             except OSError as error:
-                origin = address + name if copy is None else str(copy / name)
                 missed = f" (not in {root} either)" if root is not None and copy is None else ""
                 raise MissingRecordingError(
                     f"{self.name}: {origin} could not be fetched{missed}: {_reason(error)}. "
@@ -162,8 +143,7 @@ class DataSet:
                     hint="Put them there by hand, or name a folder that holds a copy as `root` (--root DIR). "
                     "What was fetched before is kept.",
                 ) from error
-            if progress is not None:
-                progress.advance(name)
+            progress.advance(name)
 
 
 def cache() -> Path:
@@ -188,11 +168,12 @@ def datasets() -> dict[str, DataSet]:
     found: dict[str, tuple[str, DataSet]] = {}
     for package, folder in _folders().items():
         for path in sorted(folder.glob("*.yaml"), key=lambda one: one.stem):
-            if load_yaml(path, Mapping).source is None:
+            one = DataSet(path)
+            if one.mapping.source is None:
                 continue
-            if path.stem in found:
-                raise DuplicateNameError("data set", path.stem, (found[path.stem][0], package))
-            found[path.stem] = package, DataSet(path)
+            if one.name in found:
+                raise DuplicateNameError("data set", one.name, (found[one.name][0], package))
+            found[one.name] = package, one
     return {name: one for name, (_, one) in found.items()}
 
 

@@ -35,10 +35,10 @@ def import_log(
     options: Mapping[str, Any],
     *,
     out: Path,
-    session: str = "1",
-    role: Role | None = None,
-    labels: Mapping[str, Scalar] | None = None,
-    replace: bool = False,
+    session: str,
+    role: Role | None,
+    labels: Mapping[str, Scalar],
+    replace: bool,
 ) -> ImportedLog:
     """Turn a log of a sensor's own tools into a recording; all of it is written, or nothing.
 
@@ -86,7 +86,7 @@ def import_log(
         clock=found.clock,
         session=session,
         role=role,
-        labels=dict(labels or {}),
+        labels=dict(labels),
         remarks=(*found.remarks, *began),
         origin=log.name,
         counts=dict(found.counts),

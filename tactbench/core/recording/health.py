@@ -29,6 +29,10 @@ COPY = 1.0 - 1e-8
 """Correlation from which columns are the same: digits of a table leave 1e-9 of it, noise of 80 dB leaves 1e-8."""
 WRONG_UNIT = 50.0
 """A rate that is off by more than this factor looks like times in a wrong unit."""
+_UNTIMED = {
+    "none": "no clock stated: rows are ordered, nothing more",
+    "nominal": "time stamps are row number by nominal rate, not measured",
+}
 SLOWEST_HZ = 1.0
 """No tactile sensor is known to be read more seldom: without a stated rate, a lower one looks like a wrong unit."""
 
@@ -145,10 +149,8 @@ def _whole(recording: Recording) -> Iterator[Finding]:
     meta = recording.meta
     if meta.excluded:
         yield Finding("excluded", "warning", "", (), 1, f"excluded from every evaluation: {meta.excluded}")
-    if meta.clock == "none":
-        yield Finding("no-clock", "info", "", (), 0, "no clock stated: rows are ordered, nothing more")
-    if meta.clock == "nominal":
-        yield Finding("no-clock", "info", "", (), 0, "time stamps are row number by nominal rate, not measured")
+    if meta.clock in _UNTIMED:
+        yield Finding("no-clock", "info", "", (), 0, _UNTIMED[meta.clock])
     for name, counts in meta.streams.items():
         yield from _counts(name, counts)
     absent = [spec.name for spec in (*meta.sensor.streams, *meta.reference) if spec.name not in recording.stream_names]

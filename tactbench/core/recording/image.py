@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from contextlib import suppress
 from io import FileIO
 from pathlib import Path
@@ -14,13 +14,11 @@ import numpy.typing as npt
 
 from tactbench.core.errors import UnwritableError
 from tactbench.core.recording import format as layout
-from tactbench.core.recording.partial import Annotations, Columns
+from tactbench.core.recording.clock_fit import on_host_clock
+from tactbench.core.recording.partial import Annotations, Blocks, Columns
 from tactbench.core.recording.reader import Recording, open_recording
-from tactbench.core.recording.times import on_host_clock
 from tactbench.core.spec.recording import RecordingMeta
 from tactbench.core.spec.sensor import StreamSpec
-
-Blocks = Iterable[tuple[str, Columns]]
 
 
 def store(

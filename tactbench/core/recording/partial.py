@@ -21,7 +21,7 @@ import json
 import os
 import struct
 import zlib
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -42,6 +42,9 @@ Annotations = dict[str, dict[str, npt.NDArray[Any]]]
 """Labels of rows by stream and name: (n,) texts or whole numbers."""
 Columns = dict[str, npt.NDArray[Any]]
 """Columns of a stream by name: data (n, channels), t_ns (n,), quality (n, channels), sequence, device_ns (n,)."""
+
+Blocks = Iterable[tuple[str, Columns]]
+"""Stream and columns of each block, as they came."""
 
 
 class Partial:

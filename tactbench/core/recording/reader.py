@@ -5,14 +5,13 @@ from __future__ import annotations
 import json
 from collections.abc import Iterator
 from pathlib import Path
-from types import TracebackType
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 from pydantic import ValidationError
 
-from tactbench.core.errors import FormatError, MissingRecordingError, UsageError
+from tactbench.core.errors import FormatError, MissingRecordingError, UsageError, complaint
 from tactbench.core.recording import format as layout
 from tactbench.core.samples import StreamData
 from tactbench.core.spec.recording import RecordingMeta
@@ -120,9 +119,7 @@ class Recording:
     def __enter__(self) -> Recording:
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.close()
 
     def close(self) -> None:
@@ -146,7 +143,7 @@ class Recording:
             )
         if name not in self._opened:
             with layout.readable(self.path):
-                columns = _columns(self.path, self._specs[name], _child(self.path, self._streams, name), self)
+                columns = _columns(self.path, self._specs[name], self._streams[name], self)
             self._opened[name] = LazyStream(self.path, self._specs[name], columns)
         return self._opened[name]
 
@@ -184,7 +181,6 @@ def open_recording(path: Path) -> Recording:
     """
     import h5py
 
-    path = Path(path)
     if not path.is_file():
         raise MissingRecordingError(f"There is no recording {path}.", hint="Check the path.")
     try:
@@ -217,28 +213,14 @@ def content_digest(path: Path) -> str:
         return recording.verify()
 
 
-def _child(path: Path, group: Any, name: str) -> Any:
-    """Return the item `name` of a group, or None; FormatError if its values are in another file."""
-    import h5py
-
-    link = group.get(name, getlink=True)
-    if link is None:
-        return None
-    item = group[name] if isinstance(link, h5py.HardLink) else None
-    if item is None or (isinstance(item, h5py.Dataset) and (item.is_virtual or item.external)):
-        raise FormatError(f"In {path}, {group.name}/{name} is a link to another place.", hint=layout.SEE)
-    return item
-
-
 def _columns(path: Path, spec: StreamSpec, group: Any, recording: Recording) -> dict[str, Any]:
     """Return the datasets of a stream by their name below it; FormatError if they are not as the meta says."""
     import h5py
 
     wide = len(spec.channels)
     meta, known = recording.meta, _COLUMNS if recording.version > 1 else list(_COLUMNS)[:4]
-    columns = {name: item for name in known if (item := _child(path, group, name)) is not None}
-    notes = _child(path, group, "annotations")
-    columns |= {_NOTE + name: _child(path, notes, name) for name in notes or ()}
+    columns = {name: group[name] for name in known if name in group}
+    columns |= {_NOTE + name: item for name, item in group.get("annotations", {}).items()}
 
     def refuse(what: str) -> FormatError:
         return FormatError(f"In {path}, stream {spec.name!r} {what}.", hint=layout.SEE)
@@ -283,10 +265,7 @@ def parse_meta(path: Path, text: str) -> RecordingMeta:
     try:
         return RecordingMeta.model_validate(json.loads(text))
     except ValidationError as error:
-        first = error.errors(include_url=False)[0]
-        what = f"{'.'.join(str(part) for part in first['loc'])}: {first['msg']}"
-    except UsageError as error:
-        what = error.message
-    except (ValueError, RecursionError) as error:
+        what = complaint(error)
+    except (ValueError, UsageError) as error:
         what = str(error)
     raise FormatError(f"{path} says something about itself that cannot be: {what}.", hint=layout.SEE)

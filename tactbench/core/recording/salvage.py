@@ -9,9 +9,9 @@ from tempfile import TemporaryFile
 
 from tactbench.core.recording import format as layout
 from tactbench.core.recording import image
+from tactbench.core.recording.clock_fit import with_clock_fits
 from tactbench.core.recording.partial import Columns, Journal, read_journal
 from tactbench.core.recording.reader import Recording, parse_meta
-from tactbench.core.recording.times import with_clock_fits
 from tactbench.core.spec.recording import RecordingMeta
 
 REMARK = "Rescued: the recording broke off and is not whole."
@@ -29,7 +29,6 @@ def salvage(path: Path) -> Recording:
     FormatError
         If it is not an unfinished recording.
     """
-    path = Path(path)
     journal = read_journal(path)
     meta, text = _fitted(journal, parse_meta(path, journal.text))
     behind = TemporaryFile()  # noqa: SIM115  (the recording closes it)
@@ -55,7 +54,6 @@ def rescue(path: Path, target: Path) -> None:
     RecordingError
         If `target` exists, or cannot be written.
     """
-    path, target = Path(path), Path(target)
     image.require_free(target)
     journal = read_journal(path)
     meta = parse_meta(path, journal.text)

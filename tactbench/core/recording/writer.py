@@ -5,18 +5,17 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
-from types import TracebackType
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 from pydantic import ValidationError
 
-from tactbench.core.errors import RecordingError, RigError, TactbenchError
+from tactbench.core.errors import RecordingError, RigError, TactbenchError, complaint
 from tactbench.core.recording import format as layout
 from tactbench.core.recording import image
+from tactbench.core.recording.clock_fit import with_clock_fits
 from tactbench.core.recording.partial import Annotations, Columns, Partial, read_blocks
-from tactbench.core.recording.times import with_clock_fits
 from tactbench.core.samples import Block, Quality
 from tactbench.core.spec.recording import RecordingMeta
 from tactbench.core.spec.sensor import StreamSpec
@@ -46,7 +45,7 @@ class RecordingWriter:
     Raises
     ------
     RecordingError
-        If there is a file and it is not to be replaced, the disk refuses, or `meta` cannot be stored.
+        If there is a file and it is not to be replaced, or the disk refuses.
     """
 
     def __init__(self, path: Path, meta: RecordingMeta, *, replace: bool = False, keep: bool = True) -> None:
@@ -63,26 +62,23 @@ class RecordingWriter:
         """Digest of what was written, once the recording is complete."""
         self._annotations: Annotations = {}
         self._has: dict[str, tuple[bool, bool]] = {}
-        self._partial: Partial | None = None
+        self._partial: Partial
         self.journal: Path | None = None
         """What was kept of a recording that was not completed, once the context is left."""
 
     def __enter__(self) -> RecordingWriter:
-        text = self._text()
         if not self._replace:
             image.require_free(self.path)
         try:
             self.path.parent.mkdir(parents=True, exist_ok=True)
-            self._partial = Partial(self.path, text)
+            self._partial = Partial(self.path, layout.meta_text(self.meta))
         except OSError as error:
             raise image.cannot_write(self.path, error) from error
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, _kind: object, error: BaseException | None, _trace: object) -> None:
         try:
-            if kind is None:
+            if error is None:
                 self.complete()
         except BaseException as failure:
             self._leave(failure)
@@ -92,7 +88,7 @@ class RecordingWriter:
     @property
     def rows(self) -> Mapping[str, int]:
         """Rows of the streams that have had a block."""
-        return dict(self._open.rows)
+        return self._partial.rows
 
     def complete(self) -> None:
         """Complete the recording, as leaving the context does; after an exception, before it is left.
@@ -102,11 +98,11 @@ class RecordingWriter:
         RecordingError
             If the disk refuses it; the journal then stays, as after a crash.
         """
-        journal = self._open
+        journal = self._partial
         if any(timed for _, timed in self._has.values()):
             self.meta = with_clock_fits(self.meta, self._blocks(journal))
         self.content_digest = image.store(
-            self.path, self.meta, self._text(), self._blocks(journal), self._annotations,
+            self.path, self.meta, layout.meta_text(self.meta), self._blocks(journal), self._annotations,
             aside=layout.completing_path(journal.path), replace=self._replace,
         )  # fmt: skip
 
@@ -123,7 +119,7 @@ class RecordingWriter:
 
     def _leave(self, error: BaseException | None) -> None:
         """Close the journal; remove it unless it holds rows that are nowhere else."""
-        journal, self._partial = self._open, None
+        journal = self._partial
         journal.close()
         if not self.content_digest and any(journal.rows.values()) and self._keep and not self.meta.simulated:
             self.journal = journal.path
@@ -142,26 +138,16 @@ class RecordingWriter:
         Raises
         ------
         RecordingError
-            If a field is unknown or a value does not fit it, or cannot be stored; sensor and reference cannot change
-            any more, nor whether there is a clock. If the disk refuses it.
+            If a field is unknown or a value does not fit it, or the disk refuses it.
         """
-        fixed = sorted({"sensor", "reference"} & set(changes))
-        if (changes.get("clock", self.meta.clock) == "none") != (self.meta.clock == "none"):
-            fixed.append("clock")
-        if fixed:
-            raise RecordingError(f"{', '.join(fixed)} cannot change once a recording is open.", hint="Open another.")
         try:
             self.meta = RecordingMeta.model_validate({**dict(self.meta), **changes})
         except ValidationError as error:
-            first = error.errors(include_url=False)[0]
-            where = ".".join(str(part) for part in first["loc"])
             raise RecordingError(
-                f"The recording {self.meta.name!r} cannot say {where}: {first['msg']}.", hint="Correct the rig."
+                f"The recording {self.meta.name!r} cannot say {complaint(error)}.", hint="Correct the rig."
             ) from error
         try:
-            self._open.revise(self.meta.model_dump(mode="json", include=set(changes)))
-        except ValueError as error:
-            raise self._not_storable(error) from error
+            self._partial.revise(self.meta.model_dump(mode="json", include=set(changes)))
         except OSError as error:
             raise image.cannot_write(self.path, error) from error
 
@@ -185,13 +171,8 @@ class RecordingWriter:
                 f"Some blocks of stream {spec.name!r} have sequence numbers or device times and some have none.",
                 hint="Give them with all blocks of a stream, or with none.",
             )
-        if spec.name in self._annotations:
-            raise RigError(
-                f"A block of stream {spec.name!r} came after its rows were labelled.",
-                hint="Label after the last block.",
-            )
         try:
-            self._open.append(spec.name, columns)
+            self._partial.append(spec.name, columns)
         except OSError as error:
             raise image.cannot_write(self.path, error) from error
 
@@ -200,46 +181,15 @@ class RecordingWriter:
 
         Raises
         ------
-        RigError
-            If the stream has no rows yet, or another number of them, or the values are neither.
         RecordingError
-            If the disk refuses it.
+            If the disk refuses it; on completion, if there are fewer labels or more than rows.
         """
         column = np.asarray(values)
-        rows = self._open.rows.get(stream)
-        if column.shape != (rows,):
-            raise RigError(
-                f"The annotation {name!r} has shape {column.shape} for {rows or 'no'} rows of {stream!r}.",
-                hint="Give one value a row, after the last block.",
-            )
-        if column.dtype.kind not in "iuU" or any("\0" in text for text in column.tolist() if isinstance(text, str)):
-            raise RigError(
-                f"The annotation {name!r} holds {column.dtype}; labels are text without NUL, or whole numbers.",
-                hint="Turn other labels into text.",
-            )
         try:
-            self._open.annotate(stream, name, column)
+            self._partial.annotate(stream, name, column)
         except OSError as error:
             raise image.cannot_write(self.path, error) from error
         self._annotations.setdefault(stream, {})[name] = column
-
-    @property
-    def _open(self) -> Partial:
-        if self._partial is None:
-            raise RecordingError(f"The recording {self.path} is not open.", hint="Use it as a context manager.")
-        return self._partial
-
-    def _text(self) -> str:
-        try:
-            return layout.meta_text(self.meta)
-        except ValueError as error:
-            raise self._not_storable(error) from error
-
-    def _not_storable(self, error: ValueError) -> RecordingError:
-        return RecordingError(
-            f"What the recording {self.meta.name!r} says about itself cannot be stored: {error}.",
-            hint="Use text and finite numbers; leave out what is not known.",
-        )
 
     def _checked(self, block: Block) -> StreamSpec:
         spec = self._specs.get(block.stream)
@@ -290,11 +240,9 @@ def _columns(block: Block, spec: StreamSpec) -> Columns:
 
 
 def _whole(numbers: npt.NDArray[Any], name: str, spec: StreamSpec) -> npt.NDArray[np.int64]:
-    if numbers.dtype.kind not in "iu" and not (
-        numbers.dtype.kind == "f" and np.array_equal(np.rint(numbers), numbers) and (np.abs(numbers) < 2.0**63).all()
-    ):
+    if numbers.dtype.kind not in "iu":
         raise RigError(
-            f"A block of stream {spec.name!r} has {name} that are no whole numbers, NaN perhaps.",
+            f"A block of stream {spec.name!r} has {name} that are no whole numbers: {numbers.dtype}.",
             hint="Give times as whole nanoseconds and sequence numbers as counted; never invent one.",
         )
     return numbers.astype(np.int64)

@@ -17,7 +17,7 @@ from tactbench.core.errors import UnwritableError, UsageError
 from tactbench.core.files import replace_file
 from tactbench.core.leaderboard.columns import DEFAULT, NUMERIC
 from tactbench.core.leaderboard.view import REASON, View, grid
-from tactbench.core.matrix.progress import Progress
+from tactbench.core.progress import Progress
 from tactbench.core.report.cells import details
 from tactbench.core.report.costs import ladder_table
 from tactbench.core.report.datasheet import sensor_table, table_one

@@ -6,6 +6,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field, ValidationError, model_validator
 
+from tactbench.core.errors import complaint
 from tactbench.core.spec.quantity import Frozen
 from tactbench.core.spec.sensor import ChannelKind
 from tactbench.core.spec.summary import Summary
@@ -68,7 +69,7 @@ class DeclaredTask(Frozen):
         try:
             self.spec  # noqa: B018  (what the task would refuse is refused here, in the file that declares it)
         except ValidationError as error:
-            raise ValueError(str(error.errors()[0]["msg"]).removeprefix("Value error, ")) from error
+            raise ValueError(complaint(error)) from error
         return self
 
     @property

@@ -8,7 +8,7 @@ from pydantic import Field, model_validator
 
 from tactbench.core.spec.quantity import Frozen
 
-Seconds = Annotated[float, Field(ge=0, le=1e6, allow_inf_nan=False)]
+Seconds = Annotated[float, Field(ge=0, le=1e6)]
 """A length of time that int64 nanoseconds hold many times over."""
 
 
@@ -51,13 +51,13 @@ class SlipThresholds(Frozen):
 
     hold_s: Seconds = Field(gt=0)
     """A contact rests where its displacements of this long [s] differ by no more than `gross_displacement_m`."""
-    gross_displacement_m: float = Field(gt=0, allow_inf_nan=False)
+    gross_displacement_m: float = Field(gt=0)
     """Gross slip is displacement of more than this after such a hold [m]."""
     incipient_slip_share: float = Field(gt=0, lt=1)
     """Incipient slip begins where ``1 - c/a`` exceeds this [1]."""
     gross_stick_ratio: float = Field(gt=0, lt=1)
     """It ends where c/a is at or below this: by its forces the contact slips as a whole [1]."""
-    contact_force_n: float = Field(gt=0, allow_inf_nan=False)
+    contact_force_n: float = Field(gt=0)
     """With less normal force there is no contact worth a label [N]."""
 
     @model_validator(mode="after")

@@ -44,7 +44,7 @@ def staircase(
     UsageError
         If `steps` is no whole number from 1 on.
     """
-    count = _whole("staircase", "steps", steps, 5)
+    count = _whole("staircase", "steps", steps)
     levels = [peak * level / count for level in (*range(1, count + 1), *range(count - 1, -1, -1))]
     return _path("staircase", [(hold, 0.0), *((span, level) for level in levels for span in (rise, dwell))], rate)
 
@@ -123,18 +123,18 @@ def sine(
             "expected.",
             hint="An indenter cannot pull.",
         )
-    points = _whole("sine", "periods", periods, 10) * PER_PERIOD
+    points = _whole("sine", "periods", periods) * PER_PERIOD
     step = 1.0 / (frequency * PER_PERIOD)
     swing = [(step, mean - amplitude * math.cos(2 * math.pi * point / PER_PERIOD)) for point in range(1, points + 1)]
     return _path("sine", [(hold, 0.0), (rise, mean - amplitude), *swing], rate)
 
 
-def _whole(profile: str, name: str, given: float, example: int) -> int:
+def _whole(profile: str, name: str, given: float) -> int:
     """Return `given` as a count; raises UsageError if it is no whole number from 1 on."""
     if given < 1 or given != int(given):
         raise UsageError(
             f"The profile {profile!r}: {name} is given as {given:g}, and a whole number from 1 on is expected.",
-            hint=f"For example {example}.",
+            hint="For example 5.",
         )
     return int(given)
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping
 
-from pydantic import Field, FiniteFloat, model_validator
+from pydantic import Field, model_validator
 
 from tactbench.core.errors import UsageError
 from tactbench.core.spec.quantity import Frozen, Quantity, Unit
@@ -14,15 +14,15 @@ from tactbench.core.spec.quantity import Frozen, Quantity, Unit
 class Parameter(Frozen):
     """One number of a shape or of a force profile."""
 
-    default: FiniteFloat
+    default: float
     """Its value where nobody gives one, in `unit`."""
     unit: Unit
     """In which the code that a plugin names is given it."""
     text: str = Field(pattern=r"^\S[^\n]*$")
     """One line: what it is."""
-    least: FiniteFloat = 0.0
+    least: float = 0.0
     """Smallest value that may be given, in `unit`."""
-    most: FiniteFloat | None = None
+    most: float | None = None
     """Largest value that may be given, in `unit`; None: there is no such limit."""
 
     @model_validator(mode="after")

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from itertools import pairwise, takewhile
 from typing import Annotated, Any, Literal
 
-from pydantic import Discriminator, Field, FiniteFloat, Tag, model_validator
+from pydantic import Discriminator, Field, Tag, model_validator
 
 from tactbench.core.spec.quantity import Frozen, Quantity, Source, assumed, sourced
 
@@ -48,9 +48,9 @@ class ForcePath(Frozen):
     """A normal force that runs straight from point to point, as in presses, taps and ripples."""
 
     kind: Literal["path"] = "path"
-    times_s: tuple[FiniteFloat, ...] = Field(min_length=2)
+    times_s: tuple[float, ...] = Field(min_length=2)
     """(k,) ascending from 0 [s]; the last is the whole recording."""
-    forces_n: tuple[Annotated[FiniteFloat, Field(ge=0)], ...]
+    forces_n: tuple[Annotated[float, Field(ge=0)], ...]
     """(k,) [N]"""
     samples: int = Field(ge=1)
     """Samples of the reference clock over the whole recording."""

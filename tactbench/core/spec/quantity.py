@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated, Literal
 
-from pydantic import AfterValidator, BaseModel, ConfigDict
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field
 
 from tactbench.core.errors import UsageError
 from tactbench.core.spec import units
@@ -14,9 +14,9 @@ Tag = Literal["sourced", "measured", "derived", "assumed"]
 
 
 class Frozen(BaseModel):
-    """A value object: immutable, no unknown fields."""
+    """A value object: immutable, no unknown fields, no NaN and no infinity but in quantities."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid", defer_build=True)
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, defer_build=True)
 
 
 def _known(unit: str) -> str:
@@ -40,8 +40,8 @@ class Source(Frozen):
 class Quantity(Frozen):
     """One number with its unit and its source."""
 
-    value: float
-    """The number as the source states it."""
+    value: float = Field(allow_inf_nan=True)
+    """The number as the source states it: a flat surface has an infinite radius."""
     unit: Unit
     source: Source
     """Why this number may be believed."""

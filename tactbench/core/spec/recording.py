@@ -20,7 +20,7 @@ class PlanEntry(Frozen):
     effect: str
     included: bool
     reason: str
-    change: float | None = None
+    change: float | None = Field(default=None, allow_inf_nan=True)
     """What leaving it out changes in an observed channel: at most, for an effect left out (0: exactly nothing); about,
     for an included one. None: nobody can say without computing it."""
     unit: str = "count"

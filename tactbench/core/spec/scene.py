@@ -9,7 +9,6 @@ from pydantic import (
     BaseModel,
     BeforeValidator,
     Field,
-    FiniteFloat,
     SerializerFunctionWrapHandler,
     ValidationError,
     field_serializer,
@@ -17,7 +16,7 @@ from pydantic import (
     model_validator,
 )
 
-from tactbench.core.errors import UsageError
+from tactbench.core.errors import UsageError, complaint
 from tactbench.core.spec import units
 from tactbench.core.spec.drive import ForceLoop
 from tactbench.core.spec.profile import PAPER, ForceProfile, ForceRamp
@@ -225,7 +224,7 @@ class Simulation(Frozen):
     scenario: str | None = None
     """Name of one of the sensor's scenarios, whose nuisances take the place of the usual ones; None: the usual ones."""
 
-    nuisances: Annotated[tuple[tuple[str, FiniteFloat], ...], BeforeValidator(_pairs)] = ()
+    nuisances: Annotated[tuple[tuple[str, float], ...], BeforeValidator(_pairs)] = ()
     """Nuisances by name with another value than the scene or the sensor states, as ``placement_scatter_mm: 0.3``."""
 
     @field_serializer("nuisances")
@@ -326,7 +325,7 @@ def _with(model: M, way: tuple[str, ...], given: Mapping[str, float]) -> M:
         return type(model).model_validate({**dict(model), **change})
     except ValidationError as error:
         listed = ", ".join(f"{name} = {value:g}" for name, value in given.items())
-        raise UsageError(f"{listed}: {error.errors()[0]['msg']}.", hint="Give another value.") from error
+        raise UsageError(f"{listed}: {complaint(error)}.", hint="Give another value.") from error
 
 
 _PARTS: tuple[tuple[tuple[str, ...], type[Frozen]], ...] = (

@@ -8,7 +8,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field, ValidationError, model_validator
 
-from tactbench.core.errors import NotApplicable, UsageError
+from tactbench.core.errors import NotApplicable, UsageError, complaint
 from tactbench.core.spec import units
 from tactbench.core.spec.quantity import Frozen, Length, Mass, Power, Quantity, Share, Source, Time, Unit, assumed
 from tactbench.core.spec.skin import Skin
@@ -191,7 +191,7 @@ class Nuisances(Frozen):
         try:
             return Nuisances.model_validate({**given, "creep": creep})
         except ValidationError as error:
-            raise UsageError(f"{kind}: {error.errors()[0]['msg']}.", hint="Set that as well.") from error
+            raise UsageError(f"{kind}: {complaint(error)}.", hint="Set that as well.") from error
 
     def hidden(self, noise_scale: float = 1.0) -> float:
         """Return the standard deviation that white noise and rounding hide anyway, in the channel's unit."""

@@ -6,7 +6,6 @@ A third party's sensor runs on the twin by declaring one of these media. The equ
 from __future__ import annotations
 
 import itertools
-import math
 from typing import TYPE_CHECKING, Annotated, Literal
 
 from pydantic import Field, model_validator
@@ -47,8 +46,7 @@ class SheetTable(Frozen):
     def _is_a_table(self) -> SheetTable:
         shape = {len(self.angle_deg)} == {len(row) for row in self.value_mm}
         ascending = all(a < b for axis in (self.x_mm, self.angle_deg) for a, b in itertools.pairwise(axis))
-        finite = all(math.isfinite(value) for row in self.value_mm for value in row)
-        if not (shape and self.x_mm and len(self.value_mm) == len(self.x_mm) and ascending and finite):
+        if not (shape and self.x_mm and len(self.value_mm) == len(self.x_mm) and ascending):
             raise ValueError("a table over a sheet needs ascending axes and one finite length for each pair of them")
         return self
 

@@ -20,8 +20,8 @@ class Summary(Frozen):
     """``mean``; ``deviation``: standard deviation; ``range``: largest less smallest; ``change``: last less first;
     ``mean-step``: mean absolute difference of neighbouring samples; ``band-energy``: mean square of what a causal
     band-pass (Butterworth, two poles at either end) leaves, in the channel's unit squared."""
-    start: float = Field(default=0.0, ge=0, allow_inf_nan=False)
-    end: float = Field(default=1.0, gt=0, allow_inf_nan=False)
+    start: float = Field(default=0.0, ge=0)
+    end: float = Field(default=1.0, gt=0)
     unit: Literal["recording", "s"] = "recording"
     """Of `start` and `end`: shares of each stream's samples, or seconds. Both count from the first sample that the
     protocol keeps; of a frame, shares of its length or seconds, from its beginning."""

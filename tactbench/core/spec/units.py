@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from functools import lru_cache
 
-from tactbench.core.errors import UsageError, nearest
+from tactbench.core.errors import UsageError, did_you_mean
 
 Dimension = tuple[int, int, int, int, int, int]
 """Exponents of (length, mass, time, current, temperature, count)."""
@@ -79,9 +79,8 @@ def parse(unit: str) -> tuple[float, Dimension]:
             sign = -1
         else:
             if token not in _ATOMS:
-                close = nearest(token, _ATOMS)
-                hint = f"Did you mean {' or '.join(close)}? " if close else ""
-                raise UsageError(f"The unit {unit!r} is not known.", hint=f"{hint}Units: {', '.join(sorted(_ATOMS))}.")
+                hint = f"{did_you_mean(token, _ATOMS)}Units: {', '.join(sorted(_ATOMS))}."
+                raise UsageError(f"The unit {unit!r} is not known.", hint=hint)
             size, dimension = _ATOMS[token]
             factor *= size**sign
             exponents = [have + sign * more for have, more in zip(exponents, dimension, strict=True)]

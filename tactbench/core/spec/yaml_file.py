@@ -9,7 +9,7 @@ from typing import Any, TypeVar
 import yaml
 from pydantic import BaseModel, ValidationError
 
-from tactbench.core.errors import ConfigError, nearest
+from tactbench.core.errors import ConfigError, did_you_mean
 
 M = TypeVar("M", bound=BaseModel)
 Path_ = tuple[str | int, ...]
@@ -119,9 +119,8 @@ def _explain(
     if first["type"] == "extra_forbidden":
         schema = model.model_json_schema()
         parts = (schema, *schema.get("$defs", {}).values())
-        close = nearest(str(loc[-1]), {key for part in parts for key in part.get("properties", {})})
-        meant = f"Did you mean {' or '.join(repr(word) for word in close)}?" if close else "Remove it."
-        return ConfigError(file, line, f"the key {str(loc[-1])!r} is not known.", hint=meant)
+        meant = did_you_mean(str(loc[-1]), {key for part in parts for key in part.get("properties", {})}).strip()
+        return ConfigError(file, line, f"the key {str(loc[-1])!r} is not known.", hint=meant or "Remove it.")
     if first["type"] == "missing":
         return ConfigError(file, line, f"the key {str(loc[-1])!r} is missing in {name}.", hint="Add it.")
     text = _written(root, at)

@@ -78,7 +78,9 @@ def test_without_what_only_posix_has(tables):
         "--out press.h5', 'inspect recordings/one.h5 press.h5'):\n"
         "    cli.main(words.split(), standalone_mode=False)\n"
     )
-    subprocess.run([sys.executable, "-c", script], cwd=tables.folder, check=True, capture_output=True)
+    done = subprocess.run([sys.executable, "-c", script], cwd=tables.folder, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    assert (tables.folder / "press.h5").exists()
 
 
 def test_record_then_inspect(verbs):

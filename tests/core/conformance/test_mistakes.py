@@ -38,7 +38,7 @@ MISTAKES = [
     ("pad", "def tactbench_sensors", "def tactbench_sensor", "", "tactbench_sensor"),
     ("pad", "transduction:build", "transducer:build", "code-names-resolve", "transducer"),
     ("pad", '"""A pad of', 'import h5py\n"""A pad of', "import-is-light", "h5py"),
-    ("pad", "lower=-2048", 'lower=float("nan")', "numbers-are-finite", "t1.lower: it is nan"),
+    ("pad", "lower=-2048", 'lower=float("nan")', "", "finite number"),
     ("pad", "upper=2047, ", "", "limits-are-in-order", "channels[t1].lower, upper"),
     ("pad", "lower=-2048", "lower=200", "limits-are-in-order", "channels[t1].rest: 100 count is not within lower"),
     ("pad", 'kind="taxel"', 'kind="force", unit="m"', "limits-are-in-order", "measured in N"),

@@ -9,9 +9,9 @@ import pytest
 
 from tactbench.core.cost.ladder import climb
 from tactbench.core.cost.ladder_file import write_ladder
-from tactbench.core.matrix.progress import Progress
 from tactbench.core.matrix.store import Store
 from tactbench.core.plugins.registry import load_registry
+from tactbench.core.progress import Progress
 from tactbench.core.spec.matrix import MatrixSpec
 from tests.core.evaluation.made import record
 from tests.here import IN_THIS_PROCESS

@@ -14,7 +14,7 @@ from tactbench.core.cost.ladder import by_score, mark_fronts, timed
 from tactbench.core.cost.precision import precise, quickest_enough
 from tactbench.core.cost.rounds import WARM_UP_ROWS, TimedEstimator, Timing, measure
 from tactbench.core.evaluation.metrics import metric_called
-from tactbench.core.matrix.progress import Progress
+from tactbench.core.progress import Progress
 from tactbench.plugin.simulation import CostPoint
 
 N = 1000

@@ -3,12 +3,12 @@
 import pytest
 
 from tactbench.core.errors import UsageError
-from tactbench.core.matrix.progress import Progress
 from tactbench.core.matrix.run import EngineChoice, run_matrix
 from tactbench.core.matrix.solve import TIMED
 from tactbench.core.matrix.store import Store
 from tactbench.core.matrix.summary import SEED_DECIDES
 from tactbench.core.pool import Limits
+from tactbench.core.progress import Progress
 from tactbench.core.spec.matrix import EstimatorChoice, MatrixSpec, TaskChoice
 from tests.core.cost.test_ladder import presses
 from tests.here import IN_THIS_PROCESS
@@ -103,7 +103,6 @@ def test_a_second_run_computes_nothing_and_a_changed_number_of_repeats_is_no_cha
     ("choice", "says"),
     [
         (EngineChoice("in-process", jobs=2), "--jobs 2"),
-        (EngineChoice("isolated", scheduler="tcp://127.0.0.1:1"), "--engine dask"),
     ],
 )
 def test_choices_that_do_not_go_together_are_refused(tmp_path, choice, says):

@@ -7,10 +7,10 @@ import pytest
 from matplotlib import rc_context
 from sklearn.metrics import confusion_matrix, f1_score
 
-from tactbench.core.matrix.progress import Progress
 from tactbench.core.matrix.run import run_matrix
 from tactbench.core.matrix.store import Store
 from tactbench.core.plugins.registry import load_registry
+from tactbench.core.progress import Progress
 from tactbench.core.report.figures import confusion, embedding_map, prediction_against_time, score_by_force
 from tactbench.core.report.figures.drawing import draw_figures
 from tactbench.core.report.figures.group import groups

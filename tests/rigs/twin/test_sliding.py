@@ -45,10 +45,10 @@ def record(sensors, tmp_path):
     def make(sensor="biotac", name="slide", **scene):
         scene = Scene(name=name, indenter=CAP, placement=NOMINAL, **{"observe": ("ac_pressure",), **scene})
         path = tmp_path / f"{name}.h5"
+        path.unlink(missing_ok=True)
         meta = acquire(
-            TWIN, sensors[sensor], DESCRIPTOR, scene, role=None, seed=1, path=path, clock=time.monotonic, provenance={},
-            replace=True,
-        ).meta  # fmt: skip
+            TWIN, sensors[sensor], DESCRIPTOR, scene, role=None, seed=1, path=path, clock=time.monotonic, provenance={}
+        )
         with open_recording(path) as recording:
             recording.verify()
             return meta, {stream: recording.read(stream) for stream in recording.stream_names}

@@ -21,7 +21,7 @@ def test_an_ordinary_scene_passes_and_an_infinite_radius_is_a_flat_surface():
     [
         ({"profile": ForceRamp(duration=q(math.nan, "s"))}, "profile duration"),
         ({"placement": Placement(scatter=q(-0.1))}, "placement scatter"),
-        ({"environment": Environment(noise_scale=math.inf)}, "environment noise scale"),
+        ({"environment": Environment().model_copy(update={"noise_scale": math.inf})}, "environment noise scale"),
         ({"indenter": Indenter(radius=q(-math.inf))}, "indenter radius"),
         ({"profile": ForceRamp(samples=MOST_SAMPLES + 1)}, "samples"),
     ],

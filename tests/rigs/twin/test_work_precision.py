@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from tactbench.core.cost.precision import measured
-from tactbench.core.matrix.progress import Progress
+from tactbench.core.progress import Progress
 from tactbench.core.spec.scene import Simulation
 from tactbench.plugin import Indenter, Placement, Scene, SensorDescriptor
 from tactbench.rigs.twin import work_precision

@@ -61,14 +61,10 @@ class Index:
 
     def refresh(self) -> None:
         """Bring the index up to date with the files."""
-        found = {}
-        with suppress(OSError):
-            found = {path.name: path for path in (self.folder / "cells").glob("[!.]*.h5")}
+        found = {path.name: path for path in (self.folder / "cells").glob("[!.]*.h5")}
         known = dict(self._all("SELECT file, size || ' ' || modified_ns FROM cells"))
         changed = {name: path for name, path in found.items() if known.get(name) != "{} {}".format(*signature(path))}
         lost = known.keys() - found.keys()
-        if not changed and not lost:
-            return
         for name in lost:
             self.drop(name)
         for name, path in sorted(changed.items()):

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import errno
-import json
 import os
 import time
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import replace
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -44,8 +44,6 @@ class Store:
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
-        self._index: Index | None = None
-        self._last_ns = 0
         self._provenance: tuple[str, Mapping[str, Any]] = ("", {})
 
     @contextmanager
@@ -74,11 +72,9 @@ class Store:
         finally:
             os.close(lock)
 
-    @property
+    @cached_property
     def _files(self) -> Index:
-        if self._index is None:
-            self._index = Index(self.folder)
-        return self._index
+        return Index(self.folder)
 
     def begin(self, provenance: Mapping[str, Any]) -> str:
         """Have cells that are written from now on carry this provenance, and return its id."""
@@ -92,7 +88,7 @@ class Store:
     def keep(
         self, row: Mapping[str, Any], sections: Mapping[str, Any], answers: Mapping[str, Answers] | None = None
     ) -> Row:
-        """Write the file of a cell that has ended, and return its row as it will be read.
+        """Write the file of a cell that has ended, and return its row.
 
         Raises
         ------
@@ -101,30 +97,28 @@ class Store:
         ValueError, TypeError
             If the row is not plain data; nothing is written.
         """
-        row = {**row, "made_by": self._provenance[0]}
-        self._write(CellFile(row, sections, self._provenance[1], answers=answers or {}))
-        found: Row = json.loads(json.dumps(row))
-        return found
+        kept = {**row, "made_by": self._provenance[0]}
+        self._write(CellFile(kept, sections, self._provenance[1], answers=answers or {}))
+        return kept
 
     def reuse(self, row: Row) -> None:
         """Note that a finished cell was found again, under the name it has in `row`: it is the latest of that name."""
         latest = self._files.files_of(row["cell"])
-        known = self._files.finished(row["key"]) or {}
-        if not latest or latest[0][1] != row["key"] or any(known.get(name) != row[name] for name in NAMING):
+        known = self._files.finished(row["key"])
+        if not latest or latest[0][1] != row["key"] or known is None or known["repeats"] != row["repeats"]:
             cell = read_cell(self.file_of(row))
             self._write(replace(cell, row={**cell.row, **{name: row[name] for name in NAMING}}))
 
     def _write(self, cell: CellFile) -> None:
-        self._last_ns = max(time.time_ns(), self._last_ns + 1)
-        content = replace(cell, ended_ns=self._last_ns).content()
-        path = self.file_of(cell.row)
+        cell, path = replace(cell, ended_ns=time.time_ns()), self.file_of(cell.row)
+        content = cell.content()
         with writing(self.folder):
             replace_file(path, content)
             for name, _key, status in self._files.files_of(cell.row["cell"]):
                 if status != "done" and name != path.name:  # superseded; what was finished stays for other versions
                     (path.parent / name).unlink(missing_ok=True)
                     self._files.drop(name)
-        self._files.put(path, replace(cell, ended_ns=self._last_ns))
+        self._files.put(path, cell)
 
     def file_of(self, row: Mapping[str, Any]) -> Path:
         """Return the file of a cell: named by its key, or by its name if it stopped before it had one."""

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from tactbench.core.errors import MappingError, nearest
+from tactbench.core.errors import MappingError, did_you_mean
 from tactbench.core.recording.mapping.model import Arrays, Mat
 from tactbench.core.recording.mapping.table import ArrayTable, plain
 
@@ -63,9 +63,8 @@ def read_arrays(path: Path, shown: str, how: Arrays) -> Iterator[tuple[Words, Ar
 def _require_there(shown: str, names: set[str], there: Collection[str]) -> None:
     for name in sorted(names):
         if name not in there:
-            close = nearest(name, there)
-            meant = f"Did you mean {close[0]!r}? " if close else ""
-            raise MappingError(f"{shown} has no array {name!r}.", hint=f"{meant}It has: {', '.join(sorted(there))}.")
+            hint = f"{did_you_mean(name, there)}It has: {', '.join(sorted(there))}."
+            raise MappingError(f"{shown} has no array {name!r}.", hint=hint)
 
 
 def _load_npz(path: Path, shown: str, names: set[str]) -> dict[str, npt.NDArray[Any]]:

@@ -12,7 +12,7 @@ from decimal import Decimal
 from pathlib import Path
 from typing import Any
 
-from tactbench.core.errors import MappingError, nearest
+from tactbench.core.errors import MappingError, did_you_mean
 from tactbench.core.recording.mapping.model import Column
 from tactbench.core.recording.mapping.table import MESSAGE_TIMES, BagTable, plain
 
@@ -53,11 +53,8 @@ def read_bag(path: Path, shown: str, topics: Mapping[str, Topic]) -> dict[str, B
             takers[record.id] = [_taker(tables[name], topics[name], decode) for name in asked]
     for name, topic in topics.items():
         if not len(tables[name]):
-            close = nearest(topic.name, seen)
-            meant = f"Did you mean {close[0]!r}? " if close and topic.name not in seen else ""
-            raise MappingError(
-                f"{shown} has no message of topic {topic.name!r}.", hint=f"{meant}It has: {', '.join(sorted(seen))}."
-            )
+            hint = f"{did_you_mean(topic.name, seen - {topic.name})}It has: {', '.join(sorted(seen))}."
+            raise MappingError(f"{shown} has no message of topic {topic.name!r}.", hint=hint)
     return tables
 
 

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 from pydantic import ValidationError
 
-from tactbench.core.errors import MappingError
+from tactbench.core.errors import MappingError, complaint
 from tactbench.core.recording.mapping.model import ChannelGroup, Column, StreamSource
 from tactbench.core.recording.mapping.model import Mapping as MappingFile
 from tactbench.core.spec.quantity import Quantity
@@ -89,11 +89,8 @@ def sensor_of(mapping: MappingFile) -> tuple[SensorSpec, tuple[StreamSpec, ...],
             streams=tuple(stream.spec for stream in streams.values() if stream.source.of == "sensor"),
         )
     except ValidationError as error:
-        first = error.errors(include_url=False)[0]
-        where = ".".join(str(part) for part in first["loc"])
-        given = f" (given: {first['input']!r})" if isinstance(first["input"], str | int | float) else ""
         raise MappingError(
-            f"The mapping describes a sensor that cannot be: {where}: {first['msg']}{given}.", hint="Correct the name."
+            f"The mapping describes a sensor that cannot be: {complaint(error)}.", hint="Correct the name."
         ) from error
     reference = tuple(stream.spec for stream in streams.values() if stream.source.of == "reference")
     return sensor, reference, streams
@@ -119,7 +116,7 @@ def device(sensor: SensorSpec, mapping: MappingFile, words: Mapping[str, Scalar]
 def columns_of(group: ChannelGroup) -> list[Column]:
     """Return the columns of a group, ranges spelled out."""
     given = group.columns if isinstance(group.columns, tuple) else (group.columns,)
-    return [_column(column) for text in given for column in expand(text)]
+    return [one if isinstance(one, int) else str(one) for text in given for one in expand(text)]
 
 
 def _channels(stream: str, group: ChannelGroup) -> Iterator[MappedChannel]:
@@ -156,7 +153,3 @@ def _names(stream: str, group: ChannelGroup, columns: list[Column]) -> Iterator[
     for column, values in zip(columns, combinations, strict=True):
         words = {"column": column, **dict(zip(group.over, values, strict=True))}
         yield fill(group.name, words, f"stream {stream}")
-
-
-def _column(value: Scalar) -> Column:
-    return value if isinstance(value, int) else str(value)

@@ -121,11 +121,11 @@ def _matching(name: str, source: TableSource, root: Path) -> list[FoundFile]:
     matches = list(root.glob(source.files))
     paths = [path for path in matches if path.is_file()]
     if not paths:
-        what = f"No file matches {source.files!r} (table {name!r}) in {root}."
-        if matches:
-            kind = "a directory" if matches[0].is_dir() else "not a regular file"
-            what = f"{matches[0]} (table {name!r}) is {kind}; a table is expected."
-        raise MappingError(what, hint="Check --root: the pattern starts below it.")
+        instead = f"; {matches[0]} is none" if matches else ""
+        raise MappingError(
+            f"No file matches {source.files!r} (table {name!r}) in {root}{instead}.",
+            hint="Check --root: the pattern starts below it.",
+        )
     found = []
     for path in sorted(paths, key=lambda one: one.relative_to(root).parts):
         shown = path.relative_to(root).as_posix()

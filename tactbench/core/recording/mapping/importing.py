@@ -5,7 +5,7 @@ from __future__ import annotations
 import fnmatch
 import re
 from collections import Counter
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from dataclasses import replace as replaced
@@ -17,9 +17,10 @@ from typing import cast, get_args
 import numpy as np
 
 from tactbench.core.errors import MappingError, RecordingError, UnwritableError
+from tactbench.core.progress import Progress
 from tactbench.core.recording.health import Finding, examine, is_copy
 from tactbench.core.recording.mapping.channels import MappedStream, device, fill, sensor_of
-from tactbench.core.recording.mapping.files import FileSet, RawRecording, find, read
+from tactbench.core.recording.mapping.files import RawRecording, find, read
 from tactbench.core.recording.mapping.model import MUST_NAME_SENTINELS, Mapping, Word
 from tactbench.core.recording.mapping.samples import labels, samples, times
 from tactbench.core.recording.mapping.tasks import check_tasks, place_tasks, require_answerable, tasks_text
@@ -36,9 +37,6 @@ RIG = "import"
 
 ENDING = ".h5"
 _FILE_NAME = re.compile(r"^[A-Za-z0-9][A-Za-z0-9._-]*$")
-
-Progress = Callable[[int, int, str], None]
-"""Told (files done, files in all, the last one)."""
 
 
 @dataclass(frozen=True)
@@ -105,7 +103,7 @@ def import_tables(
     out
         Folder of the recordings. It gets all of them or, if anything is wrong, none.
     progress
-        Told after every set of files.
+        Receives every set of files that is read.
     replace
         Replace recordings of the same name that hold something else; otherwise they are refused. One that holds the
         same already is left as it is.
@@ -122,22 +120,24 @@ def import_tables(
     loaded = load_yaml(mapping, Mapping)
     sensor, reference, streams = sensor_of(loaded)
     require_answerable(loaded, streams, mapping)
-    tasks = tasks_text(loaded, mapping.name)
+    tasks = tasks_text(loaded)
     sets = find(loaded, mapping.parent if root is None else root)
     made: list[Imported] = []
+    progress = progress or Progress()
+    progress.begin(f"importing {mapping.stem}", len(sets))
     with _aside(out) as folder:
-        for done, files in enumerate(sets, 1):
+        for files in sets:
             for raw in read(loaded, files):
                 meta = _meta(loaded, raw, sensor, reference)
                 _unique_name(meta, made)
                 made.append(_write(folder / f"{meta.name}{ENDING}", meta, loaded, raw, streams))
-            if progress is not None:
-                progress(done, len(sets), next(iter(files.files.values())).shown)
+            progress.advance(next(iter(files.files.values())).shown)
         check_tasks(out, tasks, replace=replace)
         placed = _place(made, out, replace=replace)
         place_tasks(out, folder, tasks)
     names = tuple(task.name for task in loaded.tasks)
-    return ImportReport(loaded.title, tuple(placed), _count_files(sets), names)
+    shown = {file.shown for files in sets for file in files.files.values()}
+    return ImportReport(loaded.title, tuple(placed), len(shown), names)
 
 
 @contextmanager
@@ -162,10 +162,6 @@ def _aside(out: Path) -> Iterator[Path]:
             with suppress(OSError):
                 empty.rmdir()
         raise
-
-
-def _count_files(sets: Sequence[FileSet]) -> int:
-    return len({file.shown for files in sets for file in files.files.values()})
 
 
 def _write(
@@ -238,7 +234,10 @@ def _meta(mapping: Mapping, raw: RawRecording, sensor: SensorSpec, reference: tu
         session=fill(names.session, words, "recording.session"),
         trial=fill(names.trial, words, "recording.trial"),
         role=cast("Role | None", role),
-        labels={label: _label(label, value, words) for label, value in names.labels.items()},
+        labels={
+            label: fill(value, words, f"recording.labels.{label}") if isinstance(value, str) else value
+            for label, value in names.labels.items()
+        },
         excluded=_excluded(mapping, raw.files),
         remarks=(*mapping.remarks, *_clock_remarks(mapping)),
         origin=origin,
@@ -263,10 +262,6 @@ def _derived(name: str, word: Word, words: dict[str, Scalar], origin: str) -> st
             hint="Add it to `values`.",
         )
     return known[given]
-
-
-def _label(label: str, value: Scalar, words: dict[str, Scalar]) -> Scalar:
-    return fill(value, words, f"recording.labels.{label}") if isinstance(value, str) else value
 
 
 def _excluded(mapping: Mapping, files: Sequence[str]) -> str:

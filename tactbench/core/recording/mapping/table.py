@@ -12,9 +12,12 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from tactbench.core.errors import MappingError, nearest
+from tactbench.core.errors import MappingError, did_you_mean
 from tactbench.core.recording.mapping.model import Column
 from tactbench.core.samples import FloatArray, IntArray
+
+MOST_LISTED = 12
+"""Columns named in a message."""
 
 
 @dataclass(frozen=True)
@@ -38,7 +41,12 @@ class TextTable:
         values = np.empty(len(self.cells))
         for row, cells in enumerate(self.cells):
             cell = cells[place]
-            values[row] = math.nan if cell in self.no_sample else self._number(cell, row, column)
+            values[row] = math.nan if cell in self.no_sample else _number(cell)
+            if math.isinf(values[row]):
+                raise MappingError(
+                    f"{self.where(row)}: column {column!r}: {cell!r} is not a number.",
+                    hint="If such cells mean 'no sample', list the text under `no_sample` of the table.",
+                )
         return values
 
     def texts(self, column: Column) -> list[str]:
@@ -53,16 +61,11 @@ class TextTable:
         for row, cells in enumerate(self.cells):
             # Seconds since 1970 in float64 are exact to 0.2 µs only: the decimal text knows better.
             try:
-                times[row] = int((Decimal(cells[place].strip()) * per_unit).to_integral_value())
-            except OverflowError as error:
-                raise MappingError(
-                    f"{self.where(row)}: column {column!r}: {cells[place]!r} is too far away for a time.",
-                    hint="Correct the unit.",
-                ) from error
-            except (InvalidOperation, ValueError) as error:
+                times[row] = _scaled(cells[place].strip(), per_unit)
+            except (InvalidOperation, ValueError, OverflowError) as error:
                 raise MappingError(
                     f"{self.where(row)}: column {column!r}: {cells[place]!r} is not a time.",
-                    hint="A row without a time cannot be kept; check the column, or write `clock: none`.",
+                    hint="A row without a time cannot be kept; check column and unit, or write `clock: none`.",
                 ) from error
         return times
 
@@ -75,24 +78,11 @@ class TextTable:
         """Return file and line of a row, for messages."""
         return f"{self.shown}:{self.lines[row]}"
 
-    def _number(self, cell: str, row: int, column: Column) -> float:
-        try:
-            # Python's float() also reads 1_000; no table in the world means that.
-            value = float(cell) if "_" not in cell else None
-        except ValueError:
-            value = None
-        if value is None or math.isinf(value):
-            raise MappingError(
-                f"{self.where(row)}: column {column!r}: {cell!r} is not a number.",
-                hint="If such cells mean 'no sample', list the text under `no_sample` of the table.",
-            )
-        return value
-
     def _place(self, column: Column) -> int:
         if isinstance(column, int):
             wide = len(self.cells[0]) if self.cells else len(self.header or ())
             place = _checked(self.shown, column, wide)
-            if self.header is not None and _is_number(self.header[place]):
+            if self.header is not None and math.isfinite(_number(self.header[place])):
                 raise MappingError(
                     f"{self.shown}: its header row has the number {self.header[place]!r} in column {column}: that looks"
                     " like a row of data, which `header: true` would drop.",
@@ -109,11 +99,8 @@ class TextTable:
                 f"{self.shown} has {self.header.count(column)} columns called {column!r}.", hint="Give its place."
             )
         if column not in self.header:
-            close = nearest(column, self.header)
-            meant = f"Did you mean {' or '.join(repr(name) for name in close)}? " if close else ""
-            raise MappingError(
-                f"{self.shown} has no column {column!r}.", hint=f"{meant}It has: {_listing(self.header)}."
-            )
+            hint = f"{did_you_mean(column, self.header)}It has: {_listing(self.header)}."
+            raise MappingError(f"{self.shown} has no column {column!r}.", hint=hint)
         return self.header.index(column)
 
 
@@ -131,11 +118,7 @@ class ArrayTable:
 
     def numbers(self, column: Column) -> FloatArray:
         """Return a column, (n,), with NaN where there is no sample; MappingError for what is no number."""
-        values = self._column(column).astype(np.float64)
-        if np.isinf(values).any():
-            row = int(np.flatnonzero(np.isinf(values))[0])
-            raise MappingError(f"{self.where(row)}: column {column}: infinite.", hint="Repair the archive.")
-        return values
+        return _without_infinities(self, column, self._column(column).astype(np.float64))
 
     def texts(self, column: Column) -> list[str]:
         """Return a column as texts, (n,)."""
@@ -147,7 +130,7 @@ class ArrayTable:
         if not np.isfinite(values).all():
             row = int(np.flatnonzero(~np.isfinite(values))[0])
             raise MappingError(f"{self.where(row)}: column {column}: not a time.", hint="Write `clock: none`.")
-        return np.array([int((Decimal(value) * per_unit).to_integral_value()) for value in values.tolist()], np.int64)
+        return np.array([_scaled(value, per_unit) for value in values.tolist()], np.int64)
 
     def take(self, rows: Sequence[int]) -> ArrayTable:
         """Return some of the rows."""
@@ -186,11 +169,7 @@ class BagTable:
 
     def numbers(self, column: Column) -> FloatArray:
         """Return a field, (n,), with NaN where there is no sample; MappingError for an infinite number."""
-        values = np.array(self.found[column], dtype=np.float64)
-        if np.isinf(values).any():
-            row = int(np.flatnonzero(np.isinf(values))[0])
-            raise MappingError(f"{self.where(row)}: {column}: infinite.", hint="Leave the field out.")
-        return values
+        return _without_infinities(self, column, np.array(self.found[column], dtype=np.float64))
 
     def texts(self, column: Column) -> list[str]:
         """Return a field as texts, (n,)."""
@@ -203,7 +182,7 @@ class BagTable:
             raise MappingError(f"{self.shown}: {column} is in nanoseconds.", hint="Write `unit: ns` under `time`.")
         if whole:
             return np.array(self.stamps, dtype=np.int64)
-        return np.array([int((Decimal(one) * per_unit).to_integral_value()) for one in self.stamps], dtype=np.int64)
+        return np.array([_scaled(one, per_unit) for one in self.stamps], dtype=np.int64)
 
     def take(self, rows: Sequence[int]) -> BagTable:
         """Return some of the rows."""
@@ -229,11 +208,24 @@ Table = TextTable | ArrayTable | BagTable
 """Rows and columns of one recording."""
 
 
-def _is_number(cell: str) -> bool:
+def _scaled(value: Any, per_unit: int) -> int:
+    return int((Decimal(value) * per_unit).to_integral_value())
+
+
+def _without_infinities(table: Table, column: Column, values: FloatArray) -> FloatArray:
+    wrong = np.flatnonzero(np.isinf(values))
+    if len(wrong):
+        raise MappingError(f"{table.where(int(wrong[0]))}: column {column}: infinite.", hint="Leave the column out.")
+    return values
+
+
+def _number(cell: str) -> float:
+    """Return the number in a cell; infinity: there is none."""
     try:
-        return math.isfinite(float(cell))
+        # Python's float() also reads 1_000; no table in the world means that.
+        return math.inf if "_" in cell else float(cell)
     except ValueError:
-        return False
+        return math.inf
 
 
 def _checked(shown: str, place: int, wide: int) -> int:
@@ -244,6 +236,6 @@ def _checked(shown: str, place: int, wide: int) -> int:
     return place
 
 
-def _listing(names: Sequence[str], most: int = 12) -> str:
-    shown = ", ".join(names[:most])
-    return f"{shown} … ({len(names)} in all)" if len(names) > most else shown
+def _listing(names: Sequence[str]) -> str:
+    shown = ", ".join(names[:MOST_LISTED])
+    return f"{shown} … ({len(names)} in all)" if len(names) > MOST_LISTED else shown

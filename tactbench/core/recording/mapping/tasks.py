@@ -11,9 +11,8 @@ import yaml
 from tactbench.core.errors import MappingError, UnwritableError
 from tactbench.core.recording.mapping.channels import MappedStream
 from tactbench.core.recording.mapping.model import Mapping as MappingFile
-from tactbench.core.spec.declared_task import FILE, TaskFile
+from tactbench.core.spec.declared_task import FILE
 from tactbench.core.spec.task import LabelTarget, VectorTarget
-from tactbench.core.spec.yaml_file import load_yaml
 
 SPLITS = ("roles", "session", "recording", "trial", "in-session", "shuffled")
 """That recordings can be asked for whatever their labels are."""
@@ -47,21 +46,19 @@ def require_answerable(mapping: MappingFile, streams: Mapping[str, MappedStream]
                 )
 
 
-def tasks_text(mapping: MappingFile, name: str) -> str:
-    """Return what is to lie beside the recordings of the mapping called `name`; empty if it declares no task."""
+def tasks_text(mapping: MappingFile) -> str:
+    """Return what is to lie beside the recordings of a mapping; empty if it declares no task."""
     if not mapping.tasks:
         return ""
     tasks = [task.model_dump(mode="json", exclude_unset=True) for task in mapping.tasks]
     body = yaml.safe_dump({"version": 1, "tasks": tasks}, sort_keys=False, allow_unicode=True)
-    return f"# Tasks of these recordings, from the mapping {name}; `tactbench run --recordings` reads them.\n{body}"
+    return f"# Tasks of these recordings, from their mapping; `tactbench run --recordings` reads them.\n{body}"
 
 
 def check_tasks(out: Path, text: str, *, replace: bool) -> None:
     """Refuse to write over other tasks unless they are to be replaced; raises MappingError."""
     target = out / FILE
-    if not text or replace or not target.exists():
-        return
-    if load_yaml(target, TaskFile) != TaskFile.model_validate(yaml.safe_load(text)):
+    if text and not replace and target.exists() and target.read_text(encoding="utf-8") != text:
         raise MappingError(
             f"{target} exists already and declares other tasks.",
             hint="Give another folder with --out DIR, or replace it with --replace.",

@@ -7,9 +7,9 @@ from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 
-from tactbench.core.errors import TactbenchError
+from tactbench.core.errors import error_text
 from tactbench.core.files import replace_file
-from tactbench.core.matrix.progress import Progress
+from tactbench.core.progress import Progress
 from tactbench.core.report.figures import (
     confusion,
     embedding_map,
@@ -73,7 +73,7 @@ def draw_figures(
                 if sketch is not None:
                     drawn.append(save(sketch, folder))
             except Exception as error:  # stops no other figure
-                why = str(error) if isinstance(error, TactbenchError) else f"{type(error).__name__}: {error}"
+                why = error_text(error)
                 remark(f"No {what}{where}: {why}")
             progress.advance(what)
     return drawn
