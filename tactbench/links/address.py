@@ -24,11 +24,6 @@ class _Line(BaseModel):
     stop_bits: int = Field(default=1, ge=1, le=2)
 
 
-class _Udp(BaseModel):
-    local_port: int = Field(default=0, gt=0, lt=65536)
-    buffer_bytes: PositiveInt = 1
-
-
 class _Spi(BaseModel):
     speed_hz: PositiveInt
     mode: int = Field(default=0, ge=0, le=3)
@@ -51,7 +46,7 @@ KINDS = MappingProxyType(
         "socket": _Kind("socket://192.168.1.5:4001", _None),
         "loop": _Kind("loop://", _None),
         "can": _Kind("can://socketcan/can0", _None),
-        "udp": _Kind("udp://192.168.1.1:49152", _Udp),
+        "udp": _Kind("udp://192.168.1.1:49152", _None),
         "spi/spidev": _Kind("spi://spidev/0.0?speed_hz=4400000", _Spi),
         "spi/bridge": _Kind("spi://bridge//dev/ttyACM0?speed_hz=4400000", _Bridge),
     }
@@ -129,7 +124,7 @@ def open_link(address: str, clock: Clock = time.monotonic_ns) -> Link:
     options = dict(given)
     match kind:
         case "udp":
-            return UdpLink(*_host_and_port(target), clock=clock, **options)
+            return UdpLink(*_host_and_port(target), clock=clock)
         case "can":
             interface, _, channel = target.partition("/")
             return CanBus(interface, channel, clock=clock, **options)

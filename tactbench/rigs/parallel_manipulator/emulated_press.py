@@ -28,8 +28,8 @@ FORCE = "fz"
 FLOOR_N = 0.6e-3
 """Standard deviation of what the force sensor adds by itself (derived: quantisation of a Nano17 read with 16 bits on
 +-10 V, rms of Fz); without it a sensor without noise would seem stuck."""
-TABULATED = 4001
-"""Depths at which the force is tabulated; straight between them."""
+BEYOND_M = 1.0
+"""Behind the end of the press curve the skin goes on as a spring, at least as far as any motor goes."""
 _FLOOR_DRAWS = 1 << 14
 _FLOOR_HZ = 7000
 """A new draw for each sample of a Net F/T box."""
@@ -84,13 +84,16 @@ class EmulatedPress:
         self._s_per_n = (self._duration_s - self._hold_s) / profile.end.to("N")
         self._corners = profile.corners
         depths_m, forces_n = simulated.press_curve(largest_n)
-        even_m = np.linspace(0.0, float(depths_m[-1]), TABULATED)
-        self._spacing_m = float(even_m[1])
-        forces = np.interp(even_m, depths_m, forces_n)
-        forces[0] = 0.0
-        self._forces_n: list[float] = forces.tolist()
+        steepness = (forces_n[-1] - forces_n[-2]) / (depths_m[-1] - depths_m[-2])
+        self._curve = (
+            skin_m + np.append(depths_m, depths_m[-1] + BEYOND_M),
+            np.append(forces_n, forces_n[-1] + BEYOND_M * steepness),
+        )
         # One for what the sensor reads, one for the noise of the force.
-        self._sensor, self._force = (SceneSamples(simulated, self._duration_s, rest_s=self._hold_s) for _ in range(2))
+        streams, blocks = (*simulated.streams, *simulated.reference), list(simulated)
+        self._sensor, self._force = (
+            SceneSamples(streams, blocks, self._duration_s, rest_s=self._hold_s) for _ in range(2)
+        )
         for samples in (self._sensor, self._force):
             samples.start(0.0)
         self._floor_n: list[float] = (FLOOR_N * rng.standard_normal(_FLOOR_DRAWS)).tolist()
@@ -101,12 +104,7 @@ class EmulatedPress:
 
     def force_n(self, position_m: float) -> float:
         """Return the force of the skin [N] at a position of the motor, as its drive counts [m]."""
-        place = (position_m - self.skin_m) / self._spacing_m
-        if place <= 0.0:
-            return 0.0
-        before = min(int(place), TABULATED - 2)
-        here, there = self._forces_n[before : before + 2]
-        return here + (place - before) * (there - here)
+        return float(np.interp(position_m, *self._curve)) if position_m > self.skin_m else 0.0
 
     def sensed(self, t_s: float, position_m: float) -> Mapping[str, float]:
         """Return the value of every channel, in its unit, at a second of the devices' clock and a motor's position."""
