@@ -237,7 +237,7 @@ class Press:
 
     def _beat(self, last: Report) -> Beat:
         limits = self.setting.limits
-        beat = Beat(self.sequence, self.clock(), self.phase, force_sequence=last.force_sequence)
+        beat = Beat(self.clock(), self.phase, force_sequence=last.force_sequence)
         match self.phase:
             case "approach" if not last.moving:
                 return replace(beat, command=CommandKind.MOVE_TO, position_m=SKIN_M - 0.1e-3, speed_m_s=0.02)
@@ -285,7 +285,6 @@ class Kind:
 
 KINDS: dict[str, Kind] = {
     "rig hangs": Kind("rig", {Trigger.BEAT_OLD}),
-    "rig skips a beat's number": Kind("rig", {Trigger.BEAT_SEQUENCE}),
     "steps too long": Kind("rig", {Trigger.COMMANDS_REFUSED}),
     "steps out of travel": Kind("rig", {Trigger.COMMANDS_REFUSED}),
     "steps not numbers": Kind("rig", {Trigger.COMMANDS_REFUSED}),
@@ -336,8 +335,6 @@ def changed(names: Mapping[str, float], setting: Setting, clock: Callable[[], in
         on = {name for name, at_s in names.items() if now_s >= at_s}
         if "rig hangs" in on:
             return None
-        if "rig skips a beat's number" in on:
-            return replace(beat, sequence=beat.sequence + 1)
         limits = setting.limits
         if "steps too long" in on:
             return replace(beat, command=CommandKind.STEP, distance_m=3 * limits.step_m)

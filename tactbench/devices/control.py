@@ -65,7 +65,6 @@ class Control:
         self._period_ns, self._stale_ns = round(1e9 * period_s), round(1e9 * stale_s)
         self.report = armed
         """What the guard answered last."""
-        self._beats = 0
         self._rows, self._rows_ns = -1, clock()
         self._next_ns = self._rows_ns + self._period_ns
         self._raw: list[tuple[float, float]] = []
@@ -164,7 +163,6 @@ class Control:
         except TactbenchError as error:
             press.fail(error_text(error))
             beat = press.step(self.report, (), 1e-9 * now_ns)
-        self._beats += 1
         number = self.report.force_sequence
-        beat = replace(beat, sequence=self._beats, t_ns=now_ns, state=str(press.state), force_sequence=number)
+        beat = replace(beat, t_ns=now_ns, state=str(press.state), force_sequence=number)
         self.report = self._guard.beat(beat)

@@ -46,7 +46,7 @@ from tactbench.devices.guard_messages import (
     Report,
     Trigger,
 )
-from tactbench.devices.positioner import Positioner, PositionerSilentError, power_off
+from tactbench.devices.positioner import Positioner, PositionerSilentError
 from tactbench.links.link import Clock
 
 T = TypeVar("T")
@@ -127,8 +127,7 @@ class LocalGuard:
         self._lost: set[str] = set()
         self._home_anew: set[str] = set()
         self._closed = False
-        self._beats = self._refused = 0
-        self._beat_ns = 0
+        self._refused = self._beat_ns = 0
         self._end_sequence = -1
         self._into_skin = self._touched = False
         self._began_ns = self._sent_ns = 0
@@ -137,8 +136,6 @@ class LocalGuard:
 
     def start(self) -> Mapping[str, Mapping[str, str]]:
         """Ask all devices who they are, and let them sample."""
-        if len(self._force.streams) != 1:
-            raise RigError("The guard needs a force sensor with one stream.")
         found = {}
         for name, device in {**self._axes, FORCE: self._force}.items():
             try:
@@ -155,7 +152,7 @@ class LocalGuard:
     def arm(self, limits: Limits) -> Report:
         """Check, home what is not homed, retract the pressing axis, and begin to expect beats.
 
-        The first beat is due within `heartbeat_s`, and its sequence is 1. Samples from before are dropped.
+        The first beat is due within `heartbeat_s`. Samples from before are dropped.
 
         Raises
         ------
@@ -177,29 +174,26 @@ class LocalGuard:
                 hint = getattr(error, "hint", "")
                 raise GuardRefusesError(f"{name} is not armed: {error_text(error)}.", hint=hint) from error
         self.state, self._limits = GuardState.ARMED, limits
-        self._beats, self._refused, self._touched = 0, 0, False
+        self._refused, self._touched = 0, False
         self._end_sequence = self._seen_force.sequence
         # What came while axes were homed may be a minute of samples: handing it over would take a beat's time.
         self._seen_force.blocks.clear()
         self._motor_blocks.clear()
         self._beat_ns = self._clock()
         self._say(None, "armed")
-        return self._report(0)
+        return self._report()
 
     def beat(self, beat: Beat) -> Report:
         """Say that the rig is there, and what shall be done; return at once."""
         limits = self._limits
         if self.state is GuardState.ARMED and limits is not None:
             self._counts["beats"] += 1
-            if beat.sequence != self._beats + 1:
-                expected = self._beats + 1
-                self.trip(Trigger.BEAT_SEQUENCE, f"beat {beat.sequence} came, {expected} was expected")
             self._see_beat(beat.t_ns, limits)
-            self._beats, self._beat_ns = beat.sequence, min(beat.t_ns, self._clock())
+            self._beat_ns = min(beat.t_ns, self._clock())
         self.look(0.0)
         # What this look has found stands before the command.
         if self.state is not GuardState.ARMED or limits is None:
-            return self._report(beat.sequence, f"the guard is in state {self.state}")
+            return self._report(f"the guard is in state {self.state}")
         reason, early = self._command(beat, limits)
         if early:
             self._counts["early"] += 1
@@ -211,7 +205,7 @@ class LocalGuard:
                 self.trip(Trigger.COMMANDS_REFUSED, f"{REFUSED} in a row, the last because {reason}")
         elif beat.command is not CommandKind.NONE:
             self._refused = 0
-        return self._report(beat.sequence, reason, early=early)
+        return self._report(reason, early=early)
 
     def advance(self, until_ns: int) -> None:
         """Look until the clock says so much."""
@@ -252,7 +246,7 @@ class LocalGuard:
             self.state = GuardState.IDLE
             self._say(None, "disarmed")
         self._limits, self.trigger = None, None
-        report, self._not_out = self._report(0), ""
+        report, self._not_out = self._report(), ""
         return report
 
     def close(self) -> None:
@@ -473,7 +467,11 @@ class LocalGuard:
             self._end(None, f"out after {took}")
         elif now_ns > self._began_ns + 1e9 * retreat_seconds(press):
             where = "nobody knows where" if math.isnan(press.position) else f"last seen at {press.position:g} m"
-            power = "power taken off" if power_off(press) else "left under power, since it may fall without"
+            power = "left under power, since it may fall without"
+            if press.facts.holds_unpowered:
+                with suppress(LinkError, RigError):
+                    press.disable()
+                    power = "power taken off"
             self._end(Trigger.RETREAT_FAILED, f"RETREAT FAILED: not out after {took}, {where}; {power}: stand clear")
         elif not press.moving and now_ns - self._sent_ns > 1e9 * AGAIN_S:
             self._send_retreat()
@@ -589,13 +587,11 @@ class LocalGuard:
         self._events.append(event)
         self._on_event(event)
 
-    def _report(self, sequence: int, reason: str = "", *, early: bool = False) -> Report:
+    def _report(self, reason: str = "", *, early: bool = False) -> Report:
         watch, state = self._seen_force, self._press.state
         return Report(
-            sequence=sequence,
             t_ns=self._clock(),
             state=self.state,
-            accepted=not reason,
             reason=reason,
             early=early,
             moving=self._moving,

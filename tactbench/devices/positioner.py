@@ -5,14 +5,13 @@ from __future__ import annotations
 import math
 from abc import abstractmethod
 from collections.abc import Callable
-from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any, ClassVar, Literal, Self
 
 import numpy as np
 from pydantic import Field, model_validator
 
-from tactbench.core.errors import LinkError, LinkTimeout, RigError
+from tactbench.core.errors import LinkTimeout, RigError
 from tactbench.core.samples import Block, Quality
 from tactbench.core.spec.sensor import ChannelSpec, StreamSpec
 from tactbench.devices.driver import Driver, DriverSettings, Options, open_for, read_options
@@ -409,12 +408,3 @@ class Positioner(Driver):
 
 def _or(value: float | None, otherwise: float) -> float:
     return otherwise if value is None else value
-
-
-def power_off(axis: Positioner) -> bool:
-    """Take an axis' power where it holds without; return whether that was done. Raises nothing."""
-    with suppress(LinkError, RigError):
-        if axis.facts.holds_unpowered:
-            axis.disable()
-            return True
-    return False

@@ -10,7 +10,7 @@ from typing import Any, ClassVar, Generic, NamedTuple, TypeVar
 
 import numpy as np
 
-from tactbench.core.errors import LinkError, LinkTimeout, LinkUnplugged, UnknownNameError
+from tactbench.core.errors import LinkError, UnknownNameError
 from tactbench.core.samples import Block
 from tactbench.core.spec.sensor import StreamSpec
 from tactbench.devices.driver import Driver, DriverSettings, open_for
@@ -19,9 +19,6 @@ from tactbench.links.can_link import CanLink
 from tactbench.links.datagram_link import DatagramLink
 
 L = TypeVar("L", ByteLink, CanLink, DatagramLink)
-
-AT_ONCE = 1000
-"""The most pieces of one `read`: a device may send faster than they are taken."""
 
 
 class Sample(NamedTuple):
@@ -102,20 +99,13 @@ class RowDriver(Driver, Generic[L]):
         found: list[Sample] = []
         link = self.link
         until_s = link.timer() + timeout_s
-        for _ in range(AT_ONCE):
-            try:
-                received = link.receive(0.0 if found else max(0.0, until_s - link.timer()))
-            except LinkTimeout:
-                break
-            except LinkUnplugged:
-                if found:  # what has come is handed out; the next read says that nothing comes any more
-                    break
-                raise
-            fresh = list(self.rows(received))
-            times += [received.t_ns] * len(fresh)
-            found += fresh
-        if not found:
-            return []
+        while not found:
+            for received in link.receive_all(max(0.0, until_s - link.timer())):
+                fresh = list(self.rows(received))
+                times += [received.t_ns] * len(fresh)
+                found += fresh
+            if not found and link.timer() >= until_s:
+                return []
         data = np.array([row.values for row in found]).astype(self.stream.dtype)
         good = [0] * data.shape[1]
         quality = np.array([good if row.quality is None else row.quality for row in found], dtype=np.uint8)

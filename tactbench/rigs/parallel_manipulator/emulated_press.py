@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from tactbench.plugin import Acquisition, NotApplicable, PluginContractError, Scene, SensorDescriptor, UsageError
+from tactbench.plugin import Acquisition, NotApplicable, Scene, SensorDescriptor
 from tactbench.plugin.devices import RigEmulators, RigFile, SceneSamples, emulators_of, with_sensor
 from tactbench.plugin.simulation import SimulatedPress
 from tactbench.rigs.parallel_manipulator.settings import MOTOR, axes_of, settings_of, with_limits
@@ -126,7 +126,7 @@ class PressEmulators(RigEmulators):
     Raises
     ------
     UsageError
-        If the file lacks something, or an emulated axis is none.
+        If the file lacks something.
     """
 
     def __init__(self, file: RigFile, registry: Any) -> None:
@@ -142,8 +142,6 @@ class PressEmulators(RigEmulators):
         self.devices = devices
         for name in axes_of(self._settings):
             axis: Any = devices[name].emulator if name in devices else None
-            if axis is not None and not hasattr(axis, "press_against"):
-                raise UsageError(f"The emulated {name} is no axis.", hint="Its emulator lacks press_against.")
             if axis is not None:  # the platform's weight is not modelled
                 axis.press_against(self._force_n if name == MOTOR else None)
             if name == MOTOR:
@@ -151,12 +149,7 @@ class PressEmulators(RigEmulators):
 
     def prepare(self, simulated: Acquisition, sensor: SensorDescriptor, scene: Scene, seed: int) -> None:
         """Put the sensor of a scene before the motor; the height of its skin is drawn."""
-        press: Any = simulated
-        if not hasattr(press, "press_curve"):
-            raise PluginContractError(
-                f"The simulated rig {self._file.emulation.physics!r} has no press curves.",
-                hint="Its acquisition needs press_curve: see SimulatedPress in tactbench.plugin.simulation.",
-            )
+        press: Any = simulated  # a SimulatedPress
         settings, heights, scene = self._settings, self._settings.heights, quiet(scene)
         rng = np.random.default_rng([self._file.emulation.seed, seed, *b"skin", *scene.name.encode()])
         most_mm = heights.tolerance_mm

@@ -151,15 +151,11 @@ class Session:
             guard.disarm()
             return None
         places = way(delta, _place_m(delta, report.positions), xy_m, heights.clearance_m, heights.stand_off_m)
-        beats = 0
         for point in way_points(delta, places):
             targets = dict(zip(JOINTS, point, strict=True))
             while targets or report.moving:
-                beats += 1
                 now_ns, kind = self.clock(), CommandKind.TRAVEL if targets else CommandKind.NONE
-                report = guard.beat(
-                    Beat(beats, now_ns, "travel", kind, force_sequence=report.force_sequence, targets=targets)
-                )
+                report = guard.beat(Beat(now_ns, "travel", kind, force_sequence=report.force_sequence, targets=targets))
                 if report.state is not GuardState.ARMED or (report.reason and not report.early):
                     said = report.trigger or report.reason
                     raise RigError(f"The manipulator was stopped on its way: {said}.", hint="See what is in its way.")

@@ -71,7 +71,7 @@ def test_a_guard_that_is_lost_says_so_ever_after(tmp_path):
         made.guard.arm(made.setting.limits)
         made.guard._process.send_signal(signal.SIGINT)
         made.guard._process.send_signal(signal.SIGHUP)
-        assert made.guard.beat(Beat(1, made.clock())).accepted
+        assert made.guard.beat(Beat(made.clock())).accepted
         made.guard._process.kill()
         for _ in range(2):
             with pytest.raises(GuardLostError, match="has retreated"):

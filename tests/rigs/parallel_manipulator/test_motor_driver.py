@@ -367,7 +367,6 @@ def test_any_bytes_from_the_drive_raise_named_errors_only(pieces, seed):
         ({"lower_m": -1e-3}, "both lower_m and upper_m"),
         ({"lower_m": 1e-3, "upper_m": 2e-3}, "'lower_m' of faulhaber"),
         ({"homing": "there"}, "'homing' of faulhaber"),
-        ({"homing_speed_m_s": 0.0}, "not 0"),
         (LIMITS | {"retreat_m": 0.1}, "retreat_m is between"),
         ({"speed": 1}, "no option of faulhaber called 'speed'.*speed_m_s"),
     ],

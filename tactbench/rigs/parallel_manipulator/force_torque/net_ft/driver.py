@@ -15,7 +15,6 @@ from tactbench.plugin.devices import (
     DriverSettings,
     LinkError,
     LinkTimeout,
-    LinkUnplugged,
     Received,
     Unwrap,
     open_for,
@@ -37,10 +36,10 @@ from tactbench.rigs.parallel_manipulator.force_torque.net_ft.codec import (
 
 QUIET_S = 0.05
 """After which a box that was stopped sends no more (assumed: a network of one cable, a busy host)."""
+MOST_SILENCED = 4096
+"""Datagrams after which a box that goes on is left alone: 4 s at 1 kHz."""
 ANSWER_S = 0.5
 """Within which a box answers, over the time its records take (assumed: a network of one cable)."""
-MOST_DATAGRAMS = 4096
-"""In one block: 4 s at 1 kHz."""
 
 
 class NetFtDriver(Driver):
@@ -133,14 +132,7 @@ class NetFtDriver(Driver):
             If the network says that nobody listens there.
         """
         came, self._kept = self._kept, []
-        try:
-            while len(came) < MOST_DATAGRAMS:
-                came.append(self._link.receive(0.0 if came else timeout_s))
-        except LinkTimeout:
-            pass
-        except LinkUnplugged:
-            if not came:
-                raise
+        came += self._link.receive_all(0.0 if came else timeout_s)
         whole = [piece for piece in came if len(piece.data) == RECORD_BYTES]
         self._counts["rejected"] += len(came) - len(whole)
         return [self._block(whole)] if whole else []
@@ -164,7 +156,7 @@ class NetFtDriver(Driver):
         """Stop the box, and drop what it sent before: records of an earlier start would seem to be of the next one."""
         self._send(Command.STOP)
         with suppress(LinkTimeout):
-            for _ in range(MOST_DATAGRAMS):
+            for _ in range(MOST_SILENCED):
                 self._link.receive(QUIET_S + 2 * self._options.every / SENSOR_RATE_HZ)
         self._silent = True
 
