@@ -129,7 +129,6 @@ class Control:
             self.press.abandon()
 
     def _gather(self) -> None:
-        """Take what the guard has for the recording."""
         for block in self._guard.force_blocks():
             self._blocks.append(block)
             self._raw += self._pressing(block)

@@ -298,7 +298,6 @@ class LocalGuard:
         return self._press.at(self._press.facts.retreat)
 
     def _see_beat(self, now_ns: int, limits: Limits) -> None:
-        """Retreat if the last beat is too old."""
         age_s = 1e-9 * (now_ns - self._beat_ns)
         if age_s > limits.heartbeat_s:
             self.trip(Trigger.BEAT_OLD, f"no beat for {1e3 * age_s:.1f} ms, {1e3 * limits.heartbeat_s:.1f} may be")
@@ -390,7 +389,6 @@ class LocalGuard:
         return "", False
 
     def _travel_reason(self, beat: Beat) -> str:
-        """Return why other axes may not travel; empty: they may."""
         if not self._retracted or self._press.moving:
             return f"{self._name} is not retracted"
         for name, target in beat.targets.items():
@@ -439,7 +437,6 @@ class LocalGuard:
         self._say(trigger, text)
 
     def _send_retreat(self) -> None:
-        """Halt the other axes that move, and send the pressing axis away from the skin."""
         self._sent_ns = self._clock()
         commands = {name: axis.halt for name, axis in self._others.items() if axis.moving}
         for name, command in {**commands, self._name: self._press.retreat}.items():
@@ -554,7 +551,6 @@ class LocalGuard:
             self._retract(limits)
 
     def _retract(self, limits: Limits) -> None:
-        """Send the pressing axis to its place of retreat under watch; raises GuardRefusesError."""
         press = self._press
         deadline_ns = self._clock() + round(1e9 * retreat_seconds(press))
         press.retreat()

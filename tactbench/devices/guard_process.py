@@ -181,11 +181,6 @@ class GuardProcess:
                 stderr=errors,
             )
 
-    @property
-    def pid(self) -> int:
-        """Number of the process."""
-        return self._process.pid
-
     def start(self) -> Mapping[str, Mapping[str, str]]:
         """Let the process open all devices."""
         identity: Mapping[str, Mapping[str, str]]
@@ -377,7 +372,6 @@ class _Server:
             _log({"left": self._clock()})
 
     def _left(self) -> bool:
-        """Return whether the process is to end."""
         self._alone |= os.getppid() != self._parent
         return self._alone or self.terminated
 
@@ -422,7 +416,6 @@ class _Server:
             self._out += _line(said)
 
     def _answer(self, what: str, body: Any) -> Any:
-        """Carry out a request; return what is answered."""
         if what == "close":
             self._over = True
             return None

@@ -239,7 +239,6 @@ class Reading:
             yield from stream.take()
 
     def _take_over(self, name: str, driver: Driver, timeout_s: float) -> bool:
-        """Read a driver once; return whether anything came."""
         blocks = driver.read(timeout_s)
         for block in blocks:
             if block.stream not in self._streams:
@@ -292,7 +291,6 @@ class Reading:
             self._fail(name, error)
 
     def _fail(self, name: str, error: Exception) -> None:
-        """End the reading for `error`, unless another one has."""
         with self._lock:
             if self.error is None:
                 self.error = error

@@ -6,7 +6,6 @@ import socket
 import time
 from abc import abstractmethod
 
-from tactbench.core.errors import LinkError
 from tactbench.links.link import WRITE_TIMEOUT_S, Clock, Link, Received, cannot_open
 
 LARGEST_DATAGRAM = 65507
@@ -28,15 +27,7 @@ class DatagramLink(Link):
 
     @abstractmethod
     def send(self, data: bytes) -> None:
-        """Send one datagram; raises as every :class:`Link`, LinkError if it is longer than UDP carries."""
-
-    def _sendable(self, data: bytes) -> None:
-        super()._sendable(data)
-        if len(data) > LARGEST_DATAGRAM:
-            raise LinkError(
-                f"{self.address}: a datagram of {len(data)} bytes was given, at most {LARGEST_DATAGRAM} go out.",
-                hint="Send it in parts.",
-            )
+        """Send one datagram; raises as every :class:`Link`."""
 
 
 class UdpLink(DatagramLink):
@@ -68,11 +59,6 @@ class UdpLink(DatagramLink):
         except OSError as error:
             self._socket.close()
             raise cannot_open(self.address, error) from error
-
-    @property
-    def local_port(self) -> int:
-        """Port of this end."""
-        return int(self._socket.getsockname()[1])
 
     def receive(self, timeout_s: float) -> Received:  # noqa: D102  (inherited)
         self._usable(timeout_s)

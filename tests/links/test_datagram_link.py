@@ -31,8 +31,8 @@ def test_datagrams_stay_whole_and_apart(far):
 def test_only_the_peer_is_heard(far):
     with UdpLink("127.0.0.1", far.getsockname()[1]) as link:
         with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as stranger:
-            stranger.sendto(b"stranger", ("127.0.0.1", link.local_port))
-        far.sendto(b"peer", ("127.0.0.1", link.local_port))
+            stranger.sendto(b"stranger", ("127.0.0.1", link._socket.getsockname()[1]))
+        far.sendto(b"peer", ("127.0.0.1", link._socket.getsockname()[1]))
         assert link.receive(5.0).data == b"peer"
         with pytest.raises(LinkTimeout):
             link.receive(0)

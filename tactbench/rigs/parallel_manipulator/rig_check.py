@@ -107,7 +107,6 @@ def _check_places(delta: LinearDelta, settings: RigSettings) -> None:
 
 
 def _axis_problems(settings: RigSettings, name: str, options: Any) -> list[str]:
-    """Return what would make an axis unsafe."""
     limits, force_n, problems = settings.limits, options.largest_force_n, []
     mandatory = [*_MANDATORY, *(("brake", "counterweight") if options.orientation == "vertical" else ())]
     missing = [option for option in mandatory if getattr(options, option) is None]

@@ -91,7 +91,6 @@ class Session:
         return [drivers[name] for name in names]
 
     def _guard(self) -> Guard:
-        """Return the guard of all axes and the force sensor."""
         names = axes_of(self.settings)
         if self.emulated is not None:
             *axes, force = self.opened(next(iter(self._file.sensors)), *names, FORCE)

@@ -57,7 +57,7 @@ class SafetyLimits(_Part):
     """How old a sample of the force may be: three sampling periods of the force sensor, and by how much sender and
     host are late (assumed: of 250 Hz or more, and an ordinary kernel)."""
     travel_mm: Range
-    """Least and greatest position of the motor; 0 lies between them, where the drive keeps them."""
+    """Least and greatest position of the motor; between them lies the 0 of a Faulhaber drive."""
     heartbeat_ms: Positive
     """The motor retreats if nobody has told it for so long to go on."""
     retreat_mm: FiniteFloat
@@ -68,8 +68,6 @@ class SafetyLimits(_Part):
     def _in_order(self) -> Self:
         low, high = self.travel_mm
         _rising(low, self.retreat_mm, high, said="the motor's travel and its place of retreat")
-        if not low < 0 < high:
-            raise ValueError("the motor's travel goes from below 0 to above 0")
         ceilings = (self.travel_ceiling_n, self.force_ceiling_n, self.rated_force_n)
         _rising(*ceilings, said="ceiling of travel, ceiling of pressing and rated force")
         return self

@@ -27,7 +27,6 @@ class Plant:
         self.state, self.trigger, self.touched, self.accepted = GuardState.ARMED, None, False, True
         self.force_gain, self.force_offset_n = 1.0, 0.0
         self.seen, self.largest_n, self.steps = [], 0.0, []
-        self.press.go()
 
     @property
     def force_n(self):

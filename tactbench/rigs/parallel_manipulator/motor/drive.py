@@ -141,7 +141,6 @@ class Drive:
         self._loaded_m: float | None = None
 
     def _stand(self) -> None:
-        """Hold the motor where it is."""
         self._motion = Motion(self.now_s, self.position_m)
 
     @property
@@ -273,7 +272,6 @@ class Drive:
         return argument
 
     def _queried(self, name: str) -> str | None:
-        """Return the answer to a query; None: it is none."""
         if name in _ABOUT:
             return _ABOUT[name]
         of, (place_m, force_n, limited) = self._options, self._pressed()

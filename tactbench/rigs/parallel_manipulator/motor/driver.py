@@ -314,7 +314,6 @@ class FaulhaberDriver(Positioner):
         return target_m
 
     def _forget(self) -> None:
-        """Take what is under way for unknown."""
         self._move, self._target, self._confirming = None, None, False
         self.state = self.state and replace(self.state, target=math.nan)
 
@@ -381,14 +380,12 @@ class FaulhaberDriver(Positioner):
         return Configuration(self._sure("CST"))
 
     def _keep(self, command: str, argument: int, query: str) -> None:
-        """Set something and read it back."""
         self._ask(command, argument)
         if self._sure(query) != argument:  # a digit may have been damaged on its way
             self._ask(command, argument)
             self._same(command, argument, query)
 
     def _same(self, command: str, argument: int, query: str) -> None:
-        """Raise PositionerError unless a setting is what was set."""
         if (found := self._sure(query)) != argument:
             raise PositionerError(
                 f"The motor's drive has {query} {found} where {command}{argument} was set.",

@@ -90,10 +90,8 @@ class NetFtDriver(Driver):
         LinkTimeout
             If two records in a row do not come.
         RigError
-            If the box sends at another rate than the options state, or is sampling.
+            If the box sends at another rate than the options state.
         """
-        if self._sampling:
-            raise RigError("The box is sampling.", hint="Ask it before it is started, or stop it first.")
         self._silence()
         self._send(Command.START_REALTIME, 2)
         first, second = (decode_records(self._next().data)[0] for _ in range(2))
