@@ -6,7 +6,7 @@ import time
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, Literal, Self, TypeVar
+from typing import Any, ClassVar, Literal, Self, TypeVar
 
 from pydantic import BaseModel, ConfigDict, ValidationError
 
@@ -30,6 +30,12 @@ class DriverSettings:
     """The host's clock, the same as the link's; virtual where time is virtual."""
 
 
+class Options(BaseModel):
+    """Options of one device, the same for its driver and its emulator."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+
+
 class Driver(ABC):
     """One device: open once it is made, until :meth:`close` or the end of its ``with`` block.
 
@@ -37,7 +43,29 @@ class Driver(ABC):
 
     What is wrong with single samples is in their blocks' quality and in :attr:`counts`, and raises nothing; what ends
     the reading raises: :class:`~tactbench.core.errors.LinkUnplugged` of the link, or a RigError of the device.
+
+    Raises
+    ------
+    UsageError
+        For options that are not known or contradict each other, or a link of another kind.
+    LinkError
+        If the link does not open.
     """
+
+    device: ClassVar[str] = ""
+    """Name in messages; empty: that of the class."""
+    link_kind: ClassVar[type[Link]]
+    """Of the link that is opened; and an example of its address."""
+    address: ClassVar[str] = "those of docs/links.md"
+    options_kind: ClassVar[type[Options]] = Options
+    """What a rig file's entry may say."""
+
+    def __init__(self, settings: DriverSettings) -> None:
+        device = self.device or type(self).__name__
+        self.clock = settings.clock
+        """Nanoseconds of the host."""
+        self.options: Any = read_options(self.options_kind, settings.options, device)
+        self.link: Any = open_for(settings, device, self.link_kind, self.address)
 
     @property
     @abstractmethod
@@ -92,9 +120,10 @@ class Driver(ABC):
         """Let the device take its present reading as zero; return whether it can do so itself."""
         return False
 
-    @abstractmethod
     def close(self) -> None:
         """Stop if it is sampling, and close the link; once closed, this does nothing."""
+        self.stop()
+        self.link.close()
 
     def __enter__(self) -> Self:
         return self
@@ -107,12 +136,6 @@ def error_text(error: Exception) -> str:
     """Return what an error says, without a full stop; of one that is not the program's own with its kind."""
     text = error.message if isinstance(error, TactbenchError) else f"{type(error).__name__}: {error}"
     return text.rstrip(".")
-
-
-class Options(BaseModel):
-    """Options of one device, the same for its driver and its emulator."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
 
 _Model = TypeVar("_Model", bound=BaseModel)

@@ -10,10 +10,10 @@ from typing import Any, ClassVar, Generic, NamedTuple, TypeVar
 
 import numpy as np
 
-from tactbench.core.errors import LinkError, UnknownNameError
+from tactbench.core.errors import LinkError
 from tactbench.core.samples import Block
 from tactbench.core.spec.sensor import StreamSpec
-from tactbench.devices.driver import Driver, DriverSettings, open_for
+from tactbench.devices.driver import Driver, DriverSettings
 from tactbench.links.byte_link import ByteLink
 from tactbench.links.can_link import CanLink
 from tactbench.links.datagram_link import DatagramLink
@@ -36,30 +36,16 @@ class RowDriver(Driver, Generic[L]):
     Rows have the time at which the host had them. A device with several streams, numbers or a clock of its own needs a
     :class:`Driver`.
 
-    Raises
-    ------
-    UsageError
-        For an option that is not among `defaults`, or a link of another kind.
-    LinkError
-        If it cannot be opened.
     """
 
     stream: ClassVar[StreamSpec]
     """What it reads."""
-    link_kind: type[L]
-    """ByteLink, CanLink or DatagramLink."""
-    defaults: ClassVar[Mapping[str, Any]] = {}
-    """Options of a rig file's entry, and what they are where it leaves them out."""
+    link: L
 
     def __init__(self, settings: DriverSettings) -> None:
-        for name in settings.options:
-            if name not in self.defaults:
-                raise UnknownNameError("option", name, self.defaults)
-        self.options: dict[str, Any] = {**self.defaults, **settings.options}
-        self.clock = settings.clock
+        super().__init__(settings)
         self.counted: Counter[str] = Counter()
         """What :attr:`counts` tells: subclasses count here what they leave out."""
-        self.link: L = open_for(settings, type(self).__name__, self.link_kind, "those of docs/links.md")
 
     @property
     def streams(self) -> tuple[StreamSpec, ...]:
@@ -118,8 +104,3 @@ class RowDriver(Driver, Generic[L]):
 
     def quiet(self) -> None:
         """Nothing, unless the device can be told to stop."""
-
-    def close(self) -> None:
-        """Stop, and close the link."""
-        self.stop()
-        self.link.close()

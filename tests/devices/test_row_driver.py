@@ -18,6 +18,7 @@ from tactbench.plugin.devices import (
     EmulatedDevices,
     EmulatorSettings,
     LinkUnplugged,
+    Options,
     RowDriver,
     RowEmulator,
     Sample,
@@ -31,8 +32,12 @@ STREAM = StreamSpec(
 )  # fmt: skip
 
 
+class UnitOptions(Options):
+    unit: int = 1
+
+
 class ByteDriver(RowDriver[ByteLink]):
-    stream, link_kind, defaults = STREAM, ByteLink, {"unit": 1}
+    stream, link_kind, options_kind = STREAM, ByteLink, UnitOptions
 
     def begin(self):
         self.link.write(b"+")
@@ -123,7 +128,7 @@ def test_an_unknown_option_is_refused_before_the_link_is_opened():
         with pytest.raises(UsageError, match="unti"):
             on(devices, ByteDriver, unti=2)
         with on(devices, ByteDriver, unit=2) as driver:  # the link is free
-            assert driver.options == {"unit": 2}
+            assert driver.options.unit == 2
 
 
 def test_a_link_of_another_kind_is_refused_and_closed():
