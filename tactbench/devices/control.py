@@ -131,16 +131,12 @@ class Control:
     def _gather(self) -> None:
         for block in self._guard.force_blocks():
             self._blocks.append(block)
-            self._raw += self._pressing(block)
+            assert block.t_ns is not None
+            force_n = self._limits.pressing_n(block.data)
+            self._raw += zip((1e-9 * block.t_ns).tolist(), force_n.tolist(), strict=True)
         self._blocks.extend(self._guard.motor_blocks())
         self._events.extend(self._guard.events())
         self._counts = self._guard.counts()
-
-    def _pressing(self, block: Block) -> list[tuple[float, float]]:
-        assert block.t_ns is not None
-        limits = self._limits
-        force = (block.data[:, limits.channel] - limits.zero[limits.channel]) * limits.sign
-        return list(zip((1e-9 * block.t_ns).tolist(), force.tolist(), strict=True))
 
     def _period(self) -> None:
         now_ns = self._clock()

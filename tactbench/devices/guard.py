@@ -95,11 +95,6 @@ class LocalGuard:
         Called while axes are homed: whether they shall stand.
     """
 
-    force_stream: StreamSpec
-    """The force sensor's stream, once it is started."""
-    motor_stream: StreamSpec
-    """The pressing axis' stream, likewise."""
-
     def __init__(
         self,
         axes: Mapping[str, Positioner],
@@ -118,7 +113,7 @@ class LocalGuard:
         self._others = {name: axes[name] for name in others}
         self._force, self._clock, self._advance = force, clock, advance
         self._on_event, self._interrupted = on_event, interrupted
-        self._watch: ForceWatch | None = None
+        self._watch = ForceWatch(self.force_stream)
         self._limits: Limits | None = None
         self._motor_blocks: deque[Block] = deque(maxlen=MOST_BLOCKS)
         self._events: list[Event] = []
@@ -132,6 +127,18 @@ class LocalGuard:
         self._into_skin = self._touched = False
         self._began_ns = self._sent_ns = 0
 
+    @property
+    def force_stream(self) -> StreamSpec:
+        """The force sensor's stream."""
+        (stream,) = self._force.streams
+        return stream
+
+    @property
+    def motor_stream(self) -> StreamSpec:
+        """The pressing axis' stream."""
+        (stream,) = self._press.streams
+        return stream
+
     # What a rig asks for ----------------------------------------------------------------------------------------------
 
     def start(self) -> Mapping[str, Mapping[str, str]]:
@@ -144,8 +151,6 @@ class LocalGuard:
             except TactbenchError as error:
                 error.message = f"{name}: {error.message}"
                 raise
-        (self.force_stream,), (self.motor_stream,) = self._force.streams, self._press.streams
-        self._watch = ForceWatch(self.force_stream)
         self._say(None, "started")
         return found
 
@@ -175,9 +180,9 @@ class LocalGuard:
                 raise GuardRefusesError(f"{name} is not armed: {error_text(error)}.", hint=hint) from error
         self.state, self._limits = GuardState.ARMED, limits
         self._refused, self._touched = 0, False
-        self._end_sequence = self._seen_force.sequence
+        self._end_sequence = self._watch.sequence
         # What came while axes were homed may be a minute of samples: handing it over would take a beat's time.
-        self._seen_force.blocks.clear()
+        self._watch.blocks.clear()
         self._motor_blocks.clear()
         self._beat_ns = self._clock()
         self._say(None, "armed")
@@ -214,7 +219,7 @@ class LocalGuard:
 
     def force_blocks(self) -> list[Block]:
         """Return all force samples since the last call, but for those that came twice or after newer ones."""
-        return [] if self._watch is None else taken(self._watch.blocks)
+        return taken(self._watch.blocks)
 
     def motor_blocks(self) -> list[Block]:
         """Return all states of the pressing axis since the last call."""
@@ -229,10 +234,8 @@ class LocalGuard:
 
         To the force sensor's the guard adds ``duplicates`` and ``late`` samples, kept out, and ``gaps``, missing.
         """
-        force = Counter(self._force.counts)
-        if self._watch is not None:
-            order = self._watch.order
-            force.update(duplicates=order.duplicates, late=order.late, gaps=order.gaps)
+        force, order = Counter(self._force.counts), self._watch.order
+        force.update(duplicates=order.duplicates, late=order.late, gaps=order.gaps)
         axes = {name: dict(axis.counts) for name, axis in self._axes.items()}
         return {FORCE: {name: count for name, count in force.items() if count}, **axes, "guard": dict(self._counts)}
 
@@ -255,8 +258,7 @@ class LocalGuard:
             return
         self._closed = True
         try:
-            if self._watch is not None:  # else it was not started: there is nothing to disarm
-                self.disarm()
+            self.disarm()
         finally:
             for device in (*self._axes.values(), self._force):
                 with suppress(LinkError):
@@ -275,19 +277,13 @@ class LocalGuard:
         if problem is not None:
             self.trip(*problem)
         self._see_beat(began_ns, limits)
-        touched = self._into_skin and self._press.moving and self._seen_force.touched(limits.touch_n)
+        touched = self._into_skin and self._press.moving and self._watch.touched(limits.touch_n)
         if self.state is GuardState.ARMED and touched:
             self._into_skin, self._touched = False, True
             self._halt(self._press)
             self._say(None, "touch: the axis holds")
         if self.state is GuardState.RETREATING:
             self._carry_on()
-
-    @property
-    def _seen_force(self) -> ForceWatch:
-        if self._watch is None:
-            raise GuardRefusesError("The guard was not started.", hint="Use start().")
-        return self._watch
 
     @property
     def _moving(self) -> bool:
@@ -314,7 +310,7 @@ class LocalGuard:
         if FORCE in self._lost:
             self._advance(self._clock() + round(1e9 * timeout_s))
             return None if limits is None else (Trigger.FORCE_LOST, "the force sensor is gone")
-        watch, problem = self._seen_force, None
+        watch, problem = self._watch, None
         try:
             blocks = self._force.read(timeout_s)
         except Exception as error:
@@ -342,7 +338,7 @@ class LocalGuard:
         if axis is self._press:
             self._motor_blocks += blocks
             if was_moving and not axis.moving:
-                self._end_sequence = self._seen_force.sequence
+                self._end_sequence = self._watch.sequence
                 self._into_skin = False
         if limits is not None and axis.state is not None and axis.state.problem:
             return Trigger.AXIS_FAULT, f"{name}: the controller says {axis.state.problem}"
@@ -364,14 +360,14 @@ class LocalGuard:
                     if axis.moving:
                         self._halt(axis)
                 return "", False
-        if beat.force_sequence > self._seen_force.sequence:
+        if beat.force_sequence > self._watch.sequence:
             return f"force sample {beat.force_sequence} has not come", False
         reason = self._travel_reason(beat) if beat.command is CommandKind.TRAVEL else self._press_reason(beat, limits)
         if reason:
             return reason, False
         if self._moving:
             return "an axis is moving", True
-        if min(beat.force_sequence, self._seen_force.changed) <= self._end_sequence:
+        if min(beat.force_sequence, self._watch.changed) <= self._end_sequence:
             return "no force sample is known from after the last move", True
         self._into_skin = self._touched = False
         press = self._press
@@ -399,7 +395,7 @@ class LocalGuard:
 
     def _press_reason(self, beat: Beat, limits: Limits) -> str:
         """Return why the pressing axis may not move; empty: it may."""
-        state, force_n = self._press.state, self._seen_force.force_n
+        state, force_n = self._press.state, self._watch.force_n
         if state is None or math.isnan(state.target):
             return f"the target of {self._name} is not known"
         is_step = beat.command is CommandKind.STEP
@@ -509,8 +505,8 @@ class LocalGuard:
     def _wait_for_force(self, limits: Limits) -> None:
         """Watch the unloaded force for a while; raises GuardRefusesError."""
         before = -1
-        while self._seen_force.received != before:  # what has waited since nobody looked
-            before = self._seen_force.received
+        while self._watch.received != before:  # what has waited since nobody looked
+            before = self._watch.received
             self._take_force(0.0, None)
         problem: Problem | None = None
         until_ns = self._clock() + round(1e9 * ALIVE_S)
@@ -578,13 +574,12 @@ class LocalGuard:
     # Saying -----------------------------------------------------------------------------------------------------------
 
     def _say(self, trigger: Trigger | None, text: str) -> None:
-        force_n = math.nan if self._watch is None else self._watch.force_n
-        event = Event(self._clock(), self.state, trigger, force_n, self._press.position, text)
+        event = Event(self._clock(), self.state, trigger, self._watch.force_n, self._press.position, text)
         self._events.append(event)
         self._on_event(event)
 
     def _report(self, reason: str = "", *, early: bool = False) -> Report:
-        watch, state = self._seen_force, self._press.state
+        watch, state = self._watch, self._press.state
         return Report(
             t_ns=self._clock(),
             state=self.state,

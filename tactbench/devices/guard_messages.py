@@ -10,7 +10,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
 
+import numpy as np
+
 from tactbench.core.errors import RigError, UsageError
+from tactbench.core.samples import FloatArray
 
 
 class GuardRefusesError(RigError):
@@ -116,6 +119,10 @@ class Limits:
     """Samples in a row that are the same in all channels, after which the sensor is taken for stuck (assumed)."""
     lost_samples: int = 3
     """The most that may be missing between two (assumed)."""
+
+    def pressing_n(self, data: FloatArray) -> FloatArray:
+        """Return the (n,) raw pressing forces, less the zero, of (n, channels) samples of the force stream."""
+        return np.asarray(self.sign * (data[:, self.channel] - self.zero[self.channel]))
 
     def __post_init__(self) -> None:
         positive = [

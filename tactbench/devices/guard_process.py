@@ -254,8 +254,6 @@ class GuardProcess:
     def _present(self) -> None:
         if self._lost is not None:
             raise self._lost
-        if self._closed:
-            raise GuardRefusesError("The guard is closed.", hint="Open a new one.")
 
     def _report(self, what: str, within_s: float, body: Limits | Beat | None = None) -> Report:
         report: Report = self._ask(what, within_s, body)

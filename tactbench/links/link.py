@@ -103,15 +103,7 @@ class Link(ABC):
         """Give back what the link holds; called once, also after the other end is gone, and raises nothing."""
 
     def _usable(self, timeout_s: float = 0.0) -> float:
-        """Return when a wait of `timeout_s` ends, in seconds of :meth:`timer`.
-
-        Raises
-        ------
-        LinkClosed, LinkUnplugged
-            If nothing can be done with this link any more.
-        LinkError
-            If `timeout_s` is negative or not finite.
-        """
+        """Return when a wait of `timeout_s` ends, in seconds of :meth:`timer`; raises as every :class:`Link`."""
         if self._closed:
             raise LinkClosed(f"The link {self.address} is closed.", hint="Open a new one.")
         if self._loss is not None:
