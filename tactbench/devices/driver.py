@@ -8,11 +8,12 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, ClassVar, Literal, Self, TypeVar
 
-from pydantic import BaseModel, ConfigDict, ValidationError
+from pydantic import BaseModel, ConfigDict
 
-from tactbench.core.errors import TactbenchError, UnknownNameError, UsageError
+from tactbench.core.errors import TactbenchError, UsageError
 from tactbench.core.samples import Block
 from tactbench.core.spec.sensor import StreamSpec
+from tactbench.links.address import read_options
 from tactbench.links.link import Clock, Link
 
 
@@ -138,31 +139,7 @@ def error_text(error: Exception) -> str:
     return text.rstrip(".")
 
 
-_Model = TypeVar("_Model", bound=BaseModel)
 _Link = TypeVar("_Link", bound=Link)
-
-
-def read_options(kind: type[_Model], given: Mapping[str, Any], device: str) -> _Model:
-    """Return what is given as a model.
-
-    Raises
-    ------
-    UsageError
-        For an option that is not known, is missing, has no such value, or contradicts another.
-    """
-    for name in given:
-        if name not in kind.model_fields:
-            raise UnknownNameError(f"option of {device}", name, kind.model_fields)
-    try:
-        return kind.model_validate(dict(given))
-    except ValidationError as error:
-        first = error.errors(include_url=False)[0]
-        name = ".".join(map(str, first["loc"]))
-        what = f"The option {name!r} of {device}" if name else f"What is said of {device}"
-        problem = "is missing" if first["type"] == "missing" else f"is wrong: {first['msg']}"
-        raise UsageError(
-            f"{what} {problem.replace('Value error, ', '')}.", hint="See docs/hardware.md, The rig file."
-        ) from error
 
 
 def open_for(settings: DriverSettings, device: str, kind: type[_Link], example: str) -> _Link:

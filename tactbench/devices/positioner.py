@@ -14,7 +14,8 @@ from pydantic import Field, model_validator
 from tactbench.core.errors import LinkTimeout, RigError
 from tactbench.core.samples import Block, Quality
 from tactbench.core.spec.sensor import ChannelSpec, StreamSpec
-from tactbench.devices.driver import Driver, DriverSettings, Options, read_options
+from tactbench.devices.driver import Driver, DriverSettings, Options
+from tactbench.links.address import read_options
 from tactbench.links.byte_link import ByteLink
 from tactbench.links.link import Link
 
