@@ -26,12 +26,13 @@ from tactbench.plugin.devices import (
     DriverSettings,
     EmulatedDevice,
     EmulatedDevices,
+    EmulatorSettings,
     Guard,
     GuardState,
     Limits,
     LocalGuard,
 )
-from tactbench.rigs.parallel_manipulator.force_torque.net_ft.codec import NetFtOptions
+from tactbench.rigs.parallel_manipulator.force_torque.net_ft.codec import AXES
 from tactbench.rigs.parallel_manipulator.force_torque.net_ft.driver import NetFtDriver
 from tactbench.rigs.parallel_manipulator.force_torque.net_ft.emulator import DatagramFault, RdtEmulator
 from tactbench.rigs.parallel_manipulator.motor.driver import FaulhaberDriver
@@ -143,8 +144,11 @@ class Pressed:
             pressing = self.force_n + rng.normal(0, NOISE_N)
             return self.sensed([*rng.normal(0, NOISE_N, 2), pressing, *rng.normal(0, 1e-4, 3)], at_s)
 
-        options = NetFtOptions(**COUNTS, rate_hz=self.rate_hz)
-        self.force = RdtEmulator(wrench, options, faults=faults.get("force", []))
+        options = {**COUNTS, "rate_hz": self.rate_hz}
+        self.force = RdtEmulator(
+            EmulatorSettings(lambda at_s: dict(zip(AXES, wrench(at_s), strict=True)), rng, options)
+        )
+        self.force.faults = faults.get("force", [])
         self.devices = EmulatedDevices(
             {
                 "motor": EmulatedDevice("bytes", self.motor, tuple(faults.get("motor_link", ())), setting.baud),
