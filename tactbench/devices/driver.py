@@ -32,7 +32,7 @@ class DriverSettings:
 
 
 class Options(BaseModel):
-    """Options of one device, the same for its driver and its emulator."""
+    """Options of one device, the same for its driver and its emulator, or settings of a rig: known and finite ones."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 

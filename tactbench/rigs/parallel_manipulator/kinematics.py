@@ -32,9 +32,10 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Annotated, Any, Literal, NamedTuple, Self
 
 import numpy as np
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, FiniteFloat, model_validator
+from pydantic import BeforeValidator, Field, model_validator
 
 from tactbench.plugin import RigError, Source, UsageError
+from tactbench.plugin.devices import Options
 
 if TYPE_CHECKING:
     from tactbench.plugin import FloatArray
@@ -45,14 +46,14 @@ geometry files a few more; three digits are left over."""
 
 MODE = -1
 """Sign of det(p - c1, p - c2, p - c3) of a machine whose carriages are ahead; kept along every permitted move."""
-Length = Annotated[FiniteFloat, Field(gt=0, le=1e5)]
+Length = Annotated[float, Field(gt=0, le=1e5)]
 
 
 def _for_each_leg(value: Any) -> Any:
     return (value,) * 3 if isinstance(value, int | float) else value
 
 
-PerLeg = Annotated[tuple[FiniteFloat, FiniteFloat, FiniteFloat], BeforeValidator(_for_each_leg)]
+PerLeg = Annotated[tuple[float, float, float], BeforeValidator(_for_each_leg)]
 """Three numbers, or one for all legs."""
 PositivePerLeg = Annotated[tuple[Length, Length, Length], BeforeValidator(_for_each_leg)]
 
@@ -65,10 +66,8 @@ class ClosureError(RigError):
     """Joint values at which the three links do not meet, or that fix no place."""
 
 
-class LinearDelta(BaseModel):
+class LinearDelta(Options):
     """Three carriages on straight rails, vertical or inclined; q is the carriage's way along its rail from A [m]."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
 
     kind: Literal["linear-delta"] = "linear-delta"
     title: str
@@ -88,7 +87,7 @@ class LinearDelta(BaseModel):
     joint_lowest_mm: PerLeg
     """Least permitted position of each carriage."""
     joint_highest_mm: PerLeg
-    sideways_deg: Annotated[FiniteFloat, Field(gt=0, lt=90)] = 30.0
+    sideways_deg: Annotated[float, Field(gt=0, lt=90)] = 30.0
     """Largest angle of a link out of its leg's plane (assumed: rod ends of ordinary size)."""
 
     @model_validator(mode="after")

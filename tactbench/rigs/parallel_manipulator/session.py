@@ -96,13 +96,12 @@ class Session:
             *axes, force = self.opened(next(iter(self._file.sensors)), *names, FORCE)
             return LocalGuard(dict(zip(names, axes, strict=True)), force, self.clock, self.emulated.advance)
         entries: dict[str, Any] = {**self._file.devices, FORCE: self._file.force}
-        devices = {
-            name: DeviceSettings(self._registry.devices[entry.device].driver, entry.link, entry.options)
-            for name, entry in entries.items()
-            if name in (*names, FORCE)
-        }
+        *axes, force = (
+            DeviceSettings(self._registry.devices[entry.device].driver, entry.link, entry.options)
+            for entry in (entries[name] for name in (*names, FORCE))
+        )
         log = str(Path(self.settings.guard_log).expanduser().resolve())
-        return GuardProcess(ProcessSettings({name: devices[name] for name in names}, devices[FORCE], log))
+        return GuardProcess(ProcessSettings(dict(zip(names, axes, strict=True)), force, log))
 
     # A scene's beginning ----------------------------------------------------------------------------------------------
 
