@@ -156,8 +156,6 @@ class Reading:
         self._lock = threading.Lock()
         self.ended = ""
         """Which device ended the reading, and why, without a full stop; empty: none did."""
-        self.error: Exception | None = None
-        """What was raised there, with its traceback."""
 
     def __enter__(self) -> Self:
         try:
@@ -292,9 +290,7 @@ class Reading:
 
     def _fail(self, name: str, error: Exception) -> None:
         with self._lock:
-            if self.error is None:
-                self.error = error
-                self.ended = f"{name}: {error_text(error)}"
+            self.ended = self.ended or f"{name}: {error_text(error)}"
         self._over.set()
 
     def _finish(self) -> None:

@@ -89,13 +89,9 @@ class EmulatedPress:
             skin_m + np.append(depths_m, depths_m[-1] + BEYOND_M),
             np.append(forces_n, forces_n[-1] + BEYOND_M * steepness),
         )
-        # One for what the sensor reads, one for the noise of the force.
-        streams, blocks = (*simulated.streams, *simulated.reference), list(simulated)
-        self._sensor, self._force = (
-            SceneSamples(streams, blocks, self._duration_s, rest_s=self._hold_s) for _ in range(2)
-        )
-        for samples in (self._sensor, self._force):
-            samples.start(0.0)
+        streams = (*simulated.streams, *simulated.reference)
+        self._samples = SceneSamples(streams, simulated, self._duration_s, rest_s=self._hold_s)
+        self._samples.start(0.0)
         self._floor_n: list[float] = (FLOOR_N * rng.standard_normal(_FLOOR_DRAWS)).tolist()
 
     def start(self, at_s: float) -> None:
@@ -111,13 +107,13 @@ class EmulatedPress:
         force_n = self.force_n(position_m)
         since_s = (t_s - self._start_s) % self._duration_s
         load_n = float(np.interp(since_s, *self._corners))
-        noise_n = self._force(since_s).get(FORCE, load_n) - load_n
+        noise_n = self._samples(since_s).get(FORCE, load_n) - load_n
         if force_n > 0.0:
             at_s = min(self._hold_s + force_n * self._s_per_n, self._duration_s - 1e-9)
         else:
             at_s = since_s % self._hold_s if self._hold_s else 0.0
         floor = self._floor_n[int(t_s * _FLOOR_HZ) % _FLOOR_DRAWS]
-        return {**self._sensor(at_s), FORCE: force_n + noise_n + floor}
+        return {**self._samples(at_s), FORCE: force_n + noise_n + floor}
 
 
 class PressEmulators(RigEmulators):
