@@ -90,16 +90,13 @@ class Machine(faults.Pressed):
 def travel(guard: LocalGuard, machine: Machine, sign: int, change: Any) -> Report:
     """Move the rails forth or back by way points; return the last report."""
     limits = replace(machine.setting.limits, travel_ceiling_n=TRAVEL_N)
-    report, sequence = guard.arm(limits), 0
+    report = guard.arm(limits)
     points = range(1, POINTS + 1) if sign > 0 else range(POINTS - 1, -1, -1)
     for point in points:
         targets = dict.fromkeys(RAILS, point * WAY_M)
         while True:
-            sequence += 1
             kind = CommandKind.TRAVEL if targets else CommandKind.NONE
-            beat = Beat(
-                sequence, machine.clock(), "travel", kind, force_sequence=report.force_sequence, targets=targets
-            )
+            beat = Beat(machine.clock(), "travel", kind, force_sequence=report.force_sequence, targets=targets)
             changed = change(beat, 0.0)
             if changed is not None:
                 report = guard.beat(changed)

@@ -26,12 +26,13 @@ from tactbench.plugin.devices import (
     DriverSettings,
     EmulatedDevice,
     EmulatedDevices,
+    EmulatorSettings,
     Guard,
     GuardState,
     Limits,
     LocalGuard,
 )
-from tactbench.rigs.parallel_manipulator.force_torque.net_ft.codec import NetFtOptions
+from tactbench.rigs.parallel_manipulator.force_torque.net_ft.codec import AXES
 from tactbench.rigs.parallel_manipulator.force_torque.net_ft.driver import NetFtDriver
 from tactbench.rigs.parallel_manipulator.force_torque.net_ft.emulator import DatagramFault, RdtEmulator
 from tactbench.rigs.parallel_manipulator.motor.driver import FaulhaberDriver
@@ -143,8 +144,11 @@ class Pressed:
             pressing = self.force_n + rng.normal(0, NOISE_N)
             return self.sensed([*rng.normal(0, NOISE_N, 2), pressing, *rng.normal(0, 1e-4, 3)], at_s)
 
-        options = NetFtOptions(**COUNTS, rate_hz=self.rate_hz)
-        self.force = RdtEmulator(wrench, options, faults=faults.get("force", []))
+        options = {**COUNTS, "rate_hz": self.rate_hz}
+        self.force = RdtEmulator(
+            EmulatorSettings(lambda at_s: dict(zip(AXES, wrench(at_s), strict=True)), rng, options)
+        )
+        self.force.faults = faults.get("force", [])
         self.devices = EmulatedDevices(
             {
                 "motor": EmulatedDevice("bytes", self.motor, tuple(faults.get("motor_link", ())), setting.baud),
@@ -237,7 +241,7 @@ class Press:
 
     def _beat(self, last: Report) -> Beat:
         limits = self.setting.limits
-        beat = Beat(self.sequence, self.clock(), self.phase, force_sequence=last.force_sequence)
+        beat = Beat(self.clock(), self.phase, force_sequence=last.force_sequence)
         match self.phase:
             case "approach" if not last.moving:
                 return replace(beat, command=CommandKind.MOVE_TO, position_m=SKIN_M - 0.1e-3, speed_m_s=0.02)
@@ -285,7 +289,6 @@ class Kind:
 
 KINDS: dict[str, Kind] = {
     "rig hangs": Kind("rig", {Trigger.BEAT_OLD}),
-    "rig skips a beat's number": Kind("rig", {Trigger.BEAT_SEQUENCE}),
     "steps too long": Kind("rig", {Trigger.COMMANDS_REFUSED}),
     "steps out of travel": Kind("rig", {Trigger.COMMANDS_REFUSED}),
     "steps not numbers": Kind("rig", {Trigger.COMMANDS_REFUSED}),
@@ -336,8 +339,6 @@ def changed(names: Mapping[str, float], setting: Setting, clock: Callable[[], in
         on = {name for name, at_s in names.items() if now_s >= at_s}
         if "rig hangs" in on:
             return None
-        if "rig skips a beat's number" in on:
-            return replace(beat, sequence=beat.sequence + 1)
         limits = setting.limits
         if "steps too long" in on:
             return replace(beat, command=CommandKind.STEP, distance_m=3 * limits.step_m)

@@ -75,7 +75,7 @@ def rig(text: str) -> None:
     press = faults.Press(guard, setting, clock, change, hold_s=20.0)
     try:
         guard.start()
-        say(guard=guard.pid, sibling=sibling)
+        say(guard=guard._process.pid, sibling=sibling)
         last = press.run(20.0)
         say(ended=str(last.trigger))
     except GuardLostError as error:

@@ -10,26 +10,25 @@ from __future__ import annotations
 
 import sys
 import time
-from contextlib import suppress
 
 import numpy as np
 
-from tactbench.rigs.parallel_manipulator.force_torque.ati import AtiFileError, read_calibration
+from tactbench.plugin.devices import EmulatorSettings
 from tactbench.rigs.parallel_manipulator.force_torque.net_ft.codec import (
     Command,
     DatagramError,
-    NetFtOptions,
     Record,
     Request,
     decode_records,
     encode_record,
     encode_request,
 )
-from tactbench.rigs.parallel_manipulator.force_torque.net_ft.emulator import USUAL_COUNTS, RdtEmulator
+from tactbench.rigs.parallel_manipulator.force_torque.net_ft.emulator import RdtEmulator
 from tactbench.rigs.parallel_manipulator.motor.codec import CommandReader, Kind, Line, LineReader
 from tactbench.rigs.parallel_manipulator.motor.emulator import MotorEmulator
 
 CHUNK = 1000
+COUNTS = {"counts_per_newton": 1e6, "counts_per_newton_metre": 1e6}
 TEXT = np.frombuffer(b"0123456789-+ \r\n\r\nOKpvrfhPSLAMVREND", dtype=np.uint8)
 
 
@@ -61,7 +60,7 @@ def main(count: int, seed: int) -> None:
         now_s += 1.1
     print(f"motor, emulator: {now_s:.0f} s of line")
 
-    box, whole, rejected = RdtEmulator(lambda _t: (0.0,) * 6), 0, 0
+    box, whole, rejected = RdtEmulator(EmulatorSettings(lambda _t: {}, rng, COUNTS)), 0, 0
     for piece in pieces:
         cuts = np.sort(rng.integers(0, len(piece) + 1, size=27)).tolist()
         for start, end in zip([0, *cuts, 0], [*cuts, len(piece), 36], strict=True):
@@ -73,13 +72,6 @@ def main(count: int, seed: int) -> None:
         assert decode_records(encode_record(Record(5, 0, 0, (0,) * 6)))["rdt_sequence"] == 5
     print(f"force-torque, codec: {whole} records, {rejected} datagrams rejected")
 
-    files = 0
-    for piece in pieces:
-        with suppress(AtiFileError):
-            read_calibration(piece)
-            files += 1
-    print(f"force-torque, files: {len(pieces)} read, {files} of them whole")
-
     for name, load in (("free", 0.0), ("pressing", 5000.0)):
         motor = MotorEmulator(lambda x, k=load: k * max(x, 0.0), rng)
         motor.feed(b"EN\rLA300\rM\r", 0.0)
@@ -88,7 +80,7 @@ def main(count: int, seed: int) -> None:
             motor.feed(b"POS\r" if n % 20 == 0 else b"", 1e-3 * n)
         print(f"motor, {name}: {time.perf_counter() - begin:.3f} s for 1 s at a tick of 1 ms, polled at 1 kHz")
     for rate_hz in (1000.0, 7000.0):
-        box = RdtEmulator(lambda _t: (0.0,) * 6, NetFtOptions(**USUAL_COUNTS, rate_hz=rate_hz))
+        box = RdtEmulator(EmulatorSettings(lambda _t: {}, rng, COUNTS | {"rate_hz": rate_hz}))
         box.feed(encode_request(Request(Command.START_REALTIME)), 0.0)
         begin = time.perf_counter()
         sent = box.poll(1.0)

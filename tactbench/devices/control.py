@@ -65,7 +65,6 @@ class Control:
         self._period_ns, self._stale_ns = round(1e9 * period_s), round(1e9 * stale_s)
         self.report = armed
         """What the guard answered last."""
-        self._beats = 0
         self._rows, self._rows_ns = -1, clock()
         self._next_ns = self._rows_ns + self._period_ns
         self._raw: list[tuple[float, float]] = []
@@ -130,19 +129,14 @@ class Control:
             self.press.abandon()
 
     def _gather(self) -> None:
-        """Take what the guard has for the recording."""
         for block in self._guard.force_blocks():
             self._blocks.append(block)
-            self._raw += self._pressing(block)
+            assert block.t_ns is not None
+            force_n = self._limits.pressing_n(block.data)
+            self._raw += zip((1e-9 * block.t_ns).tolist(), force_n.tolist(), strict=True)
         self._blocks.extend(self._guard.motor_blocks())
         self._events.extend(self._guard.events())
         self._counts = self._guard.counts()
-
-    def _pressing(self, block: Block) -> list[tuple[float, float]]:
-        assert block.t_ns is not None
-        limits = self._limits
-        force = (block.data[:, limits.channel] - limits.zero[limits.channel]) * limits.sign
-        return list(zip((1e-9 * block.t_ns).tolist(), force.tolist(), strict=True))
 
     def _period(self) -> None:
         now_ns = self._clock()
@@ -164,7 +158,6 @@ class Control:
         except TactbenchError as error:
             press.fail(error_text(error))
             beat = press.step(self.report, (), 1e-9 * now_ns)
-        self._beats += 1
         number = self.report.force_sequence
-        beat = replace(beat, sequence=self._beats, t_ns=now_ns, state=str(press.state), force_sequence=number)
+        beat = replace(beat, t_ns=now_ns, state=str(press.state), force_sequence=number)
         self.report = self._guard.beat(beat)

@@ -6,13 +6,14 @@ import time
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, Literal, Self, TypeVar
+from typing import Any, ClassVar, Literal, Self, TypeVar
 
-from pydantic import BaseModel, ConfigDict, ValidationError
+from pydantic import BaseModel, ConfigDict
 
-from tactbench.core.errors import TactbenchError, UnknownNameError, UsageError
+from tactbench.core.errors import TactbenchError, UsageError
 from tactbench.core.samples import Block
 from tactbench.core.spec.sensor import StreamSpec
+from tactbench.links.address import read_options
 from tactbench.links.link import Clock, Link
 
 
@@ -30,6 +31,12 @@ class DriverSettings:
     """The host's clock, the same as the link's; virtual where time is virtual."""
 
 
+class Options(BaseModel):
+    """Options of one device, the same for its driver and its emulator, or settings of a rig: known and finite ones."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+
+
 class Driver(ABC):
     """One device: open once it is made, until :meth:`close` or the end of its ``with`` block.
 
@@ -37,7 +44,29 @@ class Driver(ABC):
 
     What is wrong with single samples is in their blocks' quality and in :attr:`counts`, and raises nothing; what ends
     the reading raises: :class:`~tactbench.core.errors.LinkUnplugged` of the link, or a RigError of the device.
+
+    Raises
+    ------
+    UsageError
+        For options that are not known or contradict each other, or a link of another kind.
+    LinkError
+        If the link does not open.
     """
+
+    device: ClassVar[str] = ""
+    """Name in messages; empty: that of the class."""
+    link_kind: ClassVar[type[Link]]
+    """Of the link that is opened; and an example of its address."""
+    address: ClassVar[str] = "those of docs/links.md"
+    options_kind: ClassVar[type[Options]] = Options
+    """What a rig file's entry may say."""
+
+    def __init__(self, settings: DriverSettings) -> None:
+        device = self.device or type(self).__name__
+        self.clock = settings.clock
+        """Nanoseconds of the host."""
+        self.options: Any = read_options(self.options_kind, settings.options, device)
+        self.link: Any = open_for(settings, device, self.link_kind, self.address)
 
     @property
     @abstractmethod
@@ -92,9 +121,10 @@ class Driver(ABC):
         """Let the device take its present reading as zero; return whether it can do so itself."""
         return False
 
-    @abstractmethod
     def close(self) -> None:
         """Stop if it is sampling, and close the link; once closed, this does nothing."""
+        self.stop()
+        self.link.close()
 
     def __enter__(self) -> Self:
         return self
@@ -109,37 +139,7 @@ def error_text(error: Exception) -> str:
     return text.rstrip(".")
 
 
-class Options(BaseModel):
-    """Options of one device, the same for its driver and its emulator."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
-
-
-_Model = TypeVar("_Model", bound=BaseModel)
 _Link = TypeVar("_Link", bound=Link)
-
-
-def read_options(kind: type[_Model], given: Mapping[str, Any], device: str) -> _Model:
-    """Return what is given as a model.
-
-    Raises
-    ------
-    UsageError
-        For an option that is not known, is missing, has no such value, or contradicts another.
-    """
-    for name in given:
-        if name not in kind.model_fields:
-            raise UnknownNameError(f"option of {device}", name, kind.model_fields)
-    try:
-        return kind.model_validate(dict(given))
-    except ValidationError as error:
-        first = error.errors(include_url=False)[0]
-        name = ".".join(map(str, first["loc"]))
-        what = f"The option {name!r} of {device}" if name else f"What is said of {device}"
-        problem = "is missing" if first["type"] == "missing" else f"is wrong: {first['msg']}"
-        raise UsageError(
-            f"{what} {problem.replace('Value error, ', '')}.", hint="See docs/hardware.md, The rig file."
-        ) from error
 
 
 def open_for(settings: DriverSettings, device: str, kind: type[_Link], example: str) -> _Link:

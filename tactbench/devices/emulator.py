@@ -105,30 +105,24 @@ class Fault:
         UsageError
             If name or key is unknown, or a value is not what the field holds.
         """
+        import yaml
+        from pydantic import TypeAdapter, ValidationError
+
         name, _, rest = text.partition(":")
         fields = {one.name: str(one.type) for one in dataclasses.fields(cls) if one.name != "name"}
         given: dict[str, Any] = {}
         for key, _, value in (part.partition("=") for part in rest.split(",") if part):
             if key not in fields:
                 raise UnknownNameError(f"key of the fault {name!r}", key, fields)
-            kind = fields[key].partition("[")[0]
-            try:
-                given[key] = _READERS.get(kind.partition(" ")[0], str)(value)
-            except ValueError:
-                raise UsageError(f"The fault {text!r} has {value!r} for {key}.", hint=f"{key} is {kind}.") from None
-        return cls(name, **given)
+            given[key] = value.split("+") if fields[key].startswith("frozenset") else yaml.safe_load(value)
+        try:
+            return TypeAdapter(cls).validate_python({"name": name, **given})
+        except ValidationError as error:
+            raise UsageError(f"The fault {text!r} is wrong: {error.errors()[0]['msg']}.") from error
 
     def active(self, now_s: float) -> bool:
         """Return whether it is on."""
         return self.start_s <= now_s < self.end_s
-
-
-_READERS: Mapping[str, Callable[[str], Any]] = {
-    "frozenset": lambda text: frozenset(text.split("+")),
-    "float": float,
-    "int": lambda text: int(text, 0),
-}
-"""By the annotation of a field: what reads its text."""
 
 
 def fault_concerns(faults: Iterable[Fault], name: str, now_s: float, seen: Counter[Fault]) -> bool:

@@ -31,8 +31,6 @@ if TYPE_CHECKING:
 
 LATE = 1.5
 """Periods after which a sample is late: half a period more than it should be."""
-MOST_OF_LIMIT = 0.5
-"""Part of the largest stable gain that may be used: overshoot, and a skin stiffer than declared, need the rest."""
 
 
 @dataclass(frozen=True)
@@ -254,23 +252,6 @@ class LoopModel:
             if self.growth(stiffer) >= 1:
                 return float(brentq(lambda stiffness: self.growth(stiffness) - 1, softer, stiffer, rtol=1e-6))
         return math.inf
-
-    def share_used(self, stiffness: float) -> float:
-        """Return the part of the largest stable gain that the loop uses at a stiffness [N / length].
-
-        Raises
-        ------
-        UsageError
-            If it is more than `MOST_OF_LIMIT`.
-        """
-        used = stiffness / self.largest_stiffness()
-        if used > MOST_OF_LIMIT:
-            raise UsageError(
-                f"The force loop's gains are {used:.2f} of those that no longer settle at the greatest stiffness; at "
-                f"most {MOST_OF_LIMIT:g} is permitted.",
-                hint=f"Divide both gains by {used / MOST_OF_LIMIT:.2f} or more.",
-            )
-        return used
 
     def simulate(
         self, force_n: Callable[[float], float], setpoint_n: FloatArray, noise_n: FloatArray, start: float = 0.0

@@ -101,8 +101,7 @@ class ForceWatch:
             return None
         zero = np.array(limits.zero)
         if newer is not None:
-            pressing = limits.sign * (newer.data[-_LOOKED_AT:] - zero)[:, limits.channel]
-            self._pressing.extend(pressing.tolist())
+            self._pressing.extend(limits.pressing_n(newer.data[-_LOOKED_AT:]).tolist())
             self.force_n = self._pressing[-1]
         wrenches = block.data - zero
         problem = _unknown(wrenches, block) or self._too_large(wrenches, limits, travelling)

@@ -46,7 +46,7 @@ from tactbench.devices.guard_messages import (
     Report,
     Trigger,
 )
-from tactbench.devices.positioner import Positioner, PositionerSilentError, power_off
+from tactbench.devices.positioner import Positioner, PositionerSilentError
 from tactbench.links.link import Clock
 
 T = TypeVar("T")
@@ -95,11 +95,6 @@ class LocalGuard:
         Called while axes are homed: whether they shall stand.
     """
 
-    force_stream: StreamSpec
-    """The force sensor's stream, once it is started."""
-    motor_stream: StreamSpec
-    """The pressing axis' stream, likewise."""
-
     def __init__(
         self,
         axes: Mapping[str, Positioner],
@@ -118,7 +113,7 @@ class LocalGuard:
         self._others = {name: axes[name] for name in others}
         self._force, self._clock, self._advance = force, clock, advance
         self._on_event, self._interrupted = on_event, interrupted
-        self._watch: ForceWatch | None = None
+        self._watch = ForceWatch(self.force_stream)
         self._limits: Limits | None = None
         self._motor_blocks: deque[Block] = deque(maxlen=MOST_BLOCKS)
         self._events: list[Event] = []
@@ -127,18 +122,27 @@ class LocalGuard:
         self._lost: set[str] = set()
         self._home_anew: set[str] = set()
         self._closed = False
-        self._beats = self._refused = 0
-        self._beat_ns = 0
+        self._refused = self._beat_ns = 0
         self._end_sequence = -1
         self._into_skin = self._touched = False
         self._began_ns = self._sent_ns = 0
+
+    @property
+    def force_stream(self) -> StreamSpec:
+        """The force sensor's stream."""
+        (stream,) = self._force.streams
+        return stream
+
+    @property
+    def motor_stream(self) -> StreamSpec:
+        """The pressing axis' stream."""
+        (stream,) = self._press.streams
+        return stream
 
     # What a rig asks for ----------------------------------------------------------------------------------------------
 
     def start(self) -> Mapping[str, Mapping[str, str]]:
         """Ask all devices who they are, and let them sample."""
-        if len(self._force.streams) != 1:
-            raise RigError("The guard needs a force sensor with one stream.")
         found = {}
         for name, device in {**self._axes, FORCE: self._force}.items():
             try:
@@ -147,15 +151,13 @@ class LocalGuard:
             except TactbenchError as error:
                 error.message = f"{name}: {error.message}"
                 raise
-        (self.force_stream,), (self.motor_stream,) = self._force.streams, self._press.streams
-        self._watch = ForceWatch(self.force_stream)
         self._say(None, "started")
         return found
 
     def arm(self, limits: Limits) -> Report:
         """Check, home what is not homed, retract the pressing axis, and begin to expect beats.
 
-        The first beat is due within `heartbeat_s`, and its sequence is 1. Samples from before are dropped.
+        The first beat is due within `heartbeat_s`. Samples from before are dropped.
 
         Raises
         ------
@@ -177,29 +179,26 @@ class LocalGuard:
                 hint = getattr(error, "hint", "")
                 raise GuardRefusesError(f"{name} is not armed: {error_text(error)}.", hint=hint) from error
         self.state, self._limits = GuardState.ARMED, limits
-        self._beats, self._refused, self._touched = 0, 0, False
-        self._end_sequence = self._seen_force.sequence
+        self._refused, self._touched = 0, False
+        self._end_sequence = self._watch.sequence
         # What came while axes were homed may be a minute of samples: handing it over would take a beat's time.
-        self._seen_force.blocks.clear()
+        self._watch.blocks.clear()
         self._motor_blocks.clear()
         self._beat_ns = self._clock()
         self._say(None, "armed")
-        return self._report(0)
+        return self._report()
 
     def beat(self, beat: Beat) -> Report:
         """Say that the rig is there, and what shall be done; return at once."""
         limits = self._limits
         if self.state is GuardState.ARMED and limits is not None:
             self._counts["beats"] += 1
-            if beat.sequence != self._beats + 1:
-                expected = self._beats + 1
-                self.trip(Trigger.BEAT_SEQUENCE, f"beat {beat.sequence} came, {expected} was expected")
             self._see_beat(beat.t_ns, limits)
-            self._beats, self._beat_ns = beat.sequence, min(beat.t_ns, self._clock())
+            self._beat_ns = min(beat.t_ns, self._clock())
         self.look(0.0)
         # What this look has found stands before the command.
         if self.state is not GuardState.ARMED or limits is None:
-            return self._report(beat.sequence, f"the guard is in state {self.state}")
+            return self._report(f"the guard is in state {self.state}")
         reason, early = self._command(beat, limits)
         if early:
             self._counts["early"] += 1
@@ -211,7 +210,7 @@ class LocalGuard:
                 self.trip(Trigger.COMMANDS_REFUSED, f"{REFUSED} in a row, the last because {reason}")
         elif beat.command is not CommandKind.NONE:
             self._refused = 0
-        return self._report(beat.sequence, reason, early=early)
+        return self._report(reason, early=early)
 
     def advance(self, until_ns: int) -> None:
         """Look until the clock says so much."""
@@ -220,7 +219,7 @@ class LocalGuard:
 
     def force_blocks(self) -> list[Block]:
         """Return all force samples since the last call, but for those that came twice or after newer ones."""
-        return [] if self._watch is None else taken(self._watch.blocks)
+        return taken(self._watch.blocks)
 
     def motor_blocks(self) -> list[Block]:
         """Return all states of the pressing axis since the last call."""
@@ -235,10 +234,8 @@ class LocalGuard:
 
         To the force sensor's the guard adds ``duplicates`` and ``late`` samples, kept out, and ``gaps``, missing.
         """
-        force = Counter(self._force.counts)
-        if self._watch is not None:
-            order = self._watch.order
-            force.update(duplicates=order.duplicates, late=order.late, gaps=order.gaps)
+        force, order = Counter(self._force.counts), self._watch.order
+        force.update(duplicates=order.duplicates, late=order.late, gaps=order.gaps)
         axes = {name: dict(axis.counts) for name, axis in self._axes.items()}
         return {FORCE: {name: count for name, count in force.items() if count}, **axes, "guard": dict(self._counts)}
 
@@ -252,7 +249,7 @@ class LocalGuard:
             self.state = GuardState.IDLE
             self._say(None, "disarmed")
         self._limits, self.trigger = None, None
-        report, self._not_out = self._report(0), ""
+        report, self._not_out = self._report(), ""
         return report
 
     def close(self) -> None:
@@ -261,8 +258,7 @@ class LocalGuard:
             return
         self._closed = True
         try:
-            if self._watch is not None:  # else it was not started: there is nothing to disarm
-                self.disarm()
+            self.disarm()
         finally:
             for device in (*self._axes.values(), self._force):
                 with suppress(LinkError):
@@ -281,19 +277,13 @@ class LocalGuard:
         if problem is not None:
             self.trip(*problem)
         self._see_beat(began_ns, limits)
-        touched = self._into_skin and self._press.moving and self._seen_force.touched(limits.touch_n)
+        touched = self._into_skin and self._press.moving and self._watch.touched(limits.touch_n)
         if self.state is GuardState.ARMED and touched:
             self._into_skin, self._touched = False, True
             self._halt(self._press)
             self._say(None, "touch: the axis holds")
         if self.state is GuardState.RETREATING:
             self._carry_on()
-
-    @property
-    def _seen_force(self) -> ForceWatch:
-        if self._watch is None:
-            raise GuardRefusesError("The guard was not started.", hint="Use start().")
-        return self._watch
 
     @property
     def _moving(self) -> bool:
@@ -304,7 +294,6 @@ class LocalGuard:
         return self._press.at(self._press.facts.retreat)
 
     def _see_beat(self, now_ns: int, limits: Limits) -> None:
-        """Retreat if the last beat is too old."""
         age_s = 1e-9 * (now_ns - self._beat_ns)
         if age_s > limits.heartbeat_s:
             self.trip(Trigger.BEAT_OLD, f"no beat for {1e3 * age_s:.1f} ms, {1e3 * limits.heartbeat_s:.1f} may be")
@@ -321,7 +310,7 @@ class LocalGuard:
         if FORCE in self._lost:
             self._advance(self._clock() + round(1e9 * timeout_s))
             return None if limits is None else (Trigger.FORCE_LOST, "the force sensor is gone")
-        watch, problem = self._seen_force, None
+        watch, problem = self._watch, None
         try:
             blocks = self._force.read(timeout_s)
         except Exception as error:
@@ -349,7 +338,7 @@ class LocalGuard:
         if axis is self._press:
             self._motor_blocks += blocks
             if was_moving and not axis.moving:
-                self._end_sequence = self._seen_force.sequence
+                self._end_sequence = self._watch.sequence
                 self._into_skin = False
         if limits is not None and axis.state is not None and axis.state.problem:
             return Trigger.AXIS_FAULT, f"{name}: the controller says {axis.state.problem}"
@@ -371,14 +360,14 @@ class LocalGuard:
                     if axis.moving:
                         self._halt(axis)
                 return "", False
-        if beat.force_sequence > self._seen_force.sequence:
+        if beat.force_sequence > self._watch.sequence:
             return f"force sample {beat.force_sequence} has not come", False
         reason = self._travel_reason(beat) if beat.command is CommandKind.TRAVEL else self._press_reason(beat, limits)
         if reason:
             return reason, False
         if self._moving:
             return "an axis is moving", True
-        if min(beat.force_sequence, self._seen_force.changed) <= self._end_sequence:
+        if min(beat.force_sequence, self._watch.changed) <= self._end_sequence:
             return "no force sample is known from after the last move", True
         self._into_skin = self._touched = False
         press = self._press
@@ -396,7 +385,6 @@ class LocalGuard:
         return "", False
 
     def _travel_reason(self, beat: Beat) -> str:
-        """Return why other axes may not travel; empty: they may."""
         if not self._retracted or self._press.moving:
             return f"{self._name} is not retracted"
         for name, target in beat.targets.items():
@@ -407,7 +395,7 @@ class LocalGuard:
 
     def _press_reason(self, beat: Beat, limits: Limits) -> str:
         """Return why the pressing axis may not move; empty: it may."""
-        state, force_n = self._press.state, self._seen_force.force_n
+        state, force_n = self._press.state, self._watch.force_n
         if state is None or math.isnan(state.target):
             return f"the target of {self._name} is not known"
         is_step = beat.command is CommandKind.STEP
@@ -445,7 +433,6 @@ class LocalGuard:
         self._say(trigger, text)
 
     def _send_retreat(self) -> None:
-        """Halt the other axes that move, and send the pressing axis away from the skin."""
         self._sent_ns = self._clock()
         commands = {name: axis.halt for name, axis in self._others.items() if axis.moving}
         for name, command in {**commands, self._name: self._press.retreat}.items():
@@ -473,7 +460,11 @@ class LocalGuard:
             self._end(None, f"out after {took}")
         elif now_ns > self._began_ns + 1e9 * retreat_seconds(press):
             where = "nobody knows where" if math.isnan(press.position) else f"last seen at {press.position:g} m"
-            power = "power taken off" if power_off(press) else "left under power, since it may fall without"
+            power = "left under power, since it may fall without"
+            if press.facts.holds_unpowered:
+                with suppress(LinkError, RigError):
+                    press.disable()
+                    power = "power taken off"
             self._end(Trigger.RETREAT_FAILED, f"RETREAT FAILED: not out after {took}, {where}; {power}: stand clear")
         elif not press.moving and now_ns - self._sent_ns > 1e9 * AGAIN_S:
             self._send_retreat()
@@ -514,8 +505,8 @@ class LocalGuard:
     def _wait_for_force(self, limits: Limits) -> None:
         """Watch the unloaded force for a while; raises GuardRefusesError."""
         before = -1
-        while self._seen_force.received != before:  # what has waited since nobody looked
-            before = self._seen_force.received
+        while self._watch.received != before:  # what has waited since nobody looked
+            before = self._watch.received
             self._take_force(0.0, None)
         problem: Problem | None = None
         until_ns = self._clock() + round(1e9 * ALIVE_S)
@@ -556,7 +547,6 @@ class LocalGuard:
             self._retract(limits)
 
     def _retract(self, limits: Limits) -> None:
-        """Send the pressing axis to its place of retreat under watch; raises GuardRefusesError."""
         press = self._press
         deadline_ns = self._clock() + round(1e9 * retreat_seconds(press))
         press.retreat()
@@ -584,18 +574,15 @@ class LocalGuard:
     # Saying -----------------------------------------------------------------------------------------------------------
 
     def _say(self, trigger: Trigger | None, text: str) -> None:
-        force_n = math.nan if self._watch is None else self._watch.force_n
-        event = Event(self._clock(), self.state, trigger, force_n, self._press.position, text)
+        event = Event(self._clock(), self.state, trigger, self._watch.force_n, self._press.position, text)
         self._events.append(event)
         self._on_event(event)
 
-    def _report(self, sequence: int, reason: str = "", *, early: bool = False) -> Report:
-        watch, state = self._seen_force, self._press.state
+    def _report(self, reason: str = "", *, early: bool = False) -> Report:
+        watch, state = self._watch, self._press.state
         return Report(
-            sequence=sequence,
             t_ns=self._clock(),
             state=self.state,
-            accepted=not reason,
             reason=reason,
             early=early,
             moving=self._moving,

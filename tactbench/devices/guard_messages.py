@@ -10,7 +10,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
 
+import numpy as np
+
 from tactbench.core.errors import RigError, UsageError
+from tactbench.core.samples import FloatArray
 
 
 class GuardRefusesError(RigError):
@@ -50,7 +53,6 @@ class Trigger(StrEnum):
     FORCE_STUCK = "force sensor gives the same value"
     FORCE_LOST = "force sensor is gone"
     BEAT_OLD = "no beat in time"
-    BEAT_SEQUENCE = "beat out of sequence"
     RIG_LOST = "the rig's end of the pipe is closed"
     COMMANDS_REFUSED = "commands refused in a row"
     AXIS_FAULT = "axis fault"
@@ -118,6 +120,10 @@ class Limits:
     lost_samples: int = 3
     """The most that may be missing between two (assumed)."""
 
+    def pressing_n(self, data: FloatArray) -> FloatArray:
+        """Return the (n,) raw pressing forces, less the zero, of (n, channels) samples of the force stream."""
+        return np.asarray(self.sign * (data[:, self.channel] - self.zero[self.channel]))
+
     def __post_init__(self) -> None:
         positive = [
             self.force_ceiling_n, self.travel_ceiling_n, self.touch_n, self.step_m, self.speed_m_s, self.heartbeat_s,
@@ -141,8 +147,6 @@ class Limits:
 class Beat:
     """What a rig says once a control period: that it is there, and what shall be done."""
 
-    sequence: int = 0
-    """One more than the one before; the first after `arm` is 1."""
     t_ns: int = 0
     """When it was made."""
     state: str = ""
@@ -164,16 +168,13 @@ class Beat:
 class Report:
     """What a guard answers."""
 
-    sequence: int
-    """Of the beat that it answers; 0: of `arm` and `disarm`."""
     t_ns: int
     state: GuardState
-    accepted: bool
-    """Whether the command is carried out. A move before its time (the one before has not ended, or no force sample was
-    taken since) is not accepted either; that is no offence, and `early` is true."""
     reason: str = ""
-    """Why not."""
+    """Why the command is not carried out; empty: it is."""
     early: bool = False
+    """Whether a move only came before its time (the one before has not ended, or no force sample was taken since): that
+    is no offence."""
     moving: bool = False
     """Whether any axis moves."""
     position_m: float = math.nan
@@ -191,6 +192,11 @@ class Report:
     """Why it retreated."""
     not_out: str = ""
     """What is to be done, where something did not come out or stand still; empty: it did, or has not tried."""
+
+    @property
+    def accepted(self) -> bool:
+        """Whether the command is carried out."""
+        return not self.reason
 
 
 @dataclass(frozen=True)

@@ -5,17 +5,17 @@ from __future__ import annotations
 import math
 from abc import abstractmethod
 from collections.abc import Callable
-from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any, ClassVar, Literal, Self
 
 import numpy as np
 from pydantic import Field, model_validator
 
-from tactbench.core.errors import LinkError, LinkTimeout, RigError
+from tactbench.core.errors import LinkTimeout, RigError
 from tactbench.core.samples import Block, Quality
 from tactbench.core.spec.sensor import ChannelSpec, StreamSpec
-from tactbench.devices.driver import Driver, DriverSettings, Options, open_for, read_options
+from tactbench.devices.driver import Driver, DriverSettings, Options
+from tactbench.links.address import read_options
 from tactbench.links.byte_link import ByteLink
 from tactbench.links.link import Link
 
@@ -152,17 +152,10 @@ class Positioner(Driver):
     As a device of a rig an axis has one stream, `motor`: position, current and target, once per state that was read.
     A subclass has the abstract methods and the class attributes. It calls :meth:`check_move` before it sends a move,
     :meth:`begin` after, and :meth:`see` with each answer. A DeviceDescriptor's `driver` names the class itself.
-
-    Raises
-    ------
-    UsageError
-        For options that are not known or contradict each other.
     """
 
     device: ClassVar[str]
-    """Name in messages."""
     link_kind: ClassVar[type[Link]] = ByteLink  # type: ignore[type-abstract]
-    """Of the link that is opened; and an example of its address."""
     address: ClassVar[str] = "serial:///dev/ttyUSB0?baud=9600"
     options_kind: ClassVar[type[PositionerOptions]] = PositionerOptions
     resolution_m: ClassVar[float] = math.nan
@@ -173,17 +166,14 @@ class Positioner(Driver):
     stream = "motor"
 
     def __init__(self, settings: DriverSettings) -> None:
-        self.clock = settings.clock
-        """Nanoseconds of the host."""
-        self.options: Any = read_options(self.options_kind, settings.options, self.device)
-        self.facts = self.facts_of(self.options)
+        self.facts = self.facts_of(read_options(self.options_kind, settings.options, self.device))
         self.state: PositionerState | None = None
         """What was last read; None: nothing yet."""
         self._unread: list[PositionerState] = []
         self._moving = self._retreats = False
         self._goal = math.nan
         self._rest, self._asked_ns = b"", 0
-        self.link: Any = open_for(settings, self.device, self.link_kind, self.address)
+        super().__init__(settings)
         self.homed = False
         """Whether positions mean anything, and limits hold."""
         self.enabled = False
@@ -401,20 +391,6 @@ class Positioner(Driver):
         """Hand out no more. The axis ends the move it has, and holds."""
         self._unread = []
 
-    def close(self) -> None:
-        """Close the link. The axis ends the move it has, and holds."""
-        self.stop()
-        self.link.close()
-
 
 def _or(value: float | None, otherwise: float) -> float:
     return otherwise if value is None else value
-
-
-def power_off(axis: Positioner) -> bool:
-    """Take an axis' power where it holds without; return whether that was done. Raises nothing."""
-    with suppress(LinkError, RigError):
-        if axis.facts.holds_unpowered:
-            axis.disable()
-            return True
-    return False

@@ -2,7 +2,7 @@
 
 ::
 
-    standoff -> approach -> contact -> lift -> unloaded -> return -> ramp -> unload -> done
+    approach -> contact -> lift -> unloaded -> return -> ramp -> unload -> done
     any of them -> retreat -> failed
 
 The surface is found first: a quick way to where it cannot be yet, a slow one until the raw force says that it is
@@ -32,9 +32,8 @@ SLACK_S = 2.0
 class PressState(StrEnum):
     """Where a press is."""
 
-    STANDOFF = "standoff"
-    """The motor is retracted, nothing touches."""
     APPROACH = "approach"
+    """Until the skin is touched."""
     CONTACT = "contact"
     """A small force is kept."""
     LIFT = "lift"
@@ -123,29 +122,26 @@ class Press:
         Position of the motor at which the small force was kept; NaN: not yet.
     touch_n
         Largest raw force from the first touch until the small force was kept.
-    error_n
-        Filtered minus wanted force of the last regulated step.
     """
 
     def __init__(self, plan: PressPlan, course: Course) -> None:
-        self.state = PressState.STANDOFF
+        self.state = PressState.APPROACH
         self.ended = ""
         self.not_out = ""
         self.contact_m = math.nan
         self.touch_n = 0.0
-        self.error_n = math.nan
         self.setpoint_n = 0.0
         self._plan, self._course = plan, course
         self._raw: list[tuple[float, float]] = []
         self._force_n = math.nan
         self._controller: ForceController | None = None
         self._stepped_s = 0.0
-        self._goal: Beat | None = None
-        self._requested_s: float | None = None
         self._since_s = self._due_s = 0.0
         self._began_s: float | None = None
         self._lost_s = self._off_s = 0.0
-        self._go = False
+        self._goal: Beat | None = None
+        self._requested_s: float | None = None
+        self._move(plan.near_m, plan.speed_m_s)
 
     # What a rig says --------------------------------------------------------------------------------------------------
 
@@ -158,10 +154,6 @@ class Press:
     def over(self) -> bool:
         """Whether nothing more will happen."""
         return self.state in (PressState.DONE, PressState.FAILED)
-
-    def go(self) -> None:
-        """Leave the standoff."""
-        self._go = True
 
     def begin(self, now_s: float) -> None:
         """Let the scene begin: from now on its seconds count."""
@@ -196,10 +188,6 @@ class Press:
         if report.state in (GuardState.RETREATING, GuardState.RETREATED, GuardState.FAULT):
             return self._guarded(report, now_s)
         match self.state:
-            case PressState.STANDOFF:
-                if self._go:
-                    self._enter(PressState.APPROACH, now_s)
-                    self._move(self._plan.near_m, self._plan.speed_m_s)
             case PressState.APPROACH:
                 self._approach(report, now_s)
             case PressState.LIFT | PressState.RETURN | PressState.UNLOAD:
@@ -229,7 +217,6 @@ class Press:
         return fmean(force for _, force in self._raw) if self._raw else math.nan
 
     def _guarded(self, report: Report, now_s: float) -> Beat:
-        """Note that the guard retreats, or has retreated."""
         if self.state is not PressState.RETREAT and not self.over:
             self.ended = f"in {self.state}: {report.trigger or report.state}"
             self._enter(PressState.RETREAT, now_s)
@@ -311,12 +298,10 @@ class Press:
     # Under force ------------------------------------------------------------------------------------------------------
 
     def _begin_loop(self, state: PressState, report: Report, now_s: float) -> None:
-        """Begin to regulate the force."""
         self._enter(state, now_s)
         self._controller, self._stepped_s = ForceController(self._plan.law, self._force_n, report.position_m), now_s
 
     def _setpoint(self, now_s: float) -> tuple[float, float]:
-        """Return the wanted force and its slope."""
         least = self._plan.contact_n
         if self.state is PressState.CONTACT or self._began_s is None:
             return least, 0.0
@@ -331,7 +316,6 @@ class Press:
         passed_s, self._stepped_s = now_s - self._stepped_s, now_s
         self.setpoint_n, slope = self._setpoint(now_s)
         controller.step(self._force_n, report.position_m, passed_s, self.setpoint_n, slope)
-        self.error_n = controller.filtered_n - self.setpoint_n
         if self.state is PressState.CONTACT:
             if now_s - self._since_s >= plan.settle_s:
                 self.contact_m = controller.target
@@ -354,7 +338,7 @@ class Press:
         plan = self._plan
         contact_lost = filtered_n < plan.band_n and self.setpoint_n > 2 * plan.band_n
         self._lost_s = self._lost_s + passed_s if contact_lost else 0.0
-        off = abs(self.error_n) > plan.error_band_n
+        off = abs(filtered_n - self.setpoint_n) > plan.error_band_n
         self._off_s = max(0.0, self._off_s + (passed_s if off else -0.5 * passed_s))
         if self._lost_s >= plan.lost_s:
             self.fail(f"contact was lost, at {self.setpoint_n:.2f} N")

@@ -150,8 +150,6 @@ class Reading:
         self._lock = threading.Lock()
         self.ended = ""
         """Which device ended the reading, and why, without a full stop; empty: none did."""
-        self.error: Exception | None = None
-        """What was raised there, with its traceback."""
 
     def __enter__(self) -> Self:
         try:
@@ -233,7 +231,6 @@ class Reading:
             yield from stream.take()
 
     def _take_over(self, name: str, driver: Driver, timeout_s: float) -> bool:
-        """Read a driver once; return whether anything came."""
         blocks = driver.read(timeout_s)
         for block in blocks:
             if block.stream not in self._streams:
@@ -286,11 +283,8 @@ class Reading:
             self._fail(name, error)
 
     def _fail(self, name: str, error: Exception) -> None:
-        """End the reading for `error`, unless another one has."""
         with self._lock:
-            if self.error is None:
-                self.error = error
-                self.ended = f"{name}: {error_text(error)}"
+            self.ended = self.ended or f"{name}: {error_text(error)}"
         self._over.set()
 
     def _finish(self) -> None:

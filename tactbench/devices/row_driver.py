@@ -10,18 +10,15 @@ from typing import Any, ClassVar, Generic, NamedTuple, TypeVar
 
 import numpy as np
 
-from tactbench.core.errors import LinkError, LinkTimeout, LinkUnplugged, UnknownNameError
+from tactbench.core.errors import LinkError
 from tactbench.core.samples import Block
 from tactbench.core.spec.sensor import StreamSpec
-from tactbench.devices.driver import Driver, DriverSettings, open_for
+from tactbench.devices.driver import Driver, DriverSettings
 from tactbench.links.byte_link import ByteLink
 from tactbench.links.can_link import CanLink
 from tactbench.links.datagram_link import DatagramLink
 
 L = TypeVar("L", ByteLink, CanLink, DatagramLink)
-
-AT_ONCE = 1000
-"""The most pieces of one `read`: a device may send faster than they are taken."""
 
 
 class Sample(NamedTuple):
@@ -39,30 +36,16 @@ class RowDriver(Driver, Generic[L]):
     Rows have the time at which the host had them. A device with several streams, numbers or a clock of its own needs a
     :class:`Driver`.
 
-    Raises
-    ------
-    UsageError
-        For an option that is not among `defaults`, or a link of another kind.
-    LinkError
-        If it cannot be opened.
     """
 
     stream: ClassVar[StreamSpec]
     """What it reads."""
-    link_kind: type[L]
-    """ByteLink, CanLink or DatagramLink."""
-    defaults: ClassVar[Mapping[str, Any]] = {}
-    """Options of a rig file's entry, and what they are where it leaves them out."""
+    link: L
 
     def __init__(self, settings: DriverSettings) -> None:
-        for name in settings.options:
-            if name not in self.defaults:
-                raise UnknownNameError("option", name, self.defaults)
-        self.options: dict[str, Any] = {**self.defaults, **settings.options}
-        self.clock = settings.clock
+        super().__init__(settings)
         self.counted: Counter[str] = Counter()
         """What :attr:`counts` tells: subclasses count here what they leave out."""
-        self.link: L = open_for(settings, type(self).__name__, self.link_kind, "those of docs/links.md")
 
     @property
     def streams(self) -> tuple[StreamSpec, ...]:
@@ -102,20 +85,13 @@ class RowDriver(Driver, Generic[L]):
         found: list[Sample] = []
         link = self.link
         until_s = link.timer() + timeout_s
-        for _ in range(AT_ONCE):
-            try:
-                received = link.receive(0.0 if found else max(0.0, until_s - link.timer()))
-            except LinkTimeout:
-                break
-            except LinkUnplugged:
-                if found:  # what has come is handed out; the next read says that nothing comes any more
-                    break
-                raise
-            fresh = list(self.rows(received))
-            times += [received.t_ns] * len(fresh)
-            found += fresh
-        if not found:
-            return []
+        while not found:
+            for received in link.receive_all(max(0.0, until_s - link.timer())):
+                fresh = list(self.rows(received))
+                times += [received.t_ns] * len(fresh)
+                found += fresh
+            if not found and link.timer() >= until_s:
+                return []
         data = np.array([row.values for row in found]).astype(self.stream.dtype)
         good = [0] * data.shape[1]
         quality = np.array([good if row.quality is None else row.quality for row in found], dtype=np.uint8)
@@ -128,8 +104,3 @@ class RowDriver(Driver, Generic[L]):
 
     def quiet(self) -> None:
         """Nothing, unless the device can be told to stop."""
-
-    def close(self) -> None:
-        """Stop, and close the link."""
-        self.stop()
-        self.link.close()

@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Mapping
 from types import MappingProxyType
-from typing import Any, Literal, NamedTuple
+from typing import Any, Literal, NamedTuple, TypeVar
 from urllib.parse import parse_qsl, unquote, urlsplit
 
 from pydantic import BaseModel, Field, PositiveInt, ValidationError
@@ -22,11 +22,6 @@ class _Line(BaseModel):
     baud: PositiveInt
     parity: Literal["none", "even", "odd"] = "none"
     stop_bits: int = Field(default=1, ge=1, le=2)
-
-
-class _Udp(BaseModel):
-    local_port: int = Field(default=0, gt=0, lt=65536)
-    buffer_bytes: PositiveInt = 1
 
 
 class _Spi(BaseModel):
@@ -51,7 +46,7 @@ KINDS = MappingProxyType(
         "socket": _Kind("socket://192.168.1.5:4001", _None),
         "loop": _Kind("loop://", _None),
         "can": _Kind("can://socketcan/can0", _None),
-        "udp": _Kind("udp://192.168.1.1:49152", _Udp),
+        "udp": _Kind("udp://192.168.1.1:49152", _None),
         "spi/spidev": _Kind("spi://spidev/0.0?speed_hz=4400000", _Spi),
         "spi/bridge": _Kind("spi://bridge//dev/ttyACM0?speed_hz=4400000", _Bridge),
     }
@@ -68,6 +63,32 @@ class LinkAddress(NamedTuple):
     """Port, channel, host or file; of ``can`` the interface, a slash and the channel."""
     options: Mapping[str, Any]
     """Keys and values, as the link takes them."""
+
+
+_Model = TypeVar("_Model", bound=BaseModel)
+
+
+def read_options(kind: type[_Model], given: Mapping[str, Any], what: str, *, hint: str = "") -> _Model:
+    """Return what is given as a model of `what`: a device, an address.
+
+    Raises
+    ------
+    UsageError
+        For an option that is not known, is missing, has no such value, or contradicts another.
+    """
+    for name in given:
+        if name not in kind.model_fields:
+            raise UnknownNameError(f"option of {what}", name, kind.model_fields)
+    try:
+        return kind.model_validate(dict(given))
+    except ValidationError as error:
+        first = error.errors(include_url=False)[0]
+        name = ".".join(map(str, first["loc"]))
+        about = f"The option {name!r} of {what}" if name else f"What is said of {what}"
+        problem = "is missing" if first["type"] == "missing" else f"is wrong: {first['msg']}"
+        raise UsageError(
+            f"{about} {problem.replace('Value error, ', '')}.", hint=hint or "See docs/hardware.md, The rig file."
+        ) from error
 
 
 def parse_address(text: str) -> LinkAddress:
@@ -129,7 +150,7 @@ def open_link(address: str, clock: Clock = time.monotonic_ns) -> Link:
     options = dict(given)
     match kind:
         case "udp":
-            return UdpLink(*_host_and_port(target), clock=clock, **options)
+            return UdpLink(*_host_and_port(target), clock=clock)
         case "can":
             interface, _, channel = target.partition("/")
             return CanBus(interface, channel, clock=clock, **options)
@@ -161,16 +182,9 @@ def _options(text: str, kind: str, query: str) -> dict[str, object]:
         raise _wrong(text, kind, "gives a key twice")
     if kind == "can":
         return {key: yaml.safe_load(value) for key, value in pairs}
-    model = KINDS[kind].options
-    for key in given.keys() - model.model_fields.keys():
-        raise UnknownNameError(f"key of a {kind} link", key, model.model_fields)
-    try:
-        return model.model_validate(given).model_dump(exclude_unset=True)
-    except ValidationError as error:
-        first = error.errors(include_url=False)[0]
-        key = str(first["loc"][0])
-        problem = f"does not give {key}" if first["type"] == "missing" else f"gives {key}={given[key]}: {first['msg']}"
-        raise _wrong(text, kind, problem) from None
+    example, model = KINDS[kind]
+    read = read_options(model, given, f"the address {text!r}", hint=f"Write it like {example}.")
+    return read.model_dump(exclude_unset=True)
 
 
 def _wrong(text: str, kind: str, problem: str) -> UsageError:

@@ -64,7 +64,6 @@ class CanLink(Link):
 
 
 def _data_frame(message: Any, t_ns: int, counts: Counter[str]) -> CanFrame | None:
-    """Return python-can's `message` as a frame, or count it and return None."""
     if message.is_error_frame:
         counts["error frames"] += 1
     elif message.is_remote_frame or message.is_fd:

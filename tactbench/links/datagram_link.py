@@ -6,11 +6,13 @@ import socket
 import time
 from abc import abstractmethod
 
-from tactbench.core.errors import LinkError
 from tactbench.links.link import WRITE_TIMEOUT_S, Clock, Link, Received, cannot_open
 
 LARGEST_DATAGRAM = 65507
 """Bytes: 65535 of an IPv4 packet less its header of 20 and UDP's of 8 (RFC 791, RFC 768)."""
+BUFFER_BYTES = 4 << 20
+"""Asked of the system for what is not yet read; it may give less. The usual 212 992 hold 256 datagrams of 36 bytes, a
+quarter of a second at 1 kHz (measured on Linux); what does not fit is lost without an error."""
 
 
 class DatagramLink(Link):
@@ -25,15 +27,7 @@ class DatagramLink(Link):
 
     @abstractmethod
     def send(self, data: bytes) -> None:
-        """Send one datagram; raises as every :class:`Link`, LinkError if it is longer than UDP carries."""
-
-    def _sendable(self, data: bytes) -> None:
-        super()._sendable(data)
-        if len(data) > LARGEST_DATAGRAM:
-            raise LinkError(
-                f"{self.address}: a datagram of {len(data)} bytes was given, at most {LARGEST_DATAGRAM} go out.",
-                hint="Send it in parts.",
-            )
+        """Send one datagram; raises as every :class:`Link`."""
 
 
 class UdpLink(DatagramLink):
@@ -43,29 +37,16 @@ class UdpLink(DatagramLink):
     ----------
     host, port
         The peer.
-    local_port
-        This end's port, for a peer that sends to a fixed one; 0: any free one.
-    buffer_bytes
-        Asked of the system for what is not yet read; it may give less. The usual 212 992 hold 256 datagrams of 36
-        bytes, a quarter of a second at 1 kHz (measured on Linux); what does not fit is lost without an error.
     clock
         Stamps what is received.
 
     Raises
     ------
     LinkError
-        If the host has no address, or the local port is taken.
+        If the host has no address.
     """
 
-    def __init__(
-        self,
-        host: str,
-        port: int,
-        *,
-        local_port: int = 0,
-        buffer_bytes: int = 4 << 20,
-        clock: Clock = time.monotonic_ns,
-    ) -> None:
+    def __init__(self, host: str, port: int, *, clock: Clock = time.monotonic_ns) -> None:
         super().__init__(f"udp://{f'[{host}]' if ':' in host else host}:{port}", clock)
         try:
             family, kind, protocol, _, peer = socket.getaddrinfo(host, port, type=socket.SOCK_DGRAM)[0]
@@ -73,18 +54,11 @@ class UdpLink(DatagramLink):
         except OSError as error:
             raise cannot_open(self.address, error) from error
         try:
-            self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, buffer_bytes)
-            if local_port:
-                self._socket.bind(("", local_port))
+            self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, BUFFER_BYTES)
             self._socket.connect(peer)
         except OSError as error:
             self._socket.close()
             raise cannot_open(self.address, error) from error
-
-    @property
-    def local_port(self) -> int:
-        """Port of this end."""
-        return int(self._socket.getsockname()[1])
 
     def receive(self, timeout_s: float) -> Received:  # noqa: D102  (inherited)
         self._usable(timeout_s)

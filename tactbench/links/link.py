@@ -7,6 +7,7 @@ import math
 import time
 from abc import ABC, abstractmethod
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any, Self
 
@@ -18,8 +19,8 @@ Clock = Callable[[], int]
 WRITE_TIMEOUT_S = 1.0
 """Assumed: the other end takes what is sent within this time, or is stuck. 9600 baud carry 960 bytes in it."""
 
-MOST_DISCARDED = 4096
-"""Pieces that one :meth:`Link.discard` drops: a bus that never rests does not keep it for ever."""
+MOST_AT_ONCE = 4096
+"""Pieces of one :meth:`Link.receive_all`, 4 s at 1 kHz: a bus that never rests does not keep it for ever."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,13 +70,25 @@ class Link(ABC):
         """Return the seconds by which its waits are counted: real ones, or virtual ones where time is virtual."""
         return time.monotonic()
 
+    def receive_all(self, timeout_s: float) -> list[Any]:
+        """Return all that has come, waiting at most so long for the first; an empty list: nothing came.
+
+        Raises as a read does; what came before the link was unplugged is handed out first.
+        """
+        found: list[Any] = []
+        with suppress(LinkTimeout):
+            while len(found) < MOST_AT_ONCE:
+                try:
+                    found.append(self.receive(0.0 if found else timeout_s))
+                except LinkUnplugged:
+                    if not found:
+                        raise
+                    break
+        return found
+
     def discard(self) -> None:
         """Drop what has come and was not read; what is still under way comes later. Raises as a read does."""
-        for _ in range(MOST_DISCARDED):
-            try:
-                self.receive(0.0)
-            except LinkTimeout:
-                return
+        self.receive_all(0.0)
 
     @abstractmethod
     def receive(self, timeout_s: float) -> Any:
@@ -90,15 +103,7 @@ class Link(ABC):
         """Give back what the link holds; called once, also after the other end is gone, and raises nothing."""
 
     def _usable(self, timeout_s: float = 0.0) -> float:
-        """Return when a wait of `timeout_s` ends, in seconds of :meth:`timer`.
-
-        Raises
-        ------
-        LinkClosed, LinkUnplugged
-            If nothing can be done with this link any more.
-        LinkError
-            If `timeout_s` is negative or not finite.
-        """
+        """Return when a wait of `timeout_s` ends, in seconds of :meth:`timer`; raises as every :class:`Link`."""
         if self._closed:
             raise LinkClosed(f"The link {self.address} is closed.", hint="Open a new one.")
         if self._loss is not None:

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
         with_sensor,
     )
     from tactbench.devices.control import Control
-    from tactbench.devices.driver import DeviceLog, Driver, DriverSettings, Options, open_for, read_options
+    from tactbench.devices.driver import DeviceLog, Driver, DriverSettings, Options, open_for
     from tactbench.devices.emulation.emulated_devices import EmulatedDevice, EmulatedDevices
     from tactbench.devices.emulation.scene_samples import SceneSamples
     from tactbench.devices.emulator import (
@@ -62,7 +62,7 @@ if TYPE_CHECKING:
     from tactbench.devices.reading import Reading
     from tactbench.devices.row_driver import RowDriver, Sample
     from tactbench.devices.sequence import Unwrap
-    from tactbench.links.address import open_link
+    from tactbench.links.address import open_link, read_options
     from tactbench.links.byte_link import ByteLink
     from tactbench.links.can_link import CanFrame, CanLink, read_can_log
     from tactbench.links.datagram_link import DatagramLink

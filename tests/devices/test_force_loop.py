@@ -71,12 +71,10 @@ def test_the_limit_of_increments_without_filter_and_lag_is_the_closed_one(d):
     assert model.largest_stiffness() * T == pytest.approx(2 * math.sin(math.pi / (2 * (2 * d + 1))), rel=1e-5)
 
 
-def test_gains_above_half_of_the_limit_are_refused():
+def test_the_limit_with_a_delay_of_one_period():
     # With a delay of one period and no lag the limit is k ki T = 1, whatever the filter.
     model = LoopModel.of(_loop(ki=1.0, motor_lag=_q(0.0, "s")))
-    assert model.share_used(20e3) == pytest.approx(0.2, rel=1e-5)
-    with pytest.raises(UsageError, match=r"0\.80 of those .*Divide both gains by 1\.60"):
-        model.share_used(80e3)
+    assert model.largest_stiffness() == pytest.approx(100e3, rel=1e-5)
 
 
 # The motor ------------------------------------------------------------------------------------------------------------

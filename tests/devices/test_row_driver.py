@@ -18,6 +18,7 @@ from tactbench.plugin.devices import (
     EmulatedDevices,
     EmulatorSettings,
     LinkUnplugged,
+    Options,
     RowDriver,
     RowEmulator,
     Sample,
@@ -31,8 +32,12 @@ STREAM = StreamSpec(
 )  # fmt: skip
 
 
+class UnitOptions(Options):
+    unit: int = 1
+
+
 class ByteDriver(RowDriver[ByteLink]):
-    stream, link_kind, defaults = STREAM, ByteLink, {"unit": 1}
+    stream, link_kind, options_kind = STREAM, ByteLink, UnitOptions
 
     def begin(self):
         self.link.write(b"+")
@@ -109,13 +114,9 @@ def test_frames_that_wait_are_one_block():
 
 
 def test_what_came_before_it_was_unplugged_is_handed_out():
-    class Unplugged(CanDriver):
-        def rows(self, received):
-            devices.advance(devices.clock() + 1_000_000_000)  # the frame at 20 ms comes, and the cable is pulled
-            return super().rows(received)
-
     device = EmulatedDevice("can", CanModel(settings()), faults=(LinkFault.parse("unplug:start_s=0.025"),))
-    with EmulatedDevices({"pad": device}) as devices, on(devices, Unplugged) as driver:
+    with EmulatedDevices({"pad": device}) as devices, on(devices, CanDriver) as driver:
+        devices.advance(1_000_000_000)  # the frames at 10 and 20 ms have come, and the cable is pulled
         assert driver.read(0.5)[0].data.tolist() == [[0, 1, 2]] * 2
         with pytest.raises(LinkUnplugged):
             driver.read(0.5)
@@ -127,7 +128,7 @@ def test_an_unknown_option_is_refused_before_the_link_is_opened():
         with pytest.raises(UsageError, match="unti"):
             on(devices, ByteDriver, unti=2)
         with on(devices, ByteDriver, unit=2) as driver:  # the link is free
-            assert driver.options == {"unit": 2}
+            assert driver.options.unit == 2
 
 
 def test_a_link_of_another_kind_is_refused_and_closed():

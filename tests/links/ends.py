@@ -125,7 +125,7 @@ def datagrams(clock: Callable[[], int]) -> Iterator[End]:
                 link.send(b"is anybody there?")
 
             def say() -> None:
-                far.sendto(b"a", ("127.0.0.1", link.local_port))
+                far.sendto(b"a", ("127.0.0.1", link._socket.getsockname()[1]))
 
             yield End(link, say, lambda: link.send(b"b"), unplug)
 

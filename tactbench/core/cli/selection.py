@@ -70,6 +70,8 @@ def requested_matrix(
     from tactbench.core.cli.config import default_matrix, matrix_called
     from tactbench.core.errors import UsageError
     from tactbench.core.spec.matrix import EstimatorChoice, TaskChoice
+    from tactbench.core.spec.rig_file import RigFile
+    from tactbench.core.spec.yaml_file import load_yaml
 
     base = config or ("real" if datasets else None)
     matrix = matrix_called(base) if base else default_matrix()
@@ -78,10 +80,11 @@ def requested_matrix(
     if datasets and (recordings or rig_file or rig not in (None, "replay")):
         raise UsageError("--dataset brings its own recordings.", hint="Leave out --rig, --recordings and --rig-file.")
     if rig or recordings or rig_file or datasets:
-        change["rig"] = rig or (_rig_of(rig_file) if rig_file else "replay")
+        file = load_yaml(Path(rig_file), RigFile) if rig_file else None
+        change["rig"] = rig or (file.rig if file else "replay")
         change["rig_file"] = rig_file
         if change["rig"] != matrix.rig:
-            change["sensors"] = ()  # the file's sensors are those of its own rig
+            change["sensors"] = tuple(file.sensors) if file else ()  # the matrix' sensors are those of its own rig
             over["protocol"] = ("deployable",)  # the paper's protocol needs the paper's three roles
     stated = {
         "sensors": tuple(dict.fromkeys(sensors)) or None,
@@ -138,11 +141,3 @@ def _with_those_beside(choices: list[Any], registry: Registry) -> list[Any]:
         beside = registry.tasks[choice.name].spec.beside if known else ()  # an unknown name is refused with all others
         found += [choice, *(choice.model_copy(update={"name": name}) for name in beside if name not in names)]
     return found
-
-
-def _rig_of(file: str) -> str:
-    """Return the name of the rig that a rig file is for; raises ConfigError if it is none."""
-    from tactbench.core.spec.rig_file import RigFile
-    from tactbench.core.spec.yaml_file import load_yaml
-
-    return load_yaml(Path(file), RigFile).rig

@@ -66,7 +66,8 @@ class SceneEmulators(RigEmulators):
         from tactbench.devices.emulation.scene_samples import SceneSamples
 
         profile = scene.profile
-        self._samples = SceneSamples(simulated, profile.duration.to("s"), rest_s=profile.hold_s)
+        streams = (*simulated.streams, *simulated.reference)
+        self._samples = SceneSamples(streams, simulated, profile.duration.to("s"), rest_s=profile.hold_s)
 
     def begin(self, at_s: float) -> None:
         """Press."""

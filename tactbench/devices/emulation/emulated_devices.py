@@ -9,7 +9,6 @@ from dataclasses import dataclass
 from functools import partial
 from typing import Any, Literal, Self
 
-from tactbench.core.errors import UnknownNameError
 from tactbench.core.spec.rig import EmulatedLink
 from tactbench.devices.emulation.line import Line, LinkFault
 from tactbench.devices.emulation.real_time import End, PseudoTerminal, RealTimeServer, SlcanAdapter, UdpEnd
@@ -136,13 +135,9 @@ class EmulatedDevices:
 
         Raises
         ------
-        UnknownNameError
-            If there is no such device.
         LinkError
             If it cannot be opened, or is open.
         """
-        if name not in self._devices:
-            raise UnknownNameError("emulated device", name, self._devices)
         if self._virtual is None:
             return open_link(self.addresses[name], self.clock)
         kinds = {"can": VirtualCanLink, "datagram": VirtualDatagramLink}

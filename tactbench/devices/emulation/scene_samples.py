@@ -3,28 +3,13 @@
 from __future__ import annotations
 
 from bisect import bisect_right
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from typing import Protocol
+from collections.abc import Iterable, Mapping, Sequence
 
 from tactbench.core.samples import Block
 from tactbench.core.spec.sensor import StreamSpec
 
 PRESSING_FORCE = "fz"
 """Name under which a simulated rig gives the force with which the sensor is pressed, positive when pressing [N]."""
-
-
-class SimulatedScene(Protocol):
-    """The streams of a scene and their blocks, as a simulated rig's acquisition has them."""
-
-    @property
-    def streams(self) -> tuple[StreamSpec, ...]:
-        """The sensor's."""
-
-    @property
-    def reference(self) -> tuple[StreamSpec, ...]:
-        """The force sensor's."""
-
-    def __iter__(self) -> Iterator[Block]: ...
 
 
 class SceneSamples:
@@ -37,19 +22,23 @@ class SceneSamples:
 
     Parameters
     ----------
-    scene
-        Streams and blocks, with times in nanoseconds since the scene's beginning.
+    streams
+        The sensor's and the force sensor's.
+    blocks
+        Theirs, with times in nanoseconds since the scene's beginning.
     duration_s
         Its length.
     rest_s
         How long nothing is pressed at its beginning; 0: the first sample alone is held.
     """
 
-    def __init__(self, scene: SimulatedScene, duration_s: float, *, rest_s: float = 0.0) -> None:
+    def __init__(
+        self, streams: Sequence[StreamSpec], blocks: Iterable[Block], duration_s: float, *, rest_s: float = 0.0
+    ) -> None:
         self.duration_s = duration_s
         self._rest_ns = round(1e9 * min(rest_s, duration_s))
         self._start_s: float | None = None
-        self._tracks = _tracks((*scene.streams, *scene.reference), scene)
+        self._tracks = _tracks(streams, blocks)
         self._last: tuple[tuple[int, ...], Mapping[str, float]] = (), {}
 
     def start(self, at_s: float) -> None:

@@ -60,22 +60,7 @@ class VirtualTime:
 
 
 class _VirtualLink(Link):
-    """The host's end of a line: what is written is with the device at once, waits let time go on.
-
-    Parameters
-    ----------
-    name
-        Of the device.
-    time
-        The clock of stamps and waits.
-    line
-        The device's end. What it delivered before this link was made is not seen.
-
-    Raises
-    ------
-    LinkError
-        If another link to the device is open.
-    """
+    """The host's end of a line: what is written is with the device at once, waits let time go on."""
 
     def __init__(self, name: str, time: VirtualTime, line: Line) -> None:
         super().__init__(f"emulated {name}", time)

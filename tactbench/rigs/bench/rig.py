@@ -157,7 +157,6 @@ class Bench:
             )
 
     def _zero(self, force: PressingForce, file: RigFile, driver: Driver, clock: Clock) -> dict[str, FloatArray]:
-        """Return what the force sensor reads without load, by stream; raises RigError if it is not at rest."""
         assert file.force is not None
         seconds = file.force.zero_s
         blocks: list[Block] = []

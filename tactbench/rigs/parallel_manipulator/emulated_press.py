@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from tactbench.plugin import Acquisition, NotApplicable, PluginContractError, Scene, SensorDescriptor, UsageError
+from tactbench.plugin import Acquisition, NotApplicable, Scene, SensorDescriptor
 from tactbench.plugin.devices import RigEmulators, RigFile, SceneSamples, emulators_of, with_sensor
 from tactbench.plugin.simulation import SimulatedPress
 from tactbench.rigs.parallel_manipulator.settings import MOTOR, axes_of, settings_of, with_limits
@@ -28,8 +28,8 @@ FORCE = "fz"
 FLOOR_N = 0.6e-3
 """Standard deviation of what the force sensor adds by itself (derived: quantisation of a Nano17 read with 16 bits on
 +-10 V, rms of Fz); without it a sensor without noise would seem stuck."""
-TABULATED = 4001
-"""Depths at which the force is tabulated; straight between them."""
+BEYOND_M = 1.0
+"""Behind the end of the press curve the skin goes on as a spring, at least as far as any motor goes."""
 _FLOOR_DRAWS = 1 << 14
 _FLOOR_HZ = 7000
 """A new draw for each sample of a Net F/T box."""
@@ -84,15 +84,14 @@ class EmulatedPress:
         self._s_per_n = (self._duration_s - self._hold_s) / profile.end.to("N")
         self._corners = profile.corners
         depths_m, forces_n = simulated.press_curve(largest_n)
-        even_m = np.linspace(0.0, float(depths_m[-1]), TABULATED)
-        self._spacing_m = float(even_m[1])
-        forces = np.interp(even_m, depths_m, forces_n)
-        forces[0] = 0.0
-        self._forces_n: list[float] = forces.tolist()
-        # One for what the sensor reads, one for the noise of the force.
-        self._sensor, self._force = (SceneSamples(simulated, self._duration_s, rest_s=self._hold_s) for _ in range(2))
-        for samples in (self._sensor, self._force):
-            samples.start(0.0)
+        steepness = (forces_n[-1] - forces_n[-2]) / (depths_m[-1] - depths_m[-2])
+        self._curve = (
+            skin_m + np.append(depths_m, depths_m[-1] + BEYOND_M),
+            np.append(forces_n, forces_n[-1] + BEYOND_M * steepness),
+        )
+        streams = (*simulated.streams, *simulated.reference)
+        self._samples = SceneSamples(streams, simulated, self._duration_s, rest_s=self._hold_s)
+        self._samples.start(0.0)
         self._floor_n: list[float] = (FLOOR_N * rng.standard_normal(_FLOOR_DRAWS)).tolist()
 
     def start(self, at_s: float) -> None:
@@ -101,25 +100,20 @@ class EmulatedPress:
 
     def force_n(self, position_m: float) -> float:
         """Return the force of the skin [N] at a position of the motor, as its drive counts [m]."""
-        place = (position_m - self.skin_m) / self._spacing_m
-        if place <= 0.0:
-            return 0.0
-        before = min(int(place), TABULATED - 2)
-        here, there = self._forces_n[before : before + 2]
-        return here + (place - before) * (there - here)
+        return float(np.interp(position_m, *self._curve)) if position_m > self.skin_m else 0.0
 
     def sensed(self, t_s: float, position_m: float) -> Mapping[str, float]:
         """Return the value of every channel, in its unit, at a second of the devices' clock and a motor's position."""
         force_n = self.force_n(position_m)
         since_s = (t_s - self._start_s) % self._duration_s
         load_n = float(np.interp(since_s, *self._corners))
-        noise_n = self._force(since_s).get(FORCE, load_n) - load_n
+        noise_n = self._samples(since_s).get(FORCE, load_n) - load_n
         if force_n > 0.0:
             at_s = min(self._hold_s + force_n * self._s_per_n, self._duration_s - 1e-9)
         else:
             at_s = since_s % self._hold_s if self._hold_s else 0.0
         floor = self._floor_n[int(t_s * _FLOOR_HZ) % _FLOOR_DRAWS]
-        return {**self._sensor(at_s), FORCE: force_n + noise_n + floor}
+        return {**self._samples(at_s), FORCE: force_n + noise_n + floor}
 
 
 class PressEmulators(RigEmulators):
@@ -128,7 +122,7 @@ class PressEmulators(RigEmulators):
     Raises
     ------
     UsageError
-        If the file lacks something, or an emulated axis is none.
+        If the file lacks something.
     """
 
     def __init__(self, file: RigFile, registry: Any) -> None:
@@ -144,8 +138,6 @@ class PressEmulators(RigEmulators):
         self.devices = devices
         for name in axes_of(self._settings):
             axis: Any = devices[name].emulator if name in devices else None
-            if axis is not None and not hasattr(axis, "press_against"):
-                raise UsageError(f"The emulated {name} is no axis.", hint="Its emulator lacks press_against.")
             if axis is not None:  # the platform's weight is not modelled
                 axis.press_against(self._force_n if name == MOTOR else None)
             if name == MOTOR:
@@ -153,12 +145,7 @@ class PressEmulators(RigEmulators):
 
     def prepare(self, simulated: Acquisition, sensor: SensorDescriptor, scene: Scene, seed: int) -> None:
         """Put the sensor of a scene before the motor; the height of its skin is drawn."""
-        press: Any = simulated
-        if not hasattr(press, "press_curve"):
-            raise PluginContractError(
-                f"The simulated rig {self._file.emulation.physics!r} has no press curves.",
-                hint="Its acquisition needs press_curve: see SimulatedPress in tactbench.plugin.simulation.",
-            )
+        press: Any = simulated  # a SimulatedPress
         settings, heights, scene = self._settings, self._settings.heights, quiet(scene)
         rng = np.random.default_rng([self._file.emulation.seed, seed, *b"skin", *scene.name.encode()])
         most_mm = heights.tolerance_mm

@@ -5,13 +5,14 @@ platform parallel to its base, so the platform's radius is subtracted from the b
 L from its joint centre to the point p of the platform (derived; the same folding in R. L. Williams II, The Delta
 Parallel Robot: Kinematics Solutions, 2015):
 
-    c(q) = A + q d,  A = (R_b - r_p) e + offset,  d = cos(alpha) e + sin(alpha) z,  |p - c_i(q_i)| = L_i
+    c(q) = A + q d,  A = (R_b - r_p) e,  d = cos(alpha) e + sin(alpha) z,  |p - c_i(q_i)| = L_i
 
-Inverse: w = p - A, s = d.w, n = |w - s d|, q = s + b sqrt((L - n)(L + n)).
+Inverse: w = p - A, s = d.w, n = |w - s d|, q = s + sqrt((L - n)(L + n)): carriages are ahead of the platform.
 
 Forward, three spheres: a = c2 - c1, b = c3 - c1, n = a x b, x = (A'(b x n) + B'(n x a))/|n|^2 with
 A' = (|a|^2 + L1^2 - L2^2)/2 and B' = (|b|^2 + L1^2 - L3^2)/2, h = sqrt((L1 - |x|)(L1 + |x|)),
-p = c1 + x + mode h n/|n|. `mode` is kept from homing: the lower of both solutions is the wrong one at some places.
+p = c1 + x - h n/|n|: it is assembled so that det(p - c1, p - c2, p - c3) < 0. The lower of both solutions is the wrong
+one at some places.
 
 Near a singularity, with unit links u_i = (p - c_i)/L_i, all measures without units, 1 is best:
 
@@ -31,9 +32,10 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Annotated, Any, Literal, NamedTuple, Self
 
 import numpy as np
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, FiniteFloat, model_validator
+from pydantic import BeforeValidator, Field, model_validator
 
 from tactbench.plugin import RigError, Source, UsageError
+from tactbench.plugin.devices import Options
 
 if TYPE_CHECKING:
     from tactbench.plugin import FloatArray
@@ -42,14 +44,16 @@ ROUNDING = 1e-12
 """Part of a link's length by which it may miss: distances of metres carry errors of a few 1e-16 of themselves, and
 geometry files a few more; three digits are left over."""
 
-Length = Annotated[FiniteFloat, Field(gt=0, le=1e5)]
+MODE = -1
+"""Sign of det(p - c1, p - c2, p - c3) of a machine whose carriages are ahead; kept along every permitted move."""
+Length = Annotated[float, Field(gt=0, le=1e5)]
 
 
 def _for_each_leg(value: Any) -> Any:
     return (value,) * 3 if isinstance(value, int | float) else value
 
 
-PerLeg = Annotated[tuple[FiniteFloat, FiniteFloat, FiniteFloat], BeforeValidator(_for_each_leg)]
+PerLeg = Annotated[tuple[float, float, float], BeforeValidator(_for_each_leg)]
 """Three numbers, or one for all legs."""
 PositivePerLeg = Annotated[tuple[Length, Length, Length], BeforeValidator(_for_each_leg)]
 
@@ -62,10 +66,8 @@ class ClosureError(RigError):
     """Joint values at which the three links do not meet, or that fix no place."""
 
 
-class LinearDelta(BaseModel):
+class LinearDelta(Options):
     """Three carriages on straight rails, vertical or inclined; q is the carriage's way along its rail from A [m]."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
 
     kind: Literal["linear-delta"] = "linear-delta"
     title: str
@@ -78,8 +80,6 @@ class LinearDelta(BaseModel):
     """From the axis to each joint's zero."""
     platform_radius_mm: PositivePerLeg
     """From the platform's axis to the joint of each link."""
-    offset_mm: tuple[PerLeg, PerLeg, PerLeg] = ((0.0,) * 3,) * 3
-    """Measured deviation of each leg's zero from its nominal place: x, y, z."""
     link_mm: PositivePerLeg
     """Length of each link between its joints."""
     inclination_deg: PerLeg = (90.0, 90.0, 90.0)
@@ -87,12 +87,8 @@ class LinearDelta(BaseModel):
     joint_lowest_mm: PerLeg
     """Least permitted position of each carriage."""
     joint_highest_mm: PerLeg
-    branch: Literal[-1, 1] = 1
-    """1: carriage ahead of the platform along its rail; -1: the other solution of each leg."""
-    sideways_deg: Annotated[FiniteFloat, Field(gt=0, lt=90)] = 30.0
+    sideways_deg: Annotated[float, Field(gt=0, lt=90)] = 30.0
     """Largest angle of a link out of its leg's plane (assumed: rod ends of ordinary size)."""
-    mode: Literal[-1, 1] = -1
-    """Sign of det(p - c1, p - c2, p - c3): which way the machine is assembled; kept along every permitted move."""
 
     @model_validator(mode="after")
     def _sound(self) -> Self:
@@ -118,7 +114,7 @@ class LinearDelta(BaseModel):
     def anchor_m(self) -> FloatArray:
         """The (3, 3) folded zeros A [m], a row per leg."""
         folded = np.subtract(self.base_radius_mm, self.platform_radius_mm)
-        return np.asarray(1e-3 * (folded[:, None] * self.radial + np.asarray(self.offset_mm)))
+        return np.asarray(1e-3 * folded[:, None] * self.radial)
 
     @cached_property
     def link_m(self) -> FloatArray:
@@ -169,7 +165,7 @@ def solve_inverse(delta: LinearDelta, p_m: FloatArray) -> tuple[FloatArray, Floa
     along = _dot(w, delta.rail)
     beside = np.linalg.norm(w - along[..., None] * delta.rail, axis=-1)
     L = delta.link_m
-    return along + delta.branch * _root((L - beside) * (L + beside)), beside - L
+    return along + _root((L - beside) * (L + beside)), beside - L
 
 
 def inverse(delta: LinearDelta, p_m: FloatArray) -> FloatArray:
@@ -226,7 +222,7 @@ def forward(delta: LinearDelta, q: FloatArray) -> FloatArray:
             "are missing.",
             hint="A step was lost or the geometry is wrong: home again, then check the geometry.",
         )
-    height = delta.mode * _root((L[0] - far) * (L[0] + far))
+    height = MODE * _root((L[0] - far) * (L[0] + far))
     return np.asarray(c1 + x + (height / np.sqrt(nn))[..., None] * n)
 
 

@@ -95,7 +95,6 @@ class PressAcquisition:
         self.events += self.control.events()
 
     def _within(self, blocks: Iterator[Block], end_ns: int) -> Iterator[Block]:
-        """Yield the rows that belong to the scene."""
         for block in blocks:
             assert block.t_ns is not None
             first, last = np.searchsorted(block.t_ns, (self.begin_ns, end_ns)).tolist()
@@ -228,7 +227,6 @@ class ParallelManipulator:
             self.close()
 
     def _place_m(self, scene: Scene) -> tuple[float, float]:
-        """Return the manipulator's x and y [m] for a scene."""
         places = self.settings.places
         x_mm, s_mm = scene.placement.x.to("mm"), scene.placement.s.to("mm")
         for name, value, (low, high) in (("x", x_mm, places.reach_x_mm), ("s", s_mm, places.reach_s_mm)):
@@ -337,7 +335,6 @@ def _course(scene: Scene) -> Course:
 def _find_surface(control: Control, blocks: Iterator[Block]) -> list[Event]:
     """Let the press find the surface; return what happened meanwhile, whose rows nobody keeps."""
     press = control.press
-    press.go()
     for _ in blocks:
         for _ in control.blocks():
             pass

@@ -30,6 +30,8 @@ axis' own latency."""
 INCREMENT_BYTES = 65
 """Of one increment and the look that confirms its end, and their answers: LA-12345, OK, M, OK, TPOS, -12345, POS,
 -12345, GRC, 1234, OST, 65536, each with CR, answers with LF as well."""
+MOST_OF_LIMIT = 0.5
+"""Part of the largest stable gain that may be used: overshoot, and a skin stiffer than declared, need the rest."""
 _MANDATORY = ("lower_m", "upper_m", "speed_m_s", "acceleration_m_s2", "corridor_m", "orientation")
 _UNITS = ("increment_m", "speed_unit_m_s", "acceleration_unit_m_s2", "current_unit_a")
 
@@ -80,10 +82,14 @@ def check(file: RigFile) -> RigCheck:
             problems += _line_problems(settings, options)
     forces, found = _forces(settings, facts)
     problems += found
-    greatest = 1e3 * settings.stiffness.greatest_n_mm
-    model = settings.force_loop.model(settings.limits.travel_mm)
-    refusing(lambda: model.share_used(greatest))
-    share = ("share of the largest stable gains", f"{greatest / model.largest_stiffness():.2f}, at most 0.50")
+    loop = settings.force_loop.model(settings.limits.travel_mm)
+    used = 1e3 * settings.stiffness.greatest_n_mm / loop.largest_stiffness()
+    if used > MOST_OF_LIMIT:
+        problems.append(
+            f"The force loop's gains are {used:.2f} of those that no longer settle at the greatest stiffness; at most "
+            f"{MOST_OF_LIMIT:g} is permitted. Divide both gains by {used / MOST_OF_LIMIT:.2f} or more."
+        )
+    share = ("share of the largest stable gains", f"{used:.2f}, at most {MOST_OF_LIMIT:g}")
     delta = settings.manipulator
     if isinstance(delta, LinearDelta):
         refusing(partial(_check_places, delta, settings))
@@ -107,7 +113,6 @@ def _check_places(delta: LinearDelta, settings: RigSettings) -> None:
 
 
 def _axis_problems(settings: RigSettings, name: str, options: Any) -> list[str]:
-    """Return what would make an axis unsafe."""
     limits, force_n, problems = settings.limits, options.largest_force_n, []
     mandatory = [*_MANDATORY, *(("brake", "counterweight") if options.orientation == "vertical" else ())]
     missing = [option for option in mandatory if getattr(options, option) is None]

@@ -91,19 +91,17 @@ class Session:
         return [drivers[name] for name in names]
 
     def _guard(self) -> Guard:
-        """Return the guard of all axes and the force sensor."""
         names = axes_of(self.settings)
         if self.emulated is not None:
             *axes, force = self.opened(next(iter(self._file.sensors)), *names, FORCE)
             return LocalGuard(dict(zip(names, axes, strict=True)), force, self.clock, self.emulated.advance)
         entries: dict[str, Any] = {**self._file.devices, FORCE: self._file.force}
-        devices = {
-            name: DeviceSettings(self._registry.devices[entry.device].driver, entry.link, entry.options)
-            for name, entry in entries.items()
-            if name in (*names, FORCE)
-        }
+        *axes, force = (
+            DeviceSettings(self._registry.devices[entry.device].driver, entry.link, entry.options)
+            for entry in (entries[name] for name in (*names, FORCE))
+        )
         log = str(Path(self.settings.guard_log).expanduser().resolve())
-        return GuardProcess(ProcessSettings({name: devices[name] for name in names}, devices[FORCE], log))
+        return GuardProcess(ProcessSettings(dict(zip(names, axes, strict=True)), force, log))
 
     # A scene's beginning ----------------------------------------------------------------------------------------------
 
@@ -151,15 +149,11 @@ class Session:
             guard.disarm()
             return None
         places = way(delta, _place_m(delta, report.positions), xy_m, heights.clearance_m, heights.stand_off_m)
-        beats = 0
         for point in way_points(delta, places):
             targets = dict(zip(JOINTS, point, strict=True))
             while targets or report.moving:
-                beats += 1
                 now_ns, kind = self.clock(), CommandKind.TRAVEL if targets else CommandKind.NONE
-                report = guard.beat(
-                    Beat(beats, now_ns, "travel", kind, force_sequence=report.force_sequence, targets=targets)
-                )
+                report = guard.beat(Beat(now_ns, "travel", kind, force_sequence=report.force_sequence, targets=targets))
                 if report.state is not GuardState.ARMED or (report.reason and not report.early):
                     said = report.trigger or report.reason
                     raise RigError(f"The manipulator was stopped on its way: {said}.", hint="See what is in its way.")

@@ -9,10 +9,19 @@ from __future__ import annotations
 import math
 from typing import Annotated, Any, Literal, Self
 
-from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, model_validator
+from pydantic import Field, model_validator
 
 from tactbench.plugin import UsageError, load_object
-from tactbench.plugin.devices import ForceLaw, LoopModel, NamedDevice, Positioner, PressPlan, RigFile, read_options
+from tactbench.plugin.devices import (
+    ForceLaw,
+    LoopModel,
+    NamedDevice,
+    Options,
+    Positioner,
+    PressPlan,
+    RigFile,
+    read_options,
+)
 from tactbench.rigs.parallel_manipulator.kinematics import LinearDelta
 
 MOTOR = "motor"
@@ -26,13 +35,9 @@ LEAST_HEARTBEAT_S = 0.02
 WINDUP_S = 0.2
 """Times the loop's speed is how far its target may be ahead of the measured position (assumed)."""
 
-Positive = Annotated[FiniteFloat, Field(gt=0)]
-NotNegative = Annotated[FiniteFloat, Field(ge=0)]
-Range = tuple[FiniteFloat, FiniteFloat]
-
-
-class _Part(BaseModel):
-    model_config = ConfigDict(frozen=True, extra="forbid")
+Positive = Annotated[float, Field(gt=0)]
+NotNegative = Annotated[float, Field(ge=0)]
+Range = tuple[float, float]
 
 
 def _rising(*numbers: float, said: str) -> None:
@@ -41,7 +46,7 @@ def _rising(*numbers: float, said: str) -> None:
         raise ValueError(f"{said} do not rise in this order: {', '.join(f'{number:g}' for number in numbers)}")
 
 
-class SafetyLimits(_Part):
+class SafetyLimits(Options):
     """What is never exceeded."""
 
     force_ceiling_n: Positive
@@ -57,10 +62,10 @@ class SafetyLimits(_Part):
     """How old a sample of the force may be: three sampling periods of the force sensor, and by how much sender and
     host are late (assumed: of 250 Hz or more, and an ordinary kernel)."""
     travel_mm: Range
-    """Least and greatest position of the motor; 0 lies between them, where the drive keeps them."""
+    """Least and greatest position of the motor; between them lies the 0 of a Faulhaber drive."""
     heartbeat_ms: Positive
     """The motor retreats if nobody has told it for so long to go on."""
-    retreat_mm: FiniteFloat
+    retreat_mm: float
     """Position of the motor away from the skin: where it waits, and where it goes whatever is wrong."""
     retreat_speed_mm_s: Positive
 
@@ -68,14 +73,12 @@ class SafetyLimits(_Part):
     def _in_order(self) -> Self:
         low, high = self.travel_mm
         _rising(low, self.retreat_mm, high, said="the motor's travel and its place of retreat")
-        if not low < 0 < high:
-            raise ValueError("the motor's travel goes from below 0 to above 0")
         ceilings = (self.travel_ceiling_n, self.force_ceiling_n, self.rated_force_n)
         _rising(*ceilings, said="ceiling of travel, ceiling of pressing and rated force")
         return self
 
 
-class Stiffness(_Part):
+class Stiffness(Options):
     """How stiff skin, cap and machine in series are, N/mm; declared, since nobody can compute it beforehand."""
 
     at_touch_n_mm: Positive
@@ -93,7 +96,7 @@ class Stiffness(_Part):
         return self
 
 
-class ForceControl(_Part):
+class ForceControl(Options):
     """The force loop."""
 
     rate_hz: Positive
@@ -134,7 +137,7 @@ class ForceControl(_Part):
         return LoopModel.around(self.law(travel_mm), lag_s=1e-3 * self.motor_lag_ms, delay_s=1e-3 * self.delay_ms)
 
 
-class Touch(_Part):
+class Touch(Options):
     """How the surface is found; see :class:`PressPlan`."""
 
     speed_mm_s: Positive
@@ -159,7 +162,7 @@ class Touch(_Part):
     """How far the motor goes back from that place for the unloaded hold."""
 
 
-class PressRules(_Part):
+class PressRules(Options):
     """What ends a press before its time, and how it ends; see :class:`PressPlan`."""
 
     error_band_n: Positive
@@ -174,13 +177,13 @@ class PressRules(_Part):
     """The sensor's rows may be this old, as received; older: retreat."""
 
 
-class Heights(_Part):
+class Heights(Options):
     """Where the sensor's surface is expected below the indenter.
 
     Heights are those of the manipulator's point at which the tip of the retracted indenter would have that height.
     """
 
-    surface_mm: FiniteFloat
+    surface_mm: float
     """Height of the manipulator at which the retracted indenter would touch; 0 where it is fixed."""
     tolerance_mm: NotNegative
     """How far the surface may be from there: three times its spread, and what caps differ in length."""
@@ -207,13 +210,13 @@ class Heights(_Part):
         return 1e-3 * (self.surface_mm + self.clearance_mm)
 
 
-class Places(_Part):
+class Places(Options):
     """Where the manipulator goes for a scene: the sensor's nominal contact point and the scene's offset from it."""
 
-    x_mm: FiniteFloat = 0.0
+    x_mm: float = 0.0
     """Manipulator's x with the indenter above the nominal contact point."""
-    y_mm: FiniteFloat = 0.0
-    turned_deg: FiniteFloat = 0.0
+    y_mm: float = 0.0
+    turned_deg: float = 0.0
     """Direction of the sensor's x in the manipulator's plane; its s is 90 deg further."""
     reach_x_mm: Range = (0.0, 0.0)
     """Offsets that scenes may ask for along the sensor; all of the rectangle is tested beforehand."""
@@ -233,7 +236,7 @@ class Places(_Part):
         return [self.place_m(*at) for at in ((x0, s0), (x1, s0), (x1, s1), (x0, s1))]
 
 
-class RigSettings(_Part):
+class RigSettings(Options):
     """All that this rig is told beside its devices."""
 
     limits: SafetyLimits

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from tactbench.plugin import RigError
-from tactbench.rigs.parallel_manipulator.kinematics import ROUNDING, LinearDelta, inverse, measures, solve_inverse
+from tactbench.rigs.parallel_manipulator.kinematics import MODE, ROUNDING, LinearDelta, inverse, measures, solve_inverse
 
 if TYPE_CHECKING:
     from tactbench.plugin import FloatArray
@@ -49,7 +49,7 @@ def margins(delta: LinearDelta, p_m: FloatArray) -> dict[str, FloatArray]:
     }
     return {
         **{f"{name} of leg {leg + 1}": left[:, leg] for name, left in of_legs.items() for leg in range(3)},
-        "assembly mode": found.det * delta.mode,
+        "assembly mode": MODE * found.det,
         "sigma_U": found.parallel - LEAST,
         "sigma_W": found.constraint - LEAST,
     }

@@ -38,9 +38,14 @@ class Scene:
         return iter(self.blocks)
 
 
+def scene_samples(duration_s, **more):
+    scene = Scene()
+    return SceneSamples((*scene.streams, *scene.reference), scene, duration_s, **more)
+
+
 @pytest.fixture
 def samples():
-    return SceneSamples(Scene(), 1.0, rest_s=0.3)
+    return scene_samples(1.0, rest_s=0.3)
 
 
 @pytest.mark.parametrize(
@@ -61,6 +66,6 @@ def test_outside_the_scene_nothing_is_pressed_and_the_noise_goes_on(samples, t_s
 
 
 def test_without_an_unloaded_stretch_the_first_sample_is_held():
-    samples = SceneSamples(Scene(), 1.0)
+    samples = scene_samples(1.0)
     samples.start(1.0)
     assert {samples(t_s)["a"] for t_s in (0.0, 0.99, 2.0, 2.15, 9.0)} == {0}

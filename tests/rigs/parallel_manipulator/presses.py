@@ -73,10 +73,8 @@ class Rig:
     def ended(self, seconds=3.0):
         """Return the first report that is neither of an armed nor of a retreating guard."""
         until_ns = self.clock() + round(1e9 * seconds)
-        number = 1000
         while self.clock() < until_ns:
-            number += 1
-            report = self.guard.beat(FAULTS.Beat(number, self.clock()))
+            report = self.guard.beat(FAULTS.Beat(self.clock()))
             if report.state not in (FAULTS.GuardState.ARMED, FAULTS.GuardState.RETREATING):
                 return report
             self.guard.advance(self.clock() + 10_000_000)

@@ -18,10 +18,10 @@ from tactbench.plugin.devices import (
     GuardProcess,
     GuardState,
     LinkError,
+    PositionerError,
     ProcessSettings,
 )
 from tactbench.rigs.parallel_manipulator.motor.driver import FaulhaberDriver, retreat_command
-from tactbench.rigs.parallel_manipulator.motor.exchange import MotorError
 from tests.rigs.parallel_manipulator.presses import FAULTS, PATIENT, load, rig
 
 KILLS = load("guard_kills")
@@ -71,7 +71,7 @@ def test_a_guard_that_is_lost_says_so_ever_after(tmp_path):
         made.guard.arm(made.setting.limits)
         made.guard._process.send_signal(signal.SIGINT)
         made.guard._process.send_signal(signal.SIGHUP)
-        assert made.guard.beat(Beat(1, made.clock())).accepted
+        assert made.guard.beat(Beat(made.clock())).accepted
         made.guard._process.kill()
         for _ in range(2):
             with pytest.raises(GuardLostError, match="has retreated"):
@@ -231,6 +231,6 @@ def test_a_motor_that_is_let_stand_blind(half):
 def test_a_blind_retreat_that_ends_elsewhere_says_where():
     world = FAULTS.Pressed(FAULTS.Setting())
     # Never switched on: it answers, and stays.
-    with nobody_at(world) as motor, pytest.raises(MotorError, match=r"is at 0 m 0.5 s later"):
+    with nobody_at(world) as motor, pytest.raises(PositionerError, match=r"is at 0 m 0.5 s later"):
         motor.rescue(0.5)
     assert retreat_command(motor.options) == b"SP50\rLA-5000\rM\r"

@@ -115,20 +115,18 @@ def test_the_drive_survives_any_bytes(pieces):
 some = st.floats(5e-3, 1.0)
 
 
-@given(st.floats(-0.02, 0.02), st.floats(-0.5, 0.5), some, st.floats(0.05, 50.0), st.floats(0.05, 50.0))
+@given(st.floats(-0.02, 0.02), st.floats(-0.5, 0.5), some, st.floats(0.05, 50.0))
 @settings(max_examples=100)
-def test_a_motion_keeps_its_limits_and_ends_on_its_target(target, before, speed, acceleration, braking):
+def test_a_motion_keeps_its_limits_and_ends_on_its_target(target, before, speed, rate):
     motion = Motion(0.0, 0.0, before)
-    motion.to_position(target, speed, acceleration, braking)
+    motion.to_position(target, speed, rate)
     assert motion.at(motion.end_s) == motion.at(motion.end_s + 1.0) == (target, 0.0)
     t_s = np.linspace(0.0, motion.end_s, 2000)
     place, v = np.array([motion.at(at) for at in t_s]).T
     # Place is the integral of speed, to what a trapezoid of one step hides of a corner.
-    step_s, largest = t_s[1], max(acceleration, braking)
-    assert np.abs(np.diff(place) - 0.5 * step_s * (v[1:] + v[:-1])).max() <= largest * step_s**2 + 1e-12
-    faster, slower = np.diff(np.abs(v)).max(initial=0.0), np.diff(np.abs(v)).min(initial=0.0)
-    assert faster <= acceleration * step_s + 1e-9
-    assert slower >= -braking * step_s - 1e-9
+    step_s = t_s[1]
+    assert np.abs(np.diff(place) - 0.5 * step_s * (v[1:] + v[:-1])).max() <= rate * step_s**2 + 1e-12
+    assert np.abs(np.diff(v)).max(initial=0.0) <= rate * step_s + 1e-9
     assert np.abs(v).max() <= max(speed, abs(before)) + 1e-12
     # From rest it goes straight there.
     if before == 0.0:

@@ -10,10 +10,9 @@ import pytest
 from tactbench.devices.guard_messages import Trigger
 from tactbench.devices.press import PressState
 from tactbench.plugin import NotApplicable, assumed, load_registry
-from tactbench.plugin.devices import GuardState, RigFile, largest_force_n
+from tactbench.plugin.devices import GuardState, PositionerSilentError, RigFile, largest_force_n
 from tactbench.plugin.simulation import Slide
 from tactbench.rigs.parallel_manipulator.motor.emulator import MotorEmulator
-from tactbench.rigs.parallel_manipulator.motor.exchange import MotorSilentError
 from tactbench.rigs.parallel_manipulator.rig import ParallelManipulator
 from tactbench.rigs.parallel_manipulator.settings import JOINTS, settings_of
 from tactbench.sensors.icub.emulator import Bus
@@ -207,5 +206,5 @@ def test_of_four_drives_of_one_kind_the_error_says_which_joint_is_silent(monkeyp
     monkeypatch.setattr(MotorEmulator, "feed", fed)
     monkeypatch.setattr(MotorEmulator, "poll", lambda self, now_s: [] if self in silent else poll(self, now_s))
     rig = ParallelManipulator(RigFile.model_validate(with_joints(**RARER)), None, SpringRig(5.0))
-    with pytest.raises(MotorSilentError, match="joint-2: The motor's drive did not answer AC"):
+    with pytest.raises(PositionerSilentError, match="joint-2: The motor's drive did not answer AC"):
         pressed(rig, ramp(1.0, 0.3, 1.0))

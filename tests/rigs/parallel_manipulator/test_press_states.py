@@ -27,7 +27,6 @@ class Plant:
         self.state, self.trigger, self.touched, self.accepted = GuardState.ARMED, None, False, True
         self.force_gain, self.force_offset_n = 1.0, 0.0
         self.seen, self.largest_n, self.steps = [], 0.0, []
-        self.press.go()
 
     @property
     def force_n(self):
@@ -36,8 +35,9 @@ class Plant:
     def report(self):
         moving = self.position_m != self.target_m
         return Report(
-            1, round(1e9 * self.now_s), self.state, self.accepted, moving=moving, position_m=self.position_m,
-            target_m=self.target_m, force_n=self.force_n, touched=self.touched, trigger=self.trigger,
+            round(1e9 * self.now_s), self.state, "" if self.accepted else "refused", moving=moving,
+            position_m=self.position_m, target_m=self.target_m, force_n=self.force_n, touched=self.touched,
+            trigger=self.trigger,
         )  # fmt: skip
 
     def go(self):

@@ -148,11 +148,11 @@ def test_no_rail_moves_unless_the_motor_is_retracted(session):
     _, _, limits = session.measured_limits()
     guard, report = session.guard, session.guard.arm(limits)
     guard.advance(session.clock() + 20_000_000)
-    report = guard.beat(Beat(1, session.clock()))
-    move = Beat(2, session.clock(), "", CommandKind.MOVE_TO, position_m=-2e-3, speed_m_s=5e-3,
+    report = guard.beat(Beat(session.clock()))
+    move = Beat(session.clock(), "", CommandKind.MOVE_TO, position_m=-2e-3, speed_m_s=5e-3,
                 force_sequence=report.force_sequence)  # fmt: skip
     assert guard.beat(move).accepted
-    travel = Beat(3, session.clock(), "", CommandKind.TRAVEL, targets={"joint-1": 0.07})
+    travel = Beat(session.clock(), "", CommandKind.TRAVEL, targets={"joint-1": 0.07})
     refused = guard.beat(travel)
     assert not refused.accepted
     assert re.search("motor is not retracted", refused.reason)

@@ -5,9 +5,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tactbench.rigs.parallel_manipulator.kinematics import forward
+from tactbench.rigs.parallel_manipulator.kinematics import LinearDelta, forward
 from tactbench.rigs.parallel_manipulator.workspace import PlaceRefusedError, check_move, margins, way, way_points
-from tests.rigs.parallel_manipulator.test_kinematics import LV
+from tests.rigs.parallel_manipulator.test_kinematics import LI, LV
 
 HOME = np.array([0.0, 0.0, -0.15])
 some = st.floats(-0.15, 0.15)
@@ -51,9 +51,10 @@ def test_a_singularity_on_the_way_is_refused():
 
 
 def test_the_other_way_of_assembly_is_refused():
-    flipped = LV.model_copy(update={"mode": 1})
+    wide = LinearDelta.model_validate(LI.model_dump() | {"sideways_deg": 89.0, "joint_highest_mm": 500.0})
+    above = np.array([-0.018, 0.013, 0.223])
     with pytest.raises(PlaceRefusedError, match="assembly mode"):
-        check_move(flipped, HOME, HOME)
+        check_move(wide, above, above)
 
 
 def test_out_of_a_joints_forbidden_range_is_refused_where_the_next_place_is_forbidden():

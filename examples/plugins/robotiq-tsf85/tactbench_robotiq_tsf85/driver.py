@@ -7,7 +7,7 @@ carry the command that was asked; fields before the static one may come in any o
 import struct
 from collections.abc import Iterator, Sequence
 
-from tactbench.plugin.devices import ByteLink, CanFrame, Received, RowDriver, RowEmulator, Sample
+from tactbench.plugin.devices import ByteLink, CanFrame, Options, Received, RowDriver, RowEmulator, Sample
 
 from tactbench_robotiq_tsf85 import STREAM
 
@@ -30,10 +30,16 @@ def static_taxels(data: bytes, finger: int) -> tuple[int, ...] | None:
     return None  # an unknown field ends a packet
 
 
+class TSF85Options(Options):
+    """Which finger."""
+
+    finger: int = 0
+
+
 class TSF85Driver(RowDriver[ByteLink]):
     """Asks for the next sample when the last has come."""
 
-    stream, link_kind, defaults = STREAM, ByteLink, {"finger": 0}
+    stream, link_kind, options_kind = STREAM, ByteLink, TSF85Options
     _asked_ns: int | None = None
     _left = b""
 
@@ -52,7 +58,7 @@ class TSF85Driver(RowDriver[ByteLink]):
         self._left = data = data[data.find(MARK) :] if MARK in data else b""
         if len(data) >= HEAD and len(data) >= HEAD + data[3]:
             self._left, self._asked_ns = b"", None
-            taxels = static_taxels(data[HEAD:][: data[3]], self.options["finger"])
+            taxels = static_taxels(data[HEAD:][: data[3]], self.options.finger)
             if taxels is not None:
                 yield Sample(taxels)
 

@@ -5,7 +5,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 from tactbench.plugin import Quality
-from tactbench.plugin.devices import CanFrame, CanLink, RowDriver, RowEmulator, Sample
+from tactbench.plugin.devices import CanFrame, CanLink, Options, RowDriver, RowEmulator, Sample
 
 from tactbench_xela_uskin import STREAM, TAXELS
 
@@ -25,15 +25,21 @@ def decode(frame: CanFrame) -> tuple[int, tuple[int, ...]] | None:
     return taxel, struct.unpack(">xHHHx", frame.data)
 
 
+class USkinOptions(Options):
+    """Which board."""
+
+    board: int = 1
+
+
 class USkinDriver(RowDriver[CanLink]):
     """One board. Taxels that were not heard since the last row are marked as missing. How it is stopped, no source says."""
 
-    stream, link_kind, defaults = STREAM, CanLink, {"board": 1}
+    stream, link_kind, options_kind = STREAM, CanLink, USkinOptions
 
     def begin(self) -> None:
         """Let it send."""
         self._heard: dict[int, tuple[int, ...]] = {}
-        self.link.send(CanFrame(START + self.options["board"], b"\x07\x00"))
+        self.link.send(CanFrame(START + self.options.board, b"\x07\x00"))
 
     def rows(self, received: CanFrame) -> Iterator[Sample]:
         """Return a row with the last taxel's frame."""

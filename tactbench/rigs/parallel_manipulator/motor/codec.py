@@ -61,21 +61,17 @@ class CommandReader:
     """Bytes of a host into commands, as the drive reads them: spaces and case do not count."""
 
     def __init__(self) -> None:
-        self._line = bytearray()
+        self._line = b""
 
     def feed(self, data: bytes) -> list[Command]:
         """Return the commands that `data` completes; one that cannot be read has an empty name."""
         found = []
-        for byte in data:
-            if byte != 0x0D:
-                # One byte more than allowed is kept, so that the line cannot be read as a shorter one.
-                if len(self._line) <= LONGEST_LINE:
-                    self._line.append(byte)
-                continue
-            text = self._line.decode("latin-1").replace(" ", "").upper()
-            match = _COMMAND.fullmatch(text) if len(self._line) <= LONGEST_LINE else None
-            self._line.clear()
-            name, argument = ("", None) if match is None else match.groups()
+        *lines, rest = (self._line + data).split(b"\r")
+        # One byte more than allowed is kept, so that the line cannot be read as a shorter one.
+        self._line = rest[: LONGEST_LINE + 1]
+        for line in lines:
+            match = _COMMAND.fullmatch(line.decode("latin-1").replace(" ", "").upper())
+            name, argument = ("", None) if match is None or len(line) > LONGEST_LINE else match.groups()
             found.append(Command(name, int(argument) if argument else None))
         return found
 
@@ -115,25 +111,24 @@ class Line(NamedTuple):
         return self.kind is Kind.VALUE or (self.kind is Kind.TEXT and name.upper() in TEXTS)
 
 
-_VALUE = re.compile(rb"[+-]?[0-9]{1,19}")
-_PRINTED = re.compile(rb"[\x20-\x7e]+")
+_VALUE = re.compile(r"[+-]?[0-9]{1,19}")
+_PRINTED = re.compile(r"[\x20-\x7e]+")
 
 
-def read_line(raw: bytes, t_ns: int = 0) -> Line:
-    """Return what one line is; `raw` is without its CR LF. Raises nothing."""
-    text = raw.decode("latin-1")
-    if raw.startswith(b"Overtemperature"):
+def _read_line(raw: bytes, t_ns: int) -> Line:
+    text, whole = raw.decode("latin-1").removesuffix("\r"), raw.endswith(b"\r") and len(raw) <= LONGEST_LINE + 1
+    if whole and raw.startswith(b"Overtemperature"):
         # The character between the words differs among sources; the meaning does not.
         return Line(Kind.REFUSAL, OVERTEMPERATURE, t_ns)
-    if _PRINTED.fullmatch(raw) is None:
+    if not whole or _PRINTED.fullmatch(text) is None:
         kind = Kind.GARBLED
     elif text == OK:
         kind = Kind.OK
     elif text in REFUSALS:
         kind = Kind.REFUSAL
-    elif _VALUE.fullmatch(raw):
+    elif _VALUE.fullmatch(text):
         kind = Kind.VALUE
-    elif len(raw) == 1:
+    elif len(text) == 1:
         kind = Kind.NOTICE if text in NOTICES else Kind.GARBLED
     else:
         kind = Kind.TEXT
@@ -144,29 +139,24 @@ class LineReader:
     """Bytes from the drive into lines; cut anywhere, and in step again after the next LF."""
 
     def __init__(self) -> None:
-        self._line = bytearray()
+        self._line = b""
         self._began_ns = 0
 
     def feed(self, data: bytes, t_ns: int = 0) -> list[Line]:
         """Return the lines that `data`, in the host at `t_ns`, completes, notices among them; raises nothing."""
-        found = []
-        for byte in data:
-            if not self._line:
-                self._began_ns = t_ns
-            # One byte more than allowed is kept, so that an overlong line is known as such.
-            if byte != 0x0A and len(self._line) <= LONGEST_LINE + 1:
-                self._line.append(byte)
-            if byte == 0x0A:
-                raw = bytes(self._line)
-                self._line.clear()
-                whole = raw.endswith(b"\r") and len(raw) <= LONGEST_LINE + 1
-                garbled = Line(Kind.GARBLED, raw.decode("latin-1"), self._began_ns)
-                found.append(read_line(raw[:-1], self._began_ns) if whole else garbled)
+        if not self._line:
+            self._began_ns = t_ns
+        *ended, rest = (self._line + data).split(b"\n")
+        found = [_read_line(raw, t_ns if number else self._began_ns) for number, raw in enumerate(ended)]
+        if ended:
+            self._began_ns = t_ns
+        # One byte more than allowed is kept, so that an overlong line is known as such.
+        self._line = rest[: LONGEST_LINE + 2]
         return found
 
     def clear(self) -> None:
         """Forget an unfinished line: after a time-out, or a change of answer mode."""
-        self._line.clear()
+        self._line = b""
 
 
 class OperationStatus(IntFlag):
@@ -176,7 +166,6 @@ class OperationStatus(IntFlag):
     DEVIATION_ERROR = 1 << 5
     OVERVOLTAGE = 1 << 6
     OVERTEMPERATURE = 1 << 7
-    INPUT_1 = 1 << 8
     POSITION_ATTAINED = 1 << 16
 
 

@@ -2,7 +2,7 @@
 
 What the drive does where no public document says so is assumed, and marked so beside the code. The commands are those
 that a driver sends. Quasi-static (assumed): the motor is where the reference is, as far as the load permits at the
-current limit. Lag, mass, friction and heat are left out; without power it stands.
+current limit, and accelerates as it brakes, by DEC. Lag, mass, friction and heat are left out; without power it stands.
 """
 
 from __future__ import annotations
@@ -75,35 +75,27 @@ class Motion:
         self._pieces.append((began_s, place, speed, acceleration))
         self._pieces.append((began_s + seconds, *self.at(began_s + seconds), 0.0))
 
-    def _change(self, speed: float, rate: float) -> None:
+    def to_speed(self, speed: float, rate: float) -> None:
+        """Go over to a speed at the end, at an acceleration that is positive."""
         change = speed - self._pieces[-1][2]
         self._go_on(abs(change) / rate, math.copysign(rate, change))
 
-    def to_speed(self, speed: float, acceleration: float, braking: float) -> None:
-        """Go over to a speed at the end; backwards goes through rest."""
-        now = self._pieces[-1][2]
-        if now * speed < 0.0:
-            self._change(0.0, braking)
-            now = 0.0
-        self._change(speed, acceleration if abs(speed) > abs(now) else braking)
-
-    def to_position(self, target_m: float, speed: float, acceleration: float, braking: float) -> None:
-        """End at rest on a target; speed, acceleration and braking are positive."""
+    def to_position(self, target_m: float, speed: float, rate: float) -> None:
+        """End at rest on a target; speed and acceleration are positive."""
         _, place, now, _ = self._pieces[-1]
-        if now * (target_m - place) <= 0.0 or now**2 > 2 * braking * abs(target_m - place):
-            self._change(0.0, braking)  # away from it, or past it
+        if now * (target_m - place) <= 0.0 or now**2 > 2 * rate * abs(target_m - place):
+            self.to_speed(0.0, rate)  # away from it, or past it
         elif abs(now) > speed:
-            self._change(math.copysign(speed, now), braking)
+            self.to_speed(math.copysign(speed, now), rate)
         _, place, now, _ = self._pieces[-1]
-        away = abs(target_m - place)
         # The speed at which acceleration over the first part of the way meets braking over the rest (derived).
-        peak = math.sqrt((2 * acceleration * away + now**2) * braking / (acceleration + braking))
+        peak = math.sqrt(rate * abs(target_m - place) + 0.5 * now**2)
         peak = max(min(peak, speed), abs(now))
-        self._change(math.copysign(peak, target_m - place), acceleration)
-        left = abs(target_m - self._pieces[-1][1]) - peak**2 / (2 * braking)
+        self.to_speed(math.copysign(peak, target_m - place), rate)
+        left = abs(target_m - self._pieces[-1][1]) - peak**2 / (2 * rate)
         if peak > 0.0:
             self._go_on(max(0.0, left / peak), 0.0)
-        self._change(0.0, braking)
+        self.to_speed(0.0, rate)
         self._pieces[-1] = (self.end_s, target_m, 0.0, 0.0)
 
 
@@ -149,7 +141,6 @@ class Drive:
         self._loaded_m: float | None = None
 
     def _stand(self) -> None:
-        """Hold the motor where it is."""
         self._motion = Motion(self.now_s, self.position_m)
 
     @property
@@ -233,7 +224,7 @@ class Drive:
                 self._need_power()
                 units, most = self._number(argument, LARGEST_SPEED), self.settings["SP"]
                 self._at_speed = True
-                self._begin().to_speed(min(max(units, -most), most) * self._options.speed_unit_m_s, *self._rates)
+                self._begin().to_speed(min(max(units, -most), most) * self._options.speed_unit_m_s, self._rate)
             case "HO":
                 called = 0 if argument is None else self._number(argument, LARGEST_POSITION)
                 self._origin_m = self.position_m - self._options.position_m(called)
@@ -250,9 +241,8 @@ class Drive:
         return OK
 
     @property
-    def _rates(self) -> tuple[float, float]:
-        unit = self._options.acceleration_unit_m_s2
-        return unit * self.settings["AC"], unit * self.settings["DEC"]
+    def _rate(self) -> float:
+        return self._options.acceleration_unit_m_s2 * self.settings["DEC"]
 
     def _begin(self) -> Motion:
         """Return a new motion, from where the reference is and as fast as it is now."""
@@ -269,7 +259,7 @@ class Drive:
                 self.target_m = min(max(self.target_m, lower), upper)
         # Assumed: without a target loaded since, the last one counts, also after motion at a speed.
         self._at_speed = False
-        self._begin().to_position(self.target_m, self._options.speed_unit_m_s * self.settings["SP"], *self._rates)
+        self._begin().to_position(self.target_m, self._options.speed_unit_m_s * self.settings["SP"], self._rate)
 
     def _need_power(self) -> None:
         if not self.enabled:
@@ -282,7 +272,6 @@ class Drive:
         return argument
 
     def _queried(self, name: str) -> str | None:
-        """Return the answer to a query; None: it is none."""
         if name in _ABOUT:
             return _ABOUT[name]
         of, (place_m, force_n, limited) = self._options, self._pressed()

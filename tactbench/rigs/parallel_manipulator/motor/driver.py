@@ -7,7 +7,14 @@ from collections.abc import Callable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, replace
 
-from tactbench.plugin.devices import DriverSettings, NotReadyError, Positioner, PositionerFacts, PositionerState
+from tactbench.plugin.devices import (
+    DriverSettings,
+    NotReadyError,
+    Positioner,
+    PositionerError,
+    PositionerFacts,
+    PositionerState,
+)
 from tactbench.rigs.parallel_manipulator.motor.codec import (
     ACKNOWLEDGED,
     Configuration,
@@ -15,7 +22,7 @@ from tactbench.rigs.parallel_manipulator.motor.codec import (
     encode,
     line_time_s,
 )
-from tactbench.rigs.parallel_manipulator.motor.exchange import Answer, Exchange, MotorError, MotorRefusalError
+from tactbench.rigs.parallel_manipulator.motor.exchange import Answer, Exchange, MotorRefusalError
 from tactbench.rigs.parallel_manipulator.motor.profile import FaulhaberOptions
 
 CORRIDOR_M = 0.2e-3
@@ -127,7 +134,7 @@ class FaulhaberDriver(Positioner):
         self._exchange.send("ANSW", 2)
         self._exchange.quiet()
         if not self._configuration() & Configuration.ACKNOWLEDGES:
-            raise MotorError("The motor's drive does not acknowledge commands after ANSW2.")
+            raise PositionerError("The motor's drive does not acknowledge commands after ANSW2.")
         self._ask("SOR", 0)
         for setting in self._settings:
             self._keep(*setting)
@@ -149,11 +156,11 @@ class FaulhaberDriver(Positioner):
         self._ask("EN")
         self.enabled = bool(self._configuration() & Configuration.POWER_STAGE)
         if not self.enabled:
-            raise MotorError("The motor's drive was enabled and has no power.", hint="Check its supply.")
+            raise PositionerError("The motor's drive was enabled and has no power.", hint="Check its supply.")
         place_m, target_m = self.locate()
         if abs(place_m - target_m) > CORRIDOR_M:
             self.disable()
-            raise MotorError(
+            raise PositionerError(
                 f"The motor was to hold its place at {place_m:g} m, and its target is {target_m:g} m; it is without "
                 "power again.",
                 hint="Home it anew.",
@@ -202,7 +209,7 @@ class FaulhaberDriver(Positioner):
         self._ask("HO", home)
         place_m, _ = self.locate()
         if abs(place_m - options.home_m) > CORRIDOR_M:
-            raise MotorError(f"The motor's place was to be called {options.home_m:g} m, and is {place_m:g} m.")
+            raise PositionerError(f"The motor's place was to be called {options.home_m:g} m, and is {place_m:g} m.")
         for setting in self._limits:
             self._keep(*setting)
         if self._limits:
@@ -217,7 +224,7 @@ class FaulhaberDriver(Positioner):
                 self.update(self._exchange.answer_s)
 
     def confirm(self) -> None:
-        """Read back every setting and the ends of travel that the options state; raises MotorError if one differs."""
+        """Read back every setting and end of travel that the options state; raises PositionerError if one differs."""
         for setting in (*self._settings, *self._limits):
             if setting[0] == "SP":  # the speed of the last retreat may stand there
                 self._keep(*setting)
@@ -229,7 +236,7 @@ class FaulhaberDriver(Positioner):
 
     def _holds_limits(self) -> None:
         if not self._configuration() & Configuration.POSITION_LIMITS:
-            raise MotorError("The motor's drive does not hold the ends of travel.", hint="Home it anew.")
+            raise PositionerError("The motor's drive does not hold the ends of travel.", hint="Home it anew.")
 
     def _against_stop(self, stop: Callable[[], bool]) -> None:
         """Run at a speed and with little current until the motor stands at its current limit, twice in a row."""
@@ -243,13 +250,13 @@ class FaulhaberDriver(Positioner):
             while times < 2:
                 status = OperationStatus(self._ask("OST").value)
                 if status & _FAULTS:
-                    raise MotorError("The motor's drive reports a fault while it looks for its place.")
+                    raise PositionerError("The motor's drive reports a fault while it looks for its place.")
                 limited = bool(status & OperationStatus.CURRENT_LIMITATION) and self._ask("GN").value == 0
                 times = times + 1 if limited else 0
                 if stop():
-                    raise MotorError("The motor was told to stand while it looked for an end stop.")
+                    raise PositionerError("The motor was told to stand while it looked for an end stop.")
                 if self.clock() > until_ns:
-                    raise MotorError(
+                    raise PositionerError(
                         f"The motor has not found an end stop within {HOMING_S:g} s.",
                         hint="Check homing_speed_m_s and homing_current_a in the rig file.",
                     )
@@ -271,14 +278,6 @@ class FaulhaberDriver(Positioner):
         units = self._usual if speed is None else self._options.speed(speed)
         return self._go(self._options.increments(position), units)
 
-    def move_by(self, distance: float) -> float:
-        """Begin to move from the last target by a distance, to the nearest increment; return the new target."""
-        if self._target is None:
-            raise NotReadyError("The motor's target is not known.", hint="Use locate() once it is at rest.")
-        target = self._target + self._options.increments(distance)
-        self.check_move(self._options.position_m(target))
-        return self._go(target, self._usual)
-
     def halt(self) -> None:
         """Begin to move to the position that was last read, whatever is under way: it brakes and holds there."""
         if self.state is None or not self.homed:
@@ -288,8 +287,8 @@ class FaulhaberDriver(Positioner):
     def retreat(self) -> None:
         """Begin to move to the place away from the sensor, whatever is under way; without one it halts.
 
-        Where it is not answered, `update` raises MotorSilentError: call this again, it is the same wherever the motor
-        is.
+        Where it is not answered, `update` raises PositionerSilentError: call this again, it is the same wherever the
+        motor is.
         """
         if math.isnan(self.facts.retreat):
             self.halt()
@@ -315,8 +314,8 @@ class FaulhaberDriver(Positioner):
         return target_m
 
     def _forget(self) -> None:
-        """Take what is under way for unknown."""
         self._move, self._target, self._confirming = None, None, False
+        self.state = self.state and replace(self.state, target=math.nan)
 
     def rescue(self, within_s: float | None) -> float:
         """Retreat, or stand, with a drive that another process had; see `Positioner`.
@@ -335,7 +334,7 @@ class FaulhaberDriver(Positioner):
                 self.link.write(b"\r" + retreat_command(self._options))
                 self._exchange.quiet()
                 sent_ns = self.clock()
-            with suppress(MotorError):
+            with suppress(PositionerError):
                 place_m = self._options.position_m(self._ask("POS").value)
                 away_m = abs(place_m - target_m)
                 there = there + 1 if away_m <= self.facts.near else 0
@@ -344,7 +343,7 @@ class FaulhaberDriver(Positioner):
                 if away_m < nearest_m:
                     nearest_m, sent_ns = away_m, self.clock()
         where = "does not say where it is" if math.isnan(place_m) else f"is at {place_m:g} m"
-        raise MotorError(
+        raise PositionerError(
             f"The motor was sent to {target_m:g} m, and {where} {within_s:.1f} s later.",
             hint="Stand clear, cut its supply, and see what is in its way.",
         )
@@ -373,22 +372,22 @@ class FaulhaberDriver(Positioner):
             if value == before:
                 return value
             before = value
-        raise MotorError(f"The motor's drive gives no two equal answers in a row to {query}.", hint="Is it at rest?")
+        raise PositionerError(
+            f"The motor's drive gives no two equal answers in a row to {query}.", hint="Is it at rest?"
+        )
 
     def _configuration(self) -> Configuration:
         return Configuration(self._sure("CST"))
 
     def _keep(self, command: str, argument: int, query: str) -> None:
-        """Set something and read it back."""
         self._ask(command, argument)
         if self._sure(query) != argument:  # a digit may have been damaged on its way
             self._ask(command, argument)
             self._same(command, argument, query)
 
     def _same(self, command: str, argument: int, query: str) -> None:
-        """Raise MotorError unless a setting is what was set."""
         if (found := self._sure(query)) != argument:
-            raise MotorError(
+            raise PositionerError(
                 f"The motor's drive has {query} {found} where {command}{argument} was set.",
                 hint="Was it without power, or set by another program? Check the option against the drive's manual.",
             )
@@ -403,7 +402,7 @@ class FaulhaberDriver(Positioner):
         try:
             for answer in self._exchange.pump(timeout_s):
                 self._take(answer)
-        except MotorError:
+        except PositionerError:
             self._forget()
             self._speed = None
             raise
@@ -442,7 +441,7 @@ class FaulhaberDriver(Positioner):
         self._confirming = False
         if answer.value != self._target:
             expected, found = (self._options.position_m(steps) for steps in (self._target, answer.value))
-            raise MotorError(
+            raise PositionerError(
                 f"The motor's target is {found:g} m, and {expected:g} m was asked for.",
                 hint="A byte was damaged on the line: let it retreat, and check the cable.",
             )
@@ -469,7 +468,7 @@ class FaulhaberDriver(Positioner):
         if status & OperationStatus.POSITION_ATTAINED:
             self._move = None
         elif self.clock() > move.due_ns:
-            raise MotorError(
+            raise PositionerError(
                 f"The motor stands at {self.position:g} m{f' ({problem})' if problem else ''} and has not reached "
                 f"{options.position_m(move.target):g} m within {move.seconds:.2f} s.",
                 hint="Let it retreat, and see what is in its way.",

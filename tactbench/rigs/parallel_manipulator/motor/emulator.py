@@ -64,9 +64,6 @@ class MotorEmulator(DeviceEmulator):
         What is wrong with it; may be changed at any time.
     """
 
-    keeps_pace = True
-    """Bytes take their time here."""
-
     def __init__(
         self,
         load: Load | None,

@@ -40,15 +40,7 @@ _HINTS = {
 }
 
 
-class MotorError(PositionerError):
-    """The motor or its drive does not do what it was asked for."""
-
-
-class MotorSilentError(MotorError, PositionerSilentError):
-    """A command was not answered, or nothing is answered any more."""
-
-
-class MotorRefusalError(MotorError):
+class MotorRefusalError(PositionerError):
     """The drive refuses a command."""
 
 
@@ -68,10 +60,10 @@ class Answer(NamedTuple):
         return int(self.checked().text)
 
     def checked(self) -> Line:
-        """Return the line; raises MotorSilentError if none came, MotorRefusalError if the drive refuses."""
+        """Return the line; raises PositionerSilentError if none came, MotorRefusalError if the drive refuses."""
         text = f"{self.name}{'' if self.argument is None else self.argument}"
         if self.line is None:
-            raise MotorSilentError(
+            raise PositionerSilentError(
                 f"The motor's drive did not answer {text} in time; whether it was carried out is not known.",
                 hint="Check the cable; read the position before the next move.",
             )
@@ -131,7 +123,7 @@ class Exchange:
 
         Raises
         ------
-        MotorSilentError
+        PositionerSilentError
             If three answers in a row did not come.
         LinkUnplugged
             If the link is gone.
@@ -202,7 +194,7 @@ class Exchange:
         return []
 
     def _overdue(self) -> list[Answer]:
-        """Give up what is out, and ask what is known; raises MotorSilentError."""
+        """Give up what is out, and ask what is known; raises PositionerSilentError."""
         lost = list(self._out)
         self._out.clear()
         self._reader.clear()
@@ -210,7 +202,7 @@ class Exchange:
         self._missed += 1
         if self._missed >= IN_A_ROW:
             self._missed, self._marking = 0, False
-            raise MotorSilentError(
+            raise PositionerSilentError(
                 f"The motor's drive on {self._link.address} is silent: {IN_A_ROW} answers in a row did not come within "
                 f"{self.answer_s:.2f} s.",
                 hint="Check its power and cable. The motor, if it moves, ends its last move and holds.",

@@ -8,9 +8,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import Literal, Self
+from typing import Literal
 
-from pydantic import Field, model_validator
+from pydantic import Field
 
 from tactbench.plugin import RigError
 from tactbench.plugin.devices import PositionerOptions
@@ -44,12 +44,6 @@ class FaulhaberOptions(PositionerOptions):
     """Towards the end stop; negative: towards negative positions."""
     homing_current_a: float = Field(default=0.2, gt=0.0)
     """With which it runs against an end stop."""
-
-    @model_validator(mode="after")
-    def _moves(self) -> Self:
-        if self.homing_speed_m_s == 0.0:
-            raise ValueError("a homing speed is not 0")
-        return self
 
     @property
     def largest_force_n(self) -> float | None:

@@ -15,11 +15,8 @@ from tactbench.plugin.devices import (
     DriverSettings,
     LinkError,
     LinkTimeout,
-    LinkUnplugged,
     Received,
     Unwrap,
-    open_for,
-    read_options,
 )
 from tactbench.rigs.parallel_manipulator.force_torque.net_ft.codec import (
     AXES,
@@ -37,10 +34,10 @@ from tactbench.rigs.parallel_manipulator.force_torque.net_ft.codec import (
 
 QUIET_S = 0.05
 """After which a box that was stopped sends no more (assumed: a network of one cable, a busy host)."""
+MOST_SILENCED = 4096
+"""Datagrams after which a box that goes on is left alone: 4 s at 1 kHz."""
 ANSWER_S = 0.5
 """Within which a box answers, over the time its records take (assumed: a network of one cable)."""
-MOST_DATAGRAMS = 4096
-"""In one block: 4 s at 1 kHz."""
 
 
 class NetFtDriver(Driver):
@@ -53,27 +50,24 @@ class NetFtDriver(Driver):
     A saturated sensor marks all six channels SATURATED, any other error of the status word SUSPECT, and both both; a
     threshold set in the box is a warning: it is counted, its values are good. Nothing is asked for again where nothing
     comes: `read` then returns nothing. A box that was without power counts anew, and stays silent until it is started.
-
-    Raises
-    ------
-    UsageError
-        For options that are not known or contradict each other, or a link that carries no datagrams.
-    LinkError
-        If the link does not open.
     """
 
+    device, link_kind, address = "net-ft", DatagramLink, "udp://192.168.1.1:49152"
+    options_kind = NetFtOptions
+    options: NetFtOptions
+    link: DatagramLink
+
     def __init__(self, settings: DriverSettings) -> None:
-        self._options = read_options(NetFtOptions, settings.options, "net-ft")
+        super().__init__(settings)
         self._counts: Counter[str] = Counter()
         self._kept: list[Received] = []
         self._sampling = self._silent = False
         self._numbers, self._ticks = Unwrap(32), Unwrap(32)
-        self._link = open_for(settings, "net-ft", DatagramLink, "udp://192.168.1.1:49152")  # type: ignore[type-abstract]
 
     @property
     def streams(self) -> tuple[StreamSpec, ...]:
         """`force_torque`, at the rate that the options state, as the box rounds it."""
-        return (self._options.stream,)
+        return (self.options.stream,)
 
     @property
     def counts(self) -> Mapping[str, int]:
@@ -91,18 +85,16 @@ class NetFtDriver(Driver):
         LinkTimeout
             If two records in a row do not come.
         RigError
-            If the box sends at another rate than the options state, or is sampling.
+            If the box sends at another rate than the options state.
         """
-        if self._sampling:
-            raise RigError("The box is sampling.", hint="Ask it before it is started, or stop it first.")
         self._silence()
         self._send(Command.START_REALTIME, 2)
         first, second = (decode_records(self._next().data)[0] for _ in range(2))
         every = (int(second["ft_sequence"]) - int(first["ft_sequence"])) % SEQUENCE_MODULUS
-        if every != self._options.every:
+        if every != self.options.every:
             raise RigError(
                 f"The box sends every {every}th of its {SENSOR_RATE_HZ} samples a second, expected was every "
-                f"{self._options.every}th (rate_hz: {self._options.rate_hz:g}).",
+                f"{self.options.every}th (rate_hz: {self.options.rate_hz:g}).",
                 hint=f"Set the RDT rate on its web page, or write rate_hz: {SENSOR_RATE_HZ / max(every, 1):.6g}.",
             )
         return {"rate_hz": f"{SENSOR_RATE_HZ / every:.6g}", "status": f"{int(second['status']):08X}"}
@@ -118,7 +110,7 @@ class NetFtDriver(Driver):
         if not self._silent:  # else the other devices of a rig, which sample already, would wait for nothing
             self._silence()
         self._silent = False
-        self._link.discard()
+        self.link.discard()
         self._numbers, self._ticks = Unwrap(32), Unwrap(32)
         self._send(Command.START_REALTIME)
         self._sampling = True
@@ -133,14 +125,7 @@ class NetFtDriver(Driver):
             If the network says that nobody listens there.
         """
         came, self._kept = self._kept, []
-        try:
-            while len(came) < MOST_DATAGRAMS:
-                came.append(self._link.receive(0.0 if came else timeout_s))
-        except LinkTimeout:
-            pass
-        except LinkUnplugged:
-            if not came:
-                raise
+        came += self.link.receive_all(0.0 if came else timeout_s)
         whole = [piece for piece in came if len(piece.data) == RECORD_BYTES]
         self._counts["rejected"] += len(came) - len(whole)
         return [self._block(whole)] if whole else []
@@ -152,24 +137,19 @@ class NetFtDriver(Driver):
             with suppress(LinkError):
                 self._silence()
 
-    def close(self) -> None:
-        """Stop, and close the link."""
-        self.stop()
-        self._link.close()
-
     def _send(self, command: Command, records: int = 0) -> None:
-        self._link.send(encode_request(Request(command, records)))
+        self.link.send(encode_request(Request(command, records)))
 
     def _silence(self) -> None:
         """Stop the box, and drop what it sent before: records of an earlier start would seem to be of the next one."""
         self._send(Command.STOP)
         with suppress(LinkTimeout):
-            for _ in range(MOST_DATAGRAMS):
-                self._link.receive(QUIET_S + 2 * self._options.every / SENSOR_RATE_HZ)
+            for _ in range(MOST_SILENCED):
+                self.link.receive(QUIET_S + 2 * self.options.every / SENSOR_RATE_HZ)
         self._silent = True
 
     def _next(self) -> Received:
-        return self._link.receive(ANSWER_S + 2 * self._options.every / SENSOR_RATE_HZ)
+        return self.link.receive(ANSWER_S + 2 * self.options.every / SENSOR_RATE_HZ)
 
     def _block(self, came: list[Received]) -> Block:
         records = decode_records(b"".join(piece.data for piece in came))
@@ -177,7 +157,7 @@ class NetFtDriver(Driver):
         return Block(
             stream=STREAM,
             t_ns=np.array([piece.t_ns for piece in came], dtype=np.int64),
-            data=self._options.wrench(records["counts"]),
+            data=self.options.wrench(records["counts"]),
             quality=self._marks(records["status"]) if records["status"].any() else None,
             sequence=numbers,
             # 10^9 / 7000 in whole numbers.

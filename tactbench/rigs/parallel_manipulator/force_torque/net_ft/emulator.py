@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -49,33 +49,26 @@ class DatagramFault(Fault):
 
 LARGEST = (25.0, 25.0, 35.0, 0.25, 0.25, 0.25)
 """Where the sensor saturates [N, N*m]: a Nano17 SI-25-0.25 (sourced: calibration file FT8577)."""
-USUAL_COUNTS = {"counts_per_newton": 1e6, "counts_per_newton_metre": 1e6}
-"""Sourced: pyNetFT."""
 
 
 class RdtEmulator(DeviceEmulator):
-    """A box and its sensor.
+    """A box and its sensor, which reads `settings.senses`: fx, fy, fz [N], tx, ty, tz [N*m]; the rest is 0.
 
-    Parameters
+    Attributes
     ----------
-    wrench
-        Fx, Fy, Fz [N], Tx, Ty, Tz [N*m] at a time [s].
-    options
-        Counts per unit and rate of records; None: 1 kHz and usual ones.
     faults
         What is wrong with it; may be changed at any time.
+
+    Raises
+    ------
+    UsageError
+        For options or faults that are not known.
     """
 
-    def __init__(
-        self,
-        wrench: Callable[[float], Sequence[float]],
-        options: NetFtOptions | None = None,
-        *,
-        faults: Iterable[DatagramFault] = (),
-    ) -> None:
-        self.options = options or NetFtOptions.model_validate(USUAL_COUNTS)
-        self.faults = list(faults)
-        self._wrench = wrench
+    def __init__(self, settings: EmulatorSettings) -> None:
+        self.options = read_options(NetFtOptions, settings.options, "net-ft")
+        self.faults = [DatagramFault.parse(text) for text in settings.faults]
+        self._senses = settings.senses
         self._seen: Counter[Fault] = Counter()
         self._now_s = 0.0
         self._next: int | None = None
@@ -119,7 +112,8 @@ class RdtEmulator(DeviceEmulator):
     def _one(self, sample: int) -> list[Sent]:
         at_s = sample / SENSOR_RATE_HZ
         # Number by number: numpy would take longer for six, and this is done a thousand times a second.
-        wrench = list(zip(self._wrench(at_s), LARGEST, strict=True))
+        sensed = self._senses(at_s)
+        wrench = [(sensed.get(name, 0.0), end) for name, end in zip(AXES, LARGEST, strict=True)]
         saturated = any(abs(value) >= end for value, end in wrench) or any(
             fault.name == "saturated" and fault.active(at_s) for fault in self.faults
         )
@@ -152,20 +146,3 @@ class RdtEmulator(DeviceEmulator):
             self._held = datagram
             return [(at_s, datagram)] * doubled
         return [(at_s, datagram)] * (1 + doubled) + self._released(at_s)
-
-
-def build(settings: EmulatorSettings) -> RdtEmulator:
-    """Return an emulated box that reads `settings.senses`: fx, fy, fz [N], tx, ty, tz [N*m]; the rest is 0.
-
-    Raises
-    ------
-    UsageError
-        For options or faults that are not known.
-    """
-
-    def wrench(at_s: float) -> list[float]:
-        sensed = settings.senses(at_s)
-        return [sensed.get(name, 0.0) for name in AXES]
-
-    options = read_options(NetFtOptions, settings.options, "net-ft")
-    return RdtEmulator(wrench, options, faults=[DatagramFault.parse(text) for text in settings.faults])
