@@ -2,8 +2,8 @@
 
 :class:`GuardProcess` is what the rig holds. The process is spawned in a session of its own, so that Ctrl-C at the
 terminal does not reach it; SIGINT and SIGHUP are ignored, SIGTERM means: retreat, and leave. One thread takes requests
-of the rig, then looks once, and so on; it waits for the rig nowhere. Requests and answers are pickled, numbered, and a
-line of base64 each; lines without a number bring samples and events as they come.
+of the rig, then looks once, and so on; it waits for the rig nowhere. Requests and answers are lines of JSON, numbered;
+lines without a number bring samples and events as they come.
 
 When the rig dies, the process retreats, writes so to its log and leaves. It notices by the end of the socket, by its
 parent's number, or, whatever holds the socket open and whether the rig is dead or only hangs, by the age of the last
@@ -16,12 +16,10 @@ Needs sessions and signals of POSIX.
 
 from __future__ import annotations
 
-import binascii
 import gc
 import json
 import math
 import os
-import pickle
 import pkgutil
 import select
 import signal
@@ -36,6 +34,10 @@ from functools import partial
 from pathlib import Path
 from typing import Any, NoReturn, TypeAlias
 
+import numpy as np
+from pydantic import TypeAdapter
+
+from tactbench.core import errors
 from tactbench.core.errors import LinkClosed, LinkError, RigError, TactbenchError, UsageError
 from tactbench.core.samples import Block
 from tactbench.core.spec.sensor import StreamSpec
@@ -61,7 +63,7 @@ ARM_S = 180.0
 OPEN_S = 1.0
 """For so long a port is tried that another process still holds (assumed; free 5 ms after that was killed, measured)."""
 MOST_BYTES = 1 << 20
-"""Under way to a rig that does not take them: some seconds of a force sensor at 1 kHz."""
+"""Under way to a rig that does not take them: some 5 s of a force sensor at 1 kHz."""
 IDLE_S = 0.05
 """Wait for the rig's first words, and its last."""
 
@@ -135,6 +137,13 @@ def _opened(settings: DeviceSettings, clock: Clock) -> Any:
             time.sleep(1e-3)
 
 
+_KINDS: dict[type, TypeAdapter[Any]] = {
+    kind: TypeAdapter(kind) for kind in (ProcessSettings, Limits, Beat, Report, Event)
+}
+_COLUMNS = {"t_ns": "int64", "data": "", "quality": "uint8", "sequence": "int64", "device_ns": "int64"}
+"""Of a block, and their types; that of `data` is the stream's."""
+
+
 class GuardProcess:
     """A guard in a process of its own, as its rig sees it: the same methods as :class:`~.guard.LocalGuard`.
 
@@ -173,7 +182,7 @@ class GuardProcess:
         self._socket, theirs = socket.socketpair()
         with theirs, Path(settings.log).open("ab") as errors:
             self._process = subprocess.Popen(
-                [sys.executable, "-P", "-c", f"from {__name__} import main; main()", str(theirs.fileno())],
+                [sys.executable, "-P", "-m", __name__, str(theirs.fileno())],
                 pass_fds=(theirs.fileno(),),
                 start_new_session=True,
                 stdin=subprocess.DEVNULL,
@@ -183,8 +192,9 @@ class GuardProcess:
 
     def start(self) -> Mapping[str, Mapping[str, str]]:
         """Let the process open all devices."""
-        identity: Mapping[str, Mapping[str, str]]
-        identity, self.force_stream, self.motor_stream = self._ask("start", START_S, self._settings)
+        found = self._ask("start", START_S, asdict(self._settings))
+        self.force_stream, self.motor_stream = map(StreamSpec.model_validate, found["streams"])
+        identity: Mapping[str, Mapping[str, str]] = found["identity"]
         return identity
 
     def arm(self, limits: Limits) -> Report:
@@ -256,7 +266,7 @@ class GuardProcess:
             raise self._lost
 
     def _report(self, what: str, within_s: float, body: Limits | Beat | None = None) -> Report:
-        report: Report = self._ask(what, within_s, body)
+        report: Report = _read(Report, self._ask(what, within_s, body and asdict(body)))
         return report
 
     def _ask(self, what: str, within_s: float, body: Any = None) -> Any:
@@ -270,7 +280,11 @@ class GuardProcess:
             if said is None and not self._receive(max(0.0, 1e-9 * (until_ns - self._clock()))):
                 self._fail(f"it has not answered within {within_s:.3f} s")
         if "error" in said:
-            raise said["error"]
+            kind, message, hint = said["error"]
+            found = getattr(errors, kind, GuardRefusesError)
+            error: TactbenchError = found.__new__(found)  # some are made of other arguments
+            TactbenchError.__init__(error, message, hint=hint)
+            raise error
         return said["answer"]
 
     def _receive(self, timeout_s: float) -> bool:
@@ -291,10 +305,10 @@ class GuardProcess:
         if not end:
             return None
         self._rest = rest
-        said = _read(line)
+        said = json.loads(line)
         for name, kept in self._blocks.items():
-            kept += said.get(name, ())
-        self._events += said.get("events", ())
+            kept += [_block(getattr(self, f"{name}_stream"), columns) for columns in said.get(name, ())]
+        self._events += [_read(Event, event) for event in said.get("events", ())]
         self._counts = said.get("counts", self._counts)
         return said
 
@@ -321,12 +335,22 @@ Guard: TypeAlias = LocalGuard | GuardProcess
 """What a rig drives its axes through: in its own process, or in one of its own."""
 
 
-def _read(line: bytes) -> Any:
-    return pickle.loads(binascii.a2b_base64(line))
+def _read(kind: type, said: Any) -> Any:
+    return _KINDS[kind].validate_python(said)
 
 
 def _line(said: Any) -> bytes:
-    return binascii.b2a_base64(pickle.dumps(said))
+    return json.dumps(said, default=float).encode() + b"\n"  # numpy's numbers, too
+
+
+def _columns(block: Block) -> dict[str, Any]:
+    return {name: column.tolist() for name in _COLUMNS if (column := getattr(block, name)) is not None}
+
+
+def _block(stream: StreamSpec, columns: Mapping[str, Any]) -> Block:
+    types = {**_COLUMNS, "data": stream.dtype}
+    found: Any = {name: np.array(column, types[name]) for name, column in columns.items()}
+    return Block(stream.name, **{"t_ns": None, **found})
 
 
 class _Server:
@@ -394,12 +418,12 @@ class _Server:
         self._receive()
         *lines, self._in = self._in.split(b"\n")
         for line in lines:
-            number, what, body = _read(line)
+            number, what, body = json.loads(line)
             said: dict[str, Any] = {"number": number}
             try:
                 said["answer"] = self._answer(what, body)
             except TactbenchError as error:
-                said["error"] = error
+                said["error"] = type(error).__name__, error.message, error.hint
             if self._guard is not None:
                 self._bring(self._guard)  # before the answer that may rest on it
                 said["counts"] = self._guard.counts()
@@ -409,7 +433,11 @@ class _Server:
         """Send samples and events that have come; what a rig does not take stays with the guard."""
         if len(self._out) > MOST_BYTES:
             return
-        said = {"force": guard.force_blocks(), "motor": guard.motor_blocks(), "events": guard.events()}
+        said = {
+            "force": list(map(_columns, guard.force_blocks())),
+            "motor": list(map(_columns, guard.motor_blocks())),
+            "events": list(map(asdict, guard.events())),
+        }
         if any(said.values()):
             self._out += _line(said)
 
@@ -418,11 +446,12 @@ class _Server:
             self._over = True
             return None
         if what == "start":
-            return self._start(body)
+            return self._start(_read(ProcessSettings, body))
         guard = self._guard
         if guard is None:
             raise GuardRefusesError("The guard was not started.", hint="Use start().")
-        return getattr(guard, what)(*([] if body is None else [body]))
+        given = [] if body is None else [_read({"arm": Limits, "beat": Beat}[what], body)]
+        return asdict(getattr(guard, what)(*given))
 
     def _start(self, settings: ProcessSettings) -> Any:
         self._clock = settings.clock()
@@ -441,7 +470,8 @@ class _Server:
         self._guard = guard
         # What there is by now stays: collections have little to look at.
         gc.freeze()
-        return identity, guard.force_stream, guard.motor_stream
+        streams = guard.force_stream, guard.motor_stream
+        return {"identity": identity, "streams": [stream.model_dump(mode="json") for stream in streams]}
 
     def _flush(self) -> None:
         with suppress(OSError):  # full, or nobody there
@@ -454,7 +484,7 @@ def _log(entry: Mapping[str, Any]) -> None:
 
 
 def main() -> None:
-    """Run the process; its argument is the number of an open socket."""
+    """Run the process: ``python -m … SOCKET``, the number of an open socket."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGHUP, signal.SIG_IGN)
     server = _Server(socket.socket(fileno=int(sys.argv[1])))
@@ -465,3 +495,7 @@ def main() -> None:
     signal.signal(signal.SIGTERM, terminate)
     server.run()
     server.close()
+
+
+if __name__ == "__main__":
+    main()
