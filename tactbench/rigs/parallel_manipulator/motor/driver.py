@@ -224,7 +224,7 @@ class FaulhaberDriver(Positioner):
                 self.update(self._exchange.answer_s)
 
     def confirm(self) -> None:
-        """Read back every setting and the ends of travel that the options state; raises PositionerError if one differs."""
+        """Read back each setting and the ends of travel that the options state; raises PositionerError if one differs."""
         for setting in (*self._settings, *self._limits):
             if setting[0] == "SP":  # the speed of the last retreat may stand there
                 self._keep(*setting)
@@ -287,8 +287,8 @@ class FaulhaberDriver(Positioner):
     def retreat(self) -> None:
         """Begin to move to the place away from the sensor, whatever is under way; without one it halts.
 
-        Where it is not answered, `update` raises PositionerSilentError: call this again, it is the same wherever the motor
-        is.
+        Where it is not answered, `update` raises PositionerSilentError: call this again, it is the same wherever the
+        motor is.
         """
         if math.isnan(self.facts.retreat):
             self.halt()
