@@ -224,7 +224,7 @@ class FaulhaberDriver(Positioner):
                 self.update(self._exchange.answer_s)
 
     def confirm(self) -> None:
-        """Read back each setting and the ends of travel that the options state; raises PositionerError if one differs."""
+        """Read back all settings and the ends of travel that options state; raises PositionerError if one differs."""
         for setting in (*self._settings, *self._limits):
             if setting[0] == "SP":  # the speed of the last retreat may stand there
                 self._keep(*setting)
