@@ -1,6 +1,7 @@
 """A recording on one clock: what belongs together, what is missing, what it is called."""
 
 import shutil
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -83,6 +84,6 @@ def test_several_sensors_and_copies_are_refused_by_name(tmp_path):
     with pytest.raises(DataError, match="'a' of made and 'b' of raw"):
         load_dataset(force_task(), [path, other])
     (tmp_path / "again").mkdir()
-    copy = shutil.copy(path, tmp_path / "again")
+    copy = Path(shutil.copy(path, tmp_path / "again"))
     with pytest.raises(DataError, match="'a' is given twice"):
         load_dataset(force_task(), [path, copy])
