@@ -126,7 +126,7 @@ def _outcome(board: Board) -> str:
     alike = [row for row, rank in others if not rank.behind]
     if alike:
         return f"{where}{name} has {quality}; {_some(list(map(board.name, alike)))} cannot be told from it."
-    return f"{where}{name} is best; closest is {_closest(board, first, [row for row, _ in others])}."
+    return f"{where}{name} is best; {_closest(board, first, [row for row, _ in others])}."
 
 
 def _too_few(rows: Sequence[Row]) -> str:
@@ -147,19 +147,16 @@ def _closest(board: Board, first: Row, others: Sequence[Row]) -> str:
     found, second = min(((difference(first, row), row) for row in others), key=lambda pair: sign * pair[0].value)
     name = board.name(second)
     if found.low is None or found.high is None or sign * found.value <= 0:
-        return name
+        return f"closest is {name}"
     low, high = sorted((sign * found.low, sign * found.high))
-    by = score_with_unit(sign * found.value, unit)
-    ends = f"{percent(None, None)} {interval(low, high, unit)}"
+    by = f"{score_with_unit(sign * found.value, unit)} ({percent(None, None)} {interval(low, high, unit)}), to {name}"
     kept = [row.get("replicates") or {} for row in (first, second)]
     key = "beyond" if all("beyond" in one for one in kept) else "scores"
     if not found.paired or not all(key in one for one in kept):
-        return f"{name}, worse by {by} ({ends})"
+        return f"its smallest difference is {by}"
     wins = sum(sign * (one - other) > 0 for one, other in zip(*(one[key] for one in kept), strict=True))
-    return (
-        f"{name}, worse in {wins} of {counted(len(kept[0][key]), 'campaign')}; mean of the differences"
-        f"{' beyond the floor' if key == 'beyond' else ''} within campaigns {by} ({ends})"
-    )
+    of = " beyond the floor" if key == "beyond" else ""
+    return f"its smallest mean difference{of} is {by}, worse in {wins} of {counted(len(kept[0][key]), 'campaign')}"
 
 
 def _timed(board: Board) -> str:
@@ -267,11 +264,10 @@ def _how(board: Board) -> Iterator[Note]:
     campaigns = [row for row in board.answers if row.get("replicate_unit") == "replicate"]
     if campaigns:
         counts = [row["n_replicates"] for row in campaigns]
-        what = "Score, interval" if any(row["ci_low"] is not None for row in campaigns) else "Score"
+        median = f"Score: median over {_counts(counts, 'campaign')}, each simulated anew with its own seed"
+        interval_of = "; interval: of that median" if any(row["ci_low"] is not None for row in campaigns) else ""
         range_of = "; range: lowest … highest campaign" if max(counts) > 1 else ""
-        parts.append(
-            f"{what}: median over {_counts(counts, 'campaign')}, each simulated anew with its own seed{range_of}"
-        )
+        parts.append(f"{median}{interval_of}{range_of}")
     sessions = [row for row in board.answers if row["ci_low"] is not None and row not in campaigns]
     over = grouped((row for row in sessions if row.get("n_replicates")), lambda row: str(row["replicate_unit"]))
     for unit, rows in over.items():

@@ -189,11 +189,12 @@ class Truth:
 NAME = r"(?:In simulation )?(\S+)"
 QUALITY = "(?:the best score|the smallest error beyond the floor)"
 ABOVE = {
-    rf"{NAME} is best; closest is (\S+?)(?:, worse by [\d.]+(?: N)? \(95 % [^;]*\))?\.":
+    rf"{NAME} is best; (?:closest is|its smallest difference is [\d.]+(?: N)? \(95 % [^;]*\), to) (\S+)\.":
         lambda t, a, b: t.ahead(a, b) and t.leads(a),
-    rf"{NAME} is best; closest is (\S+), worse in (\d+) of (\d+) campaigns; mean of the "
-    r"differences( beyond the floor)? within campaigns ([\d.]+)(?: N)? \(95 % ([\d.]+) … ([\d.]+)\)\.":
-        lambda t, a, b, *numbers: t.ahead(a, b) and t.leads(a) and t.by_campaign(a, b, *numbers),
+    rf"{NAME} is best; its smallest mean difference( beyond the floor)? is ([\d.]+)(?: N)? \(95 % ([\d.]+) … ([\d.]+)\)"
+    r", to (\S+), worse in (\d+) of (\d+) campaigns\.":
+        lambda t, a, beyond, value, low, high, b, *wins:
+        t.ahead(a, b) and t.leads(a) and t.by_campaign(a, b, *wins, beyond, value, low, high),
     rf"{NAME} has {QUALITY}; (.*?)(?: and \d+ more)? cannot be told from it\.":
         lambda t, a, b: t.leads(a) and all(not t.ranks[t.called(one)["cell"]].behind for one in b.split(", ")),
     rf"{NAME} has {QUALITY}, and is not shown to be better than the "
@@ -225,9 +226,10 @@ BELOW = {
         lambda t: any(one["dagger"] for one in t.rows),
     r"Beyond floor: the root of RMSE² − floor²(; places go by it)?\. Floor: .* \((?:[abc] 0\.1000(?:, )?)+\)\.":
         lambda t, by: bool(by) == (bool(t.better) and t.floor),
-    r"(?:(Score(, interval)?: median over (.*? campaigns?), each simulated anew with its own seed[^=.]*|"
-    r"Interval: over ([^.]*))(?:\. |\.$))?(Delay: sampling, link, window, computing; training: the final fit\.)?":
-        lambda t, s, i, n, m, delay: t.how(i, n, m, delay),
+    r"(?:(Score: median over (.*? campaigns?), each simulated anew with its own seed"
+    r"(; interval: of that median)?[^=.]*|Interval: over ([^.]*))(?:\. |\.$))?"
+    r"(Delay: sampling, link, window, computing; training: the final fit\.)?":
+        lambda t, s, n, i, m, delay: t.how(i, n, m, delay),
     r"Times cannot be compared: (taken on 2 hosts)?(?: and )?(taken while up to 4 cells ran)?\.":
         lambda t, hosts, many: bool(hosts) == (len({o["host"] for o in t.answers}) == 2)
         and bool(many) == any(o["concurrency"] == 4 for o in t.answers),
