@@ -20,7 +20,7 @@ from pathlib import Path
 
 HERE = Path(__file__).resolve().parent
 POINTS = {
-    "coarse": {"conduction_refinement": 1, "cells_factor": 0.75, "most_nodes": 9, "table_tolerance_factor": 12.0},
+    "coarse": {"conduction_refinement": 1, "most_nodes": 9, "table_tolerance_factor": 12.0},
     "default": {},
     "finer": {"conduction_refinement": 3, "cells_factor": 1.5, "most_nodes": 20, "table_tolerance_factor": 3.0},
 }
