@@ -205,7 +205,7 @@ def schedules(count: int, seed: int) -> Iterator[Outcome]:
         stiffness = float(np.exp(rng.uniform(np.log(4e3), np.log(40e3))))
         setting = faults.Setting(115200, stiffness, 20e-3, seed=1000 * seed + number)
         some = rng.choice(len(names), size=int(rng.integers(0, 3)), replace=False)
-        drawn = tuple((names[n], float(rng.uniform(0.8, 9.0))) for n in some)
+        drawn = tuple((names[n], float(rng.uniform(1.6, 9.0))) for n in some)  # all devices are open by then
         # Two in three have something in the way, at a random place.
         obstacle_m = float(rng.uniform(0.3e-3, POINTS * WAY_M)) if rng.integers(3) else 1.0
         yield schedule(setting, drawn, obstacle_m)
