@@ -85,7 +85,7 @@ ACQUIRED_SPLITS = ("roles", "session", "recording", "unit", "in-session", "shuff
 
 
 @dataclass
-class Source:
+class RecordingSource:
     """Where the recordings of some cells come from."""
 
     paths: Sequence[Path]
@@ -96,7 +96,7 @@ class Source:
     """Why there are no recordings, or not all of them."""
 
 
-RecordingPlan = dict[RequestKey, Source]
+RecordingPlan = dict[RequestKey, RecordingSource]
 
 
 @dataclass(frozen=True)
@@ -164,7 +164,7 @@ def plan_parts(
             some, own = plan_run(part.matrix, registry, keys, store, part.recordings, limits)
         else:
             some = plan_cells(part.matrix, part.matrix.sensors, registry)
-            own = {request_key(cell): Source((), trouble=part.trouble) for cell in some}
+            own = {request_key(cell): RecordingSource((), trouble=part.trouble) for cell in some}
         for cell in some:
             if cells.setdefault(cell.name, cell) is not cell:
                 raise UsageError(
@@ -207,7 +207,7 @@ def plan_run(
     for cell in cells:
         _check_split(registry.tasks[cell.task].spec, cell.split)
     return cells, {
-        key: Source([request.path for request in made], made, None if made else _no_scenes(key, matrix))
+        key: RecordingSource([request.path for request in made], made, None if made else _no_scenes(key, matrix))
         for key, made in requests_for(cells, registry, keys, store).items()
     }
 
@@ -244,7 +244,8 @@ def _from_replay(
         names = {planned.scene.name for planned in registry.tasks[task].spec.scenes_for(split)}
         found = scenes.get(sensor, {})
         fitting = [path for path, scene in found.items() if scene is None or not names or scene in names]
-        plan[key] = Source(fitting, trouble=broken.get(sensor) or (None if fitting else _no_scenes(key, matrix)))
+        trouble = broken.get(sensor) or (None if fitting else _no_scenes(key, matrix))
+        plan[key] = RecordingSource(fitting, trouble=trouble)
     return cells, plan
 
 

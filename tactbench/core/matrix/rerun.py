@@ -9,7 +9,7 @@ from pathlib import Path
 
 from tactbench.core.matrix.keys import Keys, differences
 from tactbench.core.matrix.plan import Cell
-from tactbench.core.matrix.plan_recordings import Source, request_key, requests_for
+from tactbench.core.matrix.plan_recordings import RecordingSource, request_key, requests_for
 from tactbench.core.matrix.run import EngineChoice, Run
 from tactbench.core.matrix.store import Row, Store
 from tactbench.core.matrix.summary import SEED_DECIDES
@@ -47,10 +47,10 @@ def compute_again(
     """
     with tempfile.TemporaryDirectory(prefix="tactbench-rerun-") as place, Store(Path(place)).hold() as again:
         keys, need = Keys(registry), request_key(asked)
-        source = Source(paths)
+        source = RecordingSource(paths)
         if registry.rigs[asked.rig].simulated:
             requests = requests_for([asked], registry, keys, again)[need]
-            source = Source([request.path for request in requests], requests)
+            source = RecordingSource([request.path for request in requests], requests)
         run = Run(again, registry, keys, {need: source}, EngineChoice("in-process"), None, progress, None, [asked])
         run.carry_out([asked], alone=True)
         row = run.rows[asked.name]
