@@ -18,6 +18,7 @@ IN_THIS_PROCESS = EngineChoice("in-process")
 def make_here(patch: pytest.MonkeyPatch) -> None:
     """Have every process pool carry out its items in this process, and leave no bytecode of plugins that change."""
     patch.setattr(EngineChoice, "engine", lambda choice, jobs: InProcess())
+    patch.setattr(EngineChoice, "recorder", lambda choice, computed: InProcess())
     patch.setattr(Pool, "each", lambda pool, work, items: InProcess().each(work, items))
     patch.setattr(sys, "dont_write_bytecode", True)
 

@@ -74,6 +74,12 @@ class EngineChoice:
             return Dask(self.processes, self.limits, os.environ.get("DASK_SCHEDULER_ADDRESS"))
         return InProcess() if self.name == "in-process" else Pool(jobs, self.limits)
 
+    def recorder(self, *, computed: bool) -> Engine:
+        """Return what makes recordings on this machine: those of devices one at a time, with time to be closed."""
+        if self.name == "in-process":
+            return InProcess()
+        return Pool(self.processes, self.limits) if computed else Pool(1, replace(self.limits, grace_s=GRACE_S))
+
 
 @dataclass(frozen=True)
 class Outcome:
@@ -196,18 +202,12 @@ class Run:
             return
         self.progress.begin("recording", len(missing))
         computed = all(is_computed(request, self.registry) for request in missing.values())
-        with self._recorder(computed=computed) as recorder:
+        # The operator's terminal belongs to this process.
+        here = self.operator is not None and not computed
+        with InProcess() if here else self.choice.recorder(computed=computed) as recorder:
             self._submit_recordings(recorder, missing.values(), computed=computed)
             for request, outcome in recorder.outcomes():
                 self._recorded(request, outcome)
-
-    def _recorder(self, *, computed: bool) -> Engine:
-        """Return what makes recordings, with time for real devices to be closed."""
-        # The operator's terminal belongs to this process.
-        if (self.operator is not None and not computed) or isinstance(self.choice.engine(1), InProcess):
-            return InProcess()
-        limits = self.choice.limits if computed else replace(self.choice.limits, grace_s=GRACE_S)
-        return Pool(self.choice.processes if computed else 1, limits)
 
     def _clear(self, requests: Iterable[RecordingRequest]) -> None:
         """Remove what a simulation that was killed has left; what devices gave is never removed."""
@@ -298,8 +298,10 @@ class Run:
             )
             self.computed += 1
         self.progress.advance(cell.name, stopped=self.rows[cell.name]["status"] in STOPPED)
+        if self.shown is None or any(one.name not in self.rows for one in self.cells if one.repeat == cell.repeat):
+            return
         left = {one.repeat for one in self.cells if one.name not in self.rows}
-        if self.shown is not None and left and cell.repeat not in left:
+        if left:
             self.shown([self.rows[one.name] for one in self.cells if one.repeat not in left])
 
     def _stopped(
