@@ -13,7 +13,7 @@ from dataclasses import replace
 
 from tactbench.core.errors import TactbenchError
 from tactbench.core.samples import Block
-from tactbench.devices.driver import error_text
+from tactbench.devices.driver import fault_text
 from tactbench.devices.guard_messages import Event, Limits, Report
 from tactbench.devices.guard_process import Guard
 from tactbench.devices.press import Press
@@ -125,7 +125,7 @@ class Control:
                 self._guard.advance(self._next_ns)
                 self._period()
         except Exception as error:
-            self.press.fail(error_text(error))
+            self.press.fail(fault_text(error))
             self.press.abandon()
 
     def _gather(self) -> None:
@@ -156,7 +156,7 @@ class Control:
         try:
             beat = press.step(self.report, raw, 1e-9 * now_ns)
         except TactbenchError as error:
-            press.fail(error_text(error))
+            press.fail(fault_text(error))
             beat = press.step(self.report, (), 1e-9 * now_ns)
         number = self.report.force_sequence
         beat = replace(beat, t_ns=now_ns, state=str(press.state), force_sequence=number)

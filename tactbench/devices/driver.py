@@ -10,7 +10,7 @@ from typing import Any, ClassVar, Literal, Self, TypeVar
 
 from pydantic import BaseModel, ConfigDict
 
-from tactbench.core.errors import TactbenchError, UsageError
+from tactbench.core.errors import TactbenchError, UsageError, error_text
 from tactbench.core.samples import Block
 from tactbench.core.spec.sensor import StreamSpec
 from tactbench.links.address import read_options
@@ -133,10 +133,9 @@ class Driver(ABC):
         self.close()
 
 
-def error_text(error: Exception) -> str:
-    """Return what an error says, without a full stop; of one that is not the program's own with its kind."""
-    text = error.message if isinstance(error, TactbenchError) else f"{type(error).__name__}: {error}"
-    return text.rstrip(".")
+def fault_text(error: Exception) -> str:
+    """Return what an error says within a sentence: without its next step and its full stop."""
+    return (error.message if isinstance(error, TactbenchError) else error_text(error)).rstrip(".")
 
 
 _Link = TypeVar("_Link", bound=Link)

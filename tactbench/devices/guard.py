@@ -34,7 +34,7 @@ from tactbench.core.errors import (
 )
 from tactbench.core.samples import Block
 from tactbench.core.spec.sensor import StreamSpec
-from tactbench.devices.driver import Driver, error_text
+from tactbench.devices.driver import Driver, fault_text
 from tactbench.devices.force_watch import MOST_BLOCKS, ForceWatch, Problem
 from tactbench.devices.guard_messages import (
     Beat,
@@ -177,7 +177,7 @@ class LocalGuard:
                 if isinstance(error, GuardRefusesError):
                     raise
                 hint = getattr(error, "hint", "")
-                raise GuardRefusesError(f"{name} is not armed: {error_text(error)}.", hint=hint) from error
+                raise GuardRefusesError(f"{name} is not armed: {fault_text(error)}.", hint=hint) from error
         self.state, self._limits = GuardState.ARMED, limits
         self._refused, self._touched = 0, False
         self._end_sequence = self._watch.sequence
@@ -315,7 +315,7 @@ class LocalGuard:
             blocks = self._force.read(timeout_s)
         except Exception as error:
             self._lost.add(FORCE)
-            return Trigger.FORCE_LOST, error_text(error)
+            return Trigger.FORCE_LOST, fault_text(error)
         for block in blocks:
             found = watch.take(block, limits, travelling=travelling)
             problem = problem or found
@@ -328,7 +328,7 @@ class LocalGuard:
         try:
             blocks = axis.read(0.0)
         except Exception as error:
-            text = f"{name}: {error_text(error)}"
+            text = f"{name}: {fault_text(error)}"
             if isinstance(error, LinkUnplugged | LinkClosed):
                 self._lost.add(name)
                 return Trigger.AXIS_LOST, text
@@ -381,7 +381,7 @@ class LocalGuard:
                 self._into_skin = press.state is not None and beat.position_m > press.state.target
                 press.move_to(beat.position_m, beat.speed_m_s)
         except Exception as error:  # of the axis' driver: whatever it is, it was not carried out
-            return error_text(error), False
+            return fault_text(error), False
         return "", False
 
     def _travel_reason(self, beat: Beat) -> str:
@@ -418,7 +418,7 @@ class LocalGuard:
         try:
             axis.halt()
         except Exception as error:
-            self.trip(Trigger.AXIS_FAULT, error_text(error))
+            self.trip(Trigger.AXIS_FAULT, fault_text(error))
 
     # Retreat ----------------------------------------------------------------------------------------------------------
 
@@ -538,7 +538,7 @@ class LocalGuard:
             except Exception as error:
                 with suppress(Exception):
                     axis.halt()
-                self._homing_failed(name, *(problem or (Trigger.HOMING, error_text(error))))
+                self._homing_failed(name, *(problem or (Trigger.HOMING, fault_text(error))))
         axis.confirm()
         if not axis.enabled:
             axis.enable()

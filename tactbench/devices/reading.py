@@ -15,7 +15,7 @@ from tactbench.core.errors import LinkError, RigError, UsageError
 from tactbench.core.samples import COLUMNS, Block, Quality, join_blocks
 from tactbench.core.spec.recording import StreamCounts
 from tactbench.core.spec.sensor import StreamSpec
-from tactbench.devices.driver import Driver, error_text
+from tactbench.devices.driver import Driver, fault_text
 from tactbench.devices.sequence import SequenceCheck
 from tactbench.links.link import Clock
 
@@ -284,7 +284,7 @@ class Reading:
 
     def _fail(self, name: str, error: Exception) -> None:
         with self._lock:
-            self.ended = self.ended or f"{name}: {error_text(error)}"
+            self.ended = self.ended or f"{name}: {fault_text(error)}"
         self._over.set()
 
     def _finish(self) -> None:
