@@ -22,7 +22,7 @@ MUST_NAME_SENTINELS = {"force": "N", "torque": "N*m"}
 """Kinds that are targets, and what their units are converted to; a number that means "no sample" would be learnt."""
 
 
-class Cells(Frozen):
+class Tabular(Frozen):
     """Rows of cells."""
 
     header: bool
@@ -33,14 +33,14 @@ class Cells(Frozen):
     """Cells with exactly one of these texts hold no sample, for example "" or "NA"."""
 
 
-class Csv(Cells):
+class Csv(Tabular):
     """Cells between delimiters."""
 
     format: Literal["csv"] = "csv"
     delimiter: str = Field(default=",", min_length=1, max_length=1)
 
 
-class Text(Cells):
+class Text(Tabular):
     """Cells between spaces or tabs."""
 
     format: Literal["text"] = "text"
@@ -56,7 +56,7 @@ class Records(Frozen):
     no_sample: tuple[str, ...] = ()
 
 
-class Xlsx(Cells):
+class Xlsx(Tabular):
     """A sheet of an Excel workbook; the extra ``[xlsx]``."""
 
     format: Literal["xlsx"] = "xlsx"

@@ -9,7 +9,7 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from tactbench.core.errors import MappingError
-from tactbench.core.recording.mapping.model import Cells, Csv, Records, Text
+from tactbench.core.recording.mapping.model import Csv, Records, Tabular, Text
 from tactbench.core.recording.mapping.table import TextTable
 
 _DELIMITERS = {"\t": "tab", ";": "semicolon"}
@@ -39,7 +39,7 @@ def read_text(path: Path, shown: str, how: Csv | Text | Records) -> TextTable:
     return table_of(shown, list(_cells(text, shown, how)), how)
 
 
-def table_of(shown: str, lines: list[Line], how: Cells) -> TextTable:
+def table_of(shown: str, lines: list[Line], how: Tabular) -> TextTable:
     """Return the table that lines make, the first of them its header if `how` says so."""
     header = None
     if how.header and lines:
