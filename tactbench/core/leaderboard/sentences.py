@@ -267,7 +267,7 @@ def _how(board: Board) -> Iterator[Note]:
         median = f"Score: median over {_counts(counts, 'campaign')}, each simulated anew with its own seed"
         interval_of = "; interval: of that median" if any(row["ci_low"] is not None for row in campaigns) else ""
         several = f"{median}{interval_of}; range: lowest … highest campaign"
-        parts.append(several if max(counts) > 1 else "Score: of one simulated campaign")
+        parts.append(several if max(counts) > 1 else "Score: of 1 campaign, simulated with its own seed")
     sessions = [row for row in board.answers if row["ci_low"] is not None and row not in campaigns]
     over = grouped((row for row in sessions if row.get("n_replicates")), lambda row: str(row["replicate_unit"]))
     for unit, rows in over.items():
