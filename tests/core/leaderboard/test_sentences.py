@@ -226,7 +226,7 @@ BELOW = {
         lambda t: any(one["dagger"] for one in t.rows),
     r"Beyond floor: the root of RMSE² − floor²(; places go by it)?\. Floor: .* \((?:[abc] 0\.1000(?:, )?)+\)\.":
         lambda t, by: bool(by) == (bool(t.better) and t.floor),
-    r"(?:(Score: (?:median over (.*? campaigns), each simulated anew with its own seed|of 1 campaign, simulated with its own seed)"
+    r"(?:(Score: (?:median over (.*? campaigns), each simulated anew|of 1 campaign, simulated) with its own seed"
     r"(; interval: of that median)?[^=.]*|Interval: over ([^.]*))(?:\. |\.$))?"
     r"(Delay: sampling, link, window, computing; training: the final fit\.)?":
         lambda t, s, n, i, m, delay: t.how(i, n or "1" * ("of 1 campaign" in (s or "")), m, delay),
