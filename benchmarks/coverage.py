@@ -2,7 +2,7 @@
 
 ::
 
-    python benchmarks/coverage.py [--trials 1000] [--seed 1] [--only scores|time|differences|ranks|errors|floor]
+    python benchmarks/coverage.py [--trials 1000] [--seed 1] [--only scores|boards|differences|ranks|errors|floor]
 
 A synthetic sensor's error has a part that stays for a session (another in the next one; "session sd" is its deviation,
 that of the rest is 1) and a part that moves slowly within it, first order with memory 0.9. The truth is the score over
@@ -34,6 +34,8 @@ from tactbench.core.statistics.ranking import ranks
 ROWS = 60
 MEMORY = 0.9
 CLASSES = 3
+PRESSES, PER_PRESS, OF_PRESSES = 10, 10, 0.3
+"""Presses of a unit, rows of a press, and the deviation of what stays for a press."""
 SESSIONS = (5, 8, 15, 30)
 
 
@@ -126,10 +128,11 @@ def scores(trials: int, seed: int) -> None:
                     code = np.repeat(np.arange(sessions), ROWS)
                     k = CLASSES if draw is classes else 0
                     unit = ReplicateUnits("session", code, ())
-                    found = score_interval(METRICS[metric], y.ravel(), answered.ravel(), code, unit, k, 0)
+                    found = score_interval(METRICS[metric], y.ravel(), answered.ravel(), unit, k)
                     low, high = percentile(metric, sums_of(metric, y, answered), rng)
-                    hits += found.low <= truth <= found.high, low <= truth <= high
-                    wider.append((found.high - found.low) / max(high - low, 1e-9))
+                    end = np.inf if found.high is None else found.high
+                    hits += found.low <= truth <= end, low <= truth <= high
+                    wider.append((end - found.low) / max(high - low, 1e-9))
                 shares = " / ".join(f"{100 * hit / trials:.1f}" for hit in hits)
                 cells.append(f"{shares} x{np.median(wider):.1f}")
             lines.append(cells)
@@ -140,27 +143,34 @@ def scores(trials: int, seed: int) -> None:
     table(title, columns, lines)
 
 
-def in_time(trials: int, seed: int) -> None:
-    """Cover the truth of the one session that there is, by blocks of time."""
+def boards(trials: int, seed: int) -> None:
+    """Cover the truth by what a table prints of units with ten presses each; fewer than five print no interval."""
     lines = []
-    for metric, draw in (("rmse", numbers), ("macro_f1", classes)):
-        k = CLASSES if draw is classes else 0
-        for n in (1500, 6000):
-            truth = truth_of(metric, draw, 0.0, 1.0)
-            rng = np.random.default_rng([seed, n])
-            hits = np.zeros(2)
-            zeros = np.zeros(n, dtype=np.int64)
-            for trial in range(trials):
-                y, answered = (one.ravel() for one in draw(rng, 1, 0.0, 1.0, n=n))
-                score = METRICS[metric].of(y, answered, k)
-                unit = ReplicateUnits("session", zeros, ())
-                found = score_interval(METRICS[metric], y, answered, zeros, unit, k, trial)
-                loss = (y != answered) * 1.0 if k else (answered - y) ** 2
-                half = 1.96 * loss.std() / np.sqrt(n) / (1 if k else 2 * np.sqrt(loss.mean()))
-                hits += found.low <= truth <= found.high, abs(score - truth) <= half
-            lines.append([metric, str(n), *(f"{100 * hit / trials:.1f}" for hit in hits)])
-    columns = ["metric", "rows", "ours", "rows independent"]
-    table("One recording: coverage [%] of that session's truth", columns, lines)
+    rows = np.arange(PRESSES * PER_PRESS)
+    for kind, level in (("rmse", 0.0), *(("accuracy", level) for level in (1.0, 2.0, 3.0))):
+        for spread in (0.1, 0.5, 1.0):
+            variance = 1.0 + spread**2 + OF_PRESSES**2
+            truth = np.sqrt(variance) if kind == "rmse" else stats.norm.cdf(level / np.sqrt(variance))
+            cells = [kind, f"{truth:.3f}", f"{spread:g}"]
+            for units in (2, 5, 6, 12):
+                rng = np.random.default_rng([seed, units, int(10 * spread), int(level)])
+                printed = hits = 0
+                for _ in range(trials):
+                    of_unit, of_press = rng.normal(size=(units, 1, 1)), rng.normal(size=(units, PRESSES, 1))
+                    error = spread * of_unit + OF_PRESSES * of_press + rng.normal(size=(units, PRESSES, PER_PRESS))
+                    y, answered = np.zeros(error.size), error.ravel()
+                    if kind == "accuracy":
+                        y = np.tile([0, 1], error.size // 2)
+                        answered = np.where(level + error.ravel() > 0, y, 1 - y)
+                    unit = ReplicateUnits("session", np.repeat(np.arange(units), len(rows)), ())
+                    found = score_interval(METRICS[kind], y, answered, unit, 2 * (kind == "accuracy"))
+                    printed += found.low is not None
+                    end = np.inf if found.high is None else found.high
+                    hits += found.low is not None and found.low <= truth <= end
+                cells.append(f"{100 * hits / printed:.1f}" if printed else "none")
+            lines.append(cells)
+    columns = ["metric", "truth", "unit sd", *(f"{n} units" for n in (2, 5, 6, 12))]
+    table(f"Coverage [%] of printed intervals; presses' sd {OF_PRESSES}, rows' 1", columns, lines)
 
 
 def differences(trials: int, seed: int) -> None:
@@ -250,7 +260,7 @@ def beyond(trials: int, seed: int) -> None:
         for own in (0.05, 0.1, 0.2, 0.5):
             rng = np.random.default_rng([seed, sessions, int(100 * own)])
             ours = fixed = clear = 0
-            for trial in range(trials):
+            for _ in range(trials):
                 noise = sigma * rng.normal(size=(sessions, hold + n))
                 wrong = own * slow(rng, sessions, n)
                 y, answered = noise[:, hold:].ravel(), wrong.ravel()
@@ -262,8 +272,8 @@ def beyond(trials: int, seed: int) -> None:
                 found = beyond_floor(floor, answers, unit)
                 ours += found.low <= own <= found.high
                 clear += found.low > 0
-                whole = score_interval(METRICS["rmse"], y, answered, session, unit, 0, trial)
-                low, high = (np.sqrt(max(0.0, end**2 - floor.value**2)) for end in (whole.low, whole.high))
+                whole = score_interval(METRICS["rmse"], y, answered, unit, 0)
+                low, high = (np.sqrt(max(0.0, end**2 - floor.value**2)) for end in (whole.low, whole.high or np.inf))
                 fixed += low <= own <= high
             share = [f"{100 * count / trials:.1f}" for count in (ours, fixed, clear)]
             lines.append([str(sessions), f"{own:g}", *share])
@@ -273,7 +283,7 @@ def beyond(trials: int, seed: int) -> None:
 
 PARTS = {
     "scores": scores,
-    "time": in_time,
+    "boards": boards,
     "differences": differences,
     "ranks": ranking,
     "errors": errors,

@@ -5,6 +5,7 @@ The command line goes through the same functions, and :func:`evaluate` computes 
 
 from __future__ import annotations
 
+import math
 import os
 import random
 import shutil
@@ -169,7 +170,8 @@ class Result(Results):
     score
         The metric over the test rows of all folds together.
     interval
-        Its ends, None where the table shows none; ``row["ci_method"]`` says over what.
+        Its ends over what the split holds out, the upper one infinite where it is open; None of fewer than five, whose
+        own scores are ``row["replicate_scores"]``. ``row["ci_method"]`` says over what.
     trivial
         Scores of the task's trivial answers by name; None of one that could not answer.
     fold_scores
@@ -187,7 +189,7 @@ class Result(Results):
         self.score: float = row["score"]
         self.interval: tuple[float, float] | None = None
         if row["ci_low"] is not None:
-            self.interval = row["ci_low"], row["ci_high"]
+            self.interval = row["ci_low"], math.inf if row["ci_high"] is None else row["ci_high"]
         self.trivial = {str(one["estimator"]): one["score"] for one in rows[1:]}
         self.fold_scores = {name.removeprefix("fold "): row["scores"].get(name) for name in row["fold_sizes"]}
         self.row, self.answers, self._task, self._names = row, answers, task, names

@@ -129,12 +129,16 @@ def _replicates(found: _Stored) -> Iterator[Field]:
     (row,) = over_replicates([row for row in found.store.rows() if row["cell"].rpartition("/")[0] == name])
     unit, many, of = str(row["unit"]), row["n_replicates"], str(row["replicate_unit"])
     yield "score", f"{score_with_unit(row['score'], unit)} over {counted(many, of)}"
-    yield f"{percent(many, of)} interval", f"{interval(row['ci_low'], row['ci_high'], unit)} {row['ci_method'] or ''}"
+    if row["ci_low"] is not None:
+        ends = interval(row["ci_low"], row["ci_high"], unit)
+        yield f"{percent(many, of)} interval", f"{ends} {row['ci_method']}"
     for name in ("score_beyond_floor", "reference_floor", "published"):
         if row[name] is not None:
             yield name.replace("_", " "), score_with_unit(row[name], unit)
-    for seed, value in zip(row["seeds"], row["replicate_scores"], strict=True):
-        yield f"score, seed {seed}", score_with_unit(value, unit)
+    kept = found.row["replicates"]
+    own = zip(kept["names"], kept["own"], strict=True) if of != "replicate" else ()
+    for label, value in own or zip((f"seed {seed}" for seed in row["seeds"]), row["replicate_scores"], strict=True):
+        yield f"score, {label}" if of == "replicate" else f"score, {of} {label}", score_with_unit(value, unit)
     if row["delay_parts_ms"] and row["answer_delay_ms"] is not None:
         yield "delay after touch", delay(row["answer_delay_ms"], row["delay_parts_ms"])
         yield from ((f"  {part}", duration(value / 1e3)) for part, value in row["delay_parts_ms"].items())

@@ -49,7 +49,7 @@ from tactbench.core.evaluation.leaks import copied_channels, leak_stamps
 from tactbench.core.evaluation.metrics import METRICS, Metric, class_f1, confusion, metric_called, vector_details
 from tactbench.core.evaluation.protocols import ProtocolSpec, protocol_called
 from tactbench.core.evaluation.reference_floor import beyond_floor, reference_floor, true_force
-from tactbench.core.evaluation.replicate_sums import replicates, summed
+from tactbench.core.evaluation.replicate_sums import recordings_right, replicates, summed
 from tactbench.core.evaluation.result import Result, Sizes, Times
 from tactbench.core.evaluation.sets import asked_for, prepared, tare_s, tared
 from tactbench.core.evaluation.splits import (
@@ -111,7 +111,7 @@ def evaluate_cell(context: CellContext, recordings: Sequence[Path] | Dataset) ->
     data = load_task(task, recordings, context.protocol, context.split, estimator=estimator, seed=seed)
     build = builder(estimator, context.params, task, seed, context.threads)
     return evaluate(
-        Configured(without_windows(estimator, task), build, context.params), data, clock=context.clock, seed=seed,
+        Configured(without_windows(estimator, task), build, context.params), data, clock=context.clock,
         threads=context.threads, latency=context.latency,
     )  # fmt: skip
 
@@ -277,7 +277,6 @@ def evaluate(
     data: TaskData,
     *,
     clock: Clock,
-    seed: int = 0,
     threads: int = 1,
     latency: bool = True,
 ) -> Result:
@@ -287,8 +286,8 @@ def evaluate(
     ----------
     estimator
         Any object with ``fit`` and ``predict``, which stays as it is; or one that is to be made anew.
-    clock, seed, threads, latency
-        As in :class:`CellContext`; `seed` decides what intervals resample.
+    clock, threads, latency
+        As in :class:`CellContext`.
     """
     if not isinstance(estimator, Configured):
         given = estimator
@@ -303,7 +302,7 @@ def evaluate(
             fitted = _fit(estimator, data, assignment, metric, counts, clock)
             answered.append(_answer(fitted, data, descriptor, metric, rules, number, clock))
         times, delay_remarks = _times(fitted, answered, data, descriptor, clock, threads, latency=latency)
-    return _result(answered, data, descriptor, metric, rules, times, delay_remarks, counts, seed)
+    return _result(answered, data, descriptor, metric, rules, times, delay_remarks, counts)
 
 
 def _fit(
@@ -461,7 +460,6 @@ def _result(
     times: Times,
     delay_remarks: Sequence[str],
     counts: Counter[str],
-    seed: int,
 ) -> Result:
     task, made = data.task, data.data
     n_classes = len(made.classes)
@@ -470,7 +468,7 @@ def _result(
     score = metric.of(tested.y_true, tested.y_pred, n_classes)
     if not np.isfinite(score):
         _refuse(descriptor.name, metric, tested)
-    unit = replicates(made, task, data.split, tested)
+    unit = replicates(made, data.split, tested)
     scores = {f"fold {one.name}": one.score for one in answered}
     if answered[-1].validation is not None:
         scores["validation"] = answered[-1].validation
@@ -490,11 +488,13 @@ def _result(
         if floor is not None:
             beside["beyond"] = beyond_floor(floor, tested, unit)
         if truth is not None:
-            interval = score_interval(metric, truth, tested.y_pred, tested.recording, unit, 0, seed)
+            interval = score_interval(metric, truth, tested.y_pred, unit, 0)
             beside["true"] = metric.of(truth, tested.y_pred), interval
     else:
         sums = metric.rows(tested.y_true, tested.y_pred, n_classes).sum(axis=0)
         beside["confusion"] = confusion(sums, n_classes).astype(np.int64)
+        if rules is None and task.answer_per != "frame":
+            beside["recordings_right"], beside["recordings_asked"] = recordings_right(tested) or (None, None)
         scores |= {
             f"F1 of {label}": float(one) for label, one in zip(made.classes, class_f1(sums, n_classes), strict=True)
         }
@@ -511,15 +511,17 @@ def _result(
         remarks.append("not tared: no recording states an unloaded hold")
     remarks += [_untrained(answered), *delay_remarks]
     took_part, left_out, stamps = _part_taken(data)
+    specimens = {meta.labels.get("unit") for meta in took_part}
     return Result(
         metric=metric.name,
         score=score,
-        interval=score_interval(metric, tested.y_true, tested.y_pred, tested.recording, unit, n_classes, seed),
+        interval=score_interval(metric, tested.y_true, tested.y_pred, unit, n_classes),
         # R² of labels that never change is undefined; a key that is not there says so, NaN would not even be JSON.
         scores={name: value for name, value in scores.items() if np.isfinite(value)},
         sizes=Sizes(
             n_recordings=len(took_part),
             n_sessions=len({meta.session for meta in took_part}),
+            n_specimens=None if None in specimens else len(specimens),
             n_train=sum(one.sizes[0] for one in answered),
             n_test=len(tested),
             fold_sizes={f"fold {one.name}": one.sizes for one in answered},
@@ -527,7 +529,7 @@ def _result(
         times=times,
         split=data.split,
         sets=sets,
-        replicates=summed(metric, tested, unit, made, floor),
+        replicates=summed(metric, tested, unit, n_classes, floor),
         classes=made.classes,
         chosen=_chosen(answered) | _thresholds(answered, rules),
         search=tuple(

@@ -1,4 +1,4 @@
-"""The interval of a score: over sessions, or over blocks of time where there are too few sessions."""
+"""The interval of a score over the units that a split holds out: sessions, objects, places or trials."""
 
 from __future__ import annotations
 
@@ -11,16 +11,14 @@ import numpy as np
 import numpy.typing as npt
 
 from tactbench.core.evaluation.metrics import Metric, confusion
-from tactbench.core.evaluation.time_blocks import RESAMPLES, block_length, circular_blocks
 from tactbench.core.samples import FloatArray, IntArray
+from tactbench.core.spec.row import plural
 
 LEVEL = 0.95
 ENOUGH_UNITS = 5
-"""Fewer than this cannot be resampled: the interval would be their range."""
-NOT_ONE = float(np.sqrt(2.0))
-"""Standard error of the log-odds of half an error in n rows: where not one was wrong, more may not be known."""
+"""Fewer than this cannot tell how units differ."""
 FURTHEST = 10.0
-"""An error's interval ends at so many times the error itself: few replicates may put no upper bound to it."""
+"""Multiple of an error from which on the upper end of its interval is open: so few units may put no bound to it."""
 _MOST_FREEDOM = 1e9
 """Degrees of freedom beyond which t is normal to all digits."""
 
@@ -29,14 +27,16 @@ _MOST_FREEDOM = 1e9
 class Interval:
     """Where a score may lie, and how that was found."""
 
-    low: float
-    high: float
-    method: str
+    low: float | None = None
+    """None: there are too few units for an interval"""
+    high: float | None = None
+    """None, with a `low`: the data put no upper bound to an error"""
+    method: str = ""
 
 
 @dataclass(frozen=True)
 class ReplicateUnits:
-    """What was repeated: sessions, groups or recordings."""
+    """What a split holds out: sessions, objects or recordings."""
 
     name: str
     """What one of them is called: session, object …"""
@@ -44,8 +44,6 @@ class ReplicateUnits:
     """(n,) which one each row belongs to"""
     labels: tuple[str, ...]
     """What each is called, by its code"""
-    caveat: str = ""
-    """What an interval over them does not know; added to how it was found"""
 
     def sums(self, rows: FloatArray) -> FloatArray:
         """Return (units, m) sums of (n, m) summands over the rows of each."""
@@ -54,7 +52,7 @@ class ReplicateUnits:
         return out
 
     def enough(self, y: npt.NDArray[Any], n_classes: int) -> bool:
-        """Tell whether there are enough of them to resample, of every class that occurs in (n,) labels."""
+        """Tell whether there are enough of them for an interval, of every class that occurs in (n,) labels."""
         each = [y == one for one in range(n_classes)]
         own = [self.codes, *(self.codes[mask] for mask in each if mask.any())]
         return all(len(np.unique(codes)) >= ENOUGH_UNITS for codes in own)
@@ -62,8 +60,8 @@ class ReplicateUnits:
     def strata(self, y: npt.NDArray[Any], n_classes: int) -> IntArray:
         """Return (units,) numbers, equal for units that may stand in for each other.
 
-        All of them, or class by class where each has one class only: without it a resample could lose a class, and its
-        score would be that of another question.
+        All of them, or class by class where each has one class only: a score without a class is that of another
+        question.
         """
         there = np.zeros((int(self.codes.max()) + 1, max(n_classes, 1)), dtype=bool)
         there[self.codes, y if n_classes else 0] = True
@@ -73,112 +71,72 @@ class ReplicateUnits:
 
 
 def score_interval(
-    metric: Metric,
-    y: npt.NDArray[Any],
-    predicted: npt.NDArray[Any],
-    recording: IntArray,
-    unit: ReplicateUnits,
-    n_classes: int,
-    seed: int,
+    metric: Metric, y: npt.NDArray[Any], predicted: npt.NDArray[Any], unit: ReplicateUnits, n_classes: int
 ) -> Interval:
-    """Return the interval of ``metric.of(y, predicted)``; rows of a recording are in time order.
+    """Return the interval of ``metric.of(y, predicted)``; no ends where fewer than five units, or of a class, tell it.
 
     Notes
     -----
-    With at least five units, each is left out in turn, those of one class standing in for each other only, and the
-    interval is Student's over units [1]_, on a scale that suits the metric (:func:`transform_of`). Percentiles of
-    resampled units cover less than they say where there are few: ``benchmarks/coverage.py``. One wrong answer or none
-    does not tell how units differ: the lower end is then at most that of n units right out of n [2]_, however many rows
-    they have; of one right answer or none, the upper end alike. With fewer units, or when a class is in fewer than
-    five, time is resampled instead: circular blocks within each recording, whose length follows from the
-    autocorrelation of the loss (`time_blocks`). Such an interval knows nothing of the spread between sessions and says
-    so.
+    Each unit is left out in turn, those of one class standing in for each other only, and the interval is Student's
+    over units [1]_, on a scale that suits the metric (:func:`transform_of`). Percentiles of resampled units cover less
+    than they say where there are few. Errors have half the degrees of freedom: offsets of units make their squares so
+    long-tailed that a spread of n of them is worth no more, as of numbers with an excess kurtosis of 2 (Box 1953,
+    Non-normality and tests on variances); with all of them 83 to 89 % were covered. Rows, or units within those that
+    are held out, are no replicates: an interval over them knows nothing of the spread between units.
+    ``benchmarks/coverage.py`` measures all of this.
+
+    A share so near to 1 that its mistakes would not fill one unit, in fewer than half of the units (or than five), does
+    not tell how units differ. Its lower end is multiplied by that of n units right out of n, ``0.025^(1/n)`` [2]_: a
+    kind of unit that occurs more often would have been met. Its upper end lets units with a mistake be as rare as the
+    binomial lower end of their number allows. An answer without any mistake is the limit of this rule; shares near 0
+    mirror it.
 
     References
     ----------
     .. [1] Cameron, Gelbach and Miller 2008, Bootstrap-based improvements for inference with clustered errors.
     .. [2] Clopper and Pearson 1934, The use of confidence or fiducial limits illustrated in the case of the binomial.
     """
-    rng = np.random.default_rng(np.random.SeedSequence([seed, 0xC1]))  # the same blocks for every figure of a cell
     rows = metric.rows(y, predicted, n_classes)
-    if unit.enough(y, n_classes):
-        return _of_units(metric, rows, y, unit, n_classes)
-    if len(np.unique(recording)) == len(recording):
-        return _of_too_few(metric, rows, n_classes)
-    total = np.zeros((RESAMPLES, rows.shape[1]))
-    lengths, sizes = [], []
-    for one in np.unique(recording):
-        mine = recording == one
-        length = block_length(loss_of(metric, y[mine], predicted[mine]))
-        lengths.append(length)
-        sizes.append(int(mine.sum()) / length)
-        total += circular_blocks(rows[mine], length, rng)
-    spread = f"{min(lengths)}" if min(lengths) == max(lengths) else f"{min(lengths)}–{max(lengths)}"
-    many = f"{len(lengths)} recording" + ("s" if len(lengths) > 1 else "")
-    method = f"block bootstrap in time within {many} (blocks of {spread} rows): spread between sessions is not in it"
-    score = float(metric.score(rows.sum(axis=0), n_classes))
-    scale = transform_of(metric.name, score, len(y))
-    resampled = scale.there(metric.score(total, n_classes))
-    resampled = resampled[np.isfinite(resampled)]  # R² of a resample whose labels are all alike
-    freedom = max(sum(sizes) - len(lengths), 1.0)
-    widened = np.sqrt(sum(sizes) / freedom)  # a variance of so many blocks is that much too small
-    return _student(metric, score, float(resampled.std()) * widened, freedom, scale, method)
-
-
-def _of_units(metric: Metric, rows: FloatArray, y: npt.NDArray[Any], unit: ReplicateUnits, n_classes: int) -> Interval:
-    """Return Student's interval over units, from what leaving each out changes."""
-    sums, strata = unit.sums(rows), unit.strata(y, n_classes)
-    score = float(metric.score(sums.sum(axis=0), n_classes))
+    sums = unit.sums(rows)
+    if not unit.enough(y, n_classes) or np.isfinite(own_scores(metric, sums, n_classes)).sum() < ENOUGH_UNITS:
+        return Interval()
+    strata, score = unit.strata(y, n_classes), float(metric.score(sums.sum(axis=0), n_classes))
     scale = transform_of(metric.name, score, len(y))
     without = scale.there(metric.score(sums.sum(axis=0) - sums, n_classes))
     without = np.where(np.isfinite(without), without, scale.there(score))  # R² of labels that are all alike
-    freedom = len(sums) - len(np.unique(strata))
-    over = f"{len(sums)} {plural(unit.name)}"
-    method = f"jackknife over {over} (Student's t, {freedom} degrees of freedom, {scale.name}){unit.caveat}"
-    deviation = float(np.sqrt((influences(without, strata) ** 2).sum()))
-    found = _student(metric, score, deviation, freedom, scale, method)
-    if metric.kind == "regression":
-        return found
-    right, least = np.trace(confusion(sums.sum(axis=0), n_classes)), (0.5 - LEVEL / 2) ** (1 / len(sums))
-    alike = f"{method}; no surer than {over} all alike (Clopper and Pearson)"
-    if rows.sum() - right <= 1:
-        return Interval(min(found.low, least), found.high, alike)
-    return Interval(found.low, max(found.high, 1 - least), alike) if right <= 1 else found
-
-
-def _student(
-    metric: Metric, score: float, deviation: float, freedom: float, scale: ScoreTransform, method: str
-) -> Interval:
-    """Return Student's interval of a score whose standard error on `scale` is `deviation`."""
-    if metric.kind != "regression" and score in (0.0, 1.0):
-        deviation = NOT_ONE
-    reach = float(student_quantile(freedom)) * deviation
+    n = len(sums)
+    freedom = (n - len(np.unique(strata))) / (2 if metric.kind == "regression" else 1)
+    method = f"jackknife over {n} {plural(unit.name)} (Student's t, {freedom:g} degrees of freedom, {scale.name})"
+    reach = float(student_quantile(freedom)) * float(np.sqrt((influences(without, strata) ** 2).sum()))
     ends = [float(scale.back(scale.there(score) + one * reach)) for one in (-1.0, 1.0)]
-    return Interval(min(*ends, score), max(*ends, score), method)
-
-
-def _of_too_few(metric: Metric, rows: FloatArray, n_classes: int) -> Interval:
-    """Return what a few rows, each a recording of its own, cannot exclude: there is no time to resample in them."""
-    method = f"none: {len(rows)} recordings of one row each are too few to resample; the range of what is possible"
+    low, high = min(*ends, score), max(*ends, score)
     if metric.kind != "regression":
-        return Interval(0.0, 1.0, method)
-    each = metric.score(rows, n_classes)
-    if not np.isfinite(each).all():  # R² of one row is undefined
-        each = metric.score(rows.sum(axis=0), n_classes)
-    return Interval(float(each.min()), float(each.max()), method)
+        right = np.trace(confusion(sums, n_classes), axis1=1, axis2=2)
+        wrong, hit = int((right < sums.sum(axis=1)).sum()), int((right > 0).sum())
+        few = max(ENOUGH_UNITS, n / 2)
+        if wrong < few and 1 - score < 1 / n:
+            low, high = _few_mistakes(score, low, high, wrong, n)
+            method += f"; {wrong} of them with a mistake (Clopper and Pearson)"
+        if hit < few and score < 1 / n:
+            high, low = (1 - one for one in _few_mistakes(1 - score, 1 - high, 1 - low, hit, n))
+            method += f"; {hit} of them with a right answer (Clopper and Pearson)"
+    return Interval(low, high if np.isfinite(high) else None, method)
 
 
-def plural(name: str) -> str:
-    """Return the name of several units."""
-    return name + ("es" if name.endswith("s") else "s")
+def _few_mistakes(score: float, low: float, high: float, wrong: int, n: int) -> tuple[float, float]:
+    """Return the ends of the interval of a share, where `wrong` of n units hold its few mistakes."""
+    tail = 0.5 - LEVEL / 2
+    low = (low if wrong else 1.0) * tail ** (1 / n)
+    if not wrong:
+        return low, 1.0
+    rare = importlib.import_module("scipy.special").betaincinv(wrong, n - wrong + 1, tail)
+    return low, max(high, 1 - (1 - score) * float(rare) * n / wrong)
 
 
-def loss_of(metric: Metric, y: npt.NDArray[Any], predicted: npt.NDArray[Any]) -> FloatArray:
-    """Return (n,) what each row adds to the error: its square, or whether the class is wrong."""
-    if metric.kind != "regression":
-        return np.asarray(y != predicted, dtype=np.float64)
-    squares = (predicted - y) ** 2
-    return np.asarray(squares.sum(axis=1)) if metric.vector else squares
+def own_scores(metric: Metric, sums: FloatArray, n_classes: int) -> FloatArray:
+    """Return (units,) the score of each by itself; not finite where the metric of it is undefined."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return metric.score(sums, n_classes)
 
 
 def student_quantile(freedom: Any) -> FloatArray:
@@ -228,8 +186,8 @@ class ScoreTransform:
 def transform_of(metric: str, score: float, n: int) -> ScoreTransform:
     """Return the scale of a metric on which Student's interval is to be made.
 
-    No error's interval reaches beyond ten times its `score`; a share of `n` rows is never nearer to 0 or 1 than half
-    of one.
+    The upper end of an error is infinite beyond ten times its `score`; a share of `n` rows is never nearer to 0 or 1
+    than half of one.
 
     Notes
     -----
@@ -243,7 +201,7 @@ def transform_of(metric: str, score: float, n: int) -> ScoreTransform:
         return ScoreTransform(
             "reciprocal scale",
             lambda x: 1.0 / np.maximum(x, least),
-            lambda x: 1.0 / np.maximum(x, 1.0 / (FURTHEST * max(score, least))),
+            lambda x: 1.0 / x if x > 1.0 / (FURTHEST * max(score, least)) else np.inf,
         )
     if metric == "r2":
         return ScoreTransform(

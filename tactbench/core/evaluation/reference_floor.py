@@ -17,7 +17,6 @@ from tactbench.core.evaluation.dataset import Dataset, Table
 from tactbench.core.evaluation.interval import ReplicateUnits, influences, student_quantile
 from tactbench.core.evaluation.metrics import Metric, ratio
 from tactbench.core.evaluation.sets import hold_s, unloaded
-from tactbench.core.evaluation.time_blocks import integrated_correlation
 from tactbench.core.samples import Answers, FloatArray, IntArray
 from tactbench.core.spec.task import ChannelTarget, TaskSpec
 
@@ -157,3 +156,28 @@ def true_force(task: TaskSpec, data: Dataset, tested: Answers) -> FloatArray | N
             return None
         out[mine] = np.interp(tested.time_s[mine], *meta.scene.profile.corners)
     return out
+
+
+def integrated_correlation(centred: FloatArray) -> float:
+    """Return the sum of all correlations of (n,) numbers about their mean, at least that of white noise: 1.
+
+    The mean of n of them varies by so many times ``variance / n``. By the flat-top lag window, whose bandwidth is twice
+    the last lag with a significant correlation (Politis and White 2004, Automatic block-length selection for the
+    dependent bootstrap).
+    """
+    n = len(centred)
+    if n < 8 or not (np.abs(centred) > 0).any():
+        return 1.0
+    centred = centred / np.abs(centred).max()
+    reach = max(5, int(np.ceil(np.sqrt(np.log10(n)))))
+    longest = min(int(np.ceil(np.sqrt(n))) + reach, n - 1)
+    spectrum = np.fft.rfft(centred, 1 << int(np.ceil(np.log2(2 * n))))  # padded: circular sums would wrap around
+    covariance = np.fft.irfft(np.abs(spectrum) ** 2)[: min(2 * longest, n - 1) + 1] / n
+    variance = float(np.mean(centred**2))
+    small = np.abs(covariance[1 : longest + 1] / variance) < 2.0 * np.sqrt(np.log10(n) / n)
+    last = next((lag for lag in range(len(small) - reach + 1) if small[lag : lag + reach].all()), longest)
+    bandwidth = min(2 * max(last, 1), len(covariance) - 1)
+    lags = np.arange(-bandwidth, bandwidth + 1)
+    ratio = np.abs(lags) / bandwidth
+    window = np.where(ratio <= 0.5, 1.0, 2.0 * (1.0 - ratio))
+    return max(float((window * covariance[np.abs(lags)]).sum()) / variance, 1.0)

@@ -6,6 +6,7 @@
      "names": ["s1", "s2", …],           in order of the names: two rows with the same names can be paired
      "strata": [0, 0, 1, …] or None,     which replicates may stand in for each other; None: all
      "sums": [[…], …]                    the metric's summands over each replicate
+     "own": [0.61, …]                    the score of each by itself; None where the metric of it is undefined
      "floor": [[…, …], …]}               of a RMSE whose reference has a floor: squares and degrees of freedom of its
                                          unloaded holds over each replicate
 
@@ -16,77 +17,58 @@ column, count …``. Scores follow exactly: :attr:`Metric.score` of the sum of a
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from tactbench.core.evaluation.dataset import Dataset
-from tactbench.core.evaluation.interval import ReplicateUnits, plural
+from tactbench.core.evaluation.interval import ReplicateUnits, own_scores
 from tactbench.core.evaluation.metrics import EXCESS, Metric
 from tactbench.core.evaluation.protocols import shots
 from tactbench.core.evaluation.reference_floor import Floor
 from tactbench.core.evaluation.splits import SPLITS_WITHOUT_GROUPS
 from tactbench.core.samples import Answers, FloatArray
-from tactbench.core.spec.task import TaskSpec
 
 
-def replicates(data: Dataset, task: TaskSpec, split: str, tested: Answers) -> ReplicateUnits:
-    """Return the unit of replication of every test row.
-
-    The coarsest unit of which there are enough to resample: the group that the split keeps apart, or else the session;
-    then the groups that the task names; then the recording; then the groups within recordings, such as presses. If
-    there are not enough of any, the first: the interval then resamples time and says so. Groups that some test row is
-    not in cannot be resampled.
-    """
-    first = "session" if split in SPLITS_WITHOUT_GROUPS or shots(split) else split
-    named = [name for name in task.splits if name not in (*SPLITS_WITHOUT_GROUPS, first) and not shots(name)]
-    names = list(dict.fromkeys([first, *named, "recording"]))
-    within = sorted(set(data.tables[0].groups) - set(names))
-    there = [one for one in (_unit(data, name, tested) for name in names) if one is not None]
-    finer = [one for one in (_unit(data, name, tested) for name in within) if one is not None]
-    units = [*there, *sorted(finer, key=lambda one: len(one.labels))]
-    for place, one in enumerate(units):
-        if one.enough(tested.y_true, len(data.classes)):
-            passed_over = " and ".join(plural(other.name) for other in units[:place])
-            return replace(one, caveat=f": spread between {passed_over} is not in it" if place else "")
-    return units[0]
-
-
-def _unit(data: Dataset, name: str, tested: Answers) -> ReplicateUnits | None:
-    """Return the groups of one name; None if some test row is in none."""
+def replicates(data: Dataset, split: str, tested: Answers) -> ReplicateUnits:
+    """Return the unit of replication of every test row: what the split keeps apart, or else the session."""
+    name = "session" if split in SPLITS_WITHOUT_GROUPS or shots(split) else split
     values = np.empty(len(tested), dtype=object)
     for place in np.unique(tested.recording):
         table, mine = data.tables[place], tested.recording == place
-        if name not in table.groups:
-            return None
         values[mine] = table.groups[name][np.searchsorted(table.row, tested.row[mine])]
     labels, codes = np.unique(values.astype(np.str_), return_inverse=True)
     return ReplicateUnits(name, codes.reshape(-1).astype(np.int64), tuple(labels.tolist()))
 
 
 def summed(
-    metric: Metric, tested: Answers, unit: ReplicateUnits, data: Dataset, floor: Floor | None = None
+    metric: Metric, tested: Answers, unit: ReplicateUnits, n_classes: int, floor: Floor | None = None
 ) -> dict[str, Any]:
-    """Return what a row keeps of its replicates.
-
-    Where there are too few of them, the sums are over recordings: no interval rests on them.
-    """
-    n_classes = len(data.classes)
-    if not unit.enough(tested.y_true, n_classes):
-        places, codes = np.unique(tested.recording, return_inverse=True)
-        unit = ReplicateUnits("recording", codes, tuple(data.metas[place].name for place in places))
+    """Return what a row keeps of its replicates."""
     strata = unit.strata(tested.y_true, n_classes)
     sums = unit.sums(metric.rows(tested.y_true, tested.y_pred, n_classes))
+    own = own_scores(metric, sums, n_classes)
     kept = {
         "unit": unit.name,
         "names": list(unit.labels),
         "strata": strata.tolist() if strata.any() else None,
         "sums": [_without_needless_points(line) for line in sums.tolist()],
+        "own": [float(one) if np.isfinite(one) else None for one in own],
     }
     if n_classes:
         kept["sums"] = [[int(one) for place in np.flatnonzero(line) for one in (place, line[place])] for line in sums]
     return kept | ({} if floor is None else {"floor": floor.by_replicate(tested, unit.codes).tolist()})
+
+
+def recordings_right(tested: Answers) -> tuple[int, int] | None:
+    """Return how many recordings most answers to which are right, and how many were tested; None if one has classes."""
+    right = []
+    for place in np.unique(tested.recording):
+        mine = tested.recording == place
+        if np.ptp(tested.y_true[mine]):
+            return None  # no recording of several classes is right or wrong as a whole
+        right.append(np.bincount(tested.y_pred[mine]).argmax() == tested.y_true[mine][0])
+    return sum(map(bool, right)), len(right)
 
 
 def _without_needless_points(line: list[float]) -> list[float]:

@@ -20,8 +20,10 @@ class Sizes:
     """How much was answered; named as in the row."""
 
     n_recordings: int
-    """that some fold uses; n_sessions alike"""
+    """that some fold uses; n_sessions and n_specimens alike"""
     n_sessions: int
+    n_specimens: int | None
+    """devices, by the label `unit`; None where a recording has none"""
     n_train: int
     n_test: int
     fold_sizes: Mapping[str, tuple[int, int]]
@@ -68,6 +70,10 @@ class Result:
     classes: tuple[Any, ...] = ()
     confusion: npt.NDArray[np.int64] | None = None
     """(true class, predicted class)"""
+    recordings_right: int | None = None
+    """test recordings most answers to which are right, of a classification; None where one has several classes"""
+    recordings_asked: int | None = None
+    """test recordings, of which some were right"""
     beyond: BeyondFloor | None = None
     """of an error of force: what is beyond the noise of the reference; None where that is not known"""
     true: tuple[float, Interval] | None = None

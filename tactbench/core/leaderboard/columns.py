@@ -7,9 +7,10 @@ from dataclasses import dataclass, field
 from typing import Literal, NamedTuple
 
 from tactbench.core.leaderboard.levels import KEY as LEVEL
-from tactbench.core.leaderboard.names import Row, answer_name
+from tactbench.core.leaderboard.names import Row, answer_name, held_out
 from tactbench.core.spec.status import STOPPED
 from tactbench.core.statistics.rank import Rank
+from tactbench.core.statistics.replicates import FEWEST
 from tactbench.core.tables.numbers import ABSENT, coarse, delay, duration, interval, score, tail, whole
 from tactbench.core.tables.text import visible
 
@@ -35,7 +36,8 @@ def _score(shown: str, key: str) -> Column:
 
 def _interval(shown: str, low: str, high: str) -> Column:
     def middle(row: Row) -> float | None:
-        return None if row.get(low) is None or row.get(high) is None else (row[low] + row[high]) / 2
+        ends = [end for end in (row.get(low), row.get(high)) if end is not None]
+        return sum(ends) / len(ends) if ends else None
 
     return Column(shown, lambda row: interval(row.get(low), row.get(high), row["unit"]), middle)
 
@@ -47,11 +49,16 @@ def _time(shown: str, key: str, per_second: float = 1.0) -> Column:
     return Column(shown, lambda row: duration(seconds(row)), seconds, timed=True)
 
 
-def _one_campaign(row: Row) -> str:
-    """Return between what the scores of single campaigns lie, where there are several."""
-    several = row.get("replicate_unit") == "replicate" and (row.get("n_replicates") or 0) > 1
-    low, high = row.get("score_min"), row.get("score_max")
-    return f"{coarse(low, row['unit'])} … {coarse(high, row['unit'])}" if several and low is not None else ABSENT
+def _range(row: Row) -> str:
+    """Return between what the scores of single campaigns lie; of what a split holds out each, where no interval is."""
+    scores, unit = row.get("replicate_scores") or [], row["unit"]
+    if len(scores) < 2 or (held_out(row) and row["ci_low"] is not None):
+        return ABSENT
+    several = f"{coarse(row['score_min'], unit)} … {coarse(row['score_max'], unit)}"
+    if not held_out(row):
+        return several
+    each = ", ".join(score(one, unit) for one in scores)
+    return visible(f"{each if len(scores) < FEWEST else several} by {row['replicate_unit']}")
 
 
 def _right(row: Row) -> str:
@@ -68,7 +75,7 @@ OF_ROWS: dict[str, Column] = {
     "estimator": Column("estimator", answer_name),
     "score": _score("score", "score"),
     "interval": _interval("interval", "ci_low", "ci_high"),
-    "range": Column("one_campaign", _one_campaign, lambda row: row.get("score_min")),
+    "range": Column("range", _range, lambda row: row.get("score_min")),
     "beyond floor": _score("beyond_floor", "score_beyond_floor"),
     "interval beyond floor": _interval("beyond_floor_interval", "beyond_floor_ci_low", "beyond_floor_ci_high"),
     "true error": _score("true_error", "true_score"),

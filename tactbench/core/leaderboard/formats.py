@@ -34,7 +34,7 @@ SUFFIXES = {
 """The format that a file is meant to have, by how its name ends."""
 IN_FOLDER = ("md", "csv", "json")
 """A run's result folder has these, ``leaderboard.md`` and so on; the others are made when asked for."""
-_IN_A_PAPER = ("sensor", "estimator", "score", "interval", "published")
+_IN_A_PAPER = ("sensor", "estimator", "score", "interval", "range", "published")
 _LONG = 12
 """Letters of a name in a paper from which its column breaks it."""
 
@@ -66,7 +66,8 @@ def _in_a_paper(block: Block, grid: TextTable, names: Sequence[str], number: int
     order = sorted(range(len(grid.lines)), key=lambda place: grid.kinds[place] == "baseline")
     lines = [dict(zip(grid.columns, grid.lines[place], strict=True)) for place in order]
     marked = [line.get("notes") or (NO_BETTER if line.get("place") == NO_BETTER else "") for line in lines]
-    names = [name for name in names if name in grid.columns and name != "notes"]
+    left_out = {"notes"} | ({"range"} if names == _IN_A_PAPER and "interval" in grid.columns else set())
+    names = [name for name in names if name in grid.columns and name not in left_out]
     shown = (tuple(line[name].replace(" … ", "–") for name in names) for line in lines)
     heads = dict(zip(grid.columns, grid.headers, strict=True))
     table = replace(

@@ -60,6 +60,11 @@ def split_name(split: str) -> str:
     return _SPLITS.get(split, f"split {'' if shots(split) else 'by '}{split}")
 
 
+def held_out(row: Row) -> bool:
+    """Return whether the replicates of a row are what its split holds out, and not campaigns."""
+    return row.get("replicate_unit") not in ("replicate", None)
+
+
 def sign_of(row: Row) -> float:
     """Return 1 where a lower score is better, else -1: a score times it is the lower the better."""
     return 1.0 if row["metric"] in LOWER_IS_BETTER else -1.0
@@ -121,7 +126,9 @@ class Bars:
     def unshown(self, row: Row) -> bool:
         """Return whether the interval of an answer holds the score of the trivial one, or lies beyond it."""
         end = row[WORSE_END[sign_of(row)]]
-        return end is not None and _reaches(sign_of(row) * end, row, self.score(row))
+        if end is None:  # an interval that is open above, or none
+            return row["ci_low"] is not None and self.score(row) is not None
+        return _reaches(sign_of(row) * end, row, self.score(row))
 
 
 def no_better(row: Row) -> bool:

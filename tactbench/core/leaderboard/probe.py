@@ -115,4 +115,6 @@ def _beyond_guessing(first: Row, trivial: float) -> bool | None:
         return float(importlib.import_module("scipy.special").bdtrc(right - 1, n, guess)) <= TAIL
     sign = sign_of(first)
     worst = first[WORSE_END[sign]]
-    return None if first["n_test"] < FEWEST or worst is None else sign * (trivial - worst) > 0
+    if first["n_test"] < FEWEST or first["ci_low"] is None:
+        return None
+    return worst is not None and sign * (trivial - worst) > 0

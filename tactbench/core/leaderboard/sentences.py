@@ -10,10 +10,11 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from tactbench.core.leaderboard.names import Bars, Row, answer_name, grouped, sign_of
+from tactbench.core.leaderboard.names import Bars, Row, answer_name, grouped, held_out, sign_of
+from tactbench.core.spec.row import plural
 from tactbench.core.spec.status import STOPPED
 from tactbench.core.statistics.rank import Rank, beyond_floor
-from tactbench.core.statistics.replicates import FEWEST, counted, percent
+from tactbench.core.statistics.replicates import FEWEST, count_range, counted, percent
 from tactbench.core.tables.numbers import interval, score, score_with_unit
 from tactbench.core.tables.text import cut
 
@@ -131,11 +132,11 @@ def _outcome(board: Board) -> str:
 
 def _too_few(rows: Sequence[Row]) -> str:
     """Return that there are too few campaigns, or sessions, to say more."""
-    if any(row.get("replicate_unit") != "replicate" for row in rows):
-        of_each = " of each class" if rows[0]["classes"] else ""
-        return f"Too few tested sessions for places, which need {FEWEST}{of_each}."
-    have = _counts([row["n_replicates"] for row in rows], "campaign")
-    more = " (`--repeats 8`)" if rows[0]["repeats"] < FEWEST else ""
+    if held_out(rows[0]):
+        unit, more = str(rows[0]["replicate_unit"]), " of each class" if rows[0]["classes"] else ""
+    else:
+        unit, more = "campaign", " (`--repeats 8`)" if rows[0]["repeats"] < FEWEST else ""
+    have = count_range([row["n_replicates"] for row in rows], unit)
     return f"{have}: too few for intervals and places, which need {FEWEST}{more}."
 
 
@@ -179,8 +180,8 @@ def _published(board: Board) -> str:
     alone = len({row["sensor"] for row in rows}) == len(rows)
 
     def beside(row: Row) -> str:
-        value = row["published"]
-        return "below" if value < row["ci_low"] else "above" if value > row["ci_high"] else "inside"
+        value, high = row["published"], row["ci_high"]
+        return "below" if value < row["ci_low"] else "above" if high is not None and value > high else "inside"
 
     figures = grouped(rows, beside)
     parts: list[str] = []
@@ -200,6 +201,7 @@ def below(board: Board) -> tuple[Note, ...]:
         *_ended(board, True),
         *_protocol(board),
         *_floors(board),
+        *_compared(board),
         *_how(board),
         *_hosts(board),
         *_ended(board, False),
@@ -264,25 +266,27 @@ def _how(board: Board) -> Iterator[Note]:
     campaigns = [row for row in board.answers if row.get("replicate_unit") == "replicate"]
     if campaigns:
         counts = [row["n_replicates"] for row in campaigns]
-        median = f"Score: median over {_counts(counts, 'campaign')}, each simulated anew with its own seed"
+        median = f"Score: median over {count_range(counts, 'campaign')}, each simulated anew with its own seed"
         interval_of = "; interval: of that median" if any(row["ci_low"] is not None for row in campaigns) else ""
         several = f"{median}{interval_of}; range: lowest … highest campaign"
         parts.append(several if max(counts) > 1 else "Score: of 1 campaign, simulated with its own seed")
-    sessions = [row for row in board.answers if row["ci_low"] is not None and row not in campaigns]
-    over = grouped((row for row in sessions if row.get("n_replicates")), lambda row: str(row["replicate_unit"]))
-    for unit, rows in over.items():
-        parts.append(f"Interval: over {_counts([row['n_replicates'] for row in rows], unit)}")
-    sentences = ["; ".join(parts)] if parts else []
+    sentences = list(parts)
     if board.times and any(row.get("answer_delay_ms") is not None for row in board.answers):
         sentences.append("Delay: sampling, link, window, computing; training: the final fit")
     if sentences:
         yield Note(f"{'. '.join(sentences)}.")
 
 
-def _counts(counts: Sequence[int], unit: str) -> str:
-    """Return how many of a unit rows are over, from the fewest to the most."""
-    least, most = min(counts), max(counts)
-    return counted(most, unit) if least == most else f"{least} to {counted(most, unit)}"
+def _compared(board: Board) -> Iterator[Note]:
+    """Yield how rows of several sensors are held against each other on recordings, and what that cannot say."""
+    rows = [row for row, _ in board.placed if held_out(row)]
+    if board.unranked or len({row["sensor"] for row in rows}) < 2:
+        return
+    unit = plural(str(rows[0]["replicate_unit"]))
+    shared = len({tuple(row["replicates"]["names"]) for row in rows}) == 1
+    how = f"paired over {unit}, which all rows share" if shared else f"unpaired: {unit} differ between rows"
+    one = "; one specimen of each sensor: how specimens differ is not known"
+    yield Note(f"Places: {how}{one if {row.get('n_specimens') for row in rows} == {1} else ''}.", printed=True)
 
 
 def _hosts(board: Board) -> Iterator[Note]:

@@ -34,8 +34,6 @@ from tactbench.core.tables.text import cut, visible
 from tactbench.core.tables.text_table import TextTable
 
 _Key = tuple[str, str, str, str]
-PLACED_OVER = ("replicate", "session", None)
-"""What places may rest on: what is recorded anew. None: a row that does not say."""
 LONGEST = 1000
 """Characters of a sentence on the provenance; the whole of it lies in the result folder."""
 
@@ -219,8 +217,9 @@ def places(results: Sequence[Row]) -> tuple[dict[str, Rank], str]:
 
 
 def _may_be_placed(row: Row) -> bool:
+    """Tell whether a row has enough campaigns, or units that its split holds out, for a place; or states none."""
     count = row.get("n_replicates")
-    return count is None or (count >= FEWEST and row.get("replicate_unit") in PLACED_OVER)
+    return count is None or (count >= FEWEST if row.get("replicate_unit") == "replicate" else row["ci_low"] is not None)
 
 
 def errors(results: Sequence[Row]) -> list[float]:

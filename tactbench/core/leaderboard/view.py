@@ -9,9 +9,9 @@ from dataclasses import dataclass, replace
 from tactbench.core.errors import UnknownNameError
 from tactbench.core.evaluation.protocols import is_probe
 from tactbench.core.leaderboard.columns import COLUMNS, DEFAULT, NUMERIC, SHOWN, Line
-from tactbench.core.leaderboard.names import Row, grouped, metric_name
+from tactbench.core.leaderboard.names import Row, grouped, held_out, metric_name
 from tactbench.core.leaderboard.table import Block, Table
-from tactbench.core.statistics.replicates import percent
+from tactbench.core.statistics.replicates import count_range, percent
 from tactbench.core.tables.text import command_line, visible
 from tactbench.core.tables.text_table import Entry, TextTable, finite
 
@@ -88,12 +88,17 @@ def grid(block: Block, view: View = DEFAULT_VIEW) -> TextTable:
         origin=block.origin,
         summary=(block.setting, *block.verdict),
         notes=tuple(map(str, block.notes)),
-        first_to_go=() if view.columns else _FIRST_TO_GO,
+        # Where there is no interval, the range stands in its place.
+        first_to_go=() if view.columns else tuple(n for n in _FIRST_TO_GO if n != "range" or _has(lines, "interval")),
         unbroken=frozenset({CELL}),
     )
     # A column of dashes says that nobody has a place.
     keep = ("place",) if any(texts["place"] for texts, _ in lines) else ()
     return table if view.columns else table.compact(keep)
+
+
+def _has(lines: Sequence[_Texts], column: str) -> bool:
+    return any(texts.get(column) for texts, _ in lines)
 
 
 def _texts(line: Line) -> dict[str, str]:
@@ -146,6 +151,10 @@ def headings(names: Sequence[str], block: Block) -> tuple[str, ...]:
     unit = "" if rows[0]["unit"] == "1" else visible(f" [{rows[0]['unit']}]")
     levels = {percent(row.get("n_replicates"), row.get("replicate_unit")) for row in rows if row["ci_low"] is not None}
     interval = f"{levels.pop()} interval" if len(levels) == 1 else "interval"
+    units = [row for row in rows if row["ci_low"] is not None and held_out(row)]
+    if units:
+        counts = [row["n_replicates"] for row in units]
+        interval += f" over {visible(count_range(counts, str(units[0]['replicate_unit'])))}"
     shown = {"score": metric_name(rows[0]), "interval": interval, "notes": ""}
     shown |= {name: f"{name}{unit}" for name in ("beyond floor", "true error")}
     return tuple(shown.get(name, name) for name in names)

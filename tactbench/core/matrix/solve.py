@@ -123,7 +123,7 @@ def solve(job: Job, concurrency: int = 1, given: Estimator | None = None) -> Sol
         result = evaluate_cell(context, data)
     else:
         folds = load_task(task, data, cell.protocol, cell.split, seed=cell.seed)
-        result = evaluate(given, folds, clock=time.perf_counter, seed=cell.seed, latency=cell.timed)
+        result = evaluate(given, folds, clock=time.perf_counter, latency=cell.timed)
     row = {
         **opening(cell, task),
         **row_of(result),

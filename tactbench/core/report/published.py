@@ -77,9 +77,10 @@ def stands_beside(row: Row, task: TaskSpec, published: Published) -> bool:
 def _verdict(row: Row, published: float) -> tuple[Verdict, str]:
     if row["status"] != "done":
         return "no answer", f"{row['status']}: {row['reason']}"
-    if row["ci_low"] is None or row["ci_high"] is None:
+    low, high = row["ci_low"], row["ci_high"]
+    if low is None:
         return "no interval", ""
-    return "inside" if row["ci_low"] <= published <= row["ci_high"] else "outside", ""
+    return "inside" if low <= published and (high is None or published <= high) else "outside", ""
 
 
 def _command(task: TaskSpec, published: Published) -> str:

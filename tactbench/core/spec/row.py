@@ -18,6 +18,11 @@ MEDIAN_ERROR, HIGH_ERROR = "median error", "95th percentile of the error"
 Numbers = dict[str, float]
 
 
+def plural(unit: str) -> str:
+    """Return the name of several units of replication."""
+    return unit + ("es" if unit.endswith("s") else "s")
+
+
 class RowModel(BaseModel):
     """One cell. Times are seconds unless the name says otherwise; a row may have other keys, of which nothing is asked.
 
@@ -75,6 +80,7 @@ class RowModel(BaseModel):
     published_remark: str = ""
     n_recordings: int | None = None
     n_sessions: int | None = None
+    n_specimens: int | None = None
     n_train: int | None = None
     n_test: int | None = None
     # What it cost
@@ -111,6 +117,8 @@ class RowModel(BaseModel):
     fold_sizes: dict[str, Any] = {}
     confusion: list[list[Any]] | None = None
     classes: list[str | bool | int | float] = []
+    recordings_right: float | None = None
+    recordings_asked: float | None = None
     events: Numbers = {}
     operating_points: list[Numbers] = []
     recordings: list[str] = []
@@ -127,8 +135,6 @@ class ReplicatedRow(RowModel):
     seeds: list[float] | None = None
     score_min: float | None = None
     score_max: float | None = None
-    recordings_right: float | None = None
-    recordings_asked: float | None = None
 
 
 def _members(annotation: Any) -> list[Any]:

@@ -11,6 +11,7 @@ from statistics import median, median_low
 from typing import Any
 
 from tactbench.core.matrix.summary import fill_baselines
+from tactbench.core.spec.row import plural
 
 Row = Mapping[str, Any]
 
@@ -43,16 +44,15 @@ def over_replicates(rows: Sequence[Row]) -> list[dict[str, Any]]:
     -------
     list of dict
         In the order in which the cells come first. On a simulated rig `score` is the median over replicates, and the
-        interval is that of the median (:func:`median_interval`), None of fewer than five. On recordings the replicates
-        are the sessions (or coarser groups) within the row, whose own interval stays if there are five or more; of
-        several seeds asked of the same recordings the one with the median score stands for all. Times are medians.
-        Recordings, answers and key are those of the first replicate.
+        interval is that of the median (:func:`median_interval`), None of fewer than five. On recordings, and
+        of a single campaign whose split holds out five units, the replicates are those, and the row's own interval stays; of several seeds asked of the same recordings
+        the one with the median score stands for all. Times are medians. Recordings, answers and key are those of the
+        first replicate.
 
     Notes
     -----
     Keys that are added: `n_replicates`, `replicate_unit`, `replicate_scores`, `seeds`, `score_min` and `score_max` (the
-    range of the replicates' scores), `recordings_right` and `recordings_asked` (of a classification: test recordings
-    most of whose samples were classified rightly, the mean over replicates).
+    range of the replicates' scores). `recordings_right` and `recordings_asked` are means over replicates.
     """
     groups: dict[str, list[Row]] = {}
     for row in rows:
@@ -78,17 +78,16 @@ def _of_all(name: str, members: Sequence[Row]) -> dict[str, Any]:
         return dict(first)
     done = [row for row in members if row["status"] == "done"]
     if not done:
-        counted = _counted([first], len(members), "replicate", [])
-        return {**first, **counted, "replicates": {}, "cell": name, **_right(done)}
-    found = _of_campaigns(done) if done[0]["simulated"] else _of_sessions(done)
-    return {**found, "cell": name, "repeat": first["repeat"], "remarks": _remarks(members, done), **_right(done)}
+        return {**first, **_counted([first], len(members), "replicate", []), "replicates": {}, "cell": name}
+    found = _of_campaigns(done) if done[0]["simulated"] else _of_recordings(done)
+    return {**found, "cell": name, "repeat": first["repeat"], "remarks": _remarks(members, done)}
 
 
 def _of_campaigns(done: Sequence[Row]) -> dict[str, Any]:
     """Return the row of a simulated cell: each replicate is a campaign recorded anew."""
     first = done[0]
-    if len(done) == 1 and _sessions(first) >= FEWEST:
-        return _of_sessions(done)
+    if len(done) == 1 and first["ci_low"] is not None:
+        return _of_recordings(done)  # its split holds out enough of what is simulated, too: devices, placements
     found = dict(first) | {key: _median([row.get(key) for row in done]) for key in _MEDIANS if key in first}
     level = 0.0
     for key, (low, high) in _INTERVALS.items():
@@ -114,6 +113,7 @@ def _of_campaigns(done: Sequence[Row]) -> dict[str, Any]:
         "answer_delay_ms": None if found.get("answer_delay_ms") is None else sum(parts.values()),
         "confusion": _added([row["confusion"] for row in done]),
         "counts": dict(sum((Counter(row["counts"]) for row in done), Counter[str]())),
+        **{key: _mean([row.get(key) for row in done]) for key in ("recordings_right", "recordings_asked")},
     }
 
 
@@ -132,13 +132,17 @@ def _kept(done: Sequence[Row]) -> dict[str, Any]:
     return kept
 
 
-def _of_sessions(done: Sequence[Row]) -> dict[str, Any]:
-    """Return the row of a cell whose replicates are the sessions in it; of several seeds the median one's."""
+def _of_recordings(done: Sequence[Row]) -> dict[str, Any]:
+    """Return the row of a cell whose replicates are what its split holds out; of several seeds the median one's.
+
+    A row that does not keep their own scores has an interval over something else, and loses it.
+    """
     middle = median_low([row["score"] for row in done])
     row = next(row for row in done if row["score"] == middle)
-    many = _sessions(row)
-    found = {**row, **_counted(done, max(many, 1), _unit(row) if many else "session", [one["score"] for one in done])}
-    if many < FEWEST:
+    kept = row.get("replicates") or {}
+    own, unit = kept.get("own") or [], str(kept.get("unit") or "session")
+    found = {**row, **_counted(done, max(len(own), 1), unit, [one for one in own if one is not None])}
+    if not own or row["ci_low"] is None:
         ends = dict.fromkeys([end for both in _INTERVALS.values() for end in both if end in row])
         found |= {**ends, "ci_method": "", "replicates": {}}
     return found
@@ -156,18 +160,13 @@ def _counted(done: Sequence[Row], n: int, unit: str, scores: list[float]) -> dic
     }
 
 
-def _unit(row: Row) -> str:
-    return str((row.get("replicates") or {}).get("unit", ""))
-
-
-def _sessions(row: Row) -> int:
-    """Return how many sessions, or groups, a row's own interval is over; 0 if recordings are all that was repeated."""
-    return 0 if _unit(row) == "recording" else len((row.get("replicates") or {}).get("names", ()))
-
-
 def _median(values: Sequence[Any]) -> float | None:
     known = [float(value) for value in values if value is not None]
     return median(known) if known else None
+
+
+def _mean(values: Sequence[Any]) -> float | None:
+    return None if None in values else sum(values) / len(values)
 
 
 def _chosen(done: Sequence[Row]) -> dict[str, Any]:
@@ -195,35 +194,6 @@ def _remarks(members: Sequence[Row], done: Sequence[Row]) -> list[str]:
     texts = [remark if n == many else f"in {n} of {many} replicates: {remark}" for remark, n in counts.items()]
     stopped = [row for row in members if row["status"] != "done"]
     return [*texts, *(f"replicate with seed {row['seed']}: {row['status']}: {row['reason']}" for row in stopped)]
-
-
-def _right(done: Sequence[Row]) -> dict[str, Any]:
-    """Return how many test recordings were classified rightly by most of their samples, the mean over replicates."""
-    each = [found for row in done if (found := recordings_right(row)) is not None]
-    if not each or len(each) < len(done):
-        return {"recordings_right": None, "recordings_asked": None}
-    return {
-        "recordings_right": sum(right for right, _ in each) / len(each),
-        "recordings_asked": sum(total for _, total in each) / len(each),
-    }
-
-
-def recordings_right(row: Row) -> tuple[int, int] | None:
-    """Return how many test recordings of one class each were classified rightly, and how many were tested.
-
-    None of a regression, and where the row does not keep its recordings apart.
-    """
-    n = len(row["classes"])
-    if not n or _unit(row) != "recording":
-        return None
-    right = 0
-    for line in row["replicates"]["sums"]:
-        counts = dict(zip(line[::2], line[1::2], strict=True))
-        if len({column // n for column in counts}) != 1:
-            return None  # samples of several classes: no recording is right or wrong as a whole
-        commonest = max(counts, key=lambda column: counts[column])
-        right += commonest // n == commonest % n
-    return right, len(row["replicates"]["sums"])
 
 
 @dataclass(frozen=True)
@@ -260,14 +230,20 @@ def median_interval(values: Sequence[float]) -> MedianInterval | None:
         return MedianInterval(ordered[0], ordered[-1], held)
     share = (held - LEVEL) / (held - next_held)
     weight = (n - k) * share / (k + (n - 2 * k) * share)
-    low = (1 - weight) * ordered[k - 1] + weight * ordered[k]
-    high = (1 - weight) * ordered[n - k] + weight * ordered[n - k - 1]
+    low = ordered[k - 1] + weight * (ordered[k] - ordered[k - 1])  # of equal values exactly these
+    high = ordered[n - k] - weight * (ordered[n - k] - ordered[n - k - 1])
     return MedianInterval(low, high, LEVEL)
 
 
 def counted(n: int, unit: str) -> str:
     """Return so many of a unit of replication as text: ``8 replicates``, ``20 presses``, ``1 session``."""
-    return f"{n} {unit}" if n == 1 else f"{n} {unit}{'es' if unit.endswith('s') else 's'}"
+    return f"{n} {unit if n == 1 else plural(unit)}"
+
+
+def count_range(counts: Sequence[int], unit: str) -> str:
+    """Return how many of a unit there are, from the fewest to the most: ``5 to 8 sessions``."""
+    least, most = min(counts), max(counts)
+    return counted(most, unit) if least == most else f"{least} to {counted(most, unit)}"
 
 
 def percent(n: int | None, unit: str | None) -> str:

@@ -21,8 +21,8 @@ def coarse(value: float | None, unit: str) -> str:
 
 
 def interval(low: float | None, high: float | None, unit: str) -> str:
-    """Return an interval in the digits of its score."""
-    return ABSENT if low is None or high is None else f"{score(low, unit)} … {score(high, unit)}"
+    """Return an interval in the digits of its score; one that the data do not bound above is open."""
+    return ABSENT if low is None else f"{score(low, unit)} … {'open' if high is None else score(high, unit)}"
 
 
 def signed(value: float, unit: str) -> str:

@@ -28,6 +28,7 @@ def boards(draw):
     repeats = draw(st.integers(1, 9))
     rng = np.random.default_rng(draw(st.integers(0, 2**32 - 1)))
     common = 0.1 * rng.standard_normal(repeats)
+    unit = draw(st.sampled_from(["session", "recording", "press"]))
     rows = []
     for sensor in draw(st.sampled_from(["a", "ab", "abc"])):
         for estimator in draw(st.sampled_from(ESTIMATORS)):
@@ -46,14 +47,18 @@ def boards(draw):
             }
             if not simulated:
                 squares = each.round(6) ** 2
+                begins = draw(st.sampled_from([0, 0, 3]))
                 kept = {
-                    "unit": draw(st.sampled_from(["session", "recording", "press"])),
-                    "names": list(map(str, range(repeats))),
+                    "unit": unit,
+                    "names": list(map(str, range(begins, begins + repeats))),
                     "strata": None,
-                    "sums": [[10.0, 10.0 * one] for one in squares],
+                    "sums": [[10.0 * one, 10.0] for one in squares],
+                    "own": np.sqrt(squares).tolist(),
                 }
                 score = float(np.sqrt(squares.mean()))
-                ends = {"ci_low": score - 0.1, "ci_high": score + 0.1, "n_sessions": 5}
+                ends = {"ci_low": None, "ci_high": None, "n_specimens": draw(st.sampled_from([None, 1, 1, 2]))}
+                if repeats >= 5:
+                    ends |= {"ci_low": score - 0.1, "ci_high": draw(st.sampled_from([score + 0.1, None]))}
                 rows.append(row(sensor, estimator, score, replicates=kept, **ends, **RECORDED, **more))
                 continue
             for seed, one in enumerate(map(float, each), 1):
@@ -89,14 +94,22 @@ class Truth:
         self.answers = [one for one in rows if not one["is_baseline"]]
         self.better = [one for one in self.answers if not self.reaches(one, one["score"])]
         self.worse = [one for one in self.answers if one not in self.better]
-        self.unshown = [one for one in self.better if self.reaches(one, one["ci_high" if self.sign > 0 else "ci_low"])]
+        known = [one for one in self.better if one["ci_low"] is not None]
+        self.unshown = [one for one in known if self.reaches(one, self.worse_end(one))]
         self.several = len({one["sensor"] for one in rows}) > 1
         self.floor = all(one.get("reference_floor") is not None for one in self.better)
         self.ranks = ranked(self.better) if self.better and all(map(self.enough, self.better)) else None
 
     @staticmethod
     def enough(one):
-        return one["n_replicates"] >= 5 and one["replicate_unit"] in ("replicate", "session")
+        return one["n_replicates"] >= 5
+
+    def shared(self):
+        return len({tuple(one["replicates"]["names"]) for one in self.better}) == 1
+
+    def worse_end(self, one):
+        end = one["ci_high" if self.sign > 0 else "ci_low"]
+        return np.inf if end is None else end
 
     def bar(self, one):
         """The best trivial answer of the same sensor."""
@@ -175,10 +188,9 @@ class Truth:
         family = [one for one in self.stopped if one["status"] == status]
         return len([one for one in family if one["reason"] != reason]) == others < len(family)
 
-    def how(self, interval, campaigns, units, delay):
+    def how(self, interval, campaigns, delay):
         some = [one for one in self.answers if one["ci_low"] is not None]
         assert not campaigns or (self.counts(campaigns, self.answers) and bool(interval) == bool(some))
-        assert not units or self.counts(units, some)
         return bool(delay) == any(one["answer_delay_ms"] is not None for one in self.answers)
 
     def counts(self, text, rows):
@@ -205,10 +217,9 @@ ABOVE = {
         lambda t, a, b: t.better == t.answers == [t.called(a)] and t.bars(b, t.better),
     rf"{NAME} is the only of (\d+) answers that is better than the trivial one of its own sensor \((.*)\)\.":
         lambda t, a, n, b: t.better == [t.called(a)] and int(n) == len(t.answers) and t.bars(b, t.better),
-    r"(.*campaigns?): too few for intervals and places, which need 5(?: \(`--repeats 8`\))?\. (\S+) has .*\.":
+    r"(.*(?:campaign|session|recording|press)(?:e?s)?): too few for intervals and places, which need 5"
+    r"(?: \(`--repeats 8`\))?\. (\S+) has .*\.":
         lambda t, n, a: t.counts(n, t.better) and min(o["n_replicates"] for o in t.better) < 5 and t.leads(a),
-    r"Too few tested sessions for places, which need 5(?: of each class)?\. (\S+) has .*\.":
-        lambda t, a: not all(map(t.enough, t.better)) and t.leads(a),
     r"(?:The only answer|None of (\d+) answers) scores (?:no )?better than the trivial one of its own sensor "
     r"\((.*)\)\.":
         lambda t, n, b: not t.better and int(n or 1) == len(t.answers) and t.bars(b, t.answers),
@@ -227,9 +238,13 @@ BELOW = {
     r"Beyond floor: the root of RMSE² − floor²(; places go by it)?\. Floor: .* \((?:[abc] 0\.1000(?:, )?)+\)\.":
         lambda t, by: bool(by) == (bool(t.better) and t.floor),
     r"(?:(Score: (?:median over (.*? campaigns), each simulated anew|of 1 campaign, simulated) with its own seed"
-    r"(; interval: of that median)?[^=.]*|Interval: over ([^.]*))(?:\. |\.$))?"
+    r"(; interval: of that median)?[^=.]*)(?:\. |\.$))?"
     r"(Delay: sampling, link, window, computing; training: the final fit\.)?":
-        lambda t, s, n, i, m, delay: t.how(i, n or "1" * ("of 1 campaign" in (s or "")), m, delay),
+        lambda t, s, n, i, delay: t.how(i, n or "1" * ("of 1 campaign" in (s or "")), delay),
+    r"Places: (paired over (?:sessions|recordings|presses), which all rows share|unpaired: .* differ between rows)"
+    r"(; one specimen of each sensor: how specimens differ is not known)?\.":
+        lambda t, pairs, one: pairs.startswith("paired") == t.shared()
+        and bool(one) == ({o["n_specimens"] for o in t.better} == {1}),
     r"Times cannot be compared: (taken on 2 hosts)?(?: and )?(taken while up to 4 cells ran)?\.":
         lambda t, hosts, many: bool(hosts) == (len({o["host"] for o in t.answers}) == 2)
         and bool(many) == any(o["concurrency"] == 4 for o in t.answers),

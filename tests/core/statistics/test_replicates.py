@@ -12,7 +12,6 @@ from tactbench.core.statistics.replicates import (
     MedianInterval,
     median_interval,
     over_replicates,
-    recordings_right,
 )
 from tests.core.leaderboard.rows import row
 
@@ -61,13 +60,18 @@ def test_what_some_replicates_remark_is_told_with_their_number_and_a_stopped_one
     assert found["remarks"] == ["always", "in 2 of 7 replicates: at times", stopped]
 
 
-def test_recordings_keep_the_interval_over_their_sessions_and_lose_one_that_is_not_over_sessions():
-    names = [f"s{place}" for place in range(6)]
-    for unit, kept in (("session", True), ("recording", False)):
-        one = row(simulated=False, replicates={"unit": unit, "names": names, "strata": None, "sums": []})
-        (found,) = over_replicates([one])
-        assert (found["ci_low"] is not None) is kept
-        assert (found["n_replicates"], found["replicate_unit"]) == ((6, "session") if kept else (1, "session"))
+def test_recordings_keep_the_interval_over_what_is_held_out_and_fewer_than_five_have_their_own_scores():
+    own = [0.5, 0.3, None, 0.4, 0.6, 0.2]
+    kept = {"unit": "object", "names": list("abcdef"), "strata": None, "sums": [], "own": own}
+    (found,) = over_replicates([row(simulated=False, replicates=kept)])
+    assert (found["n_replicates"], found["replicate_unit"], found["score_min"]) == (6, "object", 0.2)
+    assert (found["ci_low"], found["ci_high"]) == pytest.approx((0.4, 0.6))
+    few = kept | {"names": ["a", "b"], "own": own[:2]}
+    (found,) = over_replicates([row(simulated=False, replicates=few, ci_low=None, ci_high=None)])
+    assert (found["replicate_scores"], found["replicates"]) == ([0.5, 0.3], {})
+    # Rows of versions that took finer units do not keep the units' own scores.
+    (found,) = over_replicates([row(simulated=False, replicates={name: kept[name] for name in kept if name != "own"})])
+    assert (found["ci_low"], found["ci_high"], found["replicates"]) == (None, None, {})
     (found,) = over_replicates([one | {"simulated": False} for one in replicates(SCORES)])
     assert (found["n_replicates"], found["ci_low"]) == (1, None), "seeds asked of the same recordings are no replicates"
     assert found["score"] in SCORES
@@ -82,15 +86,6 @@ def test_errors_of_force_are_compared_beyond_their_floor():
     assert "beyond the floor" in found.method
     own, others = (each["replicates"]["beyond"] for each in (one, other))
     assert found.value == pytest.approx(np.mean(own) - np.mean(others))
-
-
-def test_recordings_classified_rightly_are_counted_by_most_of_their_samples():
-    # Three classes: lines of (column of the confusion matrix, count).
-    lines = [[0, 9, 1, 1], [4, 2, 5, 8], [8, 10]]
-    kept = {"unit": "recording", "names": ["x", "y", "z"], "strata": None, "sums": lines}
-    assert recordings_right(row(classes=["p", "q", "r"], replicates=kept)) == (2, 3)
-    mixed = kept | {"sums": [[0, 4, 4, 1]], "names": ["x"]}
-    assert recordings_right(row(classes=["p", "q", "r"], replicates=mixed)) is None
 
 
 def test_five_have_their_range_and_eight_the_ends_of_the_published_formula():

@@ -1,6 +1,6 @@
 """Hard recordings for every protocol and every installed estimator, each made by hand and evaluated from its file.
 
-The right answer of all of them: a finite score within a finite interval, or an error that says what was given, what was
+The right answer of all of them: a finite score within its interval, or an error that says what was given, what was
 expected and the next step. Never NaN, never a hang, never a warning.
 """
 
@@ -101,8 +101,8 @@ def any_data(case, *, protocol, name, kind):
         case.says(split=str(split))
         result = evaluated(asked, paths, name, protocol, split, params=QUICK.get(name), latency=True)
     low, high = result.interval.low, result.interval.high
-    case.holds(np.isfinite([result.score, low, high]).all(), f"the score is {result.score} in {low} to {high}")
-    case.holds(low <= high, f"the interval runs from {low} to {high}")
+    case.holds(np.isfinite(result.score), f"the score is {result.score}")
+    case.holds(low is None or high is None or low <= result.score <= high, f"the interval runs from {low} to {high}")
     case.holds(np.isfinite(list(result.scores.values())).all(), f"a score is none: {result.scores}")
     warned = [text for text in result.counts if "RuntimeWarning" in text]
     case.holds(not warned, f"{warned}")

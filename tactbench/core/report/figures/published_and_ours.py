@@ -38,8 +38,8 @@ def draw_published(results: Results) -> Sketch | None:
     figure.suptitle("Published scores and ours" + (" (SIM: ours are simulated)" if simulated else ""))
     legend(figure, axes[:, 0])
     parts = [
-        "Open black diamonds are the published scores; filled circles are our scores, the median over replicates where "
-        "there are several (small strokes), with their intervals where there are five or more."
+        "Open black diamonds are the published scores; filled circles are our scores, small strokes those of each "
+        "replicate, with intervals where five or more tell one."
     ]
     parts += [text for key, text in MARKS.items() if any(row[key] for row in rows)]
     parts.append(f"Published: {'; '.join(dict.fromkeys(line.published.reference for line, _ in every))}.")
