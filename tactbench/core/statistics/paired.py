@@ -17,7 +17,7 @@ from tactbench.core.evaluation.metrics import METRICS
 from tactbench.core.evaluation.replicate_sums import tables_of
 from tactbench.core.samples import FloatArray, IntArray
 from tactbench.core.statistics.influence import PairableRows, scores_of, together
-from tactbench.core.statistics.replicates import counted
+from tactbench.core.statistics.replicates import FEWEST, counted
 
 Row = Mapping[str, Any]
 Verdict = Literal["better", "worse", "equivalent", "undecided"]
@@ -131,7 +131,7 @@ def _unpaired(first: Row, second: Row, value: float, sign: float, groups: list[P
         known: dict[str, Any] = dict.fromkeys(("p", "smallest_p", "effect", "improved"))
         return _difference(
             first, value, np.inf, np.inf,
-            **known, replicates=0, unit=unit, paired=False, method="not paired (replicates are missing)",
+            **known, replicates=0, unit=unit, paired=False, method=f"too few replicates for an interval, which needs {FEWEST}",
         )  # fmt: skip
     one, other = sorted(groups, key=lambda group: int(group.places[0]))
     deviation = float(np.sqrt((one.influence**2).sum() + (other.influence**2).sum()))
