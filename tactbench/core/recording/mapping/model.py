@@ -31,6 +31,8 @@ class Tabular(Frozen):
     """Lines before the header or the first row that mean nothing."""
     no_sample: tuple[str, ...] = ()
     """Cells with exactly one of these texts hold no sample, for example "" or "NA"."""
+    transposed: bool = False
+    """True: a line holds all samples of one channel; with `header` its first cell is the name."""
 
 
 class Csv(Tabular):
