@@ -87,7 +87,7 @@ def read(mapping: Mapping, files: FileSet) -> Iterator[RawRecording]:
     (first, source), *_ = mapping.tables.items()
     if isinstance(source.read, Arrays):
         file = files.files[first]
-        for words, array in read_arrays(file.path, file.shown, source.read):
+        for words, array in read_arrays(file.path, file.shown, source.read, file.words):
             yield RawRecording({first: array}, {**files.words, **words}, shown)
         return
     tables: dict[str, Table] = {}

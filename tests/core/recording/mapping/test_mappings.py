@@ -142,6 +142,37 @@ def test_an_archive_of_arrays(tables, name):
     assert meta.labels == {"slip": "yes", "block": "1"}
 
 
+NPY = """
+clock: none
+tables:
+  table:
+    files: "x_*.npy"
+    path: "x_(?P<fold>[a-z]+)"
+    read: {format: npy, axes: [recording, channel, channel, row], per_recording: {y: "labels_{fold}.npy"}}
+recording: {name: "{fold}-{index}", session: s, labels: {material: "{y}"}}
+streams:
+  taxels: {table: table, dtype: float32, channels: [{columns: 0..5, name: "t{column}", kind: taxel, unit: count}]}
+"""
+
+
+def test_arrays_in_files_of_their_own_with_channels_on_a_grid(tables):
+    X = np.random.default_rng(0).normal(size=(4, 2, 3, 5)).astype(np.float32)
+    for fold, labels in (("a", [3, 1, 2, 0]), ("b", [0, 0, 7, 0])):
+        np.save(tables.data / f"x_{fold}.npy", X if fold == "a" else -X)
+        np.save(tables.data / f"labels_{fold}.npy", labels)
+    report = tables.run(NPY)
+    meta, streams = read(report, 6)
+    assert (meta.name, meta.labels) == ("b-2", {"material": "7"})
+    assert np.array_equal(streams["taxels"].data, -X[2].reshape(6, 5).T)
+
+
+def test_a_pickled_array_and_one_without_its_labels_are_refused(tables):
+    np.save(tables.data / "x_a.npy", np.zeros((4, 2, 3, 5)))
+    tables.refused("labels_a.npy", text=NPY)
+    np.save(tables.data / "labels_a.npy", np.array([0, 1, 2, "a"], dtype=object))
+    tables.refused("x_a.npy cannot be read", "allow_pickle", text=NPY)
+
+
 def test_a_sheet_of_an_excel_workbook_and_words_for_no_sample(tables):
     book = openpyxl.Workbook()
     lines = [[row * 0.01, row, row / 3, {3: None, 4: "NA", 5: "nan"}.get(row, 1), row * 1.5] for row in range(20)]
