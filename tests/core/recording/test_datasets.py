@@ -145,7 +145,7 @@ def test_one_that_cannot_be_had_costs_its_own_rows_of_a_task_that_both_declare(t
 
 def test_the_board_asks_data_sets_that_there_are():
     named = {choice.dataset for choice in matrix_called("real").tasks}
-    assert len(named) == 5
+    assert len(named) == 8
     assert named <= datasets().keys()
 
 
