@@ -1,4 +1,4 @@
-"""The figures of the real board once more, by numpy and scikit-learn alone, from the published files.
+"""The figures of the real board once more, by numpy and scikit-learn (openpyxl reads sheets), from the published files.
 
 Nothing of tactbench is imported: files are read, folds are made, features are scaled and scores are computed here.
 Beside each figure stands that of a board (`leaderboard.json` of `tactbench run --config real`), the difference, and
@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from openpyxl import load_workbook
 from sklearn.ensemble import (
     HistGradientBoostingClassifier,
     HistGradientBoostingRegressor,
@@ -34,6 +35,7 @@ Array = np.ndarray[Any, Any]
 class Question:
     """Rows, answers, and the folds: pairs of masks over rows."""
 
+    sensor: str
     task: str
     protocol: str
     split: str
@@ -44,6 +46,7 @@ class Question:
     row: Array | None = None
     answered: Array | None = None
     """Rows with an answer; the others are only scaled by"""
+    boosting: bool = True
 
 
 def eflesh_force(data: Path) -> Iterator[Question]:
@@ -54,8 +57,9 @@ def eflesh_force(data: Path) -> Iterator[Question]:
     session = np.repeat(np.arange(len(tables)), [len(one) for one in tables])
     answered = gram != -1
     shared = {
-        "task": "force", "protocol": "deployable", "X": np.concatenate([one[:, 1:] for one in tables]),
-        "y": gram * NEWTON_PER_GRAM, "trees": 100, "answered": answered,
+        "sensor": "eflesh", "task": "force", "protocol": "deployable",
+        "X": np.concatenate([one[:, 1:] for one in tables]), "y": gram * NEWTON_PER_GRAM,
+        "trees": 100, "answered": answered,
         "row": np.concatenate([np.arange(float(len(one))) for one in tables]),
     }  # fmt: skip
     yield Question(split="session", folds=[(session != one, session == one) for one in range(len(tables))], **shared)
@@ -74,7 +78,7 @@ def eflesh_location(data: Path) -> Iterator[Question]:
     places = [np.loadtxt(one / "states.csv", delimiter=",", usecols=(1, 2)) for one in sessions]
     session = np.repeat(np.arange(len(tables)), [len(one) for one in tables])
     yield Question(
-        "contact-location", "deployable", "session", np.concatenate([one[:, 1:] for one in tables]),
+        "eflesh-location", "contact-location", "deployable", "session", np.concatenate([one[:, 1:] for one in tables]),
         np.concatenate(places), [(session != one, session == one) for one in range(len(tables))], 100,
         row=np.concatenate([np.arange(float(len(one))) for one in tables]),
     )  # fmt: skip
@@ -87,7 +91,8 @@ def eflesh_slip(data: Path) -> Iterator[Question]:
     measures = (X.std(1), np.abs(np.diff(X, axis=1)).mean(1), X[:, -1] - X[:, 0], np.ptp(X, axis=1))
     words = np.array(["stable", "slipped"])[y]
     folds = dealt([str(block) for block in np.arange(len(y)) // 18])
-    yield Question("slip-sequence", "deployable", "block", np.concatenate(measures, axis=1), words, folds, 500)
+    X = np.concatenate(measures, axis=1)
+    yield Question("eflesh-slip", "slip-sequence", "deployable", "block", X, words, folds, 500)
 
 
 def biotacsp(data: Path) -> Iterator[Question]:
@@ -98,7 +103,7 @@ def biotacsp(data: Path) -> Iterator[Question]:
         rows += [line.split(",") for line in text[1:]]
     cells = np.array(rows)
     yield Question(
-        "grasp-stability", "deployable", "object", cells[:, 2:].astype(float),
+        "biotac-sp", "grasp-stability", "deployable", "object", cells[:, 2:].astype(float),
         np.array(["stable", "slipped"])[cells[:, 1].astype(int)], dealt(cells[:, 0].tolist()), 300,
     )  # fmt: skip
 
@@ -117,9 +122,60 @@ def icub(data: Path) -> Iterator[Question]:
             trials.append(trial)
             first.append(place == 0)
     X, y, begins = np.array(frames, float), np.array(objects), np.array(first)
-    yield Question("object-identity", "deployable", "trial", X, y, dealt(trials), 100)
+    yield Question("icub-hand", "object-identity", "deployable", "trial", X, y, dealt(trials), 100)
     folds = [(train & begins, test & begins) for train, test in dealt(trials)]
-    yield Question("object-identity", "first-frame", "trial", X, y, folds, 100)
+    yield Question("icub-hand", "object-identity", "first-frame", "trial", X, y, folds, 100)
+
+
+def fluid(data: Path) -> Iterator[Question]:
+    """Yield the presses of each of nine sensors; each of eight segments of 10 mm is held out in turn."""
+    for path in sorted((data / "fsi/Machine Learning").glob("*.xlsx")):
+        header, *rows = load_workbook(path, read_only=True, data_only=True).worksheets[0].iter_rows(values_only=True)
+        table = np.array(rows, float)
+        place, left, right, force = (table[:, header.index(name)] for name in ("X", "Pl", "Pr", "F"))
+        segment = np.minimum(place // 10, 8)
+        medium, diameter = path.stem.removeprefix("1D_").split("_dia")
+        yield Question(
+            f"fluid-{medium}-{diameter.lstrip('_')}", "force", "deployable", "placement", np.stack([left, right], 1),
+            force, [(segment != one, segment == one) for one in np.unique(segment)], 100,
+        )  # fmt: skip
+
+
+def biotac_slide(data: Path) -> Iterator[Question]:
+    """Yield slides of a BioTac, in five blocks of ten repetitions."""
+    names = [f"ele{one}" for one in range(1, 20)] + ["pdc"] + [f"pac{one}" for one in range(1, 23)] + ["tdc", "tac"]
+    slides, materials, blocks = [], [], []
+    for path in sorted((data / "biotac-slide/raw_data").glob("*/*.csv"), key=lambda one: one.name.replace("_", "-")):
+        header, *lines = path.read_text().splitlines()
+        places = [header.split(",").index(name) for name in names]
+        slides.append(np.array([line.split(",")[:45] for line in lines], float)[:, places])
+        material, repetition, _ = path.stem.split("_")
+        materials.append(material)
+        blocks.append((int(repetition) - 1) // 10)
+    yield from slid("biotac-finger", slides, materials, blocks)
+
+
+def icub_slide(data: Path) -> Iterator[Question]:
+    """Yield slides of the iCub's skin, in the five published folds."""
+    slides, materials, blocks = [], [], []
+    for fold in ("test", "val_0", "val_1", "val_2", "val_3"):
+        X = np.load(data / f"biotac-slide/compiled_data/icub_{fold}.npy").astype(float)
+        slides += list(X.reshape(len(X), 60, -1).transpose(0, 2, 1))
+        materials += np.load(data / f"biotac-slide/compiled_data/labels_{fold}.npy").astype(str).tolist()
+        blocks += [fold] * len(X)
+    yield from slid("icub-skin", slides, materials, blocks)
+
+
+def slid(sensor: str, slides: list[Array], materials: list[str], blocks: list[Any]) -> Iterator[Question]:
+    """Yield a row a slide: mean, deviation, minimum, maximum and mean absolute step; then the first frames alone."""
+    measures = [[X.mean(0), X.std(0), X.min(0), X.max(0), np.abs(np.diff(X, axis=0)).mean(0)] for X in slides]
+    block, y = np.array(blocks), np.array(materials)
+    folds = [(block != one, block == one) for one in np.unique(block)]
+    for protocol, X in (
+        ("deployable", np.array([np.concatenate(one) for one in measures])),
+        ("first-frame", np.array([one[0] for one in slides])),
+    ):
+        yield Question(sensor, "material", protocol, "block", X, y, folds, 300, boosting=False)
 
 
 def dealt(groups: list[str]) -> list[tuple[Array, Array]]:
@@ -193,7 +249,8 @@ def trivial(question: Question) -> float:
 def figures(question: Question) -> Iterator[tuple[str, float]]:
     """Yield estimator and score with seed 1."""
     for name, make in models(question, 1).items():
-        yield name, learned(question, make, question.X)
+        if name != "boosting" or question.boosting:
+            yield name, learned(question, make, question.X)
     yield "mean" if question.y.dtype.kind == "f" else "majority", trivial(question)
     if question.row is not None:
         yield "time-index", learned(question, LinearRegression, question.row[:, None])
@@ -215,14 +272,15 @@ def main() -> None:
     rows = json.loads(given.board.read_text()) if given.board else []
     rows = rows["rows"] if isinstance(rows, dict) else rows
     board = {
-        (row["task"], row["protocol"], row["split"], row["estimator"].partition("-1")[0]): row["score"] for row in rows
-    }
-    print("| task | protocol | split | estimator | board | plain script | difference | other seeds |")
-    print("|---|---|---|---|---|---|---|---|")
-    for make in (eflesh_force, eflesh_location, eflesh_slip, biotacsp, icub):
+        (*(row[name] for name in ("sensor", "task", "protocol", "split")), row["estimator"].partition("-1")[0]):
+        row["score"] for row in rows
+    }  # fmt: skip
+    print("| sensor | task | protocol | split | estimator | board | plain script | difference | other seeds |")
+    print("|---|---|---|---|---|---|---|---|---|")
+    for make in (eflesh_force, eflesh_location, eflesh_slip, biotacsp, icub, fluid, biotac_slide, icub_slide):
         for question in make(given.data):
             for name, found in figures(question):
-                words = (question.task, question.protocol, question.split, name)
+                words = (question.sensor, question.task, question.protocol, question.split, name)
                 there = board.get(words, float("nan"))
                 more = seeds_range(question, given.seeds) if name == "forest" and abs(there - found) > 1e-9 else ""
                 print(

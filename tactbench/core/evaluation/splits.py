@@ -22,8 +22,10 @@ TRAIN_SHARE = 0.8
 """First part, in time, that an in-session split trains on."""
 SPLITS_WITHOUT_GROUPS = ("roles", "session", "in-session", "shuffled")
 """Splits whose unit of replication is the session; few-shot-N is another."""
+ONE_BY_ONE = ("unit", "placement", "cap_radius_mm")
+"""Groups that are left out one by one whatever the task, beside those of the task's own campaigns."""
 MOST_ONE_BY_ONE = 12
-"""Up to so many groups of a task's own campaign are left out one by one; more are dealt into folds."""
+"""Up to so many groups are left out one by one; more are dealt into folds."""
 SHUFFLED_STAMP = "leaks: split shuffled puts neighbouring rows of one recording or object on both sides."
 SHUFFLED_WHOLE_STAMP = "leaks: split shuffled deals recordings at random, those of one object or session on both sides."
 
@@ -81,8 +83,8 @@ def _split_for(task: TaskSpec, protocol: ProtocolSpec, data: Dataset, requested:
                 f"These recordings cannot be split by {requested!r}.", hint=f"They can by: {', '.join(able)}."
             )
         return requested
-    for name in task.splits:
-        if name != "shuffled" and _can(name, data):
+    for name in sorted(task.splits, key=lambda name: name == "shuffled"):  # a leak is better than no answer only
+        if _can(name, data):
             return name
     raise NotApplicable(
         f"None of the splits of task {task.name!r} ({', '.join(task.splits)}) fits these recordings.",
@@ -110,8 +112,10 @@ def _require_first_rows(task: TaskSpec, data: Dataset, split: str) -> None:
 def _can(name: str, data: Dataset) -> bool:
     if name == "roles":
         return {"train", "test"} <= {meta.role for meta in data.metas}
-    if name in ("in-session", "shuffled"):
-        return name == "shuffled" or not data.whole
+    if name == "shuffled":
+        return not data.whole or len(_open_to_folds(data)) > 1
+    if name == "in-session":
+        return not data.whole
     number = shots(name)
     if number is not None:
         return len(training_sessions(data)) >= number and any(meta.role == "test" for meta in data.metas)
@@ -155,7 +159,8 @@ def make_splits(data: Dataset, split: str, seed: int, gap: int = 0, *, one_by_on
     Parameters
     ----------
     one_by_one
-        Leave each group out alone, rather than dealing groups into folds, if there are no more than `MOST_ONE_BY_ONE`.
+        Leave each group out alone, as those of `ONE_BY_ONE`, rather than dealing groups into folds, if there are no
+        more than `MOST_ONE_BY_ONE`.
     gap
         Rows left out between training and test where a recording is cut in time: the longest window that may be chosen.
 
@@ -175,7 +180,7 @@ def make_splits(data: Dataset, split: str, seed: int, gap: int = 0, *, one_by_on
     names = sorted(sizes)
     if split == "session":
         return [_held_out(data, split, {name}, name) for name in names]
-    if one_by_one and len(names) <= MOST_ONE_BY_ONE:
+    if (one_by_one or split in ONE_BY_ONE) and len(names) <= MOST_ONE_BY_ONE:
         return [_told(_held_out(data, split, {name}, f"{split} {name}"), data) for name in names]
     return [_held_out(data, split, values, f"{split} fold {number}") for number, values in enumerate(_dealt(sizes), 1)]
 

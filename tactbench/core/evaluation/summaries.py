@@ -13,7 +13,7 @@ from tactbench.core.errors import DataError, NotApplicable, PluginContractError
 from tactbench.core.evaluation.dataset import Dataset, Table, require_computable
 from tactbench.core.evaluation.protocols import ProtocolSpec
 from tactbench.core.evaluation.sets import dropped_s, hold_s, less_rest
-from tactbench.core.events.labels import spread
+from tactbench.core.events.labels import extremes, spread
 from tactbench.core.plugins.registry import load_object
 from tactbench.core.samples import FloatArray, IntArray, StreamReadings
 from tactbench.core.spec.rig import EstimatorDescriptor
@@ -135,6 +135,8 @@ def measured(values: FloatArray, measure: str, first: IntArray, last: IntArray) 
     """
     if measure == "range":
         found = spread(values, first, last)
+    elif measure in ("minimum", "maximum"):
+        found = extremes(values, first, last)[measure == "maximum"]
     elif measure == "change":
         found = values[np.maximum(last - 1, 0)] - values[np.minimum(first, len(values) - 1)]
     elif measure == "mean-step":

@@ -117,10 +117,16 @@ def at_rest(t_ns: IntArray, displacement_m: FloatArray, thresholds: SlipThreshol
 
 
 def spread(values: FloatArray, first: IntArray, end: IntArray) -> FloatArray:
-    """Return (k, …) largest less smallest of each ``values[first:end]``; what `first` has where that is empty."""
+    """Return (k, …) largest less smallest of each ``values[first:end]``; 0 where that is empty."""
+    least, largest = extremes(values, first, end)
+    return np.asarray(largest - least)
+
+
+def extremes(values: FloatArray, first: IntArray, end: IntArray) -> tuple[FloatArray, FloatArray]:
+    """Return (k, …) smallest and largest of each ``values[first:end]``; what `first` has where that is empty."""
     pairs = np.column_stack([first, end]).ravel()
     padded = np.concatenate([values, values[-1:]])  # reduceat wants every place to exist
-    return np.asarray(np.maximum.reduceat(padded, pairs)[::2] - np.minimum.reduceat(padded, pairs)[::2])
+    return np.minimum.reduceat(padded, pairs)[::2], np.maximum.reduceat(padded, pairs)[::2]
 
 
 def _stretches(mask: npt.NDArray[np.bool_]) -> IntArray:

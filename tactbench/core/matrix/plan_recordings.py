@@ -25,6 +25,7 @@ from tactbench.core.plugins.registry import Registry
 from tactbench.core.plugins.rig_files import load_rig_file
 from tactbench.core.pool import InProcess, Limits, Pool
 from tactbench.core.progress import Progress
+from tactbench.core.spec.declared_task import DeclaredTask
 from tactbench.core.spec.matrix import MatrixSpec
 from tactbench.core.spec.rig_file import RigFile
 from tactbench.core.spec.scene import Role, Scene
@@ -107,6 +108,8 @@ class Part:
     recordings: Path | None
     trouble: TactbenchError | None = None
     """Why the data set is not there"""
+    declared: tuple[DeclaredTask, ...] = ()
+    """Tasks that it would have brought"""
 
 
 def parts_of(matrix: MatrixSpec, recordings: Path | None, root: Path | None, progress: Progress) -> list[Part]:
@@ -144,7 +147,7 @@ def _from_dataset(matrix: MatrixSpec, dataset: DataSet, root: Path | None, progr
         return Part(matrix, dataset.recordings(root, progress))
     except TactbenchError as error:
         sensors = matrix.sensors or (dataset.mapping.sensor.name,)
-        return Part(matrix.model_copy(update={"sensors": sensors}), None, error)
+        return Part(matrix.model_copy(update={"sensors": sensors}), None, error, dataset.mapping.tasks)
 
 
 def plan_parts(

@@ -145,7 +145,7 @@ def run_matrix(
     with store.hold():
         preload("tactbench.core.matrix.preloaded")
         parts = parts_of(matrix, recordings, root, progress)
-        declared = chain.from_iterable(declared_in(part.recordings) for part in parts)
+        declared = chain.from_iterable((*part.declared, *declared_in(part.recordings)) for part in parts)
         registry = with_declared(installed(), declared)
         keys = Keys(registry)
         cells, plan = plan_parts(parts, registry, keys, store, choice.limits)

@@ -44,6 +44,8 @@ class DeclaredTask(Frozen):
     splits: tuple[str, ...] = Field(min_length=1)
     """The default first: roles, session, in-session, few-shot-N, shuffled, or the name of a label."""
     features: tuple[ChannelKind, ...] = ("taxel",)
+    optional_features: tuple[ChannelKind, ...] = ()
+    """Further kinds, of sensors that have them."""
     answer_per: Literal["sample", "recording"] = "sample"
     summaries: tuple[Summary, ...] = ()
     vote: Literal["frames"] | None = None
@@ -79,10 +81,11 @@ class DeclaredTask(Frozen):
         unit = self.target.unit if metric in ("rmse", "mae", VECTOR_METRIC) else "1"
         return TaskSpec(
             name=self.name, title=self.title or self.name, question=self.question or f"What is {self.name}?",
-            kind="classification" if answer == "class" else "regression", features=self.features, target=self.target,
-            answer_per=self.answer_per, summaries=self.summaries, vote=self.vote, metric=metric, unit=unit,
-            equivalence=self.equivalence, protocols=self.protocols, splits=self.splits,
-            estimators=self.estimators or _ESTIMATORS[answer], baselines=self.baselines or _BASELINES[answer],
+            kind="classification" if answer == "class" else "regression", features=self.features,
+            optional_features=self.optional_features, target=self.target, answer_per=self.answer_per,
+            summaries=self.summaries, vote=self.vote, metric=metric, unit=unit, equivalence=self.equivalence,
+            protocols=self.protocols, splits=self.splits, estimators=self.estimators or _ESTIMATORS[answer],
+            baselines=self.baselines or _BASELINES[answer],
         )  # fmt: skip
 
 

@@ -16,8 +16,8 @@ class Summary(Frozen):
     Nothing is resampled: each stream is summarised on its own clock.
     """
 
-    measure: Literal["mean", "deviation", "range", "change", "mean-step", "band-energy"]
-    """``mean``; ``deviation``: standard deviation; ``range``: largest less smallest; ``change``: last less first;
+    measure: Literal["mean", "deviation", "minimum", "maximum", "range", "change", "mean-step", "band-energy"]
+    """``mean``; ``deviation``: standard deviation; ``range``: maximum less minimum; ``change``: last less first;
     ``mean-step``: mean absolute difference of neighbouring samples; ``band-energy``: mean square of what a causal
     band-pass (Butterworth, two poles at either end) leaves, in the channel's unit squared."""
     start: float = Field(default=0.0, ge=0)

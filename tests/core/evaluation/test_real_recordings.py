@@ -5,13 +5,17 @@ splits, units and labels, and a forest of thirty is within 0.02 N and 0.01 of on
 named from an iCub's first frames are tested beside the import of the files, which takes the longest.
 """
 
+from itertools import groupby
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from tactbench.core.evaluation.dataset import load_dataset
 from tactbench.core.plugins.registry import load_registry
 from tactbench.core.recording.mapping import import_tables
+from tactbench.core.recording.mapping.model import Mapping
+from tactbench.core.spec.yaml_file import load_yaml
 from tests.core.evaluation.made import evaluated
 
 REGISTRY = load_registry()
@@ -71,3 +75,57 @@ def test_grasp_stability_by_object_official_and_shuffled(grasps):
     assert official.sizes.n_test == 511
     assert 0.70 < official.score < 0.82
     assert run("grasp-stability", grasps, "roles", "majority").score == pytest.approx(261 / 511)
+
+
+def test_nine_sensors_of_one_mapping_leave_the_same_segments_out(shared_data, tmp_path):
+    """Linear regression has no seed: the notes give .70 N for the best sensor and 3.0 for the worst."""
+    made = import_tables(MAPPINGS / "fluid-force.yaml", root=shared_data / "fsi", out=tmp_path).recordings
+    scores, segments = {}, set()
+    for sensor, own in groupby(made, key=lambda one: one.sensor):
+        result = run("force", [one.path for one in own], "placement", "ols")
+        scores[sensor] = result.score
+        segments.add(tuple(folds(result)))
+    assert len(scores) == 9
+    assert len(segments) == 1
+    assert [name.split()[-1] for name in segments.pop()] == [f"{place}-{place + 10}" for place in range(10, 90, 10)]
+    assert min(scores, key=scores.get) == "fluid-air-1_0mm"
+    assert scores["fluid-air-1_0mm"] == pytest.approx(0.695, abs=0.001)
+    assert scores["fluid-water-2_0mm"] == pytest.approx(3.001, abs=0.001)
+
+
+def two_materials(sensor, data, root):
+    """Two folds of ten slides over each of two materials."""
+    if sensor == "biotac":
+        for name in ("mat1", "mat2"):
+            (root / "raw_data" / name).mkdir(parents=True)
+            for repetition in range(1, 21):
+                path = f"raw_data/{name}/{name}_{repetition}_bio.csv"
+                (root / path).symlink_to(data / path)
+        return
+    (root / "compiled_data").mkdir(parents=True)
+    for fold in ("test", "val_0"):
+        X, y = (np.load(data / f"compiled_data/{what}_{fold}.npy") for what in ("icub", "labels"))
+        for what, values in (("icub", X), ("labels", y)):
+            np.save(root / f"compiled_data/{what}_{fold}.npy", values[y < 2])
+
+
+@pytest.mark.parametrize(
+    ("sensor", "channels", "blocks"),
+    [
+        ("biotac", 44, ["repetitions 1-10", "repetitions 11-20"]),
+        ("icub", 60, ["published fold test", "published fold val_0"]),
+    ],
+)
+def test_two_sensors_are_asked_for_the_material_in_the_same_words(shared_data, tmp_path, sensor, channels, blocks):
+    two_materials(sensor, shared_data / "biotac-slide", tmp_path / "files")
+    report = import_tables(MAPPINGS / f"{sensor}-slide.yaml", root=tmp_path / "files", out=tmp_path / "out")
+    (one,), (other,) = (load_yaml(MAPPINGS / f"{name}-slide.yaml", Mapping).tasks for name in ("biotac", "icub"))
+    assert one == other
+    data = load_dataset(one.spec, [made.path for made in report.recordings])
+    assert (len(data.tables), data.tables[0].X.shape[1]) == (40, channels)
+    assert sorted({str(table.groups["block"][0]) for table in data.tables}) == blocks
+    moved, first = (
+        evaluated(one.spec, data, "logistic", protocol, "block") for protocol in ("deployable", "first-frame")
+    )
+    assert (len(folds(moved)), len(folds(first))) == (2, 2)
+    assert moved.score > 0.75, "a guess has a probability of 0.1 % of that, of 40 slides over two materials"

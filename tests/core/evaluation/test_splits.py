@@ -12,6 +12,7 @@ from tactbench.core.evaluation.dataset import load_dataset
 from tactbench.core.evaluation.protocols import DEPLOYABLE
 from tactbench.core.evaluation.sets import FeatureScale, causal_mean, keep, part
 from tactbench.core.evaluation.splits import choose_split, inner_splits, make_splits
+from tactbench.plugin import ChannelTarget, Summary
 
 from .made import evaluated, force_task, grasps, label_task, ramp, record, sessions
 
@@ -74,16 +75,27 @@ def test_the_causal_mean_is_that_of_a_naive_loop(k, lengths, offset, seed):
     np.testing.assert_allclose(causal_mean(X, k, segment), naive, atol=1e-12 if offset == 0 else 1e-7)
 
 
-def test_a_shuffled_split_is_stamped_and_never_the_default(tmp_path):
+def test_a_shuffled_split_is_stamped_and_taken_unasked_only_where_nothing_else_fits(tmp_path):
     paths = sessions(tmp_path)
-    assert run(paths).split == "session"
+    shuffled_first = force_task(splits=("shuffled", "session"))
+    assert evaluated(shuffled_first, paths).split == "session"
+    assert evaluated(shuffled_first, paths[:1]).split == "shuffled"
     shuffled = run(paths, "shuffled")
     assert shuffled.stamps
     assert "leaks" in shuffled.stamps[0]
     assert not run(paths, "in-session").stamps
-    only_shuffled = force_task(splits=("shuffled",))
+    whole = force_task(
+        splits=("shuffled",), answer_per="recording", target=ChannelTarget(reduce="max"),
+        summaries=(Summary(measure="mean"),),
+    )  # fmt: skip
     with pytest.raises(NotApplicable):
-        choose_split(only_shuffled, DEPLOYABLE, load_dataset(only_shuffled, paths), None)
+        choose_split(whole, DEPLOYABLE, load_dataset(whole, paths[:1]), None)
+
+
+@pytest.mark.parametrize(("label", "folds"), [("unit", 7), ("placement", 7), ("block", 5)])
+def test_units_and_placements_are_left_out_one_by_one_whatever_the_task(tmp_path, label, folds):
+    paths = [record(tmp_path / f"{place}.h5", *ramp(place, n=20), labels={label: place}) for place in range(7)]
+    assert len(make_splits(load_dataset(force_task(), paths), label, 0)) == folds
 
 
 def test_an_official_test_set_is_touched_by_split_roles_only(tmp_path):

@@ -14,7 +14,8 @@ from tactbench.plugin import StreamReadings, Summary
 
 RATE_HZ = 100.0
 BAND = (5.0, 20.0)
-MEASURES = ("mean", "deviation", "range", "change", "mean-step", "band-energy")
+MEASURES = ("mean", "deviation", "minimum", "maximum", "range", "change", "mean-step", "band-energy")
+LEVELS = ("mean", "minimum", "maximum")
 # Readings of up to 1e3, sums of 60 of them: rounding of 1e-16 of each, times what a filter of four poles makes of it.
 ROUNDING = 1e-8
 
@@ -38,9 +39,10 @@ readings = arrays(np.float64, st.tuples(st.integers(8, 60), st.integers(1, 3)), 
 
 @settings(max_examples=100)
 @given(measure=st.sampled_from(MEASURES), X=readings, factor=st.floats(-10, 10), offset=st.floats(-1e3, 1e3))
-def test_a_gain_scales_as_the_unit_says_and_an_offset_changes_the_mean_alone(measure, X, factor, offset):
-    gain = {"mean": factor, "change": factor, "band-energy": factor**2}.get(measure, abs(factor))
-    expected = gain * value(X, measure) + (offset if measure == "mean" else 0.0)
+def test_a_gain_scales_as_the_unit_says_and_an_offset_changes_levels_alone(measure, X, factor, offset):
+    gain = {"band-energy": factor**2}.get(measure, factor if measure in ("change", *LEVELS) else abs(factor))
+    before = {"minimum": "maximum", "maximum": "minimum"}.get(measure, measure) if factor < 0 else measure
+    expected = gain * value(X, before) + (offset if measure in LEVELS else 0.0)
     assert value(factor * X + offset, measure) == pytest.approx(expected, abs=ROUNDING * 1e6, rel=ROUNDING)
 
 
@@ -58,7 +60,7 @@ def test_what_the_words_mean():
     X = [1.0, 3.0, 2.0, 6.0]
     assert value(X, "mean") == 3.0
     assert value(X, "deviation") == pytest.approx(np.sqrt(3.5))
-    assert value(X, "range") == 5.0
+    assert (value(X, "minimum"), value(X, "maximum"), value(X, "range")) == (1.0, 6.0, 5.0)
     assert value(X, "change") == 5.0
     assert value(X, "mean-step") == pytest.approx((2 + 1 + 4) / 3)
     assert value([0.1] * 1000, "deviation") == 0.0, "what never changes has no deviation, not its rounding"

@@ -58,7 +58,7 @@ def digests(files):
     return {name: hashlib.sha256(content).hexdigest() for name, content in files.items()}
 
 
-def described(folder, address="", name="pad"):
+def described(folder, address="", name="pad", **change):
     """A data set of three recordings, one file each."""
     text = f"""
         clock: none
@@ -68,7 +68,8 @@ def described(folder, address="", name="pad"):
         source: {{address: "{address}", licence: MIT, citation: nobody, measured: nothing, tasks: [force], bytes: 1}}
     """
     folder.mkdir(parents=True, exist_ok=True)
-    return DataSet(write_mapping(folder / f"{name}.yaml", text, sensor__name=name, source__files=digests(PRESSES)))
+    change |= {"sensor__name": name, "source__files": digests(PRESSES)}
+    return DataSet(write_mapping(folder / f"{name}.yaml", text, **change))
 
 
 def test_it_is_fetched_and_imported_once(tmp_path, server, kept):
@@ -132,9 +133,19 @@ def test_a_plugin_brings_data_sets_as_files(tmp_path, monkeypatch):
     assert dataset_called("pad").source.citation == "nobody"
 
 
+def test_one_that_cannot_be_had_costs_its_own_rows_of_a_task_that_both_declare(tmp_path, server):
+    thirds = {"streams__taxels__annotations": {"third": {"rows_per": 7}}}
+    task = {"name": "third", "target": {"source": "label", "name": "third"}, "splits": ["recording"]}
+    for name, address in (("pad", server.address), ("lost", "")):
+        described(tmp_path, address, name, tasks=[task], source__tasks=["third"], **thirds)
+    asked = "run --dataset pad.yaml --dataset lost.yaml --task third --estimator logistic --format json"
+    rows = json.loads(Verbs(tmp_path, here=True)(*asked.split()).stdout)
+    assert {(row["sensor"], row["status"]) for row in rows} == {("pad", "done"), ("lost", "skipped")}
+
+
 def test_the_board_asks_data_sets_that_there_are():
     named = {choice.dataset for choice in matrix_called("real").tasks}
-    assert len(named) == 5
+    assert len(named) == 8
     assert named <= datasets().keys()
 
 

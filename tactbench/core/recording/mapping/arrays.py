@@ -1,4 +1,4 @@
-"""Reading NumPy archives and MATLAB files into tables; pickled objects are refused."""
+"""Reading NumPy arrays and MATLAB files into tables; pickled objects are refused."""
 
 from __future__ import annotations
 
@@ -12,14 +12,17 @@ import numpy as np
 import numpy.typing as npt
 
 from tactbench.core.errors import MappingError, did_you_mean
-from tactbench.core.recording.mapping.model import Arrays, Mat
+from tactbench.core.recording.mapping.channels import fill
+from tactbench.core.recording.mapping.model import Arrays, Mat, Npy
 from tactbench.core.recording.mapping.table import ArrayTable, plain
 
 Words = dict[str, str]
 
 
-def read_arrays(path: Path, shown: str, how: Arrays) -> Iterator[tuple[Words, ArrayTable]]:
+def read_arrays(path: Path, shown: str, how: Arrays, known: Words) -> Iterator[tuple[Words, ArrayTable]]:
     """Yield one table a recording, with its words: ``index`` (from 0, with leading zeros) and `per_recording`.
+
+    `known` are the words of the path, for names of further files.
 
     Raises
     ------
@@ -32,7 +35,7 @@ def read_arrays(path: Path, shown: str, how: Arrays) -> Iterator[tuple[Words, Ar
         arrays = {name: _shaped(values, len(how.axes) if name == how.array else 1)
                   for name, values in _load_mat(path, shown, names).items()}  # fmt: skip
     else:
-        arrays = _load_npz(path, shown, names)
+        arrays = _load_numpy(path, shown, how, {name: fill(name, known, shown) for name in names})
     values = arrays[how.array]
     if values.ndim != len(how.axes):
         raise MappingError(
@@ -44,10 +47,10 @@ def read_arrays(path: Path, shown: str, how: Arrays) -> Iterator[tuple[Words, Ar
         raise MappingError(f"{shown}: array {how.array!r} holds {values.dtype}, not numbers.", hint="Name another.")
     if values.size == 0:
         raise MappingError(f"{shown}: array {how.array!r} is empty.", hint="Name another array.")
-    present = [axis for axis in ("recording", "row", "channel") if axis in how.axes]
-    ordered = np.transpose(values, [how.axes.index(axis) for axis in present])
-    shape = dict(zip(present, ordered.shape, strict=True))
-    ordered = ordered.reshape(tuple(shape.get(axis, 1) for axis in ("recording", "row", "channel")))
+    order = ("recording", "row", "channel")
+    ordered = np.transpose(values, sorted(range(values.ndim), key=lambda axis: order.index(how.axes[axis])))
+    lengths = [values.shape[how.axes.index(axis)] if axis in how.axes else 1 for axis in order[:2]]
+    ordered = ordered.reshape(*lengths, -1)
     for word, name in how.per_recording.items():
         if arrays[name].shape != (len(ordered),):
             raise MappingError(
@@ -57,7 +60,8 @@ def read_arrays(path: Path, shown: str, how: Arrays) -> Iterator[tuple[Words, Ar
     wide = len(str(len(ordered) - 1))
     for index, rows in enumerate(ordered):
         words = {word: plain(arrays[name][index].item()) for word, name in how.per_recording.items()}
-        yield {"index": f"{index:0{wide}d}", **words}, ArrayTable(f"{shown}[{how.array}, {index}]", rows)
+        where = f"{shown}[{f'{how.array}, ' if how.array else ''}{index}]"
+        yield {"index": f"{index:0{wide}d}", **words}, ArrayTable(where, rows)
 
 
 def _require_there(shown: str, names: set[str], there: Collection[str]) -> None:
@@ -67,18 +71,25 @@ def _require_there(shown: str, names: set[str], there: Collection[str]) -> None:
             raise MappingError(f"{shown} has no array {name!r}.", hint=hint)
 
 
-def _load_npz(path: Path, shown: str, names: set[str]) -> dict[str, npt.NDArray[Any]]:
+def _load_numpy(path: Path, shown: str, how: Arrays, names: dict[str, str]) -> dict[str, npt.NDArray[Any]]:
     try:
+        if isinstance(how, Npy):
+            return {name: _load_npy(path.parent / file if file else path) for name, file in names.items()}
         with path.open("rb") as opened, np.load(opened, allow_pickle=False) as archive:
-            _require_there(shown, names, archive.files)
+            _require_there(shown, {*names}, archive.files)
             return {name: archive[name] for name in names}
     except MappingError:
         raise
     except (OSError, ValueError, EOFError, zipfile.BadZipFile) as error:
         raise MappingError(
-            f"{shown} cannot be read as a NumPy archive: {error}.",
-            hint="Pickled objects are refused; store plain arrays with numpy.savez_compressed.",
+            f"{shown} cannot be read as a NumPy {'array' if isinstance(how, Npy) else 'archive'}: {error}.",
+            hint="Pickled objects are refused; store plain arrays with numpy.save or numpy.savez_compressed.",
         ) from error
+
+
+def _load_npy(path: Path) -> npt.NDArray[Any]:
+    with path.open("rb") as opened:
+        return np.lib.format.read_array(opened, allow_pickle=False)
 
 
 def _load_mat(path: Path, shown: str, names: set[str]) -> dict[str, npt.NDArray[Any]]:

@@ -47,36 +47,38 @@ class RawRecording:
     """Paths below the root"""
 
 
-def find(mapping: Mapping, root: Path) -> list[FileSet]:
-    """Return what belongs together, in the order of the first table's paths.
+def find(mapping: Mapping, root: Path) -> tuple[list[FileSet], tuple[str, ...]]:
+    """Return what belongs together, in the order of the first table's paths, and which files lack a partner.
 
     Raises
     ------
     MappingError
-        If a pattern finds no file, a path lacks the words, or a file has no partner or several.
+        If a pattern finds no file, a path lacks the words, a file has several partners, or none has one.
     """
     if not root.is_dir():
         raise MappingError(f"There is no folder {root}.", hint="Name the folder of the data set with --root DIR.")
     found = {name: _matching(name, source, root) for name, source in mapping.tables.items()}
     lead, *others = found
-    sets = []
+    sets, orphans = [], []
     used: dict[str, set[str]] = {name: set() for name in others}
     for leader in found[lead]:
         files, words = {lead: leader}, dict(leader.words)
         for name in others:
             partner = _partner(leader, name, found[name])
+            if isinstance(partner, str):
+                orphans.append(partner)
+                continue
             used[name].add(partner.shown)
             files[name] = partner
             words = {**partner.words, **words}
-        sets.append(FileSet(files, words))
+        if len(files) == len(found):
+            sets.append(FileSet(files, words))
+    if not sets:
+        raise MappingError(orphans[0], hint="Give both `path` expressions the same named groups.")
     for name in others:
         alone = [file.shown for file in found[name] if file.shown not in used[name]]
-        if alone:
-            raise MappingError(
-                f"{alone[0]} of table {name!r} belongs to no file of table {lead!r}.",
-                hint="Named groups that both `path` expressions share must be equal.",
-            )
-    return sets
+        orphans += [f"{shown} of table {name!r} belongs to no file of table {lead!r}." for shown in alone]
+    return sets, tuple(orphans)
 
 
 def read(mapping: Mapping, files: FileSet) -> Iterator[RawRecording]:
@@ -85,7 +87,7 @@ def read(mapping: Mapping, files: FileSet) -> Iterator[RawRecording]:
     (first, source), *_ = mapping.tables.items()
     if isinstance(source.read, Arrays):
         file = files.files[first]
-        for words, array in read_arrays(file.path, file.shown, source.read):
+        for words, array in read_arrays(file.path, file.shown, source.read, file.words):
             yield RawRecording({first: array}, {**files.words, **words}, shown)
         return
     tables: dict[str, Table] = {}
@@ -140,17 +142,20 @@ def _matching(name: str, source: TableSource, root: Path) -> list[FoundFile]:
     return found
 
 
-def _partner(leader: FoundFile, name: str, candidates: list[FoundFile]) -> FoundFile:
+def _partner(leader: FoundFile, name: str, candidates: list[FoundFile]) -> FoundFile | str:
+    """Return the file of table `name` that belongs to a file of the first, or what to say where there is none."""
     shared = (set(leader.words) & set(candidates[0].words)) - {"file"}
     fitting = [one for one in candidates if all(one.words[word] == leader.words[word] for word in shared)]
-    if len(fitting) != 1:
-        what = ", ".join(f"{word} {leader.words[word]}" for word in sorted(shared)) or "no shared words"
-        listed = ", ".join(one.shown for one in fitting[:3]) or "none"
-        raise MappingError(
-            f"{leader.shown} needs one file of table {name!r} ({what}); there are {len(fitting)}: {listed}.",
-            hint="Give both `path` expressions the same named groups.",
-        )
-    return fitting[0]
+    if len(fitting) == 1:
+        return fitting[0]
+    what = ", ".join(f"{word} {leader.words[word]}" for word in sorted(shared)) or "no shared words"
+    needs = f"{leader.shown} needs one file of table {name!r} ({what}); there "
+    if not fitting:
+        return f"{needs}is none."
+    listed = ", ".join(one.shown for one in fitting[:3])
+    raise MappingError(
+        f"{needs}are {len(fitting)}: {listed}.", hint="Give both `path` expressions the same named groups."
+    )
 
 
 def _split(mapping: Mapping, raw: RawRecording) -> Iterator[RawRecording]:

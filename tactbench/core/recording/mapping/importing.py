@@ -23,6 +23,7 @@ from tactbench.core.recording.mapping.channels import MappedStream, device, fill
 from tactbench.core.recording.mapping.files import RawRecording, find, read
 from tactbench.core.recording.mapping.model import MUST_NAME_SENTINELS, Mapping, Word
 from tactbench.core.recording.mapping.samples import labels, samples, times
+from tactbench.core.recording.mapping.table import TextTable
 from tactbench.core.recording.mapping.tasks import check_tasks, place_tasks, require_answerable, tasks_text
 from tactbench.core.recording.reader import content_digest, open_recording
 from tactbench.core.recording.writer import RecordingWriter
@@ -64,6 +65,8 @@ class ImportReport:
     files_read: int
     tasks: tuple[str, ...] = ()
     """Names of those that the mapping declares"""
+    orphans: tuple[str, ...] = ()
+    """Files that make no recording because another table has none for them, and why"""
 
     @property
     def sensors(self) -> tuple[str, ...]:
@@ -121,7 +124,7 @@ def import_tables(
     sensor, reference, streams = sensor_of(loaded)
     require_answerable(loaded, streams, mapping)
     tasks = tasks_text(loaded)
-    sets = find(loaded, mapping.parent if root is None else root)
+    sets, orphans = find(loaded, mapping.parent if root is None else root)
     made: list[Imported] = []
     progress = progress or Progress()
     progress.begin(f"importing {mapping.stem}", len(sets))
@@ -137,7 +140,7 @@ def import_tables(
         place_tasks(out, folder, tasks)
     names = tuple(task.name for task in loaded.tasks)
     shown = {file.shown for files in sets for file in files.files.values()}
-    return ImportReport(loaded.title, tuple(placed), len(shown), names)
+    return ImportReport(loaded.title, tuple(placed), len(shown), names, orphans)
 
 
 @contextmanager
@@ -194,7 +197,7 @@ def _write(
         counts |= {f"{channel} without a sample": number for channel, number in missing.items()}
         writer.revise(counts=counts)
     with open_recording(path) as written:
-        findings = (*examine(written), *_given_away(sensed, reference))
+        findings = (*examine(written), *_given_away(sensed, reference), *_trailing_delimiters(raw))
     rows = max(len(table) for table in raw.tables.values())
     return Imported(path, meta.name, rows, meta.sensor.name, missing, meta.excluded, meta.origin, findings)
 
@@ -205,6 +208,13 @@ def _given_away(sensed: dict[str, FloatArray], reference: dict[str, FloatArray])
         if len(column) == len(wanted) and is_copy(column, wanted):
             text = f"{name}, a channel of the sensor, is the reference {force} but for scale and offset"
             yield Finding("target-among-features", "warning", "", (name,), 1, text)
+
+
+def _trailing_delimiters(raw: RawRecording) -> Iterator[Finding]:
+    for name, table in raw.tables.items():
+        if isinstance(table, TextTable) and table.trailing:
+            text = f"every line of table {name} ends with a delimiter; the empty cell behind it is left out"
+            yield Finding("trailing-delimiter", "info", "", (), len(table), text)
 
 
 def _meta(mapping: Mapping, raw: RawRecording, sensor: SensorSpec, reference: tuple[StreamSpec, ...]) -> RecordingMeta:

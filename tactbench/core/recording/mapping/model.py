@@ -31,6 +31,8 @@ class Tabular(Frozen):
     """Lines before the header or the first row that mean nothing."""
     no_sample: tuple[str, ...] = ()
     """Cells with exactly one of these texts hold no sample, for example "" or "NA"."""
+    transposed: bool = False
+    """True: a line holds all samples of one channel; with `header` its first cell is the name."""
 
 
 class Csv(Tabular):
@@ -68,15 +70,16 @@ class Arrays(Frozen):
     """Arrays in one file."""
 
     array: str
-    axes: tuple[Literal["recording", "row", "channel"], ...] = Field(min_length=1, max_length=3)
-    """What each axis of the array counts; an axis that is left out has length 1."""
+    axes: tuple[Literal["recording", "row", "channel"], ...] = Field(min_length=1)
+    """What each axis of the array counts; an axis that is left out has length 1. Several axes of channels are one, the
+    last fastest."""
     per_recording: dict[Annotated[str, Field(pattern=WORD)], str] = Field(default_factory=dict)
-    """Words taken from arrays with one value a recording: word -> array."""
+    """Words taken from arrays with one value a recording: word -> array, of `npy` the file, with ``{word}`` in it."""
 
     @model_validator(mode="after")
     def _axes_differ(self) -> Arrays:
-        if len(set(self.axes)) != len(self.axes):
-            raise ValueError("an axis is named twice")
+        if max(self.axes.count("recording"), self.axes.count("row")) > 1:
+            raise ValueError("an axis is named twice; only channels may have several")
         if self.per_recording and "recording" not in self.axes:
             raise ValueError("per_recording needs an axis called recording")
         return self
@@ -86,6 +89,13 @@ class Npz(Arrays):
     """Arrays in one NumPy archive, never pickled ones."""
 
     format: Literal["npz"] = "npz"
+
+
+class Npy(Arrays):
+    """One array in a file of its own, never pickled; those of `per_recording` are in files in the same folder."""
+
+    format: Literal["npy"] = "npy"
+    array: Literal[""] = ""
 
 
 class Mat(Arrays):
@@ -123,7 +133,7 @@ class TableSource(Frozen):
     """Which: a pattern below the root, with ``*`` within a folder and ``**`` across folders."""
     path: str = ""
     """Regular expression searched in each path; its named groups become words."""
-    read: Annotated[Csv | Text | Records | Xlsx | Npz | Mat | Bag, Field(discriminator="format")]
+    read: Annotated[Csv | Text | Records | Xlsx | Npz | Npy | Mat | Bag, Field(discriminator="format")]
     time: Time | None = None
 
     @field_validator("files")

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from array import array
 from collections.abc import Collection, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from decimal import Decimal, InvalidOperation
 from typing import Any
 
@@ -28,9 +28,11 @@ class TextTable:
     """Name of the file for messages."""
     header: tuple[str, ...] | None
     cells: list[list[str]]
-    lines: list[int]
+    lines: Sequence[int | str]
     """Line of the file on which each row begins."""
     no_sample: Collection[str] = field(default=())
+    trailing: bool = False
+    """Whether the lines of data ended with a delimiter that the header had not."""
 
     def __len__(self) -> int:
         return len(self.cells)
@@ -71,8 +73,7 @@ class TextTable:
 
     def take(self, rows: Sequence[int]) -> TextTable:
         """Return some of the rows."""
-        cells = [self.cells[row] for row in rows]
-        return TextTable(self.shown, self.header, cells, [self.lines[row] for row in rows], self.no_sample)
+        return replace(self, cells=[self.cells[row] for row in rows], lines=[self.lines[row] for row in rows])
 
     def where(self, row: int) -> str:
         """Return file and line of a row, for messages."""

@@ -13,8 +13,8 @@ from tactbench.core.recording.mapping.model import Csv, Records, Tabular, Text
 from tactbench.core.recording.mapping.table import TextTable
 
 _DELIMITERS = {"\t": "tab", ";": "semicolon"}
-Line = tuple[int, list[str]]
-"""Number of a line, and its cells."""
+Line = tuple[int | str, list[str]]
+"""Number of a line, or of a cell in each where the lines are channels, and its cells."""
 
 
 def read_text(path: Path, shown: str, how: Csv | Text | Records) -> TextTable:
@@ -41,13 +41,28 @@ def read_text(path: Path, shown: str, how: Csv | Text | Records) -> TextTable:
 
 def table_of(shown: str, lines: list[Line], how: Tabular) -> TextTable:
     """Return the table that lines make, the first of them its header if `how` says so."""
-    header = None
+    header, trailing = None, _trailing(lines, how)
+    if trailing:
+        for _, cells in lines[how.header and not how.transposed :]:
+            cells.pop()
+    if how.transposed and lines:
+        _same_length(shown, lines, len(lines[0][1]))
+        turned = zip(*(cells for _, cells in lines), strict=True)
+        lines = [(f"cell {number}", list(cells)) for number, cells in enumerate(turned, 1)]
     if how.header and lines:
         header = tuple(cell.strip() for cell in lines.pop(0)[1])
     if not lines:
         raise MappingError(f"{shown} has no rows.", hint="Remove the file, or correct `header` and `skip_lines`.")
     _same_length(shown, lines, len(header) if header else len(lines[0][1]))
-    return TextTable(shown, header, [cells for _, cells in lines], [number for number, _ in lines], how.no_sample)
+    rows, places = [cells for _, cells in lines], [place for place, _ in lines]
+    return TextTable(shown, header, rows, places, how.no_sample, trailing)
+
+
+def _trailing(lines: Sequence[Line], how: Tabular) -> bool:
+    """Tell whether a delimiter ends every line of data, so that an empty cell stands where nothing has a name."""
+    data = lines[how.header and not how.transposed :]
+    longer = how.transposed or (how.header and bool(data) and len(data[0][1]) == len(lines[0][1]) + 1)
+    return longer and bool(data) and all(not cells[-1].strip() for _, cells in data)
 
 
 def _cells(text: str, shown: str, how: Csv | Text) -> Iterator[Line]:

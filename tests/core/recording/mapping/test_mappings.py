@@ -99,6 +99,23 @@ def test_columns_by_name_ranges_and_combinations(tables):
     assert taxels.t_ns is None
 
 
+@pytest.mark.parametrize(("transposed", "end"), [(False, ","), (True, ""), (True, ",")])
+def test_a_line_a_channel_and_a_delimiter_too_many(tables, transposed, end):
+    table = np.array([["t", "a", "b", "c", "f"], *(line.split(",") for line in rows().split())])
+    first, *others = [",".join(line) for line in (table.T if transposed else table)]
+    tables.put("press.csv", "\n".join([first + end * transposed, *(line + end for line in others)]))
+    report = tables.run(
+        tables__table__read={"format": "csv", "header": True, "transposed": transposed},
+        tables__table__time__column="t", streams__taxels__channels__0__columns=["a", "b", "c"],
+        streams__force__channels__0__columns="f",
+    )  # fmt: skip
+    _, streams = read(report)
+    assert np.array_equal(streams["taxels"].data[:, 1], np.arange(40) * 2)
+    assert np.array_equal(streams["taxels"].t_ns, np.arange(40) * 10_000_000)
+    (made,) = report.recordings
+    assert [one.check for one in made.findings].count("trailing-delimiter") == len(end)
+
+
 @pytest.mark.parametrize("name", ["npz", "mat"])
 def test_an_archive_of_arrays(tables, name):
     X = np.random.default_rng(0).normal(size=(11, 5, 3)).astype(np.float32)
@@ -123,6 +140,37 @@ def test_an_archive_of_arrays(tables, name):
     meta, streams = read(report, 7)
     assert np.array_equal(streams["taxels"].data, X[7])
     assert meta.labels == {"slip": "yes", "block": "1"}
+
+
+NPY = """
+clock: none
+tables:
+  table:
+    files: "x_*.npy"
+    path: "x_(?P<fold>[a-z]+)"
+    read: {format: npy, axes: [recording, channel, channel, row], per_recording: {y: "labels_{fold}.npy"}}
+recording: {name: "{fold}-{index}", session: s, labels: {material: "{y}"}}
+streams:
+  taxels: {table: table, dtype: float32, channels: [{columns: 0..5, name: "t{column}", kind: taxel, unit: count}]}
+"""
+
+
+def test_arrays_in_files_of_their_own_with_channels_on_a_grid(tables):
+    X = np.random.default_rng(0).normal(size=(4, 2, 3, 5)).astype(np.float32)
+    for fold, labels in (("a", [3, 1, 2, 0]), ("b", [0, 0, 7, 0])):
+        np.save(tables.data / f"x_{fold}.npy", X if fold == "a" else -X)
+        np.save(tables.data / f"labels_{fold}.npy", labels)
+    report = tables.run(NPY)
+    meta, streams = read(report, 6)
+    assert (meta.name, meta.labels) == ("b-2", {"material": "7"})
+    assert np.array_equal(streams["taxels"].data, -X[2].reshape(6, 5).T)
+
+
+def test_a_pickled_array_and_one_without_its_labels_are_refused(tables):
+    np.save(tables.data / "x_a.npy", np.zeros((4, 2, 3, 5)))
+    tables.refused("labels_a.npy", text=NPY)
+    np.save(tables.data / "labels_a.npy", np.array([0, 1, 2, "a"], dtype=object))
+    tables.refused("x_a.npy cannot be read", "allow_pickle", text=NPY)
 
 
 def test_a_sheet_of_an_excel_workbook_and_words_for_no_sample(tables):
@@ -192,6 +240,16 @@ def test_tables_that_do_not_belong_together(tables, files, says):
     tables.refused(says, text=JOINED)
 
 
+def test_a_file_without_a_partner_costs_its_own_recording_and_is_named(tables):
+    tables.put("1_probe/sensor.csv", rows())
+    tables.put("1_probe/states.csv", states())
+    tables.put("2_probe/sensor.csv", rows())
+    tables.put("3_probe/states.csv", states())
+    report = tables.run(JOINED)
+    assert [made.name for made in report.recordings] == ["1"]
+    assert [text.split()[0] for text in report.orphans] == ["2_probe/sensor.csv", "3_probe/states.csv"]
+
+
 def test_one_file_of_several_sessions(tables):
     tables.put("a.csv", "".join(f"{row},{row % 3},{row},{row},{row},{'xy'[row % 2]}\n" for row in range(10)))
     report = tables.run(split_by={"session": 5}, recording={"name": "{file}-{session}", "session": "{session}"})
@@ -228,6 +286,7 @@ def test_a_sentinel_that_nobody_named_is_refused(tables):
     [
         ("0,1,2,3,4\n1,1,2,3\n", {}, "press.csv:2: 4 cells"),
         ("0,1,2,3,4\nsoon,1,2,3,4\n", {}, "press.csv:2: column 0: 'soon'"),
+        ("0,1,soon\n0,1,2\n", {"tables__table__read__transposed": True}, "press.csv:cell 3: column 0: 'soon'"),
         ("0,nan,2,3,4\n1,nan,2,3,5\n", {}, "column 1 (channel t1)"),
         ("0\t1\t2\t3\t4\n1\t1\t2\t3\t4\n", {}, "press.csv is separated by tabs"),
         (rows(), {"tables__table__read__header": True}, "'0.00' in column 0"),
