@@ -131,7 +131,7 @@ def _unpaired(first: Row, second: Row, value: float, sign: float, groups: list[P
         known: dict[str, Any] = dict.fromkeys(("p", "smallest_p", "effect", "improved"))
         return _difference(
             first, value, np.inf, np.inf,
-            **known, replicates=0, unit=unit, paired=False, method=f"too few replicates for an interval, which needs {FEWEST}",
+            **known, replicates=0, unit=unit, paired=False, method=f"too few replicates: an interval needs {FEWEST}",
         )  # fmt: skip
     one, other = sorted(groups, key=lambda group: int(group.places[0]))
     deviation = float(np.sqrt((one.influence**2).sum() + (other.influence**2).sum()))

@@ -44,10 +44,10 @@ def over_replicates(rows: Sequence[Row]) -> list[dict[str, Any]]:
     -------
     list of dict
         In the order in which the cells come first. On a simulated rig `score` is the median over replicates, and the
-        interval is that of the median (:func:`median_interval`), None of fewer than five. On recordings, and
-        of a single campaign whose split holds out five units, the replicates are those, and the row's own interval stays; of several seeds asked of the same recordings
-        the one with the median score stands for all. Times are medians. Recordings, answers and key are those of the
-        first replicate.
+        interval is that of the median (:func:`median_interval`), None of fewer than five. On recordings, and of a
+        single campaign whose split holds out five units, the replicates are what is held out, and the row's own
+        interval stays; of several seeds asked of the same recordings the one with the median score stands for all.
+        Times are medians. Recordings, answers and key are those of the first replicate.
 
     Notes
     -----
