@@ -99,7 +99,13 @@ def _curved() -> list[EstimatorDescriptor]:
 
 
 def _forests() -> list[EstimatorDescriptor]:
-    found = []
+    found = [
+        EstimatorDescriptor(
+            name="extra-trees", title="Extremely randomised trees", kinds=BOTH, linear=False,
+            params={"n_estimators": 200, "min_samples_leaf": 2}, where="tactbench.estimators.nonlinear:extra_trees",
+            rehearsal={"n_estimators": 2},
+        )
+    ]  # fmt: skip
     for trees in TREES:
         number = "" if trees == TREES[0] else f"-{trees}"
         params = {"n_estimators": trees, "max_depth": None, "min_samples_leaf": 1}

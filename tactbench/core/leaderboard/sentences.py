@@ -124,7 +124,8 @@ def _outcome(board: Board) -> str:
             return "" if board.unplaced else f"{name} is the only answer."
         only = "the only answer" if not board.unplaced else f"the only of {len(board.answers)} answers that is"
         return f"{where}{name} is {only} better than the trivial one of its own sensor ({board.bars_of([first])})."
-    alike = [row for row, rank in others if not rank.behind]
+    # Who shares its place is told from it by pairs alone, of which among many some are apart by chance.
+    alike = [row for row, rank in others if rank.place == leader.place or not rank.behind]
     if alike:
         return f"{where}{name} has {quality}; {_some(list(map(board.name, alike)))} cannot be told from it."
     return f"{where}{name} is best; {_closest(board, first, [row for row, _ in others])}."

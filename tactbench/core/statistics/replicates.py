@@ -86,7 +86,7 @@ def _of_all(name: str, members: Sequence[Row]) -> dict[str, Any]:
 def _of_campaigns(done: Sequence[Row]) -> dict[str, Any]:
     """Return the row of a simulated cell: each replicate is a campaign recorded anew."""
     first = done[0]
-    if len(done) == 1 and first["ci_low"] is not None:
+    if len(done) == 1 and first["ci_low"] is not None and "own" in (first.get("replicates") or {}):
         return _of_recordings(done)  # its split holds out enough of what is simulated, too: devices, placements
     found = dict(first) | {key: _median([row.get(key) for row in done]) for key in _MEDIANS if key in first}
     level = 0.0

@@ -154,6 +154,10 @@ class Truth:
         assert self.gap(first, second) <= min(self.gap(first, one) for one in behind) + 1e-12
         return all(self.ranks[one["cell"]].behind for one in behind)
 
+    def near(self, name):
+        rank = self.ranks[self.called(name)["cell"]]
+        return rank.place == 1 or not rank.behind
+
     def gap(self, first, second):
         """By how much an answer is worse: the mean of the campaigns' differences, else the difference of scores."""
         kept = [one["replicates"] or {} for one in (first, second)]
@@ -208,7 +212,7 @@ ABOVE = {
         lambda t, a, beyond, value, low, high, b, *wins:
         t.ahead(a, b) and t.leads(a) and t.by_campaign(a, b, *wins, beyond, value, low, high),
     rf"{NAME} has {QUALITY}; (.*?)(?: and \d+ more)? cannot be told from it\.":
-        lambda t, a, b: t.leads(a) and all(not t.ranks[t.called(one)["cell"]].behind for one in b.split(", ")),
+        lambda t, a, b: t.leads(a) and all(t.near(one) for one in b.split(", ")),
     rf"{NAME} has {QUALITY}, and is not shown to be better than the "
     r"trivial (\S+) of its own sensor\.":
         lambda t, a, b: t.leads(a) and t.called(a) in t.unshown and t.bar(t.called(a))["estimator"] == b,
