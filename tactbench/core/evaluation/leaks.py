@@ -11,6 +11,7 @@ import numpy.typing as npt
 from tactbench.core.evaluation.dataset import Dataset
 from tactbench.core.evaluation.splits import Assignment, Mask
 from tactbench.core.recording.health import MONOTONE, is_copy
+from tactbench.core.spec.row import LEAKS
 
 BLOCK = 16
 """Consecutive rows that must be equal; a recording of fewer rows counts as a whole."""
@@ -40,7 +41,7 @@ def copied_channels(data: Dataset) -> tuple[str, ...]:
         for name, column in zip(data.features, X.T, strict=True)
         if any(is_copy(column, part, recording) for part in parts)
     ]
-    return (f"leaks: {', '.join(found)} is {MONOTONE.format('the target')}.",) if found else ()
+    return (f"{LEAKS}{', '.join(found)} is {MONOTONE.format('the target')}.",) if found else ()
 
 
 def leak_stamps(data: Dataset, assignments: Sequence[Assignment]) -> tuple[str, ...]:
@@ -64,7 +65,7 @@ def leak_stamps(data: Dataset, assignments: Sequence[Assignment]) -> tuple[str, 
     if worst <= MOST_SHARED:
         return _single_rows(data, assignments)
     return (
-        f"leaks: {worst:.0%} of the test rows of a fold are equal to training rows, in blocks of {BLOCK}; "
+        f"{LEAKS}{worst:.0%} of the test rows of a fold are equal to training rows, in blocks of {BLOCK}; "
         f"{pair[0]!r} repeats {pair[1]!r}.",
     )
 
@@ -102,7 +103,7 @@ def _single_rows(data: Dataset, assignments: Sequence[Assignment]) -> tuple[str,
     # Coarse readings agree by chance, and then far more often in half of the columns than in all.
     if worst <= MOST_SHARED or min(by_half) < (1 - MOST_SHARED) * distinct:
         return ()
-    return (f"leaks: {worst:.0%} of the test rows of a fold are equal to training rows.",)
+    return (f"{LEAKS}{worst:.0%} of the test rows of a fold are equal to training rows.",)
 
 
 def _mixed(*columns: npt.NDArray[Any] | None) -> _Hashes:

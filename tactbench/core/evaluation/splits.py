@@ -13,6 +13,7 @@ import numpy.typing as npt
 from tactbench.core.errors import DataError, NotApplicable, UsageError
 from tactbench.core.evaluation.dataset import Dataset, Table
 from tactbench.core.evaluation.protocols import FIRST_FRAME, ProtocolSpec, shots
+from tactbench.core.spec.row import LEAKS
 from tactbench.core.spec.task import TaskSpec
 
 Mask = npt.NDArray[np.bool_]
@@ -24,8 +25,10 @@ SPLITS_WITHOUT_GROUPS = ("roles", "session", "in-session", "shuffled")
 """Splits whose unit of replication is the session; few-shot-N is another."""
 MOST_ONE_BY_ONE = 12
 """Up to so many groups of a task's own campaign are left out one by one; more are dealt into folds."""
-SHUFFLED_STAMP = "leaks: split shuffled puts neighbouring rows of one recording or object on both sides."
-SHUFFLED_WHOLE_STAMP = "leaks: split shuffled deals recordings at random, those of one object or session on both sides."
+SHUFFLED_STAMP = f"{LEAKS}split shuffled puts neighbouring rows of one recording or object on both sides."
+SHUFFLED_WHOLE_STAMP = (
+    f"{LEAKS}split shuffled deals recordings at random, those of one object or session on both sides."
+)
 
 
 @dataclass(frozen=True)
