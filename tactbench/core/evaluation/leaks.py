@@ -28,19 +28,12 @@ def copied_channels(data: Dataset) -> tuple[str, ...]:
     """Return a stamp if a channel gives the target of a regression away, or its size, else nothing."""
     if data.classes:
         return ()
-    rows = [table.labelled for table in data.tables]
-    targets, X = (
-        np.concatenate([column[mask] for column, mask in zip(columns, rows, strict=True)])
-        for columns in ([table.y for table in data.tables], [table.X for table in data.tables])
-    )
-    recording = np.repeat(np.arange(len(rows)), [mask.sum() for mask in rows])
-    parts = [*targets.reshape(len(targets), -1).T]
+    X, y = (np.concatenate([getattr(one, name)[one.labelled] for one in data.tables]) for name in ("X", "y"))
+    recording = np.repeat(np.arange(len(data.tables)), [one.labelled.sum() for one in data.tables])
+    parts = [*y.reshape(len(y), -1).T]
     parts += [abs(part) for part in parts if part.min() < 0 < part.max()]  # a square does not tell the sign
-    found = [
-        name
-        for name, column in zip(data.features, X.T, strict=True)
-        if any(is_copy(column, part, recording) for part in parts)
-    ]
+    channels = zip(data.features, X.T, strict=True)
+    found = [name for name, column in channels if any(is_copy(column, part, recording) for part in parts)]
     return (f"{LEAKS}{', '.join(found)} is {MONOTONE.format('the target')}.",) if found else ()
 
 
@@ -79,27 +72,22 @@ def _learned(fold: Assignment) -> tuple[Mask, ...]:
 
 def _single_rows(data: Dataset, assignments: Sequence[Assignment]) -> tuple[str, ...]:
     """Return a stamp if rows that stand each for itself, since no clock orders them, stand on both sides of a split."""
-    places = [place for place, one in enumerate(data.tables) if one.meta.clock == "none" or len(one.row) == 1]
-    if not places:
+    if not all(one.meta.clock == "none" or len(one.row) == 1 for one in data.tables):
         return ()
-    tables = [data.tables[place] for place in places]
-    mixed = [_mixed(one.X, one.force, *([] if data.classes else [one.y])) for one in tables]
-    rows = [one.sum(axis=1, dtype=np.uint64) for one in mixed]
+    mixed = [_mixed(one.X, one.force, *([] if data.classes else [one.y])) for one in data.tables]
+    rows, *halves = (
+        [one[:, start::step].sum(axis=1, dtype=np.uint64) for one in mixed] for start, step in ((0, 1), (0, 2), (1, 2))
+    )
 
     def shared(fold: Assignment) -> float:
         """Return the share of the distinct test rows that training has too."""
-        test, train = (
-            np.unique(np.concatenate([one[masks[place]] for one, place in zip(rows, places, strict=True)]))
-            for masks in (fold.test, _learned(fold))
-        )
+        sets = [[one[mask] for one, mask in zip(rows, masks, strict=True)] for masks in (fold.test, _learned(fold))]
+        test, train = (np.unique(np.concatenate(one)) for one in sets)
         met = np.isin(test, train)
         return float(met.mean()) if met.sum() > AT_REST else 0.0
 
     worst = max(map(shared, assignments))
-    distinct, *by_half = (
-        len(np.unique(np.concatenate([one[:, part].sum(axis=1, dtype=np.uint64) for one in mixed])))
-        for part in (slice(None), slice(None, None, 2), slice(1, None, 2))
-    )
+    distinct, *by_half = (len(np.unique(np.concatenate(one))) for one in (rows, *halves))
     # Coarse readings agree by chance, and then far more often in half of the columns than in all.
     if worst <= MOST_SHARED or min(by_half) < (1 - MOST_SHARED) * distinct:
         return ()

@@ -26,9 +26,7 @@ SPLITS_WITHOUT_GROUPS = ("roles", "session", "in-session", "shuffled")
 MOST_ONE_BY_ONE = 12
 """Up to so many groups of a task's own campaign are left out one by one; more are dealt into folds."""
 SHUFFLED_STAMP = f"{LEAKS}split shuffled puts neighbouring rows of one recording or object on both sides."
-SHUFFLED_WHOLE_STAMP = (
-    f"{LEAKS}split shuffled deals recordings at random, those of one object or session on both sides."
-)
+SHUFFLED_WHOLE_STAMP = f"{LEAKS}split shuffled deals recordings at random, of one object or session on both sides."
 
 
 @dataclass(frozen=True)

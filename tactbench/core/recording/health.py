@@ -32,7 +32,7 @@ LAG = 5
 FEWEST_VALUES = 200
 """Distinct values from which on it is no chance that all are in one order: noise of a thousandth of the range turns
 some twenty pairs of so many round, 0.56 n² noise / range of n."""
-MONOTONE = f"in every row a monotone function of {{}}, at most {LAG} rows early or late"
+MONOTONE = f"but for rounding a monotone function of {{}}, at most {LAG} rows early or late"
 """What is said of a copy."""
 GLANCE = 500
 """Rows that are looked at first: whatever holds for all holds for some."""

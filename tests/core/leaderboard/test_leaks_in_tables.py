@@ -39,9 +39,9 @@ def repeated(X, force):
 
 
 PLANTED = {
-    scaled: "t1 is in every row a monotone function of the target",
-    squared: "t1 is in every row a monotone function of the target",
-    lagged: "t1 is in every row a monotone function of the target",
+    scaled: "t1 is but for rounding a monotone function of the target",
+    squared: "t1 is but for rounding a monotone function of the target",
+    lagged: "t1 is but for rounding a monotone function of the target",
     repeated: "17% of the test rows of a fold are equal to training rows",
 }
 
