@@ -19,7 +19,7 @@ import numpy as np
 import numpy.typing as npt
 
 from tactbench.core.cli.config import default_matrix
-from tactbench.core.cli.results import opened, over_all, shown_rows, table_of
+from tactbench.core.cli.results import opened, shown_rows, table_of
 from tactbench.core.cli.threads import keep_threads
 from tactbench.core.errors import NotApplicable, UnknownNameError, UsageError
 from tactbench.core.evaluation.cell import PLAIN, TaskData
@@ -28,7 +28,7 @@ from tactbench.core.evaluation.metrics import metric_called
 from tactbench.core.evaluation.protocols import is_probe
 from tactbench.core.leaderboard.formats import records, write_tables
 from tactbench.core.leaderboard.pairwise import comparisons, record_of, tables_of, with_declared
-from tactbench.core.leaderboard.table import Table, build_table
+from tactbench.core.leaderboard.table import Table, build_table, over_all
 from tactbench.core.leaderboard.view import best, grids
 from tactbench.core.matrix.naming import cell_of
 from tactbench.core.matrix.plan import Cell, task_of

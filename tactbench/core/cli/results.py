@@ -36,6 +36,7 @@ def shown_rows(store: Store) -> list[dict[str, Any]]:
     """
     from tactbench.core.cli.screen import remark
     from tactbench.core.errors import UsageError
+    from tactbench.core.leaderboard.table import over_all
 
     rows = store.rows()
     for one in store.troubles:
@@ -43,14 +44,6 @@ def shown_rows(store: Store) -> list[dict[str, Any]]:
     if not rows:
         raise UsageError(f"{store.folder} has no row that can be shown.", hint="Run `tactbench run` again.")
     return over_all(store, rows)
-
-
-def over_all(store: Store, rows: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
-    """Return one row a cell over its replicates, with the level of its sensor."""
-    from tactbench.core.leaderboard.levels import with_levels
-    from tactbench.core.statistics.replicates import over_replicates
-
-    return with_levels(over_replicates(rows), store.folder, store.provenance)
 
 
 def table_of(store: Store, rows: Sequence[Mapping[str, Any]], *, times: bool = True) -> Table:

@@ -39,8 +39,9 @@ def command(ctx: click.Context, /, shape: str, **asked: Any) -> None:
     check_destination(shape)
     keep_threads()
     from tactbench.core.cli.listing import tell_failed
-    from tactbench.core.cli.results import over_all, table_of
+    from tactbench.core.cli.results import table_of
     from tactbench.core.leaderboard.formats import write_tables
+    from tactbench.core.leaderboard.table import over_all
     from tactbench.core.plugins.registry import installed
 
     tell_failed(installed())

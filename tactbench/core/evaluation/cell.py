@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from tactbench.core.errors import DataError, PluginContractError
+from tactbench.core.errors import DataError, NotApplicable, PluginContractError
 from tactbench.core.evaluation.dataset import LARGEST, Dataset, load_dataset
 from tactbench.core.evaluation.delay import (
     NO_LINK,
@@ -206,6 +206,11 @@ def load_task(
         window), and whether a threshold has to be chosen.
     seed
         Of split ``shuffled``.
+
+    Raises
+    ------
+    NotApplicable
+        If the estimator looks at the time and a recording states none: the order of its rows may be anybody's.
     """
     recorded = recordings if isinstance(recordings, Dataset) else load_dataset(task, recordings)
     rules, estimator = protocol_called(protocol), without_windows(estimator, task)
@@ -220,6 +225,11 @@ def load_task(
     held_back = task.kind == "events" and estimator.threshold is None and assignments[0].validation is None
     if held_back:
         assignments = [with_validation(one, data) for one in assignments]
+    if estimator.looks_at == "time" and any(meta.clock == "none" for meta in recorded.metas):
+        raise NotApplicable(
+            f"{estimator.name} looks at the time alone, which not all of these recordings state.",
+            hint="State the clock in the mapping.",
+        )
     return TaskData(task, rules, split, recorded, data, tuple(assignments), held_back)
 
 

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from tactbench.core.evaluation.dataset import Dataset, Table
-from tactbench.core.evaluation.splits import Assignment
-from tactbench.core.recording.health import is_copy
+from tactbench.core.evaluation.dataset import Dataset
+from tactbench.core.evaluation.splits import Assignment, Mask
+from tactbench.core.recording.health import MONOTONE, is_copy
+from tactbench.core.spec.row import LEAKS
 
 BLOCK = 16
 """Consecutive rows that must be equal; a recording of fewer rows counts as a whole."""
@@ -17,31 +19,30 @@ CHANGES = 0.5
 """Share of the rows of a block that must differ from the row before: sensors at rest repeat themselves."""
 MOST_SHARED = 0.05
 """Share of the test rows of a fold that is put up with. Two presses on a sensor with noise share none."""
+AT_REST = 4
+"""Distinct rows of a fold that may stand in training too: those of a sensor that nothing touches."""
 _Hashes = npt.NDArray[np.uint64]
 
 
 def copied_channels(data: Dataset) -> tuple[str, ...]:
-    """Return a stamp if a channel is the target of a regression but for scale and offset, else nothing."""
+    """Return a stamp if a channel gives the target of a regression away, or its size, else nothing."""
     if data.classes:
         return ()
-    targets = np.concatenate([table.y[table.labelled] for table in data.tables])
-    parts = targets.reshape(len(targets), -1).T
-    found = []
-    for place, name in enumerate(data.features):
-        column = np.concatenate([table.X[table.labelled, place] for table in data.tables])
-        found += [name] * any(is_copy(column, part) for part in parts)
-    return (f"leaks: {', '.join(found)} is the target but for scale and offset.",) if found else ()
+    X, y = (np.concatenate([getattr(one, name)[one.labelled] for one in data.tables]) for name in ("X", "y"))
+    recording = np.repeat(np.arange(len(data.tables)), [one.labelled.sum() for one in data.tables])
+    parts = [*y.reshape(len(y), -1).T]
+    parts += [abs(part) for part in parts if part.min() < 0 < part.max()]  # a square does not tell the sign
+    channels = zip(data.features, X.T, strict=True)
+    found = [name for name, column in channels if any(is_copy(column, part, recording) for part in parts)]
+    return (f"{LEAKS}{', '.join(found)} is {MONOTONE.format('the target')}.",) if found else ()
 
 
 def leak_stamps(data: Dataset, assignments: Sequence[Assignment]) -> tuple[str, ...]:
     """Return a stamp if readings of a fold's test set stand in its training set too, else nothing."""
-    rows = [_row_hashes(table) for table in data.tables]
+    rows = [_mixed(table.X, table.force).sum(axis=1, dtype=np.uint64) for table in data.tables]
     worst, pair = 0.0, ("", "")
     for fold in assignments:
-        learned = fold.train
-        if fold.validation is not None:
-            learned = tuple(one | other for one, other in zip(fold.train, fold.validation, strict=True))
-        known = [_blocks(hashes[mask])[0] for hashes, mask in zip(rows, learned, strict=True)]
+        known = [_blocks(hashes[mask])[0] for hashes, mask in zip(rows, _learned(fold), strict=True)]
         tested = [_blocks(hashes[mask]) for hashes, mask in zip(rows, fold.test, strict=True)]
         ends = np.cumsum([len(blocks) for blocks, _, _ in tested])
         met = np.isin(np.concatenate([blocks for blocks, _, _ in tested]), np.concatenate(known))
@@ -55,22 +56,53 @@ def leak_stamps(data: Dataset, assignments: Sequence[Assignment]) -> tuple[str, 
             train = int(np.argmax([np.isin(tested[test][0], blocks).sum() for blocks in known]))
             worst, pair = share, (data.tables[test].meta.name, data.tables[train].meta.name)
     if worst <= MOST_SHARED:
-        return ()
+        return _single_rows(data, assignments)
     return (
-        f"leaks: {worst:.0%} of the test rows of a fold are equal to training rows, in blocks of {BLOCK}; "
+        f"{LEAKS}{worst:.0%} of the test rows of a fold are equal to training rows, in blocks of {BLOCK}; "
         f"{pair[0]!r} repeats {pair[1]!r}.",
     )
 
 
-def _row_hashes(table: Table) -> _Hashes:
-    """Return a number for each row of readings and force: equal rows have equal ones, others hardly ever.
+def _learned(fold: Assignment) -> tuple[Mask, ...]:
+    """Return the rows that a fold trains or validates on."""
+    if fold.validation is None:
+        return fold.train
+    return tuple(one | other for one, other in zip(fold.train, fold.validation, strict=True))
 
-    With the force, since a sensor without noise repeats itself where the reference does not.
+
+def _single_rows(data: Dataset, assignments: Sequence[Assignment]) -> tuple[str, ...]:
+    """Return a stamp if rows that stand each for itself, since no clock orders them, stand on both sides of a split."""
+    if not all(one.meta.clock == "none" or len(one.row) == 1 for one in data.tables):
+        return ()
+    mixed = [_mixed(one.X, one.force, *([] if data.classes else [one.y])) for one in data.tables]
+    rows, *halves = (
+        [one[:, start::step].sum(axis=1, dtype=np.uint64) for one in mixed] for start, step in ((0, 1), (0, 2), (1, 2))
+    )
+
+    def shared(fold: Assignment) -> float:
+        """Return the share of the distinct test rows that training has too."""
+        sets = [[one[mask] for one, mask in zip(rows, masks, strict=True)] for masks in (fold.test, _learned(fold))]
+        test, train = (np.unique(np.concatenate(one)) for one in sets)
+        met = np.isin(test, train)
+        return float(met.mean()) if met.sum() > AT_REST else 0.0
+
+    worst = max(map(shared, assignments))
+    distinct, *by_half = (len(np.unique(np.concatenate(one))) for one in (rows, *halves))
+    # Coarse readings agree by chance, and then far more often in half of the columns than in all.
+    if worst <= MOST_SHARED or min(by_half) < (1 - MOST_SHARED) * distinct:
+        return ()
+    return (f"{LEAKS}{worst:.0%} of the test rows of a fold are equal to training rows.",)
+
+
+def _mixed(*columns: npt.NDArray[Any] | None) -> _Hashes:
+    """Return (n, columns) numbers; sums of them over columns are equal where rows are, and else hardly ever.
+
+    Of readings and force, since a sensor without noise repeats itself where the reference does not.
     """
-    X = table.X if table.force is None else np.column_stack([table.X, table.force])
+    X = np.column_stack([one for one in columns if one is not None]).astype(np.float64)
     bits = np.ascontiguousarray(X + 0.0).view(np.uint64)  # adding 0 makes -0 and 0 one
     mixed = (bits ^ (bits >> np.uint64(32))) * _factors(X.shape[1])
-    return np.asarray((mixed ^ (mixed >> np.uint64(29))).sum(axis=1, dtype=np.uint64))
+    return np.asarray(mixed ^ (mixed >> np.uint64(29)))
 
 
 def _blocks(rows: _Hashes) -> tuple[_Hashes, npt.NDArray[np.int64], int]:

@@ -13,6 +13,7 @@ import numpy.typing as npt
 from tactbench.core.errors import DataError, NotApplicable, UsageError
 from tactbench.core.evaluation.dataset import Dataset, Table
 from tactbench.core.evaluation.protocols import FIRST_FRAME, ProtocolSpec, shots
+from tactbench.core.spec.row import LEAKS
 from tactbench.core.spec.task import TaskSpec
 
 Mask = npt.NDArray[np.bool_]
@@ -26,8 +27,8 @@ ONE_BY_ONE = ("unit", "placement", "cap_radius_mm")
 """Groups that are left out one by one whatever the task, beside those of the task's own campaigns."""
 MOST_ONE_BY_ONE = 12
 """Up to so many groups are left out one by one; more are dealt into folds."""
-SHUFFLED_STAMP = "leaks: split shuffled puts neighbouring rows of one recording or object on both sides."
-SHUFFLED_WHOLE_STAMP = "leaks: split shuffled deals recordings at random, those of one object or session on both sides."
+SHUFFLED_STAMP = f"{LEAKS}split shuffled puts neighbouring rows of one recording or object on both sides."
+SHUFFLED_WHOLE_STAMP = f"{LEAKS}split shuffled deals recordings at random, of one object or session on both sides."
 
 
 @dataclass(frozen=True)

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import importlib
 from collections.abc import Iterator, Sequence
+from typing import Any
 
 from tactbench.core.evaluation.protocols import DEPLOYABLE, FIRST_FRAME
 from tactbench.core.leaderboard.names import WORSE_END, Bars, Row, answer_name, grouped, sensor_name, sign_of
-from tactbench.core.tables.numbers import ABSENT, interval, score
+from tactbench.core.spec.row import LEAKS
+from tactbench.core.tables.numbers import ABSENT, interval, score, score_with_unit
 from tactbench.core.tables.text import visible
 from tactbench.core.tables.text_table import Entry, TextTable
 
@@ -24,25 +26,19 @@ COLUMNS = (
     "trivial", "verdict",
 )  # fmt: skip
 _NOTE = (
-    f"LEAK: the first frame alone has {LEAK_SHARE:.0%} or more of the skill (score beyond the trivial answer); PART: "
-    "less, but more than a guess. OPTIMISTIC: shuffled rows score beyond the interval of the split. TRIVIAL: an answer "
-    "that reads no sensor scores as well, or the interval does not exclude it (TRIVIAL?). See docs/real-recordings.md."
+    f"LEAK: the first frame alone has {LEAK_SHARE:.0%} or more of the skill (score beyond the trivial answer), or the "
+    "row is stamped (‡); PART: less, but more than a guess. OPTIMISTIC: shuffled rows score beyond the interval of the "
+    "split. TRIVIAL: an answer that reads no sensor scores as well, or the interval does not exclude it (TRIVIAL?). "
+    "See docs/real-recordings.md."
 )
 
 
 def build_probe(rows: Sequence[Row]) -> TextTable | None:
     """Put each finished answer under `deployable` beside its probes; None if nothing was probed."""
-    alike = grouped(rows, _answer)
     bars = Bars(rows)
     lines: list[tuple[str, ...]] = []
     skipped: dict[str, None] = {}
-    for row in rows:
-        if row["is_baseline"] or row["status"] != "done" or row["protocol"] != DEPLOYABLE.name:
-            continue
-        if row["split"] in ("shuffled", "in-session"):
-            continue  # neither keeps recordings or groups apart: there is nothing to compare with
-        first = _probe_of(alike[_answer(row)], FIRST_FRAME.name, row["split"])
-        shuffled = _probe_of(alike[_answer(row)], DEPLOYABLE.name, "shuffled")
+    for row, first, shuffled in _probed(rows):
         if first is not None or shuffled is not None:
             lines.append(_line(row, shuffled, first, bars))
         if first is not None and first["status"] == "skipped":
@@ -52,6 +48,32 @@ def build_probe(rows: Sequence[Row]) -> TextTable | None:
     kinds = tuple("alarm" if {"LEAK", "TRIVIAL"} & set(line[-1].split(", ")) else "plain" for line in lines)
     title = "Probe · does the score come from the contact?"
     return TextTable(title, COLUMNS, tuple(lines), frozenset(COLUMNS[4:9]), notes=(_NOTE, *skipped), kinds=kinds)
+
+
+def with_leaks(rows: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
+    """Return rows, with a stamp where the first frame gives an answer away: the mark of whatever table shows them."""
+
+    def told(row: Row) -> str:
+        return score_with_unit(row["score"], row["unit"])
+
+    found = {
+        row["cell"]: f"{LEAKS}the first frame alone scores {told(first)}, all frames {told(row)}."
+        for row, first, _ in _probed(rows)
+        if first is not None and _told_by_first(row, first) == "LEAK"
+    }
+    return [{**row, "stamps": [*row["stamps"], found[row["cell"]]]} if row["cell"] in found else row for row in rows]
+
+
+def _probed(rows: Sequence[Row]) -> Iterator[tuple[Row, Row | None, Row | None]]:
+    """Yield each answer that may be probed, the same from first frames, and from shuffled rows."""
+    alike = grouped(rows, _answer)
+    for row in rows:
+        if row["is_baseline"] or row["status"] != "done" or row["protocol"] != DEPLOYABLE.name:
+            continue
+        if row["split"] in ("shuffled", "in-session"):
+            continue  # neither keeps recordings or groups apart: there is nothing to compare with
+        first = _probe_of(alike[_answer(row)], FIRST_FRAME.name, row["split"])
+        yield row, first, _probe_of(alike[_answer(row)], DEPLOYABLE.name, "shuffled")
 
 
 def _answer(row: Row) -> tuple[str, ...]:
@@ -81,23 +103,30 @@ def _shown(row: Row | None) -> str:
 
 
 def _verdicts(row: Row, shuffled: Row | None, first: Row | None, bars: Bars) -> Iterator[str]:
-    sign, trivial = sign_of(row), row["baseline"]
+    sign = sign_of(row)
     if bars.trivial(row) is not None and (bars.no_better(row) or bars.unshown(row)):
         yield "TRIVIAL" if bars.no_better(row) else "TRIVIAL?"
-    if first is not None and first["status"] == "done" and trivial is not None:
-        beyond = _beyond_guessing(first, trivial)
-        if beyond is None:
-            yield "too few recordings for the first frame"
-        elif beyond:
-            yield (
-                "LEAK" if sign * (trivial - first["score"]) >= LEAK_SHARE * sign * (trivial - row["score"]) else "PART"
-            )
+    leaks = any(str(stamp).startswith(LEAKS) for stamp in row["stamps"])
+    if told := "LEAK" if leaks else _told_by_first(row, first):
+        yield told
     if shuffled is not None and shuffled["status"] == "done":
         best = row[WORSE_END[-sign]]
         if best is None:
             yield "no interval for shuffled rows"
         elif sign * (best - shuffled["score"]) > 0:
             yield "OPTIMISTIC"
+
+
+def _told_by_first(row: Row, first: Row | None) -> str:
+    """Return what first frames tell of an answer: LEAK, PART, that it cannot be said, or nothing."""
+    sign, trivial = sign_of(row), row["baseline"]
+    if first is None or first["status"] != "done" or trivial is None:
+        return ""
+    beyond = _beyond_guessing(first, trivial)
+    if beyond is None:
+        return "too few recordings for the first frame"
+    most = sign * (trivial - first["score"]) >= LEAK_SHARE * sign * (trivial - row["score"])
+    return "" if not beyond else "LEAK" if most else "PART"
 
 
 def _beyond_guessing(first: Row, trivial: float) -> bool | None:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from operator import itemgetter
 from typing import NamedTuple
 
 from tactbench.core.leaderboard.names import Bars, Row, answer_name, grouped, held_out, sign_of
@@ -225,9 +226,13 @@ def _ended(board: Board, stopped: bool) -> Iterator[Note]:
 def _marks(board: Board) -> Iterator[Note]:
     """Yield what the marks of this table mean: at most as many notes as there may be, so that none goes unexplained."""
     finished = (*board.answers, *board.trivial)
-    stamps = list(dict.fromkeys(str(stamp) for row in finished for stamp in row["stamps"] or ()))
+    stamps = grouped([(str(stamp), row) for row in finished for stamp in row["stamps"] or ()], itemgetter(0))
     if stamps:
-        yield Note(f"{STAMPED}  {'; '.join(stamps)}", printed=True)
+        told = (
+            f"{_some([board.name(row) for _, row in of])}: " * (len(of) < len(finished)) + text.rstrip(".")
+            for text, of in stamps.items()
+        )
+        yield Note(f"{STAMPED}  {'; '.join(told)}.", printed=True)
     if any(rank.tied for _, rank in board.placed) and not board.unranked:
         yield Note(f"{SHARED}  shared place: these rows cannot all be told apart")
     of_own = "better than the trivial answer of its own sensor"

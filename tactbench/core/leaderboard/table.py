@@ -11,11 +11,12 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from operator import itemgetter
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from tactbench.core.evaluation.protocols import is_probe
 from tactbench.core.leaderboard.columns import Line, columns, line_of
 from tactbench.core.leaderboard.events import events_table
+from tactbench.core.leaderboard.levels import with_levels
 from tactbench.core.leaderboard.names import (
     Bars,
     Row,
@@ -26,12 +27,15 @@ from tactbench.core.leaderboard.names import (
     sign_of,
     split_name,
 )
-from tactbench.core.leaderboard.probe import build_probe
+from tactbench.core.leaderboard.probe import build_probe, with_leaks
 from tactbench.core.leaderboard.sentences import NO_BETTER, Board, Note, above, below
 from tactbench.core.statistics.rank import Rank, beyond_floor, excess_of
-from tactbench.core.statistics.replicates import FEWEST
+from tactbench.core.statistics.replicates import FEWEST, over_replicates
 from tactbench.core.tables.text import cut, visible
 from tactbench.core.tables.text_table import TextTable
+
+if TYPE_CHECKING:
+    from tactbench.core.matrix.store import Store
 
 _Key = tuple[str, str, str, str]
 LONGEST = 1000
@@ -90,6 +94,11 @@ class Table:
 
         made_by = foot(self.provenance) if self.provenance else ()
         return tuple(cut(visible(sentence), LONGEST) for sentence in made_by)
+
+
+def over_all(store: Store, rows: Sequence[Row]) -> list[dict[str, Any]]:
+    """Return one row a cell over its replicates, with the level of its sensor and the stamps of probes."""
+    return with_leaks(with_levels(over_replicates(rows), store.folder, store.provenance))
 
 
 def build_table(

@@ -73,8 +73,11 @@ def grids(table: Table, view: View = DEFAULT_VIEW) -> list[TextTable]:
 
 def grid(block: Block, view: View = DEFAULT_VIEW) -> TextTable:
     """Return what is printed of a block; numbers have what they are sorted by, and the cell that they are from."""
-    lines: list[_Texts] = [(_texts(line), line.kind) for line in block.lines]
-    if not view.wide and not view.columns:
+    short = not view.wide and not view.columns
+    # Why a trivial answer was skipped is told once, in a note.
+    told = [one for one in block.lines if not short or one.kind != "skipped" or not one.row["is_baseline"]]
+    lines: list[_Texts] = [(_texts(line), line.kind) for line in told or block.lines]
+    if short:
         lines = _with_trivial_once(lines)
     names = view.columns or ((*COLUMNS, CELL) if view.wide else DEFAULT)
     names = tuple(name for name in names if name in lines[0][0])

@@ -34,25 +34,24 @@ if TYPE_CHECKING:
 
 
 TITLE = "tactbench: tactile sensors, what they answer and what it costs"
-MOST_TASKS = 2
-"""So many tasks are named in the first section; the leaderboards have them all."""
 MOST_WHOLE = 200
 """Cells of which the page has whatever there is: each further one takes a file to be read and 20 kB."""
 
 
 def answers_section(subject: ReportData) -> Section:
     """Return the first section: what came out in a few sentences, and published scores and ours in one picture."""
-    found: dict[str, str] = {}
-    for block in subject.leaderboard.blocks:
-        if block.verdict:
-            found.setdefault(str(block.lines[0].row["task"]), f"{block.title} {block.verdict[0]}")
+    said = (
+        f"{one.title} ({one.setting.partition(' · ')[2]}) {one.verdict[0]}"
+        for one in subject.leaderboard.blocks
+        if one.verdict
+    )
     verdicts = [line.verdict for line in reproduce(subject.results.registry, subject.rows)]
     inside, judged = verdicts.count("inside"), sum(verdict in ("inside", "outside") for verdict in verdicts)
     paragraphs = (
         "SIM: simulated by a twin of the sensor; no sensor was touched."
         * any(row["simulated"] for row in subject.rows),
         f"Published numbers in the interval of ours: {inside} of {judged}." if judged else "",
-        *list(found.values())[:MOST_TASKS],
+        *said,
     )
     pictures = tuple(one for one in subject.drawn if one.name == PUBLISHED)
     return Section(paragraphs=tuple(filter(None, paragraphs)), pictures=pictures)

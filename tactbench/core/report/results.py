@@ -9,12 +9,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from tactbench.core.errors import DataError
-from tactbench.core.leaderboard.levels import with_levels
-from tactbench.core.leaderboard.table import Block, Table, build_table
+from tactbench.core.leaderboard.table import Block, Table, build_table, over_all
 from tactbench.core.matrix.store import Row, Store
 from tactbench.core.plugins.declared import with_declared_of
 from tactbench.core.samples import Answers
-from tactbench.core.statistics.replicates import over_replicates
 from tactbench.core.tables.text_table import TextTable
 
 if TYPE_CHECKING:
@@ -75,7 +73,7 @@ class Results:
 def open_results(store: Store, registry: Registry) -> Results:
     """Return what `store` holds: a row a cell."""
     rows = store.rows()
-    shown = tuple(with_levels(over_replicates(rows), store.folder, store.provenance))
+    shown = tuple(over_all(store, rows))
     return Results(store, with_declared_of(registry, shown), shown, {str(row["key"]): row for row in rows})
 
 

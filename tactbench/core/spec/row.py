@@ -15,6 +15,9 @@ LOWER_IS_BETTER = frozenset({"rmse", "mae", "mean_euclidean_error"})
 MEDIAN_ERROR, HIGH_ERROR = "median error", "95th percentile of the error"
 """Keys of `scores` that stand beside the mean error of a vector: percentiles over the test rows."""
 
+LEAKS = "leaks: "
+"""How a stamp begins that says that a score is no measure of the sensor."""
+
 Numbers = dict[str, float]
 
 

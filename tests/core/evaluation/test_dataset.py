@@ -11,7 +11,7 @@ from tactbench.core.evaluation.dataset import load_dataset
 from tactbench.core.samples import Quality
 from tactbench.plugin import Block, ChannelSpec, StreamSpec
 
-from .made import force_task, ramp, record, sensor_of, sessions, write
+from .made import evaluated, force_task, ramp, record, sensor_of, sessions, write
 
 MS = 1_000_000
 
@@ -60,6 +60,14 @@ def test_without_a_clock_rows_belong_together_only_if_they_are_equally_many(tmp_
     (table,) = load_dataset(force_task(), [record(tmp_path / "a.h5", X, force, t_ns=None)]).tables
     np.testing.assert_array_equal(table.y, force)
     np.testing.assert_array_equal(table.time_s, np.arange(50))
+
+
+def test_an_answer_from_the_time_alone_needs_a_clock(tmp_path):
+    timed, untimed = (sessions(tmp_path / name, "ab", t_ns=t_ns) for name, t_ns in (("t", "regular"), ("u", None)))
+    assert evaluated(force_task(), timed, "time-index", split="session").score < 1e-9
+    assert evaluated(force_task(), untimed, split="session").score > 0
+    with pytest.raises(NotApplicable, match="time-index looks at the time alone, which not all"):
+        evaluated(force_task(), untimed, "time-index", split="session")
 
 
 def test_flagged_samples_are_kept_and_counted(tmp_path):

@@ -44,6 +44,8 @@ def verdict(*rows):
         ([erring(1.0), erring(2.0, "first-frame", n_test=4)], "too few recordings for the first frame"),
         ([classed(0.88), classed(0.86, "first-frame"), classed(0.99, split="shuffled")], "LEAK, OPTIMISTIC"),
         ([classed(0.88), classed(0.90, split="shuffled")], "no leak shown"),
+        ([classed(1.0, stamps=["leaks: a"]), classed(0.1, "first-frame")], "LEAK"),
+        ([classed(1.0, stamps=["1 of 5 recordings left out"]), classed(0.1, "first-frame")], "no leak shown"),
         ([erring(1.0), erring(0.5, split="shuffled")], "OPTIMISTIC"),
         (
             [classed(0.95, ci_low=None, ci_high=None), classed(0.99, split="shuffled")],

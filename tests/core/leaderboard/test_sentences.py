@@ -180,6 +180,13 @@ class Truth:
         told = re.findall(r" (\d\.\d+)", text)
         return bool(told) and known.issuperset(told)
 
+    def stamped(self, names, more):
+        """Whether these rows, and so many more, are stamped, without names all."""
+        stamped = [self.name(one) for one in self.rows if one["stamps"]]
+        if names is None:
+            return len(stamped) == len(self.rows)
+        return set(stamped).issuperset(names) and len(stamped) == len(names) + more < len(self.rows)
+
     def tied(self):
         """Whether a place is shared, and each that is holds neighbours that the data do not separate."""
         groups = {}
@@ -232,7 +239,7 @@ ABOVE = {
     r"Published values: (.*?)(?:; this concerns the simulation, not the sensors)?\.": lambda t, a: t.beside(a),
 }  # fmt: skip
 BELOW = {
-    r"‡  It leaks\.": lambda t: any(one["stamps"] for one in t.rows),
+    r"‡  (?:(.*?)(?: and (\d+) more)?: )?It leaks\.": lambda t, a, more: t.stamped(a and a.split(", "), int(more or 0)),
     "=  shared place: these rows cannot all be told apart": lambda t: t.tied(),
     r"–  no better than the trivial answer of its own sensor \((.*)\)":
         lambda t, b: t.bars(b, t.worse),

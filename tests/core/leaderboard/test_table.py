@@ -79,6 +79,16 @@ def test_columns_that_say_nothing_are_left_out_and_others_shown_if_asked_for():
         known_columns(["scor"])
 
 
+def test_a_trivial_answer_that_was_skipped_stands_in_the_note_alone_unless_all_columns_are_asked_for():
+    ended = {"status": "skipped", "score": None, "reason": "No clock."}
+    rows = [row(), row(estimator="time-index", is_baseline=True, **ended), row("b", **ended)]
+    table = build_table(rows)
+    assert [[line[1] for line in grid.lines] for grid in grids(table)] == [["a", "b"]]
+    assert "a/time-index, b/lasso skipped: No clock." in table.notes
+    assert len(grids(table, View(wide=True))[0].lines) == 3
+    assert len(grids(build_table(rows[1:2]))[0].lines) == 1
+
+
 def test_the_best_of_each_sensor_keep_the_places_they_have_among_all():
     rows = [row(name, estimator, score=score) for name, estimator, score in (
         ("a", "lasso", 0.5), ("a", "ols", 0.6), ("b", "lasso", 0.7), ("b", "mean", 1.4),

@@ -8,7 +8,7 @@ from tactbench.core.matrix.store import Store
 from tactbench.core.plugins.registry import load_registry
 from tactbench.core.report import results as sections
 from tactbench.core.report.cells import recording_scores
-from tactbench.core.report.page import make_page
+from tactbench.core.report.page import answers_section, make_page
 from tactbench.core.report.results import ReportData, Results, SavedFigure, open_results
 
 from .html import Reader
@@ -68,6 +68,14 @@ def structure(html):
 
 def test_the_structure_of_the_page(subject):
     assert structure(make_page(subject).html) == STRUCTURE
+
+
+def test_the_first_section_has_a_sentence_of_each_block(material):
+    again = [row | {"split": "press", "cell": f"{row['cell']} by press"} for row in material.rows]
+    subject = with_rows(material, *material.rows, *again)
+    blocks = [block for block in subject.leaderboard.blocks if block.verdict]
+    said = [one for one in answers_section(subject).paragraphs if one.endswith(tuple(one.verdict[0] for one in blocks))]
+    assert len(set(said)) == len(blocks) == 4
 
 
 def test_the_page_is_well_formed_fetches_nothing_and_is_the_same_bytes_again(subject, results):

@@ -18,7 +18,7 @@ import numpy as np
 
 from tactbench.core.errors import MappingError, RecordingError, UnwritableError
 from tactbench.core.progress import Progress
-from tactbench.core.recording.health import Finding, examine, is_copy
+from tactbench.core.recording.health import MONOTONE, Finding, examine, is_copy
 from tactbench.core.recording.mapping.channels import MappedStream, device, fill, sensor_of
 from tactbench.core.recording.mapping.files import RawRecording, find, read
 from tactbench.core.recording.mapping.model import MUST_NAME_SENTINELS, Mapping, Word
@@ -203,10 +203,10 @@ def _write(
 
 
 def _given_away(sensed: dict[str, FloatArray], reference: dict[str, FloatArray]) -> Iterator[Finding]:
-    """Yield what stands among the sensor's channels and is a force of the reference but for scale and offset."""
+    """Yield what stands among the sensor's channels and gives a force of the reference away."""
     for (force, wanted), (name, column) in product(reference.items(), sensed.items()):
         if len(column) == len(wanted) and is_copy(column, wanted):
-            text = f"{name}, a channel of the sensor, is the reference {force} but for scale and offset"
+            text = f"{name}, a channel of the sensor, is {MONOTONE.format(force)}"
             yield Finding("target-among-features", "warning", "", (name,), 1, text)
 
 
