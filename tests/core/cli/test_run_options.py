@@ -8,6 +8,8 @@ import pytest
 
 from tactbench.core.cli.config import matrix_called, packaged_matrices
 from tactbench.core.matrix.plan import plan_cells
+from tactbench.core.plugins.declared import with_declared
+from tactbench.core.recording.datasets import datasets
 from tactbench.plugin import load_registry
 from tests.conftest import Verbs
 from tests.core.evaluation.made import record
@@ -50,7 +52,8 @@ def test_what_is_set_is_in_row_recording_score_and_why_and_is_found_again(verbs)
 @pytest.mark.parametrize("name", sorted(packaged_matrices()))
 def test_every_packaged_matrix_can_be_planned(name):
     matrix = matrix_called(name)
-    cells = plan_cells(matrix, matrix.sensors or ["any"], load_registry())
+    declared = (task for one in datasets().values() for task in one.mapping.tasks)
+    cells = plan_cells(matrix, matrix.sensors or ["any"], with_declared(load_registry(), declared))
     assert {cell.task for cell in cells if not cell.baseline} == {choice.name for choice in matrix.tasks}
 
 
