@@ -19,6 +19,7 @@ from typing import Any
 import numpy as np
 from openpyxl import load_workbook
 from sklearn.ensemble import (
+    ExtraTreesRegressor,
     HistGradientBoostingClassifier,
     HistGradientBoostingRegressor,
     RandomForestClassifier,
@@ -43,6 +44,7 @@ class Question:
     y: Array
     folds: list[tuple[Array, Array]]
     trees: int
+    """Of the forest; 0: extremely randomised trees in its place"""
     row: Array | None = None
     answered: Array | None = None
     """Rows with an answer; the others are only scaled by"""
@@ -137,7 +139,7 @@ def fluid(data: Path) -> Iterator[Question]:
         medium, diameter = path.stem.removeprefix("1D_").split("_dia")
         yield Question(
             f"fluid-{medium}-{diameter.lstrip('_')}", "force", "deployable", "placement", np.stack([left, right], 1),
-            force, [(segment != one, segment == one) for one in np.unique(segment)], 100,
+            force, [(segment != one, segment == one) for one in np.unique(segment)], trees=0,
         )  # fmt: skip
 
 
@@ -192,11 +194,15 @@ def dealt(groups: list[str]) -> list[tuple[Array, Array]]:
 def models(question: Question, seed: int) -> dict[str, Callable[[], Any]]:
     """Return what makes each model anew."""
     if question.y.dtype.kind == "f":
-        return {
+        found = {
             "ols": LinearRegression,
-            "forest": lambda: RandomForestRegressor(question.trees, random_state=seed, n_jobs=2),
             "boosting": lambda: HistGradientBoostingRegressor(early_stopping=False, random_state=seed),
         }
+        if question.trees:
+            forest = {"forest": lambda: RandomForestRegressor(question.trees, random_state=seed, n_jobs=2)}
+        else:
+            forest = {"extra-trees": lambda: ExtraTreesRegressor(200, min_samples_leaf=2, random_state=seed, n_jobs=2)}
+        return found | forest
     return {
         "logistic": lambda: LogisticRegression(solver="newton-cg", tol=1e-8, max_iter=2000),
         "forest": lambda: RandomForestClassifier(question.trees, random_state=seed, n_jobs=2),
