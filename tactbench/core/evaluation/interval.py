@@ -85,7 +85,7 @@ def score_interval(
     are held out, are no replicates: an interval over them knows nothing of the spread between units.
     ``benchmarks/coverage.py`` measures all of this.
 
-    A share so near to 1 that its mistakes would not fill one unit, in fewer than five units or a third of them, does
+    A share so near to 1 that its mistakes would not fill one unit, in at most two units or fewer than a third, does
     not tell how units differ. Its lower end is multiplied by that of n units right out of n, ``0.025^(1/n)`` [2]_: a
     kind of unit that occurs more often would have been met. Its upper end lets units with a mistake be as rare as the
     binomial lower end of their number allows. An answer without any mistake is the limit of this rule; shares near 0
@@ -113,7 +113,7 @@ def score_interval(
     if metric.kind != "regression":
         right = np.trace(confusion(sums, n_classes), axis1=1, axis2=2)
         wrong, hit = int((right < sums.sum(axis=1)).sum()), int((right > 0).sum())
-        few = max(ENOUGH_UNITS, n / 3)
+        few = max(3, n / 3)
         if wrong < few and 1 - score < 1 / n:
             low, high = _few_mistakes(score, low, high, wrong, n)
             method += f"; {wrong} of them with a mistake (Clopper and Pearson)"
