@@ -38,7 +38,9 @@ def test_the_notebook_shows_the_score_of_its_data_set(here, monkeypatch, shared_
     monkeypatch.setenv("TACTBENCH_CACHE", str(tmp_path / "cache"))
     tactbench.dataset("eflesh-normal", root=shared_data / "eflesh")
     score = execute(NOTEBOOK)["found"].score
-    assert f'"{score:.3f} N, by session' in NOTEBOOK.read_text(encoding="utf-8"), "jupyter nbconvert --execute --inplace"
+    assert f'"{score:.3f} N, by session' in NOTEBOOK.read_text(encoding="utf-8"), (
+        "jupyter nbconvert --execute --inplace"
+    )
 
 
 def test_the_notebook_runs(here, monkeypatch, tmp_path):

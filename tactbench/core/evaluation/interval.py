@@ -85,11 +85,11 @@ def score_interval(
     are held out, are no replicates: an interval over them knows nothing of the spread between units.
     ``benchmarks/coverage.py`` measures all of this.
 
-    A share so near to 1 that its mistakes would not fill one unit, in at most two units or fewer than a third, does
-    not tell how units differ. Its lower end is multiplied by that of n units right out of n, ``0.025^(1/n)`` [2]_: a
-    kind of unit that occurs more often would have been met. Its upper end lets units with a mistake be as rare as the
-    binomial lower end of their number allows. An answer without any mistake is the limit of this rule; shares near 0
-    mirror it.
+    A share so near to 1 that its mistakes are at most two, or lie in fewer than a third of the units and would not fill
+    one, does not tell how units differ. Its lower end is multiplied by that of n units right out of n, ``0.025^(1/n)``
+    [2]_: a kind of unit that occurs more often would have been met. Its upper end lets units with a mistake be as rare
+    as the binomial lower end of their number allows. An answer without any mistake is the limit of this rule; shares
+    near 0 mirror it.
 
     References
     ----------
@@ -112,15 +112,20 @@ def score_interval(
     low, high = min(*ends, score), max(*ends, score)
     if metric.kind != "regression":
         right = np.trace(confusion(sums, n_classes), axis1=1, axis2=2)
-        wrong, hit = int((right < sums.sum(axis=1)).sum()), int((right > 0).sum())
-        few = max(3, n / 3)
-        if wrong < few and 1 - score < 1 / n:
-            low, high = _few_mistakes(score, low, high, wrong, n)
-            method += f"; {wrong} of them with a mistake (Clopper and Pearson)"
-        if hit < few and score < 1 / n:
-            high, low = (1 - one for one in _few_mistakes(1 - score, 1 - high, 1 - low, hit, n))
-            method += f"; {hit} of them with a right answer (Clopper and Pearson)"
+        wrong = sums.sum(axis=1) - right
+        if 1 - score < 1 / n and _few(wrong):
+            low, high = _few_mistakes(score, low, high, int(np.count_nonzero(wrong)), n)
+            method += f"; {np.count_nonzero(wrong)} of them with a mistake (Clopper and Pearson)"
+        if score < 1 / n and _few(right):
+            mirrored = _few_mistakes(1 - score, 1 - high, 1 - low, int(np.count_nonzero(right)), n)
+            high, low = (1 - one for one in mirrored)
+            method += f"; {np.count_nonzero(right)} of them with a right answer (Clopper and Pearson)"
     return Interval(low, high if np.isfinite(high) else None, method)
+
+
+def _few(each: FloatArray) -> bool:
+    """Tell whether (units,) counts do not tell how units differ: two in all, or in less than a third of the units."""
+    return bool(each.sum() <= 2 or np.count_nonzero(each) < len(each) / 3)
 
 
 def _few_mistakes(score: float, low: float, high: float, wrong: int, n: int) -> tuple[float, float]:

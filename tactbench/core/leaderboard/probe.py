@@ -57,7 +57,7 @@ def with_leaks(rows: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
         return score_with_unit(row["score"], row["unit"])
 
     found = {
-        row["cell"]: f"{LEAKS}the first frame alone scores {told(first)}, all frames {told(row)}."
+        row["cell"]: f"{LEAKS}first frame alone {told(first)} of {told(row)}."
         for row, first, _ in _probed(rows)
         if first is not None and _told_by_first(row, first) == "LEAK"
     }

@@ -12,7 +12,7 @@ from operator import itemgetter
 from typing import NamedTuple
 
 from tactbench.core.leaderboard.names import Bars, Row, answer_name, grouped, held_out, sign_of
-from tactbench.core.spec.row import plural
+from tactbench.core.spec.row import LEAKS, plural
 from tactbench.core.spec.status import STOPPED
 from tactbench.core.statistics.rank import Rank, beyond_floor
 from tactbench.core.statistics.replicates import FEWEST, count_range, counted, percent
@@ -228,11 +228,13 @@ def _marks(board: Board) -> Iterator[Note]:
     finished = (*board.answers, *board.trivial)
     stamps = grouped([(str(stamp), row) for row in finished for stamp in row["stamps"] or ()], itemgetter(0))
     if stamps:
+        lead = LEAKS if all(text.startswith(LEAKS) for text in stamps) else ""
         told = (
-            f"{_some([board.name(row) for _, row in of])}: " * (len(of) < len(finished)) + text.rstrip(".")
+            f"{_some([board.name(row) for _, row in of])}: " * (len(of) < len(finished))
+            + text.removeprefix(lead).rstrip(".")
             for text, of in stamps.items()
         )
-        yield Note(f"{STAMPED}  {'; '.join(told)}.", printed=True)
+        yield Note(f"{STAMPED}  {lead}{'; '.join(told)}.", printed=True)
     if any(rank.tied for _, rank in board.placed) and not board.unranked:
         yield Note(f"{SHARED}  shared place: these rows cannot all be told apart")
     of_own = "better than the trivial answer of its own sensor"
