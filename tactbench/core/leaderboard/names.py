@@ -124,7 +124,17 @@ class Bars:
         return _reaches(error_of(row), row, self.score(row))
 
     def unshown(self, row: Row) -> bool:
-        """Return whether the interval of an answer holds the score of the trivial one, or lies beyond it."""
+        """Return whether the interval of an answer holds the score of the trivial one, or lies beyond it.
+
+        On recordings that of their paired difference tells, where both were tested on the same units.
+        """
+        trivial = self.trivial(row)
+        if trivial is not None and held_out(row) and row["replicates"] and trivial["replicates"]:
+            from tactbench.core.statistics.paired import difference  # numerics
+
+            found = difference(row, trivial)
+            if found.paired and found.low is not None and found.high is not None:
+                return found.high >= 0 if sign_of(row) > 0 else found.low <= 0
         end = row[WORSE_END[sign_of(row)]]
         if end is None:  # an interval that is open above, or none
             return row["ci_low"] is not None and self.score(row) is not None

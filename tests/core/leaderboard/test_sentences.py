@@ -8,6 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tactbench.core.leaderboard.table import build_table
+from tactbench.core.statistics.paired import difference
 from tactbench.core.statistics.ranking import ranks as ranked
 from tactbench.core.statistics.replicates import over_replicates
 
@@ -96,6 +97,11 @@ class Truth:
         self.worse = [one for one in self.answers if one not in self.better]
         known = [one for one in self.better if one["ci_low"] is not None]
         self.unshown = [one for one in known if self.reaches(one, self.worse_end(one))]
+        if rows[0]["replicate_unit"] != "replicate":  # pairs of units tell, where they are the same
+            pairs = [(one, self.bar(one)) for one in known]
+            same = [one for one, bar in pairs if bar and one["replicates"]["names"] == bar["replicates"].get("names")]
+            self.unshown = [one for one in self.unshown if one not in same]
+            self.unshown += [one for one in same if not self.clear(one)]
         self.several = len({one["sensor"] for one in rows}) > 1
         self.floor = all(one.get("reference_floor") is not None for one in self.better)
         self.ranks = ranked(self.better) if self.better and all(map(self.enough, self.better)) else None
@@ -103,6 +109,10 @@ class Truth:
     @staticmethod
     def enough(one):
         return one["n_replicates"] >= 5
+
+    def clear(self, one):
+        found = difference(one, self.bar(one))
+        return self.sign * (found.high if self.sign > 0 else found.low) < 0
 
     def shared(self):
         return len({tuple(one["replicates"]["names"]) for one in self.better}) == 1
