@@ -140,7 +140,7 @@ def line_of(row: Row, placing: Rank | None, names: Sequence[str], marks: Sequenc
         kind: Kind = "failed" if row["status"] in STOPPED else "skipped"
         return Line(row, {name: texts.get(name, "") for name in names}, kind)
     if placing:
-        place = f"{placing.place}=" if placing.tied else str(placing.place)
+        place = f"{placing.place}=" if placing.unsure else str(placing.place)
     ranked = {"place": place, "notes": " ".join(marks)}
     texts = {name: ranked[name] if name in ranked else OF_ROWS[name].text(row) for name in names}
     # An absent value is empty: the dash means one thing, that an answer has no place.

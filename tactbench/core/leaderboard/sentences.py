@@ -1,6 +1,6 @@
 """What is said above and below a block: a closed list, each with the condition under which it is true.
 
-docs/tables.md has the list. At most two sentences stand above and four notes below; what comes first here comes first
+docs/tables.md has the list. At most two sentences stand above and five notes below; what comes first here comes first
 there. Everything else that is known of a row is told by ``tactbench why`` and by the report.
 """
 
@@ -19,7 +19,7 @@ from tactbench.core.statistics.replicates import FEWEST, count_range, counted, p
 from tactbench.core.tables.numbers import interval, score, score_with_unit
 from tactbench.core.tables.text import cut
 
-MOST_BELOW = 4
+MOST_BELOW = 5
 MOST_NAMES = 4
 """Answers that a sentence names; it counts the others."""
 LONGEST = 300
@@ -235,8 +235,8 @@ def _marks(board: Board) -> Iterator[Note]:
             for text, of in stamps.items()
         )
         yield Note(f"{STAMPED}  {lead}{'; '.join(told)}.", printed=True)
-    if any(rank.tied for _, rank in board.placed) and not board.unranked:
-        yield Note(f"{SHARED}  shared place: these rows cannot all be told apart")
+    if any(rank.unsure for _, rank in board.placed) and not board.unranked:
+        yield Note(f"{SHARED}  each of these rows cannot be told from at least one other")
     of_own = "better than the trivial answer of its own sensor"
     if board.unplaced and board.placed:
         yield Note(f"{NO_BETTER}  no {of_own} ({board.bars_of(board.unplaced)})", printed=True)
@@ -279,6 +279,8 @@ def _how(board: Board) -> Iterator[Note]:
         several = f"{median}{interval_of}; range: lowest … highest campaign"
         parts.append(several if max(counts) > 1 else "Score: of 1 campaign, simulated with its own seed")
     sentences = list(parts)
+    if any(row["ci_low"] is not None and row["ci_high"] is None for row in board.answers):
+        sentences.append("Open: so few put no upper bound to the error")
     if board.times and any(row.get("answer_delay_ms") is not None for row in board.answers):
         sentences.append("Delay: sampling, link, window, computing; training: the final fit")
     if sentences:
@@ -292,9 +294,14 @@ def _compared(board: Board) -> Iterator[Note]:
         return
     unit = plural(str(rows[0]["replicate_unit"]))
     shared = len({tuple(row["replicates"]["names"]) for row in rows}) == 1
-    how = f"paired over {unit}, which all rows share" if shared else f"unpaired: {unit} differ between rows"
-    one = "; one specimen of each sensor: how specimens differ is not known"
-    yield Note(f"Places: {how}{one if {row.get('n_specimens') for row in rows} == {1} else ''}.", printed=True)
+    parts = [f"paired over {unit}, which all rows share" if shared else f"unpaired: {unit} differ between rows"]
+    trivial = [bar for row in rows if (bar := board.bars.score(row)) is not None]
+    if not rows[0]["classes"] and trivial and max(trivial) > 1.05 * min(trivial):
+        ends = (score(end, rows[0]["unit"]) for end in (min(trivial), max(trivial)))
+        parts.append(f"what is asked differs between sensors (trivial answers {' … '.join(ends)})")
+    if {row.get("n_specimens") for row in rows} == {1}:
+        parts.append("one specimen of each sensor: how specimens differ is not known")
+    yield Note(f"Places: {'; '.join(parts)}.", printed=True)
 
 
 def _hosts(board: Board) -> Iterator[Note]:

@@ -26,6 +26,11 @@ class Rank:
     behind: bool = False
     """clearly worse than the cell with the best score"""
 
+    @property
+    def unsure(self) -> bool:
+        """Whether it has another place, or cannot be told from some other cell."""
+        return self.tied or (self.low is not None and self.low != self.high)
+
 
 def beyond_floor(rows: Sequence[Row]) -> bool:
     """Return whether rows are ranked by their errors beyond the floor: all have one."""

@@ -197,13 +197,11 @@ class Truth:
             return len(stamped) == len(self.rows)
         return set(stamped).issuperset(names) and len(stamped) == len(names) + more < len(self.rows)
 
-    def tied(self):
-        """Whether a place is shared, and each that is holds neighbours that the data do not separate."""
-        groups = {}
-        for rank in self.ranks.values():
-            groups.setdefault(rank.place, []).append(rank)
-        shared = [group for group in groups.values() if len(group) > 1]
-        return bool(shared) and all(any(not rank.apart for rank in group[1:]) for group in shared)
+    def unsure(self):
+        """Whether the data leave some row several ranks, those that share a place among them."""
+        places = [rank.place for rank in self.ranks.values()]
+        unsure = [rank.low < rank.high for rank in self.ranks.values()]
+        return any(unsure) and all(one for one, place in zip(unsure, places, strict=True) if places.count(place) > 1)
 
     def ended(self, status, others, reason):
         family = [one for one in self.stopped if one["status"] == status]
@@ -250,7 +248,7 @@ ABOVE = {
 }  # fmt: skip
 BELOW = {
     r"‡  (?:(.*?)(?: and (\d+) more)?: )?It leaks\.": lambda t, a, more: t.stamped(a and a.split(", "), int(more or 0)),
-    "=  shared place: these rows cannot all be told apart": lambda t: t.tied(),
+    "=  each of these rows cannot be told from at least one other": lambda t: t.unsure(),
     r"–  no better than the trivial answer of its own sensor \((.*)\)":
         lambda t, b: t.bars(b, t.worse),
     r"\*  not shown to be better than the trivial answer of its own sensor \((.*)\)": lambda t, b: t.bars(b, t.unshown),
@@ -260,9 +258,11 @@ BELOW = {
         lambda t, by: bool(by) == (bool(t.better) and t.floor),
     r"(?:(Score: (?:median over (.*? campaigns), each simulated anew|of 1 campaign, simulated) with its own seed"
     r"(; interval: of that median)?[^=.]*)(?:\. |\.$))?"
+    r"(?:Open: so few put no upper bound to the error\.?)?[ ]?"
     r"(Delay: sampling, link, window, computing; training: the final fit\.)?":
         lambda t, s, n, i, delay: t.how(i, n or "1" * ("of 1 campaign" in (s or "")), delay),
     r"Places: (paired over (?:sessions|recordings|presses), which all rows share|unpaired: .* differ between rows)"
+    r"(?:; what is asked differs between sensors \([^)]*\))?"
     r"(; one specimen of each sensor: how specimens differ is not known)?\.":
         lambda t, pairs, one: pairs.startswith("paired") == t.shared()
         and bool(one) == ({o["n_specimens"] for o in t.better} == {1}),
@@ -288,7 +288,7 @@ def test_what_is_said_is_on_the_list_short_and_true(rows):
     (block,) = build_table(rows).blocks
     truth = Truth(rows)
     assert len(block.verdict) <= 2
-    assert len(block.notes) <= 4
+    assert len(block.notes) <= 5
     for text in block.verdict:
         assert holds(text, ABOVE, truth), text
     for note in block.notes:
