@@ -139,10 +139,13 @@ def test_the_rows_of_the_readme_are_those_of_the_board_and_of_the_frozen_scores(
     board = (CHECKOUT / "docs" / "real-board.md").read_text(encoding="utf-8")
     rows = re.findall(r"^\| (.*?) \| .*? \| ([\w-]+) \| [A-Za-z ]*([\d.]+)(?: \w+)? \| ([\d.]*)", text, re.MULTILINE)
     real = [row for row in rows if row[0].endswith("?")]
-    assert len(real) == 5
+    assert len(real) == 7
     for question, estimator, score, low in real:
-        there = re.findall(rf"^\| {estimator}\S* [^|]*\| ([\d.]+) \| ([\d.]*)", board, re.MULTILINE)
+        there = re.findall(rf"^\|.*? {estimator}\S* [^|]*\| ([\d.]+)[^|]*\| ([\d.]*)", board, re.MULTILINE)
         assert (score, low) in [(rounded(one, score), rounded(other, low)) for one, other in there], question
+    places = re.findall(r"^(\| [\d=]+ \| fluid-\S+ \| \S+ \| [\d.]+) N (\| .* \|)$", text, re.MULTILINE)
+    assert len(places) == 9
+    assert [row for row, interval in places if f"{row} {interval}" not in board] == []
     frozen = json.loads((CHECKOUT / "tests" / "frozen" / "default.json").read_text(encoding="utf-8"))
     simulated = re.findall(r"^\| [\d=]+ \| (\w+) \| (\w+) \| ([\d.]+)", text, re.MULTILINE)
     assert len(simulated) == 4
