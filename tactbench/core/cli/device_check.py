@@ -87,9 +87,9 @@ def check_devices(rig_file: RigFile, registry: Registry, *, seconds: float, cloc
 def _check(check: DeviceCheck, registry: Registry, entry: DeviceEntry, seconds: float, clock: Clock) -> None:
     from tactbench.core.errors import UsageError
     from tactbench.core.plugins.registry import load_object
-    from tactbench.core.plugins.rig_devices import descriptor_of, options_of
     from tactbench.core.spec.rig import SensorDescriptor
     from tactbench.devices.driver import DriverSettings
+    from tactbench.devices.rig_devices import descriptor_of, options_of
     from tactbench.links.address import open_link
 
     descriptor = descriptor_of(registry, check.name, entry)

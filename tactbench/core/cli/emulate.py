@@ -29,9 +29,9 @@ def command(names: tuple[str, ...], rig_file: Path | None) -> None:
     simulated rig carries out its scene.
     """
     from tactbench.core.errors import UsageError
-    from tactbench.core.plugins.emulators import serve
     from tactbench.core.plugins.registry import load_registry
     from tactbench.core.plugins.rig_files import load_rig_file
+    from tactbench.devices.scene_emulators import serve
 
     if bool(names) == (rig_file is not None):
         raise UsageError(

@@ -13,7 +13,6 @@ import numpy as np
 from tactbench.core.conformance.check import CheckFailed, Subject, check, code_of, fail, skip
 from tactbench.core.conformance.streams import BAD, good, joined, likely, limits_of, marks_of, times_are_right
 from tactbench.core.errors import LinkError, RigError, UsageError
-from tactbench.core.plugins.rig_devices import emulated_device, options_of
 from tactbench.core.samples import Block, IntArray, Quality, StreamData
 from tactbench.core.spec.rig import DeviceDescriptor
 from tactbench.core.spec.rig_file import EMULATED, DeviceEntry
@@ -21,6 +20,7 @@ from tactbench.core.spec.sensor import ChannelSpec
 from tactbench.devices.driver import Driver, DriverSettings
 from tactbench.devices.emulation.emulated_devices import EmulatedDevices
 from tactbench.devices.emulator import Senses
+from tactbench.devices.rig_devices import emulated_device, options_of
 from tactbench.links.link import Clock, Link
 
 READ_S, WAIT_S, SHORT_S = 1.0, 0.1, 0.005

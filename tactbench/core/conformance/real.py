@@ -30,7 +30,6 @@ from tactbench.core.conformance.streams import (
     within_limits,
 )
 from tactbench.core.errors import TactbenchError
-from tactbench.core.plugins.emulators import running
 from tactbench.core.plugins.rig_files import load_rig_file
 from tactbench.core.plugins.taking_part import rig_context
 from tactbench.core.samples import FloatArray, StreamData
@@ -127,7 +126,7 @@ def real_device_answers(subject: Subject) -> None:
 
     Let nothing touch it. Look at `tactbench doctor --rig-file FILE` for ports, permissions and what the device says.
     """
-    from tactbench.core.plugins.rig_devices import options_of
+    from tactbench.devices.rig_devices import options_of
     from tactbench.links.address import open_link
 
     descriptor, file = subject.descriptor, _file(subject)
@@ -172,7 +171,7 @@ def _built(subject: Subject) -> tuple[Any, SensorDescriptor, Any]:
     file = _file(subject)
     if file.rig != subject.name:
         skip(f"the rig file is for the rig {file.rig}")
-    context = rig_context(subject.registry, rig_file=running(file), operator=subject.operator)
+    context = rig_context(subject.registry, rig_file=file, operator=subject.operator)
     scene = tiny_scene(profile=slow_ramp(FORCE_N, SECONDS, HOLD_S))
     return subject.code("where")(context), subject.registry.sensors[next(iter(file.sensors))], scene
 

@@ -7,7 +7,6 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from tactbench.core.errors import RigError, TactbenchError, error_text
-from tactbench.core.plugins.emulators import running
 from tactbench.core.plugins.interfaces import Operator, ReplayRig, Rig
 from tactbench.core.plugins.registry import Registry, load_object
 from tactbench.core.plugins.taking_part import rig_context
@@ -33,7 +32,6 @@ def rig_of(
     descriptor = registry.rigs[name]
     if rig_file is not None:
         rig_file.checked_for(name)
-        rig_file = running(rig_file)
     context = rig_context(registry, recordings=recordings, rig_file=rig_file, operator=operator)
     with failing_as(f"The rig {name!r} could not be built"):
         built: Rig | ReplayRig = load_object(descriptor.where)(context)

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple, Protocol
 
 from tactbench.core.samples import Block, SkinGrid, SkinState
 from tactbench.core.spec.recording import PlanEntry, Scalar, StreamCounts
@@ -75,6 +75,24 @@ class DeviceAcquisition(Acquisition, Protocol):
     @property
     def ended(self) -> str:
         """Why it ended before its time; empty: it did not. Its recording is then incomplete."""
+
+
+@dataclass(frozen=True)
+class DeviceLog:
+    """The contents of one log."""
+
+    streams: tuple[StreamSpec, ...]
+    """What `blocks` are of: the streams of the sensor's spec that the log has, perhaps with fewer channels."""
+    blocks: Sequence[Block]
+    """In time order within each stream."""
+    clock: Literal["device", "host", "nominal", "none"]
+    """Who made the times: the device, the host that wrote the log, row number by rate, or nobody."""
+    started: str = ""
+    """When the log was begun, as the file states it; empty if it does not."""
+    remarks: tuple[str, ...] = ()
+    """What a reader of a score from it must know."""
+    counts: Mapping[str, int] = field(default_factory=dict)
+    """What was counted on the way in, by name."""
 
 
 class Rig(Protocol):
