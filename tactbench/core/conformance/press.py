@@ -36,6 +36,8 @@ from tactbench.core.spec.sensor import ChannelKind
 
 FORCE_N = 0.5
 """At the end of the press: every sensor that is touched by a hand bears it."""
+REAL_N = 1.0
+"""And on a rig of real devices: a motor with friction still follows it, and no fingertip is harmed."""
 SECONDS, LATE = 1.0, 0.5
 """How long it lasts; and by which share more or less for a rig that begins later."""
 NOISE_N = 0.005

@@ -17,6 +17,7 @@ from tactbench.plugin import (
     Acquisition,
     Block,
     PlanEntry,
+    Rig,
     RigContext,
     Scalar,
     Scene,
@@ -84,7 +85,7 @@ class BenchAcquisition:
         return self.reading.ended
 
 
-class Bench:
+class Bench(Rig):
     """Devices of a rig file, read while a scene is pressed by hand.
 
     Parameters

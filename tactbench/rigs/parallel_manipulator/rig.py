@@ -17,6 +17,7 @@ from tactbench.plugin import (
     Block,
     NotApplicable,
     PlanEntry,
+    Rig,
     RigContext,
     RigError,
     Scalar,
@@ -154,7 +155,7 @@ class PressAcquisition:
         return "; ".join(filter(None, (press.ended, press.not_out))) or self.reading.ended
 
 
-class ParallelManipulator:
+class ParallelManipulator(Rig):
     """Devices of a rig file, and what presses them together.
 
     Guard and homes outlive a scene: by the clock the session that keeps them begins with the first scene and ends with

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 HEAD = "# Written by `tactbench emulate`; its links are gone when that ends."
 
 
-@click.command(name="emulate")
+@click.command(name="emulate", short_help="Start emulated devices on links of this machine.")
 @click.argument("names", nargs=-1, metavar="[DEVICE]...")
 @click.option("--rig-file", type=click.Path(path_type=Path), metavar="FILE",
               help="Start every device of this file whose link is `emulated`, with its faults.")  # fmt: skip

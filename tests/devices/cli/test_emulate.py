@@ -14,7 +14,7 @@ from tactbench.core.spec.quantity import assumed
 from tactbench.core.spec.yaml_file import load_yaml
 from tactbench.plugin import ForceRamp, Scene
 from tactbench.plugin.devices import EmulatedDevices, RigFile, drivers_of, physics_of
-from tests.core.plugins import talking
+from tests.devices import talking
 
 POINTS = [
     EntryPoint("talking", talking.HERE, "tactbench"),
