@@ -218,7 +218,7 @@ def physics_of(file: RigFile, registry: Registry) -> ScenePhysics | None:
     """
     if not file.emulated:
         return ScenePhysics(None, file.emulation.control) if file.emulation.control else None
-    descriptor = registry.rigs[file.emulation.physics]
+    descriptor = registry.rigs[file.emulation.physics or registry.first_rig("simulated")]
     if not descriptor.simulated:
         raise UsageError(
             f"`physics: {descriptor.name}` in the rig file is no simulated rig.", hint="Use `physics: twin`."

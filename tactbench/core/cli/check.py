@@ -49,7 +49,7 @@ def command(
     from tactbench.core.conformance.run import plugins_named, run_checks, subjects_named
     from tactbench.core.errors import UnknownNameError, UsageError
     from tactbench.core.plugins.registry import load_registry
-    from tactbench.core.plugins.rig_files import load_rig_file
+    from tactbench.core.plugins.rigs import load_rig_file
     from tactbench.core.tables.text import json_text
 
     if listed:

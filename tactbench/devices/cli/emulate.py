@@ -30,7 +30,7 @@ def command(names: tuple[str, ...], rig_file: Path | None) -> None:
     """
     from tactbench.core.errors import UsageError
     from tactbench.core.plugins.registry import load_registry
-    from tactbench.core.plugins.rig_files import load_rig_file
+    from tactbench.core.plugins.rigs import load_rig_file
     from tactbench.devices.scene_emulators import serve
 
     if bool(names) == (rig_file is not None):

@@ -1,4 +1,4 @@
-"""Rigs built from what is installed."""
+"""Rigs built from what is installed, and the files that say which devices they have."""
 
 from __future__ import annotations
 
@@ -11,6 +11,25 @@ from tactbench.core.plugins.interfaces import Operator, ReplayRig, Rig
 from tactbench.core.plugins.registry import Registry, load_object
 from tactbench.core.plugins.taking_part import rig_context
 from tactbench.core.spec.rig_file import RigFile
+from tactbench.core.spec.yaml_file import load_yaml
+
+
+def load_rig_file(path: Path, registry: Registry) -> RigFile:
+    """Return the rig file at `path`, its own settings checked by its rig where that has a model of them.
+
+    Raises
+    ------
+    ConfigError
+        If it cannot be read, or says something unknown or wrong; the message names the line.
+    UnknownNameError
+        If no such rig is installed.
+    """
+    file = load_yaml(path, RigFile)
+    where = registry.rigs[file.rig].file
+    if where is not None:
+        load_yaml(path, load_object(where))
+    physics = file.emulation.physics or registry.first_rig("simulated")
+    return file.model_copy(update={"emulation": file.emulation.model_copy(update={"physics": physics})})
 
 
 def rig_of(
