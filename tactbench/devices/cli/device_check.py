@@ -5,21 +5,21 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
-from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import Any
+
+import numpy as np
 
 from tactbench.core.cli.stream_state import StreamState
 from tactbench.core.errors import TactbenchError
-from tactbench.core.samples import Quality
-
-if TYPE_CHECKING:
-    from tactbench.core.plugins.registry import Registry
-    from tactbench.core.samples import Block
-    from tactbench.core.spec.rig_file import DeviceEntry, RigFile
-    from tactbench.core.spec.sensor import StreamSpec
-    from tactbench.devices.driver import Driver
-    from tactbench.devices.sequence import SequenceCheck
-    from tactbench.links.link import Clock
+from tactbench.core.plugins.registry import Registry
+from tactbench.core.recording.clock_fit import ClockFit
+from tactbench.core.samples import Block, Quality
+from tactbench.core.spec.rig_file import DeviceEntry, RigFile
+from tactbench.core.spec.sensor import StreamSpec
+from tactbench.devices.driver import Driver
+from tactbench.devices.rig_devices import descriptor_of, open_driver
+from tactbench.devices.sequence import SequenceCheck
+from tactbench.links.link import Clock
 
 Record = dict[str, Any]
 
@@ -85,22 +85,11 @@ def check_devices(rig_file: RigFile, registry: Registry, *, seconds: float, cloc
 
 
 def _check(check: DeviceCheck, registry: Registry, entry: DeviceEntry, seconds: float, clock: Clock) -> None:
-    from tactbench.core.errors import UsageError
-    from tactbench.core.plugins.registry import load_object
-    from tactbench.core.spec.rig import SensorDescriptor
-    from tactbench.devices.driver import DriverSettings
-    from tactbench.devices.rig_devices import descriptor_of, options_of
-    from tactbench.links.address import open_link
-
     descriptor = descriptor_of(registry, check.name, entry)
-    if descriptor.driver is None:
-        raise UsageError(f"{check.device} has no driver.", hint="docs/plugins.md says how a sensor names one.")
-    streams = descriptor.spec.streams if isinstance(descriptor, SensorDescriptor) else ()
-    settings = DriverSettings(partial(open_link, entry.link, clock), streams, options_of(descriptor, entry), clock)
-    with load_object(descriptor.driver)(settings) as driver:
+    with open_driver(descriptor, entry, clock) as driver:
         try:
             check.identity = dict(driver.identify())
-            if not isinstance(descriptor, SensorDescriptor) and descriptor.kind == "motor":
+            if getattr(descriptor, "kind", "") == "motor":
                 check.remarks.append("a motor: not started")
                 return
             _read(check, driver, seconds, clock)
@@ -109,8 +98,6 @@ def _check(check: DeviceCheck, registry: Registry, entry: DeviceEntry, seconds: 
 
 
 def _read(check: DeviceCheck, driver: Driver, seconds: float, clock: Clock) -> None:
-    from tactbench.devices.sequence import SequenceCheck
-
     driver.start()
     blocks: dict[str, list[Block]] = {stream.name: [] for stream in driver.streams}
     ordered = {name: SequenceCheck() for name in blocks}
@@ -137,10 +124,6 @@ def _read(check: DeviceCheck, driver: Driver, seconds: float, clock: Clock) -> N
 
 def _records(device: str, spec: StreamSpec, came: Sequence[Block], ordered: SequenceCheck) -> Iterator[Record]:
     """Yield what came of a stream, a record for each kind of channel in one unit."""
-    import numpy as np
-
-    from tactbench.core.recording.clock_fit import ClockFit
-
     state, fit = StreamState(spec, rate_s=math.inf), ClockFit()
     values = np.concatenate([block.data for block in came]).astype(np.float64)
     row = 0

@@ -8,7 +8,6 @@ from __future__ import annotations
 import time
 from collections.abc import Mapping
 from contextlib import suppress
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -24,8 +23,6 @@ from tactbench.core.spec.rig import SensorDescriptor
 from tactbench.core.spec.rig_file import RigFile
 from tactbench.core.spec.sensor import Nuisances
 from tactbench.devices.conformance.driver import look_at, opened_on
-from tactbench.devices.rig_devices import options_of
-from tactbench.links.address import open_link
 
 SECONDS, HOLD_S = 8.0, 1.0
 """A motor that lifts off for the unloaded hold takes some of them to be back on the skin."""
@@ -50,8 +47,8 @@ def real_device_answers(subject: Subject) -> None:
 
     Let nothing touch it. Look at `tactbench doctor --rig-file FILE` for ports, permissions and what the device says.
     """
-    descriptor, file = subject.descriptor, _file(subject)
-    if descriptor.driver is None:
+    file = _file(subject)
+    if subject.descriptor.driver is None:
         skip("it names no driver")
     named = {getattr(one, "device", name): one for name, one in file.entries().items()}
     if subject.name not in named:
@@ -59,7 +56,7 @@ def real_device_answers(subject: Subject) -> None:
     entry = named[subject.name]
     if entry.emulated:
         skip("the rig file says that the device is emulated")
-    opened = opened_on(subject, partial(open_link, entry.link), options_of(descriptor, entry), time.monotonic_ns)
+    opened = opened_on(subject, entry, time.monotonic_ns)
     try:
         with code_of("driver.identify", subject):
             opened.driver.identify()
