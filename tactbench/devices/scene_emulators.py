@@ -21,7 +21,7 @@ from typing import Any, Protocol
 from tactbench.core.errors import NotApplicable, RigError, TactbenchError, UsageError
 from tactbench.core.plugins.interfaces import Acquisition, Rig
 from tactbench.core.plugins.registry import Registry, load_object, load_registry
-from tactbench.core.plugins.taking_part import rig_context
+from tactbench.core.plugins.rigs import rig_context
 from tactbench.core.spec.recording import PlanEntry
 from tactbench.core.spec.rig import SensorDescriptor
 from tactbench.core.spec.rig_file import FORCE, RigFile

@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING
 
 from tactbench.core.errors import LinkError, LinkTimeout, LinkUnplugged
 from tactbench.core.on_demand import on_demand
-from tactbench.core.plugins.checks import CheckTable, RigCheck
-from tactbench.core.plugins.interfaces import DeviceAcquisition, DeviceLog, Operator
+from tactbench.core.plugins.interfaces import CheckTable, DeviceAcquisition, DeviceLog, Operator, RigCheck
 from tactbench.core.spec.recording import StreamCounts
 from tactbench.core.spec.rig import DeviceDescriptor
 from tactbench.core.spec.rig_file import FORCE, NamedDevice, RigFile

@@ -13,7 +13,7 @@ from tactbench.core.cli.screen import remark
 if TYPE_CHECKING:
     from tactbench.core.cost.precision import Skipped
     from tactbench.core.cost.task_score import TaskScore
-    from tactbench.core.plugins.cost import CostPoint, CostStudy
+    from tactbench.core.plugins.interfaces import CostPoint, CostStudy
 
 Scores = Mapping[tuple[str, str], "TaskScore"]
 """By sensor and rung."""

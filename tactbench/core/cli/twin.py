@@ -12,7 +12,7 @@ from tactbench.core.cli.simulation import EFFECTS
 from tactbench.core.cli.threads import keep_threads
 
 if TYPE_CHECKING:
-    from tactbench.core.plugins.checks import Verdict
+    from tactbench.core.plugins.interfaces import Verdict
 
 _COLUMNS = ("", "what", "found", "expected", "bound", "unit", "source")
 

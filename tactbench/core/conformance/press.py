@@ -25,7 +25,7 @@ from tactbench.core.errors import nearest
 from tactbench.core.plugins.force_profiles import force_path
 from tactbench.core.plugins.interfaces import Reason
 from tactbench.core.plugins.registry import Registry, load_object
-from tactbench.core.plugins.taking_part import rig_context
+from tactbench.core.plugins.rigs import rig_context
 from tactbench.core.samples import Quality
 from tactbench.core.spec.drive import ForceLoop
 from tactbench.core.spec.profile import ForceRamp

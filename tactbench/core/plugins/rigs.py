@@ -1,17 +1,22 @@
-"""Rigs built from what is installed, and the files that say which devices they have."""
+"""Rigs built from what is installed, the files that say which devices they have, and the effects that take part.
+
+The effects of this package are candidates for every scene. An effect of another package is a candidate only where the
+sensor's descriptor or the scene names it: what is merely installed is not imported into a run, and stands in no key.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 from tactbench.core.errors import RigError, TactbenchError, error_text
-from tactbench.core.plugins.interfaces import Operator, ReplayRig, Rig
-from tactbench.core.plugins.registry import Registry, load_object
-from tactbench.core.plugins.taking_part import rig_context
+from tactbench.core.plugins.interfaces import Operator, ReplayRig, Rig, RigContext
+from tactbench.core.plugins.registry import Owned, Registry, load_object
+from tactbench.core.spec.rig import EffectDescriptor, SensorDescriptor
 from tactbench.core.spec.rig_file import RigFile
-from tactbench.core.spec.yaml_file import load_yaml
+from tactbench.core.spec.scene import Scene
 
 
 def load_rig_file(path: Path, registry: Registry) -> RigFile:
@@ -24,6 +29,8 @@ def load_rig_file(path: Path, registry: Registry) -> RigFile:
     UnknownNameError
         If no such rig is installed.
     """
+    from tactbench.core.spec.yaml_file import load_yaml
+
     file = load_yaml(path, RigFile)
     where = registry.rigs[file.rig].file
     if where is not None:
@@ -68,3 +75,28 @@ def failing_as(what: str) -> Iterator[None]:
         raise RigError(
             f"{what}: {error_text(error)}.", hint="See `tactbench list plugins` for who brings it."
         ) from error
+
+
+def taking_part(registry: Registry, sensor: SensorDescriptor, scene: Scene) -> list[Owned[EffectDescriptor]]:
+    """Return the effects that are candidates for a scene with a sensor, with their owners, sorted by name."""
+    named = effect_names(sensor, scene)
+    return [one for one in registry.effects.all_owned() if one.ours or one.descriptor.name in named]
+
+
+def effect_names(sensor: SensorDescriptor, scene: Scene) -> set[str]:
+    """Return the names of effects, and of groups of them, that the sensor's descriptor or the scene names.
+
+    A simulated rig considers those of its context's `named_effects` that are among them.
+    """
+    return {*sensor.effects, *(word.lstrip("+-") for word in scene.simulation.effects)}
+
+
+def rig_context(registry: Registry, **given: Any) -> RigContext:
+    """Return what a rig is built from: the registry's effects and indenters, and what else is `given`."""
+    owned = registry.effects.all_owned()
+    return RigContext(
+        effects=tuple(one.descriptor for one in owned if one.ours),
+        named_effects=tuple(one.descriptor for one in owned if not one.ours),
+        indenters=tuple(registry.indenters),
+        **given,
+    )

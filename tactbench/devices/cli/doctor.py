@@ -12,7 +12,7 @@ from tactbench.core.cli.options import FiniteRange, format_option
 from tactbench.core.tables.text import json_text
 
 if TYPE_CHECKING:
-    from tactbench.core.plugins.checks import RigCheck
+    from tactbench.core.plugins.interfaces import RigCheck
     from tactbench.devices.cli.device_check import DeviceCheck
     from tactbench.devices.cli.host_devices import HostItem
 

@@ -16,8 +16,7 @@ from tactbench.core.conformance.check import Subject, check, code_of, fail, skip
 from tactbench.core.conformance.press import REAL_N, WHY, slow_ramp, tiny_scene
 from tactbench.core.conformance.streams import FORCE_SHARE, carried_out, force_is, good, joined, pressing_force
 from tactbench.core.errors import TactbenchError
-from tactbench.core.plugins.rigs import load_rig_file
-from tactbench.core.plugins.taking_part import rig_context
+from tactbench.core.plugins.rigs import load_rig_file, rig_context
 from tactbench.core.samples import FloatArray, StreamData
 from tactbench.core.spec.rig import SensorDescriptor
 from tactbench.core.spec.rig_file import RigFile
