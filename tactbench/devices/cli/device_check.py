@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from tactbench.core.cli.stream_state import COUNTED
+from tactbench.core.cli.live import COUNTED
 from tactbench.core.conformance.streams import good, marks_of
 from tactbench.core.errors import TactbenchError
 from tactbench.core.plugins.registry import Registry
