@@ -198,8 +198,8 @@ def synthetic(load: str) -> Iterator[tuple[dict[str, Driver], subprocess.Popen[s
 @contextmanager
 def of_rig_file(path: Path, sensor: str) -> Iterator[tuple[dict[str, Driver], Clock]]:
     """Yield the drivers of a rig file's sensor and force sensor, and their clock; emulated ones are at rest."""
-    from tactbench.core.plugins.rig_devices import drivers_of, emulators_of
     from tactbench.devices.emulation.emulated_devices import EmulatedDevices
+    from tactbench.devices.rig_devices import drivers_of, emulators_of
 
     file = load_yaml(path, RigFile)
     registry = load_registry()

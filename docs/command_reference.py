@@ -11,7 +11,7 @@ from typing import Any
 
 import click
 
-from tactbench.core.cli import VERBS, cli
+from tactbench.core.cli import cli
 
 _TITLE = """# Commands
 
@@ -24,7 +24,7 @@ def reference() -> str:
     """Return the whole document."""
     context = click.Context(cli, info_name="tactbench")
     parts = [_TITLE]
-    for verb in VERBS:
+    for verb in cli.list_commands(context):
         command = cli.get_command(context, verb)
         assert command is not None
         parts += _described(command, f"tactbench {verb}", 2)

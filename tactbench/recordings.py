@@ -15,8 +15,8 @@ import numpy as np
 
 from tactbench.core.errors import FormatError, MissingRecordingError, UsageError
 from tactbench.core.evaluation.channels import numbers
-from tactbench.core.matrix.installed import rig_of
 from tactbench.core.plugins.registry import installed
+from tactbench.core.plugins.rigs import rig_of
 from tactbench.core.recording.reader import open_recording, read_meta
 from tactbench.core.samples import FloatArray, StreamData
 from tactbench.core.spec.recording import RecordingMeta

@@ -13,12 +13,11 @@ from types import FrameType
 from typing import Any
 
 from tactbench.core.errors import RigError
-from tactbench.core.plugins.emulators import EmulatorControl, running
 from tactbench.core.plugins.interfaces import Acquisition, Rig
 from tactbench.core.recording.completeness import INCOMPLETE, Completeness
 from tactbench.core.recording.writer import RecordingWriter
 from tactbench.core.samples import Block
-from tactbench.core.spec.recording import Emulation, PlanEntry, RecordingMeta, StreamCounts
+from tactbench.core.spec.recording import Emulation, RecordingMeta, StreamCounts
 from tactbench.core.spec.rig import RigDescriptor, SensorDescriptor
 from tactbench.core.spec.rig_file import Allowed, RigFile
 from tactbench.core.spec.scene import Role, Scene
@@ -70,7 +69,7 @@ def acquire(
         error goes on. Otherwise its journal stays, and the error names the command that makes a recording of it. Of a
         simulation nothing is left behind.
     rig_file
-        The devices: what is emulated is marked so, whatever the rig says of it, and begins with the recording.
+        The devices: what is emulated is marked so, whatever the rig says of it.
 
     Raises
     ------
@@ -81,9 +80,6 @@ def acquire(
     RecordingError
         If the file cannot be written.
     """
-    live = None if rig_file is None else running(rig_file)
-    control = EmulatorControl(live.emulation.control) if live is not None and live.emulation.control else None
-    emulated = {} if control is None else control.prepare(sensor.name, scene, seed)
     began = clock()
     with (
         _one_thread(descriptor),
@@ -106,8 +102,6 @@ def acquire(
         key = "sim_s" if descriptor.simulated else "acquisition_s"
         with RecordingWriter(path, meta) as writer:
             try:
-                if control is not None:
-                    control.begin()
                 blocks = iter(acquisition)
                 while True:
                     began = clock()
@@ -129,16 +123,14 @@ def acquire(
                 alarm = _stopped(acquisition, error)
                 if not descriptor.simulated and any(writer.rows.values()):
                     why = f"interrupted: {_why(error)}"
-                    _conclude(writer, acquisition, emulated, of_devices, {**provenance, key: spent}, why)
+                    _conclude(writer, acquisition, of_devices, {**provenance, key: spent}, why)
                     if complete_interrupted:
                         writer.complete()
                 if alarm and isinstance(error, KeyboardInterrupt):
                     raise RigError(f"It was interrupted, and the rig is not as it should be: {alarm}.") from error
                 raise
             alarm = _stopped(acquisition, RigError(lacking)) if lacking else ""
-            _conclude(
-                writer, acquisition, emulated, of_devices, {**provenance, key: spent}, lacking and INCOMPLETE + lacking
-            )
+            _conclude(writer, acquisition, of_devices, {**provenance, key: spent}, lacking and INCOMPLETE + lacking)
     if alarm:
         raise RigError(f"The scene {scene.name!r} ended, and the rig is not as it should be: {alarm}.")
     return writer.meta
@@ -198,18 +190,16 @@ def _one_interrupt() -> Iterator[Callable[[], None]]:
 def _conclude(
     writer: RecordingWriter,
     acquisition: Acquisition,
-    emulated: Mapping[str, Any],
     of_devices: Callable[..., dict[str, Any]],
     provenance: dict[str, Any],
     why: str = "",
 ) -> None:
     """Write down what is known at the end; `why` it is not to be evaluated, if it is not."""
-    drawn = {**emulated.get("drawn", {}), **acquisition.drawn}
+    drawn = dict(acquisition.drawn)
     remarks = tuple(str(text) for name, text in drawn.items() if name.startswith("remark "))
-    plan = acquisition.plan or [PlanEntry.model_validate(entry) for entry in emulated.get("plan", ())]
     writer.revise(
-        plan=tuple(plan),
-        assumptions={**emulated.get("assumptions", {}), **acquisition.assumptions},
+        plan=tuple(acquisition.plan),
+        assumptions=dict(acquisition.assumptions),
         drawn=drawn,
         remarks=(*remarks, why) if why else remarks,
         excluded=why,

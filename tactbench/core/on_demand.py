@@ -1,4 +1,4 @@
-"""Names of a module that are imported when they are first used."""
+"""What is imported when it is first used: names of a module, and what other rooms contribute to the core."""
 
 import sys
 from collections.abc import Callable, Mapping
@@ -34,3 +34,10 @@ def _modules(door: str) -> Mapping[str, str]:
     conditions = [node for node in tree.body if isinstance(node, ast.If)]
     imports = [node for one in conditions for node in one.body if isinstance(node, ast.ImportFrom)]
     return {alias.name: node.module or "" for node in imports for alias in node.names}
+
+
+def contributed(group: str) -> Mapping[str, Any]:
+    """Return what rooms that the core does not import contribute to it, by name: the entry points of tactbench."""
+    from importlib.metadata import distribution
+
+    return {point.name: point for point in sorted(distribution("tactbench").entry_points.select(group=group))}

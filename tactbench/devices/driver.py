@@ -1,12 +1,12 @@
-"""What a driver is: one device behind one link, read in blocks; its options, and what its own tools have logged."""
+"""What a driver is: one device behind one link, read in blocks; and its options."""
 
 from __future__ import annotations
 
 import time
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import Any, ClassVar, Literal, Self, TypeVar
+from typing import Any, ClassVar, Self, TypeVar
 
 from pydantic import BaseModel, ConfigDict
 
@@ -148,21 +148,3 @@ def open_for(settings: DriverSettings, device: str, kind: type[_Link], example: 
         link.close()
         raise UsageError(f"{device} cannot be spoken to through {link.address}.", hint=f"Use a link like {example}.")
     return link
-
-
-@dataclass(frozen=True)
-class DeviceLog:
-    """The contents of one log."""
-
-    streams: tuple[StreamSpec, ...]
-    """What `blocks` are of: the streams of the sensor's spec that the log has, perhaps with fewer channels."""
-    blocks: Sequence[Block]
-    """In time order within each stream."""
-    clock: Literal["device", "host", "nominal", "none"]
-    """Who made the times: the device, the host that wrote the log, row number by rate, or nobody."""
-    started: str = ""
-    """When the log was begun, as the file states it; empty if it does not."""
-    remarks: tuple[str, ...] = ()
-    """What a reader of a score from it must know."""
-    counts: Mapping[str, int] = field(default_factory=dict)
-    """What was counted on the way in, by name."""

@@ -8,24 +8,14 @@ from typing import TYPE_CHECKING
 
 from tactbench.core.errors import LinkError, LinkTimeout, LinkUnplugged
 from tactbench.core.on_demand import on_demand
-from tactbench.core.plugins.checks import CheckTable, RigCheck
-from tactbench.core.plugins.interfaces import DeviceAcquisition, Operator
+from tactbench.core.plugins.interfaces import CheckTable, DeviceAcquisition, DeviceLog, Operator, RigCheck
 from tactbench.core.spec.recording import StreamCounts
 from tactbench.core.spec.rig import DeviceDescriptor
 from tactbench.core.spec.rig_file import FORCE, NamedDevice, RigFile
 
 if TYPE_CHECKING:
-    from tactbench.core.plugins.emulators import RigEmulators, SceneEmulators
-    from tactbench.core.plugins.rig_devices import (
-        PressingForce,
-        ask_operator,
-        drivers_of,
-        emulators_of,
-        physics_of,
-        with_sensor,
-    )
     from tactbench.devices.control import Control
-    from tactbench.devices.driver import DeviceLog, Driver, DriverSettings, Options, open_for
+    from tactbench.devices.driver import Driver, DriverSettings, Options, open_for
     from tactbench.devices.emulation.emulated_devices import EmulatedDevice, EmulatedDevices
     from tactbench.devices.emulation.scene_samples import SceneSamples
     from tactbench.devices.emulator import (
@@ -59,8 +49,17 @@ if TYPE_CHECKING:
         PositionerState,
     )
     from tactbench.devices.press import Course, Press, PressPlan
+    from tactbench.devices.pressing_force import PressingForce
     from tactbench.devices.reading import Reading
+    from tactbench.devices.rig_devices import ask_operator, drivers_of, emulators_of, with_sensor
     from tactbench.devices.row_driver import RowDriver, Sample
+    from tactbench.devices.scene_emulators import (
+        RigEmulators,
+        SceneEmulators,
+        ScenePhysics,
+        physics_of,
+        running,
+    )
     from tactbench.devices.sequence import Unwrap
     from tactbench.links.address import open_link, read_options
     from tactbench.links.byte_link import ByteLink
@@ -129,6 +128,7 @@ __all__ = [
     "RowEmulator",
     "Sample",
     "SceneEmulators",
+    "ScenePhysics",
     "SceneSamples",
     "Senses",
     "Sent",
@@ -149,6 +149,7 @@ __all__ = [
     "physics_of",
     "read_can_log",
     "read_options",
+    "running",
     "with_sensor",
 ]
 

@@ -3,9 +3,10 @@
 Skins, nuisances, transducers and skin states; effects, known answers of a simulation, and what its accuracy costs.
 """
 
-from tactbench.core.plugins.checks import Verdict
-from tactbench.core.plugins.cost import CostJob, CostPoint, CostStudy
 from tactbench.core.plugins.interfaces import (
+    CostJob,
+    CostPoint,
+    CostStudy,
     EffectRun,
     EffectTrack,
     Explained,
@@ -13,8 +14,9 @@ from tactbench.core.plugins.interfaces import (
     SimulatedPress,
     Transducer,
     TransducerFactory,
+    Verdict,
 )
-from tactbench.core.plugins.taking_part import effect_names, rig_context
+from tactbench.core.plugins.rigs import effect_names, rig_context
 from tactbench.core.samples import SkinGrid, SkinState
 from tactbench.core.spec.rig import EffectDescriptor
 from tactbench.core.spec.scene import Environment, Slide, Surface

@@ -71,4 +71,5 @@ def build(context: RigContext) -> RecordingFolder:
 @hookimpl
 def tactbench_rigs() -> list[RigDescriptor]:
     """Offer the rig."""
-    return [RigDescriptor(name="replay", title="recordings made elsewhere", where="tactbench.rigs.replay:build")]
+    here = __name__
+    return [RigDescriptor(name="replay", title="recordings made elsewhere", where=f"{here}:build", replays=True)]

@@ -225,9 +225,7 @@ class _Choosing:
             elif wished > pressed:
                 yield f"any error beyond {newtons(pressed)}: the scenes of {self.task.name} press no harder."
         if chosen and all(one.row["simulated"] for one in chosen):
-            replay = command_line(
-                "tactbench", "run", "--rig", "replay", "--recordings", "DIR", "--task", self.task.name
-            )
+            replay = command_line("tactbench", "run", "--recordings", "DIR", "--task", self.task.name)
             yield f"how a real unit scores, for these are SIM; with recordings of one run `{replay}`."
         tested = {row["sensor"] for row in self.rows}
         for name, spec in sorted(self.sensors.items()):

@@ -12,6 +12,7 @@ from typing import Any
 import click
 
 import tactbench
+from tactbench.core.on_demand import contributed
 
 # verb -> (module in this folder, one line of help). The help stands here so that `--help` imports no verb.
 VERBS = {
@@ -30,8 +31,6 @@ VERBS = {
     "why": ("why", "Show what a score rests on and how a cell ended; compute it again."),
     "merge": ("merge", "Merge result folders; refuse those that contradict each other."),
     "twin": ("twin", "Explain and verify the simulated rig."),
-    "doctor": ("doctor", "Check ports, permissions, extras and clocks, and a rig's devices."),
-    "emulate": ("emulate", "Start emulated devices on links of this machine."),
     "new": ("new", "Create a plugin package: a sensor, rig, task, estimator or effect."),
     "check": ("check", "Check whether a plugin conforms."),
 }
@@ -41,25 +40,29 @@ class LazyGroup(click.Group):
     """A group that knows its verbs by name and imports one when it is called."""
 
     def list_commands(self, ctx: click.Context) -> list[str]:
-        """Return the verbs in the order in which they are used."""
-        return list(VERBS)
+        """Return the verbs in the order in which they are used, then those that other rooms contribute."""
+        return [*VERBS, *contributed("tactbench.verbs")]
 
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
         """Import the verb; offer the nearest one for one that is misspelt."""
         if cmd_name.startswith("-"):
             return None
-        if cmd_name not in VERBS:
+        if cmd_name in VERBS:
+            found: click.Command = importlib.import_module(f"tactbench.core.cli.{VERBS[cmd_name][0]}").command
+        elif cmd_name in (others := contributed("tactbench.verbs")):
+            found = others[cmd_name].load()
+        else:
             from tactbench.core.errors import UnknownNameError
 
-            raise UnknownNameError("command", cmd_name, VERBS)
-        module = importlib.import_module(f"tactbench.core.cli.{VERBS[cmd_name][0]}")
-        command: click.Command = module.command
-        return command
+            raise UnknownNameError("command", cmd_name, [*VERBS, *others])
+        return found
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
-        """Write the list of verbs without importing them."""
+        """Write the list of verbs without importing them, but those that other rooms contribute."""
+        rows = [(name, text) for name, (_, text) in VERBS.items()]
+        rows += [(name, verb.load().short_help) for name, verb in contributed("tactbench.verbs").items()]
         with formatter.section("Commands"):
-            formatter.write_dl([(name, text) for name, (_, text) in VERBS.items()])
+            formatter.write_dl(rows)
 
 
 @click.group(cls=LazyGroup, context_settings={"help_option_names": ["-h", "--help"]})

@@ -49,7 +49,7 @@ def command(
     from tactbench.core.conformance.run import plugins_named, run_checks, subjects_named
     from tactbench.core.errors import UnknownNameError, UsageError
     from tactbench.core.plugins.registry import load_registry
-    from tactbench.core.plugins.rig_files import load_rig_file
+    from tactbench.core.plugins.rigs import load_rig_file
     from tactbench.core.tables.text import json_text
 
     if listed:
@@ -103,7 +103,7 @@ def command(
 
 def _ask(subjects: Sequence[Subject], file: RigFile, yes: bool) -> None:
     """Say what is about to be opened and moved, and wait for a yes; raises UsageError without a terminal."""
-    from tactbench.core.conformance.real import FORCE_N
+    from tactbench.core.conformance.press import REAL_N
     from tactbench.core.errors import UsageError
 
     rigs = [one.name for one in subjects if one.kind == "rig"]
@@ -116,7 +116,7 @@ def _ask(subjects: Sequence[Subject], file: RigFile, yes: bool) -> None:
                          hint="Add --yes if all is clear.")  # fmt: skip
     click.confirm(
         f"The lines of the devices and sensors that are checked are opened; the rig, where it is checked, presses a "
-        f"sensor twice to {FORCE_N:g} N. Is the rig clear?", abort=True, err=True,
+        f"sensor twice to {REAL_N:g} N. Is the rig clear?", abort=True, err=True,
     )  # fmt: skip
 
 

@@ -12,7 +12,6 @@ from tactbench.core.cli.threads import keep_threads
 
 if TYPE_CHECKING:
     from tactbench.core.cost.ladder import Ladder
-    from tactbench.core.spec.matrix import MatrixSpec
 
 
 @click.command(name="cost")
@@ -63,9 +62,15 @@ def command(
     from tactbench.core.matrix.store import Store
     from tactbench.core.plugins.declared import declared_in, with_declared
     from tactbench.core.plugins.registry import load_registry
+    from tactbench.core.spec.matrix import EstimatorChoice, MatrixSpec, TaskChoice
 
     registry = with_declared(load_registry(), declared_in(recordings))
-    matrix = _matrix(sensors[0], task, recordings, protocol, estimators)
+    if protocol is None and recordings is not None:
+        protocol = "deployable"  # as `run` has it: the paper's protocol needs the paper's three roles
+    answerers = tuple(EstimatorChoice(name=name) for name in estimators or ("all",))
+    choice = TaskChoice(name=task, protocol=protocol, estimators=answerers)
+    rig = registry.first_rig("simulated" if recordings is None else "replays")
+    matrix = MatrixSpec(rig=rig, seed=1, repeats=1, sensors=(sensors[0],), tasks=(choice,))
     with progress() as display:
         ladder = climb(
             matrix, registry, Store(out / "cost"), rounds=rounds, clock=time.perf_counter, progress=display,
@@ -77,19 +82,6 @@ def command(
         print_records(ladder.rows, shape)
     paths = write_ladder(ladder, out, METRIC_NAMES.get(ladder.about["metric"], ""))
     remark(f"Files: {', '.join(map(str, paths))}")
-
-
-def _matrix(
-    sensor: str, task: str, recordings: Path | None, protocol: str | None, estimators: tuple[str, ...]
-) -> MatrixSpec:
-    from tactbench.core.spec.matrix import EstimatorChoice, MatrixSpec, TaskChoice
-
-    rig = "twin" if recordings is None else "replay"
-    if protocol is None and recordings is not None:
-        protocol = "deployable"  # as `run` has it: the paper's protocol needs the paper's three roles
-    answerers = tuple(EstimatorChoice(name=name) for name in estimators or ("all",))
-    choice = TaskChoice(name=task, protocol=protocol, estimators=answerers)
-    return MatrixSpec(rig=rig, seed=1, repeats=1, sensors=(sensor,), tasks=(choice,))
 
 
 def _print(ladder: Ladder) -> None:

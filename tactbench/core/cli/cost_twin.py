@@ -13,7 +13,7 @@ from tactbench.core.cli.screen import remark
 if TYPE_CHECKING:
     from tactbench.core.cost.precision import Skipped
     from tactbench.core.cost.task_score import TaskScore
-    from tactbench.core.plugins.cost import CostPoint, CostStudy
+    from tactbench.core.plugins.interfaces import CostPoint, CostStudy
 
 Scores = Mapping[tuple[str, str], "TaskScore"]
 """By sensor and rung."""
@@ -33,7 +33,6 @@ def show_twin(sensors: tuple[str, ...], out: Path, shape: str, *, rounds: int, t
     """
     from tactbench.core.cli.config import default_matrix
     from tactbench.core.cli.progress import progress
-    from tactbench.core.cli.twin import simulated_rig
     from tactbench.core.cost.precision import measured
     from tactbench.core.cost.task_score import quick_estimator, task_score
     from tactbench.core.errors import UsageError
@@ -41,7 +40,7 @@ def show_twin(sensors: tuple[str, ...], out: Path, shape: str, *, rounds: int, t
     from tactbench.core.spec.scene import Simulation
 
     registry = load_registry()
-    name = simulated_rig(registry)
+    name = registry.first_rig("simulated")
     descriptor = registry.rigs[name]
     if descriptor.work_precision is None:
         raise UsageError(f"The rig {name!r} does not say what its accuracy costs.", hint="Ask twin.")

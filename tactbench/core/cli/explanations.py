@@ -11,7 +11,7 @@ from tactbench.core.cli.screen import remark
 from tactbench.core.cost.task_score import quick_estimator, task_score
 from tactbench.core.errors import NotApplicable, UsageError
 from tactbench.core.plugins.registry import load_object
-from tactbench.core.plugins.taking_part import rig_context
+from tactbench.core.plugins.rigs import rig_context
 from tactbench.core.spec.scene import Simulation
 
 if TYPE_CHECKING:

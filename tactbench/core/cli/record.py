@@ -56,7 +56,7 @@ def command(
     from tactbench.core.cli.screen import remark
     from tactbench.core.errors import TactbenchError
     from tactbench.core.plugins.registry import load_registry
-    from tactbench.core.plugins.rig_files import load_rig_file
+    from tactbench.core.plugins.rigs import load_rig_file
     from tactbench.core.provenance.gather import gather
     from tactbench.core.recording.image import require_free
 
@@ -67,7 +67,7 @@ def command(
         "press", descriptor, indenter=indenter_of(registry, indenter), profile=profile_of(registry, profile)
     )
     devices = load_rig_file(Path(rig_file), registry) if rig_file else None
-    rig = rig or (devices.rig if devices else "twin")
+    rig = rig or (devices.rig if devices else registry.first_rig("simulated"))
     simulation = simulation_of(registry, rig, [sensor], effects=effects, settings=settings)
     if simulation is not None:
         scene = scene.simulated_as(simulation)
@@ -116,7 +116,7 @@ def _interrupted(path: Path) -> bool:
 
 def _built(registry: Registry, name: str, devices: RigFile | None, operator: Operator) -> Rig:
     from tactbench.core.errors import UsageError
-    from tactbench.core.matrix.installed import rig_of
+    from tactbench.core.plugins.rigs import rig_of
 
     # A folder is given so that a rig that replays can be built, and then be told from one that presses.
     rig: Rig = rig_of(name, registry, Path(), devices, operator)  # type: ignore[assignment]

@@ -75,13 +75,13 @@ def requested_matrix(
 
     base = config or ("real" if datasets else None)
     matrix = matrix_called(base) if base else default_matrix()
-    change: dict[str, Any] = {}
+    change: dict[str, Any] = {"rig": matrix.rig or registry.first_rig("simulated")}
     over: dict[str, Any] = {}
-    if datasets and (recordings or rig_file or rig not in (None, "replay")):
+    if datasets and (recordings or rig_file or rig not in (None, registry.first_rig("replays"))):
         raise UsageError("--dataset brings its own recordings.", hint="Leave out --rig, --recordings and --rig-file.")
     if rig or recordings or rig_file or datasets:
         file = load_yaml(Path(rig_file), RigFile) if rig_file else None
-        change["rig"] = rig or (file.rig if file else "replay")
+        change["rig"] = rig or (file.rig if file else registry.first_rig("replays"))
         change["rig_file"] = rig_file
         if change["rig"] != matrix.rig:
             change["sensors"] = tuple(file.sensors) if file else ()  # the matrix' sensors are those of its own rig

@@ -12,8 +12,7 @@ from tactbench.core.cli.simulation import EFFECTS
 from tactbench.core.cli.threads import keep_threads
 
 if TYPE_CHECKING:
-    from tactbench.core.plugins.checks import Verdict
-    from tactbench.core.plugins.registry import Registry
+    from tactbench.core.plugins.interfaces import Verdict
 
 _COLUMNS = ("", "what", "found", "expected", "bound", "unit", "source")
 
@@ -41,7 +40,7 @@ def explain(sensor: str, task: str, rounds: int, effects: str | None, shape: str
     from tactbench.core.plugins.registry import load_registry
 
     registry = load_registry()
-    rig = simulated_rig(registry)
+    rig = registry.first_rig("simulated")
     simulation = simulation_of(registry, rig, [sensor], effects=effects)
     print_explanations(registry, rig, sensor, task, simulation, rounds, shape)
 
@@ -61,7 +60,7 @@ def verify(ctx: click.Context, shape: str) -> None:
     from tactbench.core.plugins.registry import load_object, load_registry
 
     registry = load_registry()
-    rig = simulated_rig(registry)
+    rig = registry.first_rig("simulated")
     where = registry.rigs[rig].verification
     if where is None:
         hint = "See `tactbench show` with its name."
@@ -89,13 +88,3 @@ def _record(verdict: Verdict) -> dict[str, Any]:
     numbers = {name: getattr(verdict, name) for name in ("found", "expected", "bound")}
     finite = {name: number if math.isfinite(number) else None for name, number in numbers.items()}
     return {"what": verdict.name, "met": verdict.met, **finite, "unit": verdict.unit, "source": verdict.source}
-
-
-def simulated_rig(registry: Registry) -> str:
-    """Return the name of the simulated rig: twin, or else the first there is; raises UsageError if there is none."""
-    from tactbench.core.errors import UsageError
-
-    simulated = [rig.name for rig in registry.rigs if rig.simulated]
-    if not simulated:
-        raise UsageError("No simulated rig is installed.", hint="See `tactbench list plugins`.")
-    return "twin" if "twin" in simulated else simulated[0]

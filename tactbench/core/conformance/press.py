@@ -24,8 +24,8 @@ from tactbench.core.conformance.streams import (
 from tactbench.core.errors import nearest
 from tactbench.core.plugins.force_profiles import force_path
 from tactbench.core.plugins.interfaces import Reason
-from tactbench.core.plugins.registry import load_object
-from tactbench.core.plugins.taking_part import rig_context
+from tactbench.core.plugins.registry import Registry, load_object
+from tactbench.core.plugins.rigs import rig_context
 from tactbench.core.samples import Quality
 from tactbench.core.spec.drive import ForceLoop
 from tactbench.core.spec.profile import ForceRamp
@@ -36,6 +36,8 @@ from tactbench.core.spec.sensor import ChannelKind
 
 FORCE_N = 0.5
 """At the end of the press: every sensor that is touched by a hand bears it."""
+REAL_N = 1.0
+"""And on a rig of real devices: a motor with friction still follows it, and no fingertip is harmed."""
 SECONDS, LATE = 1.0, 0.5
 """How long it lasts; and by which share more or less for a rig that begins later."""
 NOISE_N = 0.005
@@ -68,8 +70,7 @@ def tiny_scene(end_n: float = FORCE_N, **changes: Any) -> Scene:
 
 def simulated_rig(subject: Subject) -> tuple[Any, RigDescriptor]:
     """Return the first simulated rig, built, those that come with this package before others."""
-    simulated = (one for one in subject.registry.rigs.all_owned() if one.descriptor.simulated)
-    descriptor = min(simulated, key=lambda one: not one.ours).descriptor
+    descriptor = subject.registry.rigs[subject.registry.first_rig("simulated")]
     return load_object(descriptor.where)(rig_context(subject.registry)), descriptor
 
 
@@ -93,12 +94,19 @@ def presses(subject: Subject, scenes: Sequence[Scene], field: str) -> Iterator[R
                 yield carried_out(rig, sensor, descriptor, scene)
 
 
+def _pressed_by_tasks(registry: Registry) -> Iterator[float]:
+    """Yield the largest force [N] of each scene of our tasks whose answer is a force."""
+    for owned in registry.tasks.all_owned():
+        if owned.ours and getattr(owned.descriptor.spec.target, "kind", "") == "force":
+            yield from (planned.scene.profile.largest_n for planned in owned.descriptor.spec.scenes)
+
+
 @lru_cache(maxsize=6)
 def pressed(subject: Subject, seed: int = 1) -> Recorded:
-    """Return a press: of a sensor on a simulated rig over the range of the task `force`, or of a rig, a tiny one."""
+    """Return a press: of a sensor on a simulated rig over the range of tasks of force, or of a rig, a tiny one."""
     if subject.kind == "sensor":
         (rig, descriptor), sensor, field = simulated_rig(subject), subject.descriptor, "spec"
-        end_n = max(one.scene.profile.largest_n for one in subject.registry.tasks["force"].spec.scenes)
+        end_n = max(_pressed_by_tasks(subject.registry), default=FORCE_N)
     elif subject.descriptor.simulated:
         descriptor, sensor, field, end_n = subject.descriptor, simulated_sensors(subject)[0], "where", FORCE_N
     else:
@@ -140,7 +148,7 @@ def limits_are_kept(subject: Subject) -> None:
             if subject.kind == "sensor" and channel.kind == "taxel" and full.mean() > MOST_SATURATED:
                 fail(
                     where,
-                    f"{full.mean():.0%} of its samples stand at a limit in a press over the range of the task force",
+                    f"{full.mean():.0%} of its samples stand at a limit in a press over the range of tasks of force",
                 )
 
 

@@ -10,10 +10,9 @@ from tactbench.core.conformance import (  # noqa: F401  # isort: skip  (their ch
     sensor_spec,
     transducer,
     press,
-    driver,
     task,
     estimator,
-    real,
+    recorded,
 )
 from tactbench.core.conformance.check import (
     CHECKS,
@@ -28,9 +27,13 @@ from tactbench.core.conformance.check import (
     line_in,
 )
 from tactbench.core.errors import UnknownNameError, error_text
+from tactbench.core.on_demand import contributed
 from tactbench.core.plugins.interfaces import Operator
 from tactbench.core.plugins.registry import PluginRow, Registry
 from tactbench.core.pool import InProcess, Limits, Pool
+
+for _checks in contributed("tactbench.checks").values():
+    _checks.load()
 
 TIMEOUT_S = 60.0
 """Seconds that one check may take: the slowest of ours, a press on the largest skin, takes two on an idle core."""

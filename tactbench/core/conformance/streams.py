@@ -115,7 +115,7 @@ def marks_of(stream: StreamData | Block) -> npt.NDArray[np.uint8]:
     return np.zeros(np.shape(stream.data), np.uint8) if stream.quality is None else stream.quality
 
 
-def good(stream: StreamData) -> FloatArray:
+def good(stream: StreamData | Block) -> FloatArray:
     """Return the (n, channels) samples, NaN where they mean nothing."""
     return np.where(marks_of(stream) & BAD, np.nan, stream.data.astype(np.float64))
 

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any, NamedTuple, TypeVar
 
 from tactbench.core.errors import TactbenchError
-from tactbench.core.plugins.cost import CostPoint, CostStudy
+from tactbench.core.plugins.interfaces import CostPoint, CostStudy
 from tactbench.core.progress import Progress
 
 P = TypeVar("P")

@@ -14,7 +14,7 @@ from typing import Any
 
 from tactbench.core.matrix.plan import Cell, task_of
 from tactbench.core.plugins.registry import Registry
-from tactbench.core.plugins.taking_part import taking_part
+from tactbench.core.plugins.rigs import taking_part
 from tactbench.core.provenance.source import ANSWERING, RECORDING, digest_of, sources_of, versions
 from tactbench.core.spec.rig_file import RigFile
 from tactbench.core.spec.scene import Role, Scene

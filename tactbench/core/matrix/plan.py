@@ -96,10 +96,10 @@ def plan_cells(
     """
     cells: dict[Cell, None] = {}
     rig_file_text = rig_file.model_dump_json() if rig_file else ""
-    simulated = registry.rigs[matrix.rig].simulated
+    rig = registry.rigs[matrix.rig or registry.first_rig("simulated")]
     tasks = {choice.name: registry.tasks.owned(choice.name) for choice in matrix.tasks}
     own = {
-        name: matrix.repeats or ((owned.descriptor.spec.replicates or REPLICATES) if simulated else 1)
+        name: matrix.repeats or ((owned.descriptor.spec.replicates or REPLICATES) if rig.simulated else 1)
         for name, owned in tasks.items()
     }
     for repeat in range(1, max(own.values()) + 1):
@@ -115,7 +115,7 @@ def plan_cells(
                     cell = Cell(
                         sensor=sensor,
                         task=task.name,
-                        rig=matrix.rig,
+                        rig=rig.name,
                         protocol=protocol,
                         split=split,
                         estimator=chosen.name,

@@ -17,12 +17,11 @@ from tactbench.core.errors import (
     UsageError,
 )
 from tactbench.core.evaluation.protocols import shots
-from tactbench.core.matrix.installed import failing_as, rig_of
 from tactbench.core.matrix.keys import Keys
 from tactbench.core.matrix.plan import Cell, plan_cells, serves, task_of
 from tactbench.core.matrix.store import Store
-from tactbench.core.plugins.registry import Registry
-from tactbench.core.plugins.rig_files import load_rig_file
+from tactbench.core.plugins.registry import Registry, installed
+from tactbench.core.plugins.rigs import failing_as, load_rig_file, rig_of
 from tactbench.core.pool import InProcess, Limits, Pool
 from tactbench.core.progress import Progress
 from tactbench.core.spec.declared_task import DeclaredTask
@@ -142,7 +141,7 @@ def parts_of(matrix: MatrixSpec, recordings: Path | None, root: Path | None, pro
 
 
 def _from_dataset(matrix: MatrixSpec, dataset: DataSet, root: Path | None, progress: Progress) -> Part:
-    matrix = matrix.model_copy(update={"rig": "replay"})
+    matrix = matrix.model_copy(update={"rig": installed().first_rig("replays")})
     try:
         return Part(matrix, dataset.recordings(root, progress))
     except TactbenchError as error:
@@ -196,10 +195,11 @@ def plan_run(
         If a rig that is not simulated cannot be built, cannot list its recordings, or one of them cannot be read.
     """
     rig_file = load_rig_file(Path(matrix.rig_file), registry).checked_for(matrix.rig) if matrix.rig_file else None
-    if not registry.rigs[matrix.rig].simulated:  # a simulated one replays nothing: it is built when it has to record
+    rig = registry.rigs[matrix.rig or registry.first_rig("simulated")]
+    if not rig.simulated:  # a simulated one replays nothing: it is built when it has to record
         work = partial(_replayed, registry=registry, recordings=recordings, rig_file=rig_file)
-        builder = InProcess() if registry.rigs.owned(matrix.rig).ours else Pool(1, limits)
-        ((_, paths),) = builder.each(work, [matrix.rig])
+        builder = InProcess() if registry.rigs.owned(rig.name).ours else Pool(1, limits)
+        ((_, paths),) = builder.each(work, [rig.name])
         if isinstance(paths, BaseException):
             raise paths
         if paths is not None:

@@ -1,4 +1,4 @@
-"""Imported by the fork server: libraries, our own estimators and the twin are loaded once, before it forks."""
+"""Imported by the fork server: libraries, our own estimators and simulated rigs are loaded once, before it forks."""
 
 import gc
 import os
@@ -27,5 +27,7 @@ _ours = load_registry([point for point in entry_points(group="tactbench") if poi
 for estimator in _ours.estimators:
     for kind in estimator.kinds:
         prepare(estimator, kind)
-load_object(_ours.rigs["twin"].where)
+for rig in _ours.rigs:
+    if rig.simulated:
+        load_object(rig.where)
 gc.freeze()  # pages shared with workers are not written to by the garbage collector

@@ -6,10 +6,10 @@ import time
 from dataclasses import replace
 from typing import Any
 
-from tactbench.core.matrix.installed import rig_of
 from tactbench.core.matrix.plan_recordings import RecordingRequest
 from tactbench.core.plugins.interfaces import Operator
 from tactbench.core.plugins.registry import Family, Registry
+from tactbench.core.plugins.rigs import rig_of
 from tactbench.core.spec.rig_file import RigFile
 
 GRACE_S = 5.0

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple, Protocol
 
 from tactbench.core.samples import Block, SkinGrid, SkinState
 from tactbench.core.spec.recording import PlanEntry, Scalar, StreamCounts
@@ -77,6 +77,24 @@ class DeviceAcquisition(Acquisition, Protocol):
         """Why it ended before its time; empty: it did not. Its recording is then incomplete."""
 
 
+@dataclass(frozen=True)
+class DeviceLog:
+    """The contents of one log."""
+
+    streams: tuple[StreamSpec, ...]
+    """What `blocks` are of: the streams of the sensor's spec that the log has, perhaps with fewer channels."""
+    blocks: Sequence[Block]
+    """In time order within each stream."""
+    clock: Literal["device", "host", "nominal", "none"]
+    """Who made the times: the device, the host that wrote the log, row number by rate, or nobody."""
+    started: str = ""
+    """When the log was begun, as the file states it; empty if it does not."""
+    remarks: tuple[str, ...] = ()
+    """What a reader of a score from it must know."""
+    counts: Mapping[str, int] = field(default_factory=dict)
+    """What was counted on the way in, by name."""
+
+
 class Rig(Protocol):
     """Something that carries out scenes."""
 
@@ -103,6 +121,97 @@ class Explaining(Rig, Protocol):
 
         `rounds` > 0 carries the scene out so many times and gives the median cost of each effect.
         """
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """One number held against the one that a law or a closed form gives."""
+
+    name: str
+    """What was computed, in one line: ``Hertz: depth under a paraboloid``."""
+    found: float
+    expected: float
+    bound: float
+    """Largest difference of the two that is allowed, included."""
+    unit: str = "1"
+    source: str = ""
+    """The law, where it stands, and the reason for the bound."""
+
+    def __post_init__(self) -> None:
+        """Keep plain numbers: a NumPy scalar would be no JSON."""
+        for name in ("found", "expected", "bound"):
+            object.__setattr__(self, name, float(getattr(self, name)))
+
+    @property
+    def met(self) -> bool:
+        """Whether the two agree within the bound; not a number never does."""
+        return abs(self.found - self.expected) <= self.bound
+
+
+@dataclass(frozen=True)
+class CheckTable:
+    """Some of what a rig would do by its file."""
+
+    title: str
+    head: tuple[str, ...]
+    rows: tuple[tuple[str, ...], ...]
+    """As many texts each as there are in `head`."""
+
+
+@dataclass(frozen=True)
+class RigCheck:
+    """What a rig would do by its file, and why it would not."""
+
+    tables: tuple[CheckTable, ...]
+    problems: tuple[str, ...]
+    """Each a reason to refuse the file, with the next step; empty: it may be used."""
+
+
+@dataclass(frozen=True)
+class CostPoint:
+    """One way of computing something: what it takes, and how far off it is."""
+
+    subject: str
+    """What is computed for: a sensor."""
+    observable: str
+    """What is looked at: a kind of channel."""
+    label: str
+    """Short name of the way: ``default, 48 x 64, 16 nodes``."""
+    seconds: float
+    """Median time of one piece of work, as the diagram's title says."""
+    error: float
+    """Root mean square of the difference to the reference."""
+    worst: float
+    """Largest difference."""
+    unit: str
+    floor: float
+    """Standard deviation of the noise the observable has anyway; infinity where it has none."""
+    default: bool = False
+    """This is what users get who ask for nothing."""
+    rung: str = ""
+    """Name of the rig's rung that this way is; empty: it is none."""
+    settings: Mapping[str, Scalar] = field(default_factory=dict)
+    """What was set."""
+
+
+class CostJob(NamedTuple):
+    """One way still to be measured."""
+
+    label: str
+    run: Callable[[], list[CostPoint]]
+    """Raises a TactbenchError if this sensor cannot have it: the reason becomes a row."""
+    rung: str = ""
+    """As CostPoint's."""
+
+
+class CostStudy(NamedTuple):
+    """A diagram in the making: what its points mean, and how to get them."""
+
+    title: str
+    reference: str
+    """What the errors are measured against, in one sentence."""
+    jobs: Sequence[CostJob]
+    """In order; the reference is computed with the first."""
 
 
 class ReplayRig(Protocol):

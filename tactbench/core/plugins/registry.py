@@ -23,6 +23,7 @@ from tactbench.core.errors import (
     PluginContractError,
     PluginError,
     UnknownNameError,
+    UsageError,
 )
 from tactbench.core.plugins import hookspecs
 from tactbench.core.spec.declared_task import DeclaredTask
@@ -150,6 +151,20 @@ class Registry:
     def families(self) -> Mapping[str, Family[Any]]:
         """Return the families by the name of their hook's plural."""
         return {name: getattr(self, name) for name in _KINDS}
+
+    def first_rig(self, kind: Literal["simulated", "replays"]) -> str:
+        """Return the name of the rig that is meant where none is named: of those of a kind ours, else the first.
+
+        Raises
+        ------
+        UsageError
+            If there is none.
+        """
+        able = [one for one in self.rigs.all_owned() if getattr(one.descriptor, kind)]
+        if not able:
+            what = "simulated rig" if kind == "simulated" else "rig that replays"
+            raise UsageError(f"No {what} is installed.", hint="See `tactbench list plugins`.")
+        return min(able, key=lambda one: not one.ours).descriptor.name
 
     @property
     def failures(self) -> list[PluginRow]:

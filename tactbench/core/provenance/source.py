@@ -27,17 +27,19 @@ RECORDING = (*_BOTH, "core/acquisition", "links", "devices")
 def source_digest(package: str, below: str = "") -> str:
     """Return the digest of the files of an importable package, or of one module or sub-package `below` it.
 
-    Every file counts by its place and bytes, tables and compiled modules among them; byte code and hidden files do not.
-    Nothing is imported. A package without a folder or file on disk has the digest of its name.
+    Every file counts by its place and bytes, tables and compiled modules among them; byte code and hidden files do not,
+    nor verbs and checks of tactbench, which take part in nothing. Nothing is imported. A package without a folder or
+    file on disk has the digest of its name.
     """
     sha = hashlib.sha256(f"{package} {below}".encode())
     spec = importlib.util.find_spec(package)
+    left_out = {"__pycache__"} | ({"cli", "conformance"} if package == PACKAGE else set())
     roots = [] if spec is None else list(spec.submodule_search_locations or ([spec.origin] if spec.origin else []))
     for root in sorted({Path(root) / below for root in roots}):
         files = [root] if root.is_file() else [path for path in root.rglob("*") if path.is_file()]
         for path in sorted(files):
             place = path.relative_to(root)
-            if "__pycache__" not in place.parts and not any(part.startswith(".") for part in place.parts):
+            if not left_out.intersection(place.parts) and not any(part.startswith(".") for part in place.parts):
                 sha.update(f"\0{place.as_posix()}\0".encode() + hashlib.sha256(path.read_bytes()).digest())
     return sha.hexdigest()[:32]
 

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from tactbench.core.errors import DataError, LinkError, MissingRecordingError, UsageError
+from tactbench.core.plugins.interfaces import DeviceLog
 from tactbench.core.plugins.registry import load_object
 from tactbench.core.recording.health import Finding, examine
 from tactbench.core.recording.mapping.importing import ENDING, RIG
@@ -16,7 +17,6 @@ from tactbench.core.recording.writer import RecordingWriter
 from tactbench.core.spec.recording import RecordingMeta, Scalar
 from tactbench.core.spec.rig import SensorDescriptor
 from tactbench.core.spec.scene import Role
-from tactbench.devices.driver import DeviceLog
 
 
 @dataclass(frozen=True)

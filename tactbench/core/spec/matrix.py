@@ -78,7 +78,8 @@ class MatrixSpec(Frozen):
     repeats: int | None = Field(default=None, ge=1, le=MOST_REPEATS)
     """Replicates: how often everything is recorded and answered anew, each time with another seed. None: eight on a
     simulated rig; on recordings one, whose sessions are the replicates."""
-    rig: str = "twin"
+    rig: str = ""
+    """Empty: the simulated one (:meth:`~tactbench.core.plugins.registry.Registry.first_rig`)."""
     recordings: str | None = None
     """Folder of recordings for rigs that replay; relative to where tactbench is run."""
     rig_file: str | None = None

@@ -84,6 +84,8 @@ class RigDescriptor(Frozen):
     """``module:callable``, called with a :class:`tactbench.plugin.RigContext`: a Rig or a ReplayRig."""
     simulated: bool = False
     """Rows from this rig are marked SIM and never ranked against hardware."""
+    replays: bool = False
+    """It is a ReplayRig; ``--recordings`` without ``--rig`` asks one of these."""
     rungs: tuple[str, ...] = ()
     """Names of the rungs of its ladder of solvers, the cheapest first; for simulated rigs."""
     verification: str | None = Field(default=None, pattern=WHERE)

@@ -84,8 +84,8 @@ class EmulationSettings(Frozen):
 
     time: Literal["virtual", "real"] = "virtual"
     """`virtual`: as fast as it can be computed, the same each time; `real`: by the wall clock."""
-    physics: str = "twin"
-    """The simulated rig whose samples the emulated devices read."""
+    physics: str = ""
+    """The simulated rig whose samples the emulated devices read; empty: the one that comes with tactbench."""
     seed: int = Field(default=1, ge=0)
     """Of what is drawn in emulators; the scene's own seed is the run's."""
     control: str = ""

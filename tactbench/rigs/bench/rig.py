@@ -40,6 +40,7 @@ from tactbench.plugin.devices import (
     ask_operator,
     drivers_of,
     physics_of,
+    running,
     with_sensor,
 )
 
@@ -84,7 +85,7 @@ class BenchAcquisition:
         return self.reading.ended
 
 
-class Bench:
+class Bench(Rig):
     """Devices of a rig file, read while a scene is pressed by hand.
 
     Parameters
@@ -93,15 +94,13 @@ class Bench:
         Which devices, on which links.
     operator
         Who presses; not needed where all devices are emulated.
-    physics
-        The simulated rig that moves emulated devices; None: there are none.
     """
 
-    def __init__(self, file: RigFile, operator: Operator | None, physics: Rig | None) -> None:
+    def __init__(self, file: RigFile, operator: Operator | None) -> None:
         self._registry = load_registry()
-        self._file = file
+        self._file = running(file)
         self._operator = operator
-        self._physics = physics
+        self._physics = physics_of(self._file, self._registry)
 
     @contextmanager
     def open(self, sensor: SensorDescriptor, scene: Scene, *, seed: int) -> Iterator[DeviceAcquisition]:
@@ -121,8 +120,9 @@ class Bench:
             simulated: Acquisition | None = None
             emulators = SceneEmulators(file, self._registry)
             emulated: EmulatedDevices | None = None
-            if self._physics is not None and file.emulated and file.emulation.time == "virtual":
+            if self._physics is not None:
                 simulated = stack.enter_context(self._physics.open(sensor, scene, seed=seed))
+            if simulated is not None and file.emulated:
                 emulators.prepare(simulated, sensor, scene, seed)
                 emulated = stack.enter_context(EmulatedDevices(emulators.devices))
             clock = time.monotonic_ns if emulated is None else emulated.clock
@@ -140,6 +140,8 @@ class Bench:
             )
             own = drivers[sensor.name].streams
             emulators.begin(clock() * 1e-9)
+            if self._physics is not None:
+                self._physics.begin()
             yield BenchAcquisition(
                 streams=own,
                 reference=() if force is None else force.streams,
@@ -206,5 +208,4 @@ def build(context: RigContext) -> Bench:
             f"The bench opens no {', '.join(context.rig_file.devices)}: a hand presses, and nothing moves.",
             hint="Leave it out under `devices:`, or use the rig parallel-manipulator.",
         )
-    physics = physics_of(context.rig_file, load_registry())
-    return Bench(context.rig_file, context.operator, physics)
+    return Bench(context.rig_file, context.operator)

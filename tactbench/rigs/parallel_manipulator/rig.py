@@ -42,6 +42,7 @@ from tactbench.plugin.devices import (
     ask_operator,
     physics_of,
     read_options,
+    running,
     with_sensor,
 )
 from tactbench.rigs.parallel_manipulator.emulated_press import quiet
@@ -51,7 +52,7 @@ from tactbench.rigs.parallel_manipulator.settings import MOTOR, positioner_of, s
 
 if TYPE_CHECKING:
     from tactbench.plugin import FloatArray
-    from tactbench.plugin.devices import Clock
+    from tactbench.plugin.devices import Clock, ScenePhysics
 
 STOP_S = 10.0
 """Added to the time of a retreat (assumed: a control period, and what a guard in another process takes to answer)."""
@@ -154,7 +155,7 @@ class PressAcquisition:
         return "; ".join(filter(None, (press.ended, press.not_out))) or self.reading.ended
 
 
-class ParallelManipulator:
+class ParallelManipulator(Rig):
     """Devices of a rig file, and what presses them together.
 
     Guard and homes outlive a scene: by the clock the session that keeps them begins with the first scene and ends with
@@ -169,7 +170,7 @@ class ParallelManipulator:
     operator
         Who mounts the caps; not needed where all devices are emulated.
     physics
-        The simulated rig that moves emulated devices; None: there are none.
+        What carries out the scenes that move emulated devices; None: there are none.
 
     Raises
     ------
@@ -177,7 +178,7 @@ class ParallelManipulator:
         If the settings lack something, or contradict each other. What `doctor` refuses is :func:`build`'s business.
     """
 
-    def __init__(self, file: RigFile, operator: Operator | None, physics: Rig | None) -> None:
+    def __init__(self, file: RigFile, operator: Operator | None, physics: ScenePhysics | None) -> None:
         self.settings, self._registry = settings_of(file), load_registry()
         self._file, self._operator, self._physics = file, operator, physics
         self._session: Session | None = None
@@ -211,7 +212,7 @@ class ParallelManipulator:
         try:
             with ExitStack() as stack:
                 simulated: Acquisition | None = None
-                if self._physics is not None and file.emulated:
+                if self._physics is not None:
                     simulated = stack.enter_context(self._physics.open(sensor, scene, seed=seed))
                 if self._session is None:
                     self._session = session = Session(file if file.emulated else self._file, self._registry)
@@ -316,6 +317,8 @@ class ParallelManipulator:
         )
         if session.emulators is not None:
             session.emulators.begin(1e-9 * found.begin_ns)
+        if self._physics is not None:
+            self._physics.begin()
         press.begin(1e-9 * found.begin_ns)
         return found
 
@@ -371,6 +374,6 @@ def build(context: RigContext) -> ParallelManipulator:
             "The rig 'parallel-manipulator' needs to know its devices and its limits.",
             hint="Name a rig file with --rig-file FILE; `tactbench doctor --rig-file FILE` says what it would do.",
         )
-    refuse(context.rig_file)
-    physics = physics_of(context.rig_file, load_registry())
-    return ParallelManipulator(context.rig_file, context.operator, physics)
+    file = running(context.rig_file)
+    refuse(file)
+    return ParallelManipulator(file, context.operator, physics_of(file, load_registry()))

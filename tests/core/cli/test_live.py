@@ -10,8 +10,7 @@ import numpy as np
 import pytest
 from rich.console import Console
 
-from tactbench.core.cli.live import RATE_S, LiveView
-from tactbench.core.cli.stream_state import StreamState
+from tactbench.core.cli.live import LiveView, StreamState
 from tactbench.core.samples import Block, Quality
 from tactbench.core.spec.profile import ForceRamp
 from tactbench.core.spec.quantity import sourced
@@ -103,7 +102,7 @@ def test_a_rate_is_that_of_the_last_two_seconds():
         return [Block("s", began + np.arange(rows) * period_ns, np.zeros((rows, 5))) for began in began_ns]
 
     def rate_hz(*blocks):
-        state = StreamState(PAD, rate_s=RATE_S)
+        state = StreamState(PAD)
         for block in blocks:
             state.take(block)
         return state.rate_hz

@@ -2,6 +2,7 @@
 
 import json
 import os
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -79,5 +80,6 @@ def test_help_imports_no_verb_and_listing_loads_no_numerics():
     )
     done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True, timeout=60,
                           env={**os.environ, "PYTHONWARNINGS": "error"})  # fmt: skip
+    assert re.search(r"^  emulate +Start emulated devices", done.stdout, re.MULTILINE)  # by its entry point
     assert "HELP []" in done.stdout
     assert "LIST []" in done.stdout

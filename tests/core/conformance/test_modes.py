@@ -10,9 +10,9 @@ import yaml
 
 from tactbench.core.conformance.run import run_checks, subjects_named
 from tactbench.core.plugins.registry import load_registry
-from tactbench.core.plugins.rig_devices import emulated_device
 from tactbench.core.spec.rig_file import DeviceEntry
 from tactbench.devices.emulation.emulated_devices import EmulatedDevices
+from tactbench.devices.rig_devices import emulated_device
 from tests.conftest import THIRD_PARTY
 from tests.core.conformance.test_recorded import written
 from tests.rigs.parallel_manipulator.spring import EXAMPLE, example

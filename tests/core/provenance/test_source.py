@@ -48,6 +48,17 @@ def test_byte_code_and_hidden_files_do_not_count(package):
     assert digest() == before
 
 
+def test_verbs_and_checks_of_tactbench_do_not_count(package, monkeypatch):
+    """A recording of the twin was made anew since a verb about devices had changed."""
+    monkeypatch.setattr("tactbench.core.provenance.source.PACKAGE", "some_plugin")
+    before = source_digest("some_plugin")
+    for name in ("cli/doctor.py", "conformance/driver.py"):
+        (package / name).parent.mkdir(parents=True)
+        (package / name).write_bytes(b"x")
+    source_digest.cache_clear()
+    assert source_digest("some_plugin") == before
+
+
 def test_a_module_of_its_own_counts_and_what_it_imports_does_not(tmp_path, monkeypatch):
     (tmp_path / "lone_plugin.py").write_text("from lone_filters import LAW\n")
     (tmp_path / "lone_filters.py").write_text("LAW = 3\n")

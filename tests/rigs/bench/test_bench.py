@@ -8,7 +8,6 @@ import pytest
 from tactbench.core.acquisition import acquire
 from tactbench.core.errors import DataError, RigError, UsageError
 from tactbench.core.evaluation.dataset import load_dataset
-from tactbench.core.plugins.emulators import running
 from tactbench.core.recording.reader import open_recording
 from tactbench.core.spec.quantity import assumed
 from tactbench.core.spec.rig_file import Allowed, DeviceEntry, EmulationSettings, ForceEntry
@@ -37,7 +36,6 @@ def rig_file(sensor="icub", faults=(), force_faults=(), time="virtual", seed=1, 
 
 
 def bench(file, operator=None):
-    file = None if file is None else running(file)
     context = RigContext(effects=tuple(REGISTRY.effects), rig_file=file, operator=operator)
     return load_object(REGISTRY.rigs["bench"].where)(context)
 

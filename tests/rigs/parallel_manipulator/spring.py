@@ -7,7 +7,7 @@ import numpy as np
 import yaml
 
 from tactbench.plugin import Block, ChannelSpec, ForceRamp, Scene, StreamSpec, assumed, load_registry
-from tactbench.plugin.devices import RigFile
+from tactbench.plugin.devices import RigFile, ScenePhysics
 from tactbench.rigs.parallel_manipulator.rig import ParallelManipulator
 from tactbench.rigs.parallel_manipulator.settings import JOINTS
 
@@ -150,5 +150,5 @@ def pressed(rig, scene, seed=1):
 
 def on_spring(stiffness_n_mm, scene=None, *, noise_n=0.005, seed=1, **changes):
     """Press a spring by the changed example."""
-    rig = ParallelManipulator(file_of(**changes), None, SpringRig(stiffness_n_mm, noise_n))
+    rig = ParallelManipulator(file_of(**changes), None, ScenePhysics(SpringRig(stiffness_n_mm, noise_n)))
     return pressed(rig, scene or ramp(), seed)

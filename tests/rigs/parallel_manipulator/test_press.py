@@ -10,7 +10,7 @@ import pytest
 from tactbench.devices.guard_messages import Trigger
 from tactbench.devices.press import PressState
 from tactbench.plugin import NotApplicable, assumed, load_registry
-from tactbench.plugin.devices import GuardState, PositionerSilentError, RigFile, largest_force_n
+from tactbench.plugin.devices import GuardState, PositionerSilentError, RigFile, ScenePhysics, largest_force_n
 from tactbench.plugin.simulation import Slide
 from tactbench.rigs.parallel_manipulator.motor.emulator import MotorEmulator
 from tactbench.rigs.parallel_manipulator.rig import ParallelManipulator
@@ -121,7 +121,7 @@ def test_a_motor_that_does_not_come_out_is_said():
 
 
 def test_a_press_that_is_stopped_retreats_within_a_control_period():
-    rig = ParallelManipulator(file_of(**RARER), None, SpringRig(5.0))
+    rig = ParallelManipulator(file_of(**RARER), None, ScenePhysics(SpringRig(5.0)))
     with rig.open(load_registry().sensors["icub"], ramp(5.0, 0.5, 20.0), seed=1) as acquisition:
         next(block for block in acquisition if block.t_ns[-1] > acquisition.begin_ns + 2e9)
         assert acquisition.control.press.state is PressState.RAMP
@@ -135,7 +135,7 @@ def test_a_press_that_is_stopped_retreats_within_a_control_period():
 
 
 def test_scenes_that_the_rig_cannot_press_are_refused():
-    rig = ParallelManipulator(file_of(**QUICK), None, SpringRig(5.0))
+    rig = ParallelManipulator(file_of(**QUICK), None, ScenePhysics(SpringRig(5.0)))
     slide = ramp().model_copy(update={"slide": Slide(speed=assumed(1.0, "mm/s", "a test"))})
     with pytest.raises(NotApplicable, match="slides"):
         pressed(rig, slide)
@@ -160,7 +160,7 @@ def silenced(monkeypatch):
 
 
 def test_a_sensor_that_falls_silent_ends_the_press_and_the_motor_is_out(monkeypatch):
-    rig = ParallelManipulator(file_of(**RARER), None, SpringRig(5.0))
+    rig = ParallelManipulator(file_of(**RARER), None, ScenePhysics(SpringRig(5.0)))
     with rig.open(load_registry().sensors["icub"], ramp(1.0, 0.3, 2.0), seed=1) as acquisition:
         blocks = iter(acquisition)
         first = list(islice(blocks, 20))
@@ -176,7 +176,7 @@ def test_a_sensor_that_falls_silent_ends_the_press_and_the_motor_is_out(monkeypa
 
 def test_the_manipulator_goes_to_the_scenes_place_before_it_presses():
     said = with_joints(settings__places__reach_x_mm=[-15.0, 15.0], **RARER)
-    rig = ParallelManipulator(RigFile.model_validate(said), None, SpringRig(5.0))
+    rig = ParallelManipulator(RigFile.model_validate(said), None, ScenePhysics(SpringRig(5.0)))
     scene = ramp(1.0, 0.3, 1.5)
     place = scene.placement.model_copy(update={"x": assumed(12.0, "mm", "a test")})
     found = pressed(rig, scene.model_copy(update={"placement": place}))
@@ -205,6 +205,6 @@ def test_of_four_drives_of_one_kind_the_error_says_which_joint_is_silent(monkeyp
 
     monkeypatch.setattr(MotorEmulator, "feed", fed)
     monkeypatch.setattr(MotorEmulator, "poll", lambda self, now_s: [] if self in silent else poll(self, now_s))
-    rig = ParallelManipulator(RigFile.model_validate(with_joints(**RARER)), None, SpringRig(5.0))
+    rig = ParallelManipulator(RigFile.model_validate(with_joints(**RARER)), None, ScenePhysics(SpringRig(5.0)))
     with pytest.raises(PositionerSilentError, match="joint-2: The motor's drive did not answer AC"):
         pressed(rig, ramp(1.0, 0.3, 1.0))

@@ -8,7 +8,6 @@ import time
 import yaml
 
 from tactbench.core.acquisition import acquire
-from tactbench.core.plugins.emulators import running
 from tactbench.core.recording.reader import open_recording
 from tactbench.plugin import RigContext, load_registry
 from tactbench.plugin.devices import RigFile
@@ -38,7 +37,7 @@ def impatient(tmp_path):
 def test_presses_go_through_driver_guard_process_and_emulators_and_keep_their_home(tmp_path):
     """The sender of the force was a thread of the rig's process, which held it up for longer than the guard allows."""
     file, icub, scene = impatient(tmp_path), REGISTRY.sensors["icub"], ramp(5.0, 0.5, 5.0)
-    rig = build(RigContext(effects=tuple(REGISTRY.effects), rig_file=running(file)))
+    rig = build(RigContext(effects=tuple(REGISTRY.effects), rig_file=file))
     for name in ("a.h5", "b.h5"):
         acquire(
             rig, icub, REGISTRY.rigs["parallel-manipulator"], scene, role=None, seed=7, path=tmp_path / name,

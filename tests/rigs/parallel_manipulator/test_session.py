@@ -7,7 +7,7 @@ import pytest
 
 from tactbench.devices.guard_messages import GuardRefusesError
 from tactbench.plugin import RigError, load_registry
-from tactbench.plugin.devices import RigFile
+from tactbench.plugin.devices import RigFile, ScenePhysics
 from tactbench.rigs.parallel_manipulator.kinematics import forward, inverse
 from tactbench.rigs.parallel_manipulator.rig import ParallelManipulator
 from tactbench.rigs.parallel_manipulator.session import Session
@@ -81,7 +81,7 @@ def test_the_platform_is_where_it_believes_to_be_scene_after_scene(session):
 
 
 def test_a_scene_is_the_same_in_its_own_session_each_time():
-    rig = ParallelManipulator(FILE, None, SpringRig(5.0))
+    rig = ParallelManipulator(FILE, None, ScenePhysics(SpringRig(5.0)))
     icub, found = load_registry().sensors["icub"], []
     for _ in range(2):
         with rig.open(icub, ramp(0.5, 0.2, 0.6), seed=1) as acquisition:

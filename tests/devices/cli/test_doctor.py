@@ -7,13 +7,13 @@ import numpy as np
 import pytest
 from serial.tools.list_ports import comports
 
-from tactbench.core.cli.device_check import check_devices
-from tactbench.core.cli.host_devices import look_at_host
 from tactbench.core.plugins.registry import Owned, Registry
 from tactbench.core.samples import Block, Quality
 from tactbench.core.spec.rig import DeviceDescriptor, SensorDescriptor
 from tactbench.core.spec.rig_file import RigFile
 from tactbench.core.spec.sensor import ChannelSpec, SensorSpec, Source, StreamSpec
+from tactbench.devices.cli.device_check import check_devices
+from tactbench.devices.cli.host_devices import look_at_host
 from tactbench.plugin.devices import Driver
 from tests.conftest import Verbs
 
@@ -30,7 +30,7 @@ devices:
 @pytest.fixture
 def doctor(tmp_path, monkeypatch):
     """The verb, with the plugin of a pad and a scale on lines."""
-    monkeypatch.setattr("tactbench.core.cli.host_devices.SLEEPS", 5)
+    monkeypatch.setattr("tactbench.devices.cli.host_devices.SLEEPS", 5)
     verbs = Verbs(tmp_path, here=True)
     return lambda *words, code=0: verbs("doctor", *words, code=code, plugins=("wired",)).stdout
 

@@ -2,24 +2,24 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
-from functools import partial
-from typing import TYPE_CHECKING, Any
+from dataclasses import dataclass, field, replace
+from typing import Any
 
-from tactbench.core.cli.stream_state import StreamState
+import numpy as np
+
+from tactbench.core.cli.live import COUNTED
+from tactbench.core.conformance.streams import good, marks_of
 from tactbench.core.errors import TactbenchError
-from tactbench.core.samples import Quality
-
-if TYPE_CHECKING:
-    from tactbench.core.plugins.registry import Registry
-    from tactbench.core.samples import Block
-    from tactbench.core.spec.rig_file import DeviceEntry, RigFile
-    from tactbench.core.spec.sensor import StreamSpec
-    from tactbench.devices.driver import Driver
-    from tactbench.devices.sequence import SequenceCheck
-    from tactbench.links.link import Clock
+from tactbench.core.plugins.registry import Registry
+from tactbench.core.recording.clock_fit import ClockFit
+from tactbench.core.samples import Block, join_blocks
+from tactbench.core.spec.rig_file import DeviceEntry, RigFile
+from tactbench.core.spec.sensor import StreamSpec
+from tactbench.devices.driver import Driver
+from tactbench.devices.rig_devices import descriptor_of, open_driver
+from tactbench.devices.sequence import SequenceCheck
+from tactbench.links.link import Clock
 
 Record = dict[str, Any]
 
@@ -85,22 +85,11 @@ def check_devices(rig_file: RigFile, registry: Registry, *, seconds: float, cloc
 
 
 def _check(check: DeviceCheck, registry: Registry, entry: DeviceEntry, seconds: float, clock: Clock) -> None:
-    from tactbench.core.errors import UsageError
-    from tactbench.core.plugins.registry import load_object
-    from tactbench.core.plugins.rig_devices import descriptor_of, options_of
-    from tactbench.core.spec.rig import SensorDescriptor
-    from tactbench.devices.driver import DriverSettings
-    from tactbench.links.address import open_link
-
     descriptor = descriptor_of(registry, check.name, entry)
-    if descriptor.driver is None:
-        raise UsageError(f"{check.device} has no driver.", hint="docs/plugins.md says how a sensor names one.")
-    streams = descriptor.spec.streams if isinstance(descriptor, SensorDescriptor) else ()
-    settings = DriverSettings(partial(open_link, entry.link, clock), streams, options_of(descriptor, entry), clock)
-    with load_object(descriptor.driver)(settings) as driver:
+    with open_driver(descriptor, entry, clock) as driver:
         try:
             check.identity = dict(driver.identify())
-            if not isinstance(descriptor, SensorDescriptor) and descriptor.kind == "motor":
+            if getattr(descriptor, "kind", "") == "motor":
                 check.remarks.append("a motor: not started")
                 return
             _read(check, driver, seconds, clock)
@@ -109,8 +98,6 @@ def _check(check: DeviceCheck, registry: Registry, entry: DeviceEntry, seconds: 
 
 
 def _read(check: DeviceCheck, driver: Driver, seconds: float, clock: Clock) -> None:
-    from tactbench.devices.sequence import SequenceCheck
-
     driver.start()
     blocks: dict[str, list[Block]] = {stream.name: [] for stream in driver.streams}
     ordered = {name: SequenceCheck() for name in blocks}
@@ -137,26 +124,19 @@ def _read(check: DeviceCheck, driver: Driver, seconds: float, clock: Clock) -> N
 
 def _records(device: str, spec: StreamSpec, came: Sequence[Block], ordered: SequenceCheck) -> Iterator[Record]:
     """Yield what came of a stream, a record for each kind of channel in one unit."""
-    import numpy as np
-
-    from tactbench.core.recording.clock_fit import ClockFit
-
-    state, fit = StreamState(spec, rate_s=math.inf), ClockFit()
-    values = np.concatenate([block.data for block in came]).astype(np.float64)
-    row = 0
-    for block in came:
-        state.take(block)
-        if block.device_ns is not None and block.t_ns is not None:
-            fit.add(block.device_ns, block.t_ns)
-        if block.quality is not None:
-            bad = (block.quality & (Quality.MISSING | Quality.SUSPECT)) != 0
-            values[row : row + len(bad)][bad] = np.nan
-        row += len(block.data)
-    line = fit.segments()[-1] if came[0].device_ns is not None else None
+    whole, hz, line = join_blocks([replace(block, quality=marks_of(block)) for block in came]), None, None
+    values, marks, times = good(whole), np.bitwise_or.reduce(marks_of(whole), axis=1), whole.t_ns
+    if times is not None and times[-1] > times[0]:
+        first = times[: len(came[0].data)]
+        hz = (len(times) - (1 if first[-1] > first[0] else len(first))) / (times[-1] - times[0]) * 1e9
+    if times is not None and whole.device_ns is not None:
+        fit = ClockFit()
+        fit.add(whole.device_ns, times)
+        line = fit.segments()[-1]
     about: Record = {
-        "device": device, "stream": spec.name, "rows": state.rows, "hz": state.rate_hz, "stated_hz": spec.rate_hz,
+        "device": device, "stream": spec.name, "rows": len(values), "hz": hz, "stated_hz": spec.rate_hz,
         "lost": ordered.gaps, "twice_or_late": ordered.duplicates + ordered.late,
-        "marked": {str(flag.name): number for flag, number in state.counts.items() if number},
+        "marked": {str(flag.name): number for flag in COUNTED if (number := int(np.count_nonzero(marks & flag)))},
         "drift_ppm": None if line is None else line.drift * 1e6,
         "clock_error_us": None if line is None or line.bound_ns is None else line.bound_ns * 1e-3,
     }  # fmt: skip
@@ -165,10 +145,10 @@ def _records(device: str, spec: StreamSpec, came: Sequence[Block], ordered: Sequ
         groups.setdefault((channel.kind, channel.unit), []).append(place)
     for (kind, unit), places in groups.items():
         columns = {spec.channels[place].name: values[np.isfinite(values[:, place]), place] for place in places}
-        good = {name: column for name, column in columns.items() if len(column) > 1}
-        sds = {name: float(column.std(ddof=1)) for name, column in good.items()}
+        columns = {name: column for name, column in columns.items() if len(column) > 1}
+        sds = {name: float(column.std(ddof=1)) for name, column in columns.items()}
         noisiest = max(sds, key=sds.__getitem__, default=None)
-        means = {name: float(column.mean()) for name, column in good.items()}
+        means = {name: float(column.mean()) for name, column in columns.items()}
         if len(means) > MOST_NAMED:
             means = {"lowest": min(means.values()), "highest": max(means.values())}
         yield {

@@ -10,7 +10,7 @@ from tactbench.plugin.devices import DeviceDescriptor, Driver, LinkTimeout
 from tactbench.sensors.ideal import SPEC
 
 TACTBENCH_API = 2
-HERE = "tests.core.plugins.talking"
+HERE = "tests.devices.talking"
 WHERE = {"driver": f"{HERE}:TalkingDriver", "emulator": f"{HERE}:build_emulator", "emulated_link": "datagram"}
 
 

@@ -6,7 +6,7 @@ import math
 import numpy as np
 import pytest
 
-from tactbench.core.plugins.checks import Verdict
+from tactbench.core.plugins.interfaces import Verdict
 
 
 @pytest.mark.parametrize(

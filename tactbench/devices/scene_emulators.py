@@ -1,4 +1,4 @@
-"""The emulated devices of a rig file in a process of their own, and what a recording tells them.
+"""The emulated devices of a rig file, and the simulated scenes that move them, in this process or in one of their own.
 
 In real time a recording's own work would hold up the devices that it reads: they run in another process, in which a
 simulated rig carries out the scene that the recording is of. The devices are at rest until the recording begins.
@@ -13,20 +13,22 @@ import socket
 import subprocess
 import sys
 import threading
-from collections.abc import Callable, Mapping
-from typing import TYPE_CHECKING, Any, Protocol
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from types import SimpleNamespace
+from typing import Any, Protocol
 
-from tactbench.core.errors import NotApplicable, RigError, TactbenchError
-from tactbench.core.plugins.interfaces import Acquisition
+from tactbench.core.errors import NotApplicable, RigError, TactbenchError, UsageError
+from tactbench.core.plugins.interfaces import Acquisition, Rig
 from tactbench.core.plugins.registry import Registry, load_object, load_registry
-from tactbench.core.plugins.rig_devices import descriptor_of, emulators_of, options_of, physics_of
+from tactbench.core.plugins.rigs import rig_context
+from tactbench.core.spec.recording import PlanEntry
 from tactbench.core.spec.rig import SensorDescriptor
 from tactbench.core.spec.rig_file import FORCE, RigFile
 from tactbench.core.spec.scene import Scene
-
-if TYPE_CHECKING:
-    from tactbench.devices.emulation.emulated_devices import EmulatedDevice
-    from tactbench.devices.emulation.scene_samples import SceneSamples
+from tactbench.devices.emulation.emulated_devices import EmulatedDevice, EmulatedDevices
+from tactbench.devices.emulation.scene_samples import SceneSamples
+from tactbench.devices.rig_devices import descriptor_of, emulators_of, options_of
 
 PREPARE_S = 300.0
 """Longest wait for a scene to be simulated."""
@@ -63,8 +65,6 @@ class SceneEmulators(RigEmulators):
 
     def prepare(self, simulated: Acquisition, sensor: SensorDescriptor, scene: Scene, seed: int) -> None:
         """Take a scene."""
-        from tactbench.devices.emulation.scene_samples import SceneSamples
-
         profile = scene.profile
         streams = (*simulated.streams, *simulated.reference)
         self._samples = SceneSamples(streams, simulated, profile.duration.to("s"), rest_s=profile.hold_s)
@@ -97,8 +97,6 @@ def serve(
     UsageError
         If a device, option or fault is not known, or has no emulator.
     """
-    from tactbench.devices.emulation.emulated_devices import EmulatedDevices
-
     physics = physics_of(file, registry)
     where = registry.rigs[file.rig].emulators
     emulators: RigEmulators = (load_object(where) if where else SceneEmulators)(file, registry)
@@ -155,43 +153,54 @@ def _opening(file: RigFile, registry: Registry, addresses: Mapping[str, str], co
     return file.model_copy(update=update)
 
 
-class EmulatorControl:
-    """Tells a process of emulated devices which scene is recorded, and when it begins.
+class ScenePhysics(Rig):
+    """What carries out the scenes that move a rig's emulated devices.
 
     Parameters
     ----------
-    address
-        ``host:port``, as ``emulation: control`` of a rig file says.
+    rig
+        The simulated rig; None: it is in the process that the devices are in.
+    control
+        Where that process listens, ``host:port``, as ``emulation: control`` of a rig file says.
     """
 
-    def __init__(self, address: str) -> None:
-        host, _, port = address.rpartition(":")
-        self._peer = host, int(port)
+    def __init__(self, rig: Rig | None, control: str = "") -> None:
+        self._rig, self._control = rig, control
 
-    def prepare(self, sensor: str, scene: Scene, seed: int) -> dict[str, Any]:
-        """Let a scene be simulated; return what a recording says of that: plan, assumptions and what was drawn.
+    @contextmanager
+    def open(self, sensor: SensorDescriptor, scene: Scene, *, seed: int) -> Iterator[Acquisition]:
+        """Carry out a scene; in another process its samples stay there, for the devices, until :meth:`begin`.
 
         Raises
         ------
         NotApplicable, RigError
             If it cannot be, or nobody answers.
         """
-        return self._ask({"sensor": sensor, "scene": scene.model_dump(mode="json"), "seed": seed}, PREPARE_S)
+        if self._rig is not None:
+            with self._rig.open(sensor, scene, seed=seed) as simulated:
+                yield simulated
+            return
+        said = self._ask({"sensor": sensor.name, "scene": scene.model_dump(mode="json"), "seed": seed}, PREPARE_S)
+        said["plan"] = tuple(map(PlanEntry.model_validate, said["plan"]))
+        there: Any = SimpleNamespace(**said)  # an Acquisition without streams
+        yield there
 
     def begin(self) -> None:
-        """Let it begin; raises as :meth:`prepare`."""
-        self._ask({"begin": True}, BEGIN_S)
+        """Let the scene begin in the other process; raises as :meth:`open`."""
+        if self._rig is None:
+            self._ask({"begin": True}, BEGIN_S)
 
     def _ask(self, message: dict[str, Any], timeout_s: float) -> dict[str, Any]:
+        host, _, port = self._control.rpartition(":")
         with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as link:
             link.settimeout(timeout_s)
             try:
-                link.connect(self._peer)
+                link.connect((host, int(port)))
                 link.send(json.dumps(message).encode())
                 answer: dict[str, Any] = json.loads(link.recv(65536))
             except OSError as error:
                 raise RigError(
-                    f"The emulated devices at {self._peer[0]}:{self._peer[1]} do not answer: {error}.",
+                    f"The emulated devices at {self._control} do not answer: {error}.",
                     hint="Start them again: `tactbench emulate`.",
                 ) from error
         if "error" in answer:
@@ -199,11 +208,29 @@ class EmulatorControl:
         return answer
 
 
+def physics_of(file: RigFile, registry: Registry) -> ScenePhysics | None:
+    """Return what carries out the scenes that move a rig's emulated devices; None: it has none.
+
+    Raises
+    ------
+    UsageError
+        If the file names a rig that is no simulation.
+    """
+    if not file.emulated:
+        return ScenePhysics(None, file.emulation.control) if file.emulation.control else None
+    descriptor = registry.rigs[file.emulation.physics or registry.first_rig("simulated")]
+    if not descriptor.simulated:
+        raise UsageError(
+            f"`physics: {descriptor.name}` in the rig file is no simulated rig.", hint="Use `physics: twin`."
+        )
+    return ScenePhysics(load_object(descriptor.where)(rig_context(registry)))
+
+
 class _Child:
     """The process of one rig file's emulators; it ends when its stdin is closed, or this process is gone."""
 
     def __init__(self, file: RigFile) -> None:
-        code = "from tactbench.core.plugins.emulators import main; main()"
+        code = "from tactbench.devices.scene_emulators import main; main()"
         self.process = subprocess.Popen([sys.executable, "-c", code], stdin=subprocess.PIPE, stdout=subprocess.PIPE)
         assert self.process.stdin is not None
         assert self.process.stdout is not None

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 HEAD = "# Written by `tactbench emulate`; its links are gone when that ends."
 
 
-@click.command(name="emulate")
+@click.command(name="emulate", short_help="Start emulated devices on links of this machine.")
 @click.argument("names", nargs=-1, metavar="[DEVICE]...")
 @click.option("--rig-file", type=click.Path(path_type=Path), metavar="FILE",
               help="Start every device of this file whose link is `emulated`, with its faults.")  # fmt: skip
@@ -29,9 +29,9 @@ def command(names: tuple[str, ...], rig_file: Path | None) -> None:
     simulated rig carries out its scene.
     """
     from tactbench.core.errors import UsageError
-    from tactbench.core.plugins.emulators import serve
     from tactbench.core.plugins.registry import load_registry
-    from tactbench.core.plugins.rig_files import load_rig_file
+    from tactbench.core.plugins.rigs import load_rig_file
+    from tactbench.devices.scene_emulators import serve
 
     if bool(names) == (rig_file is not None):
         raise UsageError(

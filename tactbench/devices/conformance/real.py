@@ -1,7 +1,6 @@
-"""Checks of what is real: a recording of a sensor, and the devices that a rig file names, which are read or press.
+"""Checks of the devices that a rig file names, which are read or press.
 
-Of the plugin of a recording no code runs. Where a line is opened, checks run in the process of the command, so that
-Ctrl-C reaches the rig, and without a limit of time.
+They run in the process of the command, so that Ctrl-C reaches the rig, and without a limit of time.
 """
 
 from __future__ import annotations
@@ -9,110 +8,30 @@ from __future__ import annotations
 import time
 from collections.abc import Mapping
 from contextlib import suppress
-from functools import lru_cache, partial
 from typing import Any
 
 import numpy as np
 
 from tactbench.core.conformance.check import Subject, check, code_of, fail, skip
-from tactbench.core.conformance.driver import look_at, opened_on
-from tactbench.core.conformance.press import WHY, slow_ramp, tiny_scene
-from tactbench.core.conformance.streams import (
-    FORCE_SHARE,
-    Recorded,
-    carried_out,
-    force_is,
-    good,
-    joined,
-    pressing_force,
-    rate_is_right,
-    read_back,
-    within_limits,
-)
+from tactbench.core.conformance.press import REAL_N, WHY, slow_ramp, tiny_scene
+from tactbench.core.conformance.streams import FORCE_SHARE, carried_out, force_is, good, joined, pressing_force
 from tactbench.core.errors import TactbenchError
-from tactbench.core.plugins.emulators import running
-from tactbench.core.plugins.rig_files import load_rig_file
-from tactbench.core.plugins.taking_part import rig_context
+from tactbench.core.plugins.rigs import load_rig_file, rig_context
 from tactbench.core.samples import FloatArray, StreamData
 from tactbench.core.spec.rig import SensorDescriptor
 from tactbench.core.spec.rig_file import RigFile
 from tactbench.core.spec.sensor import Nuisances
+from tactbench.devices.conformance.driver import look_at, opened_on
 
-LARGEST_N = 1000.0
-"""No fingertip is pressed with more; a press of 10 N in gram-force reads 1020."""
-CLEAR = 0.5
-"""Correlation of a taxel with the force from which on its sign can be told."""
-FORCE_N = 1.0
-"""At the end of a press: a motor with friction still follows it, and no fingertip is harmed."""
 SECONDS, HOLD_S = 8.0, 1.0
 """A motor that lifts off for the unloaded hold takes some of them to be back on the skin."""
 END, PEAK = 16, 99
 """The force at the end is the mean of the last sixteenth of its rows, the largest their 99th percentile: of 8 s those
 are half a second, and what is longer than a tenth: noise is no overshoot."""
 LARGEST = 1.5
-"""Times `FORCE_N`, which the force may not exceed (assumed: a loop that overshoots by half is badly tuned)."""
+"""Times `REAL_N`, which the force may not exceed (assumed: a loop that overshoots by half is badly tuned)."""
 NOISY = 3.0
 """By which factor a real unit's noise may differ from the stated one (assumed: units and rooms differ by two)."""
-
-
-@lru_cache(maxsize=2)
-def _read(subject: Subject) -> Recorded:
-    if subject.recording is None:
-        skip("no recording is given: `--recording FILE` reads one")
-    with code_of(str(subject.recording), subject):
-        return read_back(subject.recording)
-
-
-@check("sensor", mode="recording")
-def recording_fits_the_spec(subject: Subject) -> None:
-    """A real unit shows another rate, range, sign or force than is stated where the spec or the decoding is wrong.
-
-    Give a healthy recording of this sensor (`tactbench inspect FILE`). Correct rate_hz, lower, upper and sign of the
-    spec, the type and byte order of the decoding, how the device is set up, or the force's unit in the mapping (1 gf is
-    0.00981 N).
-    """
-    meta, data, wrong = _read(subject)
-    spec = subject.registry.sensors[subject.name].spec
-    if meta.sensor.name != spec.name:
-        fail("meta.sensor.name", f"it is of {meta.sensor.name!r}")
-    strange = {one.name for one in meta.sensor.channels()} - {one.name for one in spec.channels()}
-    if strange:
-        fail("meta.sensor.streams", f"the sensor has no channel {min(strange)}")
-    if wrong:
-        fail("file", wrong)
-    pressing = None
-    if any(channel.kind == "force" for one in meta.reference if one.name in data for channel in one.channels):
-        pressing, force_n = pressing_force(data, meta.reference)
-        if np.nanmax(np.abs(force_n)) > LARGEST_N:
-            fail("reference", f"it reaches {np.nanmax(np.abs(force_n)):.4g} N: are these gram-force?")
-    for stated in spec.streams:
-        if stated.name not in data:
-            continue
-        stream, limits = data[stated.name], {one.name: one for one in stated.channels}
-        own_rate = stated.name in meta.own_rates_hz or (meta.simulated and meta.emulation is None)
-        rate_is_right(f"spec.streams[{stated.name}]", stream, None if own_rate else stated.rate_hz)
-        for column, channel in enumerate(stream.spec.channels):
-            sign, values = limits[channel.name].sign, good(stream)[:, column]
-            where = f"spec.streams[{stated.name}].channels[{channel.name}]"
-            within_limits(where, limits[channel.name], values)
-            if channel.kind != "taxel" or stream.t_ns is None or pressing is None or pressing.t_ns is None:
-                continue
-            felt = np.interp(stream.t_ns, pressing.t_ns, force_n)
-            there = np.isfinite(values) & np.isfinite(felt)
-            if there.any() and np.ptp(values[there]) > 0 and np.ptp(felt[there]) > 0:
-                likeness = float(np.corrcoef(values[there], felt[there])[0, 1])
-                if likeness * sign < -CLEAR:
-                    fail(f"{where}.sign", f"{sign:+d} is stated, its correlation with the force is {likeness:+.2f}")
-
-
-@check("sensor", mode="recording", needs="recording-fits-the-spec")
-def recording_is_of_a_real_unit(subject: Subject) -> None:
-    """Only a real unit shows what a sensor is; a simulation shows what somebody believes it to be.
-
-    Record a real unit, or import recordings of one.
-    """
-    if _read(subject).meta.simulated:
-        skip("it is simulated, or its devices are emulated")
 
 
 def _file(subject: Subject) -> RigFile:
@@ -127,11 +46,8 @@ def real_device_answers(subject: Subject) -> None:
 
     Let nothing touch it. Look at `tactbench doctor --rig-file FILE` for ports, permissions and what the device says.
     """
-    from tactbench.core.plugins.rig_devices import options_of
-    from tactbench.links.address import open_link
-
-    descriptor, file = subject.descriptor, _file(subject)
-    if descriptor.driver is None:
+    file = _file(subject)
+    if subject.descriptor.driver is None:
         skip("it names no driver")
     named = {getattr(one, "device", name): one for name, one in file.entries().items()}
     if subject.name not in named:
@@ -139,7 +55,7 @@ def real_device_answers(subject: Subject) -> None:
     entry = named[subject.name]
     if entry.emulated:
         skip("the rig file says that the device is emulated")
-    opened = opened_on(subject, partial(open_link, entry.link), options_of(descriptor, entry), time.monotonic_ns)
+    opened = opened_on(subject, entry, time.monotonic_ns)
     try:
         with code_of("driver.identify", subject):
             opened.driver.identify()
@@ -172,8 +88,8 @@ def _built(subject: Subject) -> tuple[Any, SensorDescriptor, Any]:
     file = _file(subject)
     if file.rig != subject.name:
         skip(f"the rig file is for the rig {file.rig}")
-    context = rig_context(subject.registry, rig_file=running(file), operator=subject.operator)
-    scene = tiny_scene(profile=slow_ramp(FORCE_N, SECONDS, HOLD_S))
+    context = rig_context(subject.registry, rig_file=file, operator=subject.operator)
+    scene = tiny_scene(profile=slow_ramp(REAL_N, SECONDS, HOLD_S))
     return subject.code("where")(context), subject.registry.sensors[next(iter(file.sensors))], scene
 
 
@@ -192,10 +108,10 @@ def real_rig_presses(subject: Subject) -> None:
     if not hasattr(first[0], "stop"):
         return  # nothing in it moves by itself: a hand presses
     _, force_n = pressing_force(made.came, made.meta.reference)
-    force_is("reference", float(force_n[-max(1, len(force_n) // END) :].mean()), FORCE_N)
+    force_is("reference", float(force_n[-max(1, len(force_n) // END) :].mean()), REAL_N)
     largest = float(np.percentile(force_n, PEAK))
-    if largest > LARGEST * FORCE_N:
-        fail("reference", f"the force rises to {largest:.3g} N in a press to {FORCE_N:g} N")
+    if largest > LARGEST * REAL_N:
+        fail("reference", f"the force rises to {largest:.3g} N in a press to {REAL_N:g} N")
     with code_of("where", subject), rig.open(sensor, scene, seed=2) as acquisition:
         every = (*acquisition.streams, *acquisition.reference)
 
@@ -206,7 +122,7 @@ def real_rig_presses(subject: Subject) -> None:
         try:
             for block in came:
                 rising.append(block)
-                if np.abs(force(block)).max(initial=0.0) > FORCE_N / 2:
+                if np.abs(force(block)).max(initial=0.0) > REAL_N / 2:
                     break
         except KeyboardInterrupt:
             acquisition.stop("stopped by hand")
@@ -217,7 +133,7 @@ def real_rig_presses(subject: Subject) -> None:
     held = force(*rising)
     off = np.subtract(_zeros(acquisition.drawn), _zeros(made.meta.drawn))
     off_n = max([held[: max(1, len(held) // 5)].mean(), *off], key=abs)
-    if abs(off_n) > FORCE_SHARE * FORCE_N:
+    if abs(off_n) > FORCE_SHARE * REAL_N:
         fail("open", f"the force or its zero is {off_n:.3g} N off when the next press begins, before anything touches")
-    if message or (len(left) and abs(left.mean()) > FORCE_SHARE * FORCE_N):
+    if message or (len(left) and abs(left.mean()) > FORCE_SHARE * REAL_N):
         fail("stop", message or f"{left.mean():.3g} N are left after it has returned")

@@ -13,14 +13,14 @@ import numpy as np
 from tactbench.core.conformance.check import CheckFailed, Subject, check, code_of, fail, skip
 from tactbench.core.conformance.streams import BAD, good, joined, likely, limits_of, marks_of, times_are_right
 from tactbench.core.errors import LinkError, RigError, UsageError
-from tactbench.core.plugins.rig_devices import emulated_device, options_of
 from tactbench.core.samples import Block, IntArray, Quality, StreamData
 from tactbench.core.spec.rig import DeviceDescriptor
 from tactbench.core.spec.rig_file import EMULATED, DeviceEntry
 from tactbench.core.spec.sensor import ChannelSpec
-from tactbench.devices.driver import Driver, DriverSettings
+from tactbench.devices.driver import Driver
 from tactbench.devices.emulation.emulated_devices import EmulatedDevices
 from tactbench.devices.emulator import Senses
+from tactbench.devices.rig_devices import emulated_device, open_driver
 from tactbench.links.link import Clock, Link
 
 READ_S, WAIT_S, SHORT_S = 1.0, 0.1, 0.005
@@ -106,12 +106,10 @@ class Opened(NamedTuple):
         return joined("driver.read", self.driver.streams, blocks)
 
 
-def opened_on(subject: Subject, open_link: Callable[[], Link], options: dict[str, Any], clock: Clock) -> Opened:
-    """Open a driver."""
-    streams = () if isinstance(subject.descriptor, DeviceDescriptor) else subject.descriptor.spec.streams
+def opened_on(subject: Subject, entry: DeviceEntry, clock: Clock, link: Callable[[], Link] | None = None) -> Opened:
+    """Open a driver; see :func:`~tactbench.devices.rig_devices.open_driver`."""
     with code_of("driver", subject):
-        driver: Driver = subject.code("driver")(DriverSettings(open_link, streams, options, clock))
-    return Opened(subject, driver, clock)
+        return Opened(subject, open_driver(subject.descriptor, entry, clock, link), clock)
 
 
 @contextmanager
@@ -139,8 +137,8 @@ def emulated(
         device = replace(device, emulator=_Adapter(device.emulator, change))
     devices = EmulatedDevices({name: device})
     devices.advance(round(BEFORE_S * 1e9))
-    given = {**options_of(subject.descriptor, entry), **options}
-    opened = opened_on(subject, devices.opener(name), given, devices.clock)
+    entry = entry.model_copy(update={"options": options})
+    opened = opened_on(subject, entry, devices.clock, devices.opener(name))
     try:
         if started:
             opened.start()

@@ -12,12 +12,12 @@ from tactbench.core.cli.options import FiniteRange, format_option
 from tactbench.core.tables.text import json_text
 
 if TYPE_CHECKING:
-    from tactbench.core.cli.device_check import DeviceCheck
-    from tactbench.core.cli.host_devices import HostItem
-    from tactbench.core.plugins.checks import RigCheck
+    from tactbench.core.plugins.interfaces import RigCheck
+    from tactbench.devices.cli.device_check import DeviceCheck
+    from tactbench.devices.cli.host_devices import HostItem
 
 
-@click.command(name="doctor")
+@click.command(name="doctor", short_help="Check ports, permissions, extras and clocks, and a rig's devices.")
 @click.option("--rig-file", type=click.Path(path_type=Path), metavar="FILE",
               help="Also check what the rig would do by this file, then open and read its devices.")  # fmt: skip
 @click.option("--seconds", type=FiniteRange(min=0, max=600), default=3.0, show_default=True, metavar="T",
@@ -34,12 +34,12 @@ def command(ctx: click.Context, rig_file: Path | None, seconds: float, shape: st
     import time
     from dataclasses import asdict
 
-    from tactbench.core.cli.device_check import check_devices
-    from tactbench.core.cli.host_devices import look_at_host
     from tactbench.core.cli.screen import remark
     from tactbench.core.plugins.registry import load_object, load_registry
-    from tactbench.core.plugins.rig_devices import descriptor_of
-    from tactbench.core.plugins.rig_files import load_rig_file
+    from tactbench.core.plugins.rigs import load_rig_file
+    from tactbench.devices.cli.device_check import check_devices
+    from tactbench.devices.cli.host_devices import look_at_host
+    from tactbench.devices.rig_devices import descriptor_of
 
     registry = load_registry()
     rig = None if rig_file is None else load_rig_file(rig_file, registry)

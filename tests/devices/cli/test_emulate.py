@@ -9,13 +9,12 @@ from importlib.metadata import EntryPoint
 import pytest
 
 from tactbench.core.cli import main
-from tactbench.core.plugins.emulators import EmulatorControl
 from tactbench.core.plugins.registry import load_registry
 from tactbench.core.spec.quantity import assumed
 from tactbench.core.spec.yaml_file import load_yaml
 from tactbench.plugin import ForceRamp, Scene
-from tactbench.plugin.devices import EmulatedDevices, RigFile, drivers_of
-from tests.core.plugins import talking
+from tactbench.plugin.devices import EmulatedDevices, RigFile, drivers_of, physics_of
+from tests.devices import talking
 
 POINTS = [
     EntryPoint("talking", talking.HERE, "tactbench"),
@@ -63,19 +62,21 @@ def test_the_rig_file_printed_opens_devices_that_are_pressed_when_the_recording_
             not_yet.wait(0.02)
         (tmp_path / "rig.yaml").write_text(printed.getvalue())
         file = load_yaml(tmp_path / "rig.yaml", RigFile)
-        control = EmulatorControl(file.emulation.control)
+        physics = physics_of(file, registry)
         try:
-            with drivers_of(file, registry, "pad", {}, lambda: 0, ["pad"])["pad"] as pad:
+            with (
+                drivers_of(file, registry, "pad", {}, lambda: 0, ["pad"])["pad"] as pad,
+                physics.open(registry.sensors["pad"], SCENE, seed=1) as said,
+            ):
                 pad.start()
-                said = control.prepare("pad", SCENE, 1)
                 while pad.read(0.0):
                     pass
                 rest.extend(pad.read(5.0)[0].data for _ in range(20))
-                control.begin()
+                physics.begin()
                 while pad.read(0.0):
                     pass
                 pressed.extend(pad.read(5.0)[0].data for _ in range(60))
-            assert said["plan"]
+            assert said.plan
         finally:
             over.set()
 

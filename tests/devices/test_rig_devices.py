@@ -19,7 +19,7 @@ from tactbench.plugin.devices import (
     drivers_of,
     emulators_of,
 )
-from tests.core.plugins import talking
+from tests.devices import talking
 
 REGISTRY = load_registry([EntryPoint("talking", talking.HERE, "tactbench")])
 

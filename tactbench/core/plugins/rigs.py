@@ -1,0 +1,102 @@
+"""Rigs built from what is installed, the files that say which devices they have, and the effects that take part.
+
+The effects of this package are candidates for every scene. An effect of another package is a candidate only where the
+sensor's descriptor or the scene names it: what is merely installed is not imported into a run, and stands in no key.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+from tactbench.core.errors import RigError, TactbenchError, error_text
+from tactbench.core.plugins.interfaces import Operator, ReplayRig, Rig, RigContext
+from tactbench.core.plugins.registry import Owned, Registry, load_object
+from tactbench.core.spec.rig import EffectDescriptor, SensorDescriptor
+from tactbench.core.spec.rig_file import RigFile
+from tactbench.core.spec.scene import Scene
+
+
+def load_rig_file(path: Path, registry: Registry) -> RigFile:
+    """Return the rig file at `path`, its own settings checked by its rig where that has a model of them.
+
+    Raises
+    ------
+    ConfigError
+        If it cannot be read, or says something unknown or wrong; the message names the line.
+    UnknownNameError
+        If no such rig is installed.
+    """
+    from tactbench.core.spec.yaml_file import load_yaml
+
+    file = load_yaml(path, RigFile)
+    where = registry.rigs[file.rig].file
+    if where is not None:
+        load_yaml(path, load_object(where))
+    physics = file.emulation.physics or registry.first_rig("simulated")
+    return file.model_copy(update={"emulation": file.emulation.model_copy(update={"physics": physics})})
+
+
+def rig_of(
+    name: str,
+    registry: Registry,
+    recordings: Path | None = None,
+    rig_file: RigFile | None = None,
+    operator: Operator | None = None,
+) -> Rig | ReplayRig:
+    """Build the rig called `name`.
+
+    Raises
+    ------
+    UsageError
+        If the rig file is for another one.
+    RigError
+        If its own code fails, whatever that raises, or its devices cannot be emulated.
+    """
+    descriptor = registry.rigs[name]
+    if rig_file is not None:
+        rig_file.checked_for(name)
+    context = rig_context(registry, recordings=recordings, rig_file=rig_file, operator=operator)
+    with failing_as(f"The rig {name!r} could not be built"):
+        built: Rig | ReplayRig = load_object(descriptor.where)(context)
+    return built
+
+
+@contextmanager
+def failing_as(what: str) -> Iterator[None]:
+    """Raise RigError, whose message begins with `what`, in place of whatever a rig's own code raises."""
+    try:
+        yield
+    except TactbenchError:
+        raise
+    except (Exception, SystemExit) as error:
+        raise RigError(
+            f"{what}: {error_text(error)}.", hint="See `tactbench list plugins` for who brings it."
+        ) from error
+
+
+def taking_part(registry: Registry, sensor: SensorDescriptor, scene: Scene) -> list[Owned[EffectDescriptor]]:
+    """Return the effects that are candidates for a scene with a sensor, with their owners, sorted by name."""
+    named = effect_names(sensor, scene)
+    return [one for one in registry.effects.all_owned() if one.ours or one.descriptor.name in named]
+
+
+def effect_names(sensor: SensorDescriptor, scene: Scene) -> set[str]:
+    """Return the names of effects, and of groups of them, that the sensor's descriptor or the scene names.
+
+    A simulated rig considers those of its context's `named_effects` that are among them.
+    """
+    return {*sensor.effects, *(word.lstrip("+-") for word in scene.simulation.effects)}
+
+
+def rig_context(registry: Registry, **given: Any) -> RigContext:
+    """Return what a rig is built from: the registry's effects and indenters, and what else is `given`."""
+    owned = registry.effects.all_owned()
+    return RigContext(
+        effects=tuple(one.descriptor for one in owned if one.ours),
+        named_effects=tuple(one.descriptor for one in owned if not one.ours),
+        indenters=tuple(registry.indenters),
+        **given,
+    )

@@ -1,0 +1,1 @@
+"""Checks of drivers, on emulators and on real lines."""

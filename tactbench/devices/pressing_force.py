@@ -1,0 +1,136 @@
+"""The force sensor of a rig as it is recorded: which channel is pressed, and what it reads without load."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+from tactbench.core.errors import RigError, UsageError
+from tactbench.core.spec.recording import Scalar
+from tactbench.core.spec.rig_file import ForceEntry
+from tactbench.core.spec.sensor import ChannelSpec, StreamSpec
+
+if TYPE_CHECKING:
+    from tactbench.core.samples import Block, FloatArray
+
+LEAST_ROWS = 10
+"""From which a zero is taken."""
+STRETCHES = 30
+"""In which a zero is cut to see by how much their means scatter."""
+STRETCH_S = 0.02
+"""Noise of a force may be alike so long (assumed: a sample of 50 Hz that is held). No drift is told within 0.6 s."""
+MOST_BAD = 0.1
+"""Of the rows that a zero is taken from, the share that may be no numbers (assumed)."""
+_PRESSED = "normal"
+"""What the channel along which the sensor is pressed is called where it is not plain `fz`; tasks look for either."""
+
+
+class PressingForce:
+    """The force sensor of a rig as it is recorded: pressing makes the channel of the rig file's `entry` rise.
+
+    Attributes
+    ----------
+    streams
+        Of the force sensor, the pressing channel with sign 1, and called `normal` where it is not plain `fz`.
+    stream, column, sign
+        Where the pressing force is, and 1 or -1: pressing makes the device's channel rise or fall.
+
+    Raises
+    ------
+    UsageError
+        If there is no such channel.
+    """
+
+    def __init__(self, entry: ForceEntry, streams: tuple[StreamSpec, ...]) -> None:
+        self._entry, self.sign = entry, entry.sign
+        self._zeroed: dict[str, Scalar] = {}
+        self._plain = (entry.channel, entry.sign) == ("fz", 1)
+        names = {stream.name: [channel.name for channel in stream.channels] for stream in streams}
+        having = [stream for stream in streams if entry.channel in names[stream.name]]
+        if not having:
+            known = ", ".join(name for several in names.values() for name in several)
+            raise UsageError(
+                f"The force sensor {entry.device!r} has no channel {entry.channel!r}; it has {known}.",
+                hint="Correct `channel:` under `force:` in the rig file.",
+            )
+        stream = having[0]
+        self.stream, self.column = stream.name, names[stream.name].index(entry.channel)
+        channels = list(stream.channels)
+        update = {"sign": 1} if self._plain else {"sign": 1, "name": _PRESSED}
+        channels[self.column] = ChannelSpec.model_validate({**dict(channels[self.column]), **update})
+        pressed = stream.model_copy(update={"channels": tuple(channels)})
+        self.streams = tuple(pressed if one is stream else one for one in streams)
+
+    def zero(self, blocks: Iterable[Block]) -> dict[str, FloatArray]:
+        """Return what every channel reads without load, by stream: the mean of `blocks`, if nothing speaks against it.
+
+        Every channel of unit N is tested: the size of its mean, its spread, its drift (the last third's mean less the
+        first's). Rows that are no numbers or are marked are counted and left out.
+
+        Raises
+        ------
+        RigError
+            If the sensor is not at rest, or a tenth of its rows are no numbers, or fewer than ten come.
+        """
+        import numpy as np
+
+        entry, came = self._entry, list(blocks)
+        found = {stream.name: np.zeros(len(stream.channels)) for stream in self.streams}
+        for stream in self.streams if entry.zero_s > 0 else ():
+            own = [block for block in came if block.stream == stream.name]
+            rows = np.concatenate([np.empty((0, len(stream.channels))), *(block.data for block in own)])
+            marks = [block.quality if block.quality is not None else np.zeros(block.data.shape) for block in own]
+            good = np.isfinite(rows).all(axis=1) & ~np.concatenate([np.empty((0, rows.shape[1])), *marks]).any(axis=1)
+            counted = f"{len(rows)} rows in {entry.zero_s:g} s, {int((~good).sum())} of them no numbers or marked"
+            if good.sum() < LEAST_ROWS or good.mean() < 1 - MOST_BAD:
+                raise RigError(
+                    f"The force has no zero: {counted}.", hint="Look at the force sensor: `tactbench doctor` reads it."
+                )
+            rows = rows[good]
+            forces = [place for place, channel in enumerate(stream.channels) if channel.unit == "N"]
+            wrong = [text for place in forces for text in self._at_rest(stream.channels[place].name, rows[:, place])]
+            if wrong:
+                raise RigError(
+                    f"The force sensor is not at rest, and its zero is refused: {'; '.join(wrong)} ({counted}).",
+                    hint="Take hands and loads off and start again; else bias the sensor, or state its range_n, "
+                    "noise_n and largest_zero_n under `force:`.",
+                )
+            found[stream.name] = rows.mean(axis=0)
+            self._zeroed[f"zero rows of {stream.name}"] = counted
+        return found
+
+    def _at_rest(self, name: str, values: FloatArray) -> Iterator[str]:
+        """Yield what is wrong with the readings of one channel without load."""
+        import numpy as np
+
+        entry, third = self._entry, len(values) // 3
+        found = [
+            ("mean", float(values.mean()), entry.largest_zero_n or 0.1 * entry.range_n),
+            ("spread", float(values.std()), 2 * entry.noise_n if entry.noise_n else 0.05 * entry.range_n),
+        ]
+        if entry.zero_s >= STRETCHES * STRETCH_S and len(values) >= STRETCHES:
+            drift = float(values[-third:].mean() - values[:third].mean())
+            # Means of stretches scatter by noise that is held or filtered, too; neighbours differ little by a drift.
+            means = values[: len(values) // STRETCHES * STRETCHES].reshape(STRETCHES, -1).mean(axis=1)
+            deviation = float(np.sqrt(np.mean(np.diff(means) ** 2) / 2 * 6 / STRETCHES))
+            found.append(("drift", drift, max(0.01 * entry.range_n, 5 * deviation)))  # one zero in ten thousand
+        for what, value, most in found:
+            if abs(value) > most:
+                yield f"{name} has a {what} of {value:.3g} N, allowed are {most:.3g} N"
+
+    def about(self, zero: Mapping[str, FloatArray]) -> dict[str, Scalar]:
+        """Return what a recording says of the mounting and of the `zero` taken off, by stream."""
+        said = {f"zero of {name}": ", ".join(f"{value:.6g}" for value in values) for name, values in zero.items()}
+        if not self._plain:
+            said["normal force"] = f"{'-' if self.sign < 0 else ''}{self._entry.channel} of {self._entry.device}"
+        return {**said, **self._zeroed}
+
+    def turned(self, block: Block, zero: Mapping[str, FloatArray]) -> Block:
+        """Return a block with forces from the unloaded sensor's `zero`, by stream, and positive when pressing."""
+        if block.stream not in zero:
+            return block
+        data = block.data - zero[block.stream]
+        if block.stream == self.stream:
+            data[:, self.column] *= self.sign
+        return replace(block, data=data)
