@@ -22,8 +22,8 @@ from tactbench.core.cli.config import default_matrix
 from tactbench.core.cli.results import opened, shown_rows, table_of
 from tactbench.core.cli.threads import keep_threads
 from tactbench.core.errors import NotApplicable, UnknownNameError, UsageError
-from tactbench.core.evaluation.cell import PLAIN, TaskData
-from tactbench.core.evaluation.cell import load_task as folds_of
+from tactbench.core.evaluation.folds import PLAIN, TaskData
+from tactbench.core.evaluation.folds import load_task as folds_of
 from tactbench.core.evaluation.metrics import metric_called
 from tactbench.core.evaluation.protocols import is_probe
 from tactbench.core.leaderboard.formats import records, write_tables

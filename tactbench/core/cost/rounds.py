@@ -14,10 +14,10 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from tactbench.core.evaluation.cell import load_task
 from tactbench.core.evaluation.dataset import Dataset
 from tactbench.core.evaluation.delay import features_s, single_row_latency_s, single_row_preparation_s, stated_delay_ms
 from tactbench.core.evaluation.fitting import answers, builder, features_of, fit, select
+from tactbench.core.evaluation.folds import load_task
 from tactbench.core.evaluation.metrics import Metric, metric_called
 from tactbench.core.evaluation.sets import prepared
 from tactbench.core.evaluation.summaries import without_windows

@@ -1,8 +1,7 @@
-"""One cell: from recordings to folds of X and y, fitted models, their answers, and a score.
+"""One cell: its score, and what is known of it, from recordings and an estimator.
 
 :func:`load_task` makes the folds, :func:`evaluate` does the rest for any object with ``fit`` and ``predict``;
-:func:`evaluate_cell` calls both for a cell of the matrix. Regression, classification and events differ in two places
-alone: in what is scored of a fold (:func:`_answer`), and in what stands beside the score (:func:`_result`).
+:func:`evaluate_cell` calls both for a cell of the matrix.
 """
 
 from __future__ import annotations
@@ -10,15 +9,15 @@ from __future__ import annotations
 import copy
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
-from tactbench.core.errors import DataError, NotApplicable, PluginContractError
-from tactbench.core.evaluation.dataset import LARGEST, Dataset, load_dataset
+from tactbench.core.errors import DataError, PluginContractError
+from tactbench.core.evaluation.answers import AnsweredFold, Configured, FittedFold, answered_fold, fitted_fold
+from tactbench.core.evaluation.dataset import LARGEST, Dataset
 from tactbench.core.evaluation.delay import (
     NO_LINK,
     NO_RATE,
@@ -30,46 +29,24 @@ from tactbench.core.evaluation.delay import (
     stated_delay_ms,
     tail_ms,
 )
-from tactbench.core.evaluation.event_answers import Detected, EventRules, state_figures
-from tactbench.core.evaluation.fitting import (
-    Build,
-    Choice,
-    answers,
-    asked,
-    builder,
-    features_of,
-    fit,
-    one_model_a_component,
-    select,
-    voted,
-)
-from tactbench.core.evaluation.frames import band_limit, clocked, framed
+from tactbench.core.evaluation.event_answers import EventRules, state_figures
+from tactbench.core.evaluation.fitting import builder, features_of, one_model_a_component
+from tactbench.core.evaluation.folds import PLAIN, TaskData, load_task
+from tactbench.core.evaluation.frames import band_limit, clocked
 from tactbench.core.evaluation.interval import score_interval
 from tactbench.core.evaluation.leaks import copied_channels, leak_stamps
 from tactbench.core.evaluation.metrics import METRICS, Metric, class_f1, confusion, metric_called, vector_details
-from tactbench.core.evaluation.protocols import ProtocolSpec, protocol_called
 from tactbench.core.evaluation.reference_floor import beyond_floor, reference_floor, true_force
 from tactbench.core.evaluation.replicate_sums import recordings_right, replicates, summed
 from tactbench.core.evaluation.result import Result, Sizes, Times
-from tactbench.core.evaluation.sets import asked_for, prepared, tare_s, tared
-from tactbench.core.evaluation.splits import (
-    SHUFFLED_STAMP,
-    SHUFFLED_WHOLE_STAMP,
-    Assignment,
-    choose_split,
-    make_splits,
-    over_rows,
-    used_rows,
-    with_validation,
-    without_part,
-)
-from tactbench.core.evaluation.summaries import summarised, without_windows
+from tactbench.core.evaluation.sets import tare_s
+from tactbench.core.evaluation.splits import SHUFFLED_STAMP, SHUFFLED_WHOLE_STAMP, over_rows, used_rows, without_part
+from tactbench.core.evaluation.summaries import without_windows
 from tactbench.core.plugins.interfaces import Estimator
 from tactbench.core.recording.completeness import INCOMPLETE
-from tactbench.core.samples import Answers, FloatArray, Fold, IntArray, Part
+from tactbench.core.samples import Answers
 from tactbench.core.spec.recording import RecordingMeta
 from tactbench.core.spec.rig import EstimatorDescriptor
-from tactbench.core.spec.scene import Role
 from tactbench.core.spec.task import TaskSpec, VectorTarget
 from tactbench.core.thread_limit import thread_limit
 
@@ -116,172 +93,6 @@ def evaluate_cell(context: CellContext, recordings: Sequence[Path] | Dataset) ->
     )  # fmt: skip
 
 
-# --- Recordings to folds ----------------------------------------------------------------------------------------------
-
-PLAIN = EstimatorDescriptor.model_construct(name="estimator", title="", kinds=(), where="")
-"""What is taken of an estimator that is only an object: it looks at all features, and has nothing to be chosen."""
-
-
-@dataclass(frozen=True, repr=False)
-class TaskData:
-    """What a task asks of recordings under a protocol: rows, and which of them train and test.
-
-    `X` is tared, and neither scaled nor filtered: these are fitted on each fold's training rows.
-    """
-
-    task: TaskSpec
-    rules: ProtocolSpec
-    split: str
-    recorded: Dataset
-    """the recordings as they were read"""
-    data: Dataset
-    """the same as rows to be answered: samples, frames, or one row a recording"""
-    assignments: tuple[Assignment, ...]
-    """which rows of each recording are for what, fold by fold"""
-    held_back: bool = False
-    """a share of the training groups is what thresholds are chosen on: no recording has the role validation"""
-
-    def __repr__(self) -> str:
-        counts = f"X {self.X.shape}, {len(self.assignments)} folds of {len(self.data.tables)} recordings"
-        return f"<TaskData {self.task.name} by {self.split}: {counts}>"
-
-    @property
-    def X(self) -> FloatArray:  # noqa: N802  (as in scikit-learn)
-        """Return (n, features) readings of the rows that the protocol looks at and that have a label."""
-        return self._joined([tared(table) if self.rules.tare else table.X for table in self.data.tables])
-
-    @property
-    def y(self) -> npt.NDArray[Any]:
-        """Return (n,) numbers or class indices, (n, components) of a vector."""
-        return self._joined([table.y for table in self.data.tables])
-
-    @property
-    def groups(self) -> npt.NDArray[Any]:
-        """Return (n,) labels that the split keeps apart; those of the session where it keeps no group apart."""
-        tables, name = self.data.tables, self.assignments[0].groups
-        return self._joined([table.groups[name] for table in tables])
-
-    @property
-    def feature_names(self) -> tuple[str, ...]:
-        """Return what the columns of `X` are called."""
-        return self.data.features
-
-    @property
-    def classes(self) -> tuple[Any, ...]:
-        """Return the labels that class indices in `y` stand for; nothing of a regression."""
-        return self.data.classes
-
-    @property
-    def folds(self) -> list[tuple[IntArray, IntArray]]:
-        """Return the rows of each fold that train and those that test: a `cv` for scikit-learn."""
-        return [
-            (np.flatnonzero(self._joined(one.train)), np.flatnonzero(self._joined(one.test)))
-            for one in self.assignments
-        ]
-
-    def _joined(self, columns: Sequence[npt.NDArray[Any]]) -> npt.NDArray[Any]:
-        there = [asked_for(table, self.rules) & table.labelled for table in self.data.tables]
-        return np.concatenate([column[mask] for column, mask in zip(columns, there, strict=True)])
-
-
-def load_task(
-    task: TaskSpec,
-    recordings: Sequence[Path] | Dataset,
-    protocol: str,
-    split: str | None = None,
-    *,
-    estimator: EstimatorDescriptor = PLAIN,
-    seed: int = 0,
-) -> TaskData:
-    """Return recordings as rows and folds.
-
-    Parameters
-    ----------
-    recordings
-        Files, or what was read of them already.
-    split
-        What is kept apart; None: the task's first that the recordings can serve.
-    estimator
-        Decides the features of frames, the gap between training and test where recordings are cut in time (its longest
-        window), and whether a threshold has to be chosen.
-    seed
-        Of split ``shuffled``.
-
-    Raises
-    ------
-    NotApplicable
-        If the estimator looks at the time and a recording states none: the order of its rows may be anybody's.
-    """
-    recorded = recordings if isinstance(recordings, Dataset) else load_dataset(task, recordings)
-    rules, estimator = protocol_called(protocol), without_windows(estimator, task)
-    split = choose_split(task, rules, recorded, split)
-    if rules.tare:
-        tare_s(recorded)  # refuses recordings of which some only can be tared
-    frames = task.answer_per == "frame"
-    data = framed(recorded, task, rules, estimator) if frames else summarised(recorded, task, rules)
-    assignments = make_splits(data, split, seed, max(estimator.window_grid), one_by_one=split in task.campaigns)
-    if not assignments:
-        raise DataError("No fold could be made of these recordings.", hint="Choose another split.")
-    held_back = task.kind == "events" and estimator.threshold is None and assignments[0].validation is None
-    if held_back:
-        assignments = [with_validation(one, data) for one in assignments]
-    if estimator.looks_at == "time" and any(meta.clock == "none" for meta in recorded.metas):
-        raise NotApplicable(
-            f"{estimator.name} looks at the time alone, which not all of these recordings state.",
-            hint="State the clock in the mapping.",
-        )
-    return TaskData(task, rules, split, recorded, data, tuple(assignments), held_back)
-
-
-# --- Folds to fitted models -------------------------------------------------------------------------------------------
-
-
-@dataclass(frozen=True)
-class Configured:
-    """An estimator, what is known of it, and how it is made."""
-
-    descriptor: EstimatorDescriptor
-    build: Build
-    params: Mapping[str, Any] = field(default_factory=dict)
-    """fixed by the user: they are not searched"""
-
-
-@dataclass(frozen=True)
-class FittedFold:
-    """A model, and the fold that it was fitted to."""
-
-    fold: Fold
-    model: Estimator
-    choice: Choice | None
-    """what was chosen on validation data; None: there was nothing to choose"""
-    k: int
-    """rows that the mean filter looks back"""
-    search_s: float
-    fit_s: float
-
-
-@dataclass(frozen=True)
-class AnsweredFold:
-    """What was answered in one fold, and what it took."""
-
-    name: str
-    choice: Choice | None
-    score: float
-    validation: float | None
-    """the score on validation data"""
-    sizes: tuple[int, int]
-    """training and test rows, or recordings, or events and alarms"""
-    untrained: tuple[Any, ...]
-    """classes that are tested and that no training row had"""
-    search_s: float
-    fit_s: float
-    predict_s: float
-    batch_rows: int
-    sets: Mapping[Role, Answers]
-    detected: tuple[Detected, ...] = ()
-    """test recordings of a task of events, all with the fold's threshold"""
-
-
 def evaluate(
     estimator: Estimator | Configured,
     data: TaskData,
@@ -309,117 +120,10 @@ def evaluate(
     answered: list[AnsweredFold] = []
     with thread_limit(threads):
         for number, assignment in enumerate(data.assignments):
-            fitted = _fit(estimator, data, assignment, metric, counts, clock)
-            answered.append(_answer(fitted, data, descriptor, metric, rules, number, clock))
+            fitted = fitted_fold(estimator, data, assignment, metric, counts, clock)
+            answered.append(answered_fold(fitted, data, descriptor, metric, rules, number, clock))
         times, delay_remarks = _times(fitted, answered, data, descriptor, clock, threads, latency=latency)
     return _result(answered, data, descriptor, metric, rules, times, delay_remarks, counts)
-
-
-def _fit(
-    estimator: Configured, data: TaskData, assignment: Assignment, metric: Metric, counts: Counter[str], clock: Clock
-) -> FittedFold:
-    """Choose on validation data, and fit."""
-    descriptor, made = estimator.descriptor, data.data
-    began = clock()
-    choice = select(descriptor, estimator.params, estimator.build, made, data.rules, assignment, metric, counts)
-    search_s = clock() - began
-    k = choice.k if choice else descriptor.window_grid[0]
-    fold = prepared(assignment, made, data.rules, k, counts)
-    for what, part in (("training", fold.train), ("test", fold.test)):
-        if len(part) == 0:
-            raise DataError(f"The {what} set of fold {fold.name!r} has no labelled row.", hint="Choose another split.")
-    values = np.unique(fold.train.y, axis=0)
-    if len(values) < 2:
-        only = made.classes[int(values[0])] if made.classes else values[0]
-        raise DataError(
-            f"All training labels of fold {fold.name!r} are {only}: there is nothing to learn.",
-            hint="Choose another split, or check the label column with `tactbench inspect`.",
-        )
-    if made.vote:
-        answerable = set(fold.test.recording.tolist())
-        for place, (table, mask) in enumerate(zip(made.tables, assignment.test, strict=True)):
-            if place not in answerable and (mask & table.labelled).any():
-                raise DataError(
-                    f"The protocol leaves no row of recording {table.meta.name!r}, which is to be answered as a whole.",
-                    hint="Use protocol `deployable-untared`, or leave the recording out.",
-                )
-    X = features_of(fold.train, descriptor)
-    model = estimator.build(choice.params if choice else {})
-    began = clock()
-    fit(model, X, fold.train.y, descriptor.name, counts)
-    return FittedFold(fold, model, choice, k, search_s, clock() - began)
-
-
-# --- Models to answers ------------------------------------------------------------------------------------------------
-
-
-def _answer(
-    fitted: FittedFold,
-    data: TaskData,
-    descriptor: EstimatorDescriptor,
-    metric: Metric,
-    rules: EventRules | None,
-    number: int,
-    clock: Clock,
-) -> AnsweredFold:
-    """Have a model answer its fold; validation and training answers are kept where the fold is the only one."""
-    fold, made = fitted.fold, data.data
-    n_classes = 0 if rules else len(made.classes)
-    X, shape = features_of(fold.test, descriptor), fold.test.y.shape[1:]
-    began = clock()
-    predicted = answers(fitted.model, X, descriptor.name, n_classes, shape)
-    predict_s = clock() - began
-    given: dict[Role, tuple[Part, npt.NDArray[Any]]] = {"test": (fold.test, predicted)}
-    if fold.validation is not None and len(fold.validation):
-        given["validation"] = fold.validation, asked(fitted.model, fold.validation, descriptor, n_classes)
-    alone = len(data.assignments) == 1
-    if alone and not made.classes:
-        given["train"] = fold.train, asked(fitted.model, fold.train, descriptor, 0)
-    detected: tuple[Detected, ...] = ()
-    if rules is None:
-        sets = {role: _rows(*one, made, number) for role, one in given.items()}
-    else:
-        scored = {role: rules.scored(*one, made) for role, one in given.items()}
-        threshold, bounds = rules.choose(scored.get("validation", []))
-        detected = tuple(Detected(one, threshold, bounds) for one in scored["test"])
-        sets = {
-            role: rules.items([(one, rules.alarms(one, threshold)) for one in several], made, number)
-            for role, several in scored.items()
-            if role == "test" or alone
-        }
-    kept: dict[Role, Answers] = sets if alone else {"test": sets["test"]}
-    scores = {role: metric.of(one.y_true, one.y_pred, len(made.classes)) for role, one in sets.items()}
-    untrained = np.setdiff1d(fold.test.y, fold.train.y).tolist() if made.classes else []
-    return AnsweredFold(
-        name=fold.name,
-        choice=fitted.choice,
-        score=scores["test"],
-        validation=fitted.choice.score if fitted.choice else scores.get("validation"),
-        sizes=(len(fold.train), len(sets["test"])),
-        untrained=tuple(made.classes[int(one)] for one in untrained),
-        search_s=fitted.search_s,
-        fit_s=fitted.fit_s,
-        predict_s=predict_s,
-        batch_rows=len(fold.test),
-        sets=kept,
-        detected=detected,
-    )
-
-
-def _rows(part: Part, predicted: npt.NDArray[Any], made: Dataset, number: int) -> Answers:
-    """Return the answers to rows, or to recordings what their rows' answers come to, with the reference force."""
-    if made.vote:
-        part, predicted = voted(part, predicted, len(made.classes))
-    force = np.full(len(part), np.nan)
-    for place in np.unique(part.recording):
-        table, mine = made.tables[place], part.recording == place
-        if table.force is not None:
-            force[mine] = table.force[np.searchsorted(table.row, part.row[mine])]
-    fold = np.full(len(part), number, dtype=np.int64)
-    return Answers(part.y, predicted, part.recording, part.row, fold, part.time_s, force)
-
-
-# --- Answers to a score -----------------------------------------------------------------------------------------------
 
 
 def _times(

@@ -107,7 +107,8 @@ def solve(job: Job, concurrency: int = 1, given: Estimator | None = None) -> Sol
             os.chdir(folder)  # recordings lie relative to it, wherever a constructor has gone
     import numpy as np
 
-    from tactbench.core.evaluation.cell import CellContext, evaluate, evaluate_cell, load_task
+    from tactbench.core.evaluation.cell import CellContext, evaluate, evaluate_cell
+    from tactbench.core.evaluation.folds import load_task
     from tactbench.core.evaluation.result import row_of
 
     began = time.perf_counter()

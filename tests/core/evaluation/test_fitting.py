@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 
 from tactbench.core.errors import DataError, PluginContractError
-from tactbench.core.evaluation.cell import evaluate, load_task
+from tactbench.core.evaluation.cell import evaluate
 from tactbench.core.evaluation.fitting import answers, fit
+from tactbench.core.evaluation.folds import load_task
 from tactbench.core.plugins.registry import installed
 
 from .made import evaluated, force_task, label_task, ramp, record, sessions, ticking

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 
 from tactbench.core.errors import DataError, NotApplicable
-from tactbench.core.evaluation.cell import load_task
 from tactbench.core.evaluation.fitting import features_of
+from tactbench.core.evaluation.folds import load_task
 from tactbench.core.evaluation.sets import prepared
 from tactbench.core.report.figures.group import Group, Sketch, class_name, with_unit
 from tactbench.core.report.figures.score_by_force import WINDOW_S, smoothed_force

@@ -1,0 +1,175 @@
+"""From folds to answers: models fitted to the training rows of each fold, and what they answer to its test rows.
+
+Regression, classification and events differ here in what is scored of a fold (:func:`answered_fold`).
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from tactbench.core.errors import DataError
+from tactbench.core.evaluation.dataset import Dataset
+from tactbench.core.evaluation.delay import Clock
+from tactbench.core.evaluation.event_answers import Detected, EventRules
+from tactbench.core.evaluation.fitting import Build, Choice, answers, asked, features_of, fit, select, voted
+from tactbench.core.evaluation.folds import TaskData
+from tactbench.core.evaluation.metrics import Metric
+from tactbench.core.evaluation.sets import prepared
+from tactbench.core.evaluation.splits import Assignment
+from tactbench.core.plugins.interfaces import Estimator
+from tactbench.core.samples import Answers, Fold, Part
+from tactbench.core.spec.rig import EstimatorDescriptor
+from tactbench.core.spec.scene import Role
+
+
+@dataclass(frozen=True)
+class Configured:
+    """An estimator, what is known of it, and how it is made."""
+
+    descriptor: EstimatorDescriptor
+    build: Build
+    params: Mapping[str, Any] = field(default_factory=dict)
+    """fixed by the user: they are not searched"""
+
+
+@dataclass(frozen=True)
+class FittedFold:
+    """A model, and the fold that it was fitted to."""
+
+    fold: Fold
+    model: Estimator
+    choice: Choice | None
+    """what was chosen on validation data; None: there was nothing to choose"""
+    k: int
+    """rows that the mean filter looks back"""
+    search_s: float
+    fit_s: float
+
+
+@dataclass(frozen=True)
+class AnsweredFold:
+    """What was answered in one fold, and what it took."""
+
+    name: str
+    choice: Choice | None
+    score: float
+    validation: float | None
+    """the score on validation data"""
+    sizes: tuple[int, int]
+    """training and test rows, or recordings, or events and alarms"""
+    untrained: tuple[Any, ...]
+    """classes that are tested and that no training row had"""
+    search_s: float
+    fit_s: float
+    predict_s: float
+    batch_rows: int
+    sets: Mapping[Role, Answers]
+    detected: tuple[Detected, ...] = ()
+    """test recordings of a task of events, all with the fold's threshold"""
+
+
+def fitted_fold(
+    estimator: Configured, data: TaskData, assignment: Assignment, metric: Metric, counts: Counter[str], clock: Clock
+) -> FittedFold:
+    """Choose on validation data, and fit."""
+    descriptor, made = estimator.descriptor, data.data
+    began = clock()
+    choice = select(descriptor, estimator.params, estimator.build, made, data.rules, assignment, metric, counts)
+    search_s = clock() - began
+    k = choice.k if choice else descriptor.window_grid[0]
+    fold = prepared(assignment, made, data.rules, k, counts)
+    for what, part in (("training", fold.train), ("test", fold.test)):
+        if len(part) == 0:
+            raise DataError(f"The {what} set of fold {fold.name!r} has no labelled row.", hint="Choose another split.")
+    values = np.unique(fold.train.y, axis=0)
+    if len(values) < 2:
+        only = made.classes[int(values[0])] if made.classes else values[0]
+        raise DataError(
+            f"All training labels of fold {fold.name!r} are {only}: there is nothing to learn.",
+            hint="Choose another split, or check the label column with `tactbench inspect`.",
+        )
+    if made.vote:
+        answerable = set(fold.test.recording.tolist())
+        for place, (table, mask) in enumerate(zip(made.tables, assignment.test, strict=True)):
+            if place not in answerable and (mask & table.labelled).any():
+                raise DataError(
+                    f"The protocol leaves no row of recording {table.meta.name!r}, which is to be answered as a whole.",
+                    hint="Use protocol `deployable-untared`, or leave the recording out.",
+                )
+    X = features_of(fold.train, descriptor)
+    model = estimator.build(choice.params if choice else {})
+    began = clock()
+    fit(model, X, fold.train.y, descriptor.name, counts)
+    return FittedFold(fold, model, choice, k, search_s, clock() - began)
+
+
+def answered_fold(
+    fitted: FittedFold,
+    data: TaskData,
+    descriptor: EstimatorDescriptor,
+    metric: Metric,
+    rules: EventRules | None,
+    number: int,
+    clock: Clock,
+) -> AnsweredFold:
+    """Have a model answer its fold; validation and training answers are kept where the fold is the only one."""
+    fold, made = fitted.fold, data.data
+    n_classes = 0 if rules else len(made.classes)
+    X, shape = features_of(fold.test, descriptor), fold.test.y.shape[1:]
+    began = clock()
+    predicted = answers(fitted.model, X, descriptor.name, n_classes, shape)
+    predict_s = clock() - began
+    given: dict[Role, tuple[Part, npt.NDArray[Any]]] = {"test": (fold.test, predicted)}
+    if fold.validation is not None and len(fold.validation):
+        given["validation"] = fold.validation, asked(fitted.model, fold.validation, descriptor, n_classes)
+    alone = len(data.assignments) == 1
+    if alone and not made.classes:
+        given["train"] = fold.train, asked(fitted.model, fold.train, descriptor, 0)
+    detected: tuple[Detected, ...] = ()
+    if rules is None:
+        sets = {role: _rows(*one, made, number) for role, one in given.items()}
+    else:
+        scored = {role: rules.scored(*one, made) for role, one in given.items()}
+        threshold, bounds = rules.choose(scored.get("validation", []))
+        detected = tuple(Detected(one, threshold, bounds) for one in scored["test"])
+        sets = {
+            role: rules.items([(one, rules.alarms(one, threshold)) for one in several], made, number)
+            for role, several in scored.items()
+            if role == "test" or alone
+        }
+    kept: dict[Role, Answers] = sets if alone else {"test": sets["test"]}
+    scores = {role: metric.of(one.y_true, one.y_pred, len(made.classes)) for role, one in sets.items()}
+    untrained = np.setdiff1d(fold.test.y, fold.train.y).tolist() if made.classes else []
+    return AnsweredFold(
+        name=fold.name,
+        choice=fitted.choice,
+        score=scores["test"],
+        validation=fitted.choice.score if fitted.choice else scores.get("validation"),
+        sizes=(len(fold.train), len(sets["test"])),
+        untrained=tuple(made.classes[int(one)] for one in untrained),
+        search_s=fitted.search_s,
+        fit_s=fitted.fit_s,
+        predict_s=predict_s,
+        batch_rows=len(fold.test),
+        sets=kept,
+        detected=detected,
+    )
+
+
+def _rows(part: Part, predicted: npt.NDArray[Any], made: Dataset, number: int) -> Answers:
+    """Return the answers to rows, or to recordings what their rows' answers come to, with the reference force."""
+    if made.vote:
+        part, predicted = voted(part, predicted, len(made.classes))
+    force = np.full(len(part), np.nan)
+    for place in np.unique(part.recording):
+        table, mine = made.tables[place], part.recording == place
+        if table.force is not None:
+            force[mine] = table.force[np.searchsorted(table.row, part.row[mine])]
+    fold = np.full(len(part), number, dtype=np.int64)
+    return Answers(part.y, predicted, part.recording, part.row, fold, part.time_s, force)
