@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from tactbench.core.cli.options import ABOVE_0, format_option
-from tactbench.core.cli.results import is_results, opened, shown_rows
+from tactbench.core.study.results import is_results, opened, shown_rows
 
 if TYPE_CHECKING:
     from tactbench.core.choosing.choosing import Choice
@@ -81,8 +81,8 @@ def _results(folder: Path | None, task: TaskSpec) -> tuple[list[Row], str]:
 
 def _shipped() -> tuple[list[Row], str]:
     """Return the rows that came with tactbench, and how they were made."""
-    from tactbench.core.cli.config import shipped_results
     from tactbench.core.matrix.summary import fill_baselines
+    from tactbench.core.study.shipped import shipped_results
 
     shipped = json.loads(shipped_results().read_text(encoding="utf-8"))
     rows: list[Row] = shipped["rows"]

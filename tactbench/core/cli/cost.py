@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING
 import click
 
 from tactbench.core.cli.options import RESULTS, format_option
-from tactbench.core.cli.threads import keep_threads
 
 if TYPE_CHECKING:
     from tactbench.core.cost.ladder import Ladder
@@ -37,7 +36,6 @@ def command(
     in counts against seconds, and with --task what its rungs do to the score. Files go into the folder cost of the
     result folder.
     """
-    keep_threads()
     from tactbench.core.errors import UsageError
 
     if twin:
@@ -55,14 +53,14 @@ def command(
     import time
 
     from tactbench.core.cli.grid import print_records
-    from tactbench.core.cli.progress import progress
-    from tactbench.core.cli.screen import remark
     from tactbench.core.cost.ladder import climb
     from tactbench.core.cost.ladder_file import write_ladder
     from tactbench.core.leaderboard.names import METRIC_NAMES
     from tactbench.core.matrix.store import Store
     from tactbench.core.plugins.declared import declared_in, with_declared
     from tactbench.core.plugins.registry import load_registry
+    from tactbench.core.study.progress import progress
+    from tactbench.core.tables.terminal import remark
 
     registry = with_declared(load_registry(), declared_in(recordings))
     matrix = _matrix(sensors[0], task, recordings, protocol, estimators)
@@ -94,8 +92,8 @@ def _matrix(
 
 def _print(ladder: Ladder) -> None:
     from tactbench.core.cli.grid import print_grid
-    from tactbench.core.cli.screen import remark
     from tactbench.core.report.costs import COLUMNS, RIGHT, line, title
+    from tactbench.core.tables.terminal import remark
 
     about = ladder.about
     lines = [line(row, about["unit"]) for row in ladder.rows]

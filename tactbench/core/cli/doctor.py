@@ -36,10 +36,10 @@ def command(ctx: click.Context, rig_file: Path | None, seconds: float, shape: st
 
     from tactbench.core.cli.device_check import check_devices
     from tactbench.core.cli.host_devices import look_at_host
-    from tactbench.core.cli.screen import remark
     from tactbench.core.plugins.registry import load_object, load_registry
     from tactbench.core.plugins.rig_devices import descriptor_of
     from tactbench.core.plugins.rig_files import load_rig_file
+    from tactbench.core.tables.terminal import remark
 
     registry = load_registry()
     rig = None if rig_file is None else load_rig_file(rig_file, registry)

@@ -9,8 +9,8 @@ from typing import Any
 
 import click
 
-from tactbench.core.cli.results import opened, shown_rows, table_of
 from tactbench.core.cli.tables import DEFAULT_FOLDER, TABLE_FORMATS, format_of, print_table, view_of
+from tactbench.core.study.results import opened, shown_rows, table_of
 
 _FILTERS = ("sensor", "task", "protocol", "split", "estimator")
 

@@ -7,9 +7,8 @@ from typing import TYPE_CHECKING
 
 import click
 
-from tactbench.core.cli.options import YES, options
+from tactbench.core.cli.options import SIMULATION, YES
 from tactbench.core.cli.scenes import PROFILE, indenter_of, profile_of, scene_of
-from tactbench.core.cli.simulation import SIMULATION, simulation_of
 from tactbench.core.tables.text import command_line
 
 if TYPE_CHECKING:
@@ -29,7 +28,7 @@ if TYPE_CHECKING:
 @click.option("--indenter", metavar="NAME[:D=X,...]",
               help="Indenter with dimensions: cap:radius=10, cylinder:radius=4,angle=90. Default: flat.")  # fmt: skip
 @PROFILE
-@options(*SIMULATION)
+@SIMULATION
 @click.option("--seed", type=click.IntRange(min=0), default=1, show_default=True, metavar="N", help="Random seed.")
 @click.option("--out", required=True, type=click.Path(path_type=Path), metavar="FILE", help="Output file (.h5).")
 @YES
@@ -52,13 +51,14 @@ def command(
     from contextlib import ExitStack, nullcontext
 
     from tactbench.core.acquisition import acquire
-    from tactbench.core.cli.operator import TerminalOperator
-    from tactbench.core.cli.screen import remark
     from tactbench.core.errors import TactbenchError
     from tactbench.core.plugins.registry import load_registry
     from tactbench.core.plugins.rig_files import load_rig_file
     from tactbench.core.provenance.gather import gather
     from tactbench.core.recording.image import require_free
+    from tactbench.core.study.operator import TerminalOperator
+    from tactbench.core.study.simulation import simulation_of
+    from tactbench.core.tables.terminal import remark
 
     registry = load_registry()
     descriptor = registry.sensors[sensor]
@@ -68,9 +68,7 @@ def command(
     )
     devices = load_rig_file(Path(rig_file), registry) if rig_file else None
     rig = rig or (devices.rig if devices else "twin")
-    simulation = simulation_of(registry, rig, [sensor], effects=effects, settings=settings)
-    if simulation is not None:
-        scene = scene.simulated_as(simulation)
+    scene = scene.simulated_as(simulation_of(registry, rig, [sensor], effects, settings))
     require_free(out)
     provenance = gather(registry)
     try:

@@ -13,10 +13,11 @@ from typing import Any, Literal
 
 from tactbench.core.errors import UnwritableError, UsageError
 from tactbench.core.matrix.keys import Keys, Sections
-from tactbench.core.matrix.plan import Cell, task_of
+from tactbench.core.matrix.plan import Cell
 from tactbench.core.matrix.plan_recordings import (
     RecordingPlan,
     RecordingRequest,
+    RecordingSource,
     RequestKey,
     parts_of,
     plan_parts,
@@ -182,7 +183,7 @@ class Run:
         for cell in cells:
             by_need.setdefault(request_key(cell), []).append(cell)
         self._record([request for need in by_need for request in self.plan[need].requests])
-        groups = [jobs for some in by_need.values() if (jobs := self._jobs(some))]
+        groups = [jobs for need, some in by_need.items() if (jobs := self._jobs(self.plan[need], some))]
         if not groups:
             return
         self.progress.begin("evaluating, timed" if alone else "evaluating", sum(map(len, groups)))
@@ -247,16 +248,16 @@ class Run:
 
     # Cells
 
-    def _jobs(self, cells: Iterable[Cell]) -> list[Job]:
+    def _jobs(self, source: RecordingSource, cells: Iterable[Cell]) -> list[Job]:
         """Return what is to be computed of `cells` that need the same recordings; the others have their row then."""
         jobs = []
+        digests: dict[Path, str] = {}
         for cell in cells:
-            task = task_of(cell.task_key, self.registry)
-            source = self.plan[request_key(cell)]
+            task = self.registry.tasks[cell.task].spec
             try:
                 if source.trouble is not None:
                     raise source.trouble
-                digests = {path: self.store.about(path)["digest"] for path in source.paths}
+                digests = digests or {path: self.store.about(path)["digest"] for path in source.paths}
                 key, sections = self.keys.of_cell(cell, digests)
             except Exception as error:
                 self._stopped(cell, task, error)

@@ -8,8 +8,8 @@ from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager, nullcontext
 from typing import Any, TextIO
 
-from tactbench.core.cli.screen import remark
 from tactbench.core.progress import Progress
+from tactbench.core.tables.terminal import remark
 
 
 class Display(Progress):
