@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import click
 
 from tactbench.core.cli.options import YES, format_option
+from tactbench.core.tables.terminal import remark
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -47,7 +48,6 @@ def command(
     from tactbench.core.plugins.rig_files import load_rig_file
     from tactbench.core.study.operator import TerminalOperator
     from tactbench.core.study.results import opened
-    from tactbench.core.tables.terminal import remark
     from tactbench.core.tables.text import json_text
 
     if listed:
@@ -124,7 +124,6 @@ def _keep(out: Path, checked: Subject, report: CheckReport) -> None:
     from tactbench.core.leaderboard.levels import identity_of, write_level
     from tactbench.core.matrix.store import writing
     from tactbench.core.provenance.gather import gather
-    from tactbench.core.tables.terminal import remark
 
     with writing(out):
         path = write_level(

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import click
 
 from tactbench.core.cli.options import RESULTS, format_option
+from tactbench.core.tables.terminal import remark
 
 if TYPE_CHECKING:
     from tactbench.core.cost.ladder import Ladder
@@ -60,7 +61,6 @@ def command(
     from tactbench.core.plugins.declared import declared_in, with_declared
     from tactbench.core.plugins.registry import load_registry
     from tactbench.core.study.progress import progress
-    from tactbench.core.tables.terminal import remark
 
     registry = with_declared(load_registry(), declared_in(recordings))
     matrix = _matrix(sensors[0], task, recordings, protocol, estimators)
@@ -93,7 +93,6 @@ def _matrix(
 def _print(ladder: Ladder) -> None:
     from tactbench.core.cli.grid import print_grid
     from tactbench.core.report.costs import COLUMNS, RIGHT, line, title
-    from tactbench.core.tables.terminal import remark
 
     about = ladder.about
     lines = [line(row, about["unit"]) for row in ladder.rows]

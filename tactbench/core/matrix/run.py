@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import importlib.util
 import os
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from itertools import chain
@@ -108,7 +108,6 @@ def run_matrix(
     root: Path | None = None,
     operator: Operator | None = None,
     progress: Progress | None = None,
-    shown: Callable[[Sequence[Row]], None] | None = None,
 ) -> Outcome:
     """Record and evaluate `matrix`, reusing what `store` already has.
 
@@ -129,8 +128,6 @@ def run_matrix(
         Who mounts caps and presses, at a rig of real devices.
     progress
         Receives what happens.
-    shown
-        Called with the rows of all complete replicates whenever one becomes complete, but for the last.
 
     Raises
     ------
@@ -152,7 +149,7 @@ def run_matrix(
         cells, plan = plan_parts(parts, registry, keys, store, choice.limits)
         provenance = gather(registry, seed=matrix.seed, engine=choice.name)
         store.begin(provenance)
-        run = Run(store, registry, keys, plan, choice, operator, progress, shown, cells)
+        run = Run(store, registry, keys, plan, choice, operator, progress, cells)
         run.carry_out([cell for cell in cells if cell.timed], alone=True)
         run.carry_out([cell for cell in cells if not cell.timed], alone=False)
     rows = tuple(run.rows[cell.name] for cell in cells)
@@ -171,7 +168,6 @@ class Run:
     choice: EngineChoice
     operator: Operator | None
     progress: Progress
-    shown: Callable[[Sequence[Row]], None] | None
     cells: Sequence[Cell]
     rows: dict[str, Row] = field(default_factory=dict)
     computed: int = 0
@@ -299,11 +295,11 @@ class Run:
             )
             self.computed += 1
         self.progress.advance(cell.name, stopped=self.rows[cell.name]["status"] in STOPPED)
-        if self.shown is None or any(one.name not in self.rows for one in self.cells if one.repeat == cell.repeat):
+        if any(one.name not in self.rows for one in self.cells if one.repeat == cell.repeat):
             return
         left = {one.repeat for one in self.cells if one.name not in self.rows}
         if left:
-            self.shown([self.rows[one.name] for one in self.cells if one.repeat not in left])
+            self.progress.show([self.rows[one.name] for one in self.cells if one.repeat not in left])
 
     def _stopped(
         self, cell: Cell, task: TaskSpec, why: BaseException, key: str = "", sections: Sections | None = None

@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Annotated, Any
 
-from pydantic import BeforeValidator, Field
+from pydantic import AfterValidator, BeforeValidator, Field
 
 from tactbench.core.errors import UsageError
-from tactbench.core.leaderboard.table import build_table
-from tactbench.core.leaderboard.view import grids
 from tactbench.core.matrix.run import EngineChoice, EngineName, Outcome, run_matrix
 from tactbench.core.matrix.store import Store
 from tactbench.core.plugins.registry import Registry, installed
@@ -21,21 +19,23 @@ from tactbench.core.spec.matrix import EstimatorChoice, MatrixSpec, TaskChoice
 from tactbench.core.spec.quantity import Frozen
 from tactbench.core.spec.rig_file import RigFile
 from tactbench.core.spec.yaml_file import load_yaml
-from tactbench.core.statistics.replicates import over_replicates
 from tactbench.core.study.operator import TerminalOperator
 from tactbench.core.study.progress import progress
 from tactbench.core.study.shipped import matrix_called
 from tactbench.core.study.simulation import simulation_of
-from tactbench.core.tables.terminal import console, plain_text
 
 
 def _each(given: Any) -> Any:
-    """Read one word or path as a list of one, nothing as none, and each word once."""
+    """Read one word or path as a list of one, nothing as none, and paths as words."""
     several = () if given is None else (given,) if isinstance(given, str | os.PathLike) else given
-    return tuple(dict.fromkeys(os.fspath(one) if isinstance(one, os.PathLike) else one for one in several))
+    if not isinstance(several, Iterable):
+        return given
+    return [os.fspath(one) if isinstance(one, os.PathLike) else one for one in several]
 
 
-Words = Annotated[tuple[str, ...], BeforeValidator(_each)]
+Words = Annotated[
+    tuple[str, ...], BeforeValidator(_each), AfterValidator(lambda words: tuple(dict.fromkeys(words)))
+]  # fmt: skip
 
 
 class Study(Frozen):
@@ -80,14 +80,8 @@ def carry_out(study: Study) -> tuple[Store, Outcome]:
             choice=EngineChoice(study.engine, study.jobs, Limits(matrix.timeout_s, matrix.memory_mb)),
             recordings=Path(matrix.recordings) if matrix.recordings else None, root=study.root, progress=display,
             operator=TerminalOperator(yes=study.yes, paused=display.paused) if matrix.rig_file else None,
-            shown=lambda rows: display.show(lambda: _so_far(rows)),
         )  # fmt: skip
     return store, outcome
-
-
-def _so_far(rows: Sequence[Mapping[str, Any]]) -> str:
-    """Return the table of the replicates that are finished, as wide as the terminal."""
-    return plain_text(grids(build_table(over_replicates(rows))), console().width)
 
 
 def matrix_of(study: Study, registry: Registry) -> MatrixSpec:
