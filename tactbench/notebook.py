@@ -17,11 +17,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
+from pydantic import ValidationError
 
-from tactbench.core.cli.config import default_matrix
-from tactbench.core.cli.results import opened, shown_rows, table_of
-from tactbench.core.cli.threads import keep_threads
-from tactbench.core.errors import NotApplicable, UnknownNameError, UsageError
+from tactbench.core.errors import NotApplicable, UnknownNameError, UsageError, complaint
 from tactbench.core.evaluation.folds import PLAIN, TaskData
 from tactbench.core.evaluation.folds import load_task as folds_of
 from tactbench.core.evaluation.metrics import metric_called
@@ -31,18 +29,20 @@ from tactbench.core.leaderboard.pairwise import comparisons, record_of, tables_o
 from tactbench.core.leaderboard.table import Table, build_table, over_all
 from tactbench.core.leaderboard.view import best, grids
 from tactbench.core.matrix.naming import cell_of
-from tactbench.core.matrix.plan import Cell, task_of
+from tactbench.core.matrix.plan import Cell
 from tactbench.core.matrix.solve import Job, read_dataset, solve, unanswered
 from tactbench.core.matrix.summary import fill_baselines
-from tactbench.core.plugins.declared import declared_in
+from tactbench.core.plugins.declared import declared_in, with_declared_of
 from tactbench.core.plugins.declared import with_declared as with_declared_tasks
 from tactbench.core.plugins.interfaces import Estimator
 from tactbench.core.plugins.registry import installed
 from tactbench.core.samples import Answers
 from tactbench.core.spec.declared_task import FILE
-from tactbench.core.spec.matrix import EstimatorChoice, MatrixSpec
 from tactbench.core.spec.task import TaskSpec, VectorTarget
 from tactbench.core.statistics.replicates import over_replicates
+from tactbench.core.study.results import opened, shown_rows, table_of
+from tactbench.core.study.shipped import matrix_called
+from tactbench.core.study.study import Study, carry_out
 from tactbench.core.tables.html import html
 from tactbench.core.tables.terminal import plain_text
 from tactbench.core.tables.text_table import TextTable
@@ -62,7 +62,7 @@ def _question(task: str | TaskSpec, recordings: Recordings, protocol: str) -> tu
     declared = ""
     if isinstance(task, str):
         owned = registry.tasks.owned(task)
-        task, declared = owned.descriptor.spec, owned.declared.model_dump_json() if owned.declared else ""
+        task, declared = owned.descriptor.spec, owned.declared
     if not isinstance(task, TaskSpec):
         raise UsageError(f"{task!r} is no task.", hint="Give its name, see `tactbench list tasks`, or a TaskSpec.")
     if protocol not in task.protocols and not is_probe(protocol):
@@ -158,7 +158,7 @@ class Results(Rows):
         Raises UnknownNameError if these rows have nothing of such a name, or the two are not of one kind.
         """
         found = comparisons(self.table.rows, a, b, task)
-        found = with_declared(found, self.table.rows, default_matrix().comparisons)
+        found = with_declared(found, self.table.rows, matrix_called().comparisons)
         return Rows(map(record_of, found), tables_of(found))
 
 
@@ -335,24 +335,15 @@ def run(
     afterwards in this process, on the recordings of the other rows, and their rows are in the returned table alone: a
     later run knows nothing of them. An option or a name that is wrong raises UsageError, and nothing is run.
     """
-    from tactbench.core.cli.run import carry_out
-
     names, objects = _named(estimator)
-
-    def trivial_beside_objects(matrix: MatrixSpec, folder: Path | None) -> MatrixSpec:
-        tasks = with_declared_tasks(installed(), declared_in(folder)).tasks
-        bars = [tuple(EstimatorChoice(name=name) for name in tasks[one.name].spec.baselines) for one in matrix.tasks]
-        alone = [one.model_copy(update={"estimators": bar}) for one, bar in zip(matrix.tasks, bars, strict=True)]
-        return matrix.model_copy(update={"tasks": tuple(alone)}) if objects and not names else matrix
-
-    asked = {"sensor": sensor, "task": task, "estimator": names, "recordings": _folder(recordings), "out": out}
-    before = set(os.environ)
-    keep_threads()  # of child processes; this one's libraries have read the environment already
+    asked = {"sensor": sensor, "task": task, "recordings": _folder(recordings), "out": out, **options}
+    if unknown := asked.keys() - Study.model_fields:
+        raise UnknownNameError("argument of `run`", min(unknown), Study.model_fields)
     try:
-        store, outcome = carry_out(**_as_read_by_the_verb(asked | options), changed=trivial_beside_objects)
-    finally:
-        for name in set(os.environ) - before:
-            del os.environ[name]
+        study = Study(estimator=names if names or objects else None, **asked)
+    except ValidationError as error:
+        raise UsageError(f"{complaint(error)}.", hint="See the options in `tactbench run --help`.") from error
+    store, outcome = carry_out(study)
     table = table_of(store, over_all(store, outcome.rows))
     write_tables(table.rows, store.folder, table.provenance, table)
     # Of the rows of a question a finished one counts, else a trivial answer's, whose reason is that of the recordings.
@@ -399,30 +390,11 @@ def _named(estimator: Estimators) -> tuple[list[str], dict[str, Estimator]]:
     return names, objects
 
 
-def _as_read_by_the_verb(options: Mapping[str, Any]) -> dict[str, Any]:
-    """Return options as ``tactbench run`` reads them from a command line; raises UsageError for one that is wrong."""
-    import click
-
-    from tactbench.core.cli.run import command
-
-    words = []
-    for name, given in options.items():
-        for one in given if isinstance(given, list | tuple) else [given]:
-            if one is True:
-                words.append(f"--{name.replace('_', '-')}")
-            elif one is not None and one is not False:
-                words.append(f"--{name.replace('_', '-')}={one}")
-    try:
-        with command.make_context("run", words) as context:
-            return {name: value for name, value in context.params.items() if name != "shape"}
-    except click.ClickException as error:
-        raise UsageError(error.format_message(), hint="See the options in `tactbench run --help`.") from error
-
-
 def _beside(row: Row, name: str, given: Estimator, folder: Path) -> Row:
     """Return the row of an object that answers what another row answered, from the same recordings."""
     cell = replace(cell_of(row), estimator=name, params=(), baseline=False)
-    task, paths = task_of(cell.task_key, installed()), [folder / one for one in row["recordings"]]
+    task = with_declared_of(installed(), [row]).tasks[cell.task].spec
+    paths = [folder / one for one in row["recordings"]]
     if not paths:  # no answer to this question was finished
         whose = "" if row["status"] == "skipped" else f"{row['estimator']}: "
         return unanswered(cell, task, NotApplicable(f"{whose}{row['reason']}"), simulated=row["simulated"])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+import os
 import sys
 from contextlib import AbstractContextManager
 from functools import lru_cache
@@ -10,6 +11,18 @@ from typing import Any
 
 VARIABLES = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 """What numerical libraries read when they are loaded."""
+
+
+def keep_threads() -> None:
+    """Keep numerical libraries at one thread, as the table's times state; before this process loads any.
+
+    Several threads would also sum in another order on another machine. Whoever sets these variables means it.
+    """
+    for name in VARIABLES:
+        os.environ.setdefault(name, "1")
+    # scikit-learn imports pandas where it is, pandas imports Arrow, and Arrow's allocator would start a thread of its
+    # own: no numbers are computed in it, but a process with threads cannot fork its cells.
+    os.environ.setdefault("JE_ARROW_MALLOC_CONF", "background_thread:false")
 
 
 def thread_limit(threads: int) -> AbstractContextManager[Any]:

@@ -13,6 +13,7 @@ import click
 
 import tactbench
 from tactbench.core.on_demand import contributed
+from tactbench.core.thread_limit import keep_threads
 
 # verb -> (module in this folder, one line of help). The help stands here so that `--help` imports no verb.
 VERBS = {
@@ -79,6 +80,7 @@ def main(arguments: list[str] | None = None) -> None:
     # A short-lived process that imports thousands of objects to keep: looking through them for garbage every 700 new
     # ones takes a sixth of the time of an import.
     gc.set_threshold(100_000, 50, 100)
+    keep_threads()
     try:
         code: Any = cli.main(args=arguments, prog_name="tactbench", standalone_mode=False)
         sys.stdout.flush()  # what is still held back may be refused as well

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import click
 
 from tactbench.core.cli.options import YES, format_option
-from tactbench.core.cli.threads import keep_threads
+from tactbench.core.tables.terminal import remark
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -40,16 +40,14 @@ def command(
     NAME is one of these, or a plugin: then all it brings is checked. Without --rig-file nothing is opened and nothing
     moves. Exit code 1 if a check failed, 2 if nothing is called NAME.
     """
-    keep_threads()
     from tactbench.core.cli.grid import print_fields
-    from tactbench.core.cli.operator import TerminalOperator
-    from tactbench.core.cli.results import opened
-    from tactbench.core.cli.screen import remark
     from tactbench.core.conformance.check import CHECKS, KINDS, Mode
     from tactbench.core.conformance.run import plugins_named, run_checks, subjects_named
     from tactbench.core.errors import UnknownNameError, UsageError
     from tactbench.core.plugins.registry import load_registry
     from tactbench.core.plugins.rigs import load_rig_file
+    from tactbench.core.study.operator import TerminalOperator
+    from tactbench.core.study.results import opened
     from tactbench.core.tables.text import json_text
 
     if listed:
@@ -123,7 +121,6 @@ def _ask(subjects: Sequence[Subject], file: RigFile, yes: bool) -> None:
 def _keep(out: Path, checked: Subject, report: CheckReport) -> None:
     """Write the level of a sensor into a result folder, with what tells which state of its package was checked."""
     import tactbench
-    from tactbench.core.cli.screen import remark
     from tactbench.core.leaderboard.levels import identity_of, write_level
     from tactbench.core.matrix.store import writing
     from tactbench.core.provenance.gather import gather

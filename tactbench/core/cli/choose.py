@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from tactbench.core.cli.options import ABOVE_0, format_option
-from tactbench.core.cli.results import is_results, opened, shown_rows
 
 if TYPE_CHECKING:
     from tactbench.core.choosing.choosing import Choice
@@ -61,19 +60,18 @@ def command(
 def _results(folder: Path | None, task: TaskSpec) -> tuple[list[Row], str]:
     """Return the rows of a task, and where they are from."""
     from tactbench.core.errors import UsageError
+    from tactbench.core.study.results import is_results, opened, shown_rows
 
-    if folder is not None or is_results(_DEFAULT):
-        store = opened(folder or _DEFAULT)
-        rows, origin = shown_rows(store), f"the results in {store.folder}"
-    else:
-        rows, origin = _shipped()
-    found = [row for row in rows if row["task"] == task.name]
+    own = folder or _DEFAULT
+    found: list[Row] = []
+    if folder is not None or is_results(own):
+        found, origin = [row for row in shown_rows(opened(own)) if row["task"] == task.name], f"the results in {own}"
     if not found and folder is None:
         rows, origin = _shipped()
         found = [row for row in rows if row["task"] == task.name]
     if not found:
         raise UsageError(
-            f"There are no results of the task {task.name} in {folder or _DEFAULT}.",
+            f"There are no results of the task {task.name} in {own}.",
             hint=f"Make some: `tactbench run --task {task.name} --protocol {_PREFERRED}`.",
         )
     return found, origin
@@ -81,8 +79,8 @@ def _results(folder: Path | None, task: TaskSpec) -> tuple[list[Row], str]:
 
 def _shipped() -> tuple[list[Row], str]:
     """Return the rows that came with tactbench, and how they were made."""
-    from tactbench.core.cli.config import shipped_results
     from tactbench.core.matrix.summary import fill_baselines
+    from tactbench.core.study.shipped import shipped_results
 
     shipped = json.loads(shipped_results().read_text(encoding="utf-8"))
     rows: list[Row] = shipped["rows"]

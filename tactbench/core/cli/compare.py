@@ -21,9 +21,7 @@ def command(first: str, second: str, out: Path, task: str | None, config: str | 
 
     Of two folders the same cells are compared: before and after a change, or two laboratories.
     """
-    from tactbench.core.cli.config import default_matrix, matrix_called
     from tactbench.core.cli.grid import print_records, print_tables
-    from tactbench.core.cli.results import is_results, opened, shown_rows
     from tactbench.core.errors import UsageError
     from tactbench.core.leaderboard.pairwise import (
         comparisons,
@@ -32,12 +30,14 @@ def command(first: str, second: str, out: Path, task: str | None, config: str | 
         tables_of,
         with_declared,
     )
+    from tactbench.core.study.results import is_results, opened, shown_rows
+    from tactbench.core.study.shipped import matrix_called
 
     if all(is_results(Path(one)) for one in (first, second)):
         before, after = (shown_rows(opened(Path(one))) for one in (first, second))
         found = folder_comparisons(before, after, first, second, task)
     else:
-        matrix = matrix_called(config) if config else default_matrix()
+        matrix = matrix_called(config)
         rows = shown_rows(opened(out))
         found = with_declared(comparisons(rows, first, second, task), rows, matrix.comparisons)
     if not found:

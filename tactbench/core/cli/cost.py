@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import click
 
 from tactbench.core.cli.options import RESULTS, format_option
-from tactbench.core.cli.threads import keep_threads
+from tactbench.core.tables.terminal import remark
 
 if TYPE_CHECKING:
     from tactbench.core.cost.ladder import Ladder
@@ -36,7 +36,6 @@ def command(
     in counts against seconds, and with --task what its rungs do to the score. Files go into the folder cost of the
     result folder.
     """
-    keep_threads()
     from tactbench.core.errors import UsageError
 
     if twin:
@@ -54,8 +53,6 @@ def command(
     import time
 
     from tactbench.core.cli.grid import print_records
-    from tactbench.core.cli.progress import progress
-    from tactbench.core.cli.screen import remark
     from tactbench.core.cost.ladder import climb
     from tactbench.core.cost.ladder_file import write_ladder
     from tactbench.core.leaderboard.names import METRIC_NAMES
@@ -63,6 +60,7 @@ def command(
     from tactbench.core.plugins.declared import declared_in, with_declared
     from tactbench.core.plugins.registry import load_registry
     from tactbench.core.spec.matrix import EstimatorChoice, MatrixSpec, TaskChoice
+    from tactbench.core.study.progress import progress
 
     registry = with_declared(load_registry(), declared_in(recordings))
     if protocol is None and recordings is not None:
@@ -86,7 +84,6 @@ def command(
 
 def _print(ladder: Ladder) -> None:
     from tactbench.core.cli.grid import print_grid
-    from tactbench.core.cli.screen import remark
     from tactbench.core.report.costs import COLUMNS, RIGHT, line, title
 
     about = ladder.about

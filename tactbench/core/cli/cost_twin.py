@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from tactbench.core.cli.grid import print_records
-from tactbench.core.cli.screen import remark
+from tactbench.core.tables.terminal import remark
 
 if TYPE_CHECKING:
     from tactbench.core.cost.precision import Skipped
@@ -31,13 +31,13 @@ def show_twin(sensors: tuple[str, ...], out: Path, shape: str, *, rounds: int, t
     task
         Answered with recordings of every rung but the dearest, by a quick estimator; None: no score.
     """
-    from tactbench.core.cli.config import default_matrix
-    from tactbench.core.cli.progress import progress
     from tactbench.core.cost.precision import measured
     from tactbench.core.cost.task_score import quick_estimator, task_score
     from tactbench.core.errors import UsageError
     from tactbench.core.plugins.registry import load_object, load_registry
     from tactbench.core.spec.scene import Simulation
+    from tactbench.core.study.progress import progress
+    from tactbench.core.study.shipped import matrix_called
 
     registry = load_registry()
     name = registry.first_rig("simulated")
@@ -45,7 +45,7 @@ def show_twin(sensors: tuple[str, ...], out: Path, shape: str, *, rounds: int, t
     if descriptor.work_precision is None:
         raise UsageError(f"The rig {name!r} does not say what its accuracy costs.", hint="Ask twin.")
     estimator = "" if task is None else quick_estimator(registry, task)
-    chosen = [registry.sensors[sensor] for sensor in sensors or default_matrix().sensors]
+    chosen = [registry.sensors[sensor] for sensor in sensors or matrix_called().sensors]
     points: list[CostPoint] = []
     skipped: list[Skipped] = []
     scores: dict[tuple[str, str], TaskScore] = {}

@@ -15,8 +15,8 @@ def command(shape: str) -> None:
 
     `tactbench run --dataset NAME` fetches what is missing, once. One that is not public in this form needs --root.
     """
-    from tactbench.core.cli.screen import remark
     from tactbench.core.recording.datasets import cache, datasets
+    from tactbench.core.tables.terminal import remark
 
     records = []
     for name, one in datasets().items():

@@ -6,26 +6,25 @@ from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
 from tactbench.core.cli.grid import print_records
-from tactbench.core.cli.progress import progress
-from tactbench.core.cli.screen import remark
 from tactbench.core.cost.task_score import quick_estimator, task_score
 from tactbench.core.errors import NotApplicable, UsageError
 from tactbench.core.plugins.registry import load_object
 from tactbench.core.plugins.rigs import rig_context
-from tactbench.core.spec.scene import Simulation
+from tactbench.core.study.progress import progress
+from tactbench.core.tables.terminal import remark
 
 if TYPE_CHECKING:
     from tactbench.core.cost.task_score import TaskScore
     from tactbench.core.plugins.interfaces import Explained, Explaining
     from tactbench.core.plugins.registry import Registry
     from tactbench.core.spec.rig import SensorDescriptor
-    from tactbench.core.spec.scene import Scene
+    from tactbench.core.spec.scene import Scene, Simulation
 
 _COLUMNS = ("included", "effect", "cost_ms", "change", "unit", "reason")
 
 
 def print_explanations(
-    registry: Registry, rig_name: str, sensor_name: str, task_name: str, simulation: Simulation | None, rounds: int,
+    registry: Registry, rig_name: str, sensor_name: str, task_name: str, simulation: Simulation, rounds: int,
     shape: str,
 ) -> None:  # fmt: skip
     """Print the plans of a task's scenes, one table for each different set of effects, and what they do to the score.
@@ -52,8 +51,7 @@ def print_explanations(
             f"Task {task_name!r} plans no scenes: only recordings made elsewhere can answer it.",
             hint="Choose another task; see `tactbench list tasks`.",
         )
-    if simulation:
-        scenes = [scene.simulated_as(simulation) for scene in scenes]
+    scenes = [scene.simulated_as(simulation) for scene in scenes]
     records: list[dict[str, Any]] = []
     for group in _alike(rig, sensor, scenes):
         about = {"sensor": sensor_name, "task": task_name, "scene": group[0].name, "scenes": len(group)}
@@ -67,8 +65,8 @@ def print_explanations(
         records += [{**about, **one} for one in found]
     scores: dict[str, TaskScore] = {}
     if rounds:
-        answerer, asked = quick_estimator(registry, task_name), simulation or Simulation()
-        variants = {"chosen": asked, "all": asked.model_copy(update={"effects": (*asked.effects, "+all")})}
+        answerer, everything = quick_estimator(registry, task_name), {"effects": (*simulation.effects, "+all")}
+        variants = {"chosen": simulation, "all": simulation.model_copy(update=everything)}
         with progress() as display:
             for name, variant in variants.items():
                 scores[name] = task_score(

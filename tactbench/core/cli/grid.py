@@ -43,20 +43,19 @@ def print_grid(
 
 def print_tables(tables: Sequence[TextTable], shape: str = "table") -> None:
     """Print tables on stdout as ``table``, ``md`` or ``latex``."""
-    from tactbench.core.cli.screen import console
     from tactbench.core.tables.latex import latex
     from tactbench.core.tables.markdown import markdown
     from tactbench.core.tables.terminal import show
 
     if shape == "table":
-        show(tables, console())
+        show(tables)
     else:
         click.echo((markdown if shape == "md" else latex)(tables), nl=False)
 
 
 def print_fields(fields: Sequence[tuple[str, str]]) -> None:
     """Print names and values on stdout, a field a line; long values are broken at spaces of the terminal's width."""
-    from tactbench.core.cli.screen import console
+    from tactbench.core.tables.terminal import console
 
     left, width = max((len(name) for name, _ in fields), default=0) + 2, console().width
     for name, value in fields:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, get_args
 import click
 
 from tactbench.core.cli.grid import field_text, print_fields
-from tactbench.core.cli.screen import remark
+from tactbench.core.tables.terminal import remark
 from tactbench.core.tables.text import command_line
 
 if TYPE_CHECKING:
@@ -77,8 +77,8 @@ def _sound(findings: Iterable[Finding]) -> bool:
 
 def _import_tables(mapping: Path, root: Path | None, out: Path | None, replace: bool) -> bool:
     """Return whether no recording has an error."""
-    from tactbench.core.cli.progress import progress
     from tactbench.core.recording.mapping import import_tables
+    from tactbench.core.study.progress import progress
 
     target = Path("recordings") / mapping.stem if out is None else out
     with progress() as display:

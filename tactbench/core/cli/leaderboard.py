@@ -9,8 +9,7 @@ from typing import Any
 
 import click
 
-from tactbench.core.cli.results import opened, shown_rows, table_of
-from tactbench.core.cli.tables import DEFAULT_FOLDER, TABLE_FORMATS, format_of, print_table, view_of
+from tactbench.core.cli.tables import DEFAULT_FOLDER, TABLE_FORMATS, check_destination, format_of, print_table, view_of
 
 _FILTERS = ("sensor", "task", "protocol", "split", "estimator")
 
@@ -40,8 +39,8 @@ def command(
     **filters: tuple[str, ...],
 ) -> None:  # fmt: skip
     """Show the table of all results in a folder, in any format. FOLDER is what `run --out` wrote."""
-    from tactbench.core.cli.tables import check_destination
     from tactbench.core.leaderboard.view import best as best_of
+    from tactbench.core.study.results import opened, shown_rows, table_of
 
     shape = format_of(shape, to)
     check_destination(shape, to)

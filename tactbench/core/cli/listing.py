@@ -75,7 +75,7 @@ def _plugins(registry: Registry, shape: str) -> None:
 
 def tell_failed(registry: Registry) -> None:
     """Say on stderr which plugins could not be used; nothing if all could."""
-    from tactbench.core.cli.screen import remark
+    from tactbench.core.tables.terminal import remark
 
     if registry.failures or registry.refused:
         names = [row.entry_point for row in registry.failures] + [error.message for error in registry.refused]

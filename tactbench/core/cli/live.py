@@ -9,8 +9,8 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Self
 
-from tactbench.core.cli.screen import remark
 from tactbench.core.samples import Quality
+from tactbench.core.tables.terminal import remark
 
 if TYPE_CHECKING:
     from types import TracebackType

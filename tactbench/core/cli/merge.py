@@ -25,8 +25,8 @@ def command(ctx: click.Context, folders: tuple[Path, ...], out: Path) -> None:
     Folders that contradict each other are refused, and the cells are named. Where two hosts have finished one cell with
     the same scores, one host's row is kept whole: times of different hosts are never mixed.
     """
-    from tactbench.core.cli.screen import remark
     from tactbench.core.matrix.merge import merge
+    from tactbench.core.tables.terminal import remark
 
     merged = merge(folders, out, also=partial(_write_tables, folders))
     remark(f"{len(merged.rows)} cells, {merged.recordings} recordings.")
@@ -39,10 +39,10 @@ def command(ctx: click.Context, folders: tuple[Path, ...], out: Path) -> None:
 
 def _write_tables(folders: Sequence[Path], merged: Path) -> None:
     """Write what was checked of sensors, and what `tactbench leaderboard` shows, into a merged folder."""
-    from tactbench.core.cli.results import provenance_of, shown_rows
     from tactbench.core.leaderboard.formats import write_tables
     from tactbench.core.leaderboard.levels import merge_levels
     from tactbench.core.matrix.store import Store
+    from tactbench.core.study.results import provenance_of, shown_rows
 
     merge_levels(folders, merged)
     store = Store(merged)

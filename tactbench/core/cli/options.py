@@ -1,4 +1,4 @@
-"""Options that several verbs have, and those of the engine."""
+"""Options that several verbs have."""
 
 from __future__ import annotations
 
@@ -8,8 +8,6 @@ from pathlib import Path
 from typing import Any
 
 import click
-
-from tactbench.core.spec.bounds import MOST_MEMORY_MB, MOST_SECONDS
 
 Command = Callable[..., Any]
 
@@ -49,14 +47,16 @@ YES = click.option("--yes", is_flag=True, help="Do not prompt.")
 RESULTS = click.option("--out", type=click.Path(path_type=Path), default=Path("tactbench-results"), show_default=True,
                        metavar="DIR", help="Result folder.")  # fmt: skip
 
-ENGINE = (
-    click.option("--engine", type=click.Choice(("in-process", "isolated", "dask")), default="isolated",
-                 show_default=True,
-                 help="Run cells in child processes, on a Dask cluster, or in this process (for a debugger)."),
-    click.option("--jobs", type=click.IntRange(min=1), metavar="N",
-                 help="Parallel worker processes. Default: one per usable core."),
-    click.option("--timeout", type=FiniteRange(min=0, min_open=True, max=MOST_SECONDS), metavar="SECONDS",
-                 help="Time limit per cell and per recording. Default: none."),
-    click.option("--memory", type=click.IntRange(min=1, max=MOST_MEMORY_MB), metavar="MB",
-                 help="Memory limit per cell and per recording, beside shared libraries. Default: none."),
+EFFECTS = click.option(
+    "--effects", metavar="LIST",
+    help="Force effects in or out: +creep,-drift; groups and +all, -all too. A plain name enables an effect of another "
+    "package.",
 )  # fmt: skip
+SIMULATION = options(
+    EFFECTS,
+    click.option(
+        "--set", "settings", multiple=True, metavar="NAME=VALUE",
+        help="Set a nuisance (placement_scatter_mm=0.3), or rung, tolerance or scenario of the simulation; repeatable.",
+    ),
+)  # fmt: skip
+"""Given to `tactbench.core.study.simulation.simulation_of`."""

@@ -7,9 +7,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from tactbench.core.cli.options import YES, options
-from tactbench.core.cli.scenes import PROFILE, indenter_of, profile_of, scene_of
-from tactbench.core.cli.simulation import SIMULATION, simulation_of
+from tactbench.core.cli.options import SIMULATION, YES
 from tactbench.core.tables.text import command_line
 
 if TYPE_CHECKING:
@@ -28,8 +26,10 @@ if TYPE_CHECKING:
 @click.option("--rig-file", metavar="FILE", help="Devices and links of a rig of real or emulated devices.")
 @click.option("--indenter", metavar="NAME[:D=X,...]",
               help="Indenter with dimensions: cap:radius=10, cylinder:radius=4,angle=90. Default: flat.")  # fmt: skip
-@PROFILE
-@options(*SIMULATION)
+@click.option("--profile", metavar="NAME[:P=X,...]",
+              help="Force profile with its parameters: ramp:force=5,duration=60 (the default), "
+                   "sine:mean=2,frequency=0.5.")  # fmt: skip
+@SIMULATION
 @click.option("--seed", type=click.IntRange(min=0), default=1, show_default=True, metavar="N", help="Random seed.")
 @click.option("--out", required=True, type=click.Path(path_type=Path), metavar="FILE", help="Output file (.h5).")
 @YES
@@ -52,25 +52,22 @@ def command(
     from contextlib import ExitStack, nullcontext
 
     from tactbench.core.acquisition import acquire
-    from tactbench.core.cli.operator import TerminalOperator
-    from tactbench.core.cli.screen import remark
     from tactbench.core.errors import TactbenchError
     from tactbench.core.plugins.registry import load_registry
     from tactbench.core.plugins.rigs import load_rig_file
     from tactbench.core.provenance.gather import gather
     from tactbench.core.recording.image import require_free
+    from tactbench.core.study.operator import TerminalOperator
+    from tactbench.core.study.scenes import scene_of
+    from tactbench.core.study.simulation import simulation_of
+    from tactbench.core.tables.terminal import remark
 
     registry = load_registry()
     descriptor = registry.sensors[sensor]
-    # The name of the scene decides its draws: the seed alone shall, and not the name of the file.
-    scene = scene_of(
-        "press", descriptor, indenter=indenter_of(registry, indenter), profile=profile_of(registry, profile)
-    )
+    scene = scene_of(registry, descriptor, indenter, profile)
     devices = load_rig_file(Path(rig_file), registry) if rig_file else None
     rig = rig or (devices.rig if devices else registry.first_rig("simulated"))
-    simulation = simulation_of(registry, rig, [sensor], effects=effects, settings=settings)
-    if simulation is not None:
-        scene = scene.simulated_as(simulation)
+    scene = scene.simulated_as(simulation_of(registry, rig, [sensor], effects, settings))
     require_free(out)
     provenance = gather(registry)
     try:

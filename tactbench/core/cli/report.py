@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING
 import click
 
 from tactbench.core.cli.options import format_option
-from tactbench.core.cli.threads import keep_threads
 
 if TYPE_CHECKING:
     from tactbench.core.report.page import Report
@@ -29,13 +28,12 @@ def command(ctx: click.Context, folder: Path, out: Path | None, shape: str) -> N
 
     The published numbers are printed beside ours.
     """
-    keep_threads()
-    from tactbench.core.cli.progress import progress
-    from tactbench.core.cli.results import opened
-    from tactbench.core.cli.screen import remark
     from tactbench.core.plugins.registry import load_registry
     from tactbench.core.report.page import make_report
     from tactbench.core.report.results import open_results
+    from tactbench.core.study.progress import progress
+    from tactbench.core.study.results import opened
+    from tactbench.core.tables.terminal import remark
 
     store = opened(folder)
     results = open_results(store, load_registry())

@@ -2,50 +2,82 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from tactbench.core.cli.options import ENGINE, RESULTS, YES, format_option, options
-from tactbench.core.cli.selection import SELECTING, requested_matrix
+from tactbench.core.cli.options import RESULTS, SIMULATION, YES, FiniteRange, format_option, options
 from tactbench.core.cli.tables import TABLE_FORMATS, check_destination, print_table, view_of
-from tactbench.core.cli.threads import keep_threads
+from tactbench.core.spec.bounds import MOST_MEMORY_MB, MOST_REPEATS, MOST_SECONDS
+from tactbench.core.tables.terminal import remark
+from tactbench.core.tables.text import command_line, cut
 
 if TYPE_CHECKING:
-    from tactbench.core.matrix.run import EngineName, Outcome
-    from tactbench.core.matrix.store import Store
-    from tactbench.core.spec.matrix import MatrixSpec
+    from tactbench.core.matrix.run import Outcome
 
 _REASON_CHARACTERS = 200
 """Of a reason that are shown; the whole of it is in the row."""
 
 
 @click.command(name="run")
-@options(*SELECTING, *ENGINE)
-@click.option("--root", type=click.Path(path_type=Path), metavar="DIR",
-              help="Folder of a copy of the data sets; what is not there is fetched.")  # fmt: skip
-@RESULTS
-@YES
+@options(
+    click.option("--sensor", multiple=True, metavar="NAME", help="Sensor; repeatable."),
+    click.option("--task", multiple=True, metavar="NAME", help="Task; repeatable."),
+    click.option("--rig", metavar="NAME", help="Rig: twin (default), replay, or one of a rig file."),
+    click.option("--recordings", type=click.Path(path_type=Path), metavar="DIR", help="Recordings to replay."),
+    click.option("--dataset", multiple=True, metavar="NAME",
+                 help="Public data set (see `tactbench datasets`) or its mapping file; fetched once; repeatable."),
+    click.option("--rig-file", metavar="FILE", help="Devices and links of a rig of real or emulated devices."),
+    click.option("--protocol", multiple=True, metavar="NAME",
+                 help="Evaluation protocol; repeatable. Default: the task's first."),
+    click.option("--split", multiple=True, metavar="NAME",
+                 help="Train/test split: roles, session, placement, unit, few-shot, …; repeatable."),
+    click.option("--estimator", multiple=True, metavar="NAME",
+                 help="Estimator; repeatable; `all` for every one that fits."),
+    click.option("--config", metavar="FILE", help="Matrix file like benchmarks.yaml, or the name of a packaged one."),
+    click.option("--repeats", type=click.IntRange(min=1, max=MOST_REPEATS), metavar="N",
+                 help="Number of replicates, each with its own seed. Default: 8 if simulated, else 1."),
+    click.option("--seed", type=click.IntRange(min=0), metavar="N", help="Seed of the first replicate."),
+    click.option("--probe", is_flag=True, help="Add leakage probes: first frame only, shuffled rows."),
+    click.option("--include-incomplete", is_flag=True,
+                 help="Let recordings take part that lack more than their rig file allows."),
+    SIMULATION,
+    click.option("--engine", type=click.Choice(("in-process", "isolated", "dask")), default="isolated",
+                 show_default=True,
+                 help="Run cells in child processes, on a Dask cluster, or in this process (for a debugger)."),
+    click.option("--jobs", type=click.IntRange(min=1), metavar="N",
+                 help="Parallel worker processes. Default: one per usable core."),
+    click.option("--timeout", type=FiniteRange(min=0, min_open=True, max=MOST_SECONDS), metavar="SECONDS",
+                 help="Time limit per cell and per recording. Default: none."),
+    click.option("--memory", type=click.IntRange(min=1, max=MOST_MEMORY_MB), metavar="MB",
+                 help="Memory limit per cell and per recording, beside shared libraries. Default: none."),
+    click.option("--root", type=click.Path(path_type=Path), metavar="DIR",
+                 help="Folder of a copy of the data sets; what is not there is fetched."),
+    RESULTS,
+    YES,
+)  # fmt: skip
 @format_option(*TABLE_FORMATS)
 @click.pass_context
-def command(ctx: click.Context, /, shape: str, **asked: Any) -> None:
+def command(
+    ctx: click.Context, /, shape: str, estimator: tuple[str, ...], settings: tuple[str, ...], **asked: Any
+) -> None:
     """Acquire, evaluate, rank.
 
     Without options: the whole of benchmarks.yaml. Options select from it or replace its choices. What the result folder
     holds already is reused.
     """
     check_destination(shape)
-    keep_threads()
     from tactbench.core.cli.listing import tell_failed
-    from tactbench.core.cli.results import table_of
     from tactbench.core.leaderboard.formats import write_tables
     from tactbench.core.leaderboard.table import over_all
     from tactbench.core.plugins.registry import installed
+    from tactbench.core.study.results import table_of
+    from tactbench.core.study.study import Study, carry_out
 
     tell_failed(installed())
-    store, outcome = carry_out(**asked)
+    store, outcome = carry_out(Study(estimator=estimator or None, set=settings, **asked))
     table = table_of(store, over_all(store, outcome.rows))
     print_table(table, shape, view_of(store.folder))
     write_tables(table.rows, store.folder, table.provenance, table)
@@ -53,61 +85,8 @@ def command(ctx: click.Context, /, shape: str, **asked: Any) -> None:
     ctx.exit(1 if outcome.failures else 0)
 
 
-def carry_out(
-    *,
-    out: Path,
-    yes: bool,
-    engine: EngineName,
-    jobs: int | None,
-    timeout: float | None,
-    memory: int | None,
-    root: Path | None = None,
-    changed: Callable[[MatrixSpec, Path | None], MatrixSpec] = lambda matrix, _: matrix,
-    **selection: Any,
-) -> tuple[Store, Outcome]:
-    """Run what the verb's options ask for, and show the progress; return the result folder and how cells ended.
-
-    `changed` is given the matrix and the folder of recordings that were asked for, and returns the matrix that is run.
-    """
-    from tactbench.core.cli.operator import TerminalOperator
-    from tactbench.core.cli.progress import progress
-    from tactbench.core.matrix.run import EngineChoice, run_matrix
-    from tactbench.core.matrix.store import Store
-    from tactbench.core.plugins.registry import installed
-    from tactbench.core.pool import Limits
-
-    matrix, recordings = requested_matrix(installed(), **selection)
-    matrix = changed(matrix, recordings)
-    limits = Limits(  # what the options leave open, the matrix file says
-        timeout_s=matrix.timeout_s if timeout is None else timeout,
-        memory_mb=matrix.memory_mb if memory is None else memory,
-    )
-    store = Store(out)
-    with progress() as display:
-        outcome = run_matrix(
-            matrix, store, choice=EngineChoice(engine, jobs, limits), recordings=recordings, root=root,
-            progress=display,
-            operator=TerminalOperator(yes=yes, paused=display.paused) if matrix.rig_file else None,
-            shown=lambda rows: display.show(lambda: _so_far(rows)),
-        )  # fmt: skip
-    return store, outcome
-
-
-def _so_far(rows: Sequence[Mapping[str, Any]]) -> str:
-    """Return the table of the replicates that are finished, as wide as the terminal."""
-    from tactbench.core.cli.screen import console
-    from tactbench.core.leaderboard.table import build_table
-    from tactbench.core.leaderboard.view import grids
-    from tactbench.core.statistics.replicates import over_replicates
-    from tactbench.core.tables.terminal import plain_text
-
-    return plain_text(grids(build_table(over_replicates(rows))), console().width)
-
-
 def _farewell(outcome: Outcome, folder: Path) -> None:
     """Say what there is now, and where it lies."""
-    from tactbench.core.cli.screen import remark
-
     found = len(outcome.rows) - outcome.computed
     remark(f"\n{found} of {len(outcome.rows)} answers were found finished, {outcome.computed} computed now; "
            f"{outcome.recorded} recordings made now.")  # fmt: skip
@@ -119,9 +98,6 @@ def tell_stopped(rows: Sequence[Mapping[str, Any]], folder: Path) -> None:
     """Name every cell of `rows` with its reason in one line, and the commands that look into it."""
     if not rows:
         return
-    from tactbench.core.cli.screen import remark
-    from tactbench.core.tables.text import command_line, cut
-
     remark(f"\nStopped: {len(rows)}.")
     for row in rows:
         reason = cut(" ".join(str(row["reason"]).split()), _REASON_CHARACTERS)

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterable, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import click
 
-from tactbench.core.cli.screen import WITHOUT_EDGE, console
+from tactbench.core.tables.terminal import WITHOUT_EDGE, show
 
 if TYPE_CHECKING:
     from tactbench.core.leaderboard.table import Table
@@ -45,15 +44,6 @@ def view_of(folder: Path, *, wide: bool = False, columns: str | None = None, sha
     names = [name.strip() for name in columns.split(",")] if columns is not None else []
     where = "" if folder == DEFAULT_FOLDER else str(folder)
     return View(wide=wide, columns=known_columns(names), folder=where)
-
-
-def questions_of(rows: Iterable[Mapping[str, Any]]) -> dict[str, str]:
-    """Return what the tasks of rows ask, by name; a task that is not installed asks nothing."""
-    from tactbench.core.plugins.registry import installed
-
-    tasks = installed().tasks
-    names = {str(row["task"]) for row in rows}.intersection(tasks.names())
-    return {name: tasks[name].spec.question for name in names}
 
 
 def format_of(shape: str | None, to: Path | None) -> str:
@@ -104,10 +94,9 @@ def print_table(table: Table, shape: str, view: View, *, to: Path | None = None)
     from tactbench.core.files import replace_file
     from tactbench.core.leaderboard.formats import rendered
     from tactbench.core.leaderboard.view import document
-    from tactbench.core.tables.terminal import show
 
     if shape == "table" and to is None and sys.stdout.isatty():
-        show(document(table, view), console())
+        show(document(table, view))
         return
     content = rendered(table, shape, view, WITHOUT_EDGE)
     if to is None:

@@ -7,9 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from tactbench.core.cli.options import format_option
-from tactbench.core.cli.simulation import EFFECTS
-from tactbench.core.cli.threads import keep_threads
+from tactbench.core.cli.options import EFFECTS, format_option
 
 if TYPE_CHECKING:
     from tactbench.core.plugins.interfaces import Verdict
@@ -34,14 +32,13 @@ def explain(sensor: str, task: str, rounds: int, effects: str | None, shape: str
 
     It ends with the task's score with the effects chosen beside that with all of them.
     """
-    keep_threads()
     from tactbench.core.cli.explanations import print_explanations
-    from tactbench.core.cli.simulation import simulation_of
     from tactbench.core.plugins.registry import load_registry
+    from tactbench.core.study.simulation import simulation_of
 
     registry = load_registry()
     rig = registry.first_rig("simulated")
-    simulation = simulation_of(registry, rig, [sensor], effects=effects)
+    simulation = simulation_of(registry, rig, [sensor], effects)
     print_explanations(registry, rig, sensor, task, simulation, rounds, shape)
 
 
@@ -53,11 +50,10 @@ def verify(ctx: click.Context, shape: str) -> None:
 
     Exit code 1 if it misses one.
     """
-    keep_threads()
     from tactbench.core.cli.grid import print_grid, print_records
-    from tactbench.core.cli.screen import remark
     from tactbench.core.errors import UsageError
     from tactbench.core.plugins.registry import load_object, load_registry
+    from tactbench.core.tables.terminal import remark
 
     registry = load_registry()
     rig = registry.first_rig("simulated")

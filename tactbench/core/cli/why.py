@@ -5,21 +5,17 @@ from __future__ import annotations
 import sys
 from collections.abc import Iterator, Mapping
 from contextlib import redirect_stdout
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
 from tactbench.core.cli.options import RESULTS, format_option
-from tactbench.core.cli.threads import keep_threads
 from tactbench.core.tables.text import command_line, json_text, visible_lines
 
 if TYPE_CHECKING:
-    from tactbench.core.matrix.keys import Keys
-    from tactbench.core.matrix.plan import Cell
-    from tactbench.core.matrix.store import Row, Store
-    from tactbench.core.plugins.registry import Registry
+    from tactbench.core.matrix.store import Row
+    from tactbench.core.matrix.why import StoredCell
 
 Field = tuple[str, str]
 """A name, and a value with its unit."""
@@ -42,8 +38,10 @@ def command(ctx: click.Context, cell: str, out: Path, again: bool, shape: str) -
     --again, the exit code is 1 if something differs or it fails. What a simulation recorded is then recorded again,
     into another place.
     """
-    keep_threads()
-    found = _find(out, cell)
+    from tactbench.core.matrix.why import stored_cell
+    from tactbench.core.study.results import opened
+
+    found = stored_cell(opened(out), cell)
     facts = _again(found) if again else _facts(found)
     if shape == "json":
         click.echo(json_text(facts, indent=1))
@@ -52,63 +50,15 @@ def command(ctx: click.Context, cell: str, out: Path, again: bool, shape: str) -
     ctx.exit(1 if again and facts["answer"] != "identical" else 0)
 
 
-@dataclass(frozen=True)
-class _Stored:
-    """One cell, and how it was answered."""
-
-    store: Store
-    registry: Registry
-    keys: Keys
-    cell: Cell
-    row: Row
-    paths: tuple[Path, ...]
-
-    @property
-    def reasons(self) -> tuple[str, tuple[str, ...]]:
-        """Its key, and what differs from the result that is there."""
-        from tactbench.core.matrix.why import explain
-
-        why = explain(self.cell, self.paths, self.keys, self.store, self.row)
-        return why.key, why.reasons
-
-
-def _find(out: Path, given: str) -> _Stored:
-    """Return the cell of a result folder whose name, or a part of it, is `given`; raises UsageError."""
-    from tactbench.core.cli.results import opened
-    from tactbench.core.errors import UsageError
-    from tactbench.core.matrix.keys import Keys
-    from tactbench.core.matrix.naming import cell_of, meant
-    from tactbench.core.matrix.plan_recordings import request_key, requests_for
-    from tactbench.core.plugins.declared import with_declared_of
-    from tactbench.core.plugins.registry import installed
-
-    store = opened(out)
-    rows = {row["cell"]: row for row in store.rows()}
-    registry = with_declared_of(installed(), rows.values())
-    keys = Keys(registry)
-    row = rows[meant(given, list(rows))]
-    cell = cell_of(row)
-    if registry.rigs[cell.rig].simulated:
-        requests = requests_for([cell], registry, keys, store)[request_key(cell)]
-        return _Stored(store, registry, keys, cell, row, tuple(request.path for request in requests))
-    paths = []
-    for path, file in store.recordings(row):
-        if file is None:
-            hint = "Run the matrix again with --rig replay --recordings DIR."
-            raise UsageError(f"The recording {path} is not there.", hint=hint)
-        paths.append(file)
-    return _Stored(store, registry, keys, cell, row, tuple(paths))
-
-
-def _facts(found: _Stored) -> dict[str, Any]:
+def _facts(found: StoredCell) -> dict[str, Any]:
     row, name = found.row, found.cell.name
-    key, reasons = found.reasons
+    key, reasons = found.changes()
     done = row["status"] == "done"
     return {
         "cell": name,
         "answer": "hit" if done and not reasons else "miss",
         "key": key,
-        "reasons": list(reasons),
+        "reasons": reasons,
         **{fact: row.get(fact) for fact in ("status", "reason", "signal", "traceback", "log")},
         "file": str(found.store.folder / "cells" / f"{row['key']}.h5") if done else None,
         "recordings": list(row["recordings"]) if done else [],
@@ -120,7 +70,7 @@ def _facts(found: _Stored) -> dict[str, Any]:
     }
 
 
-def _replicates(found: _Stored) -> Iterator[Field]:
+def _replicates(found: StoredCell) -> Iterator[Field]:
     """Yield what the cell came to over its replicates, and what each of them scored."""
     from tactbench.core.statistics.replicates import counted, over_replicates, percent
     from tactbench.core.tables.numbers import delay, duration, interval, score_with_unit
@@ -162,7 +112,7 @@ def _rests_on(row: Row) -> Iterator[Field]:
     yield from (("remark", str(remark)) for remark in (*row.get("remarks", ()), *row.get("stamps", ())))
 
 
-def _recording_scores(found: _Stored) -> dict[str, float]:
+def _recording_scores(found: StoredCell) -> dict[str, float]:
     """Return the score of each test recording, of classes the accuracy; none of events."""
     from tactbench.core.report.cells import recording_scores
 
@@ -192,20 +142,19 @@ def _print(facts: Mapping[str, Any]) -> None:
     click.echo(visible_lines(f"\nTry: {facts['try']}"))
 
 
-def _again(found: _Stored) -> dict[str, Any]:
+def _again(found: StoredCell) -> dict[str, Any]:
     """Compute the cell again in this process, and return how it compares."""
-    from tactbench.core.cli.progress import progress
-    from tactbench.core.matrix.rerun import compute_again
+    from tactbench.core.study.progress import progress
 
     with redirect_stdout(sys.stderr), progress() as display:  # what a plugin prints is no result
-        again = compute_again(found.cell, found.row, found.store, found.registry, found.paths, display)
+        row, differences, recorded = found.again(display)
     return {
         "cell": found.cell.name,
-        "answer": "identical" if again.identical else "different",
-        "recordings_made": again.recordings,
-        **{name: again.row[name] for name in ("status", "reason", "traceback", "score")},
-        "differences": list(again.differences),
-        "circumstances": list(found.reasons[1]),
+        "answer": "identical" if row["status"] == "done" and not differences else "different",
+        "recordings_made": recorded,
+        **{name: row[name] for name in ("status", "reason", "traceback", "score")},
+        "differences": differences,
+        "circumstances": found.changes()[1],
     }
 
 

@@ -59,7 +59,7 @@ class Dask(Engine):
             If no scheduler answers, or a worker's versions or sources differ from this run's.
         """
         logging.getLogger("distributed").setLevel(logging.CRITICAL)
-        threads = {name: os.environ[name] for name in VARIABLES if name in os.environ}
+        threads = {name: os.environ.get(name, "1") for name in VARIABLES}
         with ExitStack() as stack:
             to: Any = self._scheduler
             if to is None:

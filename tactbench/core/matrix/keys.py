@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from tactbench.core.matrix.plan import Cell, task_of
+from tactbench.core.matrix.plan import Cell
 from tactbench.core.plugins.registry import Registry
 from tactbench.core.plugins.rigs import taking_part
 from tactbench.core.provenance.source import ANSWERING, RECORDING, digest_of, sources_of, versions
@@ -39,13 +39,14 @@ class Keys:
         return key, {**sections, "data": {path.stem: digest for path, digest in data.items()}}
 
     def _answering(self, cell: Cell) -> Sections:
-        pair = cell.task_key, cell.estimator
+        pair = cell.task, cell.estimator
         if pair not in self._answers:
-            spec, estimator = task_of(cell.task_key, self.registry), self.registry.estimators.owned(cell.estimator)
-            modules = [self.registry.tasks.owned(cell.task).module, estimator.module, estimator.descriptor.where]
-            modules += [spec.features_by] if spec.features_by else []
+            task, estimator = self.registry.tasks.owned(cell.task), self.registry.estimators.owned(cell.estimator)
+            features_by = self.registry.tasks[cell.task].spec.features_by
+            modules = [task.module, estimator.module, estimator.descriptor.where]
+            modules += [features_by] if features_by else []
             self._answers[pair] = {
-                "task": cell.task_key,
+                "task": task.declared or cell.task,
                 "estimator": cell.estimator,
                 "versions": versions(estimator.descriptor.distributions),
                 "source": sources_of(modules, ANSWERING),
@@ -53,14 +54,13 @@ class Keys:
         return self._answers[pair]
 
     def of_recording(
-        self, sensor: str, rig: str, scene: Scene, role: Role | None, seed: int, rig_file: str = ""
-    ) -> tuple[str, Sections]:
-        """Return the key of a recording that a rig makes, and its sections."""
+        self, sensor: str, rig: str, scene: Scene, role: Role | None, seed: int, rig_file: RigFile | None = None
+    ) -> str:
+        """Return the key of a recording that a rig makes."""
         made_by = self._making(sensor, rig, rig_file, scene)
-        sections = {**made_by, "scene": scene.model_dump(mode="json"), "role": role, "seed": seed}
-        return digest_of(_canonical(sections)), sections
+        return digest_of(_canonical({**made_by, "scene": scene.model_dump(mode="json"), "role": role, "seed": seed}))
 
-    def _making(self, sensor: str, rig: str, rig_file: str, scene: Scene) -> Sections:
+    def _making(self, sensor: str, rig: str, rig_file: RigFile | None, scene: Scene) -> Sections:
         """Return what all recordings of one sensor by one rig share.
 
         Notes
@@ -70,15 +70,15 @@ class Keys:
         """
         effects = taking_part(self.registry, self.registry.sensors[sensor], scene)
         shape = scene.indenter.shape
-        made = (sensor, rig, rig_file, str(shape), *(effect.descriptor.name for effect in effects))
+        stated = "" if rig_file is None else rig_file.model_dump_json()
+        made = (sensor, rig, stated, str(shape), *(effect.descriptor.name for effect in effects))
         if made not in self._makers:
-            devices = RigFile.model_validate_json(rig_file) if rig_file else None
-            sections: Sections = {"sensor": sensor, "rig": rig, "rig file": rig_file}
-            if devices is None or devices.emulated:
+            sections: Sections = {"sensor": sensor, "rig": rig, "rig file": stated}
+            if rig_file is None or rig_file.emulated:
                 owner, carrier = self.registry.sensors.owned(sensor), self.registry.rigs.owned(rig)
                 modules = [owner.module, carrier.module, carrier.descriptor.where]
                 modules += [where for where in (owner.descriptor.transducer, owner.descriptor.driver) if where]
-                modules += [] if devices is None else self._behind(devices)
+                modules += [] if rig_file is None else self._behind(rig_file)
                 for effect in effects:
                     modules += [effect.module, effect.descriptor.where, effect.descriptor.called_for]
                 if shape is not None and shape in self.registry.indenters:  # of an unknown one the rig complains

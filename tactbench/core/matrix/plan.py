@@ -11,9 +11,7 @@ from typing import Any
 from tactbench.core.errors import UnknownNameError, UsageError
 from tactbench.core.evaluation.protocols import DEPLOYABLE, FIRST_FRAME, is_probe, protocol_called, shots
 from tactbench.core.plugins.registry import Registry
-from tactbench.core.spec.declared_task import DeclaredTask
 from tactbench.core.spec.matrix import REPLICATES, EstimatorChoice, MatrixSpec, TaskChoice
-from tactbench.core.spec.rig_file import RigFile
 from tactbench.core.spec.scene import Simulation
 from tactbench.core.spec.task import TaskSpec
 
@@ -46,12 +44,10 @@ class Cell:
     """Whether fit time and latency are measured, with nothing else of the run at work: of the first replicate."""
     simulation: Simulation = _AS_PLANNED
     """How a simulated rig is asked to carry out its scenes."""
-    rig_file: str = ""
-    """What the rig file says, as canonical JSON; empty: there is none."""
     include_incomplete: bool = False
     """Whether incomplete recordings take part."""
     declared_task: str = ""
-    """What the recordings declare of the task, as JSON; empty: it is an installed one."""
+    """What the recordings declare of the task, as its rows tell it in JSON; empty: it is an installed one."""
 
     @cached_property
     def name(self) -> str:
@@ -61,20 +57,8 @@ class Cell:
         path = (self.sensor, self.task, self.rig, f"{self.protocol}{split}", f"{self.estimator}{options}")
         return "/".join((*path, str(self.repeat)))
 
-    @property
-    def task_key(self) -> str:
-        """What `task_of` finds its task by: its name, or the JSON that declares it."""
-        return self.declared_task or self.task
 
-
-def task_of(task: str, registry: Registry) -> TaskSpec:
-    """Return a task by its name, or by the JSON that declares it: a process may not have seen its recordings."""
-    return DeclaredTask.model_validate_json(task).spec if task.startswith("{") else registry.tasks[task].spec
-
-
-def plan_cells(
-    matrix: MatrixSpec, sensors: Sequence[str], registry: Registry, rig_file: RigFile | None = None
-) -> list[Cell]:
+def plan_cells(matrix: MatrixSpec, sensors: Sequence[str], registry: Registry) -> list[Cell]:
     """List the cells of `matrix`, in the order in which they are run and stored.
 
     Parameters
@@ -85,8 +69,6 @@ def plan_cells(
         The sensors to run it on, already checked.
     registry
         Where tasks and estimators are looked up.
-    rig_file
-        Of a rig of devices.
 
     Raises
     ------
@@ -95,7 +77,6 @@ def plan_cells(
         question, or a parameter is not one of the estimator's.
     """
     cells: dict[Cell, None] = {}
-    rig_file_text = rig_file.model_dump_json() if rig_file else ""
     rig = registry.rigs[matrix.rig or registry.first_rig("simulated")]
     tasks = {choice.name: registry.tasks.owned(choice.name) for choice in matrix.tasks}
     own = {
@@ -126,9 +107,8 @@ def plan_cells(
                         seed=matrix.seed + repeat - 1,
                         timed=matrix.latency and repeat == 1,
                         simulation=matrix.simulation,
-                        rig_file=rig_file_text,
                         include_incomplete=matrix.include_incomplete,
-                        declared_task=owned.declared.model_dump_json() if owned.declared else "",
+                        declared_task=owned.declared,
                     )
                     cells[cell] = None  # once, in the order in which they were asked for
     return with_probes(list(cells), registry) if matrix.probe else list(cells)
@@ -150,7 +130,7 @@ def with_probes(cells: Sequence[Cell], registry: Registry) -> list[Cell]:
     planned = frozenset(every)
     for cell in cells:
         rules = protocol_called(cell.protocol)
-        task = task_of(cell.task_key, registry)
+        task = registry.tasks[cell.task].spec
         if rules.probe or cell.split == "in-session" or (cell.baseline and cell.estimator not in task.baselines):
             continue
         if rules.roles_only and task.splits[:1] == ("roles",):
@@ -195,7 +175,8 @@ def _expanded(task: TaskSpec, split: str) -> tuple[str, ...]:
 
 
 def _estimators(task: TaskSpec, choice: TaskChoice, registry: Registry) -> list[EstimatorChoice]:
-    choices = list(choice.estimators) or [EstimatorChoice(name=name) for name in task.estimators]
+    own = [EstimatorChoice(name=name) for name in task.estimators]
+    choices = own if choice.estimators is None else list(choice.estimators)
     whole = any(estimator.name == "all" for estimator in choices)
     fit = [other for other in registry.estimators if task.kind in other.kinds] if whole else []
     choices = [estimator for estimator in choices if estimator.name != "all"]

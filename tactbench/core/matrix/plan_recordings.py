@@ -18,7 +18,7 @@ from tactbench.core.errors import (
 )
 from tactbench.core.evaluation.protocols import shots
 from tactbench.core.matrix.keys import Keys
-from tactbench.core.matrix.plan import Cell, plan_cells, serves, task_of
+from tactbench.core.matrix.plan import Cell, plan_cells, serves
 from tactbench.core.matrix.store import Store
 from tactbench.core.plugins.registry import Registry, installed
 from tactbench.core.plugins.rigs import failing_as, load_rig_file, rig_of
@@ -52,12 +52,11 @@ class RecordingRequest:
     role: Role
     seed: int
     path: Path
-    rig_file: str = ""
-    """What the rig file says, as canonical JSON; empty: there is none."""
+    rig_file: RigFile | None = None
 
 
 def requests_for(
-    cells: Iterable[Cell], registry: Registry, keys: Keys, store: Store
+    cells: Iterable[Cell], registry: Registry, keys: Keys, store: Store, rig_file: RigFile | None = None
 ) -> dict[RequestKey, list[RecordingRequest]]:
     """Return the recordings needed, in the campaign's order, carried out as the cells ask a simulation.
 
@@ -70,12 +69,12 @@ def requests_for(
         if needed in requests:
             continue
         requests[needed] = []
-        for planned in in_drawn_order(task_of(cell.task_key, registry).scenes_for(needed[2]), cell.seed):
+        for planned in in_drawn_order(registry.tasks[cell.task].spec.scenes_for(needed[2]), cell.seed):
             scene = planned.scene.simulated_as(cell.simulation)
-            key, _ = keys.of_recording(cell.sensor, cell.rig, scene, planned.role, cell.seed, cell.rig_file)
+            key = keys.of_recording(cell.sensor, cell.rig, scene, planned.role, cell.seed, rig_file)
             path = store.folder / "recordings" / cell.sensor / f"{scene.name}-{key[:12]}.h5"
             requests[needed].append(
-                RecordingRequest(cell.sensor, cell.rig, scene, planned.role, cell.seed, path, cell.rig_file)
+                RecordingRequest(cell.sensor, cell.rig, scene, planned.role, cell.seed, path, rig_file)
             )
     return requests
 
@@ -206,12 +205,12 @@ def plan_run(
             return _from_replay(matrix, registry, paths, store)
     if not matrix.sensors:
         raise UsageError("No sensor is named.", hint=f"Give --sensor; known: {', '.join(registry.sensors.names())}.")
-    cells = plan_cells(matrix, [registry.sensors[name].name for name in matrix.sensors], registry, rig_file)
+    cells = plan_cells(matrix, [registry.sensors[name].name for name in matrix.sensors], registry)
     for cell in cells:
         _check_split(registry.tasks[cell.task].spec, cell.split)
     return cells, {
         key: RecordingSource([request.path for request in made], made, None if made else _no_scenes(key, matrix))
-        for key, made in requests_for(cells, registry, keys, store).items()
+        for key, made in requests_for(cells, registry, keys, store, rig_file).items()
     }
 
 

@@ -6,6 +6,9 @@ from contextlib import suppress
 from importlib import import_module
 from importlib.metadata import entry_points
 
+from tactbench.core.thread_limit import keep_threads
+
+keep_threads()
 if hasattr(os, "setsid"):
     with suppress(OSError):
         os.setsid()  # Ctrl-C in a terminal reaches the run alone, which ends its workers

@@ -10,7 +10,6 @@ from tactbench.core.matrix.plan_recordings import RecordingRequest
 from tactbench.core.plugins.interfaces import Operator
 from tactbench.core.plugins.registry import Family, Registry
 from tactbench.core.plugins.rigs import rig_of
-from tactbench.core.spec.rig_file import RigFile
 
 GRACE_S = 5.0
 """Seconds that a real rig has to stand still and close its devices when its time is up."""
@@ -37,12 +36,10 @@ class Recorder:
         from tactbench.core.acquisition import acquire
 
         if self._built is None:
-            devices = RigFile.model_validate_json(request.rig_file) if request.rig_file else None
-            self._built = devices, rig_of(request.rig, self._registry, rig_file=devices, operator=self._operator)
-        devices, built = self._built
+            self._built = rig_of(request.rig, self._registry, rig_file=request.rig_file, operator=self._operator)
         rig = self._registry.rigs[request.rig]
         acquire(
-            built,
+            self._built,
             self._registry.sensors[request.sensor],
             rig,
             request.scene,
@@ -52,13 +49,13 @@ class Recorder:
             # Simulations run side by side: what they cost is the processor's time. A real rig is waited for.
             clock=time.process_time if rig.simulated else time.perf_counter,
             provenance={},
-            rig_file=devices,
+            rig_file=request.rig_file,
         )
 
 
 def is_computed(request: RecordingRequest, registry: Registry) -> bool:
     """Return whether a scene needs nothing but this machine, and no wall clock."""
-    if registry.rigs[request.rig].simulated or not request.rig_file:
-        return registry.rigs[request.rig].simulated
-    devices = RigFile.model_validate_json(request.rig_file)
+    simulated, devices = registry.rigs[request.rig].simulated, request.rig_file
+    if simulated or devices is None:
+        return simulated
     return devices.emulation.time == "virtual" and all(entry.emulated for entry in devices.entries().values())

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import importlib.util
 import os
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from itertools import chain
@@ -13,10 +13,11 @@ from typing import Any, Literal
 
 from tactbench.core.errors import UnwritableError, UsageError
 from tactbench.core.matrix.keys import Keys, Sections
-from tactbench.core.matrix.plan import Cell, task_of
+from tactbench.core.matrix.plan import Cell
 from tactbench.core.matrix.plan_recordings import (
     RecordingPlan,
     RecordingRequest,
+    RecordingSource,
     RequestKey,
     parts_of,
     plan_parts,
@@ -107,7 +108,6 @@ def run_matrix(
     root: Path | None = None,
     operator: Operator | None = None,
     progress: Progress | None = None,
-    shown: Callable[[Sequence[Row]], None] | None = None,
 ) -> Outcome:
     """Record and evaluate `matrix`, reusing what `store` already has.
 
@@ -128,8 +128,6 @@ def run_matrix(
         Who mounts caps and presses, at a rig of real devices.
     progress
         Receives what happens.
-    shown
-        Called with the rows of all complete replicates whenever one becomes complete, but for the last.
 
     Raises
     ------
@@ -151,7 +149,7 @@ def run_matrix(
         cells, plan = plan_parts(parts, registry, keys, store, choice.limits)
         provenance = gather(registry, seed=matrix.seed, engine=choice.name)
         store.begin(provenance)
-        run = Run(store, registry, keys, plan, choice, operator, progress, shown, cells)
+        run = Run(store, registry, keys, plan, choice, operator, progress, cells)
         run.carry_out([cell for cell in cells if cell.timed], alone=True)
         run.carry_out([cell for cell in cells if not cell.timed], alone=False)
     rows = tuple(run.rows[cell.name] for cell in cells)
@@ -170,7 +168,6 @@ class Run:
     choice: EngineChoice
     operator: Operator | None
     progress: Progress
-    shown: Callable[[Sequence[Row]], None] | None
     cells: Sequence[Cell]
     rows: dict[str, Row] = field(default_factory=dict)
     computed: int = 0
@@ -182,7 +179,7 @@ class Run:
         for cell in cells:
             by_need.setdefault(request_key(cell), []).append(cell)
         self._record([request for need in by_need for request in self.plan[need].requests])
-        groups = [jobs for some in by_need.values() if (jobs := self._jobs(some))]
+        groups = [jobs for need, some in by_need.items() if (jobs := self._jobs(self.plan[need], some))]
         if not groups:
             return
         self.progress.begin("evaluating, timed" if alone else "evaluating", sum(map(len, groups)))
@@ -247,16 +244,16 @@ class Run:
 
     # Cells
 
-    def _jobs(self, cells: Iterable[Cell]) -> list[Job]:
+    def _jobs(self, source: RecordingSource, cells: Iterable[Cell]) -> list[Job]:
         """Return what is to be computed of `cells` that need the same recordings; the others have their row then."""
         jobs = []
+        digests: dict[Path, str] = {}
         for cell in cells:
-            task = task_of(cell.task_key, self.registry)
-            source = self.plan[request_key(cell)]
+            task = self.registry.tasks[cell.task].spec
             try:
                 if source.trouble is not None:
                     raise source.trouble
-                digests = {path: self.store.about(path)["digest"] for path in source.paths}
+                digests = digests or {path: self.store.about(path)["digest"] for path in source.paths}
                 key, sections = self.keys.of_cell(cell, digests)
             except Exception as error:
                 self._stopped(cell, task, error)
@@ -298,11 +295,11 @@ class Run:
             )
             self.computed += 1
         self.progress.advance(cell.name, stopped=self.rows[cell.name]["status"] in STOPPED)
-        if self.shown is None or any(one.name not in self.rows for one in self.cells if one.repeat == cell.repeat):
+        if any(one.name not in self.rows for one in self.cells if one.repeat == cell.repeat):
             return
         left = {one.repeat for one in self.cells if one.name not in self.rows}
         if left:
-            self.shown([self.rows[one.name] for one in self.cells if one.repeat not in left])
+            self.progress.show([self.rows[one.name] for one in self.cells if one.repeat not in left])
 
     def _stopped(
         self, cell: Cell, task: TaskSpec, why: BaseException, key: str = "", sections: Sections | None = None

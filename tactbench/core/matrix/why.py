@@ -1,55 +1,93 @@
-"""Why a cell would be reused, or computed: what its key is made of now, compared with what it was made of."""
+"""One cell of a result folder: why it would be reused or computed, and the same once more, bit for bit."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import tempfile
 from dataclasses import dataclass
 from pathlib import Path
 
-from tactbench.core.errors import TactbenchError
+from tactbench.core.errors import TactbenchError, UsageError
 from tactbench.core.matrix.keys import Keys, differences
+from tactbench.core.matrix.naming import cell_of, meant
 from tactbench.core.matrix.plan import Cell
+from tactbench.core.matrix.plan_recordings import RecordingSource, request_key, requests_for
+from tactbench.core.matrix.run import EngineChoice, Run
 from tactbench.core.matrix.store import Row, Store
+from tactbench.core.matrix.summary import SEED_DECIDES
+from tactbench.core.plugins.declared import with_declared_of
+from tactbench.core.plugins.registry import Registry, installed
+from tactbench.core.progress import Progress
 
 
 @dataclass(frozen=True)
-class Explanation:
-    """What would happen to a cell, and why."""
+class StoredCell:
+    """A cell, the row that answers it, and the recordings that it needs, whether they are there or not."""
 
-    key: str
-    """Empty: not known before its recordings are there."""
-    hit: bool
-    reasons: tuple[str, ...]
-    """What differs from the result that is there, in words; what is missing."""
+    store: Store
+    registry: Registry
+    cell: Cell
+    row: Row
+    paths: list[Path]
+
+    def changes(self) -> tuple[str, list[str]]:
+        """Return its key, and what it would not be reused for, in words; no key: not before its recordings are there.
+
+        What differs from the result that is there comes first, then what is missing.
+        """
+        missing = [path for path in self.paths if not path.exists()]
+        reasons = [] if self.paths else ["there are no recordings of it"]
+        if missing:
+            text = f"{len(missing)} of {len(self.paths)} recordings have to be made, {missing[0].stem} first"
+            reasons = [f"{text}: they were never made, removed, or are made otherwise now"]
+        try:
+            digests = {path: self.store.about(path)["digest"] for path in self.paths if path not in missing}
+            before = self.store.cell(self.row).sections
+        except TactbenchError as error:
+            return "", [str(error)]
+        key, now = Keys(self.registry).of_cell(self.cell, digests)
+        if not reasons and self.store.finished(key) is not None:
+            return key, []
+        if missing:
+            key, before, now = "", *({**one, "data": {}} if one else {} for one in (before, now))
+        return key, [*(differences(before, now) if before else []), *reasons]
+
+    def again(self, progress: Progress) -> tuple[Row, list[str], int]:
+        """Compute it once more in this process; nothing in the result folder changes.
+
+        Return the row, what is not as it was, in words, and how many recordings were made anew, into another place: all
+        that a simulation made.
+        """
+        with tempfile.TemporaryDirectory(prefix="tactbench-rerun-") as place, Store(Path(place)).hold() as again:
+            keys, need = Keys(self.registry), request_key(self.cell)
+            source = RecordingSource(self.paths)
+            if self.registry.rigs[self.cell.rig].simulated:
+                requests = requests_for([self.cell], self.registry, keys, again)[need]
+                source = RecordingSource([request.path for request in requests], requests)
+            choice = EngineChoice("in-process")
+            run = Run(again, self.registry, keys, {need: source}, choice, None, progress, [self.cell])
+            run.carry_out([self.cell], alone=True)
+            row = run.rows[self.cell.name]
+            done = row["status"] == self.row["status"] == "done"
+            old, new = (
+                {name: one[name] for name in (SEED_DECIDES if done else ("status", "reason"))}
+                for one in (self.row, row)
+            )
+            if done:
+                for facts, kept in ((old, self.store.cell(self.row)), (new, again.cell(row))):
+                    facts |= {"recording": kept.sections["data"], "answers": kept.digests}
+        return row, differences(old, new), run.recorded
 
 
-def explain(cell: Cell, paths: Sequence[Path], keys: Keys, store: Store, row: Row | None) -> Explanation:
-    """Say whether the result of `cell` would be reused, and what differs.
-
-    Parameters
-    ----------
-    paths
-        Its recordings, whether they are there or not.
-    row
-        The latest row of that name; None: there is none.
-    """
-    missing = [path for path in paths if not path.exists()]
-    reasons = [] if paths else ["there are no recordings of it"]
-    if missing:
-        text = f"{len(missing)} of {len(paths)} recordings have to be made, {missing[0].stem} first"
-        reasons = [f"{text}: they were never made, removed, or are made otherwise now"]
-    there = [path for path in paths if path.exists()]
-    try:
-        digests = {path: store.about(path)["digest"] for path in there}
-        before = store.cell(row).sections if row is not None else {}
-    except TactbenchError as error:
-        return Explanation("", False, (str(error),))
-    key, now = keys.of_cell(cell, digests)
-    if paths and not missing and store.finished(key) is not None:
-        return Explanation(key, True, ())
-    if row is None:
-        return Explanation("" if missing else key, False, ("it was never computed into this folder", *reasons))
-    if missing or not before:
-        now, before = ({name: part for name, part in one.items() if name != "data"} for one in (now, before))
-    found = differences(before, now) if before else []
-    return Explanation("" if missing else key, False, (*found, *reasons))
+def stored_cell(store: Store, given: str) -> StoredCell:
+    """Return the cell of a result folder whose name, or a part of it, is `given`; raises UsageError."""
+    rows = {row["cell"]: row for row in store.rows()}
+    row = rows[meant(given, list(rows))]
+    registry, cell = with_declared_of(installed(), [row]), cell_of(row)
+    if registry.rigs[cell.rig].simulated:
+        requests = requests_for([cell], registry, Keys(registry), store)[request_key(cell)]
+        return StoredCell(store, registry, cell, row, [request.path for request in requests])
+    for path, file in store.recordings(row):
+        if file is None:
+            hint = "Run the matrix again with --rig replay --recordings DIR."
+            raise UsageError(f"The recording {path} is not there.", hint=hint)
+    return StoredCell(store, registry, cell, row, [file for _, file in store.recordings(row) if file is not None])

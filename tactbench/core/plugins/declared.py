@@ -66,7 +66,9 @@ def with_declared(registry: Registry, tasks: Iterable[DeclaredTask]) -> Registry
                 f"The task {name!r} that {FILE} beside the recordings declares has the name of an installed one.",
                 hint="Give it another name in the mapping and import once more, or in that file.",
             )
-        family.add(Owned(TaskDescriptor(spec=task.spec), declared_task.__name__, "recordings", "", task))
+        family.add(
+            Owned(TaskDescriptor(spec=task.spec), declared_task.__name__, "recordings", "", task.model_dump_json())
+        )
     return replace(registry, tasks=family)
 
 

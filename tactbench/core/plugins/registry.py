@@ -26,7 +26,6 @@ from tactbench.core.errors import (
     UsageError,
 )
 from tactbench.core.plugins import hookspecs
-from tactbench.core.spec.declared_task import DeclaredTask
 from tactbench.core.spec.rig import (
     DeviceDescriptor,
     EffectDescriptor,
@@ -72,8 +71,8 @@ class Owned(Generic[D]):
     module: str
     distribution: str
     version: str
-    declared: DeclaredTask | None = None
-    """Of a task that came with recordings: what they say of it; None: a plugin's."""
+    declared: str = ""
+    """Of a task that came with recordings: what they say of it, as JSON; empty: a plugin's."""
 
     @property
     def ours(self) -> bool:

@@ -38,7 +38,7 @@ def gather(registry: Registry, **circumstances: Any) -> dict[str, Any]:
         "cores": os.cpu_count(),
         "memory_mb": psutil.virtual_memory().total // 2**20,
         "host": host_id(),
-        "threads": next((os.environ[name] for name in VARIABLES if name in os.environ), "as many as cores"),
+        "threads": next((os.environ[name] for name in VARIABLES if name in os.environ), "1"),
         "plugins": list(_plugins(registry)),
         "distributions": {name: version_of(name) for name in RELEVANT},
         **circumstances,

@@ -46,8 +46,8 @@ class TaskChoice(Frozen):
     split: Names = ()
     """One or several, each giving cells of its own; none: the first of the task's splits that the recordings can serve.
     `few-shot` stands for all of the task's splits `few-shot-N`."""
-    estimators: tuple[Annotated[EstimatorChoice, BeforeValidator(_by_name)], ...] = ()
-    """Empty: the task's own. Its baselines are always run."""
+    estimators: tuple[Annotated[EstimatorChoice, BeforeValidator(_by_name)], ...] | None = None
+    """None: the task's own. Its baselines are always run, and alone where this is empty."""
     dataset: str | None = None
     """Name, or mapping file, of a public data set that is asked, whatever the matrix says of recordings."""
 

@@ -1,11 +1,13 @@
-"""Tables and notes on a terminal."""
+"""Results on stdout as tables and notes, remarks on stderr."""
 
 from __future__ import annotations
 
 import io
+import sys
 from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING
 
+from tactbench.core.tables.text import visible_lines
 from tactbench.core.tables.text_table import TextTable
 
 if TYPE_CHECKING:
@@ -15,16 +17,32 @@ _STYLE = {"result": "bold", "baseline": "dim", "failed": "red", "skipped": "dim"
 _GAP, _MARGIN = 2, 1
 _LEAST = 4
 """Letters that a column of cut words keeps."""
+WITHOUT_EDGE = 400
+"""Width of a table in a file or a pipe, which have no edge: enough for every column of names of ordinary length."""
 Part = TextTable | Sequence[str]
 """Of what is printed: a table, or notes."""
 
 
-def show(parts: Iterable[Part], console: Console) -> None:
-    """Print tables and notes; text from plugins is never read as markup."""
-    if console.is_terminal:
-        _print(parts, console)
+def remark(text: str) -> None:
+    """Say something beside the results, on stderr."""
+    print(visible_lines(text), file=sys.stderr)
+
+
+def console() -> Console:
+    """Return a console for stdout; without a terminal it is wide, plain and never cuts a table."""
+    from rich.console import Console
+
+    if sys.stdout.isatty():
+        return Console(highlight=False)
+    return Console(highlight=False, width=WITHOUT_EDGE, color_system=None)
+
+
+def show(parts: Iterable[Part]) -> None:
+    """Print tables and notes on stdout; text from plugins is never read as markup."""
+    if sys.stdout.isatty():
+        _print(parts, console())
     else:
-        console.file.write(plain_text(parts, console.width))
+        sys.stdout.write(plain_text(parts, WITHOUT_EDGE))
 
 
 def plain_text(parts: Iterable[Part], width: int = 240) -> str:

@@ -34,9 +34,9 @@ def command(ctx: click.Context, rig_file: Path | None, seconds: float, shape: st
     import time
     from dataclasses import asdict
 
-    from tactbench.core.cli.screen import remark
     from tactbench.core.plugins.registry import load_object, load_registry
     from tactbench.core.plugins.rigs import load_rig_file
+    from tactbench.core.tables.terminal import remark
     from tactbench.devices.cli.device_check import check_devices
     from tactbench.devices.cli.host_devices import look_at_host
     from tactbench.devices.rig_devices import descriptor_of

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from tactbench.core.cli.screen import remark
+from tactbench.core.tables.terminal import remark
 
 if TYPE_CHECKING:
     from tactbench.core.plugins.registry import Registry

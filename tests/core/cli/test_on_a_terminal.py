@@ -6,10 +6,10 @@ from pathlib import Path
 
 import pytest
 
-from tactbench.core.cli.operator import TerminalOperator
-from tactbench.core.cli.progress import progress
 from tactbench.core.cli.run import tell_stopped
 from tactbench.core.errors import RigError
+from tactbench.core.study.operator import TerminalOperator
+from tactbench.core.study.progress import progress
 from tests.conftest import Verbs
 from tests.core.cli.terminals import on_terminal
 
@@ -82,7 +82,7 @@ def test_the_end_names_every_stopped_cell_and_how_to_look_into_it(capsys, tmp_pa
 
 
 ASKS_TWICE = """
-from tactbench.core.cli.operator import TerminalOperator
+from tactbench.core.study.operator import TerminalOperator
 from tactbench.core.errors import RigError
 operator = TerminalOperator()
 operator.prompt("Place the cap.")

@@ -7,8 +7,8 @@ import json
 import numpy as np
 import pytest
 
-from tactbench.core.cli.config import shipped_results
 from tactbench.core.matrix.store import Store
+from tactbench.core.study.shipped import shipped_results
 from tests.conftest import Verbs
 from tests.core.cli.terminals import on_terminal
 from tests.core.matrix import made

@@ -80,7 +80,7 @@ def test_the_code_of_a_tasks_own_features_counts(tmp_path, monkeypatch):
 def test_a_recording_counts_who_makes_it_of_what_in_which_role(keys):
     scene = installed().tasks["force"].spec.scenes[0].scene
     found = {
-        keys.of_recording(sensor, "twin", one, role, seed)[0]
+        keys.of_recording(sensor, "twin", one, role, seed)
         for sensor in ("ideal", "icub")
         for one in (scene, scene.model_copy(update={"simulation": Simulation(effects=("-drift",))}))
         for role in ("train", "test")

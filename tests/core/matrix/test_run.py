@@ -53,7 +53,7 @@ def ran(shelf, tmp_path_factory):
     heard = Heard()
     folder = tmp_path_factory.mktemp("ran")
     outcome = run_matrix(matrix(), Store(folder), choice=EngineChoice(jobs=2, limits=Limits(timeout_s=100.0)),
-                         recordings=shelf, progress=heard, shown=heard.show)  # fmt: skip
+                         recordings=shelf, progress=heard)  # fmt: skip
     return outcome, heard, folder
 
 

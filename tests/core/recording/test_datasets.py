@@ -9,9 +9,9 @@ import pytest
 import yaml
 
 import tactbench
-from tactbench.core.cli.config import matrix_called
 from tactbench.core.errors import MissingRecordingError, NotApplicable
 from tactbench.core.recording.datasets import DataSet, dataset_called, datasets
+from tactbench.core.study.shipped import matrix_called
 from tests.conftest import ROOT, Verbs
 from tests.core.matrix.plugin_packages import write_metadata
 from tests.core.recording.mapping.made import write_mapping

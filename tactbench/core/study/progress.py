@@ -4,31 +4,19 @@ from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Callable, Iterator
-from contextlib import AbstractContextManager, contextmanager, nullcontext
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from typing import Any, TextIO
 
-from tactbench.core.cli.screen import remark
 from tactbench.core.progress import Progress
-
-
-class Display(Progress):
-    """Progress, and what is known so far."""
-
-    def paused(self) -> AbstractContextManager[None]:
-        """Draw nothing meanwhile: somebody is asked something."""
-        return nullcontext()
-
-    def show(self, text: Callable[[], str]) -> None:
-        """Show what `text` returns while the rest is under way, in place of what was shown before; not in a log."""
-
+from tactbench.core.tables.terminal import console, plain_text, remark
 
 _FEW = 10
 """Stages of so few steps have no estimate of the time to go: a forest and a mean differ by orders of magnitude."""
 
 
 @contextmanager
-def progress() -> Iterator[Display]:
+def progress() -> Iterator[Progress]:
     """Show progress on stderr."""
     if not sys.stderr.isatty():
         yield _Lines()
@@ -42,7 +30,7 @@ def progress() -> Iterator[Display]:
             bar.end()
 
 
-class _Lines(Display):
+class _Lines(Progress):
     """One line a stage and one a finished tenth of it: readable in a log."""
 
     def begin(self, stage: str, total: int) -> None:
@@ -57,7 +45,7 @@ class _Lines(Display):
             remark(f"{self._stage}: {self._done}/{self._total} {what}{ended}")
 
 
-class _Bar(Display):
+class _Bar(Progress):
     """A bar a stage; its clock ticks by a thread where a thread is allowed, else with each step."""
 
     def __init__(self, terminal: TextIO) -> None:
@@ -110,9 +98,13 @@ class _Bar(Display):
     def working(self, what: str) -> None:
         self._shown.update(self._task, now=what, refresh=True)
 
-    def show(self, text: Callable[[], str]) -> None:
-        """Show what `text` returns above the bars."""
-        self._text = text()
+    def show(self, rows: Sequence[Mapping[str, Any]]) -> None:
+        """Show the table of `rows` above the bars, in place of the one before."""
+        from tactbench.core.leaderboard.table import build_table
+        from tactbench.core.leaderboard.view import grids
+        from tactbench.core.statistics.replicates import over_replicates
+
+        self._text = plain_text(grids(build_table(over_replicates(rows))), console().width)
         if self._shown is not None:
             self._shown.refresh()
 

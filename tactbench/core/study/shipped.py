@@ -1,4 +1,4 @@
-"""Where what came with tactbench lies: the default matrix, matrices by name, results."""
+"""What came with tactbench, and matrices by name."""
 
 from __future__ import annotations
 
@@ -8,8 +8,6 @@ import tactbench
 from tactbench.core.errors import ConfigError, UnknownNameError
 from tactbench.core.spec.matrix import MatrixSpec
 from tactbench.core.spec.yaml_file import load_yaml
-
-_ENDINGS = (".yaml", ".yml")
 
 
 def shipped(name: str, in_checkout: str) -> Path:
@@ -27,10 +25,9 @@ def shipped(name: str, in_checkout: str) -> Path:
     raise ConfigError(name, None, "tactbench was installed without it.", hint="Install tactbench again.")
 
 
-def default_matrix() -> MatrixSpec:
-    """Return ``benchmarks.yaml`` of this folder, else the one that came with tactbench; raises ConfigError."""
-    own = Path("benchmarks.yaml")
-    return load_yaml(own if own.is_file() else shipped(own.name, own.name), MatrixSpec)
+def shipped_results() -> Path:
+    """Return the file of results that came with tactbench; raises ConfigError if the installation has lost it."""
+    return shipped("results/default.json", "examples/results/default.json")
 
 
 def packaged_matrices() -> dict[str, Path]:
@@ -38,13 +35,8 @@ def packaged_matrices() -> dict[str, Path]:
     return {path.stem: path for path in sorted(shipped("matrices", "examples/matrices").glob("*.yaml"))}
 
 
-def shipped_results() -> Path:
-    """Return the file of results that came with tactbench; raises ConfigError if the installation has lost it."""
-    return shipped("results/default.json", "examples/results/default.json")
-
-
-def matrix_called(given: str) -> MatrixSpec:
-    """Return the matrix in the file `given`, or the packaged one of that name.
+def matrix_called(given: str | Path | None = None) -> MatrixSpec:
+    """Return the matrix in the file `given`, or the packaged one of that name; None: ``benchmarks.yaml``.
 
     Raises
     ------
@@ -53,9 +45,12 @@ def matrix_called(given: str) -> MatrixSpec:
     ConfigError
         If the file is wrong or cannot be read.
     """
+    path = Path(given or "benchmarks.yaml")
+    if given is None:  # this folder's own, else the one that came with tactbench
+        return load_yaml(path if path.is_file() else shipped(path.name, path.name), MatrixSpec)
     packaged = packaged_matrices()
-    if given in packaged and not Path(given).is_file():
-        return load_yaml(packaged[given], MatrixSpec)
-    if Path(given).exists() or given.endswith(_ENDINGS) or len(Path(given).parts) > 1:
-        return load_yaml(Path(given), MatrixSpec)
-    raise UnknownNameError("packaged matrix", given, packaged)
+    if not path.is_file() and str(given) in packaged:
+        path = packaged[str(given)]
+    elif not path.exists() and path.suffix not in (".yaml", ".yml") and len(path.parts) == 1:
+        raise UnknownNameError("packaged matrix", str(given), packaged)
+    return load_yaml(path, MatrixSpec)

@@ -6,8 +6,8 @@ import sys
 from collections.abc import Callable
 from contextlib import AbstractContextManager, nullcontext
 
-from tactbench.core.cli.screen import remark
 from tactbench.core.errors import RigError
+from tactbench.core.tables.terminal import remark
 
 
 class TerminalOperator:

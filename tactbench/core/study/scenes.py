@@ -1,63 +1,50 @@
-"""Which scene the options of a verb describe: what is pressed on a sensor, and how."""
+"""Which scene a few words describe: what is pressed on a sensor, and how."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from collections.abc import Mapping
+from typing import Any
 
-import click
+from pydantic import FiniteFloat, TypeAdapter
 
-if TYPE_CHECKING:
-    from collections.abc import Mapping
-
-    from tactbench.core.plugins.registry import Registry
-    from tactbench.core.spec.parameter import Parameter
-    from tactbench.core.spec.profile import ForceProfile
-    from tactbench.core.spec.quantity import Quantity
-    from tactbench.core.spec.rig import SensorDescriptor
-    from tactbench.core.spec.scene import Indenter, Scene
+from tactbench.core.errors import UnknownNameError, UsageError
+from tactbench.core.plugins.force_profiles import force_path
+from tactbench.core.plugins.registry import Registry
+from tactbench.core.spec.parameter import Parameter
+from tactbench.core.spec.profile import ForceProfile, ForceRamp
+from tactbench.core.spec.quantity import Quantity, sourced
+from tactbench.core.spec.rig import SensorDescriptor
+from tactbench.core.spec.scene import Indenter, Scene
 
 _BY = "the command line"
 
-PROFILE = click.option(
-    "--profile", metavar="NAME[:P=X,...]",
-    help="Force profile with its parameters: ramp:force=5,duration=60 (the default), sine:mean=2,frequency=0.5.",
-)  # fmt: skip
-"""Given to `profile_of`."""
 
-
-def scene_of(
-    name: str, sensor: SensorDescriptor | None, *, indenter: Indenter | None = None, profile: ForceProfile | None = None
-) -> Scene:
-    """Return a press; what is left open is that of the paper. None: no sensor is pressed."""
-    from tactbench.core.spec.profile import ForceRamp
-    from tactbench.core.spec.scene import Indenter, Scene
-
-    indenter = indenter or Indenter()
-    labels: dict[str, str | float | int] = {}
-    if indenter.radius is not None:
-        labels["cap_radius_mm"] = indenter.radius.to("mm")
-    elif indenter.shape is not None:
-        labels["indenter"] = indenter.shape
-    kinds = tuple(dict.fromkeys(channel.kind for channel in sensor.spec.channels())) if sensor else ("taxel",)
-    observe = ("taxel",) if "taxel" in kinds else kinds
-    return Scene(name=name, indenter=indenter, profile=profile or ForceRamp(), observe=observe, labels=labels)
-
-
-def indenter_of(registry: Registry, text: str | None) -> Indenter | None:
-    """Return the indenter that --indenter describes, with every dimension of its shape; None: it was not given.
+def scene_of(registry: Registry, sensor: SensorDescriptor, indenter: str | None, profile: str | None) -> Scene:
+    """Return a press with what --indenter and --profile describe; what is left open is that of the paper.
 
     Raises
     ------
     UnknownNameError
-        If no such shape is installed.
+        If no such shape or profile is installed.
     UsageError
-        If a dimension is none of its own, no number, or out of its range.
+        If a dimension or parameter is none of its own, no number, or out of its range.
     """
-    from tactbench.core.spec.quantity import sourced
-    from tactbench.core.spec.scene import Indenter
+    pressed = Indenter() if indenter is None else _indenter(registry, indenter)
+    labels: dict[str, str | float | int] = {}
+    if pressed.radius is not None:
+        labels["cap_radius_mm"] = pressed.radius.to("mm")
+    elif pressed.shape is not None:
+        labels["indenter"] = pressed.shape
+    kinds = tuple(dict.fromkeys(channel.kind for channel in sensor.spec.channels()))
+    # The name of the scene decides its draws: the seed alone shall, and not the name of the file.
+    return Scene(
+        name="press", indenter=pressed, profile=ForceRamp() if profile is None else _profile(registry, profile),
+        observe=("taxel",) if "taxel" in kinds else kinds, labels=labels,
+    )  # fmt: skip
 
-    if text is None:
-        return None
+
+def _indenter(registry: Registry, text: str) -> Indenter:
+    """Return an indenter with every dimension of its shape."""
     name, given = _named(text)
     descriptor = registry.indenters[name]
     turned = {"angle": sourced(given.pop("angle"), "deg", _BY)} if "angle" in given else {}
@@ -69,12 +56,7 @@ def indenter_of(registry: Registry, text: str | None) -> Indenter | None:
     return Indenter(shape=name, dimensions=sizes, **turned)
 
 
-def profile_of(registry: Registry, text: str | None) -> ForceProfile | None:
-    """Return the force profile that --profile describes; None: it was not given. Raises as `indenter_of`."""
-    from tactbench.core.plugins.force_profiles import force_path
-
-    if text is None:
-        return None
+def _profile(registry: Registry, text: str) -> ForceProfile:
     name, given = _named(text)
     if name == "ramp":
         return _ramp(given)
@@ -83,10 +65,6 @@ def profile_of(registry: Registry, text: str | None) -> ForceProfile | None:
 
 
 def _ramp(given: Mapping[str, float]) -> ForceProfile:
-    from tactbench.core.errors import UnknownNameError, UsageError
-    from tactbench.core.spec.profile import ForceRamp
-    from tactbench.core.spec.quantity import sourced
-
     ramp = ForceRamp()
     change: dict[str, Any] = {}
     for name, value in given.items():
@@ -106,10 +84,6 @@ def _ramp(given: Mapping[str, float]) -> ForceProfile:
 
 def _named(text: str) -> tuple[str, dict[str, float]]:
     """Return the name and the numbers of ``NAME:A=1,B=2``; raises UsageError naming what is none."""
-    from pydantic import FiniteFloat, TypeAdapter
-
-    from tactbench.core.errors import UsageError
-
     name, _, rest = text.partition(":")
     given: dict[str, float] = {}
     for part in filter(None, rest.split(",")):
@@ -126,8 +100,6 @@ def _named(text: str) -> tuple[str, dict[str, float]]:
 
 def _in_units(given: Mapping[str, float], parameters: Mapping[str, Parameter]) -> dict[str, Quantity]:
     """Return numbers in the units of `parameters`; names that are none of them are left for whoever refuses them."""
-    from tactbench.core.spec.quantity import sourced
-
     return {
         name: sourced(value, parameters[name].unit if name in parameters else "1", _BY) for name, value in given.items()
     }

@@ -1,14 +1,16 @@
-"""How verbs open a result folder: what can be shown of it, and what is left out."""
+"""How a result folder is opened: what can be shown of it, and what is left out."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-if TYPE_CHECKING:
-    from tactbench.core.leaderboard.table import Table
-    from tactbench.core.matrix.store import Store
+from tactbench.core.errors import UsageError
+from tactbench.core.leaderboard.table import Table, build_table, over_all
+from tactbench.core.matrix.store import Row, Store
+from tactbench.core.plugins.registry import installed
+from tactbench.core.tables.terminal import remark
 
 
 def is_results(folder: Path) -> bool:
@@ -18,15 +20,12 @@ def is_results(folder: Path) -> bool:
 
 def opened(folder: Path) -> Store:
     """Return a result folder; raises UsageError if there is none."""
-    from tactbench.core.errors import UsageError
-    from tactbench.core.matrix.store import Store
-
     if not is_results(folder):
         raise UsageError(f"There are no results in {folder}.", hint="Make some with `tactbench run --out DIR`.")
     return Store(folder)
 
 
-def shown_rows(store: Store) -> list[dict[str, Any]]:
+def shown_rows(store: Store) -> list[Row]:
     """Return a row for each cell of a folder; tell of files that cannot be read.
 
     Raises
@@ -34,10 +33,6 @@ def shown_rows(store: Store) -> list[dict[str, Any]]:
     UsageError
         If there is none.
     """
-    from tactbench.core.cli.screen import remark
-    from tactbench.core.errors import UsageError
-    from tactbench.core.leaderboard.table import over_all
-
     rows = store.rows()
     for one in store.troubles:
         remark(f"Left out: {one}")
@@ -47,11 +42,11 @@ def shown_rows(store: Store) -> list[dict[str, Any]]:
 
 
 def table_of(store: Store, rows: Sequence[Mapping[str, Any]], *, times: bool = True) -> Table:
-    """Return the leaderboard of rows, one a cell; `times` as of `build_table`."""
-    from tactbench.core.cli.tables import questions_of
-    from tactbench.core.leaderboard.table import build_table
-
-    return build_table(rows, provenance_of(store, rows), times=times, questions=questions_of(rows))
+    """Return the leaderboard of rows, one a cell; `times` as of `build_table`. A task not installed asks nothing."""
+    tasks = installed().tasks
+    names = {str(row["task"]) for row in rows}.intersection(tasks.names())
+    questions = {name: tasks[name].spec.question for name in names}
+    return build_table(rows, provenance_of(store, rows), times=times, questions=questions)
 
 
 def provenance_of(store: Store, rows: Iterable[Mapping[str, Any]]) -> list[dict[str, Any]]:
