@@ -31,7 +31,6 @@ from tactbench.core.leaderboard.view import best, grids
 from tactbench.core.matrix.naming import cell_of
 from tactbench.core.matrix.plan import Cell
 from tactbench.core.matrix.solve import Job, read_dataset, solve, unanswered
-from tactbench.core.matrix.summary import fill_baselines
 from tactbench.core.plugins.declared import declared_in, with_declared_of
 from tactbench.core.plugins.declared import with_declared as with_declared_tasks
 from tactbench.core.plugins.interfaces import Estimator
@@ -260,7 +259,6 @@ def evaluate(
     row, answers = _answered(cell, spec, paths, estimator)
     trivial = [replace(cell, estimator=name, baseline=True) for name in spec.baselines if name != cell.estimator]
     rows = [row, *(_ended(one, spec, paths, one.estimator, row["simulated"]) for one in trivial)]
-    fill_baselines(rows)
     counts = Counter(one.name for one in data.metas)
     names = [one.name if counts[one.name] == 1 else str(path) for one, path in zip(data.metas, data.paths, strict=True)]
     return Result(rows, answers["test"], spec, names)

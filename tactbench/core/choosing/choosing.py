@@ -119,7 +119,7 @@ def choose(rows: Sequence[Row], wish: Wish, task: TaskSpec, sensors: Mapping[str
     Parameters
     ----------
     rows
-        Of one task, protocol and split, baselines filled in (`tactbench.core.matrix.summary.fill_baselines`).
+        Of one task, protocol and split, as :func:`over_replicates` gives them.
     sensors
         Specs by name; a sensor that is not installed has no known range and rate.
 

@@ -79,14 +79,15 @@ def _results(folder: Path | None, task: TaskSpec) -> tuple[list[Row], str]:
 
 def _shipped() -> tuple[list[Row], str]:
     """Return the rows that came with tactbench, and how they were made."""
-    from tactbench.core.matrix.summary import fill_baselines
+    from tactbench.core.statistics.replicates import over_replicates
     from tactbench.core.study.shipped import shipped_results
 
     shipped = json.loads(shipped_results().read_text(encoding="utf-8"))
-    rows: list[Row] = shipped["rows"]
-    fill_baselines(rows)
-    return rows, (f"the results that came with tactbench ({shipped['command']} of version {shipped['version']}, seed "
-                  f"{shipped['seed']}, {shipped['replicates']}; times of another machine)")  # fmt: skip
+    origin = (
+        f"the results that came with tactbench ({shipped['command']} of version {shipped['version']}, seed "
+        f"{shipped['seed']}, {shipped['replicates']}; times of another machine)"
+    )
+    return over_replicates(shipped["rows"]), origin
 
 
 def _selected(rows: list[Row], task: TaskSpec, protocol: str | None) -> tuple[list[Row], str]:

@@ -25,7 +25,6 @@ from typing import Any
 from tactbench.core.errors import FolderError
 from tactbench.core.matrix.keys import differences
 from tactbench.core.matrix.store import Row, Store, writing
-from tactbench.core.matrix.summary import SEED_DECIDES
 from tactbench.core.spec.status import STATUSES
 
 SAME_SCORE = 1e-9
@@ -35,6 +34,14 @@ _SHOWN = 10
 """Contradictions named in a message; the others are counted."""
 _DECIDES = ("configuration", "task", "estimator", "versions", "source")
 """Sections of a key that two results of one name must share."""
+
+SEED_DECIDES = (
+    "cell", "status", "metric", "score", "ci_low", "ci_high", "ci_method", "reference_floor",
+    "score_beyond_floor", "beyond_floor_ci_low", "beyond_floor_ci_high", "true_score", "tare_s", "n_recordings",
+    "n_train", "n_test",
+    "counts", "chosen", "scores", "confusion", "classes", "split", "stamps", "dagger",
+)  # fmt: skip
+"""Keys of a row that do not depend on machine or hour, but for the last bits of numbers."""
 
 
 @dataclass(frozen=True)

@@ -26,7 +26,6 @@ from tactbench.core.matrix.plan_recordings import (
 from tactbench.core.matrix.record import GRACE_S, Recorder, is_computed
 from tactbench.core.matrix.solve import Job, published, solve, unanswered
 from tactbench.core.matrix.store import Row, Store
-from tactbench.core.matrix.summary import fill_baselines
 from tactbench.core.plugins.declared import declared_in, with_declared
 from tactbench.core.plugins.interfaces import Operator
 from tactbench.core.plugins.registry import Registry, installed
@@ -153,7 +152,6 @@ def run_matrix(
         run.carry_out([cell for cell in cells if cell.timed], alone=True)
         run.carry_out([cell for cell in cells if not cell.timed], alone=False)
     rows = tuple(run.rows[cell.name] for cell in cells)
-    fill_baselines(rows)
     return Outcome(rows, provenance, run.computed, run.recorded)
 
 

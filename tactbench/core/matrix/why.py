@@ -8,12 +8,12 @@ from pathlib import Path
 
 from tactbench.core.errors import TactbenchError, UsageError
 from tactbench.core.matrix.keys import Keys, differences
+from tactbench.core.matrix.merge import SEED_DECIDES
 from tactbench.core.matrix.naming import cell_of, meant
 from tactbench.core.matrix.plan import Cell
 from tactbench.core.matrix.plan_recordings import RecordingSource, request_key, requests_for
 from tactbench.core.matrix.run import EngineChoice, Run
 from tactbench.core.matrix.store import Row, Store
-from tactbench.core.matrix.summary import SEED_DECIDES
 from tactbench.core.plugins.declared import with_declared_of
 from tactbench.core.plugins.registry import Registry, installed
 from tactbench.core.progress import Progress

@@ -7,13 +7,14 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from math import comb
+from operator import itemgetter
 from statistics import median, median_low
 from typing import Any
 
-from tactbench.core.matrix.summary import fill_baselines
-from tactbench.core.spec.row import plural
+from tactbench.core.spec.row import LOWER_IS_BETTER, plural
 
 Row = Mapping[str, Any]
+_group = itemgetter("sensor", "task", "rig", "protocol", "split", "repeat")
 
 FEWEST = 5
 """Replicates that an interval or a rank needs: the range of four holds the median in 87.5 % of cases only."""
@@ -58,8 +59,30 @@ def over_replicates(rows: Sequence[Row]) -> list[dict[str, Any]]:
     for row in rows:
         groups.setdefault(_name(row), []).append(row)
     found = [_of_all(name, sorted(members, key=_number)) for name, members in groups.items()]
-    fill_baselines(found)
+    _fill_baselines(found)
     return found
+
+
+def _fill_baselines(rows: Sequence[dict[str, Any]]) -> None:
+    """Write beside every row the best trivial score of its group that used no more than the row's own answer may.
+
+    A trivial answer that looks at the time of a sample knows what an answer from readings does not: a ramp that is
+    commanded alike in every recording. It is compared with answers that look at the time too, and with no others. One
+    that looks at the reference is an oracle, and no bar to anything.
+    """
+    by_group: dict[tuple[Any, ...], list[Row]] = {}
+    for row in rows:
+        if row.get("is_baseline") and row["status"] == "done":
+            by_group.setdefault(_group(row), []).append(row)
+    bars: dict[tuple[Any, bool], float | None] = {}
+    for group, members in by_group.items():
+        best = min if members[0]["metric"] in LOWER_IS_BETTER else max
+        for timed in (False, True):
+            knowing = {"reference"} if timed else {"reference", "time"}
+            known = [one["score"] for one in members if one.get("looks_at") not in knowing]
+            bars[group, timed] = best(known, default=None)
+    for row in rows:
+        row["baseline"] = bars.get((_group(row), row.get("looks_at") == "time"))
 
 
 def _name(row: Row) -> str:

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
+from tactbench.core.matrix.merge import SEED_DECIDES
 from tactbench.core.matrix.store import Store
-from tactbench.core.matrix.summary import SEED_DECIDES
 from tests.conftest import Verbs
 from tests.core.cost.test_ladder import presses
 

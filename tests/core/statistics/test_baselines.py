@@ -1,6 +1,6 @@
 """The baseline column: the best trivial answer that used the same knowledge."""
 
-from tactbench.core.matrix.summary import fill_baselines
+from tactbench.core.statistics.replicates import over_replicates
 from tests.core.leaderboard.rows import row
 
 
@@ -12,8 +12,7 @@ def filled(metric="rmse", scores=None, **more):
             looks_at=looks.get(name, "nothing"), **more)
         for name, score in given.items()
     ]  # fmt: skip
-    fill_baselines(rows)
-    return {one["estimator"]: one for one in rows}
+    return {one["estimator"]: one for one in over_replicates(rows)}
 
 
 def test_the_best_of_those_that_look_at_nothing_whatever_comes_first():
