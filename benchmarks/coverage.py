@@ -269,7 +269,7 @@ def beyond(trials: int, seed: int) -> None:
                 answers = Answers(y, answered, session, row, np.zeros_like(row), row.astype(np.float64), y)
                 floor = Floor({place: hold_of(noise[place, :hold]) for place in range(sessions)})
                 unit = ReplicateUnits("session", session, tuple(map(str, range(sessions))))
-                found = beyond_floor(floor, answers, unit)
+                _, found = beyond_floor(floor, answers, unit)
                 ours += found.low <= own <= found.high
                 clear += found.low > 0
                 whole = score_interval(METRICS["rmse"], y, answered, unit, 0)

@@ -19,9 +19,9 @@ import numpy.typing as npt
 
 from tactbench.core.acquisition import acquire
 from tactbench.core.evaluation.cell import CellContext, evaluate_cell
+from tactbench.core.evaluation.cell import Result as CellResult
 from tactbench.core.evaluation.dataset import Dataset, Table, load_dataset
 from tactbench.core.evaluation.metrics import metric_called
-from tactbench.core.evaluation.result import Result as CellResult
 from tactbench.core.plugins.registry import installed, load_object
 from tactbench.core.spec.recording import RecordingMeta
 from tactbench.core.spec.scene import NUISANCES, Simulation

@@ -17,7 +17,7 @@ def scored(paths, estimator, protocol, task=None, **params):
     asked = (task or force_task()).model_copy(update={"protocols": tuple(PROTOCOLS)})
     result = evaluated(asked, paths, estimator, protocol, "roles", params=params)
     assert np.isfinite(result.score)
-    assert result.interval.low is None
+    assert result.ci_low is None
     return result
 
 
@@ -98,7 +98,7 @@ def test_an_inner_set_without_rows_is_no_reason_against_the_others(tmp_path):
         # Shorter than nothing the split needs, but gone once its hold-out has been cut off.
         paths.append(record(tmp_path / f"short{place}.h5", np.ones((2, 2)), np.ones(2), role="train", session="train"))
     found = scored(paths, "ridge", "deployable")
-    assert found.sizes.n_recordings == 5
+    assert found.n_recordings == 5
     assert np.isfinite([one["score"] for one in found.search]).all()
 
 

@@ -22,11 +22,11 @@ def test_slip_of_real_sequences_by_blocks_of_neighbours(sequences):
     """The notes of the data have 0.978 of eight blocks, 0.993 of shuffled folds and 0.752 of always 'slipped'."""
     found = evaluated(slip_sequence.SPEC, sequences, "forest", params={"n_estimators": 10})
     assert found.split == "block", "nothing stricter is labelled: no object and one session"
-    assert found.sizes.n_test == 137
+    assert found.n_test == 137
     assert found.score >= 0.96
     trivial = evaluated(slip_sequence.SPEC, sequences, "majority")
     assert trivial.score == pytest.approx(103 / 137)
-    assert found.interval.low is None, "less than five blocks hold sequences without a slip"
+    assert found.ci_low is None, "less than five blocks hold sequences without a slip"
     assert min(found.replicates["own"]) > trivial.score
 
 

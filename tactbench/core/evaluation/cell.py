@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from pydantic import Field
 
 from tactbench.core.errors import DataError, PluginContractError
 from tactbench.core.evaluation.answers import AnsweredFold, Configured, FittedFold, answered_fold, fitted_fold
@@ -38,7 +39,6 @@ from tactbench.core.evaluation.leaks import copied_channels, leak_stamps
 from tactbench.core.evaluation.metrics import METRICS, Metric, class_f1, confusion, metric_called, vector_details
 from tactbench.core.evaluation.reference_floor import beyond_floor, reference_floor, true_force
 from tactbench.core.evaluation.replicate_sums import recordings_right, replicates, summed
-from tactbench.core.evaluation.result import Result, Sizes, Times
 from tactbench.core.evaluation.sets import tare_s
 from tactbench.core.evaluation.splits import SHUFFLED_STAMP, SHUFFLED_WHOLE_STAMP, over_rows, used_rows, without_part
 from tactbench.core.evaluation.summaries import without_windows
@@ -47,6 +47,8 @@ from tactbench.core.recording.completeness import INCOMPLETE
 from tactbench.core.samples import Answers
 from tactbench.core.spec.recording import RecordingMeta
 from tactbench.core.spec.rig import EstimatorDescriptor
+from tactbench.core.spec.row import Cost, Evaluated
+from tactbench.core.spec.scene import Role
 from tactbench.core.spec.task import TaskSpec, VectorTarget
 from tactbench.core.thread_limit import thread_limit
 
@@ -70,6 +72,15 @@ class CellContext:
     """that estimator and BLAS may use"""
     latency: bool = True
     """whether to measure how long the answer to one row takes"""
+
+
+class Result(Evaluated):
+    """What evaluating a cell tells, as its row says it, and the answers."""
+
+    split: str
+    score: float
+    sets: dict[Role, Any] = Field(exclude=True)
+    """:class:`Answers` by role: test always; validation, and for regression train, where the split has one fold"""
 
 
 def evaluate_cell(context: CellContext, recordings: Sequence[Path] | Dataset) -> Result:
@@ -122,11 +133,11 @@ def evaluate(
         for number, assignment in enumerate(data.assignments):
             fitted = fitted_fold(estimator, data, assignment, metric, counts, clock)
             answered.append(answered_fold(fitted, data, descriptor, metric, rules, number, clock))
-        times, delay_remarks = _times(fitted, answered, data, descriptor, clock, threads, latency=latency)
-    return _result(answered, data, descriptor, metric, rules, times, delay_remarks, counts)
+        cost, delay_remarks = _cost(fitted, answered, data, descriptor, clock, threads, latency=latency)
+    return _result(answered, data, descriptor, metric, rules, cost, delay_remarks, counts)
 
 
-def _times(
+def _cost(
     fitted: FittedFold,
     answered: Sequence[AnsweredFold],
     data: TaskData,
@@ -135,7 +146,7 @@ def _times(
     threads: int,
     *,
     latency: bool,
-) -> tuple[Times, tuple[str, ...]]:
+) -> tuple[Cost, tuple[str, ...]]:
     """Return what all folds took, and how late answers of the last fold's model are, with remarks on that."""
     recorded, task, rules = data.recorded, data.task, data.rules
     parts, remarks = stated_delay_ms(recorded, data.data, task, rules, descriptor, fitted.k)
@@ -148,7 +159,7 @@ def _times(
         parts |= ({} if ready_s is None else {"features": 1e3 * ready_s}) | {"prediction": p50}
     else:
         remarks = tuple(one for one in remarks if one not in (NO_LINK, NO_RATE))  # there is no delay to speak of
-    times = Times(
+    cost = Cost(
         search_s=sum(one.search_s for one in answered),
         fit_s=sum(one.fit_s for one in answered),
         predict_s=sum(one.predict_s for one in answered),
@@ -162,7 +173,7 @@ def _times(
         threads=threads,
         peak_rss_mb=peak_rss_mb(),
     )
-    return times, remarks
+    return cost, remarks
 
 
 def _result(
@@ -171,7 +182,7 @@ def _result(
     descriptor: EstimatorDescriptor,
     metric: Metric,
     rules: EventRules | None,
-    times: Times,
+    cost: Cost,
     delay_remarks: Sequence[str],
     counts: Counter[str],
 ) -> Result:
@@ -200,13 +211,16 @@ def _result(
         remarks.append(no_floor)
         truth = true_force(task, made, tested)
         if floor is not None:
-            beside["beyond"] = beyond_floor(floor, tested, unit)
+            own_error, interval = beyond_floor(floor, tested, unit)
+            beside |= {"reference_floor": floor.value, "score_beyond_floor": own_error}
+            beside |= {"beyond_floor_ci_low": interval.low, "beyond_floor_ci_high": interval.high}
         if truth is not None:
             interval = score_interval(metric, truth, tested.y_pred, unit, 0)
-            beside["true"] = metric.of(truth, tested.y_pred), interval
+            beside["true_score"] = metric.of(truth, tested.y_pred)
+            beside |= {"true_ci_low": interval.low, "true_ci_high": interval.high}
     else:
         sums = metric.rows(tested.y_true, tested.y_pred, n_classes).sum(axis=0)
-        beside["confusion"] = confusion(sums, n_classes).astype(np.int64)
+        beside["confusion"] = confusion(sums, n_classes).astype(np.int64).tolist()
         if rules is None and task.answer_per != "frame":
             beside["recordings_right"], beside["recordings_asked"] = recordings_right(tested) or (None, None)
         scores |= {
@@ -214,8 +228,8 @@ def _result(
         }
     if rules is not None:
         detected = [one for fold in answered for one in fold.detected]
-        latency = times.latency_ms_p50 is not None
-        compute_s = sum(times.delay_parts_ms.get(name, 0.0) for name in ("features", "prediction")) / 1e3
+        latency = cost.latency_ms_p50 is not None
+        compute_s = sum(cost.delay_parts_ms.get(name, 0.0) for name in ("features", "prediction")) / 1e3
         beside["events"] = rules.figures(detected, compute_s if latency else None)
         beside["operating_points"] = rules.operating_points(detected, compute_s if latency else None)
     elif task.answer_per == "frame":
@@ -226,37 +240,38 @@ def _result(
     remarks += [_untrained(answered), *delay_remarks]
     took_part, left_out, stamps = _part_taken(data)
     specimens = {meta.labels.get("unit") for meta in took_part}
+    interval = score_interval(metric, tested.y_true, tested.y_pred, unit, n_classes)
     return Result(
         metric=metric.name,
         score=score,
-        interval=score_interval(metric, tested.y_true, tested.y_pred, unit, n_classes),
+        ci_low=interval.low,
+        ci_high=interval.high,
+        ci_method=interval.method,
         # R² of labels that never change is undefined; a key that is not there says so, NaN would not even be JSON.
         scores={name: value for name, value in scores.items() if np.isfinite(value)},
-        sizes=Sizes(
-            n_recordings=len(took_part),
-            n_sessions=len({meta.session for meta in took_part}),
-            n_specimens=None if None in specimens else len(specimens),
-            n_train=sum(one.sizes[0] for one in answered),
-            n_test=len(tested),
-            fold_sizes={f"fold {one.name}": one.sizes for one in answered},
-        ),
-        times=times,
+        n_recordings=len(took_part),
+        n_sessions=len({meta.session for meta in took_part}),
+        n_specimens=None if None in specimens else len(specimens),
+        n_train=sum(one.sizes[0] for one in answered),
+        n_test=len(tested),
+        fold_sizes={f"fold {one.name}": list(one.sizes) for one in answered},
         split=data.split,
         sets=sets,
         replicates=summed(metric, tested, unit, n_classes, floor),
-        classes=made.classes,
+        classes=list(made.classes),
         chosen=_chosen(answered) | _thresholds(answered, rules),
-        search=tuple(
+        search=[
             {**candidate.params, "k": candidate.k, "score": candidate.score, "fold": one.name}
             for one in answered
             if one.choice
             for candidate in one.choice.compared
-        ),
+        ],
         counts=dict(counts + Counter(left_out)),
         dagger=data.rules.uses_test_statistics,
         stamps=stamps,
         tare_s=held_s or None,
-        remarks=tuple(one for one in remarks if one),
+        remarks=[one for one in remarks if one],
+        **cost.model_dump(exclude_unset=True),
         **beside,
     )
 
@@ -280,7 +295,7 @@ def _refuse(estimator: str, metric: Metric, tested: Answers) -> None:
     )
 
 
-def _part_taken(data: TaskData) -> tuple[list[RecordingMeta], dict[str, int], tuple[str, ...]]:
+def _part_taken(data: TaskData) -> tuple[list[RecordingMeta], dict[str, int], list[str]]:
     """Return the recordings that some fold uses, what no fold uses, and stamps: of leaks, of incomplete ones."""
     recorded = data.recorded
     folds = [over_rows(one, recorded) for one in data.assignments]
@@ -290,8 +305,8 @@ def _part_taken(data: TaskData) -> tuple[list[RecordingMeta], dict[str, int], tu
         stamps = leak_stamps(recorded, folds)
     else:
         stamps = (SHUFFLED_WHOLE_STAMP if recorded.whole else SHUFFLED_STAMP,)
-    stamps = (*copied_channels(recorded), *stamps, *_incomplete(recorded))
-    return took_part, without_part(recorded, data.split, used), stamps
+    stamped = [*copied_channels(recorded), *stamps, *_incomplete(recorded)]
+    return took_part, without_part(recorded, data.split, used), stamped
 
 
 def _of_answers(data: TaskData, descriptor: EstimatorDescriptor, answered: Sequence[AnsweredFold]) -> list[str]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -161,14 +161,14 @@ class EventRules:
             found["compute s per s of signal"] = 1e9 * compute_s / self.hop_ns
         return {name: value for name, value in found.items() if np.isfinite(value)}
 
-    def operating_points(self, tested: Sequence[Detected], compute_s: float | None) -> tuple[Mapping[str, float], ...]:
+    def operating_points(self, tested: Sequence[Detected], compute_s: float | None) -> list[dict[str, float]]:
         """Return what test recordings say at thresholds that validation chose for several bounds of false alarms."""
         found = []
         for number, bound in enumerate(BOUNDS_PER_MINUTE if self.own_threshold is None else ()):
             scores = self._scores([one._replace(threshold=one.bounds[number]) for one in tested])
             point = {"bound": bound, "f1": float(scores.f1), **_hits(scores, compute_s or 0.0)}
             found.append({name: value for name, value in point.items() if np.isfinite(value)})
-        return tuple(found)
+        return found
 
     def _scores(self, tested: Sequence[Detected], scale: float = 1.0) -> EventScores:
         truths = [one.scored.truth(scale) for one in tested]

@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from tactbench.core.evaluation.dataset import Dataset, Table
-from tactbench.core.evaluation.interval import ReplicateUnits, influences, student_quantile
+from tactbench.core.evaluation.interval import Interval, ReplicateUnits, influences, student_quantile
 from tactbench.core.evaluation.metrics import Metric, ratio
 from tactbench.core.evaluation.sets import hold_s, unloaded
 from tactbench.core.samples import Answers, FloatArray, IntArray
@@ -22,16 +22,6 @@ from tactbench.core.spec.task import ChannelTarget, TaskSpec
 
 FEWEST = 30
 """Independent unloaded samples below which no floor is told (assumed): a deviation from 30 is known to 13 %."""
-
-
-@dataclass(frozen=True)
-class BeyondFloor:
-    """The floor under a RMSE, and what is left of it; all in the unit of the RMSE."""
-
-    floor: float
-    score: float
-    low: float | None
-    high: float | None
 
 
 @dataclass(frozen=True)
@@ -112,7 +102,7 @@ def hold_of(y: npt.NDArray[Any]) -> FloatArray:
     return np.column_stack([centred**2, np.full(n, freedom / n)])
 
 
-def beyond_floor(floor: Floor, tested: Answers, unit: ReplicateUnits) -> BeyondFloor:
+def beyond_floor(floor: Floor, tested: Answers, unit: ReplicateUnits) -> tuple[float, Interval]:
     """Return what a RMSE is beyond the floor, with its 95 % interval; None for its ends where there are too few units.
 
     Notes
@@ -124,13 +114,13 @@ def beyond_floor(floor: Floor, tested: Answers, unit: ReplicateUnits) -> BeyondF
     loss = (tested.y_pred - tested.y_true) ** 2
     excess = float(loss.mean() - floor.square)
     if not unit.enough(tested.y_true, 0):
-        return BeyondFloor(floor.value, _root(excess), None, None)
+        return _root(excess), Interval()
     sums = unit.sums(np.column_stack([loss, np.ones(len(loss))]))
     held = floor.by_replicate(tested, unit.codes)
     without = ratio(sums.sum(axis=0) - sums) - ratio(held.sum(axis=0) - held)
     carried = influences(without, np.zeros(len(sums), dtype=np.int64))
     reach = float(student_quantile(len(sums) - 1)) * float(np.sqrt(carried @ carried))
-    return BeyondFloor(floor.value, _root(excess), _root(excess - reach), _root(excess + reach))
+    return _root(excess), Interval(_root(excess - reach), _root(excess + reach))
 
 
 def _root(excess: float) -> float:

@@ -17,7 +17,7 @@ from tactbench.core.leaderboard.names import Row
 from tactbench.core.leaderboard.sentences import NO_BETTER
 from tactbench.core.leaderboard.table import Block, Table, build_table
 from tactbench.core.leaderboard.view import DEFAULT_VIEW, WHOLE, View, document, grids
-from tactbench.core.spec.row import FORMAT, JSON_KEYS, NESTED, OF_REPLICATES, RowModel
+from tactbench.core.spec.row import FORMAT, JSON_KEYS, NESTED, OF_REPLICATES, Cost
 from tactbench.core.statistics.replicates import counted
 from tactbench.core.tables import markdown as markdown_format
 from tactbench.core.tables import terminal
@@ -163,11 +163,7 @@ def write_tables(
 RANK_KEYS = ("rank", "rank_low", "rank_high", "rank_tied")
 """Where a row stands in its block; they follow the keys of the row."""
 
-_FIELDS = list(RowModel.model_fields)
-OF_THE_MACHINE = {
-    *_FIELDS[_FIELDS.index("sim_s") : _FIELDS.index("simulated")],
-    "search", "recordings", "key", "events", "operating_points",
-}  # fmt: skip
+OF_THE_MACHINE = {*Cost.model_fields, "search", "recordings", "key", "events", "operating_points"}
 """Keys that machine, place or hour decide, not the seed alone."""
 
 FORMAT_VERSION = "1"

@@ -109,7 +109,6 @@ def solve(job: Job, concurrency: int = 1, given: Estimator | None = None) -> Sol
 
     from tactbench.core.evaluation.cell import CellContext, evaluate, evaluate_cell
     from tactbench.core.evaluation.folds import load_task
-    from tactbench.core.evaluation.result import row_of
 
     began = time.perf_counter()
     # The global generators get the cell's seed: what is drawn from them does not depend on the cells before.
@@ -127,7 +126,7 @@ def solve(job: Job, concurrency: int = 1, given: Estimator | None = None) -> Sol
         result = evaluate(given, folds, clock=time.perf_counter, latency=cell.timed)
     row = {
         **opening(cell, task),
-        **row_of(result),
+        **result.model_dump(exclude_unset=True),
         **_described(data.metas, (*result.remarks, *([TIMED] if cell.timed else []))),
         **published(cell, task, result.split),
         **({} if cell.timed else dict.fromkeys(_TIMES)),

@@ -12,11 +12,16 @@ from tactbench.core.evaluation.metrics import METRICS
 from tactbench.core.leaderboard.names import METRIC_NAMES, Row
 from tactbench.core.report.results import Details, Results
 from tactbench.core.samples import Answers
-from tactbench.core.spec.row import RowModel
+from tactbench.core.spec.row import Asked, Cost, Ended, RestsOn, Scored
 from tactbench.core.tables.text_table import ABSENT, Entry, TextTable, finite, text_table
 
-_GROUPS = {"cell": "Configuration", "status": "Answer", "sim_s": "Times and memory", "simulated": "What it rests on"}
-"""Titles of groups of single values, by the key of a row that begins each."""
+_GROUPS = {
+    **dict.fromkeys(Asked.model_fields, "Configuration"),
+    **dict.fromkeys((*Ended.model_fields, *Scored.model_fields), "Answer"),
+    **dict.fromkeys(Cost.model_fields, "Times and memory"),
+    **dict.fromkeys(RestsOn.model_fields, "What it rests on"),
+}
+"""Titles of groups of single values, by key."""
 _TITLES = {
     "params": "Parameters other than the defaults",
     "chosen": "Chosen on validation data",
@@ -58,9 +63,7 @@ def details(row: Row, results: Results | None) -> Details:
         ],
     }
     pairs: dict[str, dict[str, str]] = {}
-    group = ""
-    for name in dict.fromkeys((*RowModel.model_fields, *said)):
-        group = _GROUPS.get(name, group if name in RowModel.model_fields else "Also")
+    for name in dict.fromkeys((*_GROUPS, *said)):
         value, title = said.get(name), _TITLES.get(name, name)
         if name not in said or name in (*_TEXTS, *_APART):
             continue
@@ -69,7 +72,7 @@ def details(row: Row, results: Results | None) -> Details:
         elif isinstance(value, list | tuple) and isinstance(value[0], Mapping):
             records[title] = value
         else:
-            pairs.setdefault(group, {})[title] = _text(value)
+            pairs.setdefault(_GROUPS.get(name, "Also"), {})[title] = _text(value)
     return Details(
         cell=str(row["cell"]),
         status=str(row["status"]),

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any, Literal, get_args, get_origin, get_type_hints
+from typing import Any, Literal, get_args, get_origin
 
 from pydantic import BaseModel, ConfigDict
 
@@ -18,25 +18,19 @@ MEDIAN_ERROR, HIGH_ERROR = "median error", "95th percentile of the error"
 LEAKS = "leaks: "
 """How a stamp begins that says that a score is no measure of the sensor."""
 
-Numbers = dict[str, float]
-
 
 def plural(unit: str) -> str:
     """Return the name of several units of replication."""
     return unit + ("es" if unit.endswith("s") else "s")
 
 
-class RowModel(BaseModel):
-    """One cell. Times are seconds unless the name says otherwise; a row may have other keys, of which nothing is asked.
+class _Section(BaseModel):
+    model_config = ConfigDict(extra="forbid", strict=True, allow_inf_nan=False, defer_build=True)
 
-    Rows are handed about as plain mappings; this model says what they hold, what stands there before anything is known,
-    and checks what comes from a file. Tables for programs have its keys in this order. Each row has dictionaries and
-    lists of its own: pydantic copies empty defaults.
-    """
 
-    model_config = ConfigDict(extra="allow", strict=True, allow_inf_nan=False, defer_build=True)
+class Asked(_Section):
+    """What was asked."""
 
-    # What was asked
     cell: str
     sensor: str = ""
     task: str = ""
@@ -55,38 +49,57 @@ class RowModel(BaseModel):
     repeats: int = 1
     seed: int = 0
     simulation: dict[str, Any] = {}
-    # How it ended
+
+
+class Ended(_Section):
+    """How it ended."""
+
     status: Status
     reason: str = ""
     traceback: str = ""
     signal: int | None = None
     log: str = ""
-    # The score
+
+
+class Scored(_Section):
+    """The score, and how much was answered."""
+
     metric: str = ""
     unit: str = ""
     equivalence: float | None = None
     score: float | None = None
     ci_low: float | None = None
+    """None: there are too few units for an interval"""
     ci_high: float | None = None
+    """None, with a `ci_low`: the data put no upper bound to an error"""
     ci_method: str = ""
     reference_floor: float | None = None
+    """of an error of force: the noise of the reference; None where that is not known"""
     score_beyond_floor: float | None = None
     beyond_floor_ci_low: float | None = None
     beyond_floor_ci_high: float | None = None
     true_score: float | None = None
+    """the metric against the force that was exerted; None where that is not known"""
     true_ci_low: float | None = None
     true_ci_high: float | None = None
     tare_s: float | None = None
+    """seconds of unloaded hold that each recording was tared on, the shortest of all; None: none was tared"""
     baseline: float | None = None
     published: float | None = None
     published_reference: str = ""
     published_remark: str = ""
     n_recordings: int | None = None
+    """that some fold uses; n_sessions and n_specimens alike"""
     n_sessions: int | None = None
     n_specimens: int | None = None
+    """devices, by the label `unit`; None where a recording has none"""
     n_train: int | None = None
     n_test: int | None = None
-    # What it cost
+
+
+class Cost(_Section):
+    """What it took. What needs single answers to be timed is None where they were not."""
+
     sim_s: float | None = None
     search_s: float | None = None
     fit_s: float | None = None
@@ -94,38 +107,70 @@ class RowModel(BaseModel):
     batch_rows: int | None = None
     latency_ms_p50: float | None = None
     latency_ms_p95: float | None = None
+    """None also where fewer than 200 calls were measured"""
     latency_ms_max: float | None = None
     latency_n: int | None = None
     answer_delay_ms: float | None = None
-    delay_parts_ms: Numbers = {}
+    """None also where a part other than the link is not known; see delay"""
+    delay_parts_ms: dict[str, float] = {}
+    """sampling, link, window, features, prediction: those that are known"""
     threads: int | None = None
     peak_rss_mb: float | None = None
     wall_s: float | None = None
     concurrency: int | None = None
     host: str = ""
     made_by: str = ""
-    # What it rests on
+
+
+class RestsOn(_Section):
+    """What the score rests on, and what else is known of it."""
+
     simulated: bool = False
     emulated: bool = False
     dagger: bool = False
     stamps: list[str] = []
     remarks: list[str] = []
+    """what recordings say of themselves; what could not be done, and why"""
     assumptions: dict[str, Any] = {}
     plan: list[dict[str, Any]] = []
-    counts: Numbers = {}
-    chosen: Numbers = {}
+    counts: dict[str, int] = {}
+    """what was left out, and why"""
+    chosen: dict[str, float] = {}
     search: list[dict[str, Any]] = []
+    """every candidate that was compared on validation data: its parameters, k, score and fold"""
     digests: list[str] = []
-    scores: Numbers = {}
-    fold_sizes: dict[str, Any] = {}
-    confusion: list[list[Any]] | None = None
+    scores: dict[str, float] = {}
+    """other metrics, the score on validation data, of each fold and each class"""
+    fold_sizes: dict[str, list[int]] = {}
+    """training and test rows of each fold, by its name in `scores`"""
+    confusion: list[list[int]] | None = None
+    """(true class, predicted class)"""
     classes: list[str | bool | int | float] = []
-    recordings_right: float | None = None
-    recordings_asked: float | None = None
-    events: Numbers = {}
-    operating_points: list[Numbers] = []
+    recordings_right: int | float | None = None
+    """test recordings most answers to which are right, of a classification, the mean over replicates; None where one
+    has several classes"""
+    recordings_asked: int | float | None = None
+    """test recordings, of which some were right"""
+    events: dict[str, float] = {}
+    """figures of events, times in the unit of the name"""
+    operating_points: list[dict[str, float]] = []
+    """the same at thresholds chosen on validation for several bounds of false alarms"""
     recordings: list[str] = []
     replicates: dict[str, Any] = {}
+    """the primary metric's sums over each replicate; see replicate_sums"""
+
+
+class Evaluated(RestsOn, Cost, Scored):
+    """What evaluating a cell tells."""
+
+
+class RowModel(Evaluated, Ended, Asked):
+    """One cell. Times are seconds unless the name says otherwise; a row may have other keys, of which nothing is asked.
+
+    Rows are handed about as plain mappings; this model says what they hold and what stands there before anything is
+    known. Tables for programs have its keys in this order: the last base first. Each row has dictionaries and lists of
+    its own: pydantic copies empty defaults.
+    """
 
 
 class ReplicatedRow(RowModel):
@@ -151,8 +196,9 @@ def _types(annotation: Any) -> frozenset[type]:
     return frozenset(found | {int} if float in found else found)
 
 
-FORMAT: Mapping[str, frozenset[type]] = {name: _types(kind) for name, kind in get_type_hints(ReplicatedRow).items()
-                                         if name in ReplicatedRow.model_fields}  # fmt: skip
+FORMAT: Mapping[str, frozenset[type]] = {
+    name: _types(field.annotation) for name, field in ReplicatedRow.model_fields.items()
+}
 """Types of what may stand under a key. A row may have other keys, of which nothing is asked."""
 
 _ELSEWHERE = ("simulation", "traceback", "log", "plan", "digests")

@@ -66,12 +66,12 @@ def test_what_is_not_known_is_absent_and_said(tmp_path):
 def test_the_delay_of_a_cell_is_the_sum_of_its_parts_on_a_clock_that_counts_readings(tmp_path):
     paths = pressed(tmp_path / "a")
     untimed = evaluated(TASK, paths, OLS, "deployable-untared", "roles")
-    assert untimed.times.answer_delay_ms is None, "without the times of a machine there is no sum"
+    assert untimed.answer_delay_ms is None, "without the times of a machine there is no sum"
     assert NO_LINK not in untimed.remarks
     result = evaluated(TASK, paths, OLS, "deployable-untared", "roles", latency=True)
     tick_ms = 1e3 * 2.0**-10  # passes between the two looks at the clock around each call
     parts = {"sampling": 12.0, "window": 240.0, "features": tick_ms, "prediction": tick_ms}
-    assert result.times.delay_parts_ms == pytest.approx(parts)
-    assert result.times.answer_delay_ms == pytest.approx(252.0 + 2 * tick_ms)
-    assert result.times.latency_n == 200
+    assert result.delay_parts_ms == pytest.approx(parts)
+    assert result.answer_delay_ms == pytest.approx(252.0 + 2 * tick_ms)
+    assert result.latency_n == 200
     assert NO_LINK in result.remarks

@@ -89,7 +89,7 @@ def test_the_same_seed_gives_the_same_score_bit_by_bit_with_one_thread_or_two(tm
         for seed, threads in ((0, 1), (0, 2), (1, 1))
     )
     assert np.array_equal(first.sets["test"].y_pred, second.sets["test"].y_pred)
-    assert (first.score, first.interval) == (second.score, second.interval)
+    assert (first.score, first.ci_low, first.ci_high) == (second.score, second.ci_low, second.ci_high)
     assert other.score != first.score
 
 

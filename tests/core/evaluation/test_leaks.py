@@ -15,7 +15,7 @@ def stamps(folder, make, split="session", roles=(None, None)):
 
 
 def test_a_cut_in_time_has_no_stamp(tmp_path):
-    assert evaluated(force_task(), sessions(tmp_path), split="in-session").stamps == ()
+    assert evaluated(force_task(), sessions(tmp_path), split="in-session").stamps == []
 
 
 @pytest.mark.parametrize(("split", "roles"), [("session", (None,) * 3), ("roles", ("train", "train", "test"))])
@@ -37,7 +37,7 @@ def test_a_sensor_at_rest_repeats_itself_and_is_no_leak(tmp_path):
         X[:200], force[:200] = 7.0, 0.0
         return X, force
 
-    assert stamps(tmp_path, resting) == ()
+    assert stamps(tmp_path, resting) == []
 
 
 def presses(make, n=400):
@@ -62,7 +62,7 @@ def test_recordings_of_one_row_each_that_are_there_twice(tmp_path):
     X, force = ramp(1, n=20)
     rows = [record(tmp_path / f"{n}.h5", X[[n % 20]], force[[n % 20]], session=str(n // 10)) for n in range(40)]
     assert evaluated(force_task(), rows, split="session").stamps[0].startswith("leaks: ")
-    assert evaluated(force_task(), rows[:20], split="session").stamps == ()
+    assert evaluated(force_task(), rows[:20], split="session").stamps == []
 
 
 COARSE = {
@@ -81,7 +81,7 @@ COARSE = {
 def test_readings_that_are_equal_by_chance_are_no_leak(tmp_path, name):
     X, force, place = presses(COARSE[name])
     path = record(tmp_path / "a.h5", X, t_ns=None, annotations={"place": place, "kind": np.where(force > 2, "a", "b")})
-    assert evaluated(label_task(splits=("place",)), [path], "majority").stamps == ()
+    assert evaluated(label_task(splits=("place",)), [path], "majority").stamps == []
 
 
 GIVEN_AWAY = {

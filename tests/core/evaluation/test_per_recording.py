@@ -42,25 +42,25 @@ def run(asked, paths, split=None, estimator="forest", protocol="deployable", **m
 def test_a_recording_is_one_answer_by_what_it_did_and_not_where_it_stood(tmp_path):
     paths = sequences(tmp_path)
     result = run(task(), paths)
-    assert (result.split, result.sizes.n_train) == ("recording", 4 * 24)
+    assert (result.split, result.n_train) == ("recording", 4 * 24)
     # Deviations of 1 and 3 from 40 samples are known to 11 %: eight standard errors apart.
     assert result.score == 1.0
-    assert result.interval.method.startswith("jackknife over 24 recordings ")
+    assert result.ci_method.startswith("jackknife over 24 recordings ")
     assert "one answer a recording, from deviation, mean-step" in result.remarks
 
 
 def test_the_delay_of_an_answer_holds_the_recording_it_waits_for(tmp_path):
     paths = sequences(tmp_path, number=8)
-    whole = run(task(), paths, estimator="logistic", latency=True).times
+    whole = run(task(), paths, estimator="logistic", latency=True)
     assert whole.delay_parts_ms["features"] > 0
     assert whole.answer_delay_ms == pytest.approx(sum(whole.delay_parts_ms.values()))
     part = task(summaries=(Summary(measure="deviation", start=0.1, end=0.3, unit="s"),))
     half = task(summaries=(Summary(measure="deviation", end=0.5),))
     votes = task(summaries=(), vote="frames")
     for asked, window_ms in ((task(), 390.0), (part, 200.0), (half, 195.0), (votes, 390.0)):
-        parts = run(asked, paths, estimator="logistic").times.delay_parts_ms
+        parts = run(asked, paths, estimator="logistic").delay_parts_ms
         assert parts["window"] == pytest.approx(window_ms)
-    assert "window" not in run(task(), paths, estimator="majority").times.delay_parts_ms
+    assert "window" not in run(task(), paths, estimator="majority").delay_parts_ms
 
 
 def test_splits_keep_recordings_whole(tmp_path):
@@ -139,7 +139,7 @@ def test_the_hold_is_tared_on_and_left_out_of_every_stream(tmp_path):
     assert all(table.X[0, 1] == pytest.approx(20, abs=1) for table in untared.tables)
     result = run(FAST, paths)
     assert (result.tare_s, result.score) == (pytest.approx(0.5), 1.0)
-    assert result.times.delay_parts_ms["window"] == pytest.approx(1500, abs=1e3 / SLOW_HZ)
+    assert result.delay_parts_ms["window"] == pytest.approx(1500, abs=1e3 / SLOW_HZ)
 
 
 def crest_factor(streams):

@@ -59,7 +59,7 @@ def test_force_within_and_across_sessions(presses):
     assert len(folds(within)) == len(folds(across)) == 2
     assert all(0.2 < score < 0.35 for score in folds(within).values()), folds(within)
     assert all(0.4 < score < 0.9 for score in folds(across).values()), folds(across)
-    assert within.interval.low is across.interval.low is None, "two sessions tell no interval"
+    assert within.ci_low is across.ci_low is None, "two sessions tell no interval"
     assert sorted(across.replicates["own"]) == sorted(folds(across).values())
 
 
@@ -67,12 +67,12 @@ def test_grasp_stability_by_object_official_and_shuffled(grasps):
     by_object, shuffled = run("grasp-stability", grasps, None), run("grasp-stability", grasps, "shuffled")
     official = run("grasp-stability", grasps, "roles")
     assert by_object.split == "object"
-    assert by_object.sizes.n_test == 1276 + 1273 + 2133, "the official test is not touched"
+    assert by_object.n_test == 1276 + 1273 + 2133, "the official test is not touched"
     assert 0.83 < by_object.score < 0.92
-    assert shuffled.score > by_object.interval.high, "the leak is larger than the interval"
+    assert shuffled.score > by_object.ci_high, "the leak is larger than the interval"
     assert "leaks" in shuffled.stamps[0]
     assert not by_object.stamps
-    assert official.sizes.n_test == 511
+    assert official.n_test == 511
     assert 0.70 < official.score < 0.82
     assert run("grasp-stability", grasps, "roles", "majority").score == pytest.approx(261 / 511)
 

@@ -54,9 +54,9 @@ def test_the_error_of_its_own_comes_out_from_below_the_noise(error, recordings, 
     inside, scores = [], []
     for seed in range(60):
         answers, unit, floor = asked(error, recordings, seed)
-        found = beyond_floor(floor, answers, unit)
+        score, found = beyond_floor(floor, answers, unit)
         inside.append(found.low <= error <= found.high)
-        scores.append(found.score)
+        scores.append(score)
     assert np.mean(scores) == pytest.approx(error, rel=0.05)
     assert np.std(scores) < most
     # 95 % promised; of 60, 51 or fewer would come by chance in one run of 300.
@@ -78,12 +78,12 @@ def result_of(folder, *, simulated=True, hold=7.2, samples=400, **how):
 
 def test_a_cell_tells_its_floor_and_the_error_against_the_true_force(tmp_path):
     result = result_of(tmp_path / "a", samples=4000)
-    assert result.beyond.floor == pytest.approx(SIGMA, rel=0.1), "480 samples: 3.2 % standard error"
+    assert result.reference_floor == pytest.approx(SIGMA, rel=0.1), "480 samples: 3.2 % standard error"
     assert result.score == pytest.approx(SIGMA, rel=0.1)
-    assert result.true[0] < 0.1, "the taxels know the force"
-    assert (result.beyond.low, result.beyond.high) == (None, None), "three recordings are too few"
+    assert result.true_score < 0.1, "the taxels know the force"
+    assert (result.beyond_floor_ci_low, result.beyond_floor_ci_high) == (None, None), "three recordings are too few"
     squares, freedom = np.sum(result.replicates["floor"], axis=0)
-    assert np.sqrt(squares / freedom) == pytest.approx(result.beyond.floor, rel=1e-9)
+    assert np.sqrt(squares / freedom) == pytest.approx(result.reference_floor, rel=1e-9)
 
 
 @pytest.mark.parametrize(
@@ -96,11 +96,11 @@ def test_a_cell_tells_its_floor_and_the_error_against_the_true_force(tmp_path):
 )
 def test_without_a_hold_that_tells_there_is_no_floor_and_the_row_says_why(tmp_path, how, why):
     result = result_of(tmp_path / "a", **how)
-    assert result.beyond is None
+    assert result.score_beyond_floor is None
     assert any(why in remark for remark in result.remarks)
     assert "floor" not in result.replicates
 
 
 @pytest.mark.parametrize("how", [{"simulated": False}, {"drive": ForceLoop()}])
 def test_only_a_simulated_force_without_a_loop_is_known_truly(tmp_path, how):
-    assert result_of(tmp_path / "a", **how).true is None
+    assert result_of(tmp_path / "a", **how).true_score is None

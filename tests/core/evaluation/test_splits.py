@@ -119,11 +119,11 @@ def test_an_incomplete_recording_takes_no_part_unless_asked_for_and_the_row_says
     for name, excluded in (("short", why), ("bad", "declared unreliable")):
         paths.append(record(tmp_path / f"{name}.h5", *ramp(7), session=name, excluded=excluded))
     out = run(paths)
-    assert out.sizes.n_recordings == 3
+    assert out.n_recordings == 3
     assert out.counts["recordings left out (declared unreliable)"] == 1
     assert f"1 of 4 recordings left out: {why}" in out.stamps
     taken = run(load_dataset(force_task(), paths, include_incomplete=True))
-    assert taken.sizes.n_recordings == 4
+    assert taken.n_recordings == 4
     assert f"1 of 4 recordings take part although {why}" in taken.stamps
 
 

@@ -100,7 +100,7 @@ def any_data(case, *, protocol, name, kind):
         split = splits[case.rng.integers(len(splits))]
         case.says(split=str(split))
         result = evaluated(asked, paths, name, protocol, split, params=QUICK.get(name), latency=True)
-    low, high = result.interval.low, result.interval.high
+    low, high = result.ci_low, result.ci_high
     case.holds(np.isfinite(result.score), f"the score is {result.score}")
     case.holds(low is None or high is None or low <= result.score <= high, f"the interval runs from {low} to {high}")
     case.holds(np.isfinite(list(result.scores.values())).all(), f"a score is none: {result.scores}")
