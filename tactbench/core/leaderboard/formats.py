@@ -77,10 +77,7 @@ def _in_a_paper(block: Block, grid: TextTable, names: Sequence[str], number: int
         grid,
         title=_caption(block),
         columns=(*names, "notes"),
-        headings=(
-            *(heads[name] if "\n" in heads[name] else "\n".join(heads[name].rsplit(" ", 1)) for name in names),
-            "",
-        ),
+        headings=(*(heads[name] for name in names), ""),
         lines=tuple((*line, mark) for line, mark in zip(shown, marked, strict=True)),
         notes=tuple(f"{note.text.rstrip('.')}." for note in block.notes if note.printed),
     ).compact()
