@@ -69,12 +69,15 @@ def _in_a_paper(block: Block, grid: TextTable, names: Sequence[str], number: int
     left_out = {"notes"} | ({"range"} if names == _IN_A_PAPER and "interval" in grid.columns else set())
     names = [name for name in names if name in grid.columns and name not in left_out]
     shown = (tuple(line[name].replace(" … ", "–") for name in names) for line in lines)
-    heads = dict(zip(grid.columns, grid.headers, strict=True))
+    heads = {
+        name: head.replace(" over ", "\nover ") if " over " in head else "\n".join(head.rsplit(" ", 1))
+        for name, head in zip(grid.columns, grid.headers, strict=True)
+    }
     table = replace(
         grid,
         title=_caption(block),
         columns=(*names, "notes"),
-        headings=(*("\n".join(heads[name].rsplit(" ", 1)) for name in names), ""),
+        headings=(*(heads[name] for name in names), ""),
         lines=tuple((*line, mark) for line, mark in zip(shown, marked, strict=True)),
         notes=tuple(f"{note.text.rstrip('.')}." for note in block.notes if note.printed),
     ).compact()

@@ -146,7 +146,7 @@ def _pair(
             refused = refused or f"{name} {row['status']}: {row['reason']}"
     if one is None or other is None or refused:
         return PairwiseComparison(kind, first, second, one, other, refused)
-    if (one["metric"], list(one["classes"])) != (other["metric"], list(other["classes"])):
+    if (one["metric"], len(one["classes"])) != (other["metric"], len(other["classes"])):
         return PairwiseComparison(kind, first, second, one, other, "they were scored by other metrics or classes")
     return PairwiseComparison(kind, first, second, one, other, "", difference(one, other), over_folds(one, other))
 
@@ -197,7 +197,7 @@ def _line(pair: PairwiseComparison) -> tuple[str, ...]:
         "exploratory" if pair.p_corrected is None else _probability(pair.p_corrected),
         ABSENT if found.effect is None else signed(found.effect, "1"),
         ABSENT if found.improved is None else f"{found.improved:.2f}",
-        f"{found.replicates}" + ("" if found.paired else " unpaired"),
+        f"{found.replicates}{'' if found.paired else ' unpaired'}" if found.replicates else ABSENT,
         _verdict(pair, found),
     )
 

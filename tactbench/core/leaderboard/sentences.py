@@ -112,7 +112,7 @@ def _outcome(board: Board) -> str:
     where = "In simulation " if first["simulated"] and not first.get("emulated") else ""
     quality = "the smallest error beyond the floor" if board.by_floor else "the best score"
     if board.unranked == "few":
-        return f"{_too_few([row for row, _ in board.placed])} {name} has {quality}."
+        return f"{_too_few([row for row, _ in board.placed])}; {name} has {quality}."
     if board.unranked or leader.low is None:
         return f"Places are by score alone: {board.unranked or 'an answer has no interval'}."
     if board.bars.unshown(first):
@@ -139,7 +139,7 @@ def _too_few(rows: Sequence[Row]) -> str:
     else:
         unit, more = "campaign", " (`--repeats 8`)" if rows[0]["repeats"] < FEWEST else ""
     have = count_range([row["n_replicates"] for row in rows], unit)
-    return f"{have}: too few for intervals and places, which need {FEWEST}{more}."
+    return f"{have}: too few for intervals and places, which need {FEWEST}{more}"
 
 
 def _closest(board: Board, first: Row, others: Sequence[Row]) -> str:

@@ -43,10 +43,10 @@ def together(rows: Sequence[Row]) -> list[PairableRows]:
         kept = row.get("replicates")
         if kept:
             strata = tuple(kept["strata"] or [0] * len(kept["names"]))
-            mark = tuple(kept["names"]), strata, "scores" in kept, len(row["classes"]), row["metric"]
+            mark = tuple(kept["names"]), strata, "scores" in kept, tuple(row["classes"]), row["metric"]
             groups.setdefault(mark, []).append(place)
     found = []
-    for (names, strata, own_scores, n_classes, metric), places in groups.items():
+    for (names, strata, own_scores, classes, metric), places in groups.items():
         several, n, codes = [rows[place]["replicates"] for place in places], len(names), np.array(strata)
         sizes = np.unique(codes, return_counts=True)[1]
         if sizes.min() < (FEWEST if own_scores else 2):
@@ -55,7 +55,7 @@ def together(rows: Sequence[Row]) -> list[PairableRows]:
             scores = np.array([scores_of(one, metric) for one in several])
             influence = (scores - scores.mean(axis=1, keepdims=True)) / np.sqrt(n * (n - 1))
         else:
-            influence = influences(scores_without(several, metric, n_classes), codes)
+            influence = influences(scores_without(several, metric, len(classes)), codes)
         good = np.isfinite(influence).all(axis=1)
         where = np.array(places, dtype=np.int64)[good]
         found.append(PairableRows(where, names, codes, influence[good], float(n - len(sizes))))

@@ -246,7 +246,9 @@ def corrected_t(differences: Sequence[float], test_over_train: float) -> FoldDif
 
 
 def over_folds(first: Row, second: Row) -> FoldDifference | None:
-    """Return the corrected test of two cells over the folds that both have."""
+    """Return the corrected test of two cells over the folds that both have; None where those hold out other units."""
+    if len({tuple((row.get("replicates") or {}).get("names", ())) for row in (first, second)}) > 1:
+        return None
     sizes, other = first.get("fold_sizes") or {}, second.get("fold_sizes") or {}
     both = [name for name in sizes if name in other and name in first["scores"] and name in second["scores"]]
     if len(both) < 2:

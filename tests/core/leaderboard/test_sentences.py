@@ -237,7 +237,7 @@ ABOVE = {
     rf"{NAME} is the only of (\d+) answers that is better than the trivial one of its own sensor \((.*)\)\.":
         lambda t, a, n, b: t.better == [t.called(a)] and int(n) == len(t.answers) and t.bars(b, t.better),
     r"(.*(?:campaign|session|recording|press)(?:e?s)?): too few for intervals and places, which need 5"
-    r"(?: \(`--repeats 8`\))?\. (\S+) has .*\.":
+    r"(?: \(`--repeats 8`\))?; (\S+) has .*\.":
         lambda t, n, a: t.counts(n, t.better) and min(o["n_replicates"] for o in t.better) < 5 and t.leads(a),
     r"(?:The only answer|None of (\d+) answers) scores (?:no )?better than the trivial one of its own sensor "
     r"\((.*)\)\.":
