@@ -27,8 +27,8 @@ from pathlib import Path
 import psutil
 import trivial
 
+from tactbench.core.matrix.merge import SEED_DECIDES
 from tactbench.core.matrix.store import Row, Store
-from tactbench.core.matrix.summary import SEED_DECIDES
 from tactbench.core.recording.reader import open_recording
 
 TWIN = (
