@@ -53,6 +53,7 @@ def command(
 
     from tactbench.core.acquisition import acquire
     from tactbench.core.errors import TactbenchError
+    from tactbench.core.plugins.interfaces import RecordingRequest
     from tactbench.core.plugins.registry import load_registry
     from tactbench.core.plugins.rigs import load_rig_file
     from tactbench.core.provenance.gather import gather
@@ -83,11 +84,12 @@ def command(
                 view = stack.enter_context(LiveView(scene, f"{sensor} on {rig}{mark}, {scene.indenter}"))
                 opened, watch, paused = view.begin, view.watch, view.paused
             built = _built(registry, rig, devices, TerminalOperator(yes=yes, paused=paused))
+            request = RecordingRequest(
+                descriptor, registry.rigs[rig], scene, out, seed, rig_file=devices, name=out.stem, provenance=provenance
+            )
             meta = acquire(
-                built, descriptor, registry.rigs[rig], scene, role=None, seed=seed, path=out, clock=time.perf_counter,
-                provenance=provenance, opened=opened, watch=watch, name=out.stem, complete_interrupted=True,
-                rig_file=devices,
-            )  # fmt: skip
+                built, request, clock=time.perf_counter, opened=opened, watch=watch, complete_interrupted=True
+            )
     except (KeyboardInterrupt, TactbenchError) as error:
         if _interrupted(out):
             remark(f"What was recorded until then is in {out}, and is left out of every evaluation.")
