@@ -80,7 +80,7 @@ def command(
     store, outcome = carry_out(Study(estimator=estimator or None, set=settings, **asked))
     table = table_of(store, over_all(store, outcome.rows))
     print_table(table, shape, view_of(store.folder))
-    write_tables(table.rows, store.folder, table.provenance, table)
+    write_tables(table, store.folder)
     _farewell(outcome, store.folder)
     ctx.exit(1 if outcome.failures else 0)
 

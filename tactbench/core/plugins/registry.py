@@ -14,7 +14,7 @@ from dataclasses import dataclass, field
 from functools import lru_cache
 from importlib.metadata import Distribution, EntryPoint, entry_points
 from types import ModuleType
-from typing import Any, Generic, Literal, TypeVar, cast
+from typing import Any, Generic, Literal, TypeVar, cast, get_args
 
 import pluggy
 
@@ -37,17 +37,11 @@ from tactbench.core.spec.rig import (
     TaskDescriptor,
 )
 
-D = TypeVar(
-    "D",
-    SensorDescriptor,
-    RigDescriptor,
-    DeviceDescriptor,
-    TaskDescriptor,
-    EstimatorDescriptor,
-    EffectDescriptor,
-    IndenterDescriptor,
-    ProfileDescriptor,
-)
+Descriptor = (
+    SensorDescriptor | RigDescriptor | DeviceDescriptor | TaskDescriptor | EstimatorDescriptor | EffectDescriptor
+    | IndenterDescriptor | ProfileDescriptor
+)  # fmt: skip
+D = TypeVar("D", bound=Descriptor)
 
 
 @dataclass(frozen=True)
@@ -177,7 +171,7 @@ class Registry:
 
 
 _KINDS: dict[str, type[Any]] = {
-    f"{kind.__name__.removesuffix('Descriptor').lower()}s": kind for kind in D.__constraints__
+    f"{kind.__name__.removesuffix('Descriptor').lower()}s": kind for kind in get_args(Descriptor)
 }
 """By the plural that hooks and families are named after: ``sensors`` -> SensorDescriptor."""
 
