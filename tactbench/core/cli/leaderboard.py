@@ -9,7 +9,8 @@ from typing import Any
 
 import click
 
-from tactbench.core.cli.tables import DEFAULT_FOLDER, TABLE_FORMATS, check_destination, format_of, print_table, view_of
+from tactbench.core.cli.options import DEFAULT_FOLDER
+from tactbench.core.cli.tables import TABLE_FORMATS, check_destination, format_of, print_table, view_of
 
 _FILTERS = ("sensor", "task", "protocol", "split", "estimator")
 

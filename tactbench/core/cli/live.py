@@ -13,8 +13,6 @@ from tactbench.core.samples import Quality
 from tactbench.core.tables.terminal import remark
 
 if TYPE_CHECKING:
-    from types import TracebackType
-
     from rich.console import RenderableType
     from rich.table import Table
     from rich.text import Text
@@ -160,9 +158,7 @@ class LiveView:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         """Leave the terminal as it was, and the last state on it."""
         if self._live is None or not self._states:
             return

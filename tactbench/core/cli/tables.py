@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+from tactbench.core.cli.options import DEFAULT_FOLDER
 from tactbench.core.tables.terminal import WITHOUT_EDGE, show
 
 if TYPE_CHECKING:
@@ -18,7 +19,6 @@ TABLE_FORMATS = ("table", "json", "md", "latex", "csv", "parquet", "xlsx")
 FOR_PEOPLE = ("table", "md", "latex")
 """Formats that print less than everything."""
 NO_TEXT = ("parquet", "xlsx")
-DEFAULT_FOLDER = Path("tactbench-results")
 
 
 def view_of(folder: Path, *, wide: bool = False, columns: str | None = None, shape: str = "table") -> View:

@@ -148,7 +148,7 @@ def plan_parts(
     plan: RecordingPlan = {}
     for part in parts:
         if part.trouble is None:
-            some, own = plan_run(part.matrix, registry, keys, store, part.recordings, limits)
+            some, own = plan_run(part, registry, keys, store, limits)
         else:
             some = plan_cells(part.matrix, part.matrix.sensors, registry)
             own = {request_key(cell): RecordingSource((), trouble=part.trouble) for cell in some}
@@ -163,14 +163,9 @@ def plan_parts(
 
 
 def plan_run(
-    matrix: MatrixSpec,
-    registry: Registry,
-    keys: Keys,
-    store: Store,
-    recordings: Path | None,
-    limits: Limits,
+    part: Part, registry: Registry, keys: Keys, store: Store, limits: Limits
 ) -> tuple[list[Cell], RecordingPlan]:
-    """Return the cells of `matrix`, and where their recordings come from.
+    """Return the cells of a matrix, and where their recordings come from.
 
     Raises
     ------
@@ -179,10 +174,11 @@ def plan_run(
     TactbenchError
         If a rig that is not simulated cannot be built, cannot list its recordings, or one of them cannot be read.
     """
+    matrix = part.matrix
     rig_file = load_rig_file(Path(matrix.rig_file), registry).checked_for(matrix.rig) if matrix.rig_file else None
     rig = registry.rigs[matrix.rig or registry.first_rig("simulated")]
     if not rig.simulated:  # a simulated one replays nothing: it is built when it has to record
-        work = partial(_replayed, registry=registry, recordings=recordings, rig_file=rig_file)
+        work = partial(_replayed, registry=registry, recordings=part.recordings, rig_file=rig_file)
         builder = InProcess() if registry.rigs.owned(rig.name).ours else Pool(1, limits)
         ((_, paths),) = builder.each(work, [rig.name])
         if isinstance(paths, BaseException):
