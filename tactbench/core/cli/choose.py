@@ -106,7 +106,7 @@ def _selected(rows: list[Row], task: TaskSpec, protocol: str | None) -> tuple[li
 
 
 def _print(choice: Choice, heading: str, origin: str) -> None:
-    from tactbench.core.cli.grid import print_fields, print_grid
+    from tactbench.core.cli.grid import print_fields, print_records
     from tactbench.core.tables.numbers import interval, score
 
     print_fields([("answer", choice.verdict), ("results", f"{heading}, from {origin}")])
@@ -118,7 +118,7 @@ def _print(choice: Choice, heading: str, origin: str) -> None:
                       "interval": interval(one.low, one.high, choice.unit), **wishes})  # fmt: skip
     if lines:
         click.echo()
-        print_grid(f"score: {choice.quantity}", tuple(lines[0]), lines, numeric=("score",))
+        print_records(lines, "table", title=f"score: {choice.quantity}", numeric=("score",))
     several = {"interval": choice.intervals, "unknown": choice.unknown, "left out": choice.left_out}
     fields = [(name, text) for name, texts in several.items() for text in texts]
     if fields:

@@ -41,11 +41,9 @@ def _write_tables(folders: Sequence[Path], merged: Path) -> None:
     """Write what was checked of sensors, and what `tactbench leaderboard` shows, into a merged folder."""
     from tactbench.core.leaderboard.formats import write_tables
     from tactbench.core.leaderboard.levels import merge_levels
-    from tactbench.core.leaderboard.table import build_table
     from tactbench.core.matrix.store import Store
-    from tactbench.core.study.results import provenance_of, shown_rows
+    from tactbench.core.study.results import shown_rows, table_of
 
     merge_levels(folders, merged)
     store = Store(merged)
-    rows = shown_rows(store)
-    write_tables(build_table(rows, provenance_of(store, rows)), merged)
+    write_tables(table_of(store, shown_rows(store)), merged)

@@ -123,7 +123,7 @@ def verify(ctx: click.Context, shape: str) -> None:
 
     Exit code 1 if it misses one.
     """
-    from tactbench.core.cli.grid import print_grid, print_records
+    from tactbench.core.cli.grid import print_records
     from tactbench.core.errors import UsageError
     from tactbench.core.plugins.registry import load_object, load_registry
     from tactbench.core.tables.terminal import remark
@@ -140,7 +140,7 @@ def verify(ctx: click.Context, shape: str) -> None:
     else:
         kinds = ["" if verdict.met else "failed" for verdict in found]
         lines = [_line(verdict) for verdict in found]
-        print_grid(rig, _COLUMNS, lines, numeric=("found", "expected", "bound"), kinds=kinds)
+        print_records(lines, shape, title=rig, numeric=("found", "expected", "bound"), kinds=kinds)
     met = sum(verdict.met for verdict in found)
     remark(f"{met} of {len(found)} within their bounds.")
     ctx.exit(0 if met == len(found) else 1)

@@ -276,7 +276,7 @@ def ask_plugin(point: EntryPoint) -> dict[str, list[Any]]:
         If it does not keep the contract of its hooks; and whatever its own code raises.
     """
     module = cast(ModuleType, point.load())
-    check_api_version(point.value, getattr(module, "TACTBENCH_API", None))
+    _check_api_version(point.value, getattr(module, "TACTBENCH_API", None))
     manager = pluggy.PluginManager(hookspecs.GROUP)
     manager.add_hookspecs(hookspecs)
     manager.register(module, name=point.name)
@@ -303,14 +303,8 @@ def ask_plugin(point: EntryPoint) -> dict[str, list[Any]]:
     return offered
 
 
-def check_api_version(module: str, written_for: object) -> None:
-    """Compare the version that a plugin states with the one that is spoken here.
-
-    Raises
-    ------
-    PluginContractError
-        If they differ.
-    """
+def _check_api_version(module: str, written_for: object) -> None:
+    """Raise PluginContractError if the version that a plugin states is not the one that is spoken here."""
     spoken = hookspecs.API_VERSION
     if written_for == spoken:
         return
