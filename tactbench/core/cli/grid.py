@@ -60,7 +60,7 @@ def print_records(
     records: Sequence[Mapping[str, Any]], shape: str, *, title: str = "", columns: Sequence[str] = (),
     numeric: Collection[str] = (), kinds: Sequence[str] = (),
 ) -> None:  # fmt: skip
-    """Print records on stdout as ``json``, ``csv`` or ``table``; all have the keys of the first.
+    """Print records on stdout as ``json``, ``csv`` or ``table``; their keys are those of the first.
 
     Parameters
     ----------
@@ -78,6 +78,6 @@ def print_records(
         click.echo(csv_of_records(records), nl=False)
     elif records:
         shown = columns or tuple(records[0])
-        right = [name for name in shown if name in numeric or any(type(one[name]) in (int, float) for one in records)]
-        lines = [[field_text(one[name]) for name in shown] for one in records]
-        print_tables([text_table(title, shown, lines, numeric=right, kinds=kinds)])
+        numbers = (name for name in shown if any(type(one.get(name)) in (int, float) for one in records))
+        lines = [[field_text(one.get(name)) for name in shown] for one in records]
+        print_tables([text_table(title, shown, lines, numeric={*numeric, *numbers}, kinds=kinds)])

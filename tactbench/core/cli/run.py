@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from tactbench.core.cli.leaderboard import TABLE_FORMATS, check_destination, print_table, view_of
 from tactbench.core.cli.options import RESULTS, SIMULATION, YES, FiniteRange, format_option, options
-from tactbench.core.cli.tables import TABLE_FORMATS, check_destination, print_table, view_of
 from tactbench.core.spec.bounds import MOST_MEMORY_MB, MOST_REPEATS, MOST_SECONDS
 from tactbench.core.tables.terminal import remark
 from tactbench.core.tables.text import command_line, cut

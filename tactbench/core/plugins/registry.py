@@ -252,15 +252,15 @@ def _described_in_children(points: Sequence[tuple[str, str]], timeout_s: float) 
 def _describe(point: tuple[str, str]) -> dict[str, Any]:
     """Ask a plugin; return its descriptors as JSON has them."""
     offered = ask_plugin(EntryPoint(*point, group=hookspecs.GROUP))
-    return {family: [_plain(descriptor) for descriptor in several] for family, several in offered.items()}
+    return {family: [plain(descriptor) for descriptor in several] for family, several in offered.items()}
 
 
-def _plain(descriptor: Any) -> dict[str, Any]:
-    plain: dict[str, Any] = descriptor.model_dump()
-    if isinstance(descriptor, SensorDescriptor):  # with what stays out of recordings and keys
-        spec = descriptor.spec
-        plain["spec"]["data_sheet"] = spec.data_sheet.model_dump()
-    return plain
+def plain(descriptor: Any, mode: Literal["json", "python"] = "python") -> dict[str, Any]:
+    """Return a descriptor as plain data, with what stays out of recordings and keys: a sensor's data sheet."""
+    dumped: dict[str, Any] = descriptor.model_dump(mode=mode)
+    if isinstance(descriptor, SensorDescriptor):
+        dumped["spec"]["data_sheet"] = descriptor.spec.data_sheet.model_dump(mode=mode)
+    return dumped
 
 
 def _described(reply: Mapping[str, Any]) -> dict[str, list[Any]]:
