@@ -19,6 +19,7 @@ from pathlib import Path
 from threadpoolctl import threadpool_limits
 
 from tactbench.core.acquisition import acquire
+from tactbench.core.plugins.interfaces import RecordingRequest
 from tactbench.core.plugins.registry import load_registry
 from tactbench.plugin import RigContext, load_object
 from tactbench.tasks.slip_scenes import SLIP_SCENES
@@ -51,10 +52,9 @@ def main(rounds: int = 5) -> None:
         began, busy = time.perf_counter(), time.process_time()
         with tempfile.TemporaryDirectory() as folder:
             for one in SLIP_SCENES:
-                acquire(
-                    rig, registry.sensors[sensor], registry.rigs["twin"], one.scene, role=one.role, seed=1,
-                    path=Path(folder) / f"{one.scene.name}.h5", clock=time.monotonic, provenance={},
-                )  # fmt: skip
+                path = Path(folder) / f"{one.scene.name}.h5"
+                described = registry.sensors[sensor], registry.rigs["twin"]
+                acquire(rig, RecordingRequest(*described, one.scene, path, 1, one.role), clock=time.monotonic)
         spent_s, busy_s = time.perf_counter() - began, time.process_time() - busy
         print(
             f"the campaign on {sensor}: {len(SLIP_SCENES)} recordings of {whole_s:.0f} s in {spent_s:.1f} s, "

@@ -31,6 +31,7 @@ from threadpoolctl import threadpool_limits
 from tactbench.core.acquisition import acquire
 from tactbench.core.evaluation.cell import CellContext, evaluate_cell
 from tactbench.core.evaluation.dataset import Dataset, load_dataset
+from tactbench.core.plugins.interfaces import RecordingRequest
 from tactbench.core.spec.scene import Simulation
 from tactbench.core.spec.task import PlannedScene, in_drawn_order
 from tactbench.plugin import (
@@ -139,10 +140,7 @@ def score(sensor: str, task: str, undone: frozenset[str], seed: int, *, full: bo
         paths = []
         for item in scenes_in(task, undone, seed):
             path = Path(folder) / f"{item.scene.name}.h5"
-            acquire(
-                rig, described, RIG, item.scene, role=item.role, seed=seed, path=path, clock=time.perf_counter,
-                provenance={},
-            )  # fmt: skip
+            acquire(rig, RecordingRequest(described, RIG, item.scene, path, seed, item.role), clock=time.perf_counter)
             paths.append(path)
         # In the declared order, whatever was recorded first: rows are given to the estimator alike.
         declared = [planned.scene.name for planned in spec.scenes]

@@ -28,8 +28,7 @@ from tactbench.core.leaderboard.formats import records, write_tables
 from tactbench.core.leaderboard.pairwise import comparisons, record_of, tables_of, with_declared
 from tactbench.core.leaderboard.table import Table, build_table, over_all
 from tactbench.core.leaderboard.view import best, grids
-from tactbench.core.matrix.naming import cell_of
-from tactbench.core.matrix.plan import Cell
+from tactbench.core.matrix.plan import Cell, cell_of
 from tactbench.core.matrix.solve import Job, read_dataset, solve, unanswered
 from tactbench.core.plugins.declared import declared_in, with_declared_of
 from tactbench.core.plugins.declared import with_declared as with_declared_tasks
@@ -343,7 +342,7 @@ def run(
         raise UsageError(f"{complaint(error)}.", hint="See the options in `tactbench run --help`.") from error
     store, outcome = carry_out(study)
     table = table_of(store, over_all(store, outcome.rows))
-    write_tables(table.rows, store.folder, table.provenance, table)
+    write_tables(table, store.folder)
     # Of the rows of a question a finished one counts, else a trivial answer's, whose reason is that of the recordings.
     ended = sorted(outcome.rows, key=lambda row: (row["status"] == "done", row["is_baseline"]))
     each = {replace(cell_of(row), estimator="", params=(), baseline=False, timed=True): row for row in ended}

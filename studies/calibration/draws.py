@@ -22,6 +22,7 @@ from tactbench.core.evaluation.cell import CellContext, evaluate_cell
 from tactbench.core.evaluation.cell import Result as CellResult
 from tactbench.core.evaluation.dataset import Dataset, Table, load_dataset
 from tactbench.core.evaluation.metrics import metric_called
+from tactbench.core.plugins.interfaces import RecordingRequest
 from tactbench.core.plugins.registry import installed, load_object
 from tactbench.core.spec.recording import RecordingMeta
 from tactbench.core.spec.scene import NUISANCES, Simulation
@@ -138,10 +139,8 @@ def _simulated(
             for planned in in_drawn_order(task.scenes, seed):
                 path = Path(folder) / f"{planned.scene.name}.h5"
                 scene = planned.scene.simulated_as(simulation)
-                acquire(
-                    rig, registry.sensors[sensor], described, scene, role=planned.role, seed=seed, path=path,
-                    clock=time.process_time, provenance={},
-                )  # fmt: skip
+                request = RecordingRequest(registry.sensors[sensor], described, scene, path, seed, planned.role)
+                acquire(rig, request, clock=time.process_time)
                 paths.append(path)
             data = load_dataset(task, paths)
             for output in outputs:

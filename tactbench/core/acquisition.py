@@ -8,53 +8,40 @@ import threading
 import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import AbstractContextManager, contextmanager, nullcontext
-from pathlib import Path
 from types import FrameType
 from typing import Any
 
 from tactbench.core.errors import RigError
-from tactbench.core.plugins.interfaces import Acquisition, Rig
+from tactbench.core.plugins.interfaces import Acquisition, RecordingRequest, Rig
 from tactbench.core.recording.completeness import INCOMPLETE, Completeness
 from tactbench.core.recording.writer import RecordingWriter
 from tactbench.core.samples import Block
 from tactbench.core.spec.recording import Emulation, RecordingMeta, StreamCounts
-from tactbench.core.spec.rig import RigDescriptor, SensorDescriptor
 from tactbench.core.spec.rig_file import Allowed, RigFile
-from tactbench.core.spec.scene import Role, Scene
 from tactbench.core.thread_limit import thread_limit
 
 
 def acquire(
     rig: Rig,
-    sensor: SensorDescriptor,
-    descriptor: RigDescriptor,
-    scene: Scene,
+    request: RecordingRequest,
     *,
-    role: Role | None,
-    seed: int,
-    path: Path,
     clock: Callable[[], float],
-    provenance: Mapping[str, Any],
     opened: Callable[[Acquisition], None] | None = None,
     watch: Callable[[Block], None] | None = None,
-    name: str = "",
     complete_interrupted: bool = False,
-    rig_file: RigFile | None = None,
 ) -> RecordingMeta:
-    """Carry out `scene` and write what the rig yields to `path`; return what the recording says of itself.
+    """Carry out a scene and write what the rig yields to a file; return what the recording says of itself.
 
     A recording of devices that ended before its time, or that lacks more than the rig file allows, is kept as an
     incomplete one: `excluded` begins with ``incomplete: `` and says why.
 
     Parameters
     ----------
-    rig, descriptor
-        The rig, and what it says about itself. If its acquisition is one of devices (DeviceAcquisition), what it says
+    rig
+        What `request.rig` describes. If its acquisition is one of devices (DeviceAcquisition), what it says
         of its counts is recorded too. Where something moves in it by itself, it has ``stop(why)``, which is called
         before an interrupted recording is completed: it ends that at once, and returns what is to be done where it
         could not be ended, or an empty text.
-    role
-        What the recording is for, or None.
     clock
         Seconds, monotonic; its difference over the scene becomes ``provenance["sim_s"]`` for a simulated rig and
         ``provenance["acquisition_s"]`` otherwise. Writing the file is not counted.
@@ -62,14 +49,10 @@ def acquire(
         Called with the acquisition before its first block.
     watch
         Called with every block, once it is written.
-    name
-        Of the recording; empty: that of the scene.
     complete_interrupted
         Whether a recording that was cut short on a real rig is completed, excluded from every evaluation, before the
         error goes on. Otherwise its journal stays, and the error names the command that makes a recording of it. Of a
         simulation nothing is left behind.
-    rig_file
-        The devices: what is emulated is marked so, whatever the rig says of it.
 
     Raises
     ------
@@ -81,26 +64,37 @@ def acquire(
         If the file cannot be written.
     """
     began = clock()
+    simulated = request.rig.simulated
     with (
-        _one_thread(descriptor),
+        _one_thread() if simulated else nullcontext(),
         _one_interrupt() as ignore_interrupts,
-        rig.open(sensor, scene, seed=seed) as acquisition,
+        rig.open(request.sensor, request.scene, seed=request.seed) as acquisition,
     ):
         if opened is not None:
             opened(acquisition)
-        meta = _meta(acquisition, sensor, descriptor, scene, role, seed, name or scene.name, rig_file)
+        meta = _meta(acquisition, request)
         spent = clock() - began
-        allowed = Allowed() if rig_file is None else rig_file.allowed
+        allowed = Allowed() if request.rig_file is None else request.rig_file.allowed
         whole = Completeness(allowed, acquisition.streams, acquisition.reference)
         has_devices = hasattr(acquisition, "stream_counts")
         began_s = time.perf_counter()
 
-        def of_devices(rows: Mapping[str, int], *, cut_short: bool) -> dict[str, Any]:
+        def conclude(why: str) -> None:
+            """Write down what is known at the end; `why` it is not to be evaluated, if it is not."""
             factor = whole.seconds / (time.perf_counter() - began_s)
-            return _of_devices(acquisition, descriptor, sensor.name, rig_file, rows, cut_short=cut_short, factor=factor)
+            drawn = dict(acquisition.drawn)
+            remarks = tuple(str(text) for name, text in drawn.items() if name.startswith("remark "))
+            writer.revise(
+                plan=tuple(acquisition.plan),
+                assumptions=dict(acquisition.assumptions),
+                drawn=drawn,
+                remarks=(*remarks, why) if why else remarks,
+                excluded=why,
+                provenance={**request.provenance, "sim_s" if simulated else "acquisition_s": spent},
+                **_of_devices(acquisition, request, writer.rows, cut_short=bool(why), factor=factor),
+            )
 
-        key = "sim_s" if descriptor.simulated else "acquisition_s"
-        with RecordingWriter(path, meta) as writer:
+        with RecordingWriter(request.path, meta) as writer:
             try:
                 blocks = iter(acquisition)
                 while True:
@@ -121,18 +115,17 @@ def acquire(
             except BaseException as error:
                 ignore_interrupts()
                 alarm = _stopped(acquisition, error)
-                if not descriptor.simulated and any(writer.rows.values()):
-                    why = f"interrupted: {_why(error)}"
-                    _conclude(writer, acquisition, of_devices, {**provenance, key: spent}, why)
+                if not simulated and any(writer.rows.values()):
+                    conclude(f"interrupted: {_why(error)}")
                     if complete_interrupted:
                         writer.complete()
                 if alarm and isinstance(error, KeyboardInterrupt):
                     raise RigError(f"It was interrupted, and the rig is not as it should be: {alarm}.") from error
                 raise
             alarm = _stopped(acquisition, RigError(lacking)) if lacking else ""
-            _conclude(writer, acquisition, of_devices, {**provenance, key: spent}, lacking and INCOMPLETE + lacking)
+            conclude(lacking and INCOMPLETE + lacking)
     if alarm:
-        raise RigError(f"The scene {scene.name!r} ended, and the rig is not as it should be: {alarm}.")
+        raise RigError(f"The scene {request.scene.name!r} ended, and the rig is not as it should be: {alarm}.")
     return writer.meta
 
 
@@ -154,10 +147,8 @@ def _check_not_silent(acquisition: Acquisition, rows: Mapping[str, int]) -> None
             )
 
 
-def _one_thread(descriptor: RigDescriptor) -> AbstractContextManager[Any]:
+def _one_thread() -> AbstractContextManager[Any]:
     """Return a context in which a simulation makes the same bytes whatever number of threads BLAS was started with."""
-    if not descriptor.simulated:
-        return nullcontext()
     importlib.import_module("scipy.linalg")  # it brings a BLAS of its own: only what is loaded can be held
     return thread_limit(1)
 
@@ -187,27 +178,6 @@ def _one_interrupt() -> Iterator[Callable[[], None]]:
         signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
-def _conclude(
-    writer: RecordingWriter,
-    acquisition: Acquisition,
-    of_devices: Callable[..., dict[str, Any]],
-    provenance: dict[str, Any],
-    why: str = "",
-) -> None:
-    """Write down what is known at the end; `why` it is not to be evaluated, if it is not."""
-    drawn = dict(acquisition.drawn)
-    remarks = tuple(str(text) for name, text in drawn.items() if name.startswith("remark "))
-    writer.revise(
-        plan=tuple(acquisition.plan),
-        assumptions=dict(acquisition.assumptions),
-        drawn=drawn,
-        remarks=(*remarks, why) if why else remarks,
-        excluded=why,
-        provenance=provenance,
-        **of_devices(writer.rows, cut_short=bool(why)),
-    )
-
-
 def _stopped(acquisition: Acquisition, error: BaseException) -> str:
     """End what moves before anything is written; return what is to be done where it cannot be ended."""
     stop: Callable[[str], str] | None = getattr(acquisition, "stop", None)
@@ -227,20 +197,18 @@ def _settled(counts: StreamCounts, written: int, cut_short: bool) -> StreamCount
 
 def _of_devices(
     acquisition: Acquisition,
-    descriptor: RigDescriptor,
-    sensor: str,
-    rig_file: RigFile | None,
+    request: RecordingRequest,
     rows: Mapping[str, int],
     *,
     cut_short: bool = False,
     factor: float | None = None,
 ) -> dict[str, Any]:
     """Return the fields of the meta that an acquisition of devices knows; of another one, whose clock it is."""
-    emulation = _emulation(rig_file, sensor, acquisition, factor)
+    emulation = _emulation(request.rig_file, request.sensor.name, acquisition, factor)
     counts: Mapping[str, StreamCounts] = getattr(acquisition, "stream_counts", {})
-    simulated = descriptor.simulated or (emulation is not None and emulation.time == "virtual")
+    simulated = request.rig.simulated or (emulation is not None and emulation.time == "virtual")
     return {
-        "simulated": descriptor.simulated or emulation is not None,
+        "simulated": request.rig.simulated or emulation is not None,
         "emulation": emulation,
         "clock": "simulated" if simulated else "host",
         "streams": {name: _settled(one, rows.get(name, 0), cut_short) for name, one in counts.items()},
@@ -276,28 +244,20 @@ def _emulation(file: RigFile | None, sensor: str, acquisition: Acquisition, fact
     return ours
 
 
-def _meta(
-    acquisition: Acquisition,
-    sensor: SensorDescriptor,
-    descriptor: RigDescriptor,
-    scene: Scene,
-    role: Role | None,
-    seed: int,
-    name: str,
-    rig_file: RigFile | None,
-) -> RecordingMeta:
+def _meta(acquisition: Acquisition, request: RecordingRequest) -> RecordingMeta:
+    sensor, scene = request.sensor.spec, request.scene
     recorded_hz = {stream.name: stream.rate_hz for stream in acquisition.streams}
-    own_hz = {stream.name: stream.rate_hz for stream in sensor.spec.streams if stream.rate_hz is not None}
+    own_hz = {stream.name: stream.rate_hz for stream in sensor.streams if stream.rate_hz is not None}
     return RecordingMeta(
-        name=name,
-        sensor=sensor.spec.model_copy(update={"streams": tuple(acquisition.streams)}),
+        name=request.name or scene.name,
+        sensor=sensor.model_copy(update={"streams": tuple(acquisition.streams)}),
         own_rates_hz={name: rate for name, rate in own_hz.items() if recorded_hz.get(name, rate) != rate},
         reference=tuple(acquisition.reference),
-        rig=descriptor.name,
+        rig=request.rig.name,
         session=scene.session,
-        role=role,
+        role=request.role,
         scene=scene,
         labels=dict(scene.labels),
-        seed=seed,
-        **_of_devices(acquisition, descriptor, sensor.name, rig_file, {}),
+        seed=request.seed,
+        **_of_devices(acquisition, request, {}),
     )

@@ -3,7 +3,11 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
+
+from tactbench.core.errors import UnwritableError
 
 
 def try_lock(file: int) -> bool | None:
@@ -50,3 +54,14 @@ def replace_file(path: Path, content: bytes) -> None:
     except BaseException:
         aside.unlink(missing_ok=True)
         raise
+
+
+@contextmanager
+def writable(place: Path) -> Iterator[None]:
+    """Turn what the system refuses while `place` is written into an UnwritableError."""
+    try:
+        yield
+    except OSError as error:
+        raise UnwritableError(
+            f"{place} cannot be written: {error.strerror or error}.", hint="Give another with --out."
+        ) from error

@@ -168,12 +168,10 @@ def _used(
     file: RigFile, registry: Registry, sensor: str
 ) -> dict[str, tuple[DeviceEntry, SensorDescriptor | DeviceDescriptor]]:
     """Return the entries of a rig with one sensor, each with what is installed for it."""
-    with_sensor(file, sensor)
     used: dict[str, tuple[DeviceEntry, SensorDescriptor | DeviceDescriptor]] = {}
-    for name, entry in file.entries().items():
-        if name == sensor or isinstance(entry, ForceEntry | NamedDevice):
-            with _entry(name):
-                used[name] = entry, descriptor_of(registry, name, entry)
+    for name, entry in with_sensor(file, sensor).entries().items():
+        with _entry(name):
+            used[name] = entry, descriptor_of(registry, name, entry)
     return used
 
 

@@ -243,15 +243,11 @@ class _Child:
         self.file = RigFile.model_validate(said)
 
     def close(self) -> None:
-        assert self.process.stdin is not None
-        assert self.process.stdout is not None
-        self.process.stdin.close()
         try:
-            self.process.wait(10.0)
+            self.process.communicate(timeout=10.0)  # it closes its stdin
         except subprocess.TimeoutExpired:
             self.process.kill()
-            self.process.wait()
-        self.process.stdout.close()
+            self.process.communicate()
 
 
 _children: dict[str, _Child] = {}

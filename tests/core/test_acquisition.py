@@ -10,6 +10,7 @@ from threadpoolctl import threadpool_info, threadpool_limits
 
 from tactbench.core.acquisition import acquire
 from tactbench.core.errors import LinkUnplugged, RigError
+from tactbench.core.plugins.interfaces import RecordingRequest
 from tactbench.core.recording.reader import open_recording
 from tactbench.core.recording.salvage import rescue
 from tactbench.core.samples import Block
@@ -59,10 +60,10 @@ class Weights:
         self.drawn = {"offset_mm": 0.25}
 
 
-def run(path, rig, *, simulated=True, **more):
+def run(path, rig, *, simulated=True, rig_file=None, **more):
     descriptor = RigDescriptor(name="weights", title="weights", where="x:y", simulated=simulated)
-    return acquire(rig, SENSOR, descriptor, SCENE, role="train", seed=7, path=path, clock=ticking(),
-                   provenance={"tactbench": "1"}, **more)  # fmt: skip
+    request = RecordingRequest(SENSOR, descriptor, SCENE, path, 7, "train", rig_file, provenance={"tactbench": "1"})
+    return acquire(rig, request, clock=ticking(), **more)
 
 
 def opened(path):

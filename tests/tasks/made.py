@@ -4,6 +4,7 @@ import functools
 import time
 
 from tactbench.core.acquisition import acquire
+from tactbench.core.plugins.interfaces import RecordingRequest
 from tactbench.plugin import RigContext, load_object, load_registry
 
 REGISTRY = load_registry()
@@ -19,8 +20,8 @@ def recorded(sensor, folder, planned):
     paths = []
     for item in planned:
         paths.append(folder / f"{item.scene.name}.h5")
-        acquire(
-            twin(), REGISTRY.sensors[sensor], REGISTRY.rigs["twin"], item.scene, role=item.role, seed=1,
-            path=paths[-1], clock=time.perf_counter, provenance={},
-        )  # fmt: skip
+        request = RecordingRequest(
+            REGISTRY.sensors[sensor], REGISTRY.rigs["twin"], item.scene, paths[-1], seed=1, role=item.role
+        )
+        acquire(twin(), request, clock=time.perf_counter)
     return paths

@@ -8,14 +8,13 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from tactbench.core.cli.options import ABOVE_0, format_option
+from tactbench.core.cli.options import ABOVE_0, DEFAULT_FOLDER, format_option
 
 if TYPE_CHECKING:
     from tactbench.core.choosing.choosing import Choice
     from tactbench.core.spec.task import TaskSpec
 
 Row = dict[str, Any]
-_DEFAULT = Path("tactbench-results")
 _PREFERRED = "deployable"
 
 
@@ -62,7 +61,7 @@ def _results(folder: Path | None, task: TaskSpec) -> tuple[list[Row], str]:
     from tactbench.core.errors import UsageError
     from tactbench.core.study.results import is_results, opened, shown_rows
 
-    own = folder or _DEFAULT
+    own = folder or DEFAULT_FOLDER
     found: list[Row] = []
     if folder is not None or is_results(own):
         found, origin = [row for row in shown_rows(opened(own)) if row["task"] == task.name], f"the results in {own}"
@@ -107,7 +106,7 @@ def _selected(rows: list[Row], task: TaskSpec, protocol: str | None) -> tuple[li
 
 
 def _print(choice: Choice, heading: str, origin: str) -> None:
-    from tactbench.core.cli.grid import print_fields, print_grid
+    from tactbench.core.cli.grid import print_fields, print_records
     from tactbench.core.tables.numbers import interval, score
 
     print_fields([("answer", choice.verdict), ("results", f"{heading}, from {origin}")])
@@ -119,7 +118,7 @@ def _print(choice: Choice, heading: str, origin: str) -> None:
                       "interval": interval(one.low, one.high, choice.unit), **wishes})  # fmt: skip
     if lines:
         click.echo()
-        print_grid(f"score: {choice.quantity}", tuple(lines[0]), lines, numeric=("score",))
+        print_records(lines, "table", title=f"score: {choice.quantity}", numeric=("score",))
     several = {"interval": choice.intervals, "unknown": choice.unknown, "left out": choice.left_out}
     fields = [(name, text) for name, texts in several.items() for text in texts]
     if fields:

@@ -83,13 +83,14 @@ def command(
 
 
 def _print(ladder: Ladder) -> None:
-    from tactbench.core.cli.grid import print_grid
-    from tactbench.core.report.costs import COLUMNS, RIGHT, line, title
+    from dataclasses import replace
+
+    from tactbench.core.cli.grid import print_tables
+    from tactbench.core.report.costs import ladder_table
 
     about = ladder.about
-    lines = [line(row, about["unit"]) for row in ladder.rows]
-    kinds = ["result" if row["front_fit"] or row["front_delay"] else "" for row in ladder.rows]
-    print_grid(title(about), COLUMNS, lines, numeric=RIGHT, kinds=kinds)
+    kinds = tuple("result" if row["front_fit"] or row["front_delay"] else "" for row in ladder.rows)
+    print_tables([replace(ladder_table({**about, "rows": ladder.rows}), kinds=kinds, notes=())])
     if about["load"] is not None and about["load"] > about["cores"]:
         remark(f"The machine was busy (load {about['load']:.1f} on {about['cores']} cores): the times are too long.")
     for text in about["remarks"]:

@@ -101,19 +101,14 @@ def _records(points: Sequence[CostPoint], skipped: Sequence[Skipped], scores: Sc
 
 def _write(points: Sequence[CostPoint], records: Sequence[dict[str, Any]], study: CostStudy, folder: Path) -> None:
     from tactbench.core.cost.precision import draw
-    from tactbench.core.errors import UnwritableError
-    from tactbench.core.files import replace_file
+    from tactbench.core.files import replace_file, writable
     from tactbench.core.tables.csv_text import csv_of_records
     from tactbench.core.tables.text import json_text
 
-    try:
+    with writable(folder):
         folder.mkdir(parents=True, exist_ok=True)
         replace_file(folder / "twin.csv", csv_of_records(records).encode())
         replace_file(folder / "twin.json", (json_text(records, indent=1) + "\n").encode())
         if points:
             draw(points, study.title, [folder / "twin.png", folder / "twin.pdf"])
-    except OSError as error:
-        raise UnwritableError(
-            f"{folder} cannot be written: {error}.", hint="Give another folder with --out."
-        ) from error
     remark(f"Files: {folder}/twin.csv, .json{', .png, .pdf' if points else ''}")

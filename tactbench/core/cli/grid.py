@@ -16,31 +16,6 @@ if TYPE_CHECKING:
 GRID_FORMATS = ("table", "json", "csv")
 
 
-def print_grid(
-    title: str,
-    columns: Sequence[str],
-    rows: Sequence[Mapping[str, str]],
-    *,
-    numeric: Collection[str] = (),
-    kinds: Sequence[str] = (),
-) -> None:
-    """Print rows of text on stdout as a table.
-
-    Parameters
-    ----------
-    columns
-        Keys of the rows, in order; a column without any entry is not shown.
-    numeric
-        Columns aligned to the right.
-    kinds
-        One word a row, by which it looks; see `tactbench.core.tables.terminal`.
-    """
-    from tactbench.core.tables.text_table import text_table
-
-    lines = [[row.get(column, "") for column in columns] for row in rows]
-    print_tables([text_table(title, columns, lines, numeric=numeric, kinds=kinds)])
-
-
 def print_tables(tables: Sequence[TextTable], shape: str = "table") -> None:
     """Print tables on stdout as ``table``, ``md`` or ``latex``."""
     from tactbench.core.tables.latex import latex
@@ -83,16 +58,19 @@ def field_text(value: Any) -> str:
 
 def print_records(
     records: Sequence[Mapping[str, Any]], shape: str, *, title: str = "", columns: Sequence[str] = (),
-    kinds: Sequence[str] = (),
+    numeric: Collection[str] = (), kinds: Sequence[str] = (),
 ) -> None:  # fmt: skip
-    """Print records on stdout as ``json``, ``csv`` or ``table``; all have the keys of the first.
+    """Print records on stdout as ``json``, ``csv`` or ``table``; their keys are those of the first.
 
     Parameters
     ----------
-    title, columns, kinds
-        Of a table: its title, the keys that it shows (default: all), and one word a record, as of `print_grid`.
+    title, columns, numeric, kinds
+        Of a table: its title; the keys that it shows (default: all), but for those without any entry; those of texts
+        that are aligned to the right, as numbers are; and one word a record, by which it looks, see
+        `tactbench.core.tables.terminal`.
     """
     from tactbench.core.tables.csv_text import csv_of_records
+    from tactbench.core.tables.text_table import text_table
 
     if shape == "json":
         click.echo(json_text(list(records), indent=1))
@@ -100,6 +78,6 @@ def print_records(
         click.echo(csv_of_records(records), nl=False)
     elif records:
         shown = columns or tuple(records[0])
-        numeric = [name for name in shown if any(type(one[name]) in (int, float) for one in records)]
-        lines = [{name: field_text(one[name]) for name in shown} for one in records]
-        print_grid(title, shown, lines, numeric=numeric, kinds=kinds)
+        numbers = (name for name in shown if any(type(one.get(name)) in (int, float) for one in records))
+        lines = [[field_text(one.get(name)) for name in shown] for one in records]
+        print_tables([text_table(title, shown, lines, numeric={*numeric, *numbers}, kinds=kinds)])

@@ -13,8 +13,6 @@ from tactbench.core.samples import Quality
 from tactbench.core.tables.terminal import remark
 
 if TYPE_CHECKING:
-    from types import TracebackType
-
     from rich.console import RenderableType
     from rich.table import Table
     from rich.text import Text
@@ -160,9 +158,7 @@ class LiveView:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         """Leave the terminal as it was, and the last state on it."""
         if self._live is None or not self._states:
             return
@@ -182,10 +178,12 @@ class LiveView:
         head = Table.grid(expand=True, padding=(0, 1))
         head.add_column(no_wrap=True)
         head.add_column(ratio=1)
-        force_n, _, wrong = self._force()
+        force_n, wanted_n, wrong = self._force()
+        texts = ("-" if value is None else f"{value:.2f} N" for value in (force_n, wanted_n))
+        force = "force {}, wanted {}".format(*texts) if self._reference else "no reference force"
         bar = ProgressBar(self._scene.profile.largest_n, max(0.0, force_n or 0.0))
         head.add_row(Text(self._title, "bold"), Text(self._time(), justify="right"))
-        head.add_row(Text(self._force_text(), BAD if wrong else "bold"), bar)
+        head.add_row(Text(force, BAD if wrong else "bold"), bar)
         every = [(state, place) for state in self._sensor for place in range(len(state.spec.channels))]
         taxels = [(state, place) for state, place in every if state.spec.channels[place].kind == "taxel"]
         full = max((float(state.largest[place]) for state, place in taxels if state.largest is not None), default=0.0)
@@ -237,11 +235,6 @@ class LiveView:
             if state.latest is not None and math.isfinite(state.latest[place]):
                 return float(state.latest[place]) * units.conversion(channel.unit, "N"), wanted_n, _bad(state, place)
         return None, wanted_n, False
-
-    def _force_text(self) -> str:
-        force_n, wanted_n, _ = self._force()
-        texts = ("-" if value is None else f"{value:.2f} N" for value in (force_n, wanted_n))
-        return "force {}, wanted {}".format(*texts) if self._reference else "no reference force"
 
 
 def _bad(state: StreamState, place: int) -> bool:

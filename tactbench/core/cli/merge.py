@@ -42,9 +42,8 @@ def _write_tables(folders: Sequence[Path], merged: Path) -> None:
     from tactbench.core.leaderboard.formats import write_tables
     from tactbench.core.leaderboard.levels import merge_levels
     from tactbench.core.matrix.store import Store
-    from tactbench.core.study.results import provenance_of, shown_rows
+    from tactbench.core.study.results import shown_rows, table_of
 
     merge_levels(folders, merged)
     store = Store(merged)
-    rows = shown_rows(store)
-    write_tables(rows, merged, provenance_of(store, rows))
+    write_tables(table_of(store, shown_rows(store)), merged)

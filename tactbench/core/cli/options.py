@@ -23,6 +23,7 @@ class FiniteRange(click.FloatRange):
         return number
 
 
+DEFAULT_FOLDER = Path("tactbench-results")
 ABOVE_0 = FiniteRange(min=0, min_open=True)
 
 
@@ -44,7 +45,7 @@ def format_option(*shapes: str) -> Callable[[Command], Command]:
 
 
 YES = click.option("--yes", is_flag=True, help="Do not prompt.")
-RESULTS = click.option("--out", type=click.Path(path_type=Path), default=Path("tactbench-results"), show_default=True,
+RESULTS = click.option("--out", type=click.Path(path_type=Path), default=DEFAULT_FOLDER, show_default=True,
                        metavar="DIR", help="Result folder.")  # fmt: skip
 
 EFFECTS = click.option(

@@ -11,12 +11,8 @@ from tactbench.core.cli.options import SIMULATION, YES
 from tactbench.core.tables.text import command_line
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-    from contextlib import AbstractContextManager
-
-    from tactbench.core.plugins.interfaces import Acquisition, Operator, Rig
+    from tactbench.core.plugins.interfaces import Operator, Rig
     from tactbench.core.plugins.registry import Registry
-    from tactbench.core.samples import Block
     from tactbench.core.spec.rig_file import RigFile
 
 
@@ -52,7 +48,9 @@ def command(
     from contextlib import ExitStack, nullcontext
 
     from tactbench.core.acquisition import acquire
+    from tactbench.core.cli.live import LiveView
     from tactbench.core.errors import TactbenchError
+    from tactbench.core.plugins.interfaces import RecordingRequest
     from tactbench.core.plugins.registry import load_registry
     from tactbench.core.plugins.rigs import load_rig_file
     from tactbench.core.provenance.gather import gather
@@ -72,21 +70,19 @@ def command(
     provenance = gather(registry)
     try:
         with ExitStack() as stack:
-            opened: Callable[[Acquisition], None] | None = None
-            watch: Callable[[Block], None] | None = None
-            paused: Callable[[], AbstractContextManager[None]] = nullcontext
+            view: LiveView | None = None
             if live:
-                from tactbench.core.cli.live import LiveView
-
                 emulated = devices is not None and devices.emulated
                 mark = " (SIM)" if registry.rigs[rig].simulated else " (EMULATED)" if emulated else ""
                 view = stack.enter_context(LiveView(scene, f"{sensor} on {rig}{mark}, {scene.indenter}"))
-                opened, watch, paused = view.begin, view.watch, view.paused
-            built = _built(registry, rig, devices, TerminalOperator(yes=yes, paused=paused))
+            operator = TerminalOperator(yes=yes, paused=view.paused if view else nullcontext)
+            built = _built(registry, rig, devices, operator)
+            request = RecordingRequest(
+                descriptor, registry.rigs[rig], scene, out, seed, rig_file=devices, name=out.stem, provenance=provenance
+            )
             meta = acquire(
-                built, descriptor, registry.rigs[rig], scene, role=None, seed=seed, path=out, clock=time.perf_counter,
-                provenance=provenance, opened=opened, watch=watch, name=out.stem, complete_interrupted=True,
-                rig_file=devices,
+                built, request, clock=time.perf_counter, opened=view.begin if view else None,
+                watch=view.watch if view else None, complete_interrupted=True,
             )  # fmt: skip
     except (KeyboardInterrupt, TactbenchError) as error:
         if _interrupted(out):

@@ -7,14 +7,14 @@ from typing import TYPE_CHECKING
 
 import click
 
-from tactbench.core.cli.options import format_option
+from tactbench.core.cli.options import DEFAULT_FOLDER, format_option
 
 if TYPE_CHECKING:
     from tactbench.core.report.page import Report
 
 
 @click.command(name="report")
-@click.argument("folder", type=click.Path(path_type=Path), default=Path("tactbench-results"), required=False)
+@click.argument("folder", type=click.Path(path_type=Path), default=DEFAULT_FOLDER, required=False)
 @click.option(
     "--out",
     type=click.Path(path_type=Path),

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from tactbench.core.cli.leaderboard import TABLE_FORMATS, check_destination, print_table, view_of
 from tactbench.core.cli.options import RESULTS, SIMULATION, YES, FiniteRange, format_option, options
-from tactbench.core.cli.tables import TABLE_FORMATS, check_destination, print_table, view_of
 from tactbench.core.spec.bounds import MOST_MEMORY_MB, MOST_REPEATS, MOST_SECONDS
 from tactbench.core.tables.terminal import remark
 from tactbench.core.tables.text import command_line, cut
@@ -80,7 +80,7 @@ def command(
     store, outcome = carry_out(Study(estimator=estimator or None, set=settings, **asked))
     table = table_of(store, over_all(store, outcome.rows))
     print_table(table, shape, view_of(store.folder))
-    write_tables(table.rows, store.folder, table.provenance, table)
+    write_tables(table, store.folder)
     _farewell(outcome, store.folder)
     ctx.exit(1 if outcome.failures else 0)
 

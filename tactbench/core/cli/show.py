@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 def command(names: tuple[str, ...], everything: bool, shape: str) -> None:
     """Show sensors side by side (Table I and data sheets), or details of anything else that is installed."""
     from tactbench.core.errors import UnknownNameError, UsageError
-    from tactbench.core.plugins.registry import load_registry
+    from tactbench.core.plugins.registry import load_registry, plain
 
     registry = load_registry()
     families = registry.families()
@@ -36,7 +36,8 @@ def command(names: tuple[str, ...], everything: bool, shape: str) -> None:
     found = [family.owned(name) for name in names for family in families.values() if name in family]
     sensors = [registry.sensors[name].spec for name in names if name in registry.sensors]
     if shape == "json":
-        click.echo(json_text([_described(owned) for owned in found], indent=1))
+        described = [{"brought by": _owner(owned), **plain(owned.descriptor, "json")} for owned in found]
+        click.echo(json_text(described, indent=1))
         return
     if shape == "md":
         from tactbench.core.report.datasheet import parameters_markdown
@@ -50,14 +51,6 @@ def command(names: tuple[str, ...], everything: bool, shape: str) -> None:
     for owned in found:
         if owned.descriptor.name not in registry.sensors:
             _page(owned)
-
-
-def _described(owned: Owned[Any]) -> dict[str, Any]:
-    """Return a descriptor as plain data."""
-    dumped: dict[str, Any] = owned.descriptor.model_dump(mode="json")
-    if hasattr(owned.descriptor, "transducer"):
-        dumped["spec"]["data_sheet"] = owned.descriptor.spec.data_sheet.model_dump(mode="json")
-    return {"brought by": _owner(owned), **dumped}
 
 
 def _owner(owned: Owned[Any]) -> str:

@@ -168,8 +168,7 @@ class _Trier:
     outcomes: dict[str, CheckOutcome]
 
     def __call__(self, name: str) -> CheckOutcome:
-        self.outcomes[name] = self._tried(name)
-        return self.outcomes[name]
+        return self.outcomes.setdefault(name, self._tried(name))
 
     def _tried(self, name: str) -> CheckOutcome:
         (one,) = [one for one in CHECKS if one.name == name]

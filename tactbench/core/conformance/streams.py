@@ -14,6 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from tactbench.core.conformance.check import fail
+from tactbench.core.plugins.interfaces import RecordingRequest
 from tactbench.core.samples import COLUMNS, Block, FloatArray, Quality, StreamData, join_blocks
 from tactbench.core.spec.recording import RecordingMeta
 from tactbench.core.spec.rig import RigDescriptor, SensorDescriptor
@@ -65,10 +66,8 @@ def carried_out(
 
     with TemporaryDirectory() as folder:
         path = Path(folder) / "check.h5"
-        made = acquire(
-            rig, sensor, descriptor, scene, role=None, seed=seed, path=path, clock=time.perf_counter, provenance={},
-            rig_file=rig_file, opened=opened,
-        )  # fmt: skip
+        request = RecordingRequest(sensor, descriptor, scene, path, seed, rig_file=rig_file)
+        made = acquire(rig, request, clock=time.perf_counter, opened=opened)
         if made.excluded:
             fail("recording", f"it is {made.excluded}")
         recorded = read_back(path)

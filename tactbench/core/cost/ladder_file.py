@@ -23,8 +23,7 @@ from typing import Any
 
 from tactbench.core.cost.ladder import Ladder
 from tactbench.core.cost.precision import MARKS
-from tactbench.core.errors import UnwritableError
-from tactbench.core.files import replace_file
+from tactbench.core.files import replace_file, writable
 from tactbench.core.tables.csv_text import csv_of_records
 
 VERSION = 3
@@ -47,16 +46,12 @@ def write_ladder(ladder: Ladder, folder: Path, metric: str = "") -> list[Path]:
     place = folder / "cost" / f"{ladder.about['sensor']}-{ladder.about['task']}"
     whole = {"version": VERSION, **ladder.about, "rows": ladder.rows}
     paths = [place.with_name(f"{place.name}.{ending}") for ending in ("json", "csv", "png", "pdf")]
-    try:
+    with writable(place.parent):
         place.parent.mkdir(parents=True, exist_ok=True)
         text = json.dumps(whole, indent=1, ensure_ascii=False, allow_nan=False) + "\n"
         replace_file(paths[0], text.encode())
         replace_file(paths[1], csv_of_records(ladder.rows).encode())
         draw_ladder(ladder, paths[2:], metric)
-    except OSError as error:
-        raise UnwritableError(
-            f"{place.parent} cannot be written: {error}.", hint="Give another folder with --out."
-        ) from error
     return paths
 
 

@@ -13,9 +13,8 @@ import tactbench
 from tactbench.core.errors import UsageError
 from tactbench.core.files import replace_file
 from tactbench.core.leaderboard.columns import SHOWN
-from tactbench.core.leaderboard.names import Row
 from tactbench.core.leaderboard.sentences import NO_BETTER
-from tactbench.core.leaderboard.table import Block, Table, build_table
+from tactbench.core.leaderboard.table import Block, Table
 from tactbench.core.leaderboard.view import DEFAULT_VIEW, WHOLE, View, document, grids
 from tactbench.core.spec.row import FORMAT, JSON_KEYS, NESTED, OF_REPLICATES, Cost
 from tactbench.core.statistics.replicates import counted
@@ -140,27 +139,22 @@ def rendered(table: Table, shape: str, view: View = WHOLE, width: int = 240) -> 
     return text.encode("utf-8", "replace")
 
 
-def write_tables(
-    rows: Sequence[Row], folder: Path, provenance: Sequence[Row] = (), table: Table | None = None
-) -> tuple[Path, ...]:
-    """Write the leaderboard of `rows`, or `table` where it has been made, into a result folder; return the files.
+def write_tables(table: Table, folder: Path) -> None:
+    """Write a leaderboard into a result folder.
 
     Raises
     ------
     UsageError
         If the folder cannot be written; each of the files is then whole, an old one or a new one.
     """
-    table = table or build_table(rows, provenance)
-    paths = {folder / f"leaderboard.{shape}": shape for shape in IN_FOLDER}
     try:
-        for path, shape in paths.items():
-            replace_file(path, rendered(table, shape))
+        for shape in IN_FOLDER:
+            replace_file(folder / f"leaderboard.{shape}", rendered(table, shape))
     except OSError as error:
         raise UsageError(
             f"The tables cannot be written to {folder}: {error.strerror or error}.",
             hint="Make room or give another folder; the results themselves are safe.",
         ) from error
-    return tuple(paths)
 
 
 RANK_KEYS = ("rank", "rank_low", "rank_high", "rank_tied")

@@ -134,7 +134,5 @@ def _prepared(threads: Mapping[str, str]) -> dict[str, str]:
 def environment() -> dict[str, str]:
     """Return versions and digests of sources that may change a number."""
     registry = installed()
-    owners = [registry.tasks.owned(name) for name in registry.tasks.names()]
-    modules = [owner.module for owner in owners]
-    modules += [registry.estimators.owned(name).module for name in registry.estimators.names()]
+    modules = [owner.module for family in (registry.tasks, registry.estimators) for owner in family.all_owned()]
     return {**versions(), **sources_of(modules, ANSWERING)}

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import product
@@ -56,6 +56,20 @@ class Cell:
         split = f":{self.split}" if self.split else ""
         path = (self.sensor, self.task, self.rig, f"{self.protocol}{split}", f"{self.estimator}{options}")
         return "/".join((*path, str(self.repeat)))
+
+
+def cell_of(row: Mapping[str, Any]) -> Cell:
+    """Return the cell that a row answers."""
+    cell = Cell(
+        **{name: row[name] for name in ALIKE},
+        params=tuple(sorted(row["params"].items())),
+        baseline=row["is_baseline"],
+        timed=row["status"] != "done" or row["latency_n"] is not None,
+        simulation=Simulation.model_validate(row["simulation"]),
+    )
+    # A row says which split was taken; its name, whether that one was asked for or found.
+    found = replace(cell, split=None)
+    return found if found.name == row["cell"] else cell
 
 
 def plan_cells(matrix: MatrixSpec, sensors: Sequence[str], registry: Registry) -> list[Cell]:

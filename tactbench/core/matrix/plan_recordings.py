@@ -20,6 +20,7 @@ from tactbench.core.evaluation.protocols import shots
 from tactbench.core.matrix.keys import Keys
 from tactbench.core.matrix.plan import Cell, plan_cells, serves
 from tactbench.core.matrix.store import Store
+from tactbench.core.plugins.interfaces import RecordingRequest
 from tactbench.core.plugins.registry import Registry, installed
 from tactbench.core.plugins.rigs import failing_as, load_rig_file, rig_of
 from tactbench.core.pool import InProcess, Limits, Pool
@@ -27,7 +28,6 @@ from tactbench.core.progress import Progress
 from tactbench.core.spec.declared_task import DeclaredTask
 from tactbench.core.spec.matrix import MatrixSpec
 from tactbench.core.spec.rig_file import RigFile
-from tactbench.core.spec.scene import Role, Scene
 from tactbench.core.spec.task import TaskSpec, in_drawn_order
 
 if TYPE_CHECKING:
@@ -40,19 +40,6 @@ RequestKey = tuple[str, str, str | None, int]
 def request_key(cell: Cell) -> RequestKey:
     """Return what recordings a cell needs; those of a split that its protocol cannot serve are never made."""
     return cell.sensor, cell.task, cell.split if serves(cell.protocol, cell.split) else None, cell.seed
-
-
-@dataclass(frozen=True)
-class RecordingRequest:
-    """One recording to be made."""
-
-    sensor: str
-    rig: str
-    scene: Scene
-    role: Role
-    seed: int
-    path: Path
-    rig_file: RigFile | None = None
 
 
 def requests_for(
@@ -73,9 +60,8 @@ def requests_for(
             scene = planned.scene.simulated_as(cell.simulation)
             key = keys.of_recording(cell.sensor, cell.rig, scene, planned.role, cell.seed, rig_file)
             path = store.folder / "recordings" / cell.sensor / f"{scene.name}-{key[:12]}.h5"
-            requests[needed].append(
-                RecordingRequest(cell.sensor, cell.rig, scene, planned.role, cell.seed, path, rig_file)
-            )
+            sensor, rig = registry.sensors[cell.sensor], registry.rigs[cell.rig]
+            requests[needed].append(RecordingRequest(sensor, rig, scene, path, cell.seed, planned.role, rig_file))
     return requests
 
 
@@ -162,7 +148,7 @@ def plan_parts(
     plan: RecordingPlan = {}
     for part in parts:
         if part.trouble is None:
-            some, own = plan_run(part.matrix, registry, keys, store, part.recordings, limits)
+            some, own = plan_run(part, registry, keys, store, limits)
         else:
             some = plan_cells(part.matrix, part.matrix.sensors, registry)
             own = {request_key(cell): RecordingSource((), trouble=part.trouble) for cell in some}
@@ -177,14 +163,9 @@ def plan_parts(
 
 
 def plan_run(
-    matrix: MatrixSpec,
-    registry: Registry,
-    keys: Keys,
-    store: Store,
-    recordings: Path | None,
-    limits: Limits,
+    part: Part, registry: Registry, keys: Keys, store: Store, limits: Limits
 ) -> tuple[list[Cell], RecordingPlan]:
-    """Return the cells of `matrix`, and where their recordings come from.
+    """Return the cells of a matrix, and where their recordings come from.
 
     Raises
     ------
@@ -193,10 +174,11 @@ def plan_run(
     TactbenchError
         If a rig that is not simulated cannot be built, cannot list its recordings, or one of them cannot be read.
     """
+    matrix = part.matrix
     rig_file = load_rig_file(Path(matrix.rig_file), registry).checked_for(matrix.rig) if matrix.rig_file else None
     rig = registry.rigs[matrix.rig or registry.first_rig("simulated")]
     if not rig.simulated:  # a simulated one replays nothing: it is built when it has to record
-        work = partial(_replayed, registry=registry, recordings=recordings, rig_file=rig_file)
+        work = partial(_replayed, registry=registry, recordings=part.recordings, rig_file=rig_file)
         builder = InProcess() if registry.rigs.owned(rig.name).ours else Pool(1, limits)
         ((_, paths),) = builder.each(work, [rig.name])
         if isinstance(paths, BaseException):

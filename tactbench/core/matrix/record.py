@@ -6,8 +6,7 @@ import time
 from dataclasses import replace
 from typing import Any
 
-from tactbench.core.matrix.plan_recordings import RecordingRequest
-from tactbench.core.plugins.interfaces import Operator
+from tactbench.core.plugins.interfaces import Operator, RecordingRequest
 from tactbench.core.plugins.registry import Family, Registry
 from tactbench.core.plugins.rigs import rig_of
 
@@ -21,7 +20,7 @@ class Recorder:
     Parameters
     ----------
     registry
-        Where sensors and rigs are looked up.
+        What the rig is built from.
     operator
         Who stands at a rig of real devices.
     """
@@ -36,26 +35,14 @@ class Recorder:
         from tactbench.core.acquisition import acquire
 
         if self._built is None:
-            self._built = rig_of(request.rig, self._registry, rig_file=request.rig_file, operator=self._operator)
-        rig = self._registry.rigs[request.rig]
-        acquire(
-            self._built,
-            self._registry.sensors[request.sensor],
-            rig,
-            request.scene,
-            role=request.role,
-            seed=request.seed,
-            path=request.path,
-            # Simulations run side by side: what they cost is the processor's time. A real rig is waited for.
-            clock=time.process_time if rig.simulated else time.perf_counter,
-            provenance={},
-            rig_file=request.rig_file,
-        )
+            self._built = rig_of(request.rig.name, self._registry, rig_file=request.rig_file, operator=self._operator)
+        # Simulations run side by side: what they cost is the processor's time. A real rig is waited for.
+        acquire(self._built, request, clock=time.process_time if request.rig.simulated else time.perf_counter)
 
 
-def is_computed(request: RecordingRequest, registry: Registry) -> bool:
+def is_computed(request: RecordingRequest) -> bool:
     """Return whether a scene needs nothing but this machine, and no wall clock."""
-    simulated, devices = registry.rigs[request.rig].simulated, request.rig_file
+    simulated, devices = request.rig.simulated, request.rig_file
     if simulated or devices is None:
         return simulated
     return devices.emulation.time == "virtual" and all(entry.emulated for entry in devices.entries().values())

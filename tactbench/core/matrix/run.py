@@ -16,7 +16,6 @@ from tactbench.core.matrix.keys import Keys, Sections
 from tactbench.core.matrix.plan import Cell
 from tactbench.core.matrix.plan_recordings import (
     RecordingPlan,
-    RecordingRequest,
     RecordingSource,
     RequestKey,
     parts_of,
@@ -27,7 +26,7 @@ from tactbench.core.matrix.record import GRACE_S, Recorder, is_computed
 from tactbench.core.matrix.solve import Job, published, solve, unanswered
 from tactbench.core.matrix.store import Row, Store
 from tactbench.core.plugins.declared import declared_in, with_declared
-from tactbench.core.plugins.interfaces import Operator
+from tactbench.core.plugins.interfaces import Operator, RecordingRequest
 from tactbench.core.plugins.registry import Registry, installed
 from tactbench.core.pool import UNLIMITED, Engine, InProcess, Limits, Pool, preload
 from tactbench.core.progress import Progress
@@ -196,7 +195,7 @@ class Run:
         if not missing:
             return
         self.progress.begin("recording", len(missing))
-        computed = all(is_computed(request, self.registry) for request in missing.values())
+        computed = all(is_computed(request) for request in missing.values())
         # The operator's terminal belongs to this process.
         here = self.operator is not None and not computed
         with InProcess() if here else self.choice.recorder(computed=computed) as recorder:
@@ -210,14 +209,14 @@ class Run:
         for folder in {path.parent for path in by_path}:
             for left in folder.glob("*.h5.*"):
                 request = by_path.get(left.with_name(f"{left.name.partition('.h5.')[0]}.h5"))
-                if request is not None and is_computed(request, self.registry):
+                if request is not None and is_computed(request):
                     left.unlink(missing_ok=True)
 
     def _submit_recordings(self, recorder: Engine, missing: Iterable[RecordingRequest], *, computed: bool) -> None:
         """Queue recordings: all of a real rig as one piece of work, simulated ones by seed and sensor."""
         pieces: dict[tuple[int, str], list[RecordingRequest]] = {}
         for request in missing:
-            pieces.setdefault((request.seed, request.sensor) if computed else (0, ""), []).append(request)
+            pieces.setdefault((request.seed, request.sensor.name) if computed else (0, ""), []).append(request)
         parts = self.choice.processes if computed and len(pieces) < self.choice.processes else 1
         for piece in pieces.values():
             for part in range(min(parts, len(piece))):
@@ -229,7 +228,7 @@ class Run:
             raise outcome  # the disk is no cell's fault, and refuses the next recording too
         stopped = isinstance(outcome, BaseException)
         if stopped:
-            if "--rescue" not in str(outcome) and not is_computed(request, self.registry):
+            if "--rescue" not in str(outcome) and not is_computed(request):
                 from tactbench.core.recording.writer import recovery
 
                 journals = sorted(request.path.parent.glob(f"{request.path.name}*.partial"))
@@ -238,7 +237,7 @@ class Run:
                 if request.path in source.paths:
                     source.trouble = source.trouble or outcome
         self.recorded += not stopped
-        self.progress.advance(f"{request.sensor} {request.scene.name}", stopped=stopped)
+        self.progress.advance(f"{request.sensor.name} {request.scene.name}", stopped=stopped)
 
     # Cells
 

@@ -3,20 +3,23 @@
 from __future__ import annotations
 
 import tempfile
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from tactbench.core.errors import TactbenchError, UsageError
+from tactbench.core.errors import TactbenchError, UsageError, did_you_mean
 from tactbench.core.matrix.keys import Keys, differences
 from tactbench.core.matrix.merge import SEED_DECIDES
-from tactbench.core.matrix.naming import cell_of, meant
-from tactbench.core.matrix.plan import Cell
+from tactbench.core.matrix.plan import Cell, cell_of
 from tactbench.core.matrix.plan_recordings import RecordingSource, request_key, requests_for
 from tactbench.core.matrix.run import EngineChoice, Run
 from tactbench.core.matrix.store import Row, Store
 from tactbench.core.plugins.declared import with_declared_of
 from tactbench.core.plugins.registry import Registry, installed
 from tactbench.core.progress import Progress
+
+_SHOWN = 8
+"""Cells named in a message."""
 
 
 @dataclass(frozen=True)
@@ -91,3 +94,54 @@ def stored_cell(store: Store, given: str) -> StoredCell:
             hint = "Run the matrix again with --rig replay --recordings DIR."
             raise UsageError(f"The recording {path} is not there.", hint=hint)
     return StoredCell(store, registry, cell, row, [file for _, file in store.recordings(row) if file is not None])
+
+
+def meant(given: str, names: Sequence[str]) -> str:
+    """Return the name of the cell that `given` stands for: its name, a part of only one name, or some of its parts.
+
+    ``biotac/curvature/forest`` is ``biotac/curvature/twin/karl2016/forest/1`` where no other cell has these parts.
+
+    The replicates of a cell differ in the last part of their names alone: what names them all, with or without that
+    part, stands for the first of them.
+
+    Parameters
+    ----------
+    names
+        Of the cells there are.
+
+    Raises
+    ------
+    UsageError
+        If several cells are meant (the message lists them), or none.
+    """
+    if given in names:
+        return given
+    found = (
+        [name for name in names if _parts(name)[0] == given]
+        or [name for name in names if given in name]
+        or [name for name in names if _is_short(given, name)]
+    )
+    if len({_parts(name)[0] for name in found}) == 1:
+        return min(found, key=lambda name: _parts(name)[1])
+    if not found:
+        raise UsageError(
+            f"There is no cell called {given!r} among {len(names)}.",
+            hint=did_you_mean(given, names).strip() or "`tactbench leaderboard --format json` has their names.",
+        )
+    more = f" and {len(found) - _SHOWN} more" if len(found) > _SHOWN else ""
+    raise UsageError(
+        f"{given!r} is part of the names of {len(found)} cells.",
+        hint=f"Give more of the name of one: {', '.join(found[:_SHOWN])}{more}.",
+    )
+
+
+def _is_short(given: str, name: str) -> bool:
+    """Return whether the parts of `given` are parts of a name, in their order."""
+    parts = iter(name.split("/"))
+    return all(one in parts for one in given.split("/"))
+
+
+def _parts(name: str) -> tuple[str, int]:
+    """Return what the replicates of a cell have in common, and which one this is."""
+    cell, _, repeat = name.rpartition("/")
+    return (cell, int(repeat)) if repeat.isdecimal() else (name, 0)

@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Any, Literal, NamedTuple, Protocol
 
 from tactbench.core.samples import Block, SkinGrid, SkinState
 from tactbench.core.spec.recording import PlanEntry, Scalar, StreamCounts
-from tactbench.core.spec.rig import EffectDescriptor, IndenterDescriptor, SensorDescriptor
+from tactbench.core.spec.rig import EffectDescriptor, IndenterDescriptor, RigDescriptor, SensorDescriptor
 from tactbench.core.spec.rig_file import RigFile
-from tactbench.core.spec.scene import Scene
+from tactbench.core.spec.scene import Role, Scene
 from tactbench.core.spec.sensor import ChannelKind, ChannelSpec, SensorSpec, StreamSpec
 
 if TYPE_CHECKING:
@@ -93,6 +93,23 @@ class DeviceLog:
     """What a reader of a score from it must know."""
     counts: Mapping[str, int] = field(default_factory=dict)
     """What was counted on the way in, by name."""
+
+
+@dataclass(frozen=True)
+class RecordingRequest:
+    """One recording to be made."""
+
+    sensor: SensorDescriptor
+    rig: RigDescriptor
+    scene: Scene
+    path: Path
+    seed: int
+    role: Role | None = None
+    rig_file: RigFile | None = None
+    """The devices: what is emulated is marked so, whatever the rig says of it."""
+    name: str = ""
+    """Of the recording; empty: that of the scene."""
+    provenance: Mapping[str, Any] = field(default_factory=dict)
 
 
 class Rig(Protocol):

@@ -14,7 +14,7 @@ from dataclasses import dataclass, field
 from functools import lru_cache
 from importlib.metadata import Distribution, EntryPoint, entry_points
 from types import ModuleType
-from typing import Any, Generic, Literal, TypeVar, cast
+from typing import Any, Generic, Literal, TypeVar, cast, get_args
 
 import pluggy
 
@@ -37,17 +37,11 @@ from tactbench.core.spec.rig import (
     TaskDescriptor,
 )
 
-D = TypeVar(
-    "D",
-    SensorDescriptor,
-    RigDescriptor,
-    DeviceDescriptor,
-    TaskDescriptor,
-    EstimatorDescriptor,
-    EffectDescriptor,
-    IndenterDescriptor,
-    ProfileDescriptor,
-)
+Descriptor = (
+    SensorDescriptor | RigDescriptor | DeviceDescriptor | TaskDescriptor | EstimatorDescriptor | EffectDescriptor
+    | IndenterDescriptor | ProfileDescriptor
+)  # fmt: skip
+D = TypeVar("D", bound=Descriptor)
 
 
 @dataclass(frozen=True)
@@ -177,7 +171,7 @@ class Registry:
 
 
 _KINDS: dict[str, type[Any]] = {
-    f"{kind.__name__.removesuffix('Descriptor').lower()}s": kind for kind in D.__constraints__
+    f"{kind.__name__.removesuffix('Descriptor').lower()}s": kind for kind in get_args(Descriptor)
 }
 """By the plural that hooks and families are named after: ``sensors`` -> SensorDescriptor."""
 
@@ -258,15 +252,15 @@ def _described_in_children(points: Sequence[tuple[str, str]], timeout_s: float) 
 def _describe(point: tuple[str, str]) -> dict[str, Any]:
     """Ask a plugin; return its descriptors as JSON has them."""
     offered = ask_plugin(EntryPoint(*point, group=hookspecs.GROUP))
-    return {family: [_plain(descriptor) for descriptor in several] for family, several in offered.items()}
+    return {family: [plain(descriptor) for descriptor in several] for family, several in offered.items()}
 
 
-def _plain(descriptor: Any) -> dict[str, Any]:
-    plain: dict[str, Any] = descriptor.model_dump()
-    if isinstance(descriptor, SensorDescriptor):  # with what stays out of recordings and keys
-        spec = descriptor.spec
-        plain["spec"]["data_sheet"] = spec.data_sheet.model_dump()
-    return plain
+def plain(descriptor: Any, mode: Literal["json", "python"] = "python") -> dict[str, Any]:
+    """Return a descriptor as plain data, with what stays out of recordings and keys: a sensor's data sheet."""
+    dumped: dict[str, Any] = descriptor.model_dump(mode=mode)
+    if isinstance(descriptor, SensorDescriptor):
+        dumped["spec"]["data_sheet"] = descriptor.spec.data_sheet.model_dump(mode=mode)
+    return dumped
 
 
 def _described(reply: Mapping[str, Any]) -> dict[str, list[Any]]:
@@ -282,7 +276,7 @@ def ask_plugin(point: EntryPoint) -> dict[str, list[Any]]:
         If it does not keep the contract of its hooks; and whatever its own code raises.
     """
     module = cast(ModuleType, point.load())
-    check_api_version(point.value, getattr(module, "TACTBENCH_API", None))
+    _check_api_version(point.value, getattr(module, "TACTBENCH_API", None))
     manager = pluggy.PluginManager(hookspecs.GROUP)
     manager.add_hookspecs(hookspecs)
     manager.register(module, name=point.name)
@@ -309,14 +303,8 @@ def ask_plugin(point: EntryPoint) -> dict[str, list[Any]]:
     return offered
 
 
-def check_api_version(module: str, written_for: object) -> None:
-    """Compare the version that a plugin states with the one that is spoken here.
-
-    Raises
-    ------
-    PluginContractError
-        If they differ.
-    """
+def _check_api_version(module: str, written_for: object) -> None:
+    """Raise PluginContractError if the version that a plugin states is not the one that is spoken here."""
     spoken = hookspecs.API_VERSION
     if written_for == spoken:
         return

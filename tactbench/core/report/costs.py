@@ -15,11 +15,9 @@ _SORTED_BY = {
     "batch/row": "batch_s_per_row", "front": "", "remark": "",
 }  # fmt: skip
 """Column -> key of the number behind it."""
-COLUMNS = tuple(_SORTED_BY)
-RIGHT = tuple(name for name, key in _SORTED_BY.items() if key)
 
 
-def title(about: Mapping[str, Any]) -> str:
+def _title(about: Mapping[str, Any]) -> str:
     """Return what holds for all rows: question, metric, protocol, rounds, threads."""
     better = "higher" if about["higher_is_better"] else "lower"
     simulated = f" · SIM ({about['rig']})" if about["simulated"] else ""
@@ -31,7 +29,7 @@ def title(about: Mapping[str, Any]) -> str:
     )
 
 
-def line(row: Mapping[str, Any], unit: str) -> dict[str, str]:
+def _line(row: Mapping[str, Any], unit: str) -> dict[str, str]:
     """Return one estimator's texts by column; what was not measured is left out."""
     what = "oracle" if row.get("looks_at") == "reference" else "trivial"
     name = f"{row['estimator']} ({what})" if row["is_baseline"] else row["estimator"]
@@ -57,9 +55,10 @@ def ladder_table(about: Mapping[str, Any]) -> TextTable:
     """Return what a file of `tactbench cost` says, as the terminal shows it; raises KeyError where it is damaged."""
     lines = []
     for row in about["rows"]:
-        texts = line(row, about["unit"])
+        texts = _line(row, about["unit"])
         lines.append([Entry(texts.get(name, ""), finite(row.get(key))) for name, key in _SORTED_BY.items()])
     kinds = ["baseline" if row["is_baseline"] else "result" if row["status"] == "done" else "failed"
              for row in about["rows"]]  # fmt: skip
     words = [*(f"{text}." for text in about["remarks"]), "docs/glossary.md says what each column is."]
-    return text_table(title(about), COLUMNS, lines, numeric=RIGHT, notes=words, kinds=kinds)
+    numeric = [name for name, key in _SORTED_BY.items() if key]
+    return text_table(_title(about), tuple(_SORTED_BY), lines, numeric=numeric, notes=words, kinds=kinds)

@@ -13,8 +13,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import tactbench
-from tactbench.core.errors import UnwritableError, UsageError
-from tactbench.core.files import replace_file
+from tactbench.core.errors import UsageError
+from tactbench.core.files import replace_file, writable
 from tactbench.core.leaderboard.columns import DEFAULT, NUMERIC
 from tactbench.core.leaderboard.view import REASON, View, grid
 from tactbench.core.progress import Progress
@@ -242,17 +242,12 @@ def make_report(results: Results, out: Path, progress: Progress, *, draw: Drawer
             hint="Finish some with `tactbench run --out DIR`.",
         )
     undrawn: list[str] = []
-    try:
+    with writable(out):
         (out / "figures").mkdir(parents=True, exist_ok=True)
         drawn = draw(results, out / "figures", progress, undrawn.append)
         html, missing, broken = make_page(ReportData(results, drawn, tuple(undrawn)))
         # A lone surrogate, which JSON may hold, is no UTF-8: a question mark then.
         replace_file(out / "index.html", html.encode("utf-8", "replace"))
-    except OSError as error:
-        raise UnwritableError(
-            f"The report cannot be written to {out}: {error.strerror or error}.",
-            hint="Give another folder with --out.",
-        ) from error
     return Report(
         page=out / "index.html",
         reproduction=published_table(results.registry, results.rows),

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -46,10 +46,6 @@ def table_of(store: Store, rows: Sequence[Mapping[str, Any]], *, times: bool = T
     tasks = installed().tasks
     names = {str(row["task"]) for row in rows}.intersection(tasks.names())
     questions = {name: tasks[name].spec.question for name in names}
-    return build_table(rows, provenance_of(store, rows), times=times, questions=questions)
-
-
-def provenance_of(store: Store, rows: Iterable[Mapping[str, Any]]) -> list[dict[str, Any]]:
-    """Return what is known of the runs that `rows` are from."""
     made_by = sorted({str(row["made_by"]) for row in rows if row.get("made_by")})
-    return [known for known in map(store.provenance, made_by) if known]
+    provenance = [known for known in map(store.provenance, made_by) if known]
+    return build_table(rows, provenance, times=times, questions=questions)

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable, Sequence
 from typing import Any
 
-from pydantic import ValidationError
+from pydantic import FiniteFloat, TypeAdapter, ValidationError
 
 from tactbench.core.errors import UnknownNameError, UsageError
 from tactbench.core.plugins.registry import Registry
@@ -68,12 +67,11 @@ def _setting(text: str) -> tuple[str, Any]:
     if name in _NAMED and value:
         return name, value
     try:
-        number = float(value)
-    except ValueError:
-        number = math.nan
-    if not math.isfinite(number):
-        raise UsageError(f"--set {text!r} is not a name and a number.", hint="Write --set placement_scatter_mm=0.3.")
-    return name, number
+        return name, TypeAdapter(FiniteFloat).validate_python(value)
+    except ValueError as error:
+        raise UsageError(
+            f"--set {text!r} is not a name and a number.", hint="Write --set placement_scatter_mm=0.3."
+        ) from error
 
 
 def _check_effect(registry: Registry, word: str) -> None:

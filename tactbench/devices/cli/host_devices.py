@@ -120,17 +120,9 @@ def extras() -> Iterator[HostItem]:
         if found and found[2] not in FOR_DEVELOPERS:
             requirements.setdefault(found[2], []).append(found[1])
     for name, distributions in requirements.items():
-        lacking = ", ".join(one for one in distributions if not _installed(one))
+        lacking = ", ".join(one for one in distributions if not any(metadata.distributions(name=one)))
         text, hint = (f"not installed: {lacking}", f"pip install 'tactbench[{name}]'") if lacking else ("", "")
         yield HostItem("extra", name, "missing" if lacking else "works", text, hint)
-
-
-def _installed(distribution: str) -> bool:
-    try:
-        metadata.version(distribution)
-    except metadata.PackageNotFoundError:
-        return False
-    return True
 
 
 def clock() -> HostItem:

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 
+from tactbench.core.cli.grid import print_records
 from tactbench.core.cli.run import tell_stopped
 from tactbench.core.errors import RigError
 from tactbench.core.study.operator import TerminalOperator
@@ -111,3 +112,9 @@ def test_without_a_terminal_somebody_has_to_be_there(monkeypatch):
         monkeypatch.setattr(sys, "stdin", nothing)
         with pytest.raises(RigError, match=r"Somebody has to be there: Place the cap\..*--yes"):
             TerminalOperator().prompt("Place the cap.")
+
+
+def test_a_record_that_lacks_a_key_leaves_its_field_empty(capsys):
+    """Of two answers only one may have no trivial answer beside it."""
+    print_records([{"sensor": "a", "why": "no bar"}, {"sensor": "b"}], "table", title="sensors")
+    assert capsys.readouterr().out.splitlines()[-2:] == [" a       no bar", " b"]

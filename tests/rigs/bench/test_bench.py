@@ -8,6 +8,7 @@ import pytest
 from tactbench.core.acquisition import acquire
 from tactbench.core.errors import DataError, RigError, UsageError
 from tactbench.core.evaluation.dataset import load_dataset
+from tactbench.core.plugins.interfaces import RecordingRequest
 from tactbench.core.recording.reader import open_recording
 from tactbench.core.spec.quantity import assumed
 from tactbench.core.spec.rig_file import Allowed, DeviceEntry, EmulationSettings, ForceEntry
@@ -44,10 +45,8 @@ def press(path, file, sensor="icub", scene=SCENE, operator=None):
     """Record one scene; return its path and the error that ended it, if one did."""
     error = None
     try:
-        acquire(
-            bench(file, operator), REGISTRY.sensors[sensor], REGISTRY.rigs["bench"], scene, role=None, seed=7,
-            path=path, clock=lambda: 0.0, provenance={}, complete_interrupted=True, rig_file=file,
-        )  # fmt: skip
+        request = RecordingRequest(REGISTRY.sensors[sensor], REGISTRY.rigs["bench"], scene, path, seed=7, rig_file=file)
+        acquire(bench(file, operator), request, clock=lambda: 0.0, complete_interrupted=True)
     except RigError as raised:
         error = raised
     return error

@@ -8,6 +8,7 @@ import time
 import yaml
 
 from tactbench.core.acquisition import acquire
+from tactbench.core.plugins.interfaces import RecordingRequest
 from tactbench.core.recording.reader import open_recording
 from tactbench.plugin import RigContext, load_registry
 from tactbench.plugin.devices import RigFile
@@ -39,10 +40,9 @@ def test_presses_go_through_driver_guard_process_and_emulators_and_keep_their_ho
     file, icub, scene = impatient(tmp_path), REGISTRY.sensors["icub"], ramp(5.0, 0.5, 5.0)
     rig = build(RigContext(effects=tuple(REGISTRY.effects), rig_file=file))
     for name in ("a.h5", "b.h5"):
-        acquire(
-            rig, icub, REGISTRY.rigs["parallel-manipulator"], scene, role=None, seed=7, path=tmp_path / name,
-            clock=time.perf_counter, provenance={}, rig_file=file,
-        )  # fmt: skip
+        described = REGISTRY.rigs["parallel-manipulator"]
+        request = RecordingRequest(icub, described, scene, tmp_path / name, seed=7, rig_file=file)
+        acquire(rig, request, clock=time.perf_counter)
     with open_recording(tmp_path / "b.h5") as recording:
         recording.verify()
         meta, force, taxels = recording.meta, recording.read("force_torque"), recording.read("taxels")

@@ -10,6 +10,7 @@ import pytest
 
 from tactbench.core.acquisition import acquire
 from tactbench.core.evaluation.channels import channels_for
+from tactbench.core.plugins.interfaces import RecordingRequest
 from tactbench.core.recording.reader import open_recording
 from tactbench.core.spec.scene import Simulation
 from tactbench.plugin import (
@@ -46,9 +47,8 @@ def record(sensors, tmp_path):
         scene = Scene(name=name, indenter=CAP, placement=NOMINAL, **{"observe": ("ac_pressure",), **scene})
         path = tmp_path / f"{name}.h5"
         path.unlink(missing_ok=True)
-        meta = acquire(
-            TWIN, sensors[sensor], DESCRIPTOR, scene, role=None, seed=1, path=path, clock=time.monotonic, provenance={}
-        )
+        request = RecordingRequest(sensors[sensor], DESCRIPTOR, scene, path, seed=1)
+        meta = acquire(TWIN, request, clock=time.monotonic)
         with open_recording(path) as recording:
             recording.verify()
             return meta, {stream: recording.read(stream) for stream in recording.stream_names}
@@ -105,7 +105,7 @@ def test_a_minute_of_sliding_comes_back_from_its_file(record):
 def test_the_force_task_still_picks_the_normal_force(sensors, tmp_path):
     scene = Scene(name="both", profile=_held(), slide=_slide(20.0), observe=("taxel",))
     path = tmp_path / "both.h5"
-    acquire(TWIN, sensors["icub"], DESCRIPTOR, scene, role=None, seed=1, path=path, clock=time.monotonic, provenance={})
+    acquire(TWIN, RecordingRequest(sensors["icub"], DESCRIPTOR, scene, path, seed=1), clock=time.monotonic)
     with open_recording(path) as recording:
         (found,) = channels_for(recording, ChannelTarget(kind="force"))
         assert found[2].name == "normal"

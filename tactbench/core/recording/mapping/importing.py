@@ -16,7 +16,8 @@ from typing import cast, get_args
 
 import numpy as np
 
-from tactbench.core.errors import MappingError, RecordingError, UnwritableError
+from tactbench.core.errors import MappingError, RecordingError
+from tactbench.core.files import writable
 from tactbench.core.progress import Progress
 from tactbench.core.recording.health import MONOTONE, Finding, examine, is_copy
 from tactbench.core.recording.mapping.channels import MappedStream, device, fill, sensor_of
@@ -150,13 +151,9 @@ def _aside(out: Path) -> Iterator[Path]:
     Folders that were made for an import that is refused are removed again.
     """
     made = [folder for folder in (out, *out.parents) if not folder.exists()]
-    try:
+    with writable(out):
         out.mkdir(parents=True, exist_ok=True)
         waiting = TemporaryDirectory(prefix=".importing-", dir=out)
-    except OSError as error:
-        raise UnwritableError(
-            f"The folder {out} cannot be written: {error.strerror}.", hint="Give another with --out DIR."
-        ) from error
     try:
         with waiting as folder:
             yield Path(folder)
@@ -309,11 +306,9 @@ def _place(made: Sequence[Imported], out: Path, *, replace: bool) -> list[Import
                 )
             continue
         to_move.append((one.path, target))
-    try:
+    with writable(out):
         for path, target in to_move:
             path.replace(target)
-    except OSError as error:
-        raise UnwritableError(f"{out} cannot be written: {error.strerror}.", hint="Give another with --out.") from error
     return [replaced(one, path=out / one.path.name) for one in made]
 
 

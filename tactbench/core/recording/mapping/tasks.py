@@ -8,7 +8,8 @@ from pathlib import Path
 
 import yaml
 
-from tactbench.core.errors import MappingError, UnwritableError
+from tactbench.core.errors import MappingError
+from tactbench.core.files import writable
 from tactbench.core.recording.mapping.channels import MappedStream
 from tactbench.core.recording.mapping.model import Mapping as MappingFile
 from tactbench.core.spec.declared_task import FILE
@@ -69,10 +70,6 @@ def place_tasks(out: Path, aside: Path, text: str) -> None:
     """Write the tasks into `aside` and move them to `out`; raises UnwritableError."""
     if not text:
         return
-    try:
+    with writable(out / FILE):
         (aside / FILE).write_text(text, encoding="utf-8")
         (aside / FILE).replace(out / FILE)
-    except OSError as error:
-        raise UnwritableError(
-            f"{out / FILE} cannot be written: {error.strerror}.", hint="Give another with --out."
-        ) from error

@@ -3,7 +3,7 @@
 import pytest
 
 from tactbench.core.errors import UsageError
-from tactbench.core.matrix.naming import meant
+from tactbench.core.matrix.why import meant
 
 FOREST, FAST = "a/t/twin/p/forest", "a/t/twin/p/forest-fast"
 NAMES = [f"{FOREST}/10", f"{FOREST}/2", f"{FOREST}/1", f"{FAST}/1", "b/t/twin/p/forest/1"]
