@@ -149,9 +149,11 @@ def _closest(board: Board, first: Row, others: Sequence[Row]) -> str:
     unit, sign = first["unit"], -sign_of(first)
     found, second = min(((difference(first, row), row) for row in others), key=lambda pair: sign * pair[0].value)
     name = board.name(second)
-    if found.low is None or found.high is None or sign * found.value <= 0:
+    if found.low is None or found.high is None:
         return f"closest is {name}"
     low, high = sorted((sign * found.low, sign * found.high))
+    if low <= 0:  # apart by what places go by, and not by this difference
+        return f"closest is {name}"
     by = f"{score_with_unit(sign * found.value, unit)} ({percent(None, None)} {interval(low, high, unit)}), to {name}"
     kept = [row.get("replicates") or {} for row in (first, second)]
     key = "beyond" if all("beyond" in one for one in kept) else "scores"
