@@ -104,6 +104,7 @@ class Bars:
         trivial = (row for row in rows if row["is_baseline"] and row["status"] == "done")
         groups = grouped((row for row in trivial if row.get("looks_at") != "reference"), comparison_key)
         self._best = {key: min(alike, key=error_of) for key, alike in groups.items()}
+        self._unshown: dict[str, bool] = {}
 
     def trivial(self, row: Row) -> Row | None:
         """Return the trivial answer; None where it is not among the rows, and only its score may be known."""
@@ -128,6 +129,11 @@ class Bars:
 
         On recordings that of their paired difference tells, where both were tested on the same units.
         """
+        if row["cell"] not in self._unshown:  # a difference takes thousands of exchanges, and several notes ask
+            self._unshown[row["cell"]] = self._holds(row)
+        return self._unshown[row["cell"]]
+
+    def _holds(self, row: Row) -> bool:
         trivial = self.trivial(row)
         if trivial is not None and held_out(row) and row["replicates"] and trivial["replicates"]:
             from tactbench.core.statistics.paired import difference  # numerics

@@ -12,7 +12,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from tactbench.core.evaluation.interval import student_quantile, two_sided_p
+from tactbench.core.evaluation.interval import own_scores, student_quantile, two_sided_p
 from tactbench.core.evaluation.metrics import METRICS
 from tactbench.core.evaluation.replicate_sums import tables_of
 from tactbench.core.samples import FloatArray, IntArray
@@ -168,7 +168,7 @@ def _own_scores(row: Row) -> FloatArray:
     metric, kept, n_classes = METRICS[row["metric"]], row["replicates"], len(row["classes"])
     if "scores" in kept:
         return scores_of(kept, metric.name)
-    return metric.score(tables_of([kept], metric.name, n_classes)[0], n_classes)
+    return own_scores(metric, tables_of([kept], metric.name, n_classes)[0], n_classes)
 
 
 def _share_better(apart: FloatArray) -> float | None:
