@@ -59,16 +59,11 @@ class LazyStream:
         """Read the time stamps alone, (n,) nanoseconds; None where there is no clock."""
         return self._read("t_ns", slice(None)) if "t_ns" in self._columns else None
 
-    def add_to(self, digest: layout.ContentDigest) -> None:
-        """Add every column to the digest, by its name below the stream."""
+    def add_to(self, digest: layout.ContentDigest, *, whole: bool) -> None:
+        """Add every column to the digest, by its name below the stream, `whole` or in pieces."""
         for name in sorted(self._columns):
-            where = f"/{self.spec.name}/{name}"
-            first = self._read(name, slice(0, 0))
-            if first.dtype.kind == "U":
-                digest.texts(where, self._read(name, slice(None)))
-            else:
-                pieces = (self._read(name, rows) for rows in self._pieces())
-                digest.numbers(where, first.dtype, (len(self), *first.shape[1:]), pieces)
+            for rows in [slice(None)] if whole or not len(self) else self._pieces():
+                digest.add(f"/{self.spec.name}/{name}", self._read(name, rows))
 
     def _pieces(self) -> Iterator[slice]:
         step = layout.piece_rows(len(self.spec.channels))
@@ -103,9 +98,8 @@ class Recording:
         Names of the streams that hold data, the sensor's first, in the order of the specs.
     """
 
-    def __init__(self, path: Path, file: Any, text: str, *, complete: bool, behind: Any = None) -> None:
+    def __init__(self, path: Path, file: Any, text: str, *, complete: bool) -> None:
         self.path = path
-        self._behind = behind  # the file that an HDF5 file of a journal is built in
         self.meta = parse_meta(path, text)
         self.complete = complete
         self.version = int(file.attrs["format_version"])
@@ -125,8 +119,6 @@ class Recording:
     def close(self) -> None:
         """Close the file."""
         self._file.close()
-        if self._behind is not None:
-            self._behind.close()
 
     def stream(self, name: str) -> LazyStream:
         """Return a stream to slice.
@@ -155,7 +147,7 @@ class Recording:
         """Return the digest of what the recording says, computed from the data now."""
         digest = layout.ContentDigest(self._text, self.version)
         for name in sorted(self.stream_names):
-            self.stream(name).add_to(digest)
+            self.stream(name).add_to(digest, whole=self.version < 4)
         return digest.hexdigest()
 
     def verify(self) -> str:

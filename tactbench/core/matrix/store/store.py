@@ -114,6 +114,7 @@ class Store:
         content = cell.content()
         with writing(self.folder):
             replace_file(path, content)
+            _check_written(path, cell)
             for name, _key, status in self._files.files_of(cell.row["cell"]):
                 if status != "done" and name != path.name:  # superseded; what was finished stays for other versions
                     (path.parent / name).unlink(missing_ok=True)
@@ -176,6 +177,18 @@ def _read_recording(path: Path) -> dict[str, Any]:
         meta = recording.meta
         scene = meta.scene.name if meta.scene else None
         return {"digest": recording.verify(), "sensor": meta.sensor.name, "scene": scene}
+
+
+def _check_written(path: Path, cell: CellFile) -> None:
+    """Read the file of a cell back; FolderError, and no file, if it holds anything else."""
+    try:
+        found = read_cell(path)
+        same = (found.text, found.digests) == (cell.text, cell.digests)
+    except FormatError:
+        same = False
+    if not same:
+        path.unlink(missing_ok=True)
+        raise FolderError(f"What is read back of {path} is not what was written.", hint="Did the disk fail?")
 
 
 @contextmanager
