@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 
 from tactbench.core.errors import FolderError, FormatError
 from tactbench.core.matrix.store import Store
+from tactbench.core.matrix.store import store as STORE
 from tactbench.core.matrix.store.cell_file import read_cell
 from tactbench.core.samples import Answers
 from tests.conftest import ROOT
@@ -199,3 +200,11 @@ def test_the_queries_of_the_page_run(tmp_path):
     assert stopped == [("b/1", "failed", "a test says so")]
     assert {line[0] for line in everything} == {"a/10", "a/2", "b/1"}
     assert {json.loads(line[-1])["cell"] for line in everything} == {"a/10", "a/2", "b/1"}
+
+
+def test_a_cell_that_is_read_back_otherwise_is_none(tmp_path, monkeypatch):
+    monkeypatch.setattr(STORE, "replace_file", lambda path, content: path.write_bytes(content[:-1]))
+    with Store(tmp_path).hold() as store:
+        with pytest.raises(FolderError, match="read back"):
+            kept(store, "a")
+        assert (store.finished(key("a")), store.rows(), list(tmp_path.glob("cells/*"))) == (None, [], [])

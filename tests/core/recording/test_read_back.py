@@ -9,13 +9,15 @@ from functools import partial
 import numpy as np
 import pytest
 
-from tactbench.core.errors import RecordingError
+from tactbench.core.errors import MissingRecordingError, RecordingError
+from tactbench.core.files import try_lock
 from tactbench.core.recording import image
 from tactbench.core.recording.mapping import import_tables
 from tactbench.core.recording.reader import open_recording
 from tactbench.core.recording.salvage import rescue, salvage
 from tactbench.core.recording.writer import RecordingWriter
 from tactbench.core.samples import Block, Quality
+from tactbench.rigs.replay import RecordingFolder
 from tests.core.recording.conftest import about
 
 ROWS = np.arange(2000)
@@ -140,3 +142,20 @@ def test_a_block_that_the_disk_drops_is_missed(scene, monkeypatch):
     with pytest.raises(RecordingError, match="lost rows"):
         record(scene)
     assert not (scene / "press.h5").exists()
+
+
+def test_the_next_import_ends_what_an_import_that_was_killed_has_begun(scene):
+    imported(scene)
+    replay = RecordingFolder(scene)
+    for name in (".importing-a", ".placing-b"):
+        (scene / name).mkdir()
+        shutil.copyfile(scene / "press.h5", scene / name / f"{name[1:-2]}.h5")
+    with pytest.raises(MissingRecordingError, match="some are missing"):
+        replay.recordings()
+    with (scene / ".importing-a" / ".lock").open("w") as lock:
+        assert try_lock(lock.fileno())
+        imported(scene)
+        assert sorted(path.name for path in scene.iterdir()) == [".importing-a", "placing.h5", "press.h5"]
+    imported(scene)
+    assert sorted(path.name for path in scene.iterdir()) == ["placing.h5", "press.h5"]
+    assert len(replay.recordings()) == 2

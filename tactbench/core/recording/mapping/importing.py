@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import fnmatch
+import os
 import re
+import shutil
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
@@ -11,13 +13,13 @@ from dataclasses import dataclass, field
 from dataclasses import replace as replaced
 from itertools import product
 from pathlib import Path
-from tempfile import TemporaryDirectory
+from tempfile import mkdtemp
 from typing import cast, get_args
 
 import numpy as np
 
 from tactbench.core.errors import MappingError, RecordingError
-from tactbench.core.files import writable
+from tactbench.core.files import try_lock, writable
 from tactbench.core.progress import Progress
 from tactbench.core.recording.health import MONOTONE, Finding, examine, is_copy
 from tactbench.core.recording.mapping.channels import MappedStream, device, fill, sensor_of
@@ -25,7 +27,7 @@ from tactbench.core.recording.mapping.files import RawRecording, find, read
 from tactbench.core.recording.mapping.model import MUST_NAME_SENTINELS, Mapping, Word
 from tactbench.core.recording.mapping.samples import labels, samples, times
 from tactbench.core.recording.mapping.table import TextTable
-from tactbench.core.recording.mapping.tasks import check_tasks, place_tasks, require_answerable, tasks_text
+from tactbench.core.recording.mapping.tasks import check_tasks, require_answerable, tasks_text, write_tasks
 from tactbench.core.recording.reader import content_digest, open_recording
 from tactbench.core.recording.writer import RecordingWriter
 from tactbench.core.samples import Block, FloatArray
@@ -38,6 +40,8 @@ RIG = "import"
 """What an imported recording says about its rig: somebody else's, made known by a mapping."""
 
 ENDING = ".h5"
+WAITING, PLACING = ".importing-", ".placing-"
+"""Folders in which the recordings of an import wait, and from which they are being moved to their place."""
 _FILE_NAME = re.compile(r"^[A-Za-z0-9][A-Za-z0-9._-]*$")
 
 
@@ -129,7 +133,7 @@ def import_tables(
     made: list[Imported] = []
     progress = progress or Progress()
     progress.begin(f"importing {mapping.stem}", len(sets))
-    with _aside(out) as folder:
+    with aside(out) as folder:
         for files in sets:
             for raw in read(loaded, files):
                 meta = _meta(loaded, raw, sensor, reference)
@@ -137,31 +141,62 @@ def import_tables(
                 made.append(_write(folder / f"{meta.name}{ENDING}", meta, loaded, raw, streams))
             progress.advance(next(iter(files.files.values())).shown)
         check_tasks(out, tasks, replace=replace)
-        placed = _place(made, out, replace=replace)
-        place_tasks(out, folder, tasks)
+        write_tasks(folder, tasks)
+        placed = _fitting(made, out, replace=replace)
+        with writable(out):
+            _place(folder.rename(folder.with_name(folder.name.replace(WAITING, PLACING))), out)
     names = tuple(task.name for task in loaded.tasks)
     shown = {file.shown for files in sets for file in files.files.values()}
     return ImportReport(loaded.title, tuple(placed), len(shown), names, orphans)
 
 
 @contextmanager
-def _aside(out: Path) -> Iterator[Path]:
+def aside(out: Path) -> Iterator[Path]:
     """Give the folder in which recordings wait until all of them are good; hidden, so that no rig replays it.
 
-    Folders that were made for an import that is refused are removed again.
+    What an import that was killed has left is removed, or moved to its place if that had begun. Folders that were made
+    for an import that is refused are removed again.
     """
     made = [folder for folder in (out, *out.parents) if not folder.exists()]
     with writable(out):
         out.mkdir(parents=True, exist_ok=True)
-        waiting = TemporaryDirectory(prefix=".importing-", dir=out)
+        for name, end in ((WAITING, _remove), (PLACING, _place)):
+            for left in out.glob(f"{name}*"):
+                with _locked(left) as free:
+                    if free:
+                        end(left, out)
+        folder = Path(mkdtemp(prefix=WAITING, dir=out))
     try:
-        with waiting as folder:
-            yield Path(folder)
+        with _locked(folder):
+            yield folder
     except BaseException:
+        _remove(folder)
         for empty in made:
             with suppress(OSError):
                 empty.rmdir()
         raise
+    _remove(folder)
+
+
+@contextmanager
+def _locked(folder: Path) -> Iterator[bool]:
+    """Lock the folder of an import for this process; give whether no other process has it."""
+    lock = os.open(folder / ".lock", os.O_RDWR | os.O_CREAT, 0o666)
+    try:
+        yield bool(try_lock(lock))
+    finally:
+        os.close(lock)
+
+
+def _remove(folder: Path, _out: Path | None = None) -> None:
+    shutil.rmtree(folder, ignore_errors=True)
+
+
+def _place(folder: Path, out: Path) -> None:
+    """Move everything that waits in `folder` to `out`; as long as the folder is there, rigs do not replay `out`."""
+    for path in sorted(folder.glob("[!.]*")):
+        path.replace(out / path.name)
+    _remove(folder)
 
 
 def _write(
@@ -293,9 +328,8 @@ def _unique_name(meta: RecordingMeta, made: Sequence[Imported]) -> None:
         )
 
 
-def _place(made: Sequence[Imported], out: Path, *, replace: bool) -> list[Imported]:
-    """Move finished recordings to their place, after all of them have been found to fit there."""
-    to_move = []
+def _fitting(made: Sequence[Imported], out: Path, *, replace: bool) -> list[Imported]:
+    """Return recordings as they will lie in `out`; those that it holds already do not wait any longer."""
     for one in made:
         target = out / one.path.name
         if target.exists() and not replace:
@@ -304,11 +338,7 @@ def _place(made: Sequence[Imported], out: Path, *, replace: bool) -> list[Import
                     f"{target} exists already and holds something else.",
                     hint="Give another folder with --out DIR, or replace it with --replace.",
                 )
-            continue
-        to_move.append((one.path, target))
-    with writable(out):
-        for path, target in to_move:
-            path.replace(target)
+            one.path.unlink()
     return [replaced(one, path=out / one.path.name) for one in made]
 
 
