@@ -31,6 +31,7 @@ def store(
     *,
     aside: Path,
     replace: bool,
+    sync: bool,
 ) -> str:
     """Write a recording beside its place, read it back, and rename it to `target`; return its content digest.
 
@@ -46,6 +47,8 @@ def store(
         Where the file is written until it has been read back.
     replace
         Whether `target` may be there already.
+    sync
+        Whether to wait for the disk; False for what can be made again.
 
     Raises
     ------
@@ -58,7 +61,8 @@ def store(
         with aside.open("wb") as file:
             file.write(image)
             file.flush()
-            os.fsync(file.fileno())
+            if sync:
+                os.fsync(file.fileno())
         try:
             with open_recording(aside) as written:
                 digest = written.verify()
@@ -69,7 +73,8 @@ def store(
         if not replace:
             require_free(target)
         aside.replace(target)
-        _sync_folder(target.parent)
+        if sync:
+            _sync_folder(target.parent)
     except OSError as error:
         raise cannot_write(target, error) from error
     finally:
@@ -181,17 +186,16 @@ def _extend(group: Any, columns: Columns) -> None:
     start = group["data"].shape[0] if "data" in group else 0
     stop = start + len(columns["data"])
     for name, values in columns.items():
-        if name not in group:
-            _create(group, name, values, start)
-        group[name].resize(stop, axis=0)
-        group[name][start:stop] = values
+        column = group[name] if name in group else _create(group, name, values)
+        column.resize(stop, axis=0)
+        column[start:stop] = values
 
 
-def _create(group: Any, name: str, values: npt.NDArray[Any], rows: int) -> None:
-    """Make a column; quality may come late, and the zeros before it mean good."""
+def _create(group: Any, name: str, values: npt.NDArray[Any]) -> Any:
+    """Return a new column without rows; quality may come late, and the zeros before it mean good."""
     rest = values.shape[1:]
-    group.create_dataset(
-        name, shape=(rows, *rest), maxshape=(None, *rest), dtype=values.dtype, chunks=(layout.CHUNK_ROWS, *rest),
+    return group.create_dataset(
+        name, shape=(0, *rest), maxshape=(None, *rest), dtype=values.dtype, chunks=(layout.CHUNK_ROWS, *rest),
         compression="gzip", compression_opts=4, shuffle=True, fillvalue=0,
     )  # fmt: skip
 
@@ -208,40 +212,41 @@ def _annotate(group: Any, label: str, column: npt.NDArray[Any]) -> None:
 
 def _describe(group: Any, spec: StreamSpec) -> None:
     """Write what ordinary viewers need (NeXus: signal, axes, units)."""
-    group.attrs["NX_class"] = "NXdata"
-    group.attrs["signal"] = "data"
+    columns = {name: column for name, column in group.items() if name != "annotations"}
+    attributes = group.attrs
+    attributes["NX_class"] = "NXdata"
+    attributes["signal"] = "data"
     if spec.rate_hz is not None:
-        group.attrs["rate_hz"] = spec.rate_hz
-    if "t_ns" in group:
-        group.attrs["axes"] = ["t_ns", "."]
-    for name in ("t_ns", "device_ns", "host_ns"):
-        if name in group:
-            group[name].attrs["units"] = "ns"
+        attributes["rate_hz"] = spec.rate_hz
+    if "t_ns" in columns:
+        attributes["axes"] = ["t_ns", "."]
+    for name in columns.keys() & {"t_ns", "device_ns", "host_ns"}:
+        columns[name].attrs["units"] = "ns"
     units = {channel.unit for channel in spec.channels}
-    group["data"].attrs["units"] = units.pop() if len(units) == 1 else "mixed: see channel_units"
+    columns["data"].attrs["units"] = units.pop() if len(units) == 1 else "mixed: see channel_units"
     for name, values in layout.channel_attributes(spec):
-        group.attrs[name] = values
-    _attach_scales(group, spec)
+        attributes[name] = values
+    _attach_scales(group, columns, [channel.name for channel in spec.channels])
 
 
-def _attach_scales(group: Any, spec: StreamSpec) -> None:
+def _attach_scales(group: Any, columns: dict[str, Any], names: list[str]) -> None:
     """Make times (rows, where there is no clock) and names of channels the HDF5 dimension scales of every column.
 
     Libraries of the netCDF world then read a stream with its coordinates.
     """
     import h5py
 
-    columns = [*(group[name] for name in group if name != "annotations"), *group.get("annotations", {}).values()]
-    rows = "t_ns" if "t_ns" in group else layout.ROWS
-    if rows not in group:
-        numbers = np.arange(len(group["data"]), dtype=np.int64)
-        _create(group, rows, numbers, len(numbers))
-        group[rows][:] = numbers
-    names = [channel.name for channel in spec.channels]
-    group.create_dataset(layout.CHANNELS, data=names, dtype=h5py.string_dtype("utf-8")).make_scale(layout.CHANNELS)
-    group[rows].make_scale(rows)
-    for column in columns:
-        if column != group[rows]:
-            column.dims[0].attach_scale(group[rows])
+    rows = columns.get("t_ns")
+    if rows is None:
+        numbers = np.arange(len(columns["data"]), dtype=np.int64)
+        rows = _create(group, layout.ROWS, numbers)
+        rows.resize(len(numbers), axis=0)
+        rows[:] = numbers
+    channels = group.create_dataset(layout.CHANNELS, data=names, dtype=h5py.string_dtype("utf-8"))
+    channels.make_scale(layout.CHANNELS)
+    rows.make_scale("t_ns" if "t_ns" in columns else layout.ROWS)
+    for column in (*columns.values(), *group.get("annotations", {}).values()):
+        if column != rows:
+            column.dims[0].attach_scale(rows)
         if column.ndim == 2:
-            column.dims[1].attach_scale(group[layout.CHANNELS])
+            column.dims[1].attach_scale(channels)

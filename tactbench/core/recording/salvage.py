@@ -61,7 +61,7 @@ def rescue(path: Path, target: Path) -> None:
     except OSError as error:
         raise image.cannot_write(target, error) from error
     aside = layout.completing_path(target)
-    image.store(target, meta, text, journal.blocks(), journal.annotations, aside=aside, replace=False)
+    image.store(target, meta, text, journal.blocks(), journal.annotations, aside=aside, replace=False, sync=True)
 
 
 def _fitted(journal: Journal, meta: RecordingMeta) -> tuple[RecordingMeta, str]:
