@@ -59,8 +59,8 @@ def ran(shelf, tmp_path_factory):
 
 def test_every_planned_cell_has_a_row_in_the_order_of_the_plan(ran):
     outcome, heard, folder = ran
-    names = [f"made/force/replay/deployable:session/{one}/{repeat}"
-             for repeat in (1, 2) for one in ("forest-10", "ridge", "mean", "time-index")]  # fmt: skip
+    names = [f"made/force/replay/deployable:session/{one}/{seed}"
+             for seed in (1, 2) for one in ("forest-10", "ridge", "mean", "time-index")]  # fmt: skip
     assert [row["cell"] for row in outcome.rows] == names
     assert {row["status"] for row in outcome.rows} == {"done"}
     assert (outcome.computed, outcome.recorded, outcome.failures) == (8, 0, [])
@@ -74,7 +74,7 @@ def test_every_planned_cell_has_a_row_in_the_order_of_the_plan(ran):
 def test_times_are_taken_in_the_first_replicate_alone_and_the_row_says_so(ran):
     for row in ran[0].rows:
         times = [row[name] for name in ("fit_s", "predict_s", "latency_ms_p50", "latency_n")]
-        if row["repeat"] == 1:
+        if row["seed"] == 1:
             assert all(time is not None for time in times)
             assert TIMED in row["remarks"]
             assert (row["concurrency"], row["latency_n"] >= 20) == (1, True)
@@ -94,8 +94,8 @@ def test_a_second_run_computes_nothing_and_a_changed_number_of_repeats_is_no_cha
     folder, heard = ran[-1], Heard()
     again = run_matrix(matrix(repeats=1), Store(folder), recordings=shelf, progress=heard)
     assert (again.computed, heard.stages) == (0, [])
-    assert {(row["repeat"], row["repeats"]) for row in again.rows} == {(1, 1)}
-    assert {(row["repeat"], row["repeats"]) for row in Store(folder).rows()} == {(1, 1), (2, 2)}
+    assert {row["seed"] for row in again.rows} == {1}
+    assert {row["seed"] for row in Store(folder).rows()} == {1, 2}
 
 
 @pytest.mark.parametrize(

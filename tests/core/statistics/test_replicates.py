@@ -19,7 +19,7 @@ from tests.core.leaderboard.rows import row
 def replicates(scores, sensor="a", estimator="lasso", **more):
     """Rows of one simulated cell, one a seed."""
     return [
-        row(sensor, estimator, score=score, seed=seed, repeat=seed, repeats=len(scores), fit_s=float(seed),
+        row(sensor, estimator, score=score, seed=seed, fit_s=float(seed),
             key=str(seed), cell=f"{sensor}/question/twin/deployable/{estimator}/{seed}", **more)
         for seed, score in enumerate(scores, 1)
     ]  # fmt: skip
