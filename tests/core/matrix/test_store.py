@@ -68,6 +68,17 @@ def test_the_latest_of_a_name_counts(tmp_path):
     assert (len(found.answers(key(1))["test"]), found.finished(key(1))["cell"]) == (3, "a")
 
 
+def test_cells_that_are_named_by_their_number_among_the_repeats_are_read_under_their_seed(tmp_path):
+    """Of folders written before replicates were named by their seeds, those that never had a key among them."""
+    with Store(tmp_path).hold() as store:
+        kept(store, "a/1", repeat=1, seed=3)
+        kept(store, "b/1", "failed", repeat=1, seed=3)
+    (tmp_path / "results.sqlite").unlink()
+    found = Store(tmp_path)
+    assert [one["cell"] for one in found.rows()] == ["a/3", "b/3"]
+    assert all(found.cell(one).row == one for one in found.rows())
+
+
 def test_a_damaged_file_is_told_left_out_and_replaced(tmp_path):
     with Store(tmp_path).hold() as store:
         kept(store, "a")

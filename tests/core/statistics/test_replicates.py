@@ -38,6 +38,14 @@ def test_eight_replicates_are_one_row_with_their_median_and_its_interval():
     assert (found["score_min"], found["score_max"], found["fit_s"]) == (0.2, 0.9, 4.5)
 
 
+def test_times_are_those_of_the_host_that_timed_the_first_and_no_others():
+    rows = [one | {"host": "ab"[one["seed"] > 3], "sim_s": 2.0} for one in replicates(SCORES)]
+    rows[0] |= {"status": "timeout", "score": None}
+    rows[1] |= {"fit_s": None, "host": "c"}
+    (found,) = over_replicates(rows)
+    assert (found["host"], found["fit_s"], found["seeds"]) == ("a", 3.0, list(range(2, 9)))
+
+
 def test_fewer_than_five_have_no_interval_and_share_a_rank():
     rows = over_replicates([*replicates(SCORES[:4]), *replicates(SCORES[4:], "b")])
     assert all(one["ci_low"] is None and one["ci_high"] is None for one in rows)
