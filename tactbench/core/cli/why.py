@@ -75,7 +75,7 @@ def _replicates(found: StoredCell) -> Iterator[Field]:
     from tactbench.core.statistics.replicates import counted, over_replicates, percent
     from tactbench.core.tables.numbers import delay, duration, interval, score_with_unit
 
-    name = found.cell.name.removesuffix(f"/{found.cell.repeat}")
+    name = found.cell.name.removesuffix(f"/{found.cell.seed}")
     (row,) = over_replicates([row for row in found.store.rows() if row["cell"].rpartition("/")[0] == name])
     unit, many, of = str(row["unit"]), row["n_replicates"], str(row["replicate_unit"])
     yield "score", f"{score_with_unit(row['score'], unit)} over {counted(many, of)}"

@@ -20,8 +20,6 @@ from tactbench.core.errors import DataError, PluginContractError
 from tactbench.core.evaluation.answers import AnsweredFold, Configured, FittedFold, answered_fold, fitted_fold
 from tactbench.core.evaluation.dataset import LARGEST, Dataset
 from tactbench.core.evaluation.delay import (
-    NO_LINK,
-    NO_RATE,
     Clock,
     answer_delay_ms,
     features_s,
@@ -157,8 +155,6 @@ def _cost(
         p95, largest = tail_ms(waits_s)
         ready_s = features_s(recorded, task, rules, descriptor, fitted.fold.test.X, fitted.k, clock)
         parts |= ({} if ready_s is None else {"features": 1e3 * ready_s}) | {"prediction": p50}
-    else:
-        remarks = tuple(one for one in remarks if one not in (NO_LINK, NO_RATE))  # there is no delay to speak of
     cost = Cost(
         search_s=sum(one.search_s for one in answered),
         fit_s=sum(one.fit_s for one in answered),

@@ -266,9 +266,8 @@ class Run:
                 estimator = self.registry.estimators[cell.estimator]
                 jobs.append(Job(cell, task, estimator, tuple(digests), tuple(digests.values()), key, sections))
                 continue
-            # Its key covers neither its number among the repeats nor what is published: they change no number.
-            naming = {"cell": cell.name, "repeat": cell.repeat, "repeats": cell.repeats}
-            row = {**found, **naming, **published(cell, task, found["split"])}
+            # Its key covers neither its name nor what is published: they change no number.
+            row = {**found, "cell": cell.name, **published(cell, task, found["split"])}
             self.store.reuse(row)
             self.rows[cell.name] = row
         return jobs
@@ -298,11 +297,11 @@ class Run:
             )
             self.computed += 1
         self.progress.advance(cell.name, stopped=self.rows[cell.name]["status"] in STOPPED)
-        if any(one.name not in self.rows for one in self.cells if one.repeat == cell.repeat):
+        if any(one.name not in self.rows for one in self.cells if one.seed == cell.seed):
             return
-        left = {one.repeat for one in self.cells if one.name not in self.rows}
+        left = {one.seed for one in self.cells if one.name not in self.rows}
         if left:
-            self.progress.show([self.rows[one.name] for one in self.cells if one.repeat not in left])
+            self.progress.show([self.rows[one.name] for one in self.cells if one.seed not in left])
 
     def _stopped(
         self, cell: Cell, task: TaskSpec, why: BaseException, key: str = "", sections: Sections | None = None

@@ -45,8 +45,6 @@ class Asked(_Section):
     answer_from: str = ""
     declared_task: str = ""
     include_incomplete: bool = False
-    repeat: int = 1
-    repeats: int = 1
     seed: int = 0
     simulation: dict[str, Any] = {}
 
@@ -177,6 +175,8 @@ class ReplicatedRow(RowModel):
     """Several replicates of a cell as one row, as tables show them; and what a file adds to a row."""
 
     key: str = ""
+    repeats: int | None = None
+    """replicates that ended, however"""
     n_replicates: int | None = None
     replicate_unit: str | None = None
     replicate_scores: list[float] | None = None

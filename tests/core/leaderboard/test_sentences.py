@@ -69,9 +69,7 @@ def boards(draw):
                     else {}
                 )
                 cell = f"{sensor}/question/twin/deployable/{estimator}/{seed}"
-                rows.append(
-                    row(sensor, estimator, one, seed=seed, repeat=seed, repeats=repeats, cell=cell, **known, **more)
-                )
+                rows.append(row(sensor, estimator, one, seed=seed, cell=cell, **known, **more))
     more = RECORDED if not simulated else {}
     for place in range(draw(st.sampled_from([0, 0, 1, 6]))):
         ended = {

@@ -51,11 +51,11 @@ def test_the_latest_of_a_name_counts(tmp_path):
     with Store(tmp_path).hold() as store:
         kept(store, "a", "timeout", key=key(1))
         assert store.finished(key(1)) is None
-        kept(store, "a", key=key(1), repeats=1)
+        kept(store, "b", key=key(1))
         kept(store, "a", "failed", key=key(2))
-        assert [one["status"] for one in store.rows()] == ["failed"]
-        # Found again by its key: it is the latest now, as it is asked for today; the one that failed is gone.
-        again = {**store.finished(key(1)), "repeats": 3}
+        assert [one["status"] for one in store.rows()] == ["failed", "done"]
+        # Found again by its key: it is the latest now, under the name of today; the one that failed is gone.
+        again = {**store.finished(key(1)), "cell": "a"}
         store.reuse(again)
         assert store.rows() == [again]
         assert len(list((tmp_path / "cells").glob("*.h5"))) == 1
@@ -66,7 +66,18 @@ def test_the_latest_of_a_name_counts(tmp_path):
         kept(store, "a", key=key(3), score=2.0)
     found = Store(tmp_path)
     assert [one["key"] for one in found.rows()] == [key(3)]
-    assert (len(found.answers(key(1))["test"]), found.finished(key(1))["repeats"]) == (3, 3)
+    assert (len(found.answers(key(1))["test"]), found.finished(key(1))["cell"]) == (3, "a")
+
+
+def test_cells_that_are_named_by_their_number_among_the_repeats_are_read_under_their_seed(tmp_path):
+    """Of folders written before replicates were named by their seeds, those that never had a key among them."""
+    with Store(tmp_path).hold() as store:
+        kept(store, "a/1", repeat=1, seed=3)
+        kept(store, "b/1", "failed", repeat=1, seed=3)
+    (tmp_path / "results.sqlite").unlink()
+    found = Store(tmp_path)
+    assert [one["cell"] for one in found.rows()] == ["a/3", "b/3"]
+    assert all(found.cell(one).row == one for one in found.rows())
 
 
 def test_a_damaged_file_is_told_left_out_and_replaced(tmp_path):
@@ -187,8 +198,8 @@ def test_a_folder_that_cannot_be_made_is_refused(tmp_path):
 def test_the_queries_of_the_page_run(tmp_path):
     page = (ROOT / "docs" / "results.md").read_text()
     with Store(tmp_path / "tactbench-results").hold() as store:
-        for repeat in (10, 2):
-            kept(store, f"a/{repeat}", repeat=repeat, score=float(repeat))
+        for seed in (10, 2):
+            kept(store, f"a/{seed}", seed=seed, score=float(seed))
         kept(store, "b/1", "failed")
         assert [one["cell"] for one in store.rows()] == ["a/2", "a/10", "b/1"], "replicates as numbers"
     found = []

@@ -19,7 +19,7 @@ from tests.core.leaderboard.rows import row
 def replicates(scores, sensor="a", estimator="lasso", **more):
     """Rows of one simulated cell, one a seed."""
     return [
-        row(sensor, estimator, score=score, seed=seed, repeat=seed, repeats=len(scores), fit_s=float(seed),
+        row(sensor, estimator, score=score, seed=seed, fit_s=float(seed),
             key=str(seed), cell=f"{sensor}/question/twin/deployable/{estimator}/{seed}", **more)
         for seed, score in enumerate(scores, 1)
     ]  # fmt: skip
@@ -36,6 +36,14 @@ def test_eight_replicates_are_one_row_with_their_median_and_its_interval():
     assert (found["n_replicates"], found["replicate_unit"], found["seeds"]) == (8, "replicate", list(range(1, 9)))
     assert found["replicate_scores"] == SCORES
     assert (found["score_min"], found["score_max"], found["fit_s"]) == (0.2, 0.9, 4.5)
+
+
+def test_times_are_those_of_the_host_that_timed_the_first_and_no_others():
+    rows = [one | {"host": "ab"[one["seed"] > 3], "sim_s": 2.0} for one in replicates(SCORES)]
+    rows[0] |= {"status": "timeout", "score": None}
+    rows[1] |= {"fit_s": None, "host": "c"}
+    (found,) = over_replicates(rows)
+    assert (found["host"], found["fit_s"], found["seeds"]) == ("a", 3.0, list(range(2, 9)))
 
 
 def test_fewer_than_five_have_no_interval_and_share_a_rank():

@@ -79,6 +79,10 @@ def read_cell(path: Path, *, answers: bool = True) -> CellFile:
         raise FormatError(f"{path} {what}.", hint="Run the cell again.")
     with h5py.File(io.BytesIO(content), "r") as file:
         head = json.loads(file["head"][()])
+        row = head["row"]
+        if number := row.pop("repeat", None):  # until replicates were named by their seeds
+            name = f"{row['cell'].removesuffix(str(number))}{row['seed']}"
+            row |= {"cell": name, "key": row["key"] or path.stem}
         tables = {role: table[()] for role, table in file.get("answers", {}).items()} if answers else {}
     columns = {role: {name: table[name].copy() for name in _COLUMNS} for role, table in tables.items()}
     return CellFile(**head, answers={role: Answers(**values) for role, values in columns.items()})

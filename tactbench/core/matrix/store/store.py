@@ -24,8 +24,6 @@ if TYPE_CHECKING:
 Row = dict[str, Any]
 """One cell, as `tactbench.core.spec.row.RowModel` describes it."""
 
-NAMING = ("cell", "repeat", "repeats")
-"""What a matrix calls a cell; its key covers everything else."""
 _FULL = {
     errno.ENOSPC: "the disk is full",
     errno.EDQUOT: "the quota is used up",
@@ -104,10 +102,9 @@ class Store:
     def reuse(self, row: Row) -> None:
         """Note that a finished cell was found again, under the name it has in `row`: it is the latest of that name."""
         latest = self._files.files_of(row["cell"])
-        known = self._files.finished(row["key"])
-        if not latest or latest[0][1] != row["key"] or known is None or known["repeats"] != row["repeats"]:
+        if not latest or latest[0][1] != row["key"]:
             cell = read_cell(self.file_of(row))
-            self._write(replace(cell, row={**cell.row, **{name: row[name] for name in NAMING}}))
+            self._write(replace(cell, row={**cell.row, "cell": row["cell"]}))
 
     def _write(self, cell: CellFile) -> None:
         cell, path = replace(cell, ended_ns=time.time_ns()), self.file_of(cell.row)
