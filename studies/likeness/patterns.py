@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections import defaultdict
 from pathlib import Path
 from typing import NamedTuple
@@ -14,7 +15,7 @@ from tactbench.core.recording.reader import open_recording
 NEAREST = 10
 TILTS_DEG, AZIMUTHS_DEG = range(0, 76, 5), range(-180, 180, 15)
 """Plates of the simulation from which the nearest is taken."""
-BINS_DEG = ((0, 30), (30, 50), (50, 90))
+TILT_BINS_DEG = (0, 30, 50, 90, 181)
 
 
 class Trial(NamedTuple):
@@ -71,28 +72,38 @@ def simulated_plates(bench: Bench) -> Trial:
     return Trial(np.concatenate(changes), np.concatenate(ways))
 
 
-def compare_plates(trials: tuple[Trial, Trial], twin: Trial) -> dict[str, float]:
-    """Return explained variance and correlations by tilt of the second trial: by the first, and by the simulation."""
+def compare_plates(trials: tuple[Trial, Trial], twin: Trial) -> dict[str, tuple[int, float]]:
+    """Return how many states, and explained variance or correlation: each trial by the other, and by the simulation.
+
+    Which way the axes of the trials point is not stated: of the sixteen ways (two may be swapped, each of the three may
+    be reversed) the one is taken by which the simulation explains most of the first trial; figures are of the second.
+    """
     first, second = trials
 
-    def turned(trial: Trial, way: tuple[int, int, int]) -> Trial:
+    def turned(trial: Trial, way: tuple[int, ...]) -> Trial:
         x, y, z = trial.direction.T
-        x, y = (y, x) if way[2] else (x, y)
-        return Trial(trial.change, np.stack([way[0] * x, way[1] * y, z], axis=1))
+        x, y = (y, x) if way[3] else (x, y)
+        return Trial(trial.change, np.stack([way[0] * x, way[1] * y, way[2] * z], axis=1))
 
-    every = [(a, b, swapped) for a in (1, -1) for b in (1, -1) for swapped in (0, 1)]
+    every = list(itertools.product((1, -1), (1, -1), (1, -1), (0, 1)))
     way = max(every, key=lambda one: explained(first.change, predicted(turned(first, one), twin, 1)))
-    second = turned(second, way)
-    by_trial, by_twin = predicted(second, turned(first, way), NEAREST), predicted(second, twin, 1)
-    found = {"ceiling: by the other trial": explained(second.change, by_trial),
-             "by the simulation": explained(second.change, by_twin)}  # fmt: skip
+    first, second = turned(first, way), turned(second, way)
+    by_twin = predicted(second, twin, 1)
+    found = {
+        "ceiling: the second trial by the first": _share(second, predicted(second, first, NEAREST)),
+        "ceiling: the first trial by the second": _share(first, predicted(first, second, NEAREST)),
+        "the second trial by the simulation": _share(second, by_twin),
+    }
     tilt = np.degrees(np.arccos(np.clip(-second.direction[:, 2], -1, 1)))
-    for low, high in BINS_DEG:
+    for low, high in itertools.pairwise(TILT_BINS_DEG):
         inside = (tilt >= low) & (tilt < high)
-        if inside.any():
-            named = f"median correlation, tilts of {low} to {high} degrees"
-            found[named] = float(np.median(correlations(second.change[inside], by_twin[inside])))
+        r = np.median(correlations(second.change[inside], by_twin[inside])) if inside.any() else np.nan
+        found[f"median correlation, tilts of {low} to {high} degrees"] = (int(inside.sum()), float(r))
     return found
+
+
+def _share(trial: Trial, by: np.ndarray) -> tuple[int, float]:
+    return len(trial.change), explained(trial.change, by)
 
 
 def read_grasps(folder: Path) -> dict[tuple[str, int], np.ndarray]:
@@ -119,8 +130,8 @@ def simulated_grasps(bench: Bench) -> np.ndarray:
     return np.concatenate([bench.press(gap, (0.5, 1.0, 2.0, 4.0)) for gap in gaps])
 
 
-def compare_grasps(grasps: dict[tuple[str, int], np.ndarray], twin: np.ndarray) -> dict[str, float]:
-    """Return the explained variance of grasps about each finger's mean: by other trials, and by the best press."""
+def compare_grasps(grasps: dict[tuple[str, int], np.ndarray], twin: np.ndarray) -> dict[str, tuple[int, float]]:
+    """Return how many, and the explained variance about each finger's mean: by other trials, and by the best press."""
     real, others, best = [], [], []
     for (_, finger), rows in grasps.items():
         mean = np.concatenate([own for (_, one), own in grasps.items() if one == finger]).mean(axis=0)
@@ -131,6 +142,6 @@ def compare_grasps(grasps: dict[tuple[str, int], np.ndarray], twin: np.ndarray) 
     real, others, best = (np.concatenate(parts) for parts in (real, others, best))
     total = np.sum(real**2)
     return {
-        "ceiling: by the object's other trials": float(1 - np.sum((real - others) ** 2) / total),
-        "by the most similar of the simulation's presses": float(1 - np.sum((real - best) ** 2) / total),
+        "ceiling: by the object's other trials": (len(real), float(1 - np.sum((real - others) ** 2) / total)),
+        "by the most similar of the simulation's presses": (len(real), float(1 - np.sum((real - best) ** 2) / total)),
     }
