@@ -12,20 +12,27 @@ from __future__ import annotations
 
 import dataclasses
 import os
+import random
 import statistics
 import sys
 import tempfile
 import time
+from collections import Counter
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
+import numpy as np
 from sklearn.ensemble import RandomForestClassifier
+from sklearn.metrics import f1_score
+from threadpoolctl import threadpool_limits
 
-from tactbench.core.cost.rounds import TimedEstimator, measure, timed_estimator
-from tactbench.core.evaluation.dataset import load_dataset
+from tactbench.core.evaluation.delay import single_row_latency_s
+from tactbench.core.evaluation.folds import load_task
+from tactbench.core.evaluation.sets import prepared
 from tactbench.core.matrix.run import run_matrix
 from tactbench.core.matrix.store import Store
 from tactbench.core.plugins.registry import load_object, load_registry
-from tactbench.core.progress import Progress
 from tactbench.core.spec.matrix import EstimatorChoice, MatrixSpec, TaskChoice
 
 TASK, PROTOCOL, TREES, SEEDS = "curvature", "karl2016", 500, (1, 2, 3, 4, 5)
@@ -33,34 +40,55 @@ GOAL_LATENCY, GOAL_F1 = 5.0, 0.01
 """Stated before measuring: at least so many times quicker for one row, and no further apart in macro F1."""
 
 
-def arrays(sensor: str, folder: Path) -> TimedEstimator:
-    """Return the plain forest with the arrays of its cell."""
+@dataclasses.dataclass
+class Forest:
+    """A forest, the arrays of its cell, and what it took in seconds."""
+
+    build: Callable[[], Any]
+    X_train: np.ndarray
+    y_train: np.ndarray
+    X_test: np.ndarray
+    y_test: np.ndarray
+    fit_s: list[float] = dataclasses.field(default_factory=list)
+    batch_s: list[float] = dataclasses.field(default_factory=list)
+    latency_s: list[float] = dataclasses.field(default_factory=list)
+
+    def turn(self) -> None:
+        """Fit once, answer all test rows at once, then single ones."""
+        model, began = self.build(), time.perf_counter()
+        model.fit(self.X_train, self.y_train)
+        fitted = time.perf_counter()
+        model.predict(self.X_test)
+        self.fit_s.append(fitted - began)
+        self.batch_s.append(time.perf_counter() - fitted)
+        self.latency_s.extend(single_row_latency_s(model, self.X_test, time.perf_counter))
+
+    def f1(self) -> float:
+        """Return the macro F1 on the test rows."""
+        return f1_score(self.y_test, self.build().fit(self.X_train, self.y_train).predict(self.X_test), average="macro")
+
+
+def arrays(sensor: str, folder: Path) -> Forest:
+    """Return the arrays of a cell, and no forest yet."""
     registry = load_registry()
     choice = TaskChoice(name=TASK, protocol=PROTOCOL, estimators=(EstimatorChoice(name="majority"),))
-    (row,) = run_matrix(MatrixSpec(repeats=1, sensors=(sensor,), tasks=(choice,)), Store(folder)).rows
-    spec = registry.tasks[TASK].spec
-    data = load_dataset(spec, [folder / path for path in row["recordings"]])
-    return timed_estimator(spec, registry.estimators["forest"], {}, PROTOCOL, "roles", data, seed=1)
-
-
-def of_seed(one: TimedEstimator, name: str, seed: int) -> TimedEstimator:
-    """Return another forest on the same arrays."""
-    if name == "scikit-learn alone":
-        return dataclasses.replace(
-            one, name=name, build=lambda: RandomForestClassifier(TREES, random_state=seed, n_jobs=1)
-        )
-    descriptor = load_registry().estimators[name]
-    make = load_object(descriptor.where)
-    return dataclasses.replace(
-        one, name=name, build=lambda: make(kind="classification", seed=seed, threads=1, **descriptor.params)
+    row = run_matrix(MatrixSpec(repeats=1, sensors=(sensor,), tasks=(choice,)), Store(folder)).rows[0]
+    data = load_task(
+        registry.tasks[TASK].spec, [folder / path for path in row["recordings"]], PROTOCOL, "roles", seed=1
     )
+    fold = prepared(data.assignments[-1], data.data, data.rules, 0, Counter())
+    return Forest(lambda: None, fold.train.X, fold.train.y, fold.test.X, fold.test.y)
 
 
-def f1(one: TimedEstimator) -> float:
-    """Return the macro F1 on the test rows."""
-    model = one.build()
-    model.fit(one.X_train, one.y_train)
-    return one.metric.of(one.y_test, model.predict(one.X_test), one.n_classes)
+def of_seed(one: Forest, name: str, seed: int) -> Forest:
+    """Return a forest on the same arrays."""
+    if name == "scikit-learn alone":
+        build = lambda: RandomForestClassifier(TREES, random_state=seed, n_jobs=1)  # noqa: E731
+    else:
+        descriptor = load_registry().estimators[name]
+        make = load_object(descriptor.where)
+        build = lambda: make(kind="classification", seed=seed, threads=1, **descriptor.params)  # noqa: E731
+    return Forest(build, one.X_train, one.y_train, one.X_test, one.y_test)
 
 
 def main() -> None:
@@ -70,13 +98,13 @@ def main() -> None:
     names = ("forest", "scikit-learn alone", "forest-fast")
     with tempfile.TemporaryDirectory() as folder:
         plain = arrays(sensor, Path(folder))
-    field = {name: of_seed(plain, name, 1) for name in names}
-    times = measure(field, rounds=rounds, budget_s=float("inf"), seed=1, clock=time.perf_counter,
-                    progress=Progress())  # fmt: skip
-    for name, timing in times.items():
-        if timing.trouble is not None:
-            raise SystemExit(f"{name}: {timing.trouble}")
-    scores = {name: [f1(of_seed(plain, name, seed)) for seed in SEEDS] for name in names}
+    times = {name: of_seed(plain, name, 1) for name in names}
+    order = random.Random(1)
+    with threadpool_limits(1):
+        for _ in range(rounds):
+            for name in order.sample(names, len(names)):
+                times[name].turn()
+        scores = {name: [of_seed(plain, name, seed).f1() for seed in SEEDS] for name in names}
     load = os.getloadavg()[0] if hasattr(os, "getloadavg") else float("nan")
     print(f"{sensor}, {TASK}, {PROTOCOL}: {len(plain.X_train)} training rows of {plain.X_train.shape[1]} features, "
           f"{TREES} trees, one thread, {rounds} rounds, load {load:.1f} on {os.cpu_count()} cores")  # fmt: skip

@@ -101,7 +101,7 @@ def main(arguments: list[str] | None = None) -> None:
 
 _KEPT = {
     "run": "What was finished is kept; the same command goes on from there.",
-    "cost": "Recordings and scores are kept, times are not.",
+    "cost": "What was finished is kept; the same command goes on from there.",
     "emulate": "The emulated devices and their links are gone.",
 }
 """What is left of a verb that was interrupted."""

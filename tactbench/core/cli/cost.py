@@ -3,96 +3,108 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import Any
 
 import click
 
-from tactbench.core.cli.options import RESULTS, format_option
-from tactbench.core.tables.terminal import remark
-
-if TYPE_CHECKING:
-    from tactbench.core.cost.ladder import Ladder
+from tactbench.core.cli.options import RESULTS, format_option, options
+from tactbench.core.spec.bounds import MOST_REPEATS
+from tactbench.core.spec.matrix import REPLICATES
 
 
 @click.command(name="cost")
-@click.option("--twin", is_flag=True, help="Of the simulated rig instead: error against seconds per recording.")
-@click.option("--sensor", "sensors", multiple=True, metavar="NAME", help="Sensor; with --twin repeatable.")
-@click.option("--task", metavar="NAME", help="Task; with --twin the task to score with each rung's recordings.")
-@click.option("--estimator", "estimators", multiple=True, metavar="NAME",
-              help="Estimator; repeatable. Default: every one that fits.")  # fmt: skip
-@click.option("--recordings", type=click.Path(path_type=Path), metavar="DIR", help="Recordings to replay.")
-@click.option("--protocol", metavar="NAME", help="Evaluation protocol. Default: the task's first.")
-@click.option("--rounds", type=click.IntRange(min=1), default=5, show_default=True, metavar="N",
-              help="Number of timing rounds.")  # fmt: skip
-@RESULTS
+@options(
+    click.option("--twin", is_flag=True,
+                 help="Of the simulated rig instead: score against seconds, or without --task its error."),
+    click.option("--sensor", "sensors", multiple=True, metavar="NAME", help="Sensor; with --twin repeatable."),
+    click.option("--task", metavar="NAME", help="Task."),
+    click.option("--estimator", "estimators", multiple=True, metavar="NAME",
+                 help="Estimator; repeatable: the first is varied. Default: the task's first; --twin: a quick one."),
+    click.option("--recordings", type=click.Path(path_type=Path), metavar="DIR", help="Recordings to replay."),
+    click.option("--protocol", metavar="NAME", help="Evaluation protocol. Default: the task's first."),
+    click.option("--repeats", type=click.IntRange(min=1, max=MOST_REPEATS), metavar="N",
+                 help=f"Number of replicates. Default: {REPLICATES} if simulated, else 1."),
+    click.option("--rounds", type=click.IntRange(min=1), default=5, show_default=True, metavar="N",
+                 help="Number of timing rounds of --twin without --task."),
+    click.option("--jobs", type=click.IntRange(min=1), metavar="N",
+                 help="Parallel worker processes. Default: one per usable core."),
+    RESULTS,
+)  # fmt: skip
 @format_option("table", "json", "csv")
 def command(
-    twin: bool, sensors: tuple[str, ...], task: str | None, estimators: tuple[str, ...], recordings: Path | None,
-    protocol: str | None, rounds: int, out: Path, shape: str,
-) -> None:  # fmt: skip
+    twin: bool, sensors: tuple[str, ...], task: str | None, rounds: int, out: Path, shape: str, **asked: Any
+) -> None:
     """Measure what accuracy costs in time, and draw it.
 
-    Of estimators: score against fit time and answer delay, for one sensor and task. Of the simulated rig: --twin, error
-    in counts against seconds, and with --task what its rungs do to the score. Files go into the folder cost of the
-    result folder.
+    One setting after another is varied: trees, window, sampling rate, training sessions, protocol; with --twin the rung
+    and the tolerance of the simulation. Files go into the folder cost of the result folder, and grow with every
+    replicate; what is there already is reused.
     """
     from tactbench.core.errors import UsageError
 
-    if twin:
-        if estimators or recordings or protocol:
-            raise UsageError("--twin takes --sensor, --task and --rounds.", hint="Leave the others out.")
+    if twin and task is None:
+        if any(asked.values()):
+            raise UsageError("--twin without --task takes --sensor and --rounds.", hint="Leave the others out.")
         from tactbench.core.cli.cost_twin import show_twin
 
-        show_twin(sensors, out / "cost", shape, rounds=rounds, task=task)
+        show_twin(sensors, out / "cost", shape, rounds=rounds)
         return
-    if len(sensors) != 1 or task is None:
+    if task is None or (len(sensors) != 1 and not twin):
         raise UsageError(
             "Say what the cost is asked of.",
             hint="Of estimators: --sensor NAME --task NAME, one of each. Of the simulated rig: --twin.",
         )
-    import time
+    _show_knobs(sensors, task, twin, out / "cost", shape, **asked)
 
-    from tactbench.core.cli.grid import print_records
-    from tactbench.core.cost.ladder import climb
-    from tactbench.core.cost.ladder_file import write_ladder
-    from tactbench.core.leaderboard.names import METRIC_NAMES
-    from tactbench.core.matrix.store import Store
+
+def _show_knobs(
+    sensors: tuple[str, ...], task: str, twin: bool, folder: Path, shape: str, *, estimators: tuple[str, ...],
+    recordings: Path | None, protocol: str | None, repeats: int | None, jobs: int | None,
+) -> None:  # fmt: skip
+    """Vary what an answer, or with `twin` the simulation, takes; print and write what is known, also when stopped."""
+    from tactbench.core.cli.grid import print_records, print_tables
+    from tactbench.core.cost.knobs import measure, settings_of, simulations_of
+    from tactbench.core.cost.task_score import quick_estimator
+    from tactbench.core.errors import UsageError
+    from tactbench.core.matrix.run import EngineChoice
     from tactbench.core.plugins.declared import declared_in, with_declared
     from tactbench.core.plugins.registry import load_registry
-    from tactbench.core.spec.matrix import EstimatorChoice, MatrixSpec, TaskChoice
+    from tactbench.core.report.costs import told, trade_tables, write_trade
+    from tactbench.core.spec.matrix import MatrixSpec, TaskChoice
     from tactbench.core.study.progress import progress
+    from tactbench.core.study.shipped import matrix_called
+    from tactbench.core.tables.terminal import remark
 
     registry = with_declared(load_registry(), declared_in(recordings))
-    if protocol is None and recordings is not None:
-        protocol = "deployable"  # as `run` has it: the paper's protocol needs the paper's three roles
-    answerers = tuple(EstimatorChoice(name=name) for name in estimators or ("all",))
-    choice = TaskChoice(name=task, protocol=protocol, estimators=answerers)
-    rig = registry.first_rig("simulated" if recordings is None else "replays")
-    matrix = MatrixSpec(rig=rig, seed=1, repeats=1, sensors=(sensors[0],), tasks=(choice,))
-    with progress() as display:
-        ladder = climb(
-            matrix, registry, Store(out / "cost"), rounds=rounds, clock=time.perf_counter, progress=display,
-            recordings=recordings,
-        )  # fmt: skip
-    if shape == "table":
-        _print(ladder)
-    else:
-        print_records(ladder.rows, shape)
-    paths = write_ladder(ladder, out, METRIC_NAMES.get(ladder.about["metric"], ""))
-    remark(f"Files: {', '.join(map(str, paths))}")
-
-
-def _print(ladder: Ladder) -> None:
-    from dataclasses import replace
-
-    from tactbench.core.cli.grid import print_tables
-    from tactbench.core.report.costs import ladder_table
-
-    about = ladder.about
-    kinds = tuple("result" if row["front_fit"] or row["front_delay"] else "" for row in ladder.rows)
-    print_tables([replace(ladder_table({**about, "rows": ladder.rows}), kinds=kinds, notes=())])
-    if about["load"] is not None and about["load"] > about["cores"]:
-        remark(f"The machine was busy (load {about['load']:.1f} on {about['cores']} cores): the times are too long.")
-    for text in about["remarks"]:
-        remark(f"{text[0].upper()}{text[1:]}.")
-    remark("docs/glossary.md says what each column is.")
+    spec = registry.tasks[task].spec
+    rig = registry.rigs[registry.first_rig("simulated" if recordings is None else "replays")]
+    if twin and not rig.rungs:
+        raise UsageError(f"The rig {rig.name!r} has no rungs.", hint="Leave out --recordings.")
+    # As `run` has it: the paper's protocol needs the paper's three roles.
+    protocol = protocol or (spec.protocols[0] if recordings is None else "deployable")
+    names = estimators or ((quick_estimator(registry, task),) if twin else spec.estimators[:1])
+    chosen = [registry.estimators[name] for name in names]
+    settings = list(simulations_of(rig, chosen[0], protocol) if twin else settings_of(spec, chosen, protocol))
+    found: dict[Path, dict[str, Any]] = {}
+    try:
+        for sensor in sensors or matrix_called().sensors:
+            place = folder / f"{sensor}-{task}{'-twin' if twin else ''}"
+            matrix = MatrixSpec(rig=rig.name, sensors=(sensor,), tasks=(TaskChoice(name=task),))
+            with progress() as display:
+                for known in measure(
+                    matrix, settings, folder, repeats=repeats or (REPLICATES if rig.simulated else 1),
+                    choice=EngineChoice(jobs=jobs), recordings=recordings, progress=display,
+                ):  # fmt: skip
+                    with display.paused():
+                        for line in told(known, found.get(place)):
+                            remark(line)
+                    found[place] = known
+                    write_trade(known, place)
+    finally:  # also what there is when it is stopped
+        if shape != "table" and found:
+            print_records([{"sensor": known["sensor"], **one} for known in found.values() for one in known["settings"]],
+                          shape)  # fmt: skip
+        for place, known in found.items():
+            if shape == "table":
+                print_tables(trade_tables(known))
+            remark(f"Files: {place}.json, .csv, .png, .pdf")

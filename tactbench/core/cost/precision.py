@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple, TypeVar
 
@@ -46,19 +46,16 @@ class Skipped(NamedTuple):
     reason: str
 
 
-def measured(study: CostStudy, subject: str, progress: Progress) -> tuple[list[CostPoint], list[Skipped]]:
-    """Carry out the jobs of a study, and say of those that its subject cannot have why not."""
-    points: list[CostPoint] = []
-    skipped: list[Skipped] = []
+def measured(study: CostStudy, subject: str, progress: Progress) -> Iterator[CostPoint | Skipped]:
+    """Carry out the jobs of a study; yield its points as they come, and of what its subject cannot have why not."""
     progress.begin(subject, len(study.jobs))
     for job in study.jobs:
         progress.working(job.label)
         try:
-            points += job.run()
+            yield from job.run()
         except TactbenchError as error:
-            skipped.append(Skipped(subject, job.label, job.rung, str(error)))
+            yield Skipped(subject, job.label, job.rung, str(error))
         progress.advance(job.label)
-    return points, skipped
 
 
 def diagrams(points: Sequence[CostPoint]) -> dict[tuple[str, str], list[CostPoint]]:

@@ -9,7 +9,7 @@ from __future__ import annotations
 import copy
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Any
 
@@ -39,7 +39,7 @@ from tactbench.core.evaluation.reference_floor import beyond_floor, reference_fl
 from tactbench.core.evaluation.replicate_sums import recordings_right, replicates, summed
 from tactbench.core.evaluation.sets import tare_s
 from tactbench.core.evaluation.splits import SHUFFLED_STAMP, SHUFFLED_WHOLE_STAMP, over_rows, used_rows, without_part
-from tactbench.core.evaluation.summaries import without_windows
+from tactbench.core.evaluation.summaries import with_windows
 from tactbench.core.plugins.interfaces import Estimator
 from tactbench.core.recording.completeness import INCOMPLETE
 from tactbench.core.samples import Answers
@@ -97,8 +97,8 @@ def evaluate_cell(context: CellContext, recordings: Sequence[Path] | Dataset) ->
     data = load_task(task, recordings, context.protocol, context.split, estimator=estimator, seed=seed)
     build = builder(estimator, context.params, task, seed, context.threads)
     return evaluate(
-        Configured(without_windows(estimator, task), build, context.params), data, clock=context.clock,
-        threads=context.threads, latency=context.latency,
+        Configured(estimator, build, context.params), data, clock=context.clock, threads=context.threads,
+        latency=context.latency,
     )  # fmt: skip
 
 
@@ -123,7 +123,8 @@ def evaluate(
         given = estimator
         named = PLAIN.model_copy(update={"name": type(given).__name__})
         estimator = Configured(named, one_model_a_component(data.task, lambda _: copy.deepcopy(given)))
-    descriptor, metric = estimator.descriptor, metric_called(data.task.metric)
+    descriptor = with_windows(estimator.descriptor, data.task, data.rules)
+    estimator, metric = replace(estimator, descriptor=descriptor), metric_called(data.task.metric)
     rules = EventRules.of(data.task, descriptor.threshold) if data.task.kind == "events" else None
     counts = Counter(data.data.counts)
     answered: list[AnsweredFold] = []

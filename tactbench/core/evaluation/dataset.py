@@ -88,6 +88,19 @@ class Dataset:
         return tuple(table.meta for table in self.tables)
 
 
+def thinned(data: Dataset, every: int) -> Dataset:
+    """Return every such row of each recording, from its first: what a sensor so many times slower would have given."""
+    if every == 1:
+        return data
+
+    def of(table: Table) -> Table:
+        columns = {name: getattr(table, name) for name in ("X", "y", "labelled", "force", "time_s", "row")}
+        kept: dict[str, Any] = {name: None if one is None else one[::every] for name, one in columns.items()}
+        return replace(table, **kept, groups={name: one[::every] for name, one in table.groups.items()})
+
+    return replace(data, tables=tuple(map(of, data.tables)))
+
+
 def load_dataset(task: TaskSpec, recordings: Sequence[Path], *, include_incomplete: bool = False) -> Dataset:
     """Read `recordings` as `task` needs them.
 

@@ -89,13 +89,15 @@ def stated_delay_ms(
 
 def _reading_delay_ms(data: Dataset, rules: ProtocolSpec, k: int) -> tuple[dict[str, float], tuple[str, ...]]:
     parts: dict[str, float] = {}
-    interval_s = _row_interval_s(data)
+    interval_s = _row_interval_s(data, rules)
     remarks: dict[str, None] = {}
     waits_ms: list[float | None] = []
     for meta in data.metas:
         for place, stream in enumerate(_used(meta, data)):
-            sampled_hz = 1.0 / interval_s if place == 0 and interval_s else stream.rate_hz
-            own_hz = meta.own_rates_hz.get(stream.name, stream.rate_hz) or sampled_hz
+            stated_hz = stream.rate_hz and stream.rate_hz / rules.every
+            sampled_hz = 1.0 / interval_s if place == 0 and interval_s else stated_hz
+            own_hz = meta.own_rates_hz.get(stream.name, stream.rate_hz)
+            own_hz = own_hz / rules.every if own_hz else sampled_hz
             waits_ms.append(1e3 / own_hz if own_hz else None)
             if own_hz and sampled_hz and abs(sampled_hz - own_hz) > RATE_TOLERANCE * own_hz:
                 remarks[f"{stream.name} sampled at {sampled_hz:.4g} Hz; its own rate is {own_hz:.4g} Hz"] = None
@@ -130,7 +132,7 @@ def _used(meta: RecordingMeta, data: Dataset) -> list[StreamSpec]:
     return sorted(used, key=lambda one: all(channel.name != data.features[0] for channel in one.channels))
 
 
-def _row_interval_s(data: Dataset) -> float | None:
+def _row_interval_s(data: Dataset, rules: ProtocolSpec) -> float | None:
     """Return the interval between rows, the longest of all recordings: the median of the clock's steps.
 
     Without a clock, or where rows are single readings, by the rate that the stream states; None where there is none.
@@ -140,7 +142,7 @@ def _row_interval_s(data: Dataset) -> float | None:
         timed = table.meta.clock != "none" and len(table.time_s) > 1
         step_s = float(np.median(np.diff(table.time_s))) if timed else 0.0
         rate_hz = _used(table.meta, data)[0].rate_hz
-        found.append(step_s if 0 < step_s <= SLOWEST_S else 1.0 / rate_hz if rate_hz else None)
+        found.append(step_s if 0 < step_s <= SLOWEST_S else rules.every / rate_hz if rate_hz else None)
     return _largest(found)
 
 
@@ -154,7 +156,7 @@ def _span_s(data: Dataset, table: Table, task: TaskSpec, rules: ProtocolSpec) ->
     if task.vote:
         times_s = table.time_s[asked_for(table, rules)]
         if table.meta.clock == "none":
-            interval_s = _row_interval_s(data)
+            interval_s = _row_interval_s(data, rules)
             return None if interval_s is None else len(times_s) * interval_s
         return float(np.ptp(times_s)) if len(times_s) else 0.0
     length = _largest([_length_s(stream) for stream in kept(table, rules)])

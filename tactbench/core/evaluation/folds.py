@@ -11,12 +11,12 @@ import numpy as np
 import numpy.typing as npt
 
 from tactbench.core.errors import DataError, NotApplicable
-from tactbench.core.evaluation.dataset import Dataset, load_dataset
+from tactbench.core.evaluation.dataset import Dataset, load_dataset, thinned
 from tactbench.core.evaluation.frames import framed
-from tactbench.core.evaluation.protocols import ProtocolSpec, protocol_called
+from tactbench.core.evaluation.protocols import ProtocolSpec, protocol_called, without_options
 from tactbench.core.evaluation.sets import asked_for, tare_s, tared
 from tactbench.core.evaluation.splits import Assignment, choose_split, make_splits, with_validation
-from tactbench.core.evaluation.summaries import summarised, without_windows
+from tactbench.core.evaluation.summaries import is_summarised, summarised, with_windows
 from tactbench.core.samples import FloatArray, IntArray
 from tactbench.core.spec.rig import EstimatorDescriptor
 from tactbench.core.spec.task import TaskSpec
@@ -113,14 +113,22 @@ def load_task(
     Raises
     ------
     NotApplicable
-        If the estimator looks at the time and a recording states none: the order of its rows may be anybody's.
+        If the estimator looks at the time and a recording states none: the order of its rows may be anybody's. If the
+        protocol thins samples or states a window, and the task is not answered sample by sample.
     """
     recorded = recordings if isinstance(recordings, Dataset) else load_dataset(task, recordings)
-    rules, estimator = protocol_called(protocol), without_windows(estimator, task)
+    rules = protocol_called(protocol)
+    estimator = with_windows(estimator, task, rules)
+    frames = task.answer_per == "frame"
+    if (rules.every > 1 or rules.k is not None) and (frames or is_summarised(task, rules)):
+        raise NotApplicable(
+            f"Protocol {protocol!r} is for answers to single samples; {task.name} is answered by summaries of many.",
+            hint=f"Use protocol `{without_options(protocol)}`.",
+        )
+    recorded = thinned(recorded, rules.every)
     split = choose_split(task, rules, recorded, split)
     if rules.tare:
         tare_s(recorded)  # refuses recordings of which some only can be tared
-    frames = task.answer_per == "frame"
     data = framed(recorded, task, rules, estimator) if frames else summarised(recorded, task, rules)
     assignments = make_splits(data, split, seed, max(estimator.window_grid), one_by_one=split in task.campaigns)
     if not assignments:

@@ -7,7 +7,7 @@ from typing import Literal
 
 from pydantic import Field
 
-from tactbench.core.errors import UnknownNameError
+from tactbench.core.errors import UnknownNameError, UsageError
 from tactbench.core.spec.quantity import Frozen
 
 
@@ -34,6 +34,10 @@ class ProtocolSpec(Frozen):
     """Rows carry a dagger."""
     first_row_only: bool = False
     """Keep the first row of every recording and nothing else; see `splits`."""
+    every: int = Field(default=1, ge=1)
+    """Every such sample is looked at, from the first: those of a sensor so many times slower."""
+    k: int | None = Field(default=None, ge=0)
+    """Samples that the mean filter looks back; None: as many as the estimator states or chooses."""
     probe: bool = False
     """Asks what recordings give away, not what a sensor can do: allowed for every task, whether it lists it or not."""
 
@@ -106,11 +110,34 @@ def is_probe(name: str) -> bool:
     return name in PROTOCOLS and PROTOCOLS[name].probe
 
 
+def without_options(name: str) -> str:
+    """Return the name of a protocol without what follows its ``@``."""
+    return name.partition("@")[0]
+
+
 def protocol_called(name: str) -> ProtocolSpec:
-    """Return a protocol by name; raises UnknownNameError."""
-    if name not in PROTOCOLS:
-        raise UnknownNameError("protocol", name, PROTOCOLS)
-    return PROTOCOLS[name]
+    """Return a protocol by name, which may end in options: ``deployable@every=4,k=3``.
+
+    Raises
+    ------
+    UnknownNameError
+        If there is none of this name.
+    UsageError
+        If an option is none of ``every=N`` (from 1) and ``k=N`` (from 0).
+    """
+    plain = without_options(name)
+    if plain not in PROTOCOLS:
+        raise UnknownNameError("protocol", plain, PROTOCOLS)
+    if plain == name:
+        return PROTOCOLS[name]
+    found = re.fullmatch(r"(?:every=([1-9][0-9]{0,5}))?(?:(?:^|(?<=.),)k=([0-9]{1,6}))?", name[len(plain) + 1 :])
+    if found is None or not any(found.groups()):
+        raise UsageError(
+            f"Protocol {name!r}: {name[len(plain) + 1 :]!r} is no option of a protocol.",
+            hint=f"Write {plain}@every=4 for every 4th sample, {plain}@k=3 for a mean over 4, {plain}@every=4,k=3.",
+        )
+    given = {key: int(text) for key, text in zip(("every", "k"), found.groups(), strict=True) if text}
+    return PROTOCOLS[plain].model_copy(update={"name": name, **given})
 
 
 def shots(split: str) -> int | None:

@@ -55,10 +55,14 @@ def summarised(data: Dataset, task: TaskSpec, rules: ProtocolSpec) -> Dataset:
     return replace(data, tables=tables, features=names)
 
 
-def without_windows(estimator: EstimatorDescriptor, task: TaskSpec) -> EstimatorDescriptor:
-    """Return `estimator` without mean filters to choose from where a recording is one row: there is nothing before."""
+def with_windows(estimator: EstimatorDescriptor, task: TaskSpec, rules: ProtocolSpec) -> EstimatorDescriptor:
+    """Return `estimator` with the mean filters that it may choose from.
+
+    There is none where a recording is one row, for there is nothing before it; one where the protocol states it.
+    """
     one = bool(task.summaries or task.features_by)
-    return estimator.model_copy(update={"window_grid": (0,)}) if one else estimator
+    windows = (0,) if one else estimator.window_grid if rules.k is None else (rules.k,)
+    return estimator.model_copy(update={"window_grid": windows})
 
 
 def recording_features(task: TaskSpec, rules: ProtocolSpec) -> Callable[[Table], Features]:

@@ -9,7 +9,14 @@ from itertools import product
 from typing import Any
 
 from tactbench.core.errors import UnknownNameError, UsageError
-from tactbench.core.evaluation.protocols import DEPLOYABLE, FIRST_FRAME, is_probe, protocol_called, shots
+from tactbench.core.evaluation.protocols import (
+    DEPLOYABLE,
+    FIRST_FRAME,
+    is_probe,
+    protocol_called,
+    shots,
+    without_options,
+)
 from tactbench.core.plugins.registry import Registry
 from tactbench.core.spec.matrix import REPLICATES, EstimatorChoice, MatrixSpec, TaskChoice
 from tactbench.core.spec.scene import Simulation
@@ -159,8 +166,9 @@ def _ways(task: TaskSpec, choice: TaskChoice) -> list[tuple[str, str | None]]:
     Where several are asked for, a pair that does not go together becomes a row that says so; a single one is refused.
     """
     for name in choice.protocol:
-        if name not in task.protocols and not is_probe(name):
+        if without_options(name) not in task.protocols and not is_probe(name):
             raise UnknownNameError(f"protocol of task {task.name!r}", name, task.protocols)
+        protocol_called(name)
     splits: list[str | None] = list(dict.fromkeys(split for name in choice.split for split in _expanded(task, name)))
     ways = list(product(choice.protocol or task.protocols[:1], splits or [None]))
     if all(not serves(protocol, split) for protocol, split in ways):

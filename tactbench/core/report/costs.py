@@ -1,64 +1,91 @@
-"""What accuracy costs in time, as `tactbench cost` has measured it: on the terminal and on the page."""
+"""What accuracy costs in time, as `tactbench cost` has measured it: on the terminal, on the page and as files."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from pathlib import Path
 from typing import Any
 
-from tactbench.core.leaderboard.names import METRIC_NAMES
-from tactbench.core.tables.numbers import delay, duration, interval, score, tail
-from tactbench.core.tables.text_table import Entry, TextTable, finite, text_table
+from tactbench.core.cost.knobs import TIMES
+from tactbench.core.files import replace_file, writable
+from tactbench.core.leaderboard.names import LOWER_IS_BETTER, metric_name
+from tactbench.core.report.figures.style import styled
+from tactbench.core.report.figures.trade import ACROSS, draw_trade, title_of
+from tactbench.core.tables.csv_text import csv_of_records
+from tactbench.core.tables.numbers import delay, duration, interval, score
+from tactbench.core.tables.text import json_text
+from tactbench.core.tables.text_table import Entry, TextTable, text_table
 
-_SORTED_BY = {
-    "estimator": "", "score": "score", "95 % interval": "ci_low", "fit": "fit_s", "quartiles": "fit_s_q1",
-    "delay": "answer_delay_ms", "latency p50": "latency_ms_p50", "p95": "latency_ms_p95",
-    "batch/row": "batch_s_per_row", "front": "", "remark": "",
+_COLUMNS = {
+    "knob": "", "setting": "", "score": "score", "95 % interval": "ci_low", "answer delay": "answer_delay_ms",
+    "training": "fit_s", "simulation": "sim_s", "remark": "",
 }  # fmt: skip
 """Column -> key of the number behind it."""
 
 
-def _title(about: Mapping[str, Any]) -> str:
-    """Return what holds for all rows: question, metric, protocol, rounds, threads."""
-    better = "higher" if about["higher_is_better"] else "lower"
-    simulated = f" · SIM ({about['rig']})" if about["simulated"] else ""
-    dagger = " †" if about["dagger"] else ""
-    metric = METRIC_NAMES.get(about["metric"], about["metric"])
-    return (
-        f"{about['sensor']}, {about['task']}: {metric}, {better} is better · "
-        f"{about['protocol']}{dagger} · split {about['split']}{simulated} · {about['rounds']} rounds, 1 thread"
-    )
+def trade_tables(known: Mapping[str, Any]) -> list[TextTable]:
+    """Return what `tactbench.core.cost.knobs.measure` yields as tables; raises KeyError where a file of it is damaged.
+
+    The first, where there is one: the settings that no other one beats in both score and answer delay, the quickest
+    first.
+    """
+    best = sorted((one for one in known["settings"] if one["front"]), key=lambda one: float(one["answer_delay_ms"]))
+    title = f"{title_of(known)}: what answer delay buys"
+    front = [_table(known, title, best).only([name for name in _COLUMNS if name not in ("simulation", "remark")])]
+    return (front if best else []) + [_table(known, title_of(known), known["settings"]).compact()]
 
 
-def _line(row: Mapping[str, Any], unit: str) -> dict[str, str]:
-    """Return one estimator's texts by column; what was not measured is left out."""
-    what = "oracle" if row.get("looks_at") == "reference" else "trivial"
-    name = f"{row['estimator']} ({what})" if row["is_baseline"] else row["estimator"]
-    remark = "" if row["status"] == "done" else f"{row['status']}: {row['reason']}"
-    texts = {"estimator": name, "remark": remark}
-    if row["score"] is not None:
-        texts |= {"score": score(row["score"], unit), "95 % interval": interval(row["ci_low"], row["ci_high"], unit)}
-    if row["fit_s"] is None:
-        return texts
-    fronts = [what for what, on in (("fit", row["front_fit"]), ("delay", row["front_delay"])) if on]
-    return texts | {
-        "fit": duration(row["fit_s"]),
-        "quartiles": f"{duration(row['fit_s_q1'])} … {duration(row['fit_s_q3'])}",
-        "delay": delay(row["answer_delay_ms"], row["delay_parts_ms"]),
-        "latency p50": duration(row["latency_ms_p50"] / 1e3),
-        "p95": tail(row["latency_ms_p95"], row["latency_ms_max"], row["latency_n"]),
-        "batch/row": duration(row["batch_s_per_row"]),
-        "front": ", ".join(fronts),
-    }
-
-
-def ladder_table(about: Mapping[str, Any]) -> TextTable:
-    """Return what a file of `tactbench cost` says, as the terminal shows it; raises KeyError where it is damaged."""
+def _table(known: Mapping[str, Any], title: str, settings: list[Mapping[str, Any]]) -> TextTable:
     lines = []
-    for row in about["rows"]:
-        texts = _line(row, about["unit"])
-        lines.append([Entry(texts.get(name, ""), finite(row.get(key))) for name, key in _SORTED_BY.items()])
-    kinds = ["baseline" if row["is_baseline"] else "result" if row["status"] == "done" else "failed"
-             for row in about["rows"]]  # fmt: skip
-    words = [*(f"{text}." for text in about["remarks"]), "docs/glossary.md says what each column is."]
-    numeric = [name for name, key in _SORTED_BY.items() if key]
-    return text_table(_title(about), tuple(_SORTED_BY), lines, numeric=numeric, notes=words, kinds=kinds)
+    for one in settings:
+        texts = {
+            "knob": one["knob"], "setting": one["value"], "score": score(one["score"], known["unit"]),
+            "95 % interval": interval(one["ci_low"], one["ci_high"], known["unit"]),
+            "answer delay": delay(one["answer_delay_ms"], one["delay_parts_ms"]), "training": duration(one["fit_s"]),
+            "simulation": duration(one["sim_s"]),
+            "remark": "" if one["status"] == "done" else f"{one['status']}: {one['reason']}",
+        }  # fmt: skip
+        lines.append([Entry(texts[name], one.get(key)) for name, key in _COLUMNS.items()])
+    better = "lower" if known["metric"] in LOWER_IS_BETTER else "higher"
+    truth = " against the true force" if known["by_truth"] else ""
+    nothing = "" if known["trivial"] is None else f" Looking at nothing: {score(known['trivial'], known['unit'])}."
+    notes = [f"Score: {metric_name(known)}{truth}, {better} is better.{nothing}"]
+    kinds = ["failed" if one["status"] != "done" else "result" if one["front"] else "" for one in settings]
+    return text_table(title, tuple(_COLUMNS), lines, numeric=[name for name, key in _COLUMNS.items() if key],
+                      notes=notes, kinds=kinds)  # fmt: skip
+
+
+def told(known: Mapping[str, Any], before: Mapping[str, Any] | None) -> Iterator[str]:
+    """Yield a sentence for each setting that was not known before, or one for a replicate that was not."""
+    if before is not None and known["replicates"] > before["replicates"]:
+        yield f"{known['sensor']}, {known['task']}: {known['replicates']} replicates"
+        return
+    had = {(one["knob"], one["value"]) for one in before["settings"]} if before else set()
+    for one in known["settings"]:
+        if (one["knob"], one["value"]) not in had:
+            time = TIMES[one["knob"]] or "answer_delay_ms"
+            seconds = one[time] if time.endswith("_s") or one[time] is None else one[time] / 1e3
+            yield (
+                f"{known['sensor']}, {known['task']}, {one['knob']} {one['value']}: "
+                f"{score(one['score'], known['unit'])}, {ACROSS[time].partition(' [')[0]} {duration(seconds)}"
+            )
+
+
+def write_trade(known: Mapping[str, Any], place: Path) -> list[Path]:
+    """Write what is known as ``PLACE.json``, ``.csv`` (its settings alone), ``.png`` and ``.pdf``; return their paths.
+
+    Raises
+    ------
+    UnwritableError
+        If the folder cannot be written.
+    """
+    json, csv, *pictures = paths = [place.with_name(f"{place.name}.{end}") for end in ("json", "csv", "png", "pdf")]
+    with writable(place.parent):
+        place.parent.mkdir(parents=True, exist_ok=True)
+        replace_file(json, (json_text(known, indent=1) + "\n").encode())
+        replace_file(csv, csv_of_records(known["settings"]).encode())
+        with styled():
+            figure = draw_trade(known)
+            for picture in pictures:
+                figure.savefig(picture, dpi=150)
+    return paths

@@ -19,7 +19,7 @@ from tactbench.core.leaderboard.columns import DEFAULT, NUMERIC
 from tactbench.core.leaderboard.view import REASON, View, grid
 from tactbench.core.progress import Progress
 from tactbench.core.report.cells import details
-from tactbench.core.report.costs import ladder_table
+from tactbench.core.report.costs import trade_tables
 from tactbench.core.report.datasheet import sensor_table, table_one
 from tactbench.core.report.figures.drawing import draw_figures
 from tactbench.core.report.figures.published_and_ours import NAME as PUBLISHED
@@ -96,7 +96,7 @@ def costs_section(subject: ReportData) -> Section:
     tables = []
     for path in sorted((folder / "cost").glob("*.json")):
         with suppress(KeyError, TypeError, ValueError):  # twin.json has no such table, nor has a damaged file
-            tables.append(ladder_table(json.loads(path.read_bytes())))
+            tables += trade_tables(json.loads(path.read_bytes()))
     pictures = tuple(
         SavedFigure(path.stem, path.stem, "As `tactbench cost` has drawn it.", path)
         for path in sorted((folder / "cost").glob("*.png"))

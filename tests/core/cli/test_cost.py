@@ -2,23 +2,22 @@
 
 import json
 
+import pytest
+
+from tactbench.core.cost import knobs
 from tests.conftest import Verbs
-from tests.core.cost.test_ladder import presses
+from tests.core.cost.test_knobs import presses
 from tests.core.report.unrendered import unrendered
 
-ASKED = ("cost", "--sensor", "made", "--task", "force", "--recordings", "shelf", "--rounds", "1", "--format", "json")
+ASKED = ("cost", "--sensor", "made", "--task", "force", "--recordings", "shelf", "--format", "json")
 
 
 def test_an_estimator_that_breaks_costs_its_own_row_only(tmp_path):
     presses(tmp_path / "shelf")
     verbs = Verbs(tmp_path, here=True)
     with unrendered():
-        rows = {
-            row["estimator"]: row
-            for row in json.loads(
-                verbs(*ASKED, "--estimator", "evil-raise", "--estimator", "ols", plugins=("evil",)).stdout
-            )
-        }
+        found = json.loads(verbs(*ASKED, "--estimator", "ols", "--estimator", "evil-raise", plugins=("evil",)).stdout)
+    rows = {row["value"]: row for row in found if row["knob"] == "estimator"}
     assert (rows["ols"]["status"], rows["evil-raise"]["status"]) == ("done", "failed")
     assert "out of breath" in rows["evil-raise"]["reason"]
     files = {path.name for path in (tmp_path / "tactbench-results" / "cost").glob("made-force.*")}
@@ -26,14 +25,41 @@ def test_an_estimator_that_breaks_costs_its_own_row_only(tmp_path):
     assert verbs("leaderboard", code=2), "what is timed adds no row to the leaderboard"
 
 
-def test_the_twins_cost_says_what_a_rung_scores_and_what_a_sensor_cannot_have(tmp_path):
-    words = ("cost", "--twin", "--sensor", "acme-pad", "--rounds", "1", "--task", "force", "--format", "json")
+def test_the_twins_cost_says_what_a_rung_scores_and_what_a_sensor_cannot_have(tmp_path, monkeypatch):
+    monkeypatch.setattr(knobs, "TOLERANCES", (10.0,))
+    words = ("cost", "--twin", "--sensor", "acme-pad", "--repeats", "1", "--task", "force", "--format", "json")
     with unrendered():
         done = Verbs(tmp_path, here=True)(*words, plugins=("good",))
-    rows = {row["way"].rpartition(", up")[0] + (row["rung"] or ""): row for row in json.loads(done.stdout)}
-    default, closed = rows["newton, 32 x 32default"], rows["closed form, 32 x 32closed-form"]
-    assert default["error_rms"] > 0
-    assert default["score_force"] > 0
-    assert (closed["seconds"], closed["score_force"]) == (None, None)
-    assert "Poisson's ratio 0.45" in closed["reason"]
-    assert (tmp_path / "tactbench-results/cost/twin.png").exists()
+    rows = {row["value"]: row for row in json.loads(done.stdout)}
+    assert rows["default"]["score"] > 0
+    assert rows["fine"]["sim_s"] > 0
+    assert rows["10"]["simulation"]["tolerance"] == 10.0
+    assert (rows["closed-form"]["sim_s"], rows["closed-form"]["score"]) == (None, None)
+    assert "Poisson's ratio 0.45" in rows["closed-form"]["reason"]
+
+
+def test_what_is_known_is_printed_and_written_when_it_is_stopped(tmp_path, monkeypatch):
+    presses(tmp_path / "shelf")
+    run_matrix, runs = knobs.run_matrix, []
+
+    def stopped(*args, **more):
+        runs.append(args)
+        if len(runs) == 3:
+            raise KeyboardInterrupt
+        return run_matrix(*args, **more)
+
+    monkeypatch.setattr(knobs, "run_matrix", stopped)
+    verbs = Verbs(tmp_path, here=True)
+    with unrendered():
+        done = verbs(*ASKED, "--estimator", "ols", code=130)
+    rows = json.loads(done.stdout)
+    assert {row["knob"] for row in rows} >= {"window k", "every n-th sample"}
+    written = json.loads((tmp_path / "tactbench-results/cost/made-force.json").read_text())["settings"]
+    assert [{"sensor": "made", **row} for row in written] == rows
+    with unrendered():
+        assert len(json.loads(verbs(*ASKED, "--estimator", "ols").stdout)) > len(rows)
+
+
+@pytest.mark.parametrize("more", [("--repeats", "2"), ("--estimator", "ols")])
+def test_the_diagram_of_the_simulation_takes_no_option_of_answers(tmp_path, more):
+    Verbs(tmp_path, here=True)("cost", "--twin", "--sensor", "icub", *more, code=2)

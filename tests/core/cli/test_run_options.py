@@ -97,7 +97,7 @@ def test_events_in_time_go_from_the_row_to_tables_why_and_cost(verbs):
     assert "Events, at the threshold" in verbs("leaderboard", "--wide").stdout
     assert re.search(r"false alarms per minute +0\n", verbs("why", "made/slip/replay/deployable/pac-band").stdout)
     with unrendered():
-        assert "pac-band" in verbs("cost", "--sensor", "made", *asked, "--rounds", "1").stdout
-    costs = json.loads((verbs.folder / "tactbench-results" / "cost" / "made-slip.json").read_text())["rows"]
-    (parts,) = [one["delay_parts_ms"] for one in costs if one["estimator"] == "pac-band"]
+        assert "pac-band" in verbs("cost", "--sensor", "made", *asked).stdout
+    costs = json.loads((verbs.folder / "tactbench-results" / "cost" / "made-slip.json").read_text())["settings"]
+    (parts,) = [one["delay_parts_ms"] for one in costs if (one["knob"], one["value"]) == ("estimator", "pac-band")]
     assert (parts["window"], parts["sampling"]) == (50.0, 10.0)

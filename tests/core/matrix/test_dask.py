@@ -11,7 +11,7 @@ from tactbench.core.matrix.solve import Job
 from tactbench.core.matrix.store import Store
 from tactbench.core.pool import UNLIMITED
 from tests.conftest import Shell, Verbs
-from tests.core.cost.test_ladder import presses
+from tests.core.cost.test_knobs import presses
 from tests.core.matrix.test_evil_cells import ASKED, HONEST, decided
 from tests.core.pool.patience import processes_in, until
 

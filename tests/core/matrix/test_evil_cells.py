@@ -9,7 +9,7 @@ import pytest
 from tactbench.core.matrix.merge import SEED_DECIDES
 from tactbench.core.matrix.store import Store
 from tests.conftest import Verbs
-from tests.core.cost.test_ladder import presses
+from tests.core.cost.test_knobs import presses
 
 ASKED = ("run", "--rig", "replay", "--recordings", "shelf", "--sensor", "made", "--task", "force", "--split", "session")
 ANY_SENSOR = (*ASKED[:5], "--task", "force", "--estimator", "ols", "--split", "session", "--format", "json")

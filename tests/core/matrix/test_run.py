@@ -13,7 +13,7 @@ from tactbench.core.pool import Limits
 from tactbench.core.progress import Progress
 from tactbench.core.spec.matrix import EstimatorChoice, MatrixSpec, TaskChoice
 from tactbench.core.study.results import shown_rows, table_of
-from tests.core.cost.test_ladder import presses
+from tests.core.cost.test_knobs import presses
 from tests.here import IN_THIS_PROCESS
 
 ASKED = ("forest-10", "ridge")

@@ -12,6 +12,7 @@ from tactbench.core.errors import DataError, NotApplicable
 from tactbench.core.evaluation.fitting import features_of
 from tactbench.core.evaluation.folds import load_task
 from tactbench.core.evaluation.sets import prepared
+from tactbench.core.evaluation.summaries import with_windows
 from tactbench.core.report.figures.group import Group, Sketch, class_name, with_unit
 from tactbench.core.report.figures.score_by_force import WINDOW_S, smoothed_force
 from tactbench.core.report.figures.style import MARKERS, cycled, legend, ordered, panels
@@ -106,7 +107,7 @@ def _features(results: Results, row: dict[str, Any], test: Answers) -> FloatArra
     data = load_task(task, paths, row["protocol"], row["split"], estimator=estimator, seed=row["seed"])
     if data.data.vote:
         raise NotApplicable("a recording is answered by its frames, and has no features of its own")
-    k = int(row["chosen"].get("k", estimator.window_grid[0]))
+    k = int(row["chosen"].get("k", with_windows(estimator, task, data.rules).window_grid[0]))
     test_part = prepared(data.assignments[0], data.data, data.rules, k, Counter()).test
     if not (np.array_equal(test_part.recording, test.recording) and np.array_equal(test_part.row, test.row)):
         raise DataError(

@@ -1,0 +1,180 @@
+"""What accuracy costs in time along one knob after another: each setting is an ordinary cell of the matrix."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from tactbench.core.cost.precision import front
+from tactbench.core.evaluation.protocols import DEPLOYABLE, shots
+from tactbench.core.matrix.run import EngineChoice, run_matrix
+from tactbench.core.matrix.store import Row, Store
+from tactbench.core.progress import Progress
+from tactbench.core.spec.matrix import EstimatorChoice, MatrixSpec, TaskChoice
+from tactbench.core.spec.rig import EstimatorDescriptor, RigDescriptor
+from tactbench.core.spec.row import LOWER_IS_BETTER
+from tactbench.core.spec.scene import Simulation
+from tactbench.core.spec.task import TaskSpec
+from tactbench.core.statistics.replicates import over_replicates
+
+TREES = (3, 10, 30, 100, 300)
+WINDOWS = (0, 2, 5, 10, 20, 40)
+EVERY = (1, 2, 5, 10, 20)
+TOLERANCES = (3.0, 1.0, 0.3)
+"""Settings that are tried. The estimator's and the protocol's own are among them."""
+TIMES = {
+    "trees": "answer_delay_ms", "window k": "answer_delay_ms", "every n-th sample": "answer_delay_ms",
+    "estimator": "answer_delay_ms", "training sessions": "fit_s", "rung": "sim_s", "tolerance": "sim_s",
+    "protocol": "",
+}  # fmt: skip
+"""Knob -> the time that is paid along it; empty: none."""
+BOUGHT = ("estimator", "trees", "window k", "every n-th sample")
+"""Knobs whose settings answer the same question about the same recordings: they compete for the front."""
+_KEPT = (
+    "protocol", "split", "estimator", "params", "simulation", "status", "reason", "n_replicates", "n_train", "n_test",
+    "fit_s", "latency_ms_p50", "answer_delay_ms", "delay_parts_ms", "sim_s", "remarks",
+)  # fmt: skip
+
+VERSION = 4
+"""Of the file that holds what `measure` yields."""
+
+Record = dict[str, Any]
+
+
+class Setting(NamedTuple):
+    """One setting of one knob, all others at their defaults."""
+
+    knob: str
+    value: str
+    protocol: str
+    estimator: EstimatorChoice
+    split: str | None = None
+    simulation: Simulation = Simulation()
+
+    @property
+    def choice(self) -> TaskChoice:
+        """What is asked of the task; its name is still to be given."""
+        own = () if self.split is None else (self.split,)
+        return TaskChoice(name="", protocol=(self.protocol,), split=own, estimators=(self.estimator,))
+
+    def is_of(self, row: Row) -> bool:
+        """Tell whether a row of this simulation answers it."""
+        way = self.protocol if self.split is None else f"{self.protocol}:{self.split}"
+        asked = (way, self.estimator.name, dict(self.estimator.params))
+        return (str(row["cell"]).split("/")[3], row["estimator"], row["params"]) == asked
+
+
+def settings_of(task: TaskSpec, estimators: Sequence[EstimatorDescriptor], protocol: str) -> Iterator[Setting]:
+    """Yield what is tried of the first of `estimators`, and all of them as they are."""
+    first = estimators[0]
+    plain = EstimatorChoice(name=first.name)
+    own = first.params.get("n_estimators")
+    for trees in sorted({*TREES, own}) if isinstance(own, int) else ():
+        changed = plain if trees == own else EstimatorChoice(name=first.name, params={"n_estimators": trees})
+        yield Setting("trees", str(trees), protocol, changed)
+    if task.answer_per != "frame" and not (task.summaries or task.features_by):
+        for k in WINDOWS:
+            same = first.window_grid == (k,)
+            yield Setting("window k", str(k), protocol if same else f"{protocol}@k={k}", plain)
+        for every in EVERY:
+            name = protocol if every == 1 else f"{protocol}@every={every}"
+            yield Setting("every n-th sample", str(every), name, plain)
+    for split in task.splits:
+        if shots(split) and DEPLOYABLE.name in task.protocols:
+            yield Setting("training sessions", str(shots(split)), DEPLOYABLE.name, plain, split)
+    for name in task.protocols:
+        yield Setting("protocol", name, name, plain)
+    for one in estimators:
+        yield Setting("estimator", one.name, protocol, EstimatorChoice(name=one.name))
+
+
+def simulations_of(rig: RigDescriptor, estimator: EstimatorDescriptor, protocol: str) -> Iterator[Setting]:
+    """Yield what is tried of a simulated rig: its rungs but the dearest, and tolerances."""
+    plain = EstimatorChoice(name=estimator.name)
+    for rung in rig.rungs[:-1]:
+        yield Setting("rung", rung, protocol, plain, None, Simulation(rung=rung))
+    for tolerance in TOLERANCES:
+        yield Setting("tolerance", f"{tolerance:g}", protocol, plain, None, Simulation(tolerance=tolerance))
+
+
+def measure(
+    matrix: MatrixSpec, settings: Sequence[Setting], folder: Path, *, repeats: int, choice: EngineChoice | None = None,
+    recordings: Path | None = None, progress: Progress,
+) -> Iterator[dict[str, Any]]:  # fmt: skip
+    """Yield what is known so far, after each knob of the first replicate and after each further replicate.
+
+    Parameters
+    ----------
+    matrix
+        Rig, first seed, one sensor and one task.
+    folder
+        Of the results; each simulation other than the usual one has a folder of its own in it. What is there already is
+        reused.
+    repeats
+        Replicates; times are of the first.
+
+    Yields
+    ------
+    dict
+        ``sensor``, ``task``, ``rig``, ``protocol``, ``metric``, ``unit``, ``simulated``, ``by_truth`` (scores are
+        against the force exerted), ``trivial`` (the score of the best answer that looks at nothing, or None),
+        ``replicates``, and ``settings``: a record for each setting that has ended so far, in the order of `settings`.
+    """
+    task = matrix.tasks[0].name
+    rows: dict[Simulation, dict[str, Row]] = {}
+    for replicate in range(repeats):
+        pieces: dict[tuple[Simulation, str], list[Setting]] = {}
+        for one in settings:
+            pieces.setdefault((one.simulation, "" if replicate else one.knob), []).append(one)
+        for (simulation, _), asked in pieces.items():
+            own = folder
+            if simulation != Simulation():
+                own = folder / "-".join((asked[0].knob, asked[0].value))
+            change = {
+                "seed": matrix.seed + replicate, "repeats": 1, "latency": replicate == 0, "simulation": simulation,
+                "tasks": tuple(one.choice.model_copy(update={"name": task}) for one in asked),
+            }  # fmt: skip
+            outcome = run_matrix(
+                matrix.model_copy(update=change), Store(own), choice=choice, recordings=recordings, progress=progress
+            )
+            rows.setdefault(simulation, {}).update((row["cell"], row) for row in outcome.rows)
+            yield _known(settings, rows, matrix.seed)
+
+
+def _known(settings: Sequence[Setting], rows: Mapping[Simulation, Mapping[str, Row]], seed: int) -> dict[str, Any]:
+    answers = {simulation: over_replicates(list(own.values())) for simulation, own in rows.items()}
+    records: list[Record] = []
+    for one in settings:
+        for row in answers.get(one.simulation, ()):
+            if one.is_of(row):
+                score, low, high = judged(row)
+                records.append({"knob": one.knob, "value": one.value, "score": score, "ci_low": low, "ci_high": high,
+                                **{key: row[key] for key in _KEPT}, "front": False})  # fmt: skip
+    every = [row for own in answers.values() for row in own]
+    first = next((row for row in every if row["status"] == "done"), every[0])
+    sign = 1.0 if first["metric"] in LOWER_IS_BETTER else -1.0
+    trivial: list[float] = [
+        judged(row)[0] for row in every
+        if (row["is_baseline"], row["protocol"], row["split"]) == (True, first["protocol"], first["split"])
+        and row["looks_at"] == "nothing" and row["status"] == "done"
+    ]  # fmt: skip
+    bar = min(trivial, key=lambda score: sign * score, default=None)
+    competing = [
+        one for one in records
+        if one["knob"] in BOUGHT and one["status"] == "done" and one["answer_delay_ms"] is not None
+        and (bar is None or sign * one["score"] < sign * bar)
+    ]  # fmt: skip
+    for best in front(competing, seconds=lambda one: one["answer_delay_ms"], error=lambda one: sign * one["score"]):
+        best["front"] = True
+    about = {key: first[key] for key in ("sensor", "task", "rig", "protocol", "metric", "unit", "simulated", "dagger")}
+    return {"version": VERSION, **about, "seed": seed, "by_truth": first["true_score"] is not None, "trivial": bar,
+            "replicates": max(row["repeats"] for row in every), "settings": records}  # fmt: skip
+
+
+def judged(row: Row) -> tuple[Any, Any, Any]:
+    """Return score and interval, None where there is none: against the truth where it is known."""
+    keys = (
+        ("score", "ci_low", "ci_high") if row["true_score"] is None else ("true_score", "true_ci_low", "true_ci_high")
+    )
+    return row[keys[0]], row[keys[1]], row[keys[2]]

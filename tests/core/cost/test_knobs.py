@@ -1,0 +1,183 @@
+"""What accuracy costs along each knob: settings are cells, reused, and the front is of those that answer the same."""
+
+import csv
+import json
+import math
+from collections import Counter
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from tactbench.core.cost.knobs import Setting, measure, settings_of
+from tactbench.core.cost.precision import precise, quickest_enough
+from tactbench.core.errors import NotApplicable, UsageError
+from tactbench.core.evaluation.dataset import load_dataset
+from tactbench.core.evaluation.delay import stated_delay_ms
+from tactbench.core.evaluation.folds import load_task
+from tactbench.core.evaluation.protocols import protocol_called
+from tactbench.core.evaluation.sets import prepared
+from tactbench.core.plugins.registry import load_registry
+from tactbench.core.progress import Progress
+from tactbench.core.report.costs import trade_tables, write_trade
+from tactbench.core.spec.matrix import EstimatorChoice, MatrixSpec, TaskChoice
+from tactbench.plugin.simulation import CostPoint
+from tests.core.evaluation.made import record
+from tests.core.report.unrendered import unrendered
+from tests.here import IN_THIS_PROCESS
+
+
+def presses(folder, sessions=3, n=120):
+    """Recordings of a force on three taxels, one a session."""
+    rng = np.random.default_rng(4)
+    folder.mkdir()
+    for number in range(sessions):
+        force = np.linspace(0.0, 5.0, n) + rng.normal(0.0, 0.1, n)
+        X = force[:, None] * np.array([40.0, -25.0, 10.0]) + rng.normal(0.0, 60.0, (n, 3)) + 100.0
+        record(folder / f"press-{number}.h5", X, force, session=str(number))
+    return folder
+
+
+@pytest.fixture(scope="module")
+def shelf(tmp_path_factory):
+    return presses(tmp_path_factory.mktemp("knobs") / "shelf")
+
+
+@pytest.fixture(scope="module")
+def registry():
+    return load_registry()
+
+
+def measured(shelf, out, names, keep=lambda one: True):
+    registry = load_registry()
+    chosen = [registry.estimators[name] for name in names]
+    settings = [one for one in settings_of(registry.tasks["force"].spec, chosen, "deployable") if keep(one)]
+    matrix = MatrixSpec(rig="replay", sensors=("made",), tasks=(TaskChoice(name="force"),))
+    return list(
+        measure(matrix, settings, out, repeats=1, recordings=shelf, choice=IN_THIS_PROCESS, progress=Progress())
+    )
+
+
+@pytest.fixture(scope="module")
+def known(shelf, tmp_path_factory):
+    return measured(
+        shelf, tmp_path_factory.mktemp("out"), ["forest-10", "ols"], lambda one: one.value not in ("100", "300")
+    )
+
+
+def test_what_is_known_grows_knob_by_knob_and_all_others_stay_as_they_are(known):
+    sizes = [len(one["settings"]) for one in known]
+    assert sizes == sorted(sizes)
+    assert sizes[0] < sizes[-1]
+    settings = {(one["knob"], one["value"]): one for one in known[-1]["settings"]}
+    base = settings["estimator", "forest-10"]
+    for same in (("trees", "10"), ("window k", "0"), ("every n-th sample", "1"), ("protocol", "deployable")):
+        assert (settings[same]["score"], settings[same]["fit_s"]) == (base["score"], base["fit_s"]), "one cell"
+    assert settings["trees", "30"]["latency_ms_p50"] > settings["trees", "3"]["latency_ms_p50"]
+    # 100 Hz: a window of 21 is late by ten intervals; every tenth sample is waited for ten times as long.
+    assert settings["window k", "20"]["delay_parts_ms"]["window"] == pytest.approx(100.0)
+    assert settings["every n-th sample", "10"]["delay_parts_ms"]["sampling"] == pytest.approx(100.0)
+    assert settings["every n-th sample", "10"]["n_test"] * 10 == base["n_test"]
+    assert settings["training sessions", "1"]["status"] != "done"
+    assert settings["training sessions", "1"]["reason"]
+
+
+def test_the_front_is_beaten_by_no_setting_of_a_knob_that_competes(known):
+    competing = [
+        one for one in known[-1]["settings"] if one["knob"] in ("trees", "window k", "every n-th sample", "estimator")
+    ]
+    best = [one for one in competing if one["front"]]
+    assert best
+    for one in competing:
+        assert any(o["answer_delay_ms"] <= one["answer_delay_ms"] and o["score"] <= one["score"] for o in best)
+    assert not any(one["front"] for one in known[-1]["settings"] if one["knob"] in ("protocol", "training sessions"))
+    assert all(one["score"] < known[-1]["trivial"] for one in best)
+
+
+def test_what_was_finished_is_found_again(shelf, tmp_path):
+    few = measured(shelf, tmp_path, ["ols"], lambda one: one.knob == "window k")[-1]
+    again = measured(shelf, tmp_path, ["ols"])[-1]
+    times = {one["value"]: one["fit_s"] for one in again["settings"] if one["knob"] == "window k"}
+    assert times == {one["value"]: one["fit_s"] for one in few["settings"]}, "nothing is timed twice"
+
+
+def test_files_and_tables_say_what_is_known(known, tmp_path):
+    with unrendered():
+        paths = write_trade(known[-1], tmp_path / "cost" / "made-force")
+    assert [path.name for path in paths] == [f"made-force.{ending}" for ending in ("json", "csv", "png", "pdf")]
+    assert json.loads(paths[0].read_text()) == json.loads(json.dumps(known[-1]))
+    with paths[1].open() as file:
+        assert len(list(csv.DictReader(file))) == len(known[-1]["settings"])
+    best, every = trade_tables(known[-1])
+    assert len(best.lines) == sum(one["front"] for one in known[-1]["settings"])
+    assert len(every.lines) == len(known[-1]["settings"])
+
+
+@pytest.mark.parametrize("name", ["deployable@every=3,k=4", "deployable@every=3", "deployable@k=4"])
+def test_options_of_a_protocol_thin_samples_and_set_the_window(shelf, registry, name):
+    task, rules = registry.tasks["force"].spec, protocol_called(name)
+    paths = sorted(shelf.glob("*.h5"))
+    plain, made = (load_task(task, paths, one, "session") for one in ("deployable", name))
+    assert np.array_equal(made.X, np.concatenate([table.X[:: rules.every] for table in plain.data.tables]))
+    k = 0 if rules.k is None else rules.k
+    fold = prepared(made.assignments[0], made.data, made.rules, k, Counter())
+    rows = made.X[made.folds[0][1]]
+    train = made.X[made.folds[0][0]]
+    scaled = (rows - train.mean(axis=0)) / train.std(axis=0)
+    assert fold.test.X[-1] == pytest.approx(scaled[len(scaled) - k - 1 :].mean(axis=0))
+    parts, remarks = stated_delay_ms(made.recorded, made.data, task, rules, registry.estimators["ols"], k)
+    assert parts["sampling"] == pytest.approx(10.0 * rules.every)
+    assert parts["window"] == pytest.approx(10.0 * rules.every * k / 2)
+    assert not any("sampled at" in one for one in remarks)
+
+
+WRONG = ("@", "@k", "@k=-1", "@every=0", "@,k=1", "@k=1,every=2", "@tare=1", "@k=1@k=2")
+
+
+@pytest.mark.parametrize("name", WRONG)
+def test_what_is_no_option_of_a_protocol_is_refused(name):
+    with pytest.raises(UsageError, match="no option"):
+        protocol_called(f"deployable{name}")
+
+
+def test_a_task_that_summarises_recordings_has_no_window_of_samples(shelf, registry):
+    task = registry.tasks["slip-sequence"].spec
+    with pytest.raises(NotApplicable, match="single samples"):
+        load_task(task, load_dataset(registry.tasks["force"].spec, sorted(shelf.glob("*.h5"))), "deployable@k=3")
+
+
+def test_a_setting_is_of_its_own_row_only():
+    row = {"cell": "s/force/replay/deployable:few-shot-1/ols/1", "estimator": "ols", "params": {}}
+    ols = EstimatorChoice(name="ols")
+    assert Setting("k", "1", "deployable", ols, "few-shot-1").is_of(row)
+    assert not Setting("k", "1", "deployable", ols).is_of(row)
+
+
+def cost_point(seconds, error, *, default=False, floor=0.3):
+    return CostPoint(
+        subject="pad", observable="taxel", label="way", seconds=seconds, error=error, worst=2 * error, unit="count",
+        floor=floor, default=default, settings={"family": "newton"},
+    )  # fmt: skip
+
+
+POSITIVE = st.floats(1e-6, 1e3)
+
+
+@given(st.lists(st.tuples(POSITIVE, POSITIVE), min_size=1, max_size=20))
+def test_the_front_is_beaten_by_nobody_and_beats_everybody_else(pairs):
+    points = [cost_point(*pair) for pair in pairs]
+    best = precise(points)
+    for point in points:
+        beaten = any(o.seconds <= point.seconds and o.error <= point.error for o in best)
+        assert beaten
+    for one in best:
+        assert not any(o.seconds < one.seconds and o.error <= one.error for o in points)
+    assert [p.error for p in best] == sorted((p.error for p in best), reverse=True)
+
+
+def test_the_quickest_point_that_will_do():
+    quick, default, slow = cost_point(0.1, 0.5), cost_point(0.2, 0.05, default=True), cost_point(1.0, 0.01)
+    assert quickest_enough([quick, default, slow]) is default
+    assert quickest_enough([quick, cost_point(0.2, 0.2)]) is None
+    assert quickest_enough([cost_point(1, 1, floor=math.inf)]) is None, "no noise is stated"
