@@ -121,9 +121,10 @@ def fields(report: ImportReport, folder: Path) -> Iterator[tuple[str, str]]:
     }  # fmt: skip
     yield from ((name, field_text(value)) for name, value in stated.items() if value)
     yield from (("excluded", f"{count} recordings: {reason}") for reason, count in report.excluded.items())
-    yield from (("left out", orphan) for orphan in report.orphans[:MOST_NAMED])
-    if len(report.orphans) > MOST_NAMED:
-        yield "left out", f"{len(report.orphans) - MOST_NAMED} more files without a partner"
+    yield from (("left out", one) for one in report.left_out[:MOST_NAMED])
+    if len(report.left_out) > MOST_NAMED:
+        yield "left out", f"{len(report.left_out) - MOST_NAMED} more files without a partner"
+    yield from (("not used", columns) for columns in report.unused)
     found = Counter(
         (finding.severity, finding.message)
         for recording in report.recordings

@@ -19,12 +19,17 @@ from tactbench.core.recording.mapping.table import MESSAGE_TIMES, BagTable, plai
 
 @dataclass(frozen=True)
 class Topic:
-    """What is asked of a topic."""
+    """What the mapping uses of a table, and the topic that the table is in a bag."""
 
     name: str
     numbers: tuple[Column, ...]
     texts: tuple[Column, ...]
     time: Column | None
+
+    @property
+    def columns(self) -> tuple[Column, ...]:
+        """All columns that are used, each once."""
+        return tuple(dict.fromkeys((*self.numbers, *self.texts, *([] if self.time is None else [self.time]))))
 
 
 def read_bag(path: Path, shown: str, topics: Mapping[str, Topic]) -> dict[str, BagTable]:
@@ -88,7 +93,7 @@ def _decoder(channel: Any, schema: Any, shown: str) -> Callable[[bytes], Any]:
         raise MappingError(
             f"{shown}: topic {channel.topic!r} is encoded as {channel.message_encoding} "
             f"({schema.encoding if schema else 'no schema'}).",
-            hint="ROS 2 messages (cdr, ros2msg) and JSON are read.",
+            hint="ROS 2 messages (cdr, ros2msg) and JSON are read; `rosbags-convert` makes ROS 2 of ROS 1.",
         )
     return found
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import fnmatch
 import re
+import typing
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
@@ -21,10 +22,10 @@ from tactbench.core.files import writable
 from tactbench.core.progress import Progress
 from tactbench.core.recording.health import MONOTONE, Finding, examine, is_copy
 from tactbench.core.recording.mapping.channels import MappedStream, device, fill, sensor_of
-from tactbench.core.recording.mapping.files import RawRecording, find, read
-from tactbench.core.recording.mapping.model import MUST_NAME_SENTINELS, Mapping, Word
+from tactbench.core.recording.mapping.files import RawRecording, asked, find, read
+from tactbench.core.recording.mapping.model import MUST_NAME_SENTINELS, Arrays, Mapping, Word
 from tactbench.core.recording.mapping.samples import labels, samples, times
-from tactbench.core.recording.mapping.table import TextTable
+from tactbench.core.recording.mapping.table import Table, TextTable, names_listed
 from tactbench.core.recording.mapping.tasks import check_tasks, place_tasks, require_answerable, tasks_text
 from tactbench.core.recording.reader import content_digest, open_recording
 from tactbench.core.recording.writer import RecordingWriter
@@ -66,8 +67,10 @@ class ImportReport:
     files_read: int
     tasks: tuple[str, ...] = ()
     """Names of those that the mapping declares"""
-    orphans: tuple[str, ...] = ()
-    """Files that make no recording because another table has none for them, and why"""
+    left_out: tuple[str, ...] = ()
+    """Matches that make no recording, and why"""
+    unused: tuple[str, ...] = ()
+    """Columns that the mapping does not use, a sentence a table"""
 
     @property
     def sensors(self) -> tuple[str, ...]:
@@ -125,23 +128,31 @@ def import_tables(
     sensor, reference, streams = sensor_of(loaded)
     require_answerable(loaded, streams, mapping)
     tasks = tasks_text(loaded)
-    sets, orphans = find(loaded, mapping.parent if root is None else root)
-    made: list[Imported] = []
+    sets, left_out = find(loaded, mapping.parent if root is None else root)
+    made: dict[str, Imported] = {}
+    shapes: dict[str, Table] = {}
     progress = progress or Progress()
-    progress.begin(f"importing {mapping.stem}", len(sets))
+    one_each = not loaded.split_by and not isinstance(next(iter(loaded.tables.values())).read, Arrays)
+    if one_each:
+        progress.begin(f"importing {mapping.stem}", len(sets))
     with _aside(out) as folder:
         for files in sets:
-            for raw in read(loaded, files):
+            raws = read(loaded, files)
+            if not one_each:
+                progress.begin(f"importing {raws[0].files[0]}", len(raws))
+            for raw in raws:
+                _same_shape(loaded, raw, shapes)
                 meta = _meta(loaded, raw, sensor, reference)
                 _unique_name(meta, made)
-                made.append(_write(folder / f"{meta.name}{ENDING}", meta, loaded, raw, streams))
-            progress.advance(next(iter(files.files.values())).shown)
+                path = folder / f"{meta.name}{ENDING}"
+                made[meta.name.casefold()] = _write(path, meta, loaded, raw, streams)
+                progress.advance(meta.name)
         check_tasks(out, tasks, replace=replace)
-        placed = _place(made, out, replace=replace)
+        placed = _place([*made.values()], out, replace=replace)
         place_tasks(out, folder, tasks)
     names = tuple(task.name for task in loaded.tasks)
     shown = {file.shown for files in sets for file in files.files.values()}
-    return ImportReport(loaded.title, tuple(placed), len(shown), names, orphans)
+    return ImportReport(loaded.title, tuple(placed), len(shown), names, left_out, tuple(_unused(loaded, shapes)))
 
 
 @contextmanager
@@ -283,14 +294,42 @@ def _clock_remarks(mapping: Mapping) -> tuple[str, ...]:
     return tuple(f"What time zero means in table {name} is not known." for name in unknown)
 
 
-def _unique_name(meta: RecordingMeta, made: Sequence[Imported]) -> None:
+def _unique_name(meta: RecordingMeta, made: typing.Mapping[str, Imported]) -> None:
     # Folded: on some disks Press.h5 and press.h5 are one file.
-    other = next((one for one in made if one.name.casefold() == meta.name.casefold()), None)
+    other = made.get(meta.name.casefold())
     if other is not None:
         raise MappingError(
             f"{other.origin} and {meta.origin} would both become the recording {meta.name!r}.",
             hint="Put a word that tells them apart into `recording.name`.",
         )
+
+
+def _same_shape(mapping: Mapping, raw: RawRecording, shapes: dict[str, Table]) -> None:
+    """Compare the columns of a recording's tables with those of the first files: a place must mean the same in all."""
+    for name, table in raw.tables.items():
+        first = shapes.setdefault(name, table)
+        if len(table.columns) != len(first.columns):
+            raise MappingError(
+                f"{table.shown} has {len(table.columns)} columns, {first.shown} has {len(first.columns)} "
+                f"(table {name!r}).",
+                hint="All files of a table have the same columns: repair the file, or import it by another mapping.",
+            )
+        by_place = [one for one in asked(mapping, name).columns if isinstance(one, int)]
+        moved = [place for place in by_place if table.columns[place : place + 1] != first.columns[place : place + 1]]
+        if moved:
+            raise MappingError(
+                f"Column {moved[0]} is {table.columns[moved[0]]!r} in {table.shown} and {first.columns[moved[0]]!r} in "
+                f"{first.shown} (table {name!r}).", hint="Name the columns by their headers instead of their places.",
+            )  # fmt: skip
+
+
+def _unused(mapping: Mapping, shapes: dict[str, Table]) -> Iterator[str]:
+    """Yield which columns of a table the mapping does not use."""
+    for name, table in shapes.items():
+        used = asked(mapping, name).columns
+        left = [str(one) or str(place) for place, one in enumerate(table.columns) if not {one, place} & {*used}]
+        if left:
+            yield f"{len(left)} of {len(table.columns)} columns of table {name}: {names_listed(left)}"
 
 
 def _place(made: Sequence[Imported], out: Path, *, replace: bool) -> list[Imported]:

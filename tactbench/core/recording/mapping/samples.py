@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -11,7 +12,7 @@ import numpy.typing as npt
 from tactbench.core.errors import MappingError
 from tactbench.core.recording.mapping.channels import MappedChannel, MappedStream
 from tactbench.core.recording.mapping.model import MUST_NAME_SENTINELS, Annotation, Mapping, Time
-from tactbench.core.recording.mapping.table import Table
+from tactbench.core.recording.mapping.table import Table, nanoseconds_per
 from tactbench.core.samples import FloatArray, IntArray, Quality
 from tactbench.core.spec import units
 
@@ -70,7 +71,17 @@ def times(table: Table, time: Time) -> IntArray:
     MappingError
         If a cell is no time, or times since 1970 lie in an impossible year.
     """
-    stamps = table.nanoseconds(time.column, round(units.conversion(time.unit, "s") * 1e9))
+    stamps = table.nanoseconds(time)
+    unit = nanoseconds_per(time)
+    if time.wraps_at is not None:
+        stamps = _unwrapped(table, stamps, time, time.wraps_at * unit)
+    elif period := wrap_period(stamps, (unit,)):
+        row = int(np.flatnonzero(np.diff(stamps) < 0)[0]) + 1
+        raise MappingError(
+            f"{table.where(row)}: column {time.column!r} begins at 0 again after nearly {period // unit}, where a counter "
+            "is full.",
+            hint=f"Write `wraps_at: {period // unit}` under `time`.",
+        )
     if time.epoch == "unix":
         years = 1970 + stamps / _NS_PER_YEAR
         # Anything below a year after 1970 is a clock that starts at zero, not one of that epoch.
@@ -83,6 +94,35 @@ def times(table: Table, time: Time) -> IntArray:
                 hint="Correct the unit, or write `epoch: start` or `epoch: unknown`.",
             )
     return stamps
+
+
+def wrap_period(t_ns: IntArray, units_ns: Sequence[int] = (1, 10**3, 10**6, 10**9)) -> int:
+    """Return after how many nanoseconds a clock that runs backwards begins at 0 again, if it is such a counter, or 0.
+
+    It is one of 16, 24 or 32 bits of one of the units if every step backwards leads from within twenty median steps
+    below its end to within as many above 0.
+    """
+    steps = np.diff(t_ns)
+    back = np.flatnonzero(steps < 0)
+    if not len(back) or not (steps > 0).any():
+        return 0
+    near = 20 * float(np.median(steps[steps > 0]))
+    for period in (unit * 2**bits for unit in units_ns for bits in (16, 24, 32)):
+        before, after = t_ns[back], t_ns[back + 1]
+        if ((before < period) & (before >= period - near) & (after >= 0) & (after <= near)).all():
+            return int(period)
+    return 0
+
+
+def _unwrapped(table: Table, stamps: IntArray, time: Time, period: int) -> IntArray:
+    outside = np.flatnonzero((stamps < 0) | (stamps >= period))
+    if len(outside):
+        raise MappingError(
+            f"{table.where(int(outside[0]))}: column {time.column!r} is not below {time.wraps_at}.",
+            hint="Correct `wraps_at` under `time`.",
+        )
+    wraps = np.cumsum(np.diff(stamps, prepend=stamps[:1]) < -period / 2)
+    return stamps + wraps * period
 
 
 def labels(name: str, annotation: Annotation, table: Table) -> npt.NDArray[Any]:
