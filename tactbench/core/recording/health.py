@@ -34,7 +34,7 @@ FEWEST_VALUES = 200
 some twenty pairs of so many round, 0.56 n² noise / range of n."""
 MONOTONE = f"but for rounding a monotone function of {{}}, at most {LAG} rows early or late"
 """What is said of a copy."""
-GLANCE = 500
+GLANCE = 50
 """Rows that are looked at first: whatever holds for all holds for some."""
 WRONG_UNIT = 50.0
 """A rate that is off by more than this factor looks like times in a wrong unit."""
@@ -306,5 +306,7 @@ def is_copy(one: FloatArray, other: FloatArray, recording: npt.NDArray[np.int64]
         in_order = any(bool((np.diff(up[np.lexsort((up, y))]) >= 0).all()) for up in (x, -x))
         return in_order and min(len(np.unique(x)), len(np.unique(y))) >= fewest
 
+    if min(len(np.unique(one)), len(np.unique(other))) < FEWEST_VALUES:
+        return False
     glance = 1 + len(one) // GLANCE
     return any(monotone(lag, glance, 1) and monotone(lag, 1, FEWEST_VALUES) for lag in range(-LAG, LAG + 1))

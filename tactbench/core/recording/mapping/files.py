@@ -140,9 +140,8 @@ def _matching(name: str, source: TableSource, root: Path, left_out: list[str]) -
     in_any_case = "".join(f"[{mark.lower()}{mark.upper()}]" if mark.isalpha() else mark for mark in ending)
     pattern = f"{source.files!r} (table {name!r})"
     kinds: dict[str, list[Path]] = {"": [], "links": [], "folders": [], "case": [], "macOS": [], "linked": []}
-    for path in sorted(
-        root.glob(source.files.removesuffix(ending) + in_any_case), key=lambda one: one.relative_to(root).parts
-    ):
+    matches = root.glob(source.files.removesuffix(ending) + in_any_case)
+    for path in sorted(matches, key=lambda one: one.relative_to(root).parts):
         kinds[_kind(path, ending)].append(path)
     if "**" in source.files:
         inside = source.files.partition("**")[2].lstrip("/")
@@ -154,8 +153,8 @@ def _matching(name: str, source: TableSource, root: Path, left_out: list[str]) -
 
     if kinds["links"]:
         raise MappingError(
-            f"{len(kinds['links'])} of {len(kinds['links'] + kinds[''])} matches of {pattern} are links to files that are "
-            f"not here: {listing('links')}.",
+            f"{len(kinds['links'])} of {len(kinds['links'] + kinds[''])} matches of {pattern} are links to files that "
+            f"are not here: {listing('links')}.",
             hint="Fetch what git-annex keeps elsewhere: `datalad get FILE`; remove other links, or narrow the pattern.",
         )
     said = {

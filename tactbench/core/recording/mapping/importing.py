@@ -4,16 +4,16 @@ from __future__ import annotations
 
 import fnmatch
 import re
-import typing
 from collections import Counter
 from collections.abc import Iterator, Sequence
+from collections.abc import Mapping as AnyMapping
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from dataclasses import replace as replaced
 from itertools import product
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import cast, get_args
+from typing import NamedTuple, cast, get_args
 
 import numpy as np
 
@@ -23,9 +23,9 @@ from tactbench.core.progress import Progress
 from tactbench.core.recording.health import MONOTONE, Finding, examine, is_copy
 from tactbench.core.recording.mapping.channels import MappedStream, device, fill, sensor_of
 from tactbench.core.recording.mapping.files import RawRecording, asked, find, read
-from tactbench.core.recording.mapping.model import MUST_NAME_SENTINELS, Arrays, Mapping, Word
+from tactbench.core.recording.mapping.model import MUST_NAME_SENTINELS, Arrays, Column, Mapping, Word
 from tactbench.core.recording.mapping.samples import labels, samples, times
-from tactbench.core.recording.mapping.table import Table, TextTable, names_listed
+from tactbench.core.recording.mapping.table import TextTable, names_listed
 from tactbench.core.recording.mapping.tasks import check_tasks, place_tasks, require_answerable, tasks_text
 from tactbench.core.recording.reader import content_digest, open_recording
 from tactbench.core.recording.writer import RecordingWriter
@@ -130,7 +130,7 @@ def import_tables(
     tasks = tasks_text(loaded)
     sets, left_out = find(loaded, mapping.parent if root is None else root)
     made: dict[str, Imported] = {}
-    shapes: dict[str, Table] = {}
+    shapes: dict[str, _Shape] = {}
     progress = progress or Progress()
     one_each = not loaded.split_by and not isinstance(next(iter(loaded.tables.values())).read, Arrays)
     if one_each:
@@ -152,7 +152,7 @@ def import_tables(
         place_tasks(out, folder, tasks)
     names = tuple(task.name for task in loaded.tasks)
     shown = {file.shown for files in sets for file in files.files.values()}
-    return ImportReport(loaded.title, tuple(placed), len(shown), names, left_out, tuple(_unused(loaded, shapes)))
+    return ImportReport(loaded.title, tuple(placed), len(shown), names, left_out, tuple(_unused(shapes)))
 
 
 @contextmanager
@@ -294,7 +294,7 @@ def _clock_remarks(mapping: Mapping) -> tuple[str, ...]:
     return tuple(f"What time zero means in table {name} is not known." for name in unknown)
 
 
-def _unique_name(meta: RecordingMeta, made: typing.Mapping[str, Imported]) -> None:
+def _unique_name(meta: RecordingMeta, made: AnyMapping[str, Imported]) -> None:
     # Folded: on some disks Press.h5 and press.h5 are one file.
     other = made.get(meta.name.casefold())
     if other is not None:
@@ -304,18 +304,28 @@ def _unique_name(meta: RecordingMeta, made: typing.Mapping[str, Imported]) -> No
         )
 
 
-def _same_shape(mapping: Mapping, raw: RawRecording, shapes: dict[str, Table]) -> None:
+class _Shape(NamedTuple):
+    """The columns of the first file of a table, and those that the mapping uses."""
+
+    shown: str
+    columns: tuple[Column, ...]
+    used: tuple[Column, ...]
+
+
+def _same_shape(mapping: Mapping, raw: RawRecording, shapes: dict[str, _Shape]) -> None:
     """Compare the columns of a recording's tables with those of the first files: a place must mean the same in all."""
     for name, table in raw.tables.items():
-        first = shapes.setdefault(name, table)
+        if name not in shapes:
+            shapes[name] = _Shape(table.shown, table.columns, asked(mapping, name).columns)
+        first = shapes[name]
         if len(table.columns) != len(first.columns):
             raise MappingError(
                 f"{table.shown} has {len(table.columns)} columns, {first.shown} has {len(first.columns)} "
                 f"(table {name!r}).",
                 hint="All files of a table have the same columns: repair the file, or import it by another mapping.",
             )
-        by_place = [one for one in asked(mapping, name).columns if isinstance(one, int)]
-        moved = [place for place in by_place if table.columns[place : place + 1] != first.columns[place : place + 1]]
+        by_place = [one for one in first.used if isinstance(one, int) and one < len(first.columns)]
+        moved = [place for place in by_place if table.columns[place] != first.columns[place]]
         if moved:
             raise MappingError(
                 f"Column {moved[0]} is {table.columns[moved[0]]!r} in {table.shown} and {first.columns[moved[0]]!r} in "
@@ -323,13 +333,12 @@ def _same_shape(mapping: Mapping, raw: RawRecording, shapes: dict[str, Table]) -
             )  # fmt: skip
 
 
-def _unused(mapping: Mapping, shapes: dict[str, Table]) -> Iterator[str]:
+def _unused(shapes: dict[str, _Shape]) -> Iterator[str]:
     """Yield which columns of a table the mapping does not use."""
-    for name, table in shapes.items():
-        used = asked(mapping, name).columns
-        left = [str(one) or str(place) for place, one in enumerate(table.columns) if not {one, place} & {*used}]
+    for name, (_, columns, used) in shapes.items():
+        left = [str(one) or str(place) for place, one in enumerate(columns) if not {one, place} & {*used}]
         if left:
-            yield f"{len(left)} of {len(table.columns)} columns of table {name}: {names_listed(left)}"
+            yield f"{len(left)} of {len(columns)} columns of table {name}: {names_listed(left)}"
 
 
 def _place(made: Sequence[Imported], out: Path, *, replace: bool) -> list[Imported]:

@@ -78,8 +78,8 @@ def times(table: Table, time: Time) -> IntArray:
     elif period := wrap_period(stamps, (unit,)):
         row = int(np.flatnonzero(np.diff(stamps) < 0)[0]) + 1
         raise MappingError(
-            f"{table.where(row)}: column {time.column!r} begins at 0 again after nearly {period // unit}, where a counter "
-            "is full.",
+            f"{table.where(row)}: column {time.column!r} begins at 0 again after nearly {period // unit}, as a full "
+            "counter does.",
             hint=f"Write `wraps_at: {period // unit}` under `time`.",
         )
     if time.epoch == "unix":

@@ -116,7 +116,7 @@ class TextTable:
         if row == 0 and isinstance(line, int) and not any(math.isfinite(self._value(one)) for one in cells):
             return MappingError(
                 f"{said}; no cell of this row is, as in a row of units.",
-                hint=f"`skiprows: [{line - 1}]` leaves it out.",
+                hint=f"Write `skiprows: [{line - 1}]` under `read` (lines count from 0), with those left out already.",
             )
         marks = [mark for mark in _MARKS if mark in cell and mark != self.decimal]
         if marks and not cell.strip("+-0123456789eE" + _MARKS):

@@ -5,50 +5,10 @@ import openpyxl
 import pytest
 import scipy.io
 
-from tactbench.core.errors import MappingError, TactbenchError
-from tactbench.core.recording.mapping import import_tables
-from tactbench.core.recording.reader import open_recording
+from tactbench.core.errors import MappingError
 from tactbench.core.samples import Quality
 
-from .made import write_mapping
-
-
-class Tables:
-    """Imports the tables in ``data`` into ``out``, by the base mapping with changes."""
-
-    def __init__(self, folder):
-        self.data, self.out, self.mapping = folder / "data", folder / "out", folder / "mapping.yaml"
-        self.data.mkdir()
-
-    def put(self, name, text):
-        (self.data / name).parent.mkdir(parents=True, exist_ok=True)
-        (self.data / name).write_bytes(text.encode())
-
-    def run(self, text="", *, replace=False, **change):
-        return import_tables(write_mapping(self.mapping, text, **change), root=self.data, out=self.out, replace=replace)
-
-    def refused(self, *says, text="", **change):
-        with pytest.raises(TactbenchError) as caught:
-            self.run(text, **change)
-        assert (caught.value.exit_code, bool(caught.value.hint)) == (2, True)
-        assert [text for text in says if text not in str(caught.value)] == []
-        assert not list(self.out.rglob("*"))
-
-
-@pytest.fixture
-def tables(tmp_path):
-    return Tables(tmp_path)
-
-
-def rows(n=40, force=lambda row: row * 1.5):
-    return "".join(f"{row * 0.01:.2f},{row},{row * 2},{row * 3 % 5},{force(row)}\n" for row in range(n))
-
-
-def read(report, number=0):
-    """Return the meta of a sound recording, and its streams by name."""
-    with open_recording(report.recordings[number].path) as recording:
-        recording.verify()
-        return recording.meta, {name: recording.read(name) for name in recording.stream_names}
+from .made import read, rows
 
 
 @pytest.mark.parametrize(("name", "cells", "lines"), [("csv", ",", "\r\n"), ("text", " ", "\n")])
@@ -247,7 +207,7 @@ def test_a_file_without_a_partner_costs_its_own_recording_and_is_named(tables):
     tables.put("3_probe/states.csv", states())
     report = tables.run(JOINED)
     assert [made.name for made in report.recordings] == ["1"]
-    assert [text.split()[0] for text in report.orphans] == ["2_probe/sensor.csv", "3_probe/states.csv"]
+    assert [text.split()[0] for text in report.left_out] == ["2_probe/sensor.csv", "3_probe/states.csv"]
 
 
 def test_one_file_of_several_sessions(tables):
@@ -286,7 +246,8 @@ def test_a_sentinel_that_nobody_named_is_refused(tables):
     [
         ("0,1,2,3,4\n1,1,2,3\n", {}, "press.csv:2: 4 cells"),
         ("0,1,2,3,4\nsoon,1,2,3,4\n", {}, "press.csv:2: column 0: 'soon'"),
-        ("0,1,soon\n0,1,2\n", {"tables__table__read__transposed": True}, "press.csv:cell 3: column 0: 'soon'"),
+        ("0,1,soon\n0,1,2\n", {"tables__table__read__transposed": True, "tables__table__files": "press.csv"},
+         "press.csv:cell 3: column 0: 'soon'"),
         ("0,nan,2,3,4\n1,nan,2,3,5\n", {}, "column 1 (channel t1)"),
         ("0\t1\t2\t3\t4\n1\t1\t2\t3\t4\n", {}, "press.csv is separated by tabs"),
         (rows(), {"tables__table__read__header": True}, "'0.00' in column 0"),
