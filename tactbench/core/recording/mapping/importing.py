@@ -305,37 +305,40 @@ def _unique_name(meta: RecordingMeta, made: AnyMapping[str, Imported]) -> None:
 
 
 class _Shape(NamedTuple):
-    """The columns of the first file of a table, and those that the mapping uses."""
+    """The columns of the first file of a table, those of all files, and those that the mapping uses."""
 
     shown: str
     columns: tuple[Column, ...]
+    everywhere: dict[Column, None]
     used: tuple[Column, ...]
 
 
 def _same_shape(mapping: Mapping, raw: RawRecording, shapes: dict[str, _Shape]) -> None:
-    """Compare the columns of a recording's tables with those of the first files: a place must mean the same in all."""
+    """Raise MappingError if a table has other columns than the first file where the mapping names places."""
     for name, table in raw.tables.items():
         if name not in shapes:
-            shapes[name] = _Shape(table.shown, table.columns, asked(mapping, name).columns)
+            shapes[name] = _Shape(table.shown, table.columns, {}, asked(mapping, name).columns)
         first = shapes[name]
-        if len(table.columns) != len(first.columns):
+        first.everywhere.update(dict.fromkeys(table.columns))
+        by_place = [one for one in first.used if isinstance(one, int) and one < len(first.columns)]
+        if by_place and len(table.columns) != len(first.columns):
             raise MappingError(
                 f"{table.shown} has {len(table.columns)} columns, {first.shown} has {len(first.columns)} "
                 f"(table {name!r}).",
-                hint="All files of a table have the same columns: repair the file, or import it by another mapping.",
+                hint="Repair the file, import it by another mapping, or name the columns by a header.",
             )
-        by_place = [one for one in first.used if isinstance(one, int) and one < len(first.columns)]
-        moved = [place for place in by_place if table.columns[place] != first.columns[place]]
-        if moved:
-            raise MappingError(
-                f"Column {moved[0]} is {table.columns[moved[0]]!r} in {table.shown} and {first.columns[moved[0]]!r} in "
-                f"{first.shown} (table {name!r}).", hint="Name the columns by their headers instead of their places.",
-            )  # fmt: skip
+        for place in by_place:
+            if table.columns[place] != first.columns[place]:
+                raise MappingError(
+                    f"Column {place} is {table.columns[place]!r} in {table.shown} and {first.columns[place]!r} in "
+                    f"{first.shown} (table {name!r}).",
+                    hint="Name the columns by their headers instead of their places.",
+                )
 
 
 def _unused(shapes: dict[str, _Shape]) -> Iterator[str]:
     """Yield which columns of a table the mapping does not use."""
-    for name, (_, columns, used) in shapes.items():
+    for name, (_, _, columns, used) in shapes.items():
         left = [str(one) or str(place) for place, one in enumerate(columns) if not {one, place} & {*used}]
         if left:
             yield f"{len(left)} of {len(columns)} columns of table {name}: {names_listed(left)}"

@@ -38,7 +38,7 @@ def test_a_pattern_stays_below_its_root(tables, pattern):
     tables.refused("below the root", tables__table__files=pattern)
 
 
-def test_all_files_of_a_table_have_one_width(tables):
+def test_files_whose_columns_are_named_by_place_have_one_width(tables):
     for name in ("a.csv", "b.csv"):
         tables.put(name, rows())
     tables.put("c.csv", rows().replace("\n", ",7\n"))
@@ -47,12 +47,16 @@ def test_all_files_of_a_table_have_one_width(tables):
 
 def test_a_place_is_the_same_column_in_all_files(tables):
     tables.put("a.csv", "t,x,y,z,f\n" + rows())
+    tables.put("b.csv", "t,y,x,z,f,more\n" + rows().replace("\n", ",1\n"))
+    tables.refused("b.csv has 6 columns", tables__table__read={"format": "csv", "header": True})
     tables.put("b.csv", "t,y,x,z,f\n" + rows())
     read = {"format": "csv", "header": True}
     tables.refused("Column 1 is 'y' in b.csv and 'x' in a.csv", tables__table__read=read)
     named = {"tables__table__time__column": "t", "streams__force__channels__0__columns": "f",
              "streams__taxels__channels__0__columns": ["x", "y", "z"]}  # fmt: skip
-    assert len(tables.run(tables__table__read=read, **named).recordings) == 2
+    tables.put("c.csv", "more,t,x,y,z,f\n" + "1,".join(["", *rows().splitlines(keepends=True)]))
+    report = tables.run(tables__table__read=read, **named)
+    assert (len(report.recordings), report.unused) == (3, ("1 of 6 columns of table table: more",))
 
 
 def test_columns_that_are_not_used_are_named_once(tables):
