@@ -6,12 +6,13 @@ import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path, PurePosixPath
+from typing import NamedTuple
 
 from tactbench.core.errors import MappingError
 from tactbench.core.recording.mapping.arrays import read_arrays
 from tactbench.core.recording.mapping.bags import Topic, read_bag
 from tactbench.core.recording.mapping.channels import columns_of
-from tactbench.core.recording.mapping.model import Arrays, Bag, Mapping, Parquet, TableSource, Xlsx
+from tactbench.core.recording.mapping.model import Arrays, Bag, Column, Mapping, Parquet, TableSource, Xlsx
 from tactbench.core.recording.mapping.parquet import read_parquet
 from tactbench.core.recording.mapping.samples import check_join
 from tactbench.core.recording.mapping.sheets import read_sheet
@@ -120,6 +121,46 @@ def read(mapping: Mapping, files: FileSet) -> list[RawRecording]:
         tables |= read_bag(file.path, file.shown, wanted)
     check_join(mapping, tables)
     return list(_split(mapping, RawRecording(tables, files.words, shown)))
+
+
+class Shape(NamedTuple):
+    """The columns of the first file of a table, those of all files, and those that the mapping uses."""
+
+    shown: str
+    columns: tuple[Column, ...]
+    everywhere: dict[Column, None]
+    used: tuple[Column, ...]
+
+
+def require_same_shape(mapping: Mapping, raw: RawRecording, shapes: dict[str, Shape]) -> None:
+    """Raise MappingError if a table has other columns than the first file where the mapping names places."""
+    for name, table in raw.tables.items():
+        if name not in shapes:
+            shapes[name] = Shape(table.shown, table.columns, {}, asked(mapping, name).columns)
+        first = shapes[name]
+        first.everywhere.update(dict.fromkeys(table.columns))
+        by_place = [one for one in first.used if isinstance(one, int) and one < len(first.columns)]
+        if by_place and len(table.columns) != len(first.columns):
+            raise MappingError(
+                f"{table.shown} has {len(table.columns)} columns, {first.shown} has {len(first.columns)} "
+                f"(table {name!r}).",
+                hint="Repair the file, import it by another mapping, or name the columns by a header.",
+            )
+        for place in by_place:
+            if table.columns[place] != first.columns[place]:
+                raise MappingError(
+                    f"Column {place} is {table.columns[place]!r} in {table.shown} and {first.columns[place]!r} in "
+                    f"{first.shown} (table {name!r}).",
+                    hint="Name the columns by their headers instead of their places.",
+                )
+
+
+def unused(shapes: dict[str, Shape]) -> Iterator[str]:
+    """Yield which columns of a table the mapping does not use."""
+    for name, (_, _, columns, used) in shapes.items():
+        left = [str(one) or str(place) for place, one in enumerate(columns) if not {one, place} & {*used}]
+        if left:
+            yield f"{len(left)} of {len(columns)} columns of table {name}: {names_listed(left)}"
 
 
 def asked(mapping: Mapping, name: str, topic: str = "") -> Topic:

@@ -6,14 +6,13 @@ import fnmatch
 import re
 from collections import Counter
 from collections.abc import Iterator, Sequence
-from collections.abc import Mapping as AnyMapping
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from dataclasses import replace as replaced
 from itertools import product
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import NamedTuple, cast, get_args
+from typing import cast, get_args
 
 import numpy as np
 
@@ -22,10 +21,10 @@ from tactbench.core.files import writable
 from tactbench.core.progress import Progress
 from tactbench.core.recording.health import MONOTONE, Finding, examine, is_copy
 from tactbench.core.recording.mapping.channels import MappedStream, device, fill, sensor_of
-from tactbench.core.recording.mapping.files import RawRecording, asked, find, read
-from tactbench.core.recording.mapping.model import MUST_NAME_SENTINELS, Arrays, Column, Mapping, Word
+from tactbench.core.recording.mapping.files import RawRecording, Shape, find, read, require_same_shape, unused
+from tactbench.core.recording.mapping.model import MUST_NAME_SENTINELS, Arrays, Mapping, Word
 from tactbench.core.recording.mapping.samples import labels, samples, times
-from tactbench.core.recording.mapping.table import TextTable, names_listed
+from tactbench.core.recording.mapping.table import TextTable
 from tactbench.core.recording.mapping.tasks import check_tasks, place_tasks, require_answerable, tasks_text
 from tactbench.core.recording.reader import content_digest, open_recording
 from tactbench.core.recording.writer import RecordingWriter
@@ -129,8 +128,9 @@ def import_tables(
     require_answerable(loaded, streams, mapping)
     tasks = tasks_text(loaded)
     sets, left_out = find(loaded, mapping.parent if root is None else root)
-    made: dict[str, Imported] = {}
-    shapes: dict[str, _Shape] = {}
+    made: list[Imported] = []
+    origins: dict[str, str] = {}
+    shapes: dict[str, Shape] = {}
     progress = progress or Progress()
     one_each = not loaded.split_by and not isinstance(next(iter(loaded.tables.values())).read, Arrays)
     if one_each:
@@ -141,18 +141,17 @@ def import_tables(
             if not one_each:
                 progress.begin(f"importing {raws[0].files[0]}", len(raws))
             for raw in raws:
-                _same_shape(loaded, raw, shapes)
+                require_same_shape(loaded, raw, shapes)
                 meta = _meta(loaded, raw, sensor, reference)
-                _unique_name(meta, made)
-                path = folder / f"{meta.name}{ENDING}"
-                made[meta.name.casefold()] = _write(path, meta, loaded, raw, streams)
+                _unique_name(meta, origins)
+                made.append(_write(folder / f"{meta.name}{ENDING}", meta, loaded, raw, streams))
                 progress.advance(meta.name)
         check_tasks(out, tasks, replace=replace)
-        placed = _place([*made.values()], out, replace=replace)
+        placed = _place(made, out, replace=replace)
         place_tasks(out, folder, tasks)
     names = tuple(task.name for task in loaded.tasks)
     shown = {file.shown for files in sets for file in files.files.values()}
-    return ImportReport(loaded.title, tuple(placed), len(shown), names, left_out, tuple(_unused(shapes)))
+    return ImportReport(loaded.title, tuple(placed), len(shown), names, left_out, tuple(unused(shapes)))
 
 
 @contextmanager
@@ -294,54 +293,14 @@ def _clock_remarks(mapping: Mapping) -> tuple[str, ...]:
     return tuple(f"What time zero means in table {name} is not known." for name in unknown)
 
 
-def _unique_name(meta: RecordingMeta, made: AnyMapping[str, Imported]) -> None:
+def _unique_name(meta: RecordingMeta, origins: dict[str, str]) -> None:
     # Folded: on some disks Press.h5 and press.h5 are one file.
-    other = made.get(meta.name.casefold())
-    if other is not None:
+    other = origins.setdefault(meta.name.casefold(), meta.origin)
+    if other is not meta.origin:
         raise MappingError(
-            f"{other.origin} and {meta.origin} would both become the recording {meta.name!r}.",
+            f"{other} and {meta.origin} would both become the recording {meta.name!r}.",
             hint="Put a word that tells them apart into `recording.name`.",
         )
-
-
-class _Shape(NamedTuple):
-    """The columns of the first file of a table, those of all files, and those that the mapping uses."""
-
-    shown: str
-    columns: tuple[Column, ...]
-    everywhere: dict[Column, None]
-    used: tuple[Column, ...]
-
-
-def _same_shape(mapping: Mapping, raw: RawRecording, shapes: dict[str, _Shape]) -> None:
-    """Raise MappingError if a table has other columns than the first file where the mapping names places."""
-    for name, table in raw.tables.items():
-        if name not in shapes:
-            shapes[name] = _Shape(table.shown, table.columns, {}, asked(mapping, name).columns)
-        first = shapes[name]
-        first.everywhere.update(dict.fromkeys(table.columns))
-        by_place = [one for one in first.used if isinstance(one, int) and one < len(first.columns)]
-        if by_place and len(table.columns) != len(first.columns):
-            raise MappingError(
-                f"{table.shown} has {len(table.columns)} columns, {first.shown} has {len(first.columns)} "
-                f"(table {name!r}).",
-                hint="Repair the file, import it by another mapping, or name the columns by a header.",
-            )
-        for place in by_place:
-            if table.columns[place] != first.columns[place]:
-                raise MappingError(
-                    f"Column {place} is {table.columns[place]!r} in {table.shown} and {first.columns[place]!r} in "
-                    f"{first.shown} (table {name!r}).",
-                    hint="Name the columns by their headers instead of their places.",
-                )
-
-
-def _unused(shapes: dict[str, _Shape]) -> Iterator[str]:
-    """Yield which columns of a table the mapping does not use."""
-    for name, (_, _, columns, used) in shapes.items():
-        left = [str(one) or str(place) for place, one in enumerate(columns) if not {one, place} & {*used}]
-        if left:
-            yield f"{len(left)} of {len(columns)} columns of table {name}: {names_listed(left)}"
 
 
 def _place(made: Sequence[Imported], out: Path, *, replace: bool) -> list[Imported]:
