@@ -295,12 +295,13 @@ def _clock_remarks(mapping: Mapping) -> tuple[str, ...]:
 
 def _unique_name(meta: RecordingMeta, origins: dict[str, str]) -> None:
     # Folded: on some disks Press.h5 and press.h5 are one file.
-    other = origins.setdefault(meta.name.casefold(), meta.origin)
-    if other is not meta.origin:
+    folded = meta.name.casefold()
+    if folded in origins:
         raise MappingError(
-            f"{other} and {meta.origin} would both become the recording {meta.name!r}.",
+            f"{origins[folded]} and {meta.origin} would both become the recording {meta.name!r}.",
             hint="Put a word that tells them apart into `recording.name`.",
         )
+    origins[folded] = meta.origin
 
 
 def _place(made: Sequence[Imported], out: Path, *, replace: bool) -> list[Imported]:
