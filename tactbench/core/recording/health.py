@@ -47,9 +47,9 @@ _UNTIMED = {
 }
 FINDINGS = "findings"
 """Where the provenance of a recording has what its import found."""
-UNMARKED = ("stuck", "duplicated", "saturated", "absent", "excluded", "target-among-features")
-"""Checks that mark no score: taxels that nothing touches are constant and alike, those pressed hard saturate, streams
-that no task misses may be absent; the last two are told of a score in other ways."""
+UNMARKED = ("stuck", "duplicated", "saturated", "dead", "empty", "absent", "excluded", "target-among-features")
+"""Checks that mark no score: taxels that nothing touches are constant and alike, those pressed hard saturate; from
+`dead` on, an evaluation that needs what is not there refuses it, or tells of it in another way."""
 SLOWEST_HZ = 1.0
 """No tactile sensor is known to be read more seldom: without a stated rate, a lower one looks like a wrong unit."""
 

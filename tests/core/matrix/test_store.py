@@ -68,6 +68,18 @@ def test_the_latest_of_a_name_counts(tmp_path):
     assert (len(found.answers(key(1))["test"]), found.finished(key(1))["repeats"]) == (3, 3)
 
 
+def test_an_answer_from_other_recordings_supersedes_the_older_one_and_that_is_known(tmp_path):
+    with Store(tmp_path).hold() as store:
+        first = kept(store, "a", key=key(1), digests=["x"])
+        kept(store, "a", key=key(2), digests=["x"])  # of another version, from the same recordings
+        kept(store, "b", key=key(3), digests=["y"])
+        assert store.superseded == []
+        kept(store, "a", key=key(4), digests=["y"])
+        assert store.superseded == ["a"]
+        store.reuse(first)
+        assert store.superseded == ["a", "a"]
+
+
 def test_a_damaged_file_is_told_left_out_and_replaced(tmp_path):
     with Store(tmp_path).hold() as store:
         kept(store, "a")
