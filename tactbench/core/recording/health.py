@@ -50,6 +50,8 @@ FINDINGS = "findings"
 UNMARKED = ("stuck", "duplicated", "saturated", "dead", "empty", "absent", "excluded", "target-among-features")
 """Checks that mark no score: taxels that nothing touches are constant and alike, those pressed hard saturate; from
 `dead` on, an evaluation that needs what is not there refuses it, or tells of it in another way."""
+DATED_NS = 10**18
+"""Times from here on are dates, September 2001 and later: in a wrong unit they would be of another millennium."""
 SLOWEST_HZ = 1.0
 """No tactile sensor is known to be read more seldom: without a stated rate, a lower one looks like a wrong unit."""
 
@@ -307,6 +309,8 @@ def _clock(stream: str, data: _Stream) -> Iterator[Finding]:
     stated = data.spec.rate_hz
     slow, fast = (stated / WRONG_UNIT, stated * WRONG_UNIT) if stated else (SLOWEST_HZ, np.inf)
     looks = ": ms read as s?" if rate < slow else ": s read as ms?" if rate > fast else ""
+    if data.t_ns[0] > DATED_NS:
+        looks = ""
     if looks or (stated and abs(rate - stated) > RATE_TOLERANCE * stated):
         said = f"; {stated:g} Hz are stated" if stated else ""
         yield Finding("rate", "warning", stream, (), 0, f"{stream} runs at {rate:.4g} Hz{said}{looks}")
