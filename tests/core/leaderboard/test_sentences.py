@@ -290,6 +290,7 @@ def holds(text, known, truth):
 def test_what_is_said_is_on_the_list_short_and_true(rows):
     (block,) = build_table(rows).blocks
     truth = Truth(rows)
+    assert block.setting.endswith(" · 2 classes") == bool(rows[0]["classes"])
     assert len(block.verdict) <= 2
     assert len(block.notes) <= 5
     for text in block.verdict:
@@ -303,5 +304,6 @@ def test_what_is_said_is_on_the_list_short_and_true(rows):
             marks += ["–"] * bool(line.texts["place"] == "–" and truth.better)
             explained = {note.text[0] for note in block.notes}
             assert explained.issuperset(marks), (marks, explained)
+            assert ("!" in marks) == bool(line.row["findings"])
             assert (line.texts["place"] == "–") == (line.row not in truth.better)
             assert ("*" in line.texts["notes"]) == (line.row in truth.unshown)
