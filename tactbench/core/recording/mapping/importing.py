@@ -126,6 +126,11 @@ def import_tables(
     require_answerable(loaded, streams, mapping)
     tasks = tasks_text(loaded)
     sets, orphans = find(loaded, mapping.parent if root is None else root)
+    beside: list[Finding] = []
+    if orphans:
+        more = f" And {len(orphans) - 1} more." if orphans[1:] else ""
+        text = f"its import left files out: {orphans[0]}{more}"
+        beside.append(Finding("left-out", "warning", "", (), len(orphans), text))
     made: list[Imported] = []
     progress = progress or Progress()
     progress.begin(f"importing {mapping.stem}", len(sets))
@@ -134,7 +139,7 @@ def import_tables(
             for raw in read(loaded, files):
                 meta = _meta(loaded, raw, sensor, reference)
                 _unique_name(meta, made)
-                made.append(_write(folder / f"{meta.name}{ENDING}", meta, loaded, raw, streams))
+                made.append(_write(folder / f"{meta.name}{ENDING}", meta, loaded, raw, streams, beside))
             progress.advance(next(iter(files.files.values())).shown)
         check_tasks(out, tasks, replace=replace)
         placed = _place(made, out, replace=replace)
@@ -165,8 +170,14 @@ def _aside(out: Path) -> Iterator[Path]:
 
 
 def _write(
-    path: Path, meta: RecordingMeta, mapping: Mapping, raw: RawRecording, streams: dict[str, MappedStream]
+    path: Path,
+    meta: RecordingMeta,
+    mapping: Mapping,
+    raw: RawRecording,
+    streams: dict[str, MappedStream],
+    beside: Sequence[Finding],
 ) -> Imported:
+    """Write one recording; `beside` was found in the import as a whole."""
     counts: dict[str, int] = {}
     missing: dict[str, int] = {}
     clocks = {
@@ -194,7 +205,7 @@ def _write(
         counts |= {f"{channel} without a sample": number for channel, number in missing.items()}
         writer.revise(counts=counts, provenance={FINDINGS: []})
     with open_recording(path) as written:
-        findings = (*examine(written), *_given_away(sensed, reference), *_trailing_delimiters(raw))
+        findings = (*beside, *examine(written), *_given_away(sensed, reference), *_trailing_delimiters(raw))
     keep_findings(path, findings)
     rows = max(len(table) for table in raw.tables.values())
     return Imported(path, meta.name, rows, meta.sensor.name, missing, meta.excluded, meta.origin, findings)

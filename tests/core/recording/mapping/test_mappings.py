@@ -1,5 +1,6 @@
 """Foreign tables of every shape become recordings; every misfit is refused with its place, and nothing is left."""
 
+import re
 import unicodedata
 
 import numpy as np
@@ -251,6 +252,9 @@ def test_a_file_without_a_partner_costs_its_own_recording_and_is_named(tables):
     report = tables.run(JOINED)
     assert [made.name for made in report.recordings] == ["1"]
     assert [text.split()[0] for text in report.orphans] == ["2_probe/sensor.csv", "3_probe/states.csv"]
+    with open_recording(report.recordings[0].path) as recording:
+        (mark,) = marking(recording)
+    assert re.fullmatch(r"its import left files out: 2_probe/sensor.csv .* And 1 more\.", mark.message)
 
 
 def test_one_file_of_several_sessions(tables):
