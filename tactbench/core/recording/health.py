@@ -186,7 +186,8 @@ def marking(recording: Recording) -> list[Finding]:
     """
     meta = recording.meta
     if FINDINGS in meta.provenance:
-        found = [Finding(**one) for one in meta.provenance[FINDINGS]]
+        with layout.readable(recording.path):
+            found = [Finding(**one) for one in meta.provenance[FINDINGS]]
     else:
         found = [] if meta.simulated and meta.emulation is None else examine(recording)
     return [one for one in found if one.severity != "info" and one.check not in UNMARKED]
