@@ -128,7 +128,7 @@ def fields(report: ImportReport, folder: Path) -> Iterator[tuple[str, str]]:
         (finding.severity, finding.message)
         for recording in report.recordings
         for finding in recording.findings
-        if finding.check not in ("missing", "excluded")
+        if finding.check not in ("missing", "excluded", "left-out")
     )
     order = ("error", "warning", "info")
     worst = sorted(found.items(), key=lambda item: (order.index(item[0][0]), -item[1]))

@@ -80,6 +80,18 @@ def test_cells_that_are_named_by_their_number_among_the_repeats_are_read_under_t
     assert all(found.cell(one).row == one for one in found.rows())
 
 
+def test_an_answer_from_other_recordings_supersedes_the_older_one_and_that_is_known(tmp_path):
+    with Store(tmp_path).hold() as store:
+        first = kept(store, "a", key=key(1), digests=["x"])
+        kept(store, "a", key=key(2), digests=["x"])  # of another version, from the same recordings
+        kept(store, "b", key=key(3), digests=["y"])
+        assert store.superseded == []
+        kept(store, "a", key=key(4), digests=["y"])
+        assert store.superseded == ["a"]
+        store.reuse(first)
+        assert store.superseded == ["a", "a"]
+
+
 def test_a_damaged_file_is_told_left_out_and_replaced(tmp_path):
     with Store(tmp_path).hold() as store:
         kept(store, "a")

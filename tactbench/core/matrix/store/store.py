@@ -43,6 +43,8 @@ class Store:
     def __init__(self, folder: Path) -> None:
         self.folder = folder
         self._provenance: tuple[str, Mapping[str, Any]] = ("", {})
+        self.superseded: list[str] = []
+        """Cells whose latest answer, since this was made, is no more the one from other recordings."""
 
     @contextmanager
     def hold(self) -> Iterator[Store]:
@@ -112,7 +114,11 @@ class Store:
         with writing(self.folder):
             replace_file(path, content)
             _check_written(path, cell)
-            for name, _key, status in self._files.files_of(cell.row["cell"]):
+            before = self._files.files_of(cell.row["cell"])
+            old = self._files.finished(before[0][1]) if before else None
+            if old is not None and cell.row.get("digests") not in ([], None, old.get("digests")):
+                self.superseded.append(cell.row["cell"])
+            for name, _key, status in before:
                 if status != "done" and name != path.name:  # superseded; what was finished stays for other versions
                     (path.parent / name).unlink(missing_ok=True)
                     self._files.drop(name)

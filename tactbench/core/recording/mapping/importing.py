@@ -21,7 +21,7 @@ import numpy as np
 from tactbench.core.errors import MappingError, RecordingError
 from tactbench.core.files import try_lock, writable
 from tactbench.core.progress import Progress
-from tactbench.core.recording.health import MONOTONE, Finding, examine, is_copy
+from tactbench.core.recording.health import FINDINGS, MONOTONE, Finding, examine, is_copy, keep_findings
 from tactbench.core.recording.mapping.channels import MappedStream, device, fill, sensor_of
 from tactbench.core.recording.mapping.files import RawRecording, find, read
 from tactbench.core.recording.mapping.model import MUST_NAME_SENTINELS, Mapping, Word
@@ -31,7 +31,7 @@ from tactbench.core.recording.mapping.tasks import check_tasks, require_answerab
 from tactbench.core.recording.reader import content_digest, open_recording
 from tactbench.core.recording.writer import RecordingWriter
 from tactbench.core.samples import Block, FloatArray
-from tactbench.core.spec.recording import RecordingMeta, Scalar
+from tactbench.core.spec.recording import RecordingMeta, Scalar, composed
 from tactbench.core.spec.scene import Role
 from tactbench.core.spec.sensor import SensorSpec, StreamSpec
 from tactbench.core.spec.yaml_file import load_yaml
@@ -130,6 +130,11 @@ def import_tables(
     require_answerable(loaded, streams, mapping)
     tasks = tasks_text(loaded)
     sets, orphans = find(loaded, mapping.parent if root is None else root)
+    beside: list[Finding] = []
+    if orphans:
+        more = f" And {len(orphans) - 1} more." if orphans[1:] else ""
+        text = f"its import left files out: {orphans[0]}{more}"
+        beside.append(Finding("left-out", "warning", "", (), len(orphans), text))
     made: list[Imported] = []
     progress = progress or Progress()
     progress.begin(f"importing {mapping.stem}", len(sets))
@@ -138,7 +143,7 @@ def import_tables(
             for raw in read(loaded, files):
                 meta = _meta(loaded, raw, sensor, reference)
                 _unique_name(meta, made)
-                made.append(_write(folder / f"{meta.name}{ENDING}", meta, loaded, raw, streams))
+                made.append(_write(folder / f"{meta.name}{ENDING}", meta, loaded, raw, streams, beside))
             progress.advance(next(iter(files.files.values())).shown)
         check_tasks(out, tasks, replace=replace)
         write_tasks(folder, tasks)
@@ -200,8 +205,14 @@ def _place(folder: Path, out: Path) -> None:
 
 
 def _write(
-    path: Path, meta: RecordingMeta, mapping: Mapping, raw: RawRecording, streams: dict[str, MappedStream]
+    path: Path,
+    meta: RecordingMeta,
+    mapping: Mapping,
+    raw: RawRecording,
+    streams: dict[str, MappedStream],
+    beside: Sequence[Finding],
 ) -> Imported:
+    """Write one recording; `beside` was found in the import as a whole."""
     counts: dict[str, int] = {}
     missing: dict[str, int] = {}
     clocks = {
@@ -227,9 +238,10 @@ def _write(
             missing.update(read_in.missing)
             counts[f"rows of {name}"] = len(table)
         counts |= {f"{channel} without a sample": number for channel, number in missing.items()}
-        writer.revise(counts=counts)
+        writer.revise(counts=counts, provenance={FINDINGS: []})
     with open_recording(path) as written:
-        findings = (*examine(written), *_given_away(sensed, reference), *_trailing_delimiters(raw))
+        findings = (*beside, *examine(written), *_given_away(sensed, reference), *_trailing_delimiters(raw))
+    keep_findings(path, findings)
     rows = max(len(table) for table in raw.tables.values())
     return Imported(path, meta.name, rows, meta.sensor.name, missing, meta.excluded, meta.origin, findings)
 
@@ -292,12 +304,12 @@ def _derived(name: str, word: Word, words: dict[str, Scalar], origin: str) -> st
             f"The word {name!r} is made of {word.of!r}, which nothing gives; there are: {', '.join(sorted(words))}.",
             hint="Words may be made of words above them.",
         )
-    given = str(words[word.of])
+    given = composed(str(words[word.of]))
     if word.divided_by is not None:
         if not given.isdecimal():
             raise MappingError(f"{origin}: the word {word.of!r} is {given!r}, no whole number.", hint="Use `values`.")
         return str(int(given) // word.divided_by)
-    known = {str(key): value for key, value in (word.values or {}).items()}
+    known = {composed(str(key)): value for key, value in (word.values or {}).items()}
     if given not in known:
         raise MappingError(
             f"{origin}: {word.of} {given!r} has no translation for {name!r}; there are: {', '.join(known)}.",
