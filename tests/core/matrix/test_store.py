@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 from tactbench.core.errors import FolderError, FormatError
 from tactbench.core.matrix.store import Store
 from tactbench.core.matrix.store import store as STORE
-from tactbench.core.matrix.store.cell_file import read_cell
+from tactbench.core.matrix.store.cell_file import CellFile, read_cell
 from tactbench.core.samples import Answers
 from tests.conftest import ROOT
 
@@ -71,10 +71,9 @@ def test_the_latest_of_a_name_counts(tmp_path):
 
 def test_cells_that_are_named_by_their_number_among_the_repeats_are_read_under_their_seed(tmp_path):
     """Of folders written before replicates were named by their seeds, those that never had a key among them."""
-    with Store(tmp_path).hold() as store:
-        kept(store, "a/1", repeat=1, seed=3)
-        kept(store, "b/1", "failed", repeat=1, seed=3)
-    (tmp_path / "results.sqlite").unlink()
+    (tmp_path / "cells").mkdir()
+    for old in (row("a/1", repeat=1, seed=3), row("b/1", "failed", repeat=1, seed=3)):
+        file_of(tmp_path, old["cell"]).write_bytes(CellFile(old, SECTIONS).content())
     found = Store(tmp_path)
     assert [one["cell"] for one in found.rows()] == ["a/3", "b/3"]
     assert all(found.cell(one).row == one for one in found.rows())
