@@ -22,7 +22,7 @@ FILE = ROOT / "examples" / "results" / "default.json"
 PROTOCOLS = ("deployable", "karl2016")
 KEYS = (
     "cell", "sensor", "task", "rig", "simulated", "protocol", "dagger", "split", "estimator", "params", "is_baseline",
-    "looks_at", "repeat", "repeats", "seed", "n_replicates", "replicate_unit", "status", "metric", "unit", "score",
+    "looks_at", "repeats", "seed", "n_replicates", "replicate_unit", "status", "metric", "unit", "score",
     "score_min", "score_max", "ci_low", "ci_high", "ci_method", "reference_floor", "score_beyond_floor",
     "beyond_floor_ci_low", "beyond_floor_ci_high", "n_recordings", "n_sessions", "answer_delay_ms", "delay_parts_ms",
     "latency_ms_p50",

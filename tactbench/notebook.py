@@ -253,7 +253,7 @@ def evaluate(
     data = read_dataset(spec, paths)
     cell = Cell(
         sensor=data.metas[0].sensor.name, task=spec.name, rig="replay", protocol=protocol, split=split,
-        estimator=name_of(estimator), params=(), baseline=False, repeat=1, repeats=1, seed=seed, declared_task=declared,
+        estimator=name_of(estimator), params=(), baseline=False, seed=seed, declared_task=declared,
     )  # fmt: skip
     row, answers = _answered(cell, spec, paths, estimator)
     trivial = [replace(cell, estimator=name, baseline=True) for name in spec.baselines if name != cell.estimator]

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator
+import uuid
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 from tactbench.core.errors import UnwritableError
 
@@ -27,6 +29,27 @@ def try_lock(file: int) -> bool | None:
     except (ImportError, OSError):
         return None
     return True
+
+
+def hdf5_image(fill: Callable[[Any], None]) -> bytes:
+    """Return the bytes of an HDF5 file that is built in memory.
+
+    The HDF5 library cannot close a file on a full disk, and crashes the process when Python raises in a file object
+    that it writes through, as Ctrl-C does.
+
+    Parameters
+    ----------
+    fill
+        Writes into the open ``h5py.File``, which is of the oldest format that HDF5 still writes: every reader opens it.
+    """
+    import h5py
+
+    name = uuid.uuid4().hex  # HDF5 takes two files in memory of one name for one
+    with h5py.File(name, "w", driver="core", backing_store=False, libver="earliest") as file:
+        fill(file)
+        file.flush()
+        image: bytes = file.id.get_file_image()
+    return image
 
 
 def replace_file(path: Path, content: bytes) -> None:

@@ -32,13 +32,18 @@ class RecordingFolder(ReplayRig):
         Raises
         ------
         MissingRecordingError
-            If there is no such folder, or nothing in it.
+            If there is no such folder, nothing in it, or less than an import meant.
         """
         if not self.folder.is_dir():
             what = f"{self.folder} is no folder" if self.folder.exists() else f"There is no folder {self.folder}"
             raise MissingRecordingError(f"{what}.", hint=_HINT)
         found, unfinished = [], 0
         for below, folders, names in os.walk(self.folder):  # passes over what vanishes meanwhile, or may not be read
+            if any(name.startswith(".placing-") for name in folders):
+                raise MissingRecordingError(
+                    f"An import into {below} was interrupted while its recordings were moved there: some are missing.",
+                    hint="Give the same import again, or wait until it ends.",
+                )
             folders[:] = [name for name in folders if not name.startswith(".")]
             for name in names:
                 unfinished += name.endswith(".partial")

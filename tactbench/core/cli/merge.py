@@ -22,8 +22,9 @@ if TYPE_CHECKING:
 def command(ctx: click.Context, folders: tuple[Path, ...], out: Path) -> None:
     """Make one result folder of several: the same in whatever order, however often.
 
-    Folders that contradict each other are refused, and the cells are named. Where two hosts have finished one cell with
-    the same scores, one host's row is kept whole: times of different hosts are never mixed.
+    Replicates of other seeds join those that are there. Folders that contradict each other are refused, and the cells
+    are named. Where two hosts have finished one cell with the same scores, one host's row is kept whole: times of
+    different hosts are never mixed.
     """
     from tactbench.core.matrix.merge import merge
     from tactbench.core.tables.terminal import remark

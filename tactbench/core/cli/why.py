@@ -75,7 +75,7 @@ def _replicates(found: StoredCell) -> Iterator[Field]:
     from tactbench.core.statistics.replicates import counted, over_replicates, percent
     from tactbench.core.tables.numbers import delay, duration, interval, score_with_unit
 
-    name = found.cell.name.removesuffix(f"/{found.cell.repeat}")
+    name = found.cell.name.removesuffix(f"/{found.cell.seed}")
     (row,) = over_replicates([row for row in found.store.rows() if row["cell"].rpartition("/")[0] == name])
     unit, many, of = str(row["unit"]), row["n_replicates"], str(row["replicate_unit"])
     yield "score", f"{score_with_unit(row['score'], unit)} over {counted(many, of)}"
@@ -109,6 +109,7 @@ def _rests_on(row: Row) -> Iterator[Field]:
     yield "recordings", f"{row['n_recordings']} of {row['n_sessions']} sessions"
     yield from (("assumed", f"{name} {value}") for name, value in sorted((row.get("assumptions") or {}).items()))
     yield from (("left out", text) for text in count_texts(row.get("counts") or {}))
+    yield from (("found", str(text)) for text in row.get("findings", ()))
     yield from (("remark", str(remark)) for remark in (*row.get("remarks", ()), *row.get("stamps", ())))
 
 

@@ -29,7 +29,7 @@ RATE_TOLERANCE = 0.01
 
 SLOWEST_S = 1.0
 """Rows further apart are single readings, such as one a press, and tell no sampling interval (assumed)."""
-NO_LINK = "link delay unknown: the answer delay is without it"
+NO_LINK = "link delay unknown: an answer delay is without it"
 NO_RATE = "answer delay unknown: the recordings do not tell their sampling rate"
 AT_LEAST, AT_MOST = 20, 200
 BUDGET_S = 0.3

@@ -157,7 +157,7 @@ def _key(kind: Kind, row: Row) -> Key:
     of = {"sensors": answer, "estimators": sensor}.get(kind, f"{sensor}, {answer}")
     protocol = "" if kind == "protocols" else row["protocol"]
     split = "" if kind == "splits" else row["split"]
-    return (hardware_name(row), protocol, split, row["task"], row["repeat"], of)
+    return (hardware_name(row), protocol, split, row["task"], of)
 
 
 def tables_of(comparisons: Sequence[PairwiseComparison]) -> list[TextTable]:
@@ -244,7 +244,7 @@ def record_of(pair: PairwiseComparison) -> dict[str, Any]:
     """Return a pair as one flat record; all have the same keys."""
     row, folds = pair.row, pair.folds
     found: Mapping[str, Any] = {} if pair.difference is None else vars(pair.difference)
-    shared = ("task", "rig", "simulated", "protocol", "split", "repeat", "metric", "unit")
+    shared = ("task", "rig", "simulated", "protocol", "split", "metric", "unit")
     return {
         "compared": pair.kind, "a": pair.first, "b": pair.second, "of": pair.of, **{key: row[key] for key in shared},
         "score_a": pair.first_row and pair.first_row["score"], "score_b": pair.second_row and pair.second_row["score"],

@@ -111,7 +111,7 @@ def _texts(line: Line) -> dict[str, str]:
         for name, text in line.texts.items()
     }
     why = "" if row["status"] == "done" else visible(f"{row['status']}: {row['reason']}")
-    return {**found, CELL: visible(_cell(row)), REASON: why}
+    return {**found, CELL: visible(str(row["cell"])), REASON: why}
 
 
 def _with_trivial_once(lines: Sequence[_Texts]) -> list[_Texts]:
@@ -131,21 +131,15 @@ def _with_trivial_once(lines: Sequence[_Texts]) -> list[_Texts]:
     return found
 
 
-def _cell(row: Row) -> str:
-    """Return the name of a cell, without the number of its only replicate."""
-    name = str(row["cell"])
-    return name.removesuffix(f"/{row.get('repeat')}") if row.get("repeats") == 1 else name
-
-
 def _short(row: Row, rows: Sequence[Row]) -> str:
     """Return the shortest name of a cell that `why` takes: sensor, task and estimator where no other cell has them."""
 
     def parts(one: Row) -> tuple[str, ...]:
-        names = _cell(one).split("/")
+        names = str(one["cell"]).split("/")
         return (*names[:2], names[-1])
 
     alike = [one for one in rows if parts(one) == parts(row)]
-    return "/".join(parts(row)) if len(alike) == 1 else _cell(row)
+    return "/".join(parts(row)) if len(alike) == 1 else str(row["cell"])
 
 
 def headings(names: Sequence[str], block: Block) -> tuple[str, ...]:
@@ -168,7 +162,7 @@ def commands(table: Table, view: View = DEFAULT_VIEW) -> tuple[str, ...]:
     where, out = ((view.folder,), ("--out", view.folder)) if view.folder else ((), ())
     first = next((line.row for line in table.lines if line.kind == "result"), table.rows[0])
     paper = "for a paper, marked “simulated”" if first["simulated"] else "for a paper"
-    name = _short(first, table.rows) if view.all_rows else _cell(first)
+    name = _short(first, table.rows) if view.all_rows else str(first["cell"])
     found = {
         command_line("tactbench", "why", name, *out): "what this score rests on",
         command_line("tactbench", "report", *where): "figures and every detail",

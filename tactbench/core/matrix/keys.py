@@ -96,7 +96,7 @@ class Keys:
 
 
 def configuration_of(cell: Cell) -> Sections:
-    """Return what a cell's key covers of its configuration. Its number among the repeats is not: the seed is."""
+    """Return what a cell's key covers of its configuration."""
     return {
         "sensor": cell.sensor, "protocol": cell.protocol, "split": cell.split, "params": dict(cell.params),
         "seed": cell.seed, "timed": cell.timed, "include incomplete": cell.include_incomplete,

@@ -5,7 +5,8 @@ The result is the union of the folders' cells, by name. Of two of one name
 - finished counts more than not finished; of two that did not finish, the one whose status stands first in
   `tactbench.core.spec.status.STATUSES` is kept, then the one of the host with the smaller id;
 - two finished ones are equal if configuration, versions and source are, and what a seed decides agrees to a relative
-  1e-9: the one of the host with the smaller id is kept, whole, so that times of two hosts are not mixed;
+  1e-9: one that was timed, then the one of the host with the smaller id is kept, whole, so that times of two hosts are
+  not mixed;
 - anything else is a contradiction: nothing is written.
 
 Recordings of one name are taken from the folder whose cells are kept.
@@ -86,9 +87,7 @@ def merge(folders: Sequence[Path], out: Path, *, also: Callable[[Path], None] | 
             other = kept.setdefault(row["cell"], (row, store))
             if "done" == row["status"] == other[0]["status"] and (found := _contradiction(other, (row, store))):
                 against.append(f"{row['cell']} in {other[1].folder} and in {store.folder}: {found}")
-            kept[row["cell"]] = min(
-                other, (row, store), key=lambda one: (STATUSES.index(one[0]["status"]), one[0]["host"], one[0]["key"])
-            )
+            kept[row["cell"]] = min(other, (row, store), key=_precedence)
     if against:
         more = f"; and {len(against) - _SHOWN} more" if len(against) > _SHOWN else ""
         raise FolderError(
@@ -108,9 +107,17 @@ def merge(folders: Sequence[Path], out: Path, *, also: Callable[[Path], None] | 
     return Merged(tuple(row for row, _ in kept.values()), len(recordings), tuple(left_out))
 
 
+def _precedence(one: tuple[Row, Store]) -> tuple[Any, ...]:
+    """Return what the result that is kept has less of than any other of its name."""
+    row, _ = one
+    return STATUSES.index(row["status"]), row["latency_n"] is None, row["host"], row["key"]
+
+
 def _contradiction(one: tuple[Row, Store], other: tuple[Row, Store]) -> str:
     """Return in what two finished cells of one name differ that should be the same; empty if in nothing."""
     first, second = ({name: store.cell(row).sections.get(name) for name in _DECIDES} for row, store in (one, other))
+    for sections in (first, second):  # a run times its first replicate, which may be another's second
+        sections["configuration"] = {**(sections["configuration"] or {}), "timed": None}
     old, new = ({name: row[name] for name in SEED_DECIDES} for row, _ in (one, other))
     return "; ".join((differences(first, second) or differences(old, new, same=_same))[:3])
 

@@ -18,8 +18,7 @@ from tactbench.core.spec.task import TaskSpec
 _AS_PLANNED = Simulation()
 
 ALIKE = (
-    "sensor", "task", "rig", "protocol", "split", "estimator", "repeat", "repeats", "seed", "declared_task",
-    "include_incomplete",
+    "sensor", "task", "rig", "protocol", "split", "estimator", "seed", "declared_task", "include_incomplete",
 )  # fmt: skip
 """What a row and a cell call alike."""
 
@@ -36,12 +35,10 @@ class Cell:
     estimator: str
     params: tuple[tuple[str, Any], ...]
     baseline: bool
-    repeat: int
-    repeats: int
     seed: int
-    """Seed of this replicate: of the scenes it records and of its estimators."""
+    """Of the scenes that this replicate records and of its estimators; it names the replicate."""
     timed: bool = True
-    """Whether fit time and latency are measured, with nothing else of the run at work: of the first replicate."""
+    """Whether fit time and latency are measured, with nothing else of the run at work: of a run's first replicate."""
     simulation: Simulation = _AS_PLANNED
     """How a simulated rig is asked to carry out its scenes."""
     include_incomplete: bool = False
@@ -55,7 +52,7 @@ class Cell:
         options = "".join(f",{key}={value}" for key, value in self.params)
         split = f":{self.split}" if self.split else ""
         path = (self.sensor, self.task, self.rig, f"{self.protocol}{split}", f"{self.estimator}{options}")
-        return "/".join((*path, str(self.repeat)))
+        return "/".join((*path, str(self.seed)))
 
 
 def cell_of(row: Mapping[str, Any]) -> Cell:
@@ -97,11 +94,11 @@ def plan_cells(matrix: MatrixSpec, sensors: Sequence[str], registry: Registry) -
         name: matrix.repeats or ((owned.descriptor.spec.replicates or REPLICATES) if rig.simulated else 1)
         for name, owned in tasks.items()
     }
-    for repeat in range(1, max(own.values()) + 1):
+    for replicate in range(max(own.values())):
         for choice in matrix.tasks:
-            owned, repeats = tasks[choice.name], own[choice.name]
-            if repeat > repeats:
+            if replicate >= own[choice.name]:
                 continue
+            owned = tasks[choice.name]
             task = owned.descriptor.spec
             ways = _ways(task, choice)
             answers = _estimators(task, choice, registry)
@@ -116,10 +113,8 @@ def plan_cells(matrix: MatrixSpec, sensors: Sequence[str], registry: Registry) -
                         estimator=chosen.name,
                         params=tuple(sorted(chosen.params.items())),
                         baseline=registry.estimators[chosen.name].baseline,
-                        repeat=repeat,
-                        repeats=repeats,
-                        seed=matrix.seed + repeat - 1,
-                        timed=matrix.latency and repeat == 1,
+                        seed=matrix.seed + replicate,
+                        timed=matrix.latency and replicate == 0,
                         simulation=matrix.simulation,
                         include_incomplete=matrix.include_incomplete,
                         declared_task=owned.declared,

@@ -11,7 +11,7 @@ from itertools import chain
 from pathlib import Path
 from typing import Any, Literal
 
-from tactbench.core.errors import UnwritableError, UsageError
+from tactbench.core.errors import RecordingError, UnwritableError, UsageError
 from tactbench.core.matrix.keys import Keys, Sections
 from tactbench.core.matrix.plan import Cell
 from tactbench.core.matrix.plan_recordings import (
@@ -204,13 +204,19 @@ class Run:
                 self._recorded(request, outcome)
 
     def _clear(self, requests: Iterable[RecordingRequest]) -> None:
-        """Remove what a simulation that was killed has left; what devices gave is never removed."""
+        """Remove what a simulation that was killed has left, and its damaged recordings; never what devices gave."""
         by_path = {request.path: request for request in requests}
         for folder in {path.parent for path in by_path}:
             for left in folder.glob("*.h5.*"):
                 request = by_path.get(left.with_name(f"{left.name.partition('.h5.')[0]}.h5"))
                 if request is not None and is_computed(request):
                     left.unlink(missing_ok=True)
+        for path, request in by_path.items():
+            if path.exists() and is_computed(request):
+                try:
+                    self.store.about(path)
+                except RecordingError:
+                    path.unlink()
 
     def _submit_recordings(self, recorder: Engine, missing: Iterable[RecordingRequest], *, computed: bool) -> None:
         """Queue recordings: all of a real rig as one piece of work, simulated ones by seed and sensor."""
@@ -260,9 +266,8 @@ class Run:
                 estimator = self.registry.estimators[cell.estimator]
                 jobs.append(Job(cell, task, estimator, tuple(digests), tuple(digests.values()), key, sections))
                 continue
-            # Its key covers neither its number among the repeats nor what is published: they change no number.
-            naming = {"cell": cell.name, "repeat": cell.repeat, "repeats": cell.repeats}
-            row = {**found, **naming, **published(cell, task, found["split"])}
+            # Its key covers neither its name nor what is published: they change no number.
+            row = {**found, "cell": cell.name, **published(cell, task, found["split"])}
             self.store.reuse(row)
             self.rows[cell.name] = row
         return jobs
@@ -292,11 +297,11 @@ class Run:
             )
             self.computed += 1
         self.progress.advance(cell.name, stopped=self.rows[cell.name]["status"] in STOPPED)
-        if any(one.name not in self.rows for one in self.cells if one.repeat == cell.repeat):
+        if any(one.name not in self.rows for one in self.cells if one.seed == cell.seed):
             return
-        left = {one.repeat for one in self.cells if one.name not in self.rows}
+        left = {one.seed for one in self.cells if one.name not in self.rows}
         if left:
-            self.progress.show([self.rows[one.name] for one in self.cells if one.repeat not in left])
+            self.progress.show([self.rows[one.name] for one in self.cells if one.seed not in left])
 
     def _stopped(
         self, cell: Cell, task: TaskSpec, why: BaseException, key: str = "", sections: Sections | None = None

@@ -29,7 +29,6 @@ if TYPE_CHECKING:
 
 Row = dict[str, Any]
 
-TIMED = "fit time and latency were measured with nothing else of the run at work"
 _TIMES = ("search_s", "fit_s", "predict_s")
 
 
@@ -127,7 +126,7 @@ def solve(job: Job, concurrency: int = 1, given: Estimator | None = None) -> Sol
     row = {
         **opening(cell, task),
         **result.model_dump(exclude_unset=True),
-        **_described(data.metas, (*result.remarks, *([TIMED] if cell.timed else []))),
+        **_described(data.metas, result.remarks),
         **published(cell, task, result.split),
         **({} if cell.timed else dict.fromkeys(_TIMES)),
         "looks_at": estimator.looks_at,

@@ -143,5 +143,5 @@ def _is_short(given: str, name: str) -> bool:
 
 def _parts(name: str) -> tuple[str, int]:
     """Return what the replicates of a cell have in common, and which one this is."""
-    cell, _, repeat = name.rpartition("/")
-    return (cell, int(repeat)) if repeat.isdecimal() else (name, 0)
+    cell, _, seed = name.rpartition("/")
+    return (cell, int(seed)) if seed.isdecimal() else (name, 0)

@@ -9,7 +9,6 @@ from __future__ import annotations
 import hashlib
 import os
 import shutil
-import tempfile
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass
@@ -30,7 +29,7 @@ from tactbench.core.errors import (
 from tactbench.core.plugins import hookspecs
 from tactbench.core.progress import Progress
 from tactbench.core.recording.format import VERSION
-from tactbench.core.recording.mapping.importing import import_tables
+from tactbench.core.recording.mapping.importing import aside, import_tables
 from tactbench.core.recording.mapping.model import DataSource, Mapping
 from tactbench.core.spec.yaml_file import load_yaml
 
@@ -106,8 +105,8 @@ class DataSet:
             return target
         progress = progress or Progress()
         self._fetch(copy, root, progress)
-        with tempfile.TemporaryDirectory(prefix=".importing-", dir=target.parent) as aside:
-            made = Path(aside, "recordings")
+        with aside(target.parent) as folder:
+            made = folder / "recordings"
             import_tables(self.path, root=self.files, out=made, progress=progress)
             with suppress(OSError):  # another process was quicker
                 made.replace(target)

@@ -17,7 +17,7 @@ from tactbench.core.spec.recording import RecordingMeta
 from tactbench.core.spec.sensor import StreamSpec
 
 FORMAT = "tactbench-recording"
-VERSION = 3
+VERSION = 4
 """Written; every version from 1 on is read."""
 PARTIAL = ".partial"
 """Ending of the journal of a recording that is being made."""
@@ -84,24 +84,34 @@ class ContentDigest:
         content = json.loads(text)
         for name in not_content(version):
             content.pop(name, None)
+        self._version = version
+        self._columns: dict[tuple[str, str, tuple[int, ...]], tuple[Any, list[int]]] = {}
+        """SHA-256 and number of the rows so far, by name, type and shape of a row"""
         self._sha = hashlib.sha256(f"{FORMAT} {version}\n{canonical(content)}\n".encode())
 
-    def texts(self, name: str, values: npt.NDArray[np.str_]) -> None:
-        """Add a column of texts by name and shape, as a JSON list."""
-        self._sha.update(f"{name} text {values.shape}\n{canonical(values.tolist())}\n".encode())
-
-    def numbers(
-        self, name: str, dtype: np.dtype[Any], shape: tuple[int, ...], pieces: Iterable[npt.NDArray[Any]]
-    ) -> None:
-        """Add a column by name, type, shape and little-endian bytes in row order; `pieces` are its rows in order."""
-        plain = dtype.newbyteorder("<")
-        self._sha.update(f"{name} {plain.str} {shape}\n".encode())
-        for piece in pieces:
-            self._sha.update(np.ascontiguousarray(piece, dtype=plain).data)
+    def add(self, name: str, values: npt.NDArray[Any]) -> None:
+        """Add rows of a column to those before; of versions before 4, whole columns in the order of the streams."""
+        if values.dtype.kind == "U":
+            kind = "text"
+            body: Any = "".join(f"{canonical(text)}\n" for text in values.tolist()).encode()
+        else:
+            kind = values.dtype.newbyteorder("<").str
+            body = np.ascontiguousarray(values, dtype=kind).data
+        if self._version < 4:
+            whole = f"{canonical(values.tolist())}\n".encode() if kind == "text" else body
+            self._sha.update(f"{name} {kind} {values.shape}\n".encode())
+            self._sha.update(whole)
+            return
+        sha, rows = self._columns.setdefault((name, kind, values.shape[1:]), (hashlib.sha256(), [0]))
+        sha.update(body)
+        rows[0] += len(values)
 
     def hexdigest(self) -> str:
         """Return the digest so far."""
-        return self._sha.hexdigest()
+        sha = self._sha.copy()
+        for (name, kind, rest), (column, (rows,)) in sorted(self._columns.items()):
+            sha.update(f"{name} {kind} {(rows, *rest)} {column.hexdigest()}\n".encode())
+        return sha.hexdigest()
 
 
 def specs_by_name(meta: RecordingMeta) -> dict[str, StreamSpec]:

@@ -10,6 +10,7 @@ from typing import Any, Literal
 import numpy as np
 import numpy.typing as npt
 
+from tactbench.core.recording import format as layout
 from tactbench.core.recording.reader import LazyStream, Recording
 from tactbench.core.samples import FloatArray, Quality
 from tactbench.core.spec.recording import StreamClock, StreamCounts
@@ -42,6 +43,13 @@ _UNTIMED = {
     "none": "no clock stated: rows are ordered, nothing more",
     "nominal": "time stamps are row number by nominal rate, not measured",
 }
+FINDINGS = "findings"
+"""Where the provenance of a recording has what its import found."""
+UNMARKED = ("stuck", "duplicated", "saturated", "dead", "empty", "absent", "excluded", "target-among-features")
+"""Checks that mark no score: taxels that nothing touches are constant and alike, those pressed hard saturate; from
+`dead` on, an evaluation that needs what is not there refuses it, or tells of it in another way."""
+DATED_NS = 10**18
+"""Times from here on are dates, September 2001 and later: in a wrong unit they would be of another millennium."""
 SLOWEST_HZ = 1.0
 """No tactile sensor is known to be read more seldom: without a stated rate, a lower one looks like a wrong unit."""
 
@@ -152,6 +160,20 @@ def examine(recording: Recording) -> list[Finding]:
         found.extend(_clock(" and ".join(names), stream))
     order = {"error": 0, "warning": 1, "info": 2}
     return sorted(found, key=lambda finding: order[finding.severity])
+
+
+def marking(recording: Recording) -> list[Finding]:
+    """Return what a score from an open recording has to say: what its import found, else what is found now.
+
+    Where a simulation made it without devices, no clock, cable or table can have failed, and nothing is looked for.
+    """
+    meta = recording.meta
+    if FINDINGS in meta.provenance:
+        with layout.readable(recording.path):
+            found = [Finding(**one) for one in meta.provenance[FINDINGS]]
+    else:
+        found = [] if meta.simulated and meta.emulation is None else examine(recording)
+    return [one for one in found if one.severity != "info" and one.check not in UNMARKED]
 
 
 def _whole(recording: Recording) -> Iterator[Finding]:
@@ -271,6 +293,8 @@ def _clock(stream: str, data: _Stream) -> Iterator[Finding]:
     stated = data.spec.rate_hz
     slow, fast = (stated / WRONG_UNIT, stated * WRONG_UNIT) if stated else (SLOWEST_HZ, np.inf)
     looks = ": ms read as s?" if rate < slow else ": s read as ms?" if rate > fast else ""
+    if data.t_ns[0] > DATED_NS:
+        looks = ""
     if looks or (stated and abs(rate - stated) > RATE_TOLERANCE * stated):
         said = f"; {stated:g} Hz are stated" if stated else ""
         yield Finding("rate", "warning", stream, (), 0, f"{stream} runs at {rate:.4g} Hz{said}{looks}")

@@ -3,20 +3,21 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator, Mapping
+from collections import Counter
+from collections.abc import Iterator
 from contextlib import suppress
-from io import FileIO
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from tactbench.core.errors import UnwritableError
+from tactbench.core.errors import FormatError, UnwritableError
+from tactbench.core.files import hdf5_image
 from tactbench.core.recording import format as layout
 from tactbench.core.recording.clock_fit import on_host_clock
 from tactbench.core.recording.partial import Annotations, Blocks, Columns
-from tactbench.core.recording.reader import Recording, open_recording
+from tactbench.core.recording.reader import open_recording
 from tactbench.core.spec.recording import RecordingMeta
 from tactbench.core.spec.sensor import StreamSpec
 
@@ -30,10 +31,11 @@ def store(
     *,
     aside: Path,
     replace: bool,
+    sync: bool,
 ) -> str:
     """Write a recording beside its place, read it back, and rename it to `target`; return its content digest.
 
-    Memory is bounded by some chunks of each stream, whatever the length of the recording.
+    Of the recording, memory holds the compressed file and some chunks of each stream.
 
     Parameters
     ----------
@@ -45,6 +47,8 @@ def store(
         Where the file is written until it has been read back.
     replace
         Whether `target` may be there already.
+    sync
+        Whether to wait for the disk; False for what can be made again.
 
     Raises
     ------
@@ -53,20 +57,24 @@ def store(
         is as it was.
     """
     try:
-        with _Disk(aside, "w+") as disk:
-            try:
-                with build(disk, meta, text, blocks, annotations) as file:
-                    file.attrs["content_sha256"] = Recording(aside, file, text, complete=True).content_digest()
-                    file.attrs["complete"] = True
-            finally:
-                disk.check()
-            os.fsync(disk.fileno())
-        with open_recording(aside) as written:
-            digest = written.verify()
+        image = build(meta, text, blocks, annotations, complete=True)
+        with aside.open("wb") as file:
+            file.write(image)
+            file.flush()
+            if sync:
+                os.fsync(file.fileno())
+        try:
+            with open_recording(aside) as written:
+                digest = written.verify()
+        except FormatError as error:
+            raise UnwritableError(
+                f"What is read back of {target} is not what was written.", hint="Did the disk fail?"
+            ) from error
         if not replace:
             require_free(target)
         aside.replace(target)
-        _sync_folder(target.parent)
+        if sync:
+            _sync_folder(target.parent)
     except OSError as error:
         raise cannot_write(target, error) from error
     finally:
@@ -90,72 +98,35 @@ def cannot_write(path: Path, error: OSError) -> UnwritableError:
     )
 
 
-class _Disk(FileIO):
-    """A file that HDF5 writes through. It keeps the first error of the disk to itself until `check` raises it.
-
-    HDF5 cannot give up a file on a full disk: closing it crashes the process.
-    """
-
-    error: OSError | None = None
-
-    def write(self, content: Any) -> int:
-        """Write all of `content`, or nothing more once the disk has refused something."""
-        left = memoryview(content)
-        try:
-            while left and self.error is None:
-                left = left[super().write(left) :]
-        except OSError as error:
-            self.error = error
-        return len(content)
-
-    def truncate(self, size: int | None = None) -> int:
-        """Set the length."""
-        try:
-            return super().truncate(size)
-        except OSError as error:
-            self.error = self.error or error
-            return size or 0
-
-    def check(self) -> None:
-        """Raise the first error of the disk."""
-        if self.error is not None:
-            raise self.error
+def build(meta: RecordingMeta, text: str, blocks: Blocks, annotations: Annotations, *, complete: bool) -> bytes:
+    """Return the HDF5 file that holds all blocks; see `store`. Its digest is of the blocks, before HDF5 has them."""
+    return hdf5_image(lambda file: _fill(file, meta, text, blocks, annotations, complete=complete))
 
 
-def build(memory: Any, meta: RecordingMeta, text: str, blocks: Blocks, annotations: Annotations) -> Any:
-    """Return an open HDF5 file, written into the binary file `memory`, that holds all blocks; see `store`.
-
-    It is not marked as complete.
-    """
-    import h5py
-
-    # The oldest format that HDF5 still writes: every HDF5 reader in the world opens it.
-    file = h5py.File(memory, "w", libver="earliest")
-    try:
-        _fill(file, meta, text, blocks, annotations)
-    except BaseException:
-        file.close()
-        raise
-    return file
-
-
-def _fill(file: Any, meta: RecordingMeta, text: str, blocks: Blocks, annotations: Annotations) -> None:
+def _fill(
+    file: Any, meta: RecordingMeta, text: str, blocks: Blocks, annotations: Annotations, *, complete: bool
+) -> None:
     import h5py
 
     file.attrs["format"] = layout.FORMAT
     file.attrs["format_version"] = layout.VERSION
-    file.attrs["complete"] = False
+    file.attrs["complete"] = complete
     file.attrs["NX_class"] = "NXroot"
     # Of variable length: one of fixed length would stop at 64 KiB, about forty channels.
     file.attrs.create("meta", text, dtype=h5py.string_dtype("utf-8"))
     streams = file.create_group("streams")
     streams.attrs["NX_class"] = "NXentry"
     specs = layout.specs_by_name(meta)
-    for name, columns in _gathered(on_host_clock(meta, blocks)):
+    digest = layout.ContentDigest(text)
+    for name, columns in _gathered(_digested(on_host_clock(meta, blocks), digest)):
         _extend(streams.require_group(name), columns)
     for name in streams:
-        _annotate(streams[name], annotations.get(name, {}))
+        for label, column in annotations.get(name, {}).items():
+            kept = column if column.dtype.kind == "U" else column.astype(np.int64)
+            digest.add(f"/{name}/annotations/{label}", kept)
+            _annotate(streams[name], label, kept)
         _describe(streams[name], specs[name])
+    file.attrs["content_sha256"] = digest.hexdigest()
 
 
 def _sync_folder(folder: Path) -> None:
@@ -166,6 +137,23 @@ def _sync_folder(folder: Path) -> None:
         os.fsync(opened)
     finally:
         os.close(opened)
+
+
+def _digested(blocks: Blocks, digest: layout.ContentDigest) -> Iterator[tuple[str, Columns]]:
+    """Yield blocks with quality from the first block on that has some, and add them to the digest."""
+    rows: Counter[str] = Counter()
+    flagged = set()
+    for stream, columns in blocks:
+        shape = columns["data"].shape
+        if "quality" in columns and stream not in flagged:  # all rows before it are good
+            flagged.add(stream)
+            digest.add(f"/{stream}/quality", np.zeros((rows[stream], shape[1]), dtype=np.uint8))
+        elif stream in flagged:
+            columns = {"quality": np.zeros(shape, dtype=np.uint8), **columns}
+        rows[stream] += len(columns["data"])
+        for name, values in columns.items():
+            digest.add(f"/{stream}/{name}", values)
+        yield stream, columns
 
 
 def _gathered(blocks: Blocks) -> Iterator[tuple[str, Columns]]:
@@ -197,72 +185,68 @@ def _joined(blocks: list[Columns]) -> Columns:
 def _extend(group: Any, columns: Columns) -> None:
     start = group["data"].shape[0] if "data" in group else 0
     stop = start + len(columns["data"])
-    if "quality" in group and "quality" not in columns:
-        columns["quality"] = np.zeros(columns["data"].shape, dtype=np.uint8)
     for name, values in columns.items():
-        if name not in group:
-            _create(group, name, values, start)
-        group[name].resize(stop, axis=0)
-        group[name][start:stop] = values
+        column = group[name] if name in group else _create(group, name, values)
+        column.resize(stop, axis=0)
+        column[start:stop] = values
 
 
-def _create(group: Any, name: str, values: npt.NDArray[Any], rows: int) -> None:
-    """Make a column; quality may come late, and the zeros before it mean good."""
+def _create(group: Any, name: str, values: npt.NDArray[Any]) -> Any:
+    """Return a new column without rows; quality may come late, and the zeros before it mean good."""
     rest = values.shape[1:]
-    group.create_dataset(
-        name, shape=(rows, *rest), maxshape=(None, *rest), dtype=values.dtype, chunks=(layout.CHUNK_ROWS, *rest),
+    return group.create_dataset(
+        name, shape=(0, *rest), maxshape=(None, *rest), dtype=values.dtype, chunks=(layout.CHUNK_ROWS, *rest),
         compression="gzip", compression_opts=4, shuffle=True, fillvalue=0,
     )  # fmt: skip
 
 
-def _annotate(group: Any, annotations: Mapping[str, npt.NDArray[Any]]) -> None:
+def _annotate(group: Any, label: str, column: npt.NDArray[Any]) -> None:
     import h5py
 
-    for name, column in annotations.items():
-        notes = group.require_group("annotations")
-        if column.dtype.kind == "U":
-            texts = column.tolist()
-            notes.create_dataset(name, data=texts, dtype=h5py.string_dtype("utf-8"), compression="gzip")
-        else:
-            notes.create_dataset(name, data=column.astype(np.int64), compression="gzip", shuffle=True)
+    notes = group.require_group("annotations")
+    if column.dtype.kind == "U":
+        notes.create_dataset(label, data=column.tolist(), dtype=h5py.string_dtype("utf-8"), compression="gzip")
+    else:
+        notes.create_dataset(label, data=column, compression="gzip", shuffle=True)
 
 
 def _describe(group: Any, spec: StreamSpec) -> None:
     """Write what ordinary viewers need (NeXus: signal, axes, units)."""
-    group.attrs["NX_class"] = "NXdata"
-    group.attrs["signal"] = "data"
+    columns = {name: column for name, column in group.items() if name != "annotations"}
+    attributes = group.attrs
+    attributes["NX_class"] = "NXdata"
+    attributes["signal"] = "data"
     if spec.rate_hz is not None:
-        group.attrs["rate_hz"] = spec.rate_hz
-    if "t_ns" in group:
-        group.attrs["axes"] = ["t_ns", "."]
-    for name in ("t_ns", "device_ns", "host_ns"):
-        if name in group:
-            group[name].attrs["units"] = "ns"
+        attributes["rate_hz"] = spec.rate_hz
+    if "t_ns" in columns:
+        attributes["axes"] = ["t_ns", "."]
+    for name in columns.keys() & {"t_ns", "device_ns", "host_ns"}:
+        columns[name].attrs["units"] = "ns"
     units = {channel.unit for channel in spec.channels}
-    group["data"].attrs["units"] = units.pop() if len(units) == 1 else "mixed: see channel_units"
+    columns["data"].attrs["units"] = units.pop() if len(units) == 1 else "mixed: see channel_units"
     for name, values in layout.channel_attributes(spec):
-        group.attrs[name] = values
-    _attach_scales(group, spec)
+        attributes[name] = values
+    _attach_scales(group, columns, [channel.name for channel in spec.channels])
 
 
-def _attach_scales(group: Any, spec: StreamSpec) -> None:
+def _attach_scales(group: Any, columns: dict[str, Any], names: list[str]) -> None:
     """Make times (rows, where there is no clock) and names of channels the HDF5 dimension scales of every column.
 
     Libraries of the netCDF world then read a stream with its coordinates.
     """
     import h5py
 
-    columns = [*(group[name] for name in group if name != "annotations"), *group.get("annotations", {}).values()]
-    rows = "t_ns" if "t_ns" in group else layout.ROWS
-    if rows not in group:
-        numbers = np.arange(len(group["data"]), dtype=np.int64)
-        _create(group, rows, numbers, len(numbers))
-        group[rows][:] = numbers
-    names = [channel.name for channel in spec.channels]
-    group.create_dataset(layout.CHANNELS, data=names, dtype=h5py.string_dtype("utf-8")).make_scale(layout.CHANNELS)
-    group[rows].make_scale(rows)
-    for column in columns:
-        if column != group[rows]:
-            column.dims[0].attach_scale(group[rows])
+    rows = columns.get("t_ns")
+    if rows is None:
+        numbers = np.arange(len(columns["data"]), dtype=np.int64)
+        rows = _create(group, layout.ROWS, numbers)
+        rows.resize(len(numbers), axis=0)
+        rows[:] = numbers
+    channels = group.create_dataset(layout.CHANNELS, data=names, dtype=h5py.string_dtype("utf-8"))
+    channels.make_scale(layout.CHANNELS)
+    rows.make_scale("t_ns" if "t_ns" in columns else layout.ROWS)
+    for column in (*columns.values(), *group.get("annotations", {}).values()):
+        if column != rows:
+            column.dims[0].attach_scale(rows)
         if column.ndim == 2:
-            column.dims[1].attach_scale(group[layout.CHANNELS])
+            column.dims[1].attach_scale(channels)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -59,16 +59,11 @@ class LazyStream:
         """Read the time stamps alone, (n,) nanoseconds; None where there is no clock."""
         return self._read("t_ns", slice(None)) if "t_ns" in self._columns else None
 
-    def add_to(self, digest: layout.ContentDigest) -> None:
-        """Add every column to the digest, by its name below the stream."""
+    def add_to(self, digest: layout.ContentDigest, *, whole: bool) -> None:
+        """Add every column to the digest, by its name below the stream, `whole` or in pieces."""
         for name in sorted(self._columns):
-            where = f"/{self.spec.name}/{name}"
-            first = self._read(name, slice(0, 0))
-            if first.dtype.kind == "U":
-                digest.texts(where, self._read(name, slice(None)))
-            else:
-                pieces = (self._read(name, rows) for rows in self._pieces())
-                digest.numbers(where, first.dtype, (len(self), *first.shape[1:]), pieces)
+            for rows in [slice(None)] if whole or not len(self) else self._pieces():
+                digest.add(f"/{self.spec.name}/{name}", self._read(name, rows))
 
     def _pieces(self) -> Iterator[slice]:
         step = layout.piece_rows(len(self.spec.channels))
@@ -82,7 +77,8 @@ class LazyStream:
             if h5py.check_string_dtype(dataset.dtype) is not None:
                 return np.array(dataset.asstr("utf-8")[rows], dtype=np.str_)
             values = np.asarray(dataset[rows])
-            kept: Any = np.int64 if name.startswith(_NOTE) else values.dtype.newbyteorder("=")
+            number = name.startswith(_NOTE) and values.dtype.kind != "U"
+            kept: Any = np.int64 if number else values.dtype.newbyteorder("=")
             return values.astype(kept, copy=False)
 
 
@@ -103,9 +99,8 @@ class Recording:
         Names of the streams that hold data, the sensor's first, in the order of the specs.
     """
 
-    def __init__(self, path: Path, file: Any, text: str, *, complete: bool, behind: Any = None) -> None:
+    def __init__(self, path: Path, file: Any, text: str, *, complete: bool) -> None:
         self.path = path
-        self._behind = behind  # the file that an HDF5 file of a journal is built in
         self.meta = parse_meta(path, text)
         self.complete = complete
         self.version = int(file.attrs["format_version"])
@@ -125,8 +120,6 @@ class Recording:
     def close(self) -> None:
         """Close the file."""
         self._file.close()
-        if self._behind is not None:
-            self._behind.close()
 
     def stream(self, name: str) -> LazyStream:
         """Return a stream to slice.
@@ -155,7 +148,7 @@ class Recording:
         """Return the digest of what the recording says, computed from the data now."""
         digest = layout.ContentDigest(self._text, self.version)
         for name in sorted(self.stream_names):
-            self.stream(name).add_to(digest)
+            self.stream(name).add_to(digest, whole=self.version < 4)
         return digest.hexdigest()
 
     def verify(self) -> str:
@@ -167,6 +160,21 @@ class Recording:
                 hint="The file was changed or damaged afterwards; get it again from its source, or record it again.",
             )
         return digest
+
+
+class UnwrittenRecording(Recording):
+    """A recording in memory, to be looked at before it is written."""
+
+    def __init__(self, meta: RecordingMeta, streams: Iterable[StreamData]) -> None:
+        self.path, self.meta = Path(meta.name), meta
+        there = {one.spec.name: one for one in streams}
+        self.stream_names = tuple(name for name in layout.specs_by_name(meta) if name in there)
+        self._opened = {}
+        for name in self.stream_names:
+            columns = {column: getattr(there[name], column) for column in _COLUMNS}
+            columns |= {_NOTE + label: values for label, values in there[name].annotations.items()}
+            kept = {column: values for column, values in columns.items() if values is not None}
+            self._opened[name] = LazyStream(self.path, there[name].spec, kept)
 
 
 def open_recording(path: Path) -> Recording:
@@ -184,8 +192,8 @@ def open_recording(path: Path) -> Recording:
     if not path.is_file():
         raise MissingRecordingError(f"There is no recording {path}.", hint="Check the path.")
     try:
-        # Best effort: some network disks know no locks, and a finished recording never changes.
-        file = h5py.File(path, "r", locking="best-effort")
+        # Without a lock: a finished recording never changes, and one that a viewer holds open can be read.
+        file = h5py.File(path, "r", locking=False)
     except PermissionError as error:
         raise FormatError(f"{path} cannot be read: {error.strerror}.", hint="Check its permissions.") from error
     except (OSError, RuntimeError, ValueError) as error:

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
-from tempfile import TemporaryFile
 
 from tactbench.core.recording import format as layout
 from tactbench.core.recording import image
@@ -29,15 +28,14 @@ def salvage(path: Path) -> Recording:
     FormatError
         If it is not an unfinished recording.
     """
+    import h5py
+
     journal = read_journal(path)
     meta, text = _fitted(journal, parse_meta(path, journal.text))
-    behind = TemporaryFile()  # noqa: SIM115  (the recording closes it)
-    try:
-        file = image.build(behind, meta, text, journal.blocks(), journal.annotations)
-        return Recording(path, file, text, complete=False, behind=behind)
-    except BaseException:
-        behind.close()
-        raise
+    file = image.build(meta, text, journal.blocks(), journal.annotations, complete=False)
+    recording = Recording(path, h5py.File(h5py.h5f.open_file_image(file)), text, complete=False)
+    recording.verify()
+    return recording
 
 
 def rescue(path: Path, target: Path) -> None:
@@ -63,7 +61,7 @@ def rescue(path: Path, target: Path) -> None:
     except OSError as error:
         raise image.cannot_write(target, error) from error
     aside = layout.completing_path(target)
-    image.store(target, meta, text, journal.blocks(), journal.annotations, aside=aside, replace=False)
+    image.store(target, meta, text, journal.blocks(), journal.annotations, aside=aside, replace=False, sync=True)
 
 
 def _fitted(journal: Journal, meta: RecordingMeta) -> tuple[RecordingMeta, str]:

@@ -86,6 +86,11 @@ class RecordingWriter:
         self._leave(error)
 
     @property
+    def _unique(self) -> bool:
+        """Whether the recording cannot be made again."""
+        return self._keep and not self.meta.simulated
+
+    @property
     def rows(self) -> Mapping[str, int]:
         """Rows of the streams that have had a block."""
         return self._partial.rows
@@ -103,7 +108,7 @@ class RecordingWriter:
             self.meta = with_clock_fits(self.meta, self._blocks(journal))
         self.content_digest = image.store(
             self.path, self.meta, layout.meta_text(self.meta), self._blocks(journal), self._annotations,
-            aside=layout.completing_path(journal.path), replace=self._replace,
+            aside=layout.completing_path(journal.path), replace=self._replace, sync=self._unique,
         )  # fmt: skip
 
     def _blocks(self, journal: Partial) -> Iterator[tuple[str, Columns]]:
@@ -121,7 +126,7 @@ class RecordingWriter:
         """Close the journal; remove it unless it holds rows that are nowhere else."""
         journal = self._partial
         journal.close()
-        if not self.content_digest and any(journal.rows.values()) and self._keep and not self.meta.simulated:
+        if not self.content_digest and any(journal.rows.values()) and self._unique:
             self.journal = journal.path
             found = recovery(journal.path, self.path)
             if isinstance(error, TactbenchError):

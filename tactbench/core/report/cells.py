@@ -37,6 +37,7 @@ _TITLES = {
     "recordings": "Recordings",
     "remarks": "Remarks of the recordings",
     "stamps": "Stamps",
+    "findings": "Found in the recordings",
     "replicates": "What the interval is over",
 }
 """Lists and tables."""
@@ -51,7 +52,7 @@ def details(row: Row, results: Results | None) -> Details:
     Without `results`, scores of recordings and whatever is a table are left out.
     """
     said = {name: value for name, value in row.items() if value not in (None, "", [], {}, ())}
-    of = f", replicate {row['repeat']} of {row['repeats']}" if row["repeats"] > 1 else ""
+    of = f", replicate with seed {row['seed']}" if row["repeats"] > 1 else ""
     tested = results.answers(row).get("test") if results and row["status"] == "done" else None
     classes = list(map(str, row.get("classes") or ()))
     counts = zip(classes, said.get("confusion", ()), strict=False)

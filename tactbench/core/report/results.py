@@ -43,8 +43,8 @@ class Results:
         return self.store.answers(str(row["key"]))
 
     def replicate(self, row: Row) -> Row:
-        """Return the row of the one replicate whose answers and recordings a cell's row leads to."""
-        return self.replicates.get(str(row["key"]), row)
+        """Return the row of the one replicate whose answers and recordings a cell's row leads to, with their number."""
+        return {**self.replicates.get(str(row["key"]), row), "repeats": row["repeats"]}
 
     def provenance(self) -> list[dict[str, Any]]:
         """Return what is known of the runs that the rows are from."""

@@ -45,8 +45,6 @@ class Asked(_Section):
     answer_from: str = ""
     declared_task: str = ""
     include_incomplete: bool = False
-    repeat: int = 1
-    repeats: int = 1
     seed: int = 0
     simulation: dict[str, Any] = {}
 
@@ -129,6 +127,8 @@ class RestsOn(_Section):
     emulated: bool = False
     dagger: bool = False
     stamps: list[str] = []
+    findings: list[str] = []
+    """what was found in recordings that bears on the score, what of them was left out, classes never trained on"""
     remarks: list[str] = []
     """what recordings say of themselves; what could not be done, and why"""
     assumptions: dict[str, Any] = {}
@@ -177,6 +177,8 @@ class ReplicatedRow(RowModel):
     """Several replicates of a cell as one row, as tables show them; and what a file adds to a row."""
 
     key: str = ""
+    repeats: int | None = None
+    """replicates that ended, however"""
     n_replicates: int | None = None
     replicate_unit: str | None = None
     replicate_scores: list[float] | None = None

@@ -23,7 +23,7 @@ def ranks(rows: Iterable[Row]) -> dict[str, Rank]:
     Parameters
     ----------
     rows
-        Rows of one block: of the same task, protocol, split, hardware and repeat.
+        Rows of one block: of the same task, protocol, split and hardware.
 
     Notes
     -----

@@ -11,10 +11,10 @@ from operator import itemgetter
 from statistics import median, median_low
 from typing import Any
 
-from tactbench.core.spec.row import LOWER_IS_BETTER, plural
+from tactbench.core.spec.row import LOWER_IS_BETTER, Cost, plural
 
 Row = Mapping[str, Any]
-_group = itemgetter("sensor", "task", "rig", "protocol", "split", "repeat")
+_group = itemgetter("sensor", "task", "rig", "protocol", "split")
 
 FEWEST = 5
 """Replicates that an interval or a rank needs: the range of four holds the median in 87.5 % of cases only."""
@@ -33,7 +33,7 @@ _INTERVALS = {
 
 
 def over_replicates(rows: Sequence[Row]) -> list[dict[str, Any]]:
-    """Return one row for each cell, without the number of the replicate in its name.
+    """Return one row for each cell, without the seed of the replicate in its name.
 
     Parameters
     ----------
@@ -48,17 +48,18 @@ def over_replicates(rows: Sequence[Row]) -> list[dict[str, Any]]:
         interval is that of the median (:func:`median_interval`), None of fewer than five. On recordings, and of a
         single campaign whose split holds out five units, the replicates are what is held out, and the row's own
         interval stays; of several seeds asked of the same recordings the one with the median score stands for all.
-        Times are medians. Recordings, answers and key are those of the first replicate.
+        Times are medians over what one host measured. Recordings, answers and key are those of the first replicate.
 
     Notes
     -----
-    Keys that are added: `n_replicates`, `replicate_unit`, `replicate_scores`, `seeds`, `score_min` and `score_max` (the
-    range of the replicates' scores). `recordings_right` and `recordings_asked` are means over replicates.
+    Keys that are added: `repeats` (replicates that ended, however), `n_replicates`, `replicate_unit`,
+    `replicate_scores`, `seeds`, `score_min` and `score_max` (the range of the replicates' scores). `recordings_right`
+    and `recordings_asked` are means over replicates.
     """
     groups: dict[str, list[Row]] = {}
     for row in rows:
         groups.setdefault(_name(row), []).append(row)
-    found = [_of_all(name, sorted(members, key=_number)) for name, members in groups.items()]
+    found = [_of_all(name, sorted(members, key=itemgetter("seed"))) for name, members in groups.items()]
     _fill_baselines(found)
     return found
 
@@ -86,13 +87,9 @@ def _fill_baselines(rows: Sequence[dict[str, Any]]) -> None:
 
 
 def _name(row: Row) -> str:
-    """Return the name of a row's cell without the number of the replicate."""
+    """Return the name of a row's cell without the seed of the replicate."""
     cell = str(row["cell"])
-    return cell if row.get("n_replicates") else cell.removesuffix(f"/{row.get('repeat')}")
-
-
-def _number(row: Row) -> tuple[int, int]:
-    return row.get("repeat") or 0, row.get("seed") or 0
+    return cell if row.get("n_replicates") else cell.removesuffix(f"/{row['seed']}")
 
 
 def _of_all(name: str, members: Sequence[Row]) -> dict[str, Any]:
@@ -100,10 +97,11 @@ def _of_all(name: str, members: Sequence[Row]) -> dict[str, Any]:
     if first.get("n_replicates"):
         return dict(first)
     done = [row for row in members if row["status"] == "done"]
+    named = {"cell": name, "repeats": len(members)}
     if not done:
-        return {**first, **_counted([first], len(members), "replicate", []), "replicates": {}, "cell": name}
+        return {**first, **_counted([first], len(members), "replicate", []), "replicates": {}, **named}
     found = _of_campaigns(done) if done[0]["simulated"] else _of_recordings(done)
-    return {**found, "cell": name, "repeat": first["repeat"], "remarks": _remarks(members, done)}
+    return {**found, **named, "remarks": _remarks(members, done), "findings": _told(done, "findings")}
 
 
 def _of_campaigns(done: Sequence[Row]) -> dict[str, Any]:
@@ -111,7 +109,12 @@ def _of_campaigns(done: Sequence[Row]) -> dict[str, Any]:
     first = done[0]
     if len(done) == 1 and first["ci_low"] is not None and "own" in (first.get("replicates") or {}):
         return _of_recordings(done)  # its split holds out enough of what is simulated, too: devices, placements
-    found = dict(first) | {key: _median([row.get(key) for row in done]) for key in _MEDIANS if key in first}
+    timed = next((row for row in done if row.get("fit_s") is not None), first)
+    here = [row for row in done if row["host"] == timed["host"]]
+    found = dict(first) | {key: timed[key] for key in Cost.model_fields if key in timed}
+    for key in _MEDIANS:
+        if key in first:
+            found[key] = _median([row.get(key) for row in (here if key in Cost.model_fields else done)])
     level = 0.0
     for key, (low, high) in _INTERVALS.items():
         if low in first:
@@ -120,7 +123,7 @@ def _of_campaigns(done: Sequence[Row]) -> dict[str, Any]:
             found[low], found[high] = (known.low, known.high) if known else (None, None)
             level = known.level if known else level
     scores = [row["score"] for row in done]
-    parts = _middle([row.get("delay_parts_ms") or {} for row in done])
+    parts = _middle([row.get("delay_parts_ms") or {} for row in here])
     points_of = [row.get("operating_points") or [] for row in done]
     alike = len({len(points) for points in points_of}) == 1
     covers = "" if level == LEVEL else f", {100 * level:.3g} %"
@@ -211,12 +214,17 @@ def _added(tables: Sequence[Any]) -> Any:
 
 
 def _remarks(members: Sequence[Row], done: Sequence[Row]) -> list[str]:
-    """Return what rows remark, those of a part of the replicates with their number, and which were stopped."""
-    many = len(done)
-    counts = Counter(remark for row in done for remark in dict.fromkeys(row["remarks"]))
-    texts = [remark if n == many else f"in {n} of {many} replicates: {remark}" for remark, n in counts.items()]
+    """Return what rows remark, and which were stopped."""
     stopped = [row for row in members if row["status"] != "done"]
-    return [*texts, *(f"replicate with seed {row['seed']}: {row['status']}: {row['reason']}" for row in stopped)]
+    texts = [f"replicate with seed {row['seed']}: {row['status']}: {row['reason']}" for row in stopped]
+    return [*_told(done, "remarks"), *texts]
+
+
+def _told(done: Sequence[Row], key: str) -> list[str]:
+    """Return the texts that rows have under a key, those of a part of the replicates with their number."""
+    many = len(done)
+    counts = Counter(text for row in done for text in dict.fromkeys(row.get(key) or ()))
+    return [text if n == many else f"in {n} of {many} replicates: {text}" for text, n in counts.items()]
 
 
 @dataclass(frozen=True)

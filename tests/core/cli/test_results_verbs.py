@@ -25,7 +25,7 @@ def ran(tmp_path_factory):
             for estimator, score in (("ols", 0.52), ("lasso", 0.5), ("mean", 1.5)):
                 for seed, one in enumerate((score + worse + 0.02 * rng.standard_normal(5)).tolist(), 1):
                     named = {"sensor": sensor, "estimator": estimator, "is_baseline": estimator == "mean"}
-                    of_it = {"protocol": "deployable", "seed": seed, "repeat": seed, "repeats": 5, "fit_s": 1.0}
+                    of_it = {"protocol": "deployable", "seed": seed, "fit_s": 1.0}
                     cell = f"{sensor}/force/twin/deployable/{estimator}/{seed}"
                     made.kept(store, cell, score=one, **named, **of_it)
     return verbs

@@ -38,6 +38,9 @@ def test_what_is_set_is_in_row_recording_score_and_why_and_is_found_again(verbs)
     assert usual["recordings"] != row["recordings"]
     assert usual["score"] != row["score"]
     assert "0 computed now; 0 recordings made now" in verbs(*RUN, *SET).stderr
+    (damaged,) = verbs.folder.rglob(row["recordings"][0])
+    damaged.write_bytes(damaged.read_bytes()[:-100])
+    assert "0 computed now; 1 recordings made now" in verbs(*RUN, *SET).stderr
     facts = json.loads(verbs("why", "ols/1", "--format", "json").stdout)
     assert facts["simulation"]["nuisances"] == {"placement_scatter_mm": 0.3, "taxel_white_count": 2.0}
     (verbs.folder / "set.yaml").write_text(

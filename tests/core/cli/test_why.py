@@ -10,7 +10,7 @@ from tests.core.matrix.plugin_packages import write_acme
 
 RUN = ("run", "--repeats", "1", "--sensor", "ideal", "--task", "force", "--estimator", "acme", "--estimator",
        "acme-raises", "--effects", "-drift", "--seed", "3")  # fmt: skip
-ACME, MEAN = (f"ideal/force/twin/karl2016/{name}/1" for name in ("acme", "mean"))
+ACME, MEAN = (f"ideal/force/twin/karl2016/{name}/3" for name in ("acme", "mean"))
 
 
 @pytest.fixture(scope="module")
@@ -36,7 +36,7 @@ def here(made, tmp_path):
     return call
 
 
-def why(here, cell="acme/1", *options, **how):
+def why(here, cell="acme/3", *options, **how):
     return json.loads(here("why", cell, *options, "--format", "json", **how).stdout)
 
 

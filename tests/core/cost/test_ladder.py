@@ -9,6 +9,7 @@ import pytest
 
 from tactbench.core.cost.ladder import climb
 from tactbench.core.cost.ladder_file import write_ladder
+from tactbench.core.evaluation.delay import NO_LINK
 from tactbench.core.matrix.store import Store
 from tactbench.core.plugins.registry import load_registry
 from tactbench.core.progress import Progress
@@ -53,7 +54,7 @@ def test_what_is_timed_is_what_was_scored_whatever_was_chosen_on_validation_data
     # 100 Hz recordings of a sensor that states neither rate nor link.
     assert set(by_name["ridge"]["delay_parts_ms"]) == {"sampling", "window", "features", "prediction"}
     assert by_name["ridge"]["delay_parts_ms"]["sampling"] == pytest.approx(10.0)
-    assert ladder.about["remarks"] == ["link delay unknown: the answer delay is without it"]
+    assert ladder.about["remarks"] == [NO_LINK]
     assert (by_name["knn"]["n_features"], by_name["time-index"]["n_features"]) == (3, 1)
 
 

@@ -11,7 +11,7 @@ TASK = TaskSpec(
 
 
 def row(sensor="a", estimator="lasso", score=0.5, **more):
-    cell = Cell(sensor, "question", "twin", "deployable", "session", estimator, (), estimator == "mean", 1, 1, 1)
+    cell = Cell(sensor, "question", "twin", "deployable", "session", estimator, (), estimator == "mean", 1)
     filled = opening(cell, TASK) | {
         "status": "done", "score": score, "ci_low": (score or 0) - 0.1, "ci_high": (score or 0) + 0.1, "n_test": 4400,
         "n_sessions": 1, "fit_s": 0.5, "predict_s": 1.0, "batch_rows": 1000, "latency_ms_p50": 0.02,

@@ -43,7 +43,7 @@ def table():
                 for seed, one in enumerate(np.broadcast_to(each, 8).tolist(), 1):
                     floor = {"score_beyond_floor": max(0.0, one**2 - 0.65**2) ** 0.5} if task == "force" else {}
                     rows.append(
-                        row(sensor, name, one, seed=seed, repeat=seed, repeats=8, task=task, is_baseline=trivial,
+                        row(sensor, name, one, seed=seed, task=task, is_baseline=trivial,
                             looks_at="time" if name == "time-index" else "features", protocol="karl2016", dagger=True,
                             cell=f"{sensor}/{task}/twin/karl2016/{name}/{seed}", **more, **floor, **delay,
                             published={("icub", "forest"): 0.795, ("biotac", "forest"): 0.5}.get((sensor, name)))

@@ -33,7 +33,7 @@ def answers(n: int, seed: int = 0) -> Answers:
 def row(cell: str, status: str = "done", score: float | None = 1.0, **more):
     """Return a row with every key of the format."""
     task = load_registry().tasks["force"].spec
-    whole = opening(Cell("icub", "force", "twin", "karl2016", "roles", "mean", (), False, 1, 1, 1), task)
+    whole = opening(Cell("icub", "force", "twin", "karl2016", "roles", "mean", (), False, 1), task)
     score = score if status == "done" else None
     known = {"score": score, "ci_low": score, "ci_high": score, "n_recordings": 1, "n_sessions": 1, "n_test": 3}
     told = known if status == "done" else {"reason": "a test says so"}

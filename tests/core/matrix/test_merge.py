@@ -137,11 +137,11 @@ def test_what_stands_in_the_way_is_named_and_nothing_is_left(tmp_path):
 
 
 def test_the_verb_writes_the_tables_that_leaderboard_shows_with_levels(verbs):
-    for repeat, name in ((1, "one"), (2, "two")):
-        holding(verbs.folder / name, f"icub/force/twin/karl2016/mean/{repeat}", repeat=repeat, repeats=2, seed=repeat)
+    for seed, name in ((1, "one"), (2, "two")):
+        holding(verbs.folder / name, f"icub/force/twin/karl2016/mean/{seed}", seed=seed)
     write_level(verbs.folder / "two", "icub", {"level": "silver"})
     assert verbs("merge", "one", "two", "--out", "both").stdout == "both\n"
     written = (verbs.folder / "both" / "leaderboard.json").read_text()
     (line,) = json.loads(written)
-    assert (line["n_replicates"], line["shown"]["level"]) == (2, OTHER_VERSION)
+    assert (line["n_replicates"], line["repeats"], line["shown"]["level"]) == (2, 2, OTHER_VERSION)
     assert verbs("leaderboard", "both", "--format", "json").stdout == written

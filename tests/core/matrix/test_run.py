@@ -1,15 +1,18 @@
 """A run: what is computed when, what rows say of their times, and that scores depend on neither jobs nor engine."""
 
+import json
+
 import pytest
 
 from tactbench.core.errors import UsageError
-from tactbench.core.matrix.merge import SEED_DECIDES
+from tactbench.core.leaderboard.formats import rendered
+from tactbench.core.matrix.merge import SEED_DECIDES, merge
 from tactbench.core.matrix.run import EngineChoice, run_matrix
-from tactbench.core.matrix.solve import TIMED
 from tactbench.core.matrix.store import Store
 from tactbench.core.pool import Limits
 from tactbench.core.progress import Progress
 from tactbench.core.spec.matrix import EstimatorChoice, MatrixSpec, TaskChoice
+from tactbench.core.study.results import shown_rows, table_of
 from tests.core.cost.test_ladder import presses
 from tests.here import IN_THIS_PROCESS
 
@@ -59,8 +62,8 @@ def ran(shelf, tmp_path_factory):
 
 def test_every_planned_cell_has_a_row_in_the_order_of_the_plan(ran):
     outcome, heard, folder = ran
-    names = [f"made/force/replay/deployable:session/{one}/{repeat}"
-             for repeat in (1, 2) for one in ("forest-10", "ridge", "mean", "time-index")]  # fmt: skip
+    names = [f"made/force/replay/deployable:session/{one}/{seed}"
+             for seed in (1, 2) for one in ("forest-10", "ridge", "mean", "time-index")]  # fmt: skip
     assert [row["cell"] for row in outcome.rows] == names
     assert {row["status"] for row in outcome.rows} == {"done"}
     assert (outcome.computed, outcome.recorded, outcome.failures) == (8, 0, [])
@@ -71,16 +74,14 @@ def test_every_planned_cell_has_a_row_in_the_order_of_the_plan(ran):
     assert all(len(row["recordings"]) == 3 for row in outcome.rows)
 
 
-def test_times_are_taken_in_the_first_replicate_alone_and_the_row_says_so(ran):
+def test_times_are_taken_in_the_first_replicate_alone(ran):
     for row in ran[0].rows:
         times = [row[name] for name in ("fit_s", "predict_s", "latency_ms_p50", "latency_n")]
-        if row["repeat"] == 1:
+        if row["seed"] == 1:
             assert all(time is not None for time in times)
-            assert TIMED in row["remarks"]
             assert (row["concurrency"], row["latency_n"] >= 20) == (1, True)
         else:
             assert times == [None] * 4
-            assert TIMED not in row["remarks"]
             assert row["concurrency"] == 2
         assert row["wall_s"] > 0
 
@@ -94,8 +95,26 @@ def test_a_second_run_computes_nothing_and_a_changed_number_of_repeats_is_no_cha
     folder, heard = ran[-1], Heard()
     again = run_matrix(matrix(repeats=1), Store(folder), recordings=shelf, progress=heard)
     assert (again.computed, heard.stages) == (0, [])
-    assert {(row["repeat"], row["repeats"]) for row in again.rows} == {(1, 1)}
-    assert {(row["repeat"], row["repeats"]) for row in Store(folder).rows()} == {(1, 1), (2, 2)}
+    assert {row["seed"] for row in again.rows} == {1}
+    assert {row["seed"] for row in Store(folder).rows()} == {1, 2}
+
+
+def test_runs_of_other_seeds_merged_are_one_run(ran, shelf, tmp_path):
+    """Of any seeds: a seed of both, which one of them timed, is taken once."""
+    for name, seed, repeats in (("a", 1, 1), ("b", 2, 1), ("c", 2, 2)):
+        run_matrix(matrix(seed=seed, repeats=repeats), Store(tmp_path / name), choice=IN_THIS_PROCESS, recordings=shelf)
+
+    def table(folder):
+        store = Store(folder)
+        return rendered(table_of(store, shown_rows(store), times=False), "json")
+
+    both = merge([tmp_path / "a", tmp_path / "b"], tmp_path / "both")
+    assert decided(both.rows) == decided(ran[0].rows)
+    assert json.loads(table(tmp_path / "both"))[0]["seeds"] == [1, 2]
+    assert table(tmp_path / "both") == table(ran[-1])
+    whole = merge([ran[-1], tmp_path / "c"], tmp_path / "whole")
+    timed = {row["seed"]: row["latency_n"] is not None for row in whole.rows if row["estimator"] == "ridge"}
+    assert timed == {1: True, 2: True, 3: False}
 
 
 @pytest.mark.parametrize(

@@ -14,7 +14,8 @@ from hypothesis import strategies as st
 
 from tactbench.core.errors import FolderError, FormatError
 from tactbench.core.matrix.store import Store
-from tactbench.core.matrix.store.cell_file import read_cell
+from tactbench.core.matrix.store import store as STORE
+from tactbench.core.matrix.store.cell_file import CellFile, read_cell
 from tactbench.core.samples import Answers
 from tests.conftest import ROOT
 
@@ -50,11 +51,11 @@ def test_the_latest_of_a_name_counts(tmp_path):
     with Store(tmp_path).hold() as store:
         kept(store, "a", "timeout", key=key(1))
         assert store.finished(key(1)) is None
-        kept(store, "a", key=key(1), repeats=1)
+        kept(store, "b", key=key(1))
         kept(store, "a", "failed", key=key(2))
-        assert [one["status"] for one in store.rows()] == ["failed"]
-        # Found again by its key: it is the latest now, as it is asked for today; the one that failed is gone.
-        again = {**store.finished(key(1)), "repeats": 3}
+        assert [one["status"] for one in store.rows()] == ["failed", "done"]
+        # Found again by its key: it is the latest now, under the name of today; the one that failed is gone.
+        again = {**store.finished(key(1)), "cell": "a"}
         store.reuse(again)
         assert store.rows() == [again]
         assert len(list((tmp_path / "cells").glob("*.h5"))) == 1
@@ -65,7 +66,29 @@ def test_the_latest_of_a_name_counts(tmp_path):
         kept(store, "a", key=key(3), score=2.0)
     found = Store(tmp_path)
     assert [one["key"] for one in found.rows()] == [key(3)]
-    assert (len(found.answers(key(1))["test"]), found.finished(key(1))["repeats"]) == (3, 3)
+    assert (len(found.answers(key(1))["test"]), found.finished(key(1))["cell"]) == (3, "a")
+
+
+def test_cells_that_are_named_by_their_number_among_the_repeats_are_read_under_their_seed(tmp_path):
+    """Of folders written before replicates were named by their seeds, those that never had a key among them."""
+    (tmp_path / "cells").mkdir()
+    for old in (row("a/1", repeat=1, seed=3), row("b/1", "failed", repeat=1, seed=3)):
+        file_of(tmp_path, old["cell"]).write_bytes(CellFile(old, SECTIONS).content())
+    found = Store(tmp_path)
+    assert [one["cell"] for one in found.rows()] == ["a/3", "b/3"]
+    assert all(found.cell(one).row == one for one in found.rows())
+
+
+def test_an_answer_from_other_recordings_supersedes_the_older_one_and_that_is_known(tmp_path):
+    with Store(tmp_path).hold() as store:
+        first = kept(store, "a", key=key(1), digests=["x"])
+        kept(store, "a", key=key(2), digests=["x"])  # of another version, from the same recordings
+        kept(store, "b", key=key(3), digests=["y"])
+        assert store.superseded == []
+        kept(store, "a", key=key(4), digests=["y"])
+        assert store.superseded == ["a"]
+        store.reuse(first)
+        assert store.superseded == ["a", "a"]
 
 
 def test_a_damaged_file_is_told_left_out_and_replaced(tmp_path):
@@ -186,8 +209,8 @@ def test_a_folder_that_cannot_be_made_is_refused(tmp_path):
 def test_the_queries_of_the_page_run(tmp_path):
     page = (ROOT / "docs" / "results.md").read_text()
     with Store(tmp_path / "tactbench-results").hold() as store:
-        for repeat in (10, 2):
-            kept(store, f"a/{repeat}", repeat=repeat, score=float(repeat))
+        for seed in (10, 2):
+            kept(store, f"a/{seed}", seed=seed, score=float(seed))
         kept(store, "b/1", "failed")
         assert [one["cell"] for one in store.rows()] == ["a/2", "a/10", "b/1"], "replicates as numbers"
     found = []
@@ -199,3 +222,11 @@ def test_the_queries_of_the_page_run(tmp_path):
     assert stopped == [("b/1", "failed", "a test says so")]
     assert {line[0] for line in everything} == {"a/10", "a/2", "b/1"}
     assert {json.loads(line[-1])["cell"] for line in everything} == {"a/10", "a/2", "b/1"}
+
+
+def test_a_cell_that_is_read_back_otherwise_is_none(tmp_path, monkeypatch):
+    monkeypatch.setattr(STORE, "replace_file", lambda path, content: path.write_bytes(content[:-1]))
+    with Store(tmp_path).hold() as store:
+        with pytest.raises(FolderError, match="read back"):
+            kept(store, "a")
+        assert (store.finished(key("a")), store.rows(), list(tmp_path.glob("cells/*"))) == (None, [], [])

@@ -48,6 +48,8 @@ LOST = StreamCounts(received=N + 20, written=N, dropped=7, duplicates=2, gaps=5)
         ({"t_ns": JITTER}, {"irregular": "mean rate"}),
         (late(100, -50_000_000), {"backward": "row 100"}),
         (late(100, -10_000_000), {"repeated-time": "1 "}),
+        ({"t_ns": 500 * TIMES}, {"rate": "0.2 Hz: ms read as s?"}),
+        ({"t_ns": 1_700_000_000_000_000_000 + 500 * TIMES}, {}),  # of this century: a row a press
         ({"clock": "none"}, {"no-clock": ""}),
         ({"excluded": "it slipped off"}, {"excluded": "it slipped off"}),
         ({"force": None}, {"absent": "force_torque"}),

@@ -25,9 +25,10 @@ def kept(version, digest):
     [
         (2, "ec0bc4f35085db5b3da669083822bff1c8b37a39b1a4dfd6228c37f1ce7267c3"),
         (3, "fdf030b9e327789f876a8b93aa36e494cb12d1e45910b14b49e08cc30b65cd7b"),
+        (4, "d740feeac823dfc55e6d38ef7dc182849dde96356cc8ae05d2d48fc7ad1eda67"),
     ],
 )
-def test_versions_2_and_3(version, digest):
+def test_versions_from_2_on(version, digest):
     meta, taxels, _ = kept(version, digest)
     n = np.arange(180)
     assert (meta.emulation.time, meta.counts) == ("real", {"pad parity errors": 1})

@@ -19,7 +19,7 @@ from tests.core.leaderboard.rows import row
 def replicates(scores, sensor="a", estimator="lasso", **more):
     """Rows of one simulated cell, one a seed."""
     return [
-        row(sensor, estimator, score=score, seed=seed, repeat=seed, repeats=len(scores), fit_s=float(seed),
+        row(sensor, estimator, score=score, seed=seed, fit_s=float(seed),
             key=str(seed), cell=f"{sensor}/question/twin/deployable/{estimator}/{seed}", **more)
         for seed, score in enumerate(scores, 1)
     ]  # fmt: skip
@@ -38,6 +38,14 @@ def test_eight_replicates_are_one_row_with_their_median_and_its_interval():
     assert (found["score_min"], found["score_max"], found["fit_s"]) == (0.2, 0.9, 4.5)
 
 
+def test_times_are_those_of_the_host_that_timed_the_first_and_no_others():
+    rows = [one | {"host": "ab"[one["seed"] > 3], "sim_s": 2.0} for one in replicates(SCORES)]
+    rows[0] |= {"status": "timeout", "score": None}
+    rows[1] |= {"fit_s": None, "host": "c"}
+    (found,) = over_replicates(rows)
+    assert (found["host"], found["fit_s"], found["seeds"]) == ("a", 3.0, list(range(2, 9)))
+
+
 def test_fewer_than_five_have_no_interval_and_share_a_rank():
     rows = over_replicates([*replicates(SCORES[:4]), *replicates(SCORES[4:], "b")])
     assert all(one["ci_low"] is None and one["ci_high"] is None for one in rows)
@@ -52,12 +60,14 @@ def test_rows_are_the_same_in_any_order_and_aggregated_once():
 
 
 def test_what_some_replicates_remark_is_told_with_their_number_and_a_stopped_one_takes_no_other_down():
-    rows = [one | {"remarks": ["always", *(["at times"] if one["seed"] < 3 else [])]} for one in replicates(SCORES)]
+    told = {one["seed"]: ["always", "at times"][: 2 if one["seed"] < 3 else 1] for one in replicates(SCORES)}
+    rows = [one | dict.fromkeys(("remarks", "findings"), told[one["seed"]]) for one in replicates(SCORES)]
     rows[2] |= {"status": "timeout", "score": None, "reason": "10 s were not enough"}
     (found,) = over_replicates(rows)
     assert (found["status"], found["n_replicates"]) == ("done", 7)
     stopped = "replicate with seed 3: timeout: 10 s were not enough"
-    assert found["remarks"] == ["always", "in 2 of 7 replicates: at times", stopped]
+    assert found["remarks"] == [*found["findings"], stopped]
+    assert found["findings"] == ["always", "in 2 of 7 replicates: at times"]
 
 
 def test_recordings_keep_the_interval_over_what_is_held_out_and_fewer_than_five_have_their_own_scores():

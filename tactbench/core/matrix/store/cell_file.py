@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from tactbench.core.errors import FormatError
+from tactbench.core.files import hdf5_image
 from tactbench.core.samples import Answers
 
 FORMAT = b"tactbench-cell 5 "
@@ -33,28 +34,28 @@ class CellFile:
     """By role; none of a cell that did not finish."""
 
     @property
+    def text(self) -> str:
+        """All but the answers, as JSON; raises ValueError or TypeError if the row is not plain data."""
+        head = {"row": self.row, "sections": self.sections, "provenance": self.provenance, "ended_ns": self.ended_ns}
+        return json.dumps(head, allow_nan=False)
+
+    @property
     def digests(self) -> dict[str, str]:
         """Of the answers, by role."""
         return {role: hashlib.sha256(_table(one).tobytes()).hexdigest() for role, one in self.answers.items()}
 
     def content(self) -> bytes:
-        """Return the bytes of the file; raises ValueError or TypeError if the row is not plain data.
-
-        Notes
-        -----
-        Built in memory: on a full disk the HDF5 library cannot even close a file.
-        """
-        import h5py
+        """Return the bytes of the file; raises ValueError or TypeError if the row is not plain data."""
         import numpy as np
 
-        head = {"row": self.row, "sections": self.sections, "provenance": self.provenance, "ended_ns": self.ended_ns}
-        text = json.dumps(head, allow_nan=False).encode()
-        image = io.BytesIO()
-        with h5py.File(image, "w", userblock_size=_USER_BLOCK) as file:
+        text = self.text.encode()
+
+        def fill(file: Any) -> None:
             file["head"] = np.bytes_(text)
             for role, answers in self.answers.items():
                 file.create_dataset(f"answers/{role}", data=_table(answers), shuffle=True, compression=4)
-        body = image.getvalue()[_USER_BLOCK:]
+
+        body = hdf5_image(fill)
         return _opening(body).ljust(_USER_BLOCK, b"\0") + body
 
 
@@ -78,6 +79,10 @@ def read_cell(path: Path, *, answers: bool = True) -> CellFile:
         raise FormatError(f"{path} {what}.", hint="Run the cell again.")
     with h5py.File(io.BytesIO(content), "r") as file:
         head = json.loads(file["head"][()])
+        row = head["row"]
+        if number := row.pop("repeat", None):  # until replicates were named by their seeds
+            name = f"{row['cell'].removesuffix(str(number))}{row['seed']}"
+            row |= {"cell": name, "key": row["key"] or path.stem}
         tables = {role: table[()] for role, table in file.get("answers", {}).items()} if answers else {}
     columns = {role: {name: table[name].copy() for name in _COLUMNS} for role, table in tables.items()}
     return CellFile(**head, answers={role: Answers(**values) for role, values in columns.items()})

@@ -18,7 +18,7 @@ from tactbench.core.errors import FormatError
 from tactbench.core.matrix.store.cell_file import CellFile, read_cell
 from tactbench.core.spec.row import FORMAT
 
-VERSION = 2
+VERSION = 3
 _LOCKED_S = 10.0
 """Seconds to wait for another process that writes the index."""
 _TYPES = {str: "TEXT", int: "INTEGER", bool: "INTEGER", float: "REAL"}
@@ -97,7 +97,7 @@ class Index:
 
     def latest(self) -> Iterator[dict[str, Any]]:
         """Yield the latest row of every cell, in the order of their names and replicates."""
-        for (text,) in self._all("SELECT row FROM latest ORDER BY rtrim(cell, '0123456789'), repeat"):
+        for (text,) in self._all("SELECT row FROM latest ORDER BY rtrim(cell, '0123456789'), seed"):
             yield json.loads(text)
 
     def provenance(self, name: str) -> dict[str, Any]:

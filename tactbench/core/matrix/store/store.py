@@ -24,8 +24,6 @@ if TYPE_CHECKING:
 Row = dict[str, Any]
 """One cell, as `tactbench.core.spec.row.RowModel` describes it."""
 
-NAMING = ("cell", "repeat", "repeats")
-"""What a matrix calls a cell; its key covers everything else."""
 _FULL = {
     errno.ENOSPC: "the disk is full",
     errno.EDQUOT: "the quota is used up",
@@ -45,6 +43,8 @@ class Store:
     def __init__(self, folder: Path) -> None:
         self.folder = folder
         self._provenance: tuple[str, Mapping[str, Any]] = ("", {})
+        self.superseded: list[str] = []
+        """Cells whose latest answer, since this was made, is no more the one from other recordings."""
 
     @contextmanager
     def hold(self) -> Iterator[Store]:
@@ -104,17 +104,21 @@ class Store:
     def reuse(self, row: Row) -> None:
         """Note that a finished cell was found again, under the name it has in `row`: it is the latest of that name."""
         latest = self._files.files_of(row["cell"])
-        known = self._files.finished(row["key"])
-        if not latest or latest[0][1] != row["key"] or known is None or known["repeats"] != row["repeats"]:
+        if not latest or latest[0][1] != row["key"]:
             cell = read_cell(self.file_of(row))
-            self._write(replace(cell, row={**cell.row, **{name: row[name] for name in NAMING}}))
+            self._write(replace(cell, row={**cell.row, "cell": row["cell"]}))
 
     def _write(self, cell: CellFile) -> None:
         cell, path = replace(cell, ended_ns=time.time_ns()), self.file_of(cell.row)
         content = cell.content()
         with writing(self.folder):
             replace_file(path, content)
-            for name, _key, status in self._files.files_of(cell.row["cell"]):
+            _check_written(path, cell)
+            before = self._files.files_of(cell.row["cell"])
+            old = self._files.finished(before[0][1]) if before else None
+            if old is not None and cell.row.get("digests") not in ([], None, old.get("digests")):
+                self.superseded.append(cell.row["cell"])
+            for name, _key, status in before:
                 if status != "done" and name != path.name:  # superseded; what was finished stays for other versions
                     (path.parent / name).unlink(missing_ok=True)
                     self._files.drop(name)
@@ -176,6 +180,18 @@ def _read_recording(path: Path) -> dict[str, Any]:
         meta = recording.meta
         scene = meta.scene.name if meta.scene else None
         return {"digest": recording.verify(), "sensor": meta.sensor.name, "scene": scene}
+
+
+def _check_written(path: Path, cell: CellFile) -> None:
+    """Read the file of a cell back; FolderError, and no file, if it holds anything else."""
+    try:
+        found = read_cell(path)
+        same = (found.text, found.digests) == (cell.text, cell.digests)
+    except FormatError:
+        same = False
+    if not same:
+        path.unlink(missing_ok=True)
+        raise FolderError(f"What is read back of {path} is not what was written.", hint="Did the disk fail?")
 
 
 @contextmanager

@@ -50,8 +50,10 @@ class RawRecording:
     """Paths below the root"""
 
 
-def find(mapping: Mapping, root: Path) -> tuple[list[FileSet], tuple[str, ...]]:
-    """Return what belongs together, in the order of the first table's paths, and what is left out, a sentence each.
+def find(mapping: Mapping, root: Path) -> tuple[list[FileSet], tuple[str, ...], tuple[str, ...]]:
+    """Return what belongs together, in the order of the first table's paths, what is left out, and other matches.
+
+    The last two are sentences.
 
     Raises
     ------
@@ -62,7 +64,8 @@ def find(mapping: Mapping, root: Path) -> tuple[list[FileSet], tuple[str, ...]]:
     if not root.is_dir():
         raise MappingError(f"There is no folder {root}.", hint="Name the folder of the data set with --root DIR.")
     left_out: list[str] = []
-    found = {name: _matching(name, source, root, left_out) for name, source in mapping.tables.items()}
+    none: list[str] = []
+    found = {name: _matching(name, source, root, left_out, none) for name, source in mapping.tables.items()}
     lead, *others = found
     shared = {name: sorted({*found[lead][0].words} & {*found[name][0].words} - {"file"}) for name in others}
     by_words: dict[str, dict[tuple[str, ...], list[FoundFile]]] = {name: {} for name in others}
@@ -88,7 +91,7 @@ def find(mapping: Mapping, root: Path) -> tuple[list[FileSet], tuple[str, ...]]:
     for name in others:
         alone = [file.shown for file in found[name] if file.shown not in used[name]]
         orphans += [f"{shown} of table {name!r} belongs to no file of table {lead!r}." for shown in alone]
-    return sets, (*left_out, *orphans)
+    return sets, (*left_out, *orphans), tuple(none)
 
 
 def read(mapping: Mapping, files: FileSet) -> list[RawRecording]:
@@ -155,7 +158,7 @@ def require_same_shape(mapping: Mapping, raw: RawRecording, shapes: dict[str, Sh
                 )
 
 
-def unused(shapes: dict[str, Shape]) -> Iterator[str]:
+def unused_columns(shapes: dict[str, Shape]) -> Iterator[str]:
     """Yield which columns of a table the mapping does not use."""
     for name, (_, _, columns, used) in shapes.items():
         left = [str(one) or str(place) for place, one in enumerate(columns) if not {one, place} & {*used}]
@@ -174,8 +177,8 @@ def asked(mapping: Mapping, name: str, topic: str = "") -> Topic:
     return Topic(topic, tuple(dict.fromkeys(numbers)), tuple(dict.fromkeys(texts)), time)
 
 
-def _matching(name: str, source: TableSource, root: Path, left_out: list[str]) -> list[FoundFile]:
-    """Return the files of a table; what matches and is none of them is named in `left_out`."""
+def _matching(name: str, source: TableSource, root: Path, left_out: list[str], none: list[str]) -> list[FoundFile]:
+    """Return the files of a table; other files that match are named in `left_out`, and what is no table in `none`."""
     ending = PurePosixPath(source.files).suffix
     ending = ending if ending[1:].isalnum() else ""
     in_any_case = "".join(f"[{mark.lower()}{mark.upper()}]" if mark.isalpha() else mark for mark in ending)
@@ -199,15 +202,16 @@ def _matching(name: str, source: TableSource, root: Path, left_out: list[str]) -
             hint="Fetch what git-annex keeps elsewhere: `datalad get FILE`; remove other links, or narrow the pattern.",
         )
     said = {
-        "folders": "matches are folders", "case": f"files end in another case than {ending!r}",
-        "macOS": "files are what macOS keeps beside others (AppleDouble)",
+        "case": f"files end in another case than {ending!r}",
         "linked": "linked folders hold matches; ** does not search them",
+        "folders": "matches are folders", "macOS": "files are what macOS keeps beside others (AppleDouble)",
     }  # fmt: skip
-    notes = [f"{pattern}: {len(kinds[kind])} {said[kind]}: {listing(kind)}" for kind in said if kinds[kind]]
-    left_out += notes
+    notes = {kind: f"{pattern}: {len(kinds[kind])} {said[kind]}: {listing(kind)}" for kind in said if kinds[kind]}
+    left_out += [note for kind, note in notes.items() if kind in ("case", "linked")]
+    none += [note for kind, note in notes.items() if kind in ("folders", "macOS")]
     if not kinds[""]:
         raise MappingError(
-            f"No file matches {pattern} in {root}{''.join(f'; {note}' for note in notes)}.",
+            f"No file matches {pattern} in {root}{''.join(f'; {note}' for note in notes.values())}.",
             hint="Check --root: the pattern starts below it.",
         )
     found = []

@@ -3,33 +3,35 @@
 from __future__ import annotations
 
 import fnmatch
+import os
 import re
+import shutil
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from dataclasses import replace as replaced
 from itertools import product
 from pathlib import Path
-from tempfile import TemporaryDirectory
+from tempfile import mkdtemp
 from typing import cast, get_args
 
 import numpy as np
 
 from tactbench.core.errors import MappingError, RecordingError
-from tactbench.core.files import writable
+from tactbench.core.files import try_lock, writable
 from tactbench.core.progress import Progress
-from tactbench.core.recording.health import MONOTONE, Finding, examine, is_copy
+from tactbench.core.recording.health import FINDINGS, MONOTONE, Finding, examine, is_copy
 from tactbench.core.recording.mapping.channels import MappedStream, device, fill, sensor_of
-from tactbench.core.recording.mapping.files import RawRecording, Shape, find, read, require_same_shape, unused
+from tactbench.core.recording.mapping.files import RawRecording, Shape, find, read, require_same_shape, unused_columns
 from tactbench.core.recording.mapping.model import MUST_NAME_SENTINELS, Arrays, Mapping, Word
 from tactbench.core.recording.mapping.samples import labels, samples, times
 from tactbench.core.recording.mapping.table import TextTable
-from tactbench.core.recording.mapping.tasks import check_tasks, place_tasks, require_answerable, tasks_text
-from tactbench.core.recording.reader import content_digest, open_recording
+from tactbench.core.recording.mapping.tasks import check_tasks, require_answerable, tasks_text, write_tasks
+from tactbench.core.recording.reader import UnwrittenRecording, content_digest
 from tactbench.core.recording.writer import RecordingWriter
-from tactbench.core.samples import Block, FloatArray
-from tactbench.core.spec.recording import RecordingMeta, Scalar
+from tactbench.core.samples import Block, FloatArray, StreamData
+from tactbench.core.spec.recording import RecordingMeta, Scalar, composed
 from tactbench.core.spec.scene import Role
 from tactbench.core.spec.sensor import SensorSpec, StreamSpec
 from tactbench.core.spec.yaml_file import load_yaml
@@ -38,6 +40,8 @@ RIG = "import"
 """What an imported recording says about its rig: somebody else's, made known by a mapping."""
 
 ENDING = ".h5"
+WAITING, PLACING = ".importing-", ".placing-"
+"""Folders in which the recordings of an import wait, and from which they are being moved to their place."""
 _FILE_NAME = re.compile(r"^[A-Za-z0-9][A-Za-z0-9._-]*$")
 
 
@@ -69,7 +73,7 @@ class ImportReport:
     left_out: tuple[str, ...] = ()
     """Matches that make no recording, and why"""
     unused: tuple[str, ...] = ()
-    """Columns that the mapping does not use, a sentence a table"""
+    """Matches that are no tables, and columns that the mapping does not use, a sentence a table"""
 
     @property
     def sensors(self) -> tuple[str, ...]:
@@ -127,7 +131,12 @@ def import_tables(
     sensor, reference, streams = sensor_of(loaded)
     require_answerable(loaded, streams, mapping)
     tasks = tasks_text(loaded)
-    sets, left_out = find(loaded, mapping.parent if root is None else root)
+    sets, left_out, unused = find(loaded, mapping.parent if root is None else root)
+    beside: list[Finding] = []
+    if left_out:
+        more = f" And {len(left_out) - 1} more." if left_out[1:] else ""
+        text = f"its import left files out: {left_out[0]}{more}"
+        beside.append(Finding("left-out", "warning", "", (), len(left_out), text))
     made: list[Imported] = []
     origins: dict[str, str] = {}
     shapes: dict[str, Shape] = {}
@@ -135,7 +144,7 @@ def import_tables(
     one_each = not loaded.split_by and not isinstance(next(iter(loaded.tables.values())).read, Arrays)
     if one_each:
         progress.begin(f"importing {mapping.stem}", len(sets))
-    with _aside(out) as folder:
+    with aside(out) as folder:
         for files in sets:
             raws = read(loaded, files)
             if not one_each:
@@ -144,39 +153,76 @@ def import_tables(
                 require_same_shape(loaded, raw, shapes)
                 meta = _meta(loaded, raw, sensor, reference)
                 _unique_name(meta, origins)
-                made.append(_write(folder / f"{meta.name}{ENDING}", meta, loaded, raw, streams))
+                made.append(_write(folder / f"{meta.name}{ENDING}", meta, loaded, raw, streams, beside))
                 progress.advance(meta.name)
         check_tasks(out, tasks, replace=replace)
-        placed = _place(made, out, replace=replace)
-        place_tasks(out, folder, tasks)
+        write_tasks(folder, tasks)
+        placed = _fitting(made, out, replace=replace)
+        with writable(out):
+            _place(folder.rename(folder.with_name(folder.name.replace(WAITING, PLACING))), out)
     names = tuple(task.name for task in loaded.tasks)
     shown = {file.shown for files in sets for file in files.files.values()}
-    return ImportReport(loaded.title, tuple(placed), len(shown), names, left_out, tuple(unused(shapes)))
+    return ImportReport(loaded.title, tuple(placed), len(shown), names, left_out, (*unused, *unused_columns(shapes)))
 
 
 @contextmanager
-def _aside(out: Path) -> Iterator[Path]:
+def aside(out: Path) -> Iterator[Path]:
     """Give the folder in which recordings wait until all of them are good; hidden, so that no rig replays it.
 
-    Folders that were made for an import that is refused are removed again.
+    What an import that was killed has left is removed, or moved to its place if that had begun. Folders that were made
+    for an import that is refused are removed again.
     """
     made = [folder for folder in (out, *out.parents) if not folder.exists()]
     with writable(out):
         out.mkdir(parents=True, exist_ok=True)
-        waiting = TemporaryDirectory(prefix=".importing-", dir=out)
+        for name, end in ((WAITING, _remove), (PLACING, _place)):
+            for left in out.glob(f"{name}*"):
+                with _locked(left) as free:
+                    if free:
+                        end(left, out)
+        folder = Path(mkdtemp(prefix=WAITING, dir=out))
     try:
-        with waiting as folder:
-            yield Path(folder)
+        with _locked(folder):
+            yield folder
     except BaseException:
+        _remove(folder)
         for empty in made:
             with suppress(OSError):
                 empty.rmdir()
         raise
+    _remove(folder)
+
+
+@contextmanager
+def _locked(folder: Path) -> Iterator[bool]:
+    """Lock the folder of an import for this process; give whether no other process has it."""
+    lock = os.open(folder / ".lock", os.O_RDWR | os.O_CREAT, 0o666)
+    try:
+        yield bool(try_lock(lock))
+    finally:
+        os.close(lock)
+
+
+def _remove(folder: Path, _out: Path | None = None) -> None:
+    shutil.rmtree(folder, ignore_errors=True)
+
+
+def _place(folder: Path, out: Path) -> None:
+    """Move everything that waits in `folder` to `out`; as long as the folder is there, rigs do not replay `out`."""
+    for path in sorted(folder.glob("[!.]*")):
+        path.replace(out / path.name)
+    _remove(folder)
 
 
 def _write(
-    path: Path, meta: RecordingMeta, mapping: Mapping, raw: RawRecording, streams: dict[str, MappedStream]
+    path: Path,
+    meta: RecordingMeta,
+    mapping: Mapping,
+    raw: RawRecording,
+    streams: dict[str, MappedStream],
+    beside: Sequence[Finding],
 ) -> Imported:
+    """Write one recording; `beside` was found in the import as a whole."""
     counts: dict[str, int] = {}
     missing: dict[str, int] = {}
     clocks = {
@@ -186,9 +232,10 @@ def _write(
     }
     sensed: dict[str, FloatArray] = {}
     reference: dict[str, FloatArray] = {}
+    written: list[StreamData] = []
     with RecordingWriter(path, meta, keep=False) as writer:
         for name, stream in streams.items():
-            table = raw.tables[stream.source.table]
+            table, clock = raw.tables[stream.source.table], clocks.get(stream.source.table)
             read_in = samples(stream, table)
             columns = zip(stream.spec.channels, np.where(read_in.quality, np.nan, read_in.data).T, strict=True)
             for channel, column in columns:
@@ -196,15 +243,18 @@ def _write(
                     sensed[channel.name] = column
                 elif channel.kind in MUST_NAME_SENTINELS:
                     reference[channel.name] = column
-            writer.append(Block(name, clocks.get(stream.source.table), read_in.data, read_in.quality))
-            for label, annotation in stream.source.annotations.items():
-                writer.annotate(name, label, labels(label, annotation, table))
+            writer.append(Block(name, clock, read_in.data, read_in.quality))
+            notes = {label: labels(label, one, table) for label, one in stream.source.annotations.items()}
+            for label, values in notes.items():
+                writer.annotate(name, label, values)
+            written.append(StreamData(stream.spec, clock, read_in.data, read_in.quality, notes))
             missing.update(read_in.missing)
             counts[f"rows of {name}"] = len(table)
         counts |= {f"{channel} without a sample": number for channel, number in missing.items()}
-        writer.revise(counts=counts)
-    with open_recording(path) as written:
-        findings = (*examine(written), *_given_away(sensed, reference), *_trailing_delimiters(raw))
+        found = examine(UnwrittenRecording(meta, written))
+        findings = (*beside, *found, *_given_away(sensed, reference), *_trailing_delimiters(raw))
+        told = [asdict(one) for one in findings if one.severity != "info"]
+        writer.revise(counts=counts, provenance={FINDINGS: told})
     rows = max(len(table) for table in raw.tables.values())
     return Imported(path, meta.name, rows, meta.sensor.name, missing, meta.excluded, meta.origin, findings)
 
@@ -267,12 +317,12 @@ def _derived(name: str, word: Word, words: dict[str, Scalar], origin: str) -> st
             f"The word {name!r} is made of {word.of!r}, which nothing gives; there are: {', '.join(sorted(words))}.",
             hint="Words may be made of words above them.",
         )
-    given = str(words[word.of])
+    given = composed(str(words[word.of]))
     if word.divided_by is not None:
         if not given.isdecimal():
             raise MappingError(f"{origin}: the word {word.of!r} is {given!r}, no whole number.", hint="Use `values`.")
         return str(int(given) // word.divided_by)
-    known = {str(key): value for key, value in (word.values or {}).items()}
+    known = {composed(str(key)): value for key, value in (word.values or {}).items()}
     if given not in known:
         raise MappingError(
             f"{origin}: {word.of} {given!r} has no translation for {name!r}; there are: {', '.join(known)}.",
@@ -304,9 +354,8 @@ def _unique_name(meta: RecordingMeta, origins: dict[str, str]) -> None:
     origins[folded] = meta.origin
 
 
-def _place(made: Sequence[Imported], out: Path, *, replace: bool) -> list[Imported]:
-    """Move finished recordings to their place, after all of them have been found to fit there."""
-    to_move = []
+def _fitting(made: Sequence[Imported], out: Path, *, replace: bool) -> list[Imported]:
+    """Return recordings as they will lie in `out`; those that it holds already do not wait any longer."""
     for one in made:
         target = out / one.path.name
         if target.exists() and not replace:
@@ -315,11 +364,7 @@ def _place(made: Sequence[Imported], out: Path, *, replace: bool) -> list[Import
                     f"{target} exists already and holds something else.",
                     hint="Give another folder with --out DIR, or replace it with --replace.",
                 )
-            continue
-        to_move.append((one.path, target))
-    with writable(out):
-        for path, target in to_move:
-            path.replace(target)
+            one.path.unlink()
     return [replaced(one, path=out / one.path.name) for one in made]
 
 

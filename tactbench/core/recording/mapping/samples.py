@@ -15,6 +15,7 @@ from tactbench.core.recording.mapping.model import MUST_NAME_SENTINELS, Annotati
 from tactbench.core.recording.mapping.table import Table, nanoseconds_per
 from tactbench.core.samples import FloatArray, IntArray, Quality
 from tactbench.core.spec import units
+from tactbench.core.spec.recording import composed
 
 REPEATED_SHARE = 0.05
 """A single value outside the range of all others in more than this share of the rows is taken for a sentinel."""
@@ -141,9 +142,9 @@ def labels(name: str, annotation: Annotation, table: Table) -> npt.NDArray[Any]:
             )
         return np.arange(len(table), dtype=np.int64) // annotation.rows_per
     assert annotation.column is not None  # the model says: either rows_per or a column
-    texts = table.texts(annotation.column)
+    texts = [composed(text) for text in table.texts(annotation.column)]
     if annotation.values is not None:
-        known = {str(key): value for key, value in annotation.values.items()}
+        known = {composed(str(key)): composed(value) for key, value in annotation.values.items()}
         for row, text in enumerate(texts):
             if text not in known:
                 raise MappingError(

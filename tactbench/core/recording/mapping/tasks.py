@@ -66,10 +66,8 @@ def check_tasks(out: Path, text: str, *, replace: bool) -> None:
         )
 
 
-def place_tasks(out: Path, aside: Path, text: str) -> None:
-    """Write the tasks into `aside` and move them to `out`; raises UnwritableError."""
-    if not text:
-        return
-    with writable(out / FILE):
-        (aside / FILE).write_text(text, encoding="utf-8")
-        (aside / FILE).replace(out / FILE)
+def write_tasks(folder: Path, text: str) -> None:
+    """Write the tasks into a folder; raises UnwritableError."""
+    if text:
+        with writable(folder / FILE):
+            (folder / FILE).write_text(text, encoding="utf-8")

@@ -102,7 +102,7 @@ class Group:
         words = "-".join(filter(None, (*parts, "" if row["simulated"] else row["rig"])))
         name = re.sub(r"[^a-z0-9]+", "-", words.lower()).strip("-")
         # Of several replicates, or of several seeds of the same recordings, a figure of single answers shows one.
-        shown = f"replicate {row['repeat']} of {row['repeats']}" if row["repeats"] > 1 else ""
+        shown = f"replicate with seed {row['seed']}" if row["repeats"] > 1 else ""
         heading = [row["task"], answer_name(row), row["protocol"] + (" †" if row["dagger"] else "")]
         if row["split"] not in (None, "roles"):
             heading.append(f"split {row['split']}" + (" ‡" if row["stamps"] else ""))

@@ -1,11 +1,16 @@
 """Foreign tables of every shape become recordings; every misfit is refused with its place, and nothing is left."""
 
+import re
+import unicodedata
+
 import numpy as np
 import openpyxl
 import pytest
 import scipy.io
 
 from tactbench.core.errors import MappingError
+from tactbench.core.recording.health import marking
+from tactbench.core.recording.reader import open_recording
 from tactbench.core.samples import Quality
 
 from .made import read, rows
@@ -208,6 +213,9 @@ def test_a_file_without_a_partner_costs_its_own_recording_and_is_named(tables):
     report = tables.run(JOINED)
     assert [made.name for made in report.recordings] == ["1"]
     assert [text.split()[0] for text in report.left_out] == ["2_probe/sensor.csv", "3_probe/states.csv"]
+    with open_recording(report.recordings[0].path) as recording:
+        (mark,) = marking(recording)
+    assert re.fullmatch(r"its import left files out: 2_probe/sensor.csv .* And 1 more\.", mark.message)
 
 
 def test_one_file_of_several_sessions(tables):
@@ -288,7 +296,31 @@ def test_a_force_among_the_sensors_columns_is_warned_of(tables, columns):
     assert warned == ([] if columns == "1..3" else [("warning", ("t4",))])
 
 
-def test_times_in_a_wrong_unit_are_warned_of(tables):
+def test_times_in_a_wrong_unit_are_warned_of_and_that_is_kept_with_the_recording(tables):
     tables.put("press.csv", "".join(f"{10 * row},{row},2,3,{row}\n" for row in range(40)))
     (made,) = tables.run().recordings
     assert any(one.check == "rate" and one.message.endswith("ms read as s?") for one in made.findings)
+    read(tables.run())  # its content is what was written
+    with open_recording(made.path) as recording:
+        kept = recording.meta.provenance["findings"]
+        assert [one["check"] for one in kept] == [one.check for one in made.findings if one.severity != "info"]
+        assert [one.check for one in marking(recording)] == ["rate"]
+
+
+def test_a_word_in_two_forms_of_unicode_is_one(tables):
+    composed = "caf\u00e9"
+    for n, form in enumerate(("NFC", "NFD")):
+        name = unicodedata.normalize(form, composed)
+        tables.put(f"{n}-{name}.csv", "".join(f"{row},{row},2,3,{row},{name}\n" for row in range(9)))
+    report = tables.run(
+        """
+        words: {short: {of: word, values: {café: c}}}
+        recording: {name: "{n}-{short}", session: "{word}", labels: {object: "{word}"}}
+        """,
+        tables__table__path="(?P<n>.)-(?P<word>.*).csv",
+        streams__taxels__annotations={"again": {"column": 5}},
+    )
+    for number in range(2):
+        meta, streams = read(report, number)
+        assert (meta.session, meta.labels["object"]) == (composed, composed)
+        assert set(streams["taxels"].annotations["again"]) == {composed}
