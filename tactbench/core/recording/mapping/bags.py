@@ -14,7 +14,7 @@ from typing import Any
 
 from tactbench.core.errors import MappingError, did_you_mean
 from tactbench.core.recording.mapping.model import Column
-from tactbench.core.recording.mapping.table import MESSAGE_TIMES, BagTable, plain
+from tactbench.core.recording.mapping.table import MESSAGE_TIMES, ColumnTable, plain
 
 
 @dataclass(frozen=True)
@@ -32,7 +32,7 @@ class Topic:
         return tuple(dict.fromkeys((*self.numbers, *self.texts, *([] if self.time is None else [self.time]))))
 
 
-def read_bag(path: Path, shown: str, topics: Mapping[str, Topic]) -> dict[str, BagTable]:
+def read_bag(path: Path, shown: str, topics: Mapping[str, Topic]) -> dict[str, ColumnTable]:
     """Read topics of one bag in one pass, by the name of their table.
 
     Raises
@@ -40,7 +40,7 @@ def read_bag(path: Path, shown: str, topics: Mapping[str, Topic]) -> dict[str, B
     MappingError
         If the extra is missing, the bag is damaged or cut short, has no such topic, or messages lack a field.
     """
-    tables = {name: BagTable(f"{shown} {topic.name}") for name, topic in topics.items()}
+    tables = {name: ColumnTable(f"{shown} {topic.name}") for name, topic in topics.items()}
     takers: dict[int, list[Callable[[Any], None]]] = {}
     schemas: dict[int, Any] = {}
     seen: set[str] = set()
@@ -98,7 +98,7 @@ def _decoder(channel: Any, schema: Any, shown: str) -> Callable[[bytes], Any]:
     return found
 
 
-def _taker(table: BagTable, topic: Topic, decode: Any) -> Callable[[Any], None]:
+def _taker(table: ColumnTable, topic: Topic, decode: Any) -> Callable[[Any], None]:
     """Return what adds one message to `table`."""
     numbers = [(table.found.setdefault(column, array("d")), _path(column), column) for column in topic.numbers]
     texts = [(table.words.setdefault(column, []), _path(column), column) for column in topic.texts]

@@ -17,7 +17,7 @@ from tactbench.core.recording.mapping.parquet import read_parquet
 from tactbench.core.recording.mapping.samples import check_join
 from tactbench.core.recording.mapping.sheets import read_sheet
 from tactbench.core.recording.mapping.signatures import require_format
-from tactbench.core.recording.mapping.table import BagTable, Table, names_listed
+from tactbench.core.recording.mapping.table import ColumnTable, Table, names_listed
 from tactbench.core.recording.mapping.text import read_text
 
 Words = dict[str, str]
@@ -112,12 +112,12 @@ def read(mapping: Mapping, files: FileSet) -> list[RawRecording]:
         how = mapping.tables[name].read
         assert not isinstance(how, Arrays)  # the model refuses an archive beside other tables
         if isinstance(how, Bag):
-            tables[name] = BagTable(file.shown)  # keeps its place; read below, all topics of a bag at once
+            tables[name] = ColumnTable(file.shown)  # keeps its place; read below, all topics of a bag at once
             topics.setdefault(file, {})[name] = asked(mapping, name, how.topic)
         elif isinstance(how, Xlsx):
             tables[name] = read_sheet(file.path, file.shown, how)
         elif isinstance(how, Parquet):
-            tables[name] = read_parquet(file.path, file.shown, asked(mapping, name).columns)
+            tables[name] = read_parquet(file.path, file.shown, asked(mapping, name))
         else:
             tables[name] = read_text(file.path, file.shown, how)
     for file, wanted in topics.items():

@@ -3,72 +3,77 @@
 from __future__ import annotations
 
 import importlib
-from collections.abc import Sequence
+from array import array
+from decimal import Decimal
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-import numpy.typing as npt
-
 from tactbench.core.errors import MappingError, did_you_mean
-from tactbench.core.recording.mapping.model import Column
-from tactbench.core.recording.mapping.table import ParquetTable, names_listed
+from tactbench.core.recording.mapping.bags import Topic
+from tactbench.core.recording.mapping.table import ColumnTable, names_listed, plain
 
 
-def read_parquet(path: Path, shown: str, columns: Sequence[Column]) -> ParquetTable:
-    """Read some columns; the places of a list, equally long in every row, are columns called ``name.0``, ``name.1`` ...
+def read_parquet(path: Path, shown: str, used: Topic) -> ColumnTable:
+    """Read the columns that are used; the places of a list, equally long in every row, are ``name.0``, ``name.1`` ...
 
     Raises
     ------
     MappingError
-        If pyarrow is not installed, the file is damaged, a column is not in it, or lists differ in length.
+        If pyarrow is not installed, the file is damaged or empty, lacks a column, lists differ in length, or there are
+        no numbers where numbers are expected.
     """
     try:
-        parquet: Any = importlib.import_module("pyarrow.parquet")
+        arrow, parquet = importlib.import_module("pyarrow"), importlib.import_module("pyarrow.parquet")
     except ImportError as error:
         raise MappingError(
             f"{shown} is a Parquet file, which needs pyarrow: {error}.",
             hint="Install it with `pip install 'tactbench[parquet]'`.",
         ) from error
+    asked = [str(column) for column in used.columns]
     try:
-        schema = parquet.read_schema(path)
-        used = [name for name in schema.names if any(str(one) == name or _list_of(one) == name for one in columns)]
-        read = parquet.read_table(path, columns=used)
+        names = parquet.read_schema(path).names
+        read = parquet.read_table(path, columns=[one for one in names if {one} & {*asked, *map(_list_of, asked)}])
     except Exception as error:  # whatever a damaged file makes of the library
         raise MappingError(f"{shown} cannot be read as a Parquet file: {error}.", hint="Get it again.") from error
-    found: dict[Column, npt.NDArray[Any]] = {}
-    for name in used:
-        found |= _flat(shown, name, read.column(name))
-    for column in columns:
-        if column not in found:
-            names = [*dict.fromkeys([*map(str, found), *schema.names])]
-            hint = f"{did_you_mean(str(column), names)}It has: {names_listed(names)}."
-            raise MappingError(f"{shown} has no column {column!r}.", hint=hint)
     if not read.num_rows:
         raise MappingError(f"{shown} has no rows.", hint="Remove the file.")
-    every = (*found, *(name for name in schema.names if name not in used))
-    return ParquetTable(shown, found, every, np.arange(read.num_rows))
+    found: dict[str, Any] = {}
+    for name in read.column_names:
+        found |= _flat(shown, name, read.column(name))
+    every = (*found, *(name for name in names if name not in read.column_names))
+    for one in asked:
+        if one not in found:
+            hint = f"{did_you_mean(one, every)}It has: {names_listed(every)}."
+            raise MappingError(f"{shown} has no column {one!r}.", hint=hint)
+    table = ColumnTable(shown, rows=[*range(read.num_rows)], columns=every, row="row")
+    for column in used.numbers:
+        try:
+            table.found[column] = array("d", found[str(column)].cast("float64").to_numpy(zero_copy_only=False))
+        except arrow.ArrowException as error:
+            hint = f"Name another column; {error}."
+            raise MappingError(f"{shown}: {column!r} holds no numbers.", hint=hint) from error
+    for column in used.texts:
+        table.words[column] = [plain(value) for value in found[str(column)].to_pylist()]
+    if used.time is not None:
+        stamps = found[str(used.time)]
+        stamps = stamps.cast("string") if arrow.types.is_timestamp(stamps.type) else stamps
+        table.stamps.extend(Decimal(one) if isinstance(one, int) else one for one in stamps.to_pylist())
+    return table
 
 
-def _list_of(column: Column) -> str:
-    return str(column).rpartition(".")[0]
+def _list_of(column: str) -> str:
+    return column.rpartition(".")[0]
 
 
-def _flat(shown: str, name: str, values: Any) -> dict[Column, npt.NDArray[Any]]:
-    """Return a column, or those of its lists; dates as ISO 8601 texts."""
-    import pyarrow.types as kinds
-
-    if kinds.is_timestamp(values.type):
-        return {name: values.cast("string").to_numpy(zero_copy_only=False)}
+def _flat(shown: str, name: str, values: Any) -> dict[str, Any]:
+    """Return a column, or those of its lists."""
+    kinds, compute = importlib.import_module("pyarrow.types"), importlib.import_module("pyarrow.compute")
     if not (kinds.is_list(values.type) or kinds.is_large_list(values.type) or kinds.is_fixed_size_list(values.type)):
-        return {name: values.to_numpy(zero_copy_only=False)}
-    rows = values.combine_chunks()
-    lengths = rows.value_lengths().to_numpy(zero_copy_only=False)
-    other = np.flatnonzero(lengths != lengths[:1])
-    if len(other):
+        return {name: values}
+    first, *other = compute.list_value_length(values).unique().to_pylist()
+    if other:
         raise MappingError(
-            f"{shown}, row {other[0]}: {name!r} has {lengths[other[0]]} values, {lengths[0]:g} in row 0.",
-            hint="Lists of different lengths are no columns.",
+            f"{shown}: the lists of {name!r} have {first} values, and {other[0]}.",
+            hint="Only lists of one length are read.",
         )
-    places = rows.flatten().to_numpy(zero_copy_only=False).reshape(len(rows), -1)
-    return {f"{name}.{place}": places[:, place] for place in range(places.shape[1])}
+    return {f"{name}.{place}": compute.list_element(values, place) for place in range(first)}

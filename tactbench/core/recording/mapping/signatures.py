@@ -12,9 +12,6 @@ _FORMAT = "Write `format: {}` under `read`."
 _SIGNATURES: tuple[tuple[bytes, str, str, str], ...] = (
     # first bytes; what the file is; the format that reads it; the next step
     (b"\x1f\x8b", "is compressed with gzip", "", "Unpack it: `gunzip FILE`."),
-    (b"BZh91AY&SY", "is compressed with bzip2", "", "Unpack it: `bunzip2 FILE`."),
-    (b"\xfd7zXZ\0", "is compressed with xz", "", "Unpack it: `unxz FILE`."),
-    (b"\x28\xb5\x2f\xfd", "is compressed with zstd", "", "Unpack it: `unzstd FILE`."),
     (b"PK\x03\x04", "is a zip archive", "", "Unpack it: `unzip FILE`."),
     (b"\xd0\xcf\x11\xe0", "is a workbook of Excel before 2007 (.xls)", "", "Save the sheet as .xlsx or CSV."),
     (b"\xff\xfe", "is text in UTF-16", "", "Convert it: `iconv -f UTF-16 -t UTF-8 FILE > NEW`."),

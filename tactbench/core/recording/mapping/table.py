@@ -197,7 +197,7 @@ class ArrayTable:
 
     def nanoseconds(self, time: Time) -> IntArray:
         """Return the clock, (n,) whole nanoseconds, rounded once; MappingError for a non-time."""
-        return _array_times(self, self._column(time.column), time)
+        return _array_times(self, self._column(time.column).tolist(), time)
 
     def take(self, rows: Sequence[int]) -> ArrayTable:
         """Return some of the rows."""
@@ -224,19 +224,21 @@ MESSAGE_TIMES = ("log_time", "publish_time")
 
 
 @dataclass(frozen=True)
-class BagTable:
-    """The messages of one topic, a row each, in the order of the bag; of their fields those that were asked for."""
+class ColumnTable:
+    """Those columns that the mapping uses: fields of the messages of one topic, or columns of a Parquet file."""
 
     shown: str
-    """Name of file and topic for messages"""
+    """Name of the file, and the topic, for messages"""
     found: dict[Column, array[float]] = field(default_factory=dict)
     words: dict[Column, list[str]] = field(default_factory=dict)
     stamps: list[Any] = field(default_factory=list)
     """Of the topic's time: whole nanoseconds, or numbers in the mapping's unit"""
     rows: list[int] = field(default_factory=list)
-    """Numbers of the messages, from 0"""
+    """Numbers of the rows in the file, from 0"""
     columns: tuple[Column, ...] = ()
-    """None: other fields are not looked at"""
+    """All columns of the file; of a bag none, whose other fields are not looked at"""
+    row: str = "message"
+    """What a row is"""
 
     def __len__(self) -> int:
         return len(self.rows)
@@ -251,27 +253,27 @@ class BagTable:
 
     def nanoseconds(self, time: Time) -> IntArray:
         """Return the topic's time, (n,) nanoseconds; MappingError for a stamp whose unit is said to be another."""
-        column, per_unit = time.column, nanoseconds_per(time)
-        whole = column in MESSAGE_TIMES or isinstance(self.stamps[0], int)
-        if whole and per_unit != 1:
-            raise MappingError(f"{self.shown}: {column} is in nanoseconds.", hint="Write `unit: ns` under `time`.")
-        if whole:
-            return np.array(self.stamps, dtype=np.int64)
-        return np.array([_scaled(one, per_unit) for one in self.stamps], dtype=np.int64)
+        if not isinstance(self.stamps[0], int):
+            return _array_times(self, self.stamps, time)
+        if nanoseconds_per(time) != 1:
+            raise MappingError(f"{self.shown}: {time.column} is in nanoseconds.", hint="Write `unit: ns` under `time`.")
+        return np.array(self.stamps, dtype=np.int64)
 
-    def take(self, rows: Sequence[int]) -> BagTable:
+    def take(self, rows: Sequence[int]) -> ColumnTable:
         """Return some of the rows."""
-        return BagTable(
+        return ColumnTable(
             self.shown,
             {column: array("d", (values[row] for row in rows)) for column, values in self.found.items()},
             {column: [values[row] for row in rows] for column, values in self.words.items()},
             [self.stamps[row] for row in rows] if self.stamps else [],
             [self.rows[row] for row in rows],
+            self.columns,
+            self.row,
         )
 
     def where(self, row: int) -> str:
-        """Return file, topic and message of a row, for messages."""
-        return f"{self.shown}, message {self.rows[row]}"
+        """Return file, topic and number of a row, for messages."""
+        return f"{self.shown}, {self.row} {self.rows[row]}"
 
 
 def plain(value: Any) -> str:
@@ -279,48 +281,7 @@ def plain(value: Any) -> str:
     return str(int(value)) if isinstance(value, float) and value.is_integer() else str(value)
 
 
-@dataclass(frozen=True)
-class ParquetTable:
-    """Columns of a Parquet file by name."""
-
-    shown: str
-    """Name of the file for messages"""
-    found: dict[Column, npt.NDArray[Any]]
-    """Those that were asked for: numbers, or objects where they are texts or dates"""
-    columns: tuple[Column, ...]
-    """Names of all"""
-    rows: npt.NDArray[np.int64]
-    """Numbers of the rows, from 0"""
-
-    def __len__(self) -> int:
-        return len(self.rows)
-
-    def numbers(self, column: Column) -> FloatArray:
-        """Return a column, (n,), with NaN where there is no sample; MappingError for what is no number."""
-        values = self.found[column]
-        if values.dtype.kind not in "iufb":
-            raise MappingError(f"{self.shown}: column {column!r} holds no numbers.", hint="Name another column.")
-        return _without_infinities(self, column, values.astype(np.float64))
-
-    def texts(self, column: Column) -> list[str]:
-        """Return a column as texts, (n,)."""
-        return [plain(value) for value in self.found[column].tolist()]
-
-    def nanoseconds(self, time: Time) -> IntArray:
-        """Return the clock, (n,) whole nanoseconds, rounded once; MappingError for a non-time."""
-        return _array_times(self, self.found[time.column], time)
-
-    def take(self, rows: Sequence[int]) -> ParquetTable:
-        """Return some of the rows."""
-        found = {column: values[list(rows)] for column, values in self.found.items()}
-        return replace(self, found=found, rows=self.rows[list(rows)])
-
-    def where(self, row: int) -> str:
-        """Return file and row, for messages."""
-        return f"{self.shown}, row {self.rows[row]}"
-
-
-Table = TextTable | ArrayTable | BagTable | ParquetTable
+Table = TextTable | ArrayTable | ColumnTable
 """Rows and columns of one recording."""
 
 _DATE = re.compile(r"(\d{4}-\d\d-\d\d[T ]\d\d:\d\d:\d\d)(?:[.,](\d{1,9})\d*)?\s*(Z|[+-]\d\d:?\d\d)?")
@@ -360,11 +321,11 @@ def _since_1970(date: re.Match[str], time: Time) -> int:
     return (when - _EPOCH) // timedelta(seconds=1) * 10**9 + int(f"{fraction or '':0<9}")
 
 
-def _array_times(table: Table, values: npt.NDArray[Any], time: Time) -> IntArray:
+def _array_times(table: Table, values: Sequence[Any], time: Time) -> IntArray:
     per_unit, times = nanoseconds_per(time), np.empty(len(values), dtype=np.int64)
-    for row, value in enumerate(values.tolist()):
+    for row, value in enumerate(values):
         try:
-            date = _DATE.fullmatch(str(value)) if isinstance(value, str) else None
+            date = _DATE.fullmatch(value) if isinstance(value, str) else None
             times[row] = _since_1970(date, time) if date else _scaled(value, per_unit)
         except MappingError as error:
             raise MappingError(f"{table.where(row)}: column {time.column}: {error.message}", hint=error.hint) from error

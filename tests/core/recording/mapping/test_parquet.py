@@ -70,7 +70,7 @@ def test_stamps_are_dates(tables):
 @pytest.mark.parametrize(
     ("state", "change", "says"),
     [
-        ([[1, 2, 3, 4]] * 11 + [[1, 2, 3]], {}, "row 11: 'observation.state' has 3 values"),
+        ([[1, 2, 3, 4]] * 11 + [[1, 2, 3]], {}, "'observation.state' have 4 values, and 3"),
         ([[1, 2, 3]] * 12, {}, "no column 'observation.state.3'"),
         (None, {"streams__force__channels__0__columns": "forces"}, "no column 'forces'"),
         (None, {"streams__force__channels__0__columns": "task"}, "'task' holds no numbers"),
