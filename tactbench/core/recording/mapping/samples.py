@@ -100,17 +100,17 @@ def times(table: Table, time: Time) -> IntArray:
 def wrap_period(t_ns: IntArray, units_ns: Sequence[int] = (1, 10**3, 10**6, 10**9)) -> int:
     """Return after how many nanoseconds a clock that runs backwards begins at 0 again, if it is such a counter, or 0.
 
-    It is one of 16, 24 or 32 bits of one of the units if every step backwards leads from within twenty median steps
-    below its end to within as many above 0.
+    It is one of 16, 24 or 32 bits of one of the units if every step backwards leads from within twenty median steps, or
+    a sixteenth of its range, below its end to within as many above 0.
     """
     steps = np.diff(t_ns)
     back = np.flatnonzero(steps < 0)
     if not len(back) or not (steps > 0).any():
         return 0
-    near = 20 * float(np.median(steps[steps > 0]))
+    before, after, near = t_ns[back], t_ns[back + 1], 20 * float(np.median(steps[steps > 0]))
     for period in (unit * 2**bits for unit in units_ns for bits in (16, 24, 32)):
-        before, after = t_ns[back], t_ns[back + 1]
-        if ((before < period) & (before >= period - near) & (after >= 0) & (after <= near)).all():
+        least = max(period - near, period * 15 / 16)
+        if ((least <= before) & (before < period) & (after >= 0) & (after <= period - least)).all():
             return int(period)
     return 0
 
