@@ -94,7 +94,9 @@ class TextTable:
             if not 1 <= len(first) <= 3 or any(len(group) != 3 for group in groups):
                 return ""
             whole = whole.replace(self.thousands, "")
-        return "" if "." in whole + rest else f"{whole}{mark and '.'}{rest}"
+        if "." in whole + rest:  # beside a decimal comma: 1700000000.25 is a number, 1.234 may be a thousand and more
+            return "" if mark or _GROUPS.fullmatch(whole) else cell
+        return f"{whole}{mark and '.'}{rest}"
 
     def _value(self, cell: str) -> float:
         """Return the number in a cell, NaN for no sample; infinity: there is none."""
@@ -285,6 +287,7 @@ Table = TextTable | ArrayTable | ColumnTable
 """Rows and columns of one recording."""
 
 _DATE = re.compile(r"(\d{4}-\d\d-\d\d[T ]\d\d:\d\d:\d\d)(?:[.,](\d{1,9})\d*)?\s*(Z|[+-]\d\d:?\d\d)?")
+_GROUPS = re.compile(r"[-+]?[1-9]\d{0,2}(\.\d{3})+")
 _EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
 _MARKS = ",.'’ \u00a0\u202f"
 """What separates decimals and thousands in the world."""

@@ -38,7 +38,13 @@ def test_decimals_and_thousands(tables, cells, how):
 
 
 @pytest.mark.parametrize(
-    ("cell", "how"), [("1.5", {"decimal": ","}), ("0,5", {"thousands": ","}), ("1,23,456", {"thousands": ","})]
+    ("cell", "how"),
+    [
+        ("1.500", {"decimal": ","}),
+        ("1.234,5", {"decimal": ","}),
+        ("0,5", {"thousands": ","}),
+        ("1,23,456", {"thousands": ","}),
+    ],
 )
 def test_a_number_written_otherwise_than_the_mapping_says_is_refused(tables, cell, how):
     """Dropping every comma would make 5 of 0,5."""
@@ -47,6 +53,12 @@ def test_a_number_written_otherwise_than_the_mapping_says_is_refused(tables, cel
         f"press.csv:2: column 1: '{cell}'",
         tables__table__read={"format": "csv", "header": False, "delimiter": ";", **how},
     )
+
+
+def test_a_time_with_a_point_beside_decimal_commas(tables):
+    tables.put("press.csv", "1700000000.25;1,5;2;3;4\n1700000000.5;1,25;2;3;5\n")
+    made = taxels(tables.run(tables__table__read={"format": "csv", "header": False, "delimiter": ";", "decimal": ","}))
+    assert (made.data[:, 0].tolist(), made.t_ns[0]) == ([1.5, 1.25], 1_700_000_000_250_000_000)
 
 
 def test_a_row_of_units_and_comments_are_left_out(tables):
