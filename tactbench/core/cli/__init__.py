@@ -5,6 +5,7 @@ from __future__ import annotations
 import errno
 import gc
 import importlib
+import io
 import os
 import sys
 from typing import Any
@@ -81,6 +82,7 @@ def main(arguments: list[str] | None = None) -> None:
     # ones takes a sixth of the time of an import.
     gc.set_threshold(100_000, 50, 100)
     keep_threads()
+    _open_streams()
     try:
         code: Any = cli.main(args=arguments, prog_name="tactbench", standalone_mode=False)
         sys.stdout.flush()  # what is still held back may be refused as well
@@ -97,6 +99,17 @@ def main(arguments: list[str] | None = None) -> None:
     except Exception as error:
         code = _tell(error)
     sys.exit(code if isinstance(code, int) else 0)
+
+
+def _open_streams() -> None:
+    """Have what is printed be no error: streams that are closed lead nowhere, what is no UTF-8 is written out."""
+    for number, name in enumerate(("stdin", "stdout", "stderr")):
+        if getattr(sys, name) is None:  # a file that is opened later would get this number, and what is printed
+            stream = open(os.devnull, "w" if number else "r")  # noqa: PTH123, SIM115
+            os.set_inheritable(stream.fileno(), True)
+            setattr(sys, name, stream)
+    if isinstance(sys.stdout, io.TextIOWrapper):
+        sys.stdout.reconfigure(errors="backslashreplace")
 
 
 _KEPT = {

@@ -42,10 +42,10 @@ class Recorder:
 
 def foreign_components(registry: Registry, request: RecordingRequest) -> tuple[str, ...]:
     """Return the names of effects and of an indenter of other packages that making a recording may import."""
-    shape, known = request.scene.indenter.shape, registry.indenters
-    effects = taking_part(registry, request.sensor, request.scene)
-    indenters = [known.owned(shape)] if shape is not None and shape in known else []
-    return tuple(one.descriptor.name for one in (*effects, *indenters) if not one.ours)
+    effects, indenters = taking_part(registry, request.sensor, request.scene), registry.indenters
+    shape = str(request.scene.indenter.shape)
+    foreign = [shape] if shape in indenters and not indenters.owned(shape).ours else []
+    return (*(one.descriptor.name for one in effects if not one.ours), *foreign)
 
 
 def is_computed(request: RecordingRequest) -> bool:

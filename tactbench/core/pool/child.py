@@ -98,7 +98,8 @@ def _redirect(log: str) -> None:
         os.dup2(opened, descriptor)
     os.close(opened)
     if isinstance(sys.stdout, io.TextIOWrapper):
-        sys.stdout.reconfigure(line_buffering=True)  # what was printed before a crash is in the log, in its order
+        # What was printed before a crash is in the log, in its order; a text that is no UTF-8 is written out.
+        sys.stdout.reconfigure(line_buffering=True, errors="backslashreplace")
 
 
 class _Terminated(BaseException):

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from tactbench.core.errors import FormatError
+from tactbench.core.files import utf8_json
 from tactbench.core.samples import Answers
 
 FORMAT = b"tactbench-cell 5 "
@@ -20,10 +21,10 @@ _COLUMNS = tuple(column.name for column in fields(Answers))
 
 @dataclass(frozen=True)
 class CellFile:
-    """What the file of a cell holds."""
+    """What the file of a cell holds; making one raises ValueError or TypeError if the row is not plain data."""
 
     row: dict[str, Any]
-    """As `tactbench.core.spec.row.RowModel` describes it."""
+    """As `tactbench.core.spec.row.RowModel` describes it; its texts are UTF-8 whatever was given."""
     sections: Mapping[str, Any] = field(default_factory=dict)
     """What its key is made of, by section."""
     provenance: Mapping[str, Any] = field(default_factory=dict)
@@ -32,13 +33,17 @@ class CellFile:
     answers: Mapping[str, Answers] = field(default_factory=dict)
     """By role; none of a cell that did not finish."""
 
+    def __post_init__(self) -> None:
+        text = json.dumps(self.row, allow_nan=False, ensure_ascii=False)
+        object.__setattr__(self, "row", json.loads(utf8_json(text)))
+
     @property
     def digests(self) -> dict[str, str]:
         """Of the answers, by role."""
         return {role: hashlib.sha256(_table(one).tobytes()).hexdigest() for role, one in self.answers.items()}
 
     def content(self) -> bytes:
-        """Return the bytes of the file; raises ValueError or TypeError if the row is not plain data.
+        """Return the bytes of the file.
 
         Notes
         -----
