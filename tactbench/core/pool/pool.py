@@ -19,6 +19,7 @@ from typing import Any, Self
 import psutil
 
 from tactbench.core.errors import CellStopped, Crashed, OutOfMemory, TimedOut
+from tactbench.core.interrupts import interrupts_held
 from tactbench.core.pool.child import end_of, plain_error, run_child
 from tactbench.core.pool.limits import UNLIMITED, Limits, resident_mb
 
@@ -107,10 +108,11 @@ class Pool(Engine):
 
     def __exit__(self, *_: object) -> None:
         """End every process that is at work."""
-        super().__exit__()
-        self._abandoned.set()
-        for thread in self._threads:
-            thread.join()
+        with interrupts_held():
+            super().__exit__()
+            self._abandoned.set()
+            for thread in self._threads:
+                thread.join()
 
     def outcomes(self) -> Iterator[tuple[Any, Any]]:
         """Yield every submitted item with its result or the error that stopped it, in the order in which they end."""
