@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import os
 import signal
+import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
@@ -17,18 +19,34 @@ ONE_S = 1.0
 _raised_s = -ONE_S
 
 
+class Interrupted(KeyboardInterrupt):
+    """Raised for a signal, whose number it carries: after a KeyboardInterrupt itself, Python may end by SIGINT."""
+
+
 def interrupt(number: int, _frame: FrameType | None) -> None:
-    """Raise KeyboardInterrupt with the number of the signal."""
+    """Raise Interrupted; handles SIGTERM and SIGHUP."""
     global _raised_s
     if time.monotonic() - _raised_s >= ONE_S:
         _raised_s = time.monotonic()
-        raise KeyboardInterrupt(number)
+        raise Interrupted(number)
 
 
 def end_alike() -> None:
     """Have SIGTERM and SIGHUP raise KeyboardInterrupt as Ctrl-C does; one that is ignored (``nohup``) stays ignored."""
     for number in _handled(signal.SIG_DFL):
         signal.signal(number, interrupt)
+    sys.unraisablehook = _again
+
+
+def _again(dropped: Any) -> None:
+    """Send a signal once more where Python dropped what it raised: in a weak reference's callback, in ``__del__``."""
+    global _raised_s
+    if isinstance(dropped.exc_value, KeyboardInterrupt):
+        _raised_s = -ONE_S
+        number = dropped.exc_value.args[0] if dropped.exc_value.args else signal.SIGINT
+        threading.Timer(0.01, os.kill, (os.getpid(), number)).start()
+    else:
+        sys.__unraisablehook__(dropped)
 
 
 @contextmanager
@@ -45,7 +63,7 @@ def one_interrupt() -> Iterator[Callable[[], None]]:
 
     def first(number: int, _frame: FrameType | None) -> None:
         ignore()
-        raise KeyboardInterrupt(number)
+        raise Interrupted(number)
 
     with _handling(before, first):
         yield ignore

@@ -15,7 +15,7 @@ from typing import Any
 import click
 
 import tactbench
-from tactbench.core.interrupts import ENDING, end_alike
+from tactbench.core.interrupts import ENDING, Interrupted, end_alike
 from tactbench.core.on_demand import contributed
 from tactbench.core.thread_limit import keep_threads
 
@@ -132,8 +132,7 @@ def _interrupted(arguments: list[str] | None, error: BaseException) -> int:
         sys.stdout.flush()
     except OSError:  # the terminal is gone
         _discard_output()
-    by = error.args[0] if isinstance(error, KeyboardInterrupt) and error.args else signal.SIGINT
-    return 128 + int(by)
+    return 128 + (error.args[0] if isinstance(error, Interrupted) else signal.SIGINT)
 
 
 def _ignore_signals() -> None:

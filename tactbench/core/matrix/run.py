@@ -198,10 +198,13 @@ class Run:
         computed = all(is_computed(request) for request in missing.values())
         # The operator's terminal belongs to this process.
         here = self.operator is not None and not computed
-        with InProcess() if here else self.choice.recorder(computed=computed) as recorder:
-            self._submit_recordings(recorder, missing.values(), computed=computed)
-            for request, outcome in recorder.outcomes():
-                self._recorded(request, outcome)
+        try:
+            with InProcess() if here else self.choice.recorder(computed=computed) as recorder:
+                self._submit_recordings(recorder, missing.values(), computed=computed)
+                for request, outcome in recorder.outcomes():
+                    self._recorded(request, outcome)
+        finally:
+            self._clear(missing.values())  # of an interrupted run, too
 
     def _clear(self, requests: Iterable[RecordingRequest]) -> None:
         """Remove what a simulation that was killed has left; what devices gave is never removed."""
