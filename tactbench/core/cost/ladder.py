@@ -15,6 +15,7 @@ from tactbench.core.errors import NotApplicable, UsageError, error_text
 from tactbench.core.evaluation.dataset import load_dataset
 from tactbench.core.evaluation.delay import answer_delay_ms, tail_ms
 from tactbench.core.evaluation.metrics import metric_called
+from tactbench.core.files import named_file
 from tactbench.core.matrix.run import EngineChoice, Outcome, run_matrix
 from tactbench.core.matrix.store import Row, Store
 from tactbench.core.plugins.registry import Registry
@@ -82,7 +83,7 @@ def climb(
         )
     outcome = run_matrix(matrix, store, choice=choice, recordings=recordings, progress=progress)
     done = [row for row in outcome.rows if row["status"] == "done" and row["seed"] == matrix.seed]
-    data = load_dataset(task, [store.folder / path for path in done[0]["recordings"]]) if done else None
+    data = load_dataset(task, [store.folder / named_file(path) for path in done[0]["recordings"]]) if done else None
     answers = over_replicates(outcome.rows)
     rows: dict[str, Record] = {}
     timed_estimators: dict[str, TimedEstimator] = {}

@@ -47,6 +47,17 @@ def test_rows_answers_and_what_the_key_is_made_of_come_back_bit_for_bit(tmp_path
     assert (found.provenance(second["made_by"]), found.provenance("unknown")) == ({"cpu": "b"}, {})
 
 
+def test_texts_that_are_no_utf8_are_written_out(tmp_path):
+    """Bytes of a file name that is no UTF-8 are lone surrogates in Python's texts."""
+    with Store(tmp_path).hold() as store:
+        store.begin({"argv": ["\udce9"]})
+        given = kept(store, "a/\udce9", "failed", reason="\udcff 𝄞", remarks=["\ud834"], params={"\udce9": 1})
+    (found,) = Store(tmp_path).rows()
+    assert found == given
+    told = {name: found[name] for name in ("cell", "reason", "remarks", "params")}
+    assert told == {"cell": r"a/\udce9", "reason": r"\udcff 𝄞", "remarks": [r"\ud834"], "params": {r"\udce9": 1}}
+
+
 def test_the_latest_of_a_name_counts(tmp_path):
     with Store(tmp_path).hold() as store:
         kept(store, "a", "timeout", key=key(1))

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from tactbench.core.errors import FolderError, FormatError
-from tactbench.core.files import replace_file, try_lock
+from tactbench.core.files import named_file, replace_file, try_lock
 from tactbench.core.matrix.store.cell_file import CellFile, read_cell
 from tactbench.core.matrix.store.index import Index
 from tactbench.core.provenance.source import digest_of, provenance_id
@@ -98,8 +98,9 @@ class Store:
             If the row is not plain data; nothing is written.
         """
         kept = {**row, "made_by": self._provenance[0]}
-        self._write(CellFile(kept, sections, self._provenance[1], answers=answers or {}))
-        return kept
+        cell = CellFile(kept, sections, self._provenance[1], answers=answers or {})
+        self._write(cell)
+        return cell.row
 
     def reuse(self, row: Row) -> None:
         """Note that a finished cell was found again, under the name it has in `row`: it is the latest of that name."""
@@ -164,7 +165,7 @@ class Store:
 
     def recordings(self, row: Mapping[str, Any]) -> list[tuple[str, Path | None]]:
         """Return each recording that a row names, in its order, and its file, or None if it is not there."""
-        found = [(path, self.folder / path) for path in row["recordings"]]
+        found = [(path, self.folder / named_file(path)) for path in row["recordings"]]
         return [(path, file if file.is_file() else None) for path, file in found]
 
     def beside(self, path: Path) -> str:
