@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import atexit
 import os
 import signal
 import sys
@@ -35,6 +36,8 @@ def end_alike() -> None:
     """Have SIGTERM and SIGHUP raise KeyboardInterrupt as Ctrl-C does; one that is ignored (``nohup``) stays ignored."""
     for number in _handled(signal.SIG_DFL):
         signal.signal(number, interrupt)
+    for number in ENDING:  # what is removed when Python ends is removed whole
+        atexit.register(signal.signal, number, signal.SIG_IGN)
     sys.unraisablehook = _again
 
 
@@ -55,7 +58,6 @@ def one_interrupt() -> Iterator[Callable[[], None]]:
 
     Yields what ignores them from then on. Other threads, and who has a handler of their own, are left alone.
     """
-    before = _handled(signal.default_int_handler, interrupt)
 
     def ignore() -> None:
         for number in before:
@@ -65,26 +67,27 @@ def one_interrupt() -> Iterator[Callable[[], None]]:
         ignore()
         raise Interrupted(number)
 
-    with _handling(before, first):
+    with _handling(first) as before:
         yield ignore
 
 
 @contextmanager
 def interrupts_held() -> Iterator[None]:
     """Hold signals back until the end, where the first of them takes effect."""
-    before, came = _handled(signal.default_int_handler, interrupt), list[int]()
-    with _handling(before, lambda number, _frame: came.append(number)):
+    came: list[int] = []
+    with _handling(lambda number, _frame: came.append(number)) as before:
         yield
     for number in came[:1]:
         before[number](number, None)
 
 
 @contextmanager
-def _handling(before: dict[int, Any], handler: Callable[[int, FrameType | None], None]) -> Iterator[None]:
+def _handling(handler: Callable[[int, FrameType | None], None]) -> Iterator[dict[int, Any]]:
+    before = _handled(signal.default_int_handler, interrupt)
     for number in before:
         signal.signal(number, handler)
     try:
-        yield
+        yield before
     finally:
         for number, old in before.items():
             signal.signal(number, old)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import atexit
 import errno
 import gc
 import importlib
@@ -15,7 +14,7 @@ from typing import Any
 import click
 
 import tactbench
-from tactbench.core.interrupts import ENDING, Interrupted, end_alike
+from tactbench.core.interrupts import Interrupted, end_alike
 from tactbench.core.on_demand import contributed
 from tactbench.core.thread_limit import keep_threads
 
@@ -87,7 +86,6 @@ def main(arguments: list[str] | None = None) -> None:
     keep_threads()
     _open_streams()
     end_alike()
-    atexit.register(_ignore_signals)
     try:
         code: Any = cli.main(args=arguments, prog_name="tactbench", standalone_mode=False)
         sys.stdout.flush()  # what is still held back may be refused as well
@@ -127,18 +125,8 @@ _KEPT = {
 
 def _interrupted(arguments: list[str] | None, error: BaseException) -> int:
     words = sys.argv[1:] if arguments is None else arguments
-    try:
-        click.echo(f"Interrupted. {_KEPT.get(words[0] if words else '', '')}".strip(), err=True)
-        sys.stdout.flush()
-    except OSError:  # the terminal is gone
-        _discard_output()
+    click.echo(f"Interrupted. {_KEPT.get(words[0] if words else '', '')}".strip(), err=True)
     return 128 + (error.args[0] if isinstance(error, Interrupted) else signal.SIGINT)
-
-
-def _ignore_signals() -> None:
-    """Ignore further signals, so that what is removed when Python ends is removed whole."""
-    for number in ENDING:
-        signal.signal(number, signal.SIG_IGN)
 
 
 _REFUSALS = frozenset(getattr(errno, name, 0) for name in ("ENOSPC", "EDQUOT", "EFBIG", "EIO", "EBADF"))
