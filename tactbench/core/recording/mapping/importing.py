@@ -23,7 +23,7 @@ from tactbench.core.recording.health import MONOTONE, Finding, examine, is_copy
 from tactbench.core.recording.mapping.channels import MappedStream, device, fill, sensor_of
 from tactbench.core.recording.mapping.files import RawRecording, find, read
 from tactbench.core.recording.mapping.model import MUST_NAME_SENTINELS, Mapping, Word
-from tactbench.core.recording.mapping.samples import labels, samples, times
+from tactbench.core.recording.mapping.samples import compare_clocks, labels, samples, times
 from tactbench.core.recording.mapping.table import TextTable
 from tactbench.core.recording.mapping.tasks import check_tasks, place_tasks, require_answerable, tasks_text
 from tactbench.core.recording.reader import content_digest, open_recording
@@ -174,12 +174,14 @@ def _write(
         for name, table in raw.tables.items()
         if (time := mapping.tables[name].time) is not None
     }
+    found = [*compare_clocks(mapping, raw.tables, clocks)]
     sensed: dict[str, FloatArray] = {}
     reference: dict[str, FloatArray] = {}
     with RecordingWriter(path, meta, keep=False) as writer:
         for name, stream in streams.items():
             table = raw.tables[stream.source.table]
             read_in = samples(stream, table)
+            found.extend(read_in.findings)
             columns = zip(stream.spec.channels, np.where(read_in.quality, np.nan, read_in.data).T, strict=True)
             for channel, column in columns:
                 if stream.source.of == "sensor":
@@ -194,7 +196,7 @@ def _write(
         counts |= {f"{channel} without a sample": number for channel, number in missing.items()}
         writer.revise(counts=counts)
     with open_recording(path) as written:
-        findings = (*examine(written), *_given_away(sensed, reference), *_trailing_delimiters(raw))
+        findings = (*examine(written), *found, *_given_away(sensed, reference), *_trailing_delimiters(raw))
     rows = max(len(table) for table in raw.tables.values())
     return Imported(path, meta.name, rows, meta.sensor.name, missing, meta.excluded, meta.origin, findings)
 

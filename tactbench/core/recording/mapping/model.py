@@ -118,6 +118,8 @@ class Time(Frozen):
     unit: str
     epoch: Literal["unix", "start", "unknown"]
     """What zero is: 1970-01-01 UTC, the beginning of the recording, or nobody knows."""
+    offset_s: float = 0.0
+    """Added to the stamps [s]: the known lag of one clock behind another."""
 
     @field_validator("unit")
     @classmethod
@@ -198,7 +200,7 @@ class ChannelGroup(Frozen):
     sentinels: tuple[float, ...] | None = None
     """Numbers in the column that mean "no sample"; a force or torque must say, if only ``[]``."""
     keep_repeated: bool = False
-    """A single value outside the range of all others and often repeated is a real reading."""
+    """Without effect: repeated values are reported, and never refused. Mappings may still have it."""
     lower: float | None = None
     upper: float | None = None
     sign: Literal[-1, 0, 1] = 0
