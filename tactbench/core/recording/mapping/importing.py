@@ -25,7 +25,7 @@ from tactbench.core.recording.health import FINDINGS, MONOTONE, Finding, examine
 from tactbench.core.recording.mapping.channels import MappedStream, device, fill, sensor_of
 from tactbench.core.recording.mapping.files import RawRecording, Shape, find, read, require_same_shape, unused_columns
 from tactbench.core.recording.mapping.model import MUST_NAME_SENTINELS, Arrays, Mapping, Word
-from tactbench.core.recording.mapping.samples import labels, samples, times
+from tactbench.core.recording.mapping.samples import compare_clocks, labels, samples, times
 from tactbench.core.recording.mapping.table import TextTable
 from tactbench.core.recording.mapping.tasks import check_tasks, require_answerable, tasks_text, write_tasks
 from tactbench.core.recording.reader import UnwrittenRecording, content_digest
@@ -230,6 +230,7 @@ def _write(
         for name, table in raw.tables.items()
         if (time := mapping.tables[name].time) is not None
     }
+    found = [*compare_clocks(mapping, raw.tables, clocks)]
     sensed: dict[str, FloatArray] = {}
     reference: dict[str, FloatArray] = {}
     written: list[StreamData] = []
@@ -237,6 +238,7 @@ def _write(
         for name, stream in streams.items():
             table, clock = raw.tables[stream.source.table], clocks.get(stream.source.table)
             read_in = samples(stream, table)
+            found.extend(read_in.findings)
             columns = zip(stream.spec.channels, np.where(read_in.quality, np.nan, read_in.data).T, strict=True)
             for channel, column in columns:
                 if stream.source.of == "sensor":
@@ -251,10 +253,10 @@ def _write(
             missing.update(read_in.missing)
             counts[f"rows of {name}"] = len(table)
         counts |= {f"{channel} without a sample": number for channel, number in missing.items()}
-        found = examine(UnwrittenRecording(meta, written))
-        findings = (*beside, *found, *_given_away(sensed, reference), *_trailing_delimiters(raw))
-        told = [asdict(one) for one in findings if one.severity != "info"]
-        writer.revise(counts=counts, provenance={FINDINGS: told})
+        examined = examine(UnwrittenRecording(meta, written))
+        findings = (*beside, *examined, *found, *_given_away(sensed, reference), *_trailing_delimiters(raw))
+        kept = [asdict(one) for one in findings if one.severity != "info"]
+        writer.revise(counts=counts, provenance={FINDINGS: kept})
     rows = max(len(table) for table in raw.tables.values())
     return Imported(path, meta.name, rows, meta.sensor.name, missing, meta.excluded, meta.origin, findings)
 

@@ -148,6 +148,8 @@ class Time(Frozen):
     """Time zone of dates that state none, for example ``Europe/Berlin`` or ``UTC``."""
     wraps_at: int | None = Field(default=None, ge=2)
     """The counter begins at 0 again instead of reaching this number, for example 4294967296."""
+    offset_s: float = 0.0
+    """Added to the stamps [s]: the known lag of one clock behind another."""
 
     @field_validator("unit")
     @classmethod
@@ -238,7 +240,7 @@ class ChannelGroup(Frozen):
     sentinels: tuple[float, ...] | None = None
     """Numbers in the column that mean "no sample"; a force or torque must say, if only ``[]``."""
     keep_repeated: bool = False
-    """A single value outside the range of all others and often repeated is a real reading."""
+    """Without effect: repeated values are reported, and never refused. Mappings may still have it."""
     lower: float | None = None
     upper: float | None = None
     sign: Literal[-1, 0, 1] = 0

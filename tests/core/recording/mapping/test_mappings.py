@@ -205,6 +205,41 @@ def test_tables_that_do_not_belong_together(tables, files, says):
     tables.refused(says, text=JOINED)
 
 
+BY_CLOCK = """
+tables:
+  taxels: {files: pad.csv, read: {format: csv, header: false}, time: {column: 0, unit: s, epoch: unix}}
+  scale: {files: scale.csv, read: {format: csv, header: false}, time: {column: 0, unit: s, epoch: unix}}
+join: {by: clock}
+recording: {name: press, session: "1"}
+streams:
+  taxels: {table: taxels, channels: [{columns: 1, name: t, kind: taxel, unit: count}]}
+  force: {table: scale, of: reference, channels: [{columns: 1, name: fz, kind: force, unit: N, sentinels: []}]}
+"""
+
+
+def test_clocks_that_meet_in_part_or_not_at_all(tables):
+    def seconds(first, last):
+        return "".join(f"{1_700_000_000 + second},{second}\n" for second in range(first, last))
+
+    def found(**change):
+        report = tables.run(BY_CLOCK, replace=True, **change)
+        return [finding for finding in report.recordings[0].findings if finding.check in ("spans", "mixed-stamps")]
+
+    tables.put("pad.csv", seconds(0, 60))
+    tables.put("scale.csv", seconds(1, 61))
+    assert not found()
+    tables.put("scale.csv", seconds(50, 110))
+    (part,) = found()
+    assert "9 of 59 s in common: they begin 50 s and end 50 s apart" in part.message
+    assert not found(tables__scale__time__offset_s=-50)
+    assert "epoch" in found(tables__scale__time__epoch="unknown")[0].message
+    tables.put("scale.csv", seconds(3600, 3660))
+    for path in tables.out.iterdir():
+        path.unlink()
+    spans = ["2023-11-14T22:13:20.000Z to 2023-11-14T22:14:19.000Z", "2023-11-14T23:13:20.000Z", "3541 s"]
+    tables.refused("pad.csv", "scale.csv", *spans, text=BY_CLOCK)
+
+
 def test_a_file_without_a_partner_costs_its_own_recording_and_is_named(tables):
     tables.put("1_probe/sensor.csv", rows())
     tables.put("1_probe/states.csv", states())
@@ -239,14 +274,53 @@ def test_roles_labels_and_excluded_files(tables):
     assert (good.labels, report.excluded) == ({"weight_g": 5, "object": "good"}, {"the author says so": 1})
 
 
-def test_a_sentinel_that_nobody_named_is_refused(tables):
-    """Leaving -1 in a force must be impossible by default."""
-    tables.put("press.csv", rows(force=lambda row: -1 if row % 2 else row + 1))
+def test_sentinels_must_be_stated(tables):
+    tables.put("press.csv", rows())
     tables.refused("must state its sentinels", streams__force__channels__0__sentinels=None)
-    none = {"streams__force__channels__0__sentinels": []}
-    tables.refused("press.csv", "column 4", "-1 in 50.0 %", **none)
-    kept = tables.run(streams__force__channels__0__keep_repeated=True, **none)
-    assert not np.isnan(read(kept)[1]["force"].data).any()
+
+
+ROWS = np.arange(600)
+PRESSES = np.maximum(np.round(10 * np.sin(ROWS / 30) + 3, 1), 0)
+LEVELS = np.random.default_rng(4).uniform(2, 10, 21)[ROWS // 30]
+
+
+def some(share, value, seed=3):
+    return np.where(np.random.default_rng(seed).random(600) < share, value, PRESSES)
+
+
+def unsigned(values):
+    return np.mod(np.round(values), 2**16)
+
+
+@pytest.mark.parametrize(
+    ("column", "says"),
+    [
+        (some(0.08, 65535), "fz: 65535,"),
+        (some(0.03, -999), "`sentinels: [-999]`"),
+        (some(0.03, -1), "`sentinels: [-1]`"),
+        (np.where(ROWS % 2, -1, PRESSES), "`sentinels: [-1]`"),
+        (np.where(ROWS % 100 < 10, -1, PRESSES + 5), "`sentinels: [-1]`"),
+        (np.where(ROWS % 500 == 250, -9999, PRESSES), "`sentinels: [-9999]`"),
+        (unsigned(400 * PRESSES - 40 + ROWS % 90), "fz: jumps between 0 and 65536"),
+        (PRESSES, ""),
+        (np.minimum(PRESSES, 6), ""),
+        (np.full(600, 7), ""),
+        (np.where(ROWS % 30 < 20, np.round(LEVELS * np.sin(np.pi * (ROWS % 30) / 20), 2), 0), ""),
+        (np.where(ROWS % 30 < 20, np.round(LEVELS, 2), 0), ""),
+        (np.where(ROWS % 30 < 20, 5 + ROWS % 13 / 1000, 0), ""),
+        (np.where(ROWS % 40 < 20, 65535, 0), ""),
+        (np.random.default_rng(5).integers(0, 256, 600), ""),
+        (np.where(ROWS < 60, ROWS % 2, ROWS // 30), ""),
+    ],
+)  # fmt: skip
+def test_values_that_are_no_readings_are_reported_and_kept(tables, column, says):
+    tables.put("press.csv", rows(600, lambda row: column[row]))
+    report = tables.run(
+        streams__force__channels__0={"columns": 4, "name": "fz", "kind": "force", "unit": "N", "sentinels": []}
+    )
+    found = [finding for finding in report.recordings[0].findings if finding.check == "no-reading"]
+    assert [(one.channels, says in one.message) for one in found] == [(("fz",), True)] * bool(says)
+    assert np.array_equal(read(report)[1]["force"].data[:, 0], column)
 
 
 @pytest.mark.parametrize(
