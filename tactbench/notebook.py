@@ -24,6 +24,7 @@ from tactbench.core.evaluation.folds import PLAIN, TaskData
 from tactbench.core.evaluation.folds import load_task as folds_of
 from tactbench.core.evaluation.metrics import metric_called
 from tactbench.core.evaluation.protocols import is_probe
+from tactbench.core.files import named_file
 from tactbench.core.leaderboard.formats import records, write_tables
 from tactbench.core.leaderboard.pairwise import comparisons, record_of, tables_of, with_declared
 from tactbench.core.leaderboard.table import Table, build_table, over_all
@@ -391,7 +392,7 @@ def _beside(row: Row, name: str, given: Estimator, folder: Path) -> Row:
     """Return the row of an object that answers what another row answered, from the same recordings."""
     cell = replace(cell_of(row), estimator=name, params=(), baseline=False)
     task = with_declared_of(installed(), [row]).tasks[cell.task].spec
-    paths = [folder / one for one in row["recordings"]]
+    paths = [folder / named_file(one) for one in row["recordings"]]
     if not paths:  # no answer to this question was finished
         whose = "" if row["status"] == "skipped" else f"{row['estimator']}: "
         return unanswered(cell, task, NotApplicable(f"{whose}{row['reason']}"), simulated=row["simulated"])

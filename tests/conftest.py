@@ -103,7 +103,7 @@ class Verbs:
         from tactbench.core.plugins.registry import installed
         from tests.here import forget, make_here
 
-        thresholds = gc.get_threshold()
+        thresholds, hook = gc.get_threshold(), sys.unraisablehook
         out, err = (io.TextIOWrapper(io.BytesIO(), encoding="utf-8", write_through=True) for _ in range(2))
         with (
             contextlib.chdir(self.folder),
@@ -126,6 +126,7 @@ class Verbs:
                     main(list(arguments))
             finally:
                 gc.set_threshold(*thresholds)
+                sys.unraisablehook = hook
                 if plugins:
                     installed.cache_clear()
                 if self.here:

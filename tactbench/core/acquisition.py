@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 import importlib
-import signal
-import threading
 import time
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import AbstractContextManager, contextmanager, nullcontext
-from types import FrameType
+from collections.abc import Callable, Mapping
+from contextlib import AbstractContextManager, nullcontext
 from typing import Any
 
 from tactbench.core.errors import RigError
+from tactbench.core.interrupts import one_interrupt
 from tactbench.core.plugins.interfaces import Acquisition, RecordingRequest, Rig
 from tactbench.core.recording.completeness import INCOMPLETE, Completeness
 from tactbench.core.recording.writer import RecordingWriter
@@ -67,7 +65,7 @@ def acquire(
     simulated = request.rig.simulated
     with (
         _one_thread() if simulated else nullcontext(),
-        _one_interrupt() as ignore_interrupts,
+        one_interrupt() as ignore_interrupts,
         rig.open(request.sensor, request.scene, seed=request.seed) as acquisition,
     ):
         if opened is not None:
@@ -151,31 +149,6 @@ def _one_thread() -> AbstractContextManager[Any]:
     """Return a context in which a simulation makes the same bytes whatever number of threads BLAS was started with."""
     importlib.import_module("scipy.linalg")  # it brings a BLAS of its own: only what is loaded can be held
     return thread_limit(1)
-
-
-@contextmanager
-def _one_interrupt() -> Iterator[Callable[[], None]]:
-    """Raise KeyboardInterrupt for the first Ctrl-C and ignore further ones: what it leaves time to keep is kept.
-
-    Yields what ignores them from then on. Other threads, and who has a handler of their own, are left alone.
-    """
-
-    def ignore() -> None:
-        signal.signal(signal.SIGINT, signal.SIG_IGN)
-
-    def first(_number: int, _frame: FrameType | None) -> None:
-        ignore()
-        raise KeyboardInterrupt
-
-    in_main = threading.current_thread() is threading.main_thread()
-    if not in_main or signal.getsignal(signal.SIGINT) is not signal.default_int_handler:
-        yield lambda: None
-        return
-    signal.signal(signal.SIGINT, first)
-    try:
-        yield ignore
-    finally:
-        signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
 def _stopped(acquisition: Acquisition, error: BaseException) -> str:

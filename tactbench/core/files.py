@@ -1,8 +1,9 @@
-"""Writing a file whole or not at all, and locks."""
+"""Writing a file whole or not at all, locks, and texts that are no UTF-8."""
 
 from __future__ import annotations
 
 import os
+import re
 import uuid
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -10,6 +11,16 @@ from pathlib import Path
 from typing import Any
 
 from tactbench.core.errors import UnwritableError
+
+
+def utf8_json(text: str) -> str:
+    r"""Return JSON with the lone surrogates of its texts written out: a byte of a file name becomes ``\\udce9``."""
+    return re.sub("[\ud800-\udfff]", lambda found: rf"\\u{ord(found[0]):04x}", text)
+
+
+def named_file(text: str) -> Path:
+    """Return the path of a file whose name :func:`utf8_json` may have written out."""
+    return Path(re.sub(r"\\u(dc[89a-f][0-9a-f])", lambda found: chr(int(found[1], 16)), text))
 
 
 def try_lock(file: int) -> bool | None:

@@ -286,7 +286,8 @@ atexit.register(end_running)
 
 def main() -> None:
     """Serve the rig file of the first line of stdin; end when stdin does."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # of the whole terminal: who reads the devices has to end first
+    for number in {signal.SIGINT, getattr(signal, "SIGHUP", signal.SIGINT)}:
+        signal.signal(number, signal.SIG_IGN)  # of the whole terminal: who reads the devices has to end first
     over = threading.Event()
     file = RigFile.model_validate_json(sys.stdin.readline())
 

@@ -5,13 +5,16 @@ from __future__ import annotations
 import errno
 import gc
 import importlib
+import io
 import os
+import signal
 import sys
 from typing import Any
 
 import click
 
 import tactbench
+from tactbench.core.interrupts import Interrupted, end_alike
 from tactbench.core.on_demand import contributed
 from tactbench.core.thread_limit import keep_threads
 
@@ -76,16 +79,18 @@ def cli() -> None:
 
 
 def main(arguments: list[str] | None = None) -> None:
-    """Run the command line and exit: 0 every cell done, 1 some cell failed, 2 usage, 130 interrupted."""
+    """Run the command line and exit: 0 every cell done, 1 some cell failed, 2 usage, 130 interrupted (128 + signal)."""
     # A short-lived process that imports thousands of objects to keep: looking through them for garbage every 700 new
     # ones takes a sixth of the time of an import.
     gc.set_threshold(100_000, 50, 100)
     keep_threads()
+    _open_streams()
+    end_alike()
     try:
         code: Any = cli.main(args=arguments, prog_name="tactbench", standalone_mode=False)
         sys.stdout.flush()  # what is still held back may be refused as well
-    except (click.exceptions.Abort, KeyboardInterrupt):
-        code = _interrupted(arguments)
+    except (click.exceptions.Abort, KeyboardInterrupt) as error:
+        code = _interrupted(arguments, error.__cause__ or error)
     except click.ClickException as error:
         error.show()
         code = error.exit_code
@@ -99,6 +104,17 @@ def main(arguments: list[str] | None = None) -> None:
     sys.exit(code if isinstance(code, int) else 0)
 
 
+def _open_streams() -> None:
+    """Have what is printed be no error: streams that are closed lead nowhere, what is no UTF-8 is written out."""
+    for number, name in enumerate(("stdin", "stdout", "stderr")):
+        if getattr(sys, name) is None:  # a file that is opened later would get this number, and what is printed
+            stream = open(os.devnull, "w" if number else "r", errors="backslashreplace")  # noqa: PTH123, SIM115
+            os.set_inheritable(stream.fileno(), True)
+            setattr(sys, name, stream)
+    if isinstance(sys.stdout, io.TextIOWrapper):
+        sys.stdout.reconfigure(errors="backslashreplace")
+
+
 _KEPT = {
     "run": "What was finished is kept; the same command goes on from there.",
     "cost": "What was finished is kept; the same command goes on from there.",
@@ -107,10 +123,10 @@ _KEPT = {
 """What is left of a verb that was interrupted."""
 
 
-def _interrupted(arguments: list[str] | None) -> int:
+def _interrupted(arguments: list[str] | None, error: BaseException) -> int:
     words = sys.argv[1:] if arguments is None else arguments
     click.echo(f"Interrupted. {_KEPT.get(words[0] if words else '', '')}".strip(), err=True)
-    return 130
+    return 128 + (error.args[0] if isinstance(error, Interrupted) else signal.SIGINT)
 
 
 _REFUSALS = frozenset(getattr(errno, name, 0) for name in ("ENOSPC", "EDQUOT", "EFBIG", "EIO", "EBADF"))

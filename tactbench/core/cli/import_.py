@@ -121,14 +121,15 @@ def fields(report: ImportReport, folder: Path) -> Iterator[tuple[str, str]]:
     }  # fmt: skip
     yield from ((name, field_text(value)) for name, value in stated.items() if value)
     yield from (("excluded", f"{count} recordings: {reason}") for reason, count in report.excluded.items())
-    yield from (("left out", orphan) for orphan in report.orphans[:MOST_NAMED])
-    if len(report.orphans) > MOST_NAMED:
-        yield "left out", f"{len(report.orphans) - MOST_NAMED} more files without a partner"
+    yield from (("left out", one) for one in report.left_out[:MOST_NAMED])
+    if len(report.left_out) > MOST_NAMED:
+        yield "left out", f"{len(report.left_out) - MOST_NAMED} more files without a partner"
+    yield from (("not used", one) for one in report.unused)
     found = Counter(
         (finding.severity, finding.message)
         for recording in report.recordings
         for finding in recording.findings
-        if finding.check not in ("missing", "excluded")
+        if finding.check not in ("missing", "excluded", "left-out")
     )
     order = ("error", "warning", "info")
     worst = sorted(found.items(), key=lambda item: (order.index(item[0][0]), -item[1]))

@@ -16,6 +16,7 @@ from tactbench.core.tables.text import command_line, cut
 
 if TYPE_CHECKING:
     from tactbench.core.matrix.run import Outcome
+    from tactbench.core.matrix.store import Store
 
 _REASON_CHARACTERS = 200
 """Of a reason that are shown; the whole of it is in the row."""
@@ -81,15 +82,19 @@ def command(
     table = table_of(store, over_all(store, outcome.rows))
     print_table(table, shape, view_of(store.folder))
     write_tables(table, store.folder)
-    _farewell(outcome, store.folder)
+    _farewell(outcome, store)
     ctx.exit(1 if outcome.failures else 0)
 
 
-def _farewell(outcome: Outcome, folder: Path) -> None:
+def _farewell(outcome: Outcome, store: Store) -> None:
     """Say what there is now, and where it lies."""
+    folder = store.folder
     found = len(outcome.rows) - outcome.computed
     remark(f"\n{found} of {len(outcome.rows)} answers were found finished, {outcome.computed} computed now; "
            f"{outcome.recorded} recordings made now.")  # fmt: skip
+    if store.superseded:
+        remark(f"{len(store.superseded)} of them supersede answers of the same names from other recordings: tables "
+               "show the latest. Another --out DIR keeps both.")  # fmt: skip
     remark(f"Files: {folder}/leaderboard.md, .csv, .json; results.sqlite; recordings/; cells/")
     tell_stopped(outcome.failures, folder)
 

@@ -109,6 +109,7 @@ def _rests_on(row: Row) -> Iterator[Field]:
     yield "recordings", f"{row['n_recordings']} of {row['n_sessions']} sessions"
     yield from (("assumed", f"{name} {value}") for name, value in sorted((row.get("assumptions") or {}).items()))
     yield from (("left out", text) for text in count_texts(row.get("counts") or {}))
+    yield from (("found", str(text)) for text in row.get("findings", ()))
     yield from (("remark", str(remark)) for remark in (*row.get("remarks", ()), *row.get("stamps", ())))
 
 

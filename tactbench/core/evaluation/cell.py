@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import copy
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Any
@@ -18,7 +18,7 @@ from pydantic import Field
 
 from tactbench.core.errors import DataError, PluginContractError
 from tactbench.core.evaluation.answers import AnsweredFold, Configured, FittedFold, answered_fold, fitted_fold
-from tactbench.core.evaluation.dataset import LARGEST, Dataset
+from tactbench.core.evaluation.dataset import LARGEST, Dataset, alike
 from tactbench.core.evaluation.delay import (
     Clock,
     answer_delay_ms,
@@ -234,7 +234,7 @@ def _result(
     held_s = tare_s(data.recorded) if data.rules.tare else 0.0
     if data.rules.tare and not held_s:
         remarks.append("not tared: no recording states an unloaded hold")
-    remarks += [_untrained(answered), *delay_remarks]
+    remarks += delay_remarks
     took_part, left_out, stamps = _part_taken(data)
     specimens = {meta.labels.get("unit") for meta in took_part}
     interval = score_interval(metric, tested.y_true, tested.y_pred, unit, n_classes)
@@ -266,6 +266,7 @@ def _result(
         counts=dict(counts + Counter(left_out)),
         dagger=data.rules.uses_test_statistics,
         stamps=stamps,
+        findings=[*data.recorded.findings, *_groups_alike(data), *_untrained(answered)],
         tare_s=held_s or None,
         remarks=[one for one in remarks if one],
         **cost.model_dump(exclude_unset=True),
@@ -339,14 +340,22 @@ def _incomplete(recorded: Dataset) -> list[str]:
     return texts
 
 
-def _untrained(answered: Sequence[AnsweredFold]) -> str:
-    """Return which classes were asked for that no training row had: no estimator can answer them."""
+def _groups_alike(data: TaskData) -> Iterator[str]:
+    """Yield labels that the split keeps apart as two, and that are probably one."""
+    name = data.assignments[0].groups
+    tables = [table.groups[name] for table in data.data.tables if name in table.groups]
+    return alike(f"values of {name}", sorted({str(one) for table in tables for one in np.unique(table)}))
+
+
+def _untrained(answered: Sequence[AnsweredFold]) -> Iterator[str]:
+    """Yield which classes were asked for that no training row had: no estimator can answer them."""
     folds: dict[str, list[str]] = {}
     for one in answered:
         for label in one.untrained:
             folds.setdefault(str(label), []).append(one.name)
     named = [f"{label!r} in {', '.join(names)}" for label, names in sorted(folds.items())]
-    return f"tested but never trained on: {'; '.join(named)}" if named else ""
+    if named:
+        yield f"tested but never trained on: {'; '.join(named)}"
 
 
 def _chosen(answered: Sequence[AnsweredFold]) -> dict[str, float]:

@@ -100,6 +100,23 @@ def on_clock(values: FloatArray, stream: StreamData, clock: StreamData, recordin
     return out
 
 
+def never_meeting(recording: Recording, target: ChannelTarget, clock: StreamData) -> str:
+    """Return when `clock` and a channel run that has samples, none of them near; empty where that is not so."""
+    found = channels_for(recording, target)
+    if len(found) != 1:
+        return ""
+    name, place, channel = found[0]
+    other = recording.read(name)
+    if clock.t_ns is None or other.t_ns is None or np.isnan(numbers(other)[:, place]).all():
+        return ""
+    (start, end), (first, last) = (times[[0, -1]] / 1e9 for times in (clock.t_ns, other.t_ns))
+    later = first - start
+    return (
+        f"{clock.spec.name} runs from {start:.3f} to {end:.3f} s, and {channel.name} from {first:.3f} to {last:.3f} s: "
+        f"it begins {abs(later):.3f} s {'later' if later > 0 else 'earlier'}"
+    )
+
+
 def unit_factor(channel: ChannelSpec, unit: str) -> float:
     """Return what turns stored numbers into `unit`: by the channel's unit, or by its scale if that does not tell."""
     try:
@@ -120,10 +137,15 @@ def require_forward(data: StreamData, recording: str) -> None:
     steps = np.diff(data.t_ns)
     backward = int((steps < 0).sum())
     if backward or not steps.any():
+        from tactbench.core.recording.mapping.samples import wrap_period
+
         what = f"runs backwards {backward} times" if backward else "stands still"
+        step = "sort the rows before they are imported, or record again."
+        if wrap_period(data.t_ns):
+            step = "a full counter begins at 0 again: import with `wraps_at` under `time`."
         raise DataError(
             f"In recording {recording!r}, the time of {data.spec.name} {what}.",
-            hint="See where with `tactbench inspect`; sort the rows before they are imported, or record again.",
+            hint=f"See where with `tactbench inspect`; {step}",
         )
 
 

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import re
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -16,6 +17,7 @@ from tactbench.core.evaluation.channels import (
     channel_on,
     channels_for,
     feature_streams,
+    never_meeting,
     numbers,
     on_clock,
     read_channel,
@@ -23,12 +25,19 @@ from tactbench.core.evaluation.channels import (
 )
 from tactbench.core.evaluation.slip_reference import SlipReference, slip_reference
 from tactbench.core.recording.completeness import INCOMPLETE
+from tactbench.core.recording.health import Finding, marking
 from tactbench.core.recording.reader import Recording, open_recording
 from tactbench.core.samples import FloatArray, IntArray, Quality, StreamData, StreamReadings
 from tactbench.core.spec.events import SlipTarget
 from tactbench.core.spec.recording import RecordingMeta
 from tactbench.core.spec.task import ChannelTarget, LabelTarget, TaskSpec, VectorTarget
 
+MUCH = 0.05
+"""Share of the rows left out from which on it stands beside the score."""
+MOST_NAMED = 4
+"""Recordings left out that are named."""
+_SPACES = re.compile(r"(?<!\d)\s+|\s+(?!\d)")
+"""Spaces, but for those between digits: '1 12' and '11 2' are two."""
 LARGEST = 1e100
 """Of a reading or a target, in whatever unit: sums of the squares of a billion of them are still numbers."""
 
@@ -51,12 +60,16 @@ class Table:
     """(n,) seconds since the first sample, or the row index where the recording has no clock"""
     row: IntArray
     """(n,) index of the row in its stream"""
+    rows: int
+    """of its stream, left out or not"""
     groups: Mapping[str, npt.NDArray[np.str_]]
     """Labels by which rows can be kept together: name -> (n,)"""
     readings: tuple[StreamReadings, ...] = ()
     """Every stream on its own clock, times from the first row on; read where a task summarises recordings or frames"""
     reference: SlipReference | None = None
     """What the reference says about slip, on its own clock; read where a task asks for it"""
+    apart: str = ""
+    """From when to when features and target have samples, if these never meet"""
 
     @property
     def slip(self) -> SlipReference:
@@ -75,6 +88,8 @@ class Dataset:
     """Class labels in order of their index; empty for regression"""
     counts: Mapping[str, int] = field(default_factory=dict)
     """What was left out, and why"""
+    findings: tuple[str, ...] = ()
+    """What was found in the recordings that bears on a score, and what of them takes no part"""
     paths: tuple[Path, ...] = ()
     """The files of the tables"""
     whole: bool = False
@@ -118,6 +133,7 @@ def load_dataset(task: TaskSpec, recordings: Sequence[Path], *, include_incomple
         is given twice, or nothing is left.
     """
     counts: Counter[str] = Counter()
+    seen: dict[str, dict[str, str]] = {}
     tables: list[Table] = []
     paths: list[Path] = []
     features: tuple[str, ...] = ()
@@ -128,6 +144,8 @@ def load_dataset(task: TaskSpec, recordings: Sequence[Path], *, include_incomple
                 counts[f"recordings left out ({excluded})"] += 1
                 continue
             names, table = _read(recording, task, counts)
+            for one in _bearing(recording, task, names):
+                seen.setdefault(one.check, {}).setdefault(recording.meta.name, one.message)
         meta, first = table.meta, (tables or [table])[0].meta
         if tables and (meta.sensor.name, names) != (first.sensor.name, features):
             raise DataError(
@@ -148,6 +166,12 @@ def load_dataset(task: TaskSpec, recordings: Sequence[Path], *, include_incomple
         )
     target = _target_name(task)
     if not any(table.labelled.any() for table in tables):
+        apart = next((one for one in tables if one.apart), None)
+        if apart is not None:
+            raise DataError(
+                f"No reading of any recording is near a {target} in time: in {apart.meta.name!r}, {apart.apart}.",
+                hint="Put both on one clock: is one of them in another time zone, or does it count from another start?",
+            )
         raise NotApplicable(
             f"No recording has any {target}, which task {task.name!r} asks for.",
             hint="State it in the mapping, or choose another task.",
@@ -164,7 +188,57 @@ def load_dataset(task: TaskSpec, recordings: Sequence[Path], *, include_incomple
     whole = task.answer_per != "sample"
     if whole:
         tables = [_whole(table, task, target) for table in tables]
-    return Dataset(tuple(tables), features, classes, dict(counts), tuple(paths), whole, bool(task.vote))
+    findings = (*_in_some(seen, len(tables)), *_left_out(tables, task, target), *alike("classes", classes))
+    return Dataset(tuple(tables), features, classes, dict(counts), findings, tuple(paths), whole, bool(task.vote))
+
+
+def _bearing(recording: Recording, task: TaskSpec, features: Sequence[str]) -> list[Finding]:
+    """Return what was found in a recording, other than of streams and channels that `task` does not look at."""
+    streams = {*feature_streams(recording, task), *(stream.name for stream in recording.meta.reference)}
+    channels = {*features, *(channel.name for stream in recording.meta.reference for channel in stream.channels)}
+    return [
+        one
+        for one in marking(recording)
+        if (not one.channels or channels & set(one.channels))
+        and (not one.stream or any(name in one.stream for name in streams))  # it may name several
+    ]
+
+
+def _in_some(seen: Mapping[str, Mapping[str, str]], n: int) -> Iterator[str]:
+    """Yield by check in how many of `n` recordings something was found, and what; `seen` has it by recording."""
+    for by_name in seen.values():
+        (name, message), *_ = by_name.items()
+        such = f", such as {name}" if len(set(by_name.values())) > 1 else ""
+        yield f"in {len(by_name)} of {n} recordings{such}: {message}"
+
+
+def _left_out(tables: Sequence[Table], task: TaskSpec, target: str) -> Iterator[str]:
+    """Yield which recordings have no row that can be used, and the share of the rows of the others that cannot.
+
+    A label that is not there is no row lost: who gave the labels has left it out.
+    """
+    out = [table for table in tables if not table.labelled.any()]
+    if out:
+        names = ", ".join(one.meta.name for one in out[:MOST_NAMED]) + (", …" if len(out) > MOST_NAMED else "")
+        apart = next((f" ({one.meta.name}: {one.apart})" for one in out if one.apart), "")
+        yield f"{len(out)} of {len(tables)} recordings left out, without any {target}: {names}{apart}"
+    there = [table for table in tables if table.labelled.any()]
+    rows = sum(table.rows for table in there)
+    missing = {
+        "a sample of each channel": rows - sum(len(table.row) for table in there),
+        f"a {target}": sum(int((~table.labelled).sum()) for table in there) if _channels_of(task) else 0,
+    }
+    if sum(missing.values()) >= MUCH * rows:
+        why = " and ".join(f"{count} without {what}" for what, count in missing.items() if count)
+        yield f"{sum(missing.values()) / rows:.0%} of {rows} rows left out: {why}"
+
+
+def alike(what: str, labels: Iterable[Any]) -> Iterator[str]:
+    """Yield labels that differ by case or spaces alone: they are probably one."""
+    by_letters: dict[str, list[str]] = {}
+    for label in labels:
+        by_letters.setdefault(_SPACES.sub("", str(label).casefold()), []).append(repr(label))
+    yield from (f"{what} {', '.join(some)} differ by case or spaces alone" for some in by_letters.values() if some[1:])
 
 
 def _whole(table: Table, task: TaskSpec, target: str) -> Table:
@@ -212,6 +286,7 @@ def _read(recording: Recording, task: TaskSpec, counts: Counter[str]) -> tuple[t
             hint="Leave the channel out of the mapping, or record it again.",
         )
     y, labelled = _target(recording, task, clock)
+    targets = [] if labelled.any() else _channels_of(task)
     for name, column in (columns | ({"the target": y} if task.kind == "regression" else {})).items():
         require_computable(column, name, meta)
     force = y if isinstance(task.target, ChannelTarget) and task.target.kind == "force" else None
@@ -235,9 +310,11 @@ def _read(recording: Recording, task: TaskSpec, counts: Counter[str]) -> tuple[t
         force=None if force is None else force[whole],
         time_s=time_s[whole],
         row=row[whole],
+        rows=len(row),
         groups={name: column[whole] for name, column in _groups(meta, clock, task).items()},
         readings=tuple(own),
         reference=reference,
+        apart=next(filter(None, (never_meeting(recording, one, clock) for one in targets)), ""),
     )
     return tuple(columns), table
 
@@ -296,10 +373,17 @@ def _target(recording: Recording, task: TaskSpec, features: StreamData) -> Label
         return found if task.kind == "classification" else _as_numbers(found, task.target.name, recording.meta.name)
     if isinstance(task.target, SlipTarget):  # of frames, which are made of the recording later
         return np.zeros(len(features.data)), np.ones(len(features.data), dtype=bool)
-    targets = task.target.components if isinstance(task.target, VectorTarget) else (task.target,)
+    targets = _channels_of(task)
     y = np.column_stack([channel_on(recording, one, features) for one in targets])
     labelled = np.asarray(~np.isnan(y).any(axis=1))
     return (y if isinstance(task.target, VectorTarget) else y[:, 0]), labelled
+
+
+def _channels_of(task: TaskSpec) -> tuple[ChannelTarget, ...]:
+    """Return the channels that a task asks for; none where it asks for labels or events."""
+    if isinstance(task.target, VectorTarget):
+        return task.target.components
+    return (task.target,) if isinstance(task.target, ChannelTarget) else ()
 
 
 def _as_numbers(found: Labels, name: str, recording: str) -> Labels:

@@ -24,7 +24,7 @@ MOST_NAMES = 4
 """Answers that a sentence names; it counts the others."""
 LONGEST = 300
 """Characters of a note; `why`, JSON, CSV and Parquet have the whole reason of a cell."""
-NO_BETTER, UNSHOWN, STAMPED, SHARED = "–", "*", "‡", "="
+NO_BETTER, UNSHOWN, STAMPED, FOUND, SHARED = "–", "*", "‡", "!", "="
 
 
 class Note(NamedTuple):
@@ -75,7 +75,8 @@ class Board:
     def marks(self, row: Row) -> list[str]:
         """Return the marks of a finished row, other than its place."""
         unshown = not row["is_baseline"] and not self.bars.no_better(row) and self.bars.unshown(row)
-        return [*([UNSHOWN] if unshown else []), *([STAMPED] if row["stamps"] else [])]
+        found = {UNSHOWN: unshown, STAMPED: row["stamps"], FOUND: row.get("findings")}
+        return [mark for mark, has in found.items() if has]
 
     def bars_of(self, rows: Sequence[Row]) -> str:
         """Return the trivial answers that rows are held against, with their scores."""
@@ -228,15 +229,17 @@ def _ended(board: Board, stopped: bool) -> Iterator[Note]:
 def _marks(board: Board) -> Iterator[Note]:
     """Yield what the marks of this table mean: at most as many notes as there may be, so that none goes unexplained."""
     finished = (*board.answers, *board.trivial)
-    stamps = grouped([(str(stamp), row) for row in finished for stamp in row["stamps"] or ()], itemgetter(0))
-    if stamps:
-        lead = LEAKS if all(text.startswith(LEAKS) for text in stamps) else ""
-        told = (
+    for mark, key in ((STAMPED, "stamps"), (FOUND, "findings")):
+        texts = grouped([(str(text), row) for row in finished for text in row.get(key) or ()], itemgetter(0))
+        if not texts:
+            continue
+        lead = LEAKS if all(text.startswith(LEAKS) for text in texts) else ""
+        told = "; ".join(
             f"{_some([board.name(row) for _, row in of])}: " * (len(of) < len(finished))
             + text.removeprefix(lead).rstrip(".")
-            for text, of in stamps.items()
+            for text, of in texts.items()
         )
-        yield Note(f"{STAMPED}  {lead}{'; '.join(told)}.", printed=True)
+        yield Note(f"{mark}  {lead}{told}{'' if told.endswith('?') else '.'}", printed=True)
     if any(rank.unsure for _, rank in board.placed) and not board.unranked:
         yield Note(f"{SHARED}  each of these rows cannot be told from at least one other")
     of_own = "better than the trivial answer of its own sensor"

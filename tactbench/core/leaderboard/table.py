@@ -30,7 +30,7 @@ from tactbench.core.leaderboard.names import (
 from tactbench.core.leaderboard.probe import build_probe, with_leaks
 from tactbench.core.leaderboard.sentences import NO_BETTER, Board, Note, above, below
 from tactbench.core.statistics.rank import Rank, beyond_floor, excess_of
-from tactbench.core.statistics.replicates import FEWEST, over_replicates
+from tactbench.core.statistics.replicates import FEWEST, count_range, over_replicates
 from tactbench.core.tables.text import cut, visible
 from tactbench.core.tables.text_table import TextTable
 
@@ -165,6 +165,8 @@ def _block(key: _Key, members: Sequence[Row], columns: Sequence[str], question: 
     direction = "lower" if sign_of(members[0]) > 0 else "higher"
     setting = [f"{metric_name(members[0])}, {direction} is better", f"protocol {protocol}"]
     setting += [split_name(split)] if split else []
+    classes = [len(row["classes"]) for row in finished if row["classes"]]
+    setting += [count_range(classes, "class")] if classes else []
     return Block(
         title=visible(
             f"{task[:1].upper()}{task[1:]}" + (f": {question[:1].lower()}{question[1:]}" if question else "")

@@ -9,16 +9,21 @@ from __future__ import annotations
 import logging
 import multiprocessing
 import os
+import signal
 import warnings
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import ExitStack
+from contextlib import ExitStack, contextmanager
+from multiprocessing import resource_tracker
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
-from distributed import Client, KilledWorker, LocalCluster, as_completed  # noqa: TID253  (imported for this engine alone)
+from dask import config  # noqa: TID253  (imported for this engine alone)
+from distributed import Client, KilledWorker, LocalCluster, as_completed  # noqa: TID253
 from distributed.versions import VersionMismatchWarning  # noqa: TID253
 
 from tactbench.core.errors import Crashed, EngineError, UsageError, error_text
+from tactbench.core.interrupts import interrupts_held
 from tactbench.core.matrix.keys import differences
 from tactbench.core.matrix.solve import Job, check_content
 from tactbench.core.plugins.registry import installed
@@ -63,10 +68,13 @@ class Dask(Engine):
         with ExitStack() as stack:
             to: Any = self._scheduler
             if to is None:
-                to = stack.enter_context(LocalCluster(
-                    n_workers=self._jobs, threads_per_worker=1, host="127.0.0.1", memory_limit=0,
-                    dashboard_address=None, silence_logs=logging.CRITICAL,
-                ))  # fmt: skip
+                place = stack.enter_context(TemporaryDirectory(prefix="tactbench-dask-", ignore_cleanup_errors=True))
+                settings = config.set({"temporary-directory": place})
+                with interrupts_held(), _without_interrupts(), settings:
+                    to = stack.enter_context(LocalCluster(
+                        n_workers=self._jobs, threads_per_worker=1, host="127.0.0.1", memory_limit=0,
+                        dashboard_address=None, silence_logs=logging.CRITICAL,
+                    ))  # fmt: skip
             try:
                 with warnings.catch_warnings():  # versions that may change a number are compared below
                     warnings.simplefilter("ignore", VersionMismatchWarning)
@@ -88,8 +96,9 @@ class Dask(Engine):
 
     def __exit__(self, *_: object) -> None:
         """Disconnect; what is under way is cancelled."""
-        super().__exit__()
-        self._stack.close()
+        with interrupts_held():
+            super().__exit__()
+            self._stack.close()
 
     def outcomes(self) -> Iterator[tuple[Any, Any]]:
         """Yield every cell with its result or the error that stopped it, in the order in which they end."""
@@ -111,6 +120,20 @@ class Dask(Engine):
                     hint="Give the same command again: what was finished is kept.",
                 )
                 yield of[future], lost
+
+
+@contextmanager
+def _without_interrupts() -> Iterator[None]:
+    """Have processes that are started within ignore Ctrl-C at the terminal: the run ends them."""
+    if not hasattr(signal, "pthread_sigmask"):
+        yield
+        return
+    resource_tracker.ensure_running()  # which would let them through in the thread that starts it
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGINT])
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 def carry_out(work: Callable[[Any], Any], job: Job, folder: str, limits: Limits) -> Any:

@@ -98,10 +98,10 @@ def merge(folders: Sequence[Path], out: Path, *, also: Callable[[Path], None] | 
         recordings: set[str] = set()
         for row, store in kept.values():
             shutil.copyfile(store.file_of(row), aside / "cells" / store.file_of(row).name)
-            for name in row["recordings"]:
-                if not Path(name).is_absolute() and (store.folder / name).is_file() and name not in recordings:
+            for name, file in store.recordings(row):
+                if not Path(name).is_absolute() and file is not None and name not in recordings:
                     recordings.add(name)
-                    _link(store.folder / name, aside / name)
+                    _link(file, aside / file.relative_to(store.folder))
         if also is not None:
             also(aside)
     return Merged(tuple(row for row, _ in kept.values()), len(recordings), tuple(left_out))

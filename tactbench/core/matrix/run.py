@@ -22,7 +22,7 @@ from tactbench.core.matrix.plan_recordings import (
     plan_parts,
     request_key,
 )
-from tactbench.core.matrix.record import GRACE_S, Recorder, is_computed
+from tactbench.core.matrix.record import GRACE_S, Recorder, foreign_components, is_computed
 from tactbench.core.matrix.solve import Job, published, solve, unanswered
 from tactbench.core.matrix.store import Row, Store
 from tactbench.core.plugins.declared import declared_in, with_declared
@@ -198,10 +198,13 @@ class Run:
         computed = all(is_computed(request) for request in missing.values())
         # The operator's terminal belongs to this process.
         here = self.operator is not None and not computed
-        with InProcess() if here else self.choice.recorder(computed=computed) as recorder:
-            self._submit_recordings(recorder, missing.values(), computed=computed)
-            for request, outcome in recorder.outcomes():
-                self._recorded(request, outcome)
+        try:
+            with InProcess() if here else self.choice.recorder(computed=computed) as recorder:
+                self._submit_recordings(recorder, missing.values(), computed=computed)
+                for request, outcome in recorder.outcomes():
+                    self._recorded(request, outcome)
+        finally:
+            self._clear(missing.values())  # of an interrupted run, too
 
     def _clear(self, requests: Iterable[RecordingRequest]) -> None:
         """Remove what a simulation that was killed has left, and its damaged recordings; never what devices gave."""
@@ -219,12 +222,14 @@ class Run:
                     path.unlink()
 
     def _submit_recordings(self, recorder: Engine, missing: Iterable[RecordingRequest], *, computed: bool) -> None:
-        """Queue recordings: all of a real rig as one piece of work, simulated ones by seed and sensor."""
-        pieces: dict[tuple[int, str], list[RecordingRequest]] = {}
+        """Queue recordings: all of a real rig as one piece of work, simulated ones by seed, sensor and packages."""
+        pieces: dict[tuple[object, ...], list[RecordingRequest]] = {}
         for request in missing:
-            pieces.setdefault((request.seed, request.sensor.name) if computed else (0, ""), []).append(request)
+            apart = (foreign_components(self.registry, request), request.seed, request.sensor.name) if computed else ()
+            pieces.setdefault(apart, []).append(request)
         parts = self.choice.processes if computed and len(pieces) < self.choice.processes else 1
-        for piece in pieces.values():
+        # Where all are made in one process, those that import no other package are made before one is imported.
+        for _, piece in sorted(pieces.items(), key=lambda one: any(one[0][:1])):
             for part in range(min(parts, len(piece))):
                 requests = piece[part::parts]
                 recorder.submit(Recorder(self.registry, self.operator), requests)

@@ -41,7 +41,7 @@ def run_child(
     folder
         The working folder of the parent, that relative paths of items start from.
     """
-    _redirect(log)
+    printed = _redirect(log)
     if hasattr(os, "setsid"):
         with suppress(OSError):
             os.setsid()  # its process group, by which the parent ends it with what it has started
@@ -61,18 +61,17 @@ def run_child(
             with suppress(Exception):
                 stream.flush()
         try:
-            connection.send((kind, value, end_of(log)))
+            connection.send((kind, value, end_of(printed)))
         except Exception as error:  # it cannot be pickled
-            connection.send(("error", plain_error(error), end_of(log)))
+            connection.send(("error", plain_error(error), end_of(printed)))
     with suppress(EOFError, OSError):
         connection.recv()  # the parent ends this process together with its group
 
 
-def end_of(log: str) -> str:
-    """Return the end of what the item at work has printed."""
-    with open(log, "rb") as file:  # noqa: PTH123  (seek from the end)
-        file.seek(max(0, file.seek(0, os.SEEK_END) - LOG_BYTES))
-        return file.read().decode(errors="replace")
+def end_of(log: int) -> str:
+    """Return the end of what the item at work has printed, from the descriptor of a log."""
+    os.lseek(log, max(0, os.fstat(log).st_size - LOG_BYTES), os.SEEK_SET)
+    return os.read(log, LOG_BYTES).decode(errors="replace")
 
 
 def _carry_out(work: Callable[[Any], Any], item: Any, limits: Limits) -> tuple[str, Any]:
@@ -92,13 +91,16 @@ def _carry_out(work: Callable[[Any], Any], item: Any, limits: Limits) -> tuple[s
         faulthandler.cancel_dump_traceback_later()
 
 
-def _redirect(log: str) -> None:
-    opened = os.open(log, os.O_WRONLY | os.O_CREAT | os.O_APPEND, 0o600)
+def _redirect(log: str) -> int:
+    opened = os.open(log, os.O_RDWR | os.O_APPEND)
+    with suppress(OSError):  # both sides have it open: nothing is left, however they end
+        os.unlink(log)  # noqa: PTH108
     for descriptor in (1, 2):
         os.dup2(opened, descriptor)
-    os.close(opened)
     if isinstance(sys.stdout, io.TextIOWrapper):
-        sys.stdout.reconfigure(line_buffering=True)  # what was printed before a crash is in the log, in its order
+        # What was printed before a crash is in the log, in its order; a text that is no UTF-8 is written out.
+        sys.stdout.reconfigure(line_buffering=True, errors="backslashreplace")
+    return opened
 
 
 class _Terminated(BaseException):

@@ -19,6 +19,7 @@ from typing import Any, Self
 import psutil
 
 from tactbench.core.errors import CellStopped, Crashed, OutOfMemory, TimedOut
+from tactbench.core.interrupts import interrupts_held
 from tactbench.core.pool.child import end_of, plain_error, run_child
 from tactbench.core.pool.limits import UNLIMITED, Limits, resident_mb
 
@@ -107,10 +108,11 @@ class Pool(Engine):
 
     def __exit__(self, *_: object) -> None:
         """End every process that is at work."""
-        super().__exit__()
-        self._abandoned.set()
-        for thread in self._threads:
-            thread.join()
+        with interrupts_held():
+            super().__exit__()
+            self._abandoned.set()
+            for thread in self._threads:
+                thread.join()
 
     def outcomes(self) -> Iterator[tuple[Any, Any]]:
         """Yield every submitted item with its result or the error that stopped it, in the order in which they end."""
@@ -163,16 +165,13 @@ class _Child:
         self._limits = limits
         context = _context()
         self._connection, theirs = context.Pipe()
-        handle, name = tempfile.mkstemp(prefix="tactbench-", suffix=".log")
-        os.close(handle)
-        self._log = name
+        self._log, self._log_name = tempfile.mkstemp(prefix="tactbench-", suffix=".log")
         try:
-            arguments = (work, items, theirs, name, str(Path.cwd()), limits)
+            arguments = (work, items, theirs, self._log_name, str(Path.cwd()), limits)
             self._process = context.Process(target=run_child, args=arguments)
             _start(self._process.start)
         except BaseException:
-            self._connection.close()
-            Path(name).unlink()
+            self._close()
             raise
         finally:
             theirs.close()
@@ -200,8 +199,8 @@ class _Child:
 
     def _beyond_limits(self, spent_s: float, shared_mb: float | None) -> CellStopped | None:
         """Return why the item at work must be ended; None if it need not."""
-        if Path(self._log).stat().st_size > MOST_LOG_BYTES:
-            os.truncate(self._log, 0)
+        if os.fstat(self._log).st_size > MOST_LOG_BYTES:
+            os.ftruncate(self._log, 0)
         timeout_s, memory_mb = self._limits.timeout_s, self._limits.memory_mb
         if shared_mb is None:  # it has not begun
             late = Crashed(f"Its process did not begin within {START_S:g} s.", hint="Run fewer at once (--jobs).")
@@ -228,8 +227,12 @@ class _Child:
         """End the process and its group; if `unfinished`, after the time that it has to close its devices."""
         if not self.over:
             self._kill(unfinished=unfinished)
+        self._close()
+
+    def _close(self) -> None:
         self._connection.close()
-        Path(self._log).unlink(missing_ok=True)
+        os.close(self._log)
+        Path(self._log_name).unlink(missing_ok=True)
 
     def _kill(self, *, unfinished: bool) -> None:
         if self._limits.grace_s and unfinished:

@@ -13,6 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from tactbench.core.errors import FormatError
+from tactbench.core.files import utf8_json
 from tactbench.core.spec.recording import RecordingMeta
 from tactbench.core.spec.sensor import StreamSpec
 
@@ -61,7 +62,8 @@ def piece_rows(channels: int) -> int:
 
 def canonical(content: Any) -> str:
     """Return plain data as canonical JSON; ValueError for NaN and infinity, which JSON does not have."""
-    return json.dumps(content, sort_keys=True, separators=(",", ":"), ensure_ascii=False, allow_nan=False)
+    text = json.dumps(content, sort_keys=True, separators=(",", ":"), ensure_ascii=False, allow_nan=False)
+    return utf8_json(text)
 
 
 def meta_text(meta: RecordingMeta) -> str:

@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
 
 import numpy as np
 import numpy.typing as npt
 
+from tactbench.core.recording import format as layout
+from tactbench.core.recording.lag import FEWEST_ROWS, find_lag, windows
 from tactbench.core.recording.reader import LazyStream, Recording
-from tactbench.core.samples import FloatArray, Quality
+from tactbench.core.samples import FloatArray, IntArray, Quality, StreamData
 from tactbench.core.spec.recording import StreamClock, StreamCounts
 from tactbench.core.spec.sensor import ChannelSpec
 
@@ -34,7 +36,7 @@ FEWEST_VALUES = 200
 some twenty pairs of so many round, 0.56 n² noise / range of n."""
 MONOTONE = f"but for rounding a monotone function of {{}}, at most {LAG} rows early or late"
 """What is said of a copy."""
-GLANCE = 500
+GLANCE = 50
 """Rows that are looked at first: whatever holds for all holds for some."""
 WRONG_UNIT = 50.0
 """A rate that is off by more than this factor looks like times in a wrong unit."""
@@ -42,6 +44,13 @@ _UNTIMED = {
     "none": "no clock stated: rows are ordered, nothing more",
     "nominal": "time stamps are row number by nominal rate, not measured",
 }
+FINDINGS = "findings"
+"""Where the provenance of a recording has what its import found."""
+UNMARKED = ("stuck", "duplicated", "saturated", "dead", "empty", "absent", "excluded", "target-among-features")
+"""Checks that mark no score: taxels that nothing touches are constant and alike, those pressed hard saturate; from
+`dead` on, an evaluation that needs what is not there refuses it, or tells of it in another way."""
+DATED_NS = 10**18
+"""Times from here on are dates, September 2001 and later: in a wrong unit they would be of another millennium."""
 SLOWEST_HZ = 1.0
 """No tactile sensor is known to be read more seldom: without a stated rate, a lower one looks like a wrong unit."""
 
@@ -68,6 +77,8 @@ class _Stream:
         self.name, self.spec, self.rows = stream.spec.name, stream.spec, len(stream)
         channels = self.spec.channels
         self.t_ns = stream.times()
+        self._stream = stream
+        self._only: FloatArray | None = None
         self.missing, self.saturated, self.suspect = (np.zeros(len(channels), dtype=np.int64) for _ in range(3))
         self.low, self.high = np.full(len(channels), np.inf), np.full(len(channels), -np.inf)
         self.lost_before = 0
@@ -75,9 +86,9 @@ class _Stream:
         digests = [hashlib.sha256() for _ in channels]
         bottom, top = np.array([_ends(one) for one in channels]).T
         for block in stream.blocks():
-            values = block.data.astype(np.float64) + 0.0  # -0 and 0 are one
-            flags = np.zeros((1, len(channels)), dtype=np.uint8) if block.quality is None else block.quality
-            missing = ~np.isfinite(values) | ((flags & Quality.MISSING) != 0)
+            values, flags, missing = _numbers(block)
+            if len(values) == self.rows:
+                self._only = np.where(missing, np.nan, values)
             saturated = ((flags & Quality.SATURATED) != 0) | (values >= top) | (values <= bottom)
             self.missing += missing.sum(axis=0)
             self.saturated += (saturated & ~missing).sum(axis=0)
@@ -101,15 +112,40 @@ class _Stream:
         """Return the names of some channels, by a mask."""
         return tuple(one.name for one, taken in zip(self.spec.channels, which, strict=True) if taken)
 
+    def between(self, kind: str, first_ns: int, last_ns: int) -> tuple[IntArray, FloatArray]:
+        """Return times (n,) and samples (n, q) of the channels of a kind that have some, without incomplete rows."""
+        assert self.t_ns is not None  # whoever gives times has seen them
+        rows = slice(*np.searchsorted(self.t_ns, (first_ns, last_ns + 1)))
+        if self._only is None:
+            values, _, missing = _numbers(self._stream[rows])
+            values = np.where(missing, np.nan, values)
+        else:
+            values = self._only[rows]
+        wanted = [one.kind == kind for one in self.spec.channels]
+        values = values[:, wanted & (2 * self.missing < self.rows)]
+        there = np.isfinite(values).all(axis=1)
+        return self.t_ns[rows][there], values[there]
+
     def said(self, which: npt.NDArray[Any]) -> str:
         """Name channels as people would: "taxels t4 and t7", "fz", "E1, E2, E3 … (19 channels)"."""
         names = self.names(which)
-        if len(names) > MOST_LISTED:
-            return f"{', '.join(names[:3])} … ({len(names)} channels)"
-        listed = names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"
-        if all(one.kind == "taxel" for one in self.spec.channels if one.name in names):
-            return f"taxel{'s' if len(names) > 1 else ''} {listed}"
-        return listed
+        if len(names) <= MOST_LISTED and all(one.kind == "taxel" for one in self.spec.channels if one.name in names):
+            return f"taxel{'s' if len(names) > 1 else ''} {listed(names)}"
+        return listed(names)
+
+
+def listed(names: Sequence[str]) -> str:
+    """Name channels: "t4 and t7", "E1, E2, E3 … (19 channels)"."""
+    if len(names) > MOST_LISTED:
+        return f"{', '.join(names[:3])} … ({len(names)} channels)"
+    return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"
+
+
+def _numbers(block: StreamData) -> tuple[FloatArray, npt.NDArray[np.uint8], npt.NDArray[np.bool_]]:
+    """Return samples, their flags, and where there is none."""
+    values = block.data.astype(np.float64) + 0.0  # -0 and 0 are one
+    flags = np.zeros((1, values.shape[1]), dtype=np.uint8) if block.quality is None else block.quality
+    return values, flags, ~np.isfinite(values) | ((flags & Quality.MISSING) != 0)
 
 
 def _ends(spec: ChannelSpec) -> tuple[float, float]:
@@ -136,6 +172,7 @@ def examine(recording: Recording) -> list[Finding]:
     """
     found = list(_whole(recording))
     clocks: dict[bytes, tuple[list[str], _Stream]] = {}
+    streams: dict[str, _Stream] = {}
     for name in recording.stream_names:
         clock = recording.meta.clocks.get(name)
         stream = _Stream(recording.stream(name))
@@ -147,11 +184,31 @@ def examine(recording: Recording) -> list[Finding]:
         if clock is not None:
             found.extend(_clock_fit(name, clock))
         if stream.t_ns is not None:
+            streams[name] = stream
             clocks.setdefault(stream.t_ns.tobytes(), ([], stream))[0].append(name)
     for names, stream in clocks.values():
         found.extend(_clock(" and ".join(names), stream))
+    own = [spec.name for spec in recording.meta.sensor.streams]
+    for name, stream in streams.items():
+        for other, reference in streams.items():
+            if name in own and other not in own:
+                found.extend(_late(stream, reference))
     order = {"error": 0, "warning": 1, "info": 2}
     return sorted(found, key=lambda finding: order[finding.severity])
+
+
+def marking(recording: Recording) -> list[Finding]:
+    """Return what a score from an open recording has to say: what its import found, else what is found now.
+
+    Where a simulation made it without devices, no clock, cable or table can have failed, and nothing is looked for.
+    """
+    meta = recording.meta
+    if FINDINGS in meta.provenance:
+        with layout.readable(recording.path):
+            found = [Finding(**one) for one in meta.provenance[FINDINGS]]
+    else:
+        found = [] if meta.simulated and meta.emulation is None else examine(recording)
+    return [one for one in found if one.severity != "info" and one.check not in UNMARKED]
 
 
 def _whole(recording: Recording) -> Iterator[Finding]:
@@ -271,9 +328,33 @@ def _clock(stream: str, data: _Stream) -> Iterator[Finding]:
     stated = data.spec.rate_hz
     slow, fast = (stated / WRONG_UNIT, stated * WRONG_UNIT) if stated else (SLOWEST_HZ, np.inf)
     looks = ": ms read as s?" if rate < slow else ": s read as ms?" if rate > fast else ""
+    if data.t_ns[0] > DATED_NS:
+        looks = ""
     if looks or (stated and abs(rate - stated) > RATE_TOLERANCE * stated):
         said = f"; {stated:g} Hz are stated" if stated else ""
         yield Finding("rate", "warning", stream, (), 0, f"{stream} runs at {rate:.4g} Hz{said}{looks}")
+
+
+def _late(sensor: _Stream, reference: _Stream) -> Iterator[Finding]:
+    forces = np.array([one.kind == "force" for one in reference.spec.channels])
+    own, other = sensor.t_ns, reference.t_ns
+    if own is None or other is None or not forces.any() or all(one.kind != "taxel" for one in sensor.spec.channels):
+        return
+    if any(len(t_ns) < FEWEST_ROWS or (np.diff(t_ns) < 0).any() for t_ns in (own, other)):
+        return
+    said: list[tuple[str, tuple[float, float]]] = []
+    for place, window in windows(own, other).items():
+        lag = find_lag(*sensor.between("taxel", *window), *reference.between("force", *window))
+        if lag is not None:
+            ends = {" at the beginning": lag.beginning, " at the end": lag.end}
+            said += (ends if lag.drifts and not place else {place: lag.middle}).items()
+    if said:
+        text = ", ".join(
+            f"{1e3 * abs(late):.0f} ± {max(2e3 * error, 1):.0f} ms {'behind' if late > 0 else 'ahead of'} "
+            f"{reference.said(forces)}{place}"
+            for place, (late, error) in said
+        )
+        yield Finding("lag", "warning", sensor.name, reference.names(forces), sensor.rows, f"{sensor.name} is {text}")
 
 
 def is_copy(one: FloatArray, other: FloatArray, recording: npt.NDArray[np.int64] | None = None) -> bool:
@@ -306,5 +387,7 @@ def is_copy(one: FloatArray, other: FloatArray, recording: npt.NDArray[np.int64]
         in_order = any(bool((np.diff(up[np.lexsort((up, y))]) >= 0).all()) for up in (x, -x))
         return in_order and min(len(np.unique(x)), len(np.unique(y))) >= fewest
 
+    if min(len(np.unique(one)), len(np.unique(other))) < FEWEST_VALUES:
+        return False
     glance = 1 + len(one) // GLANCE
     return any(monotone(lag, glance, 1) and monotone(lag, 1, FEWEST_VALUES) for lag in range(-LAG, LAG + 1))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -77,7 +77,8 @@ class LazyStream:
             if h5py.check_string_dtype(dataset.dtype) is not None:
                 return np.array(dataset.asstr("utf-8")[rows], dtype=np.str_)
             values = np.asarray(dataset[rows])
-            kept: Any = np.int64 if name.startswith(_NOTE) else values.dtype.newbyteorder("=")
+            number = name.startswith(_NOTE) and values.dtype.kind != "U"
+            kept: Any = np.int64 if number else values.dtype.newbyteorder("=")
             return values.astype(kept, copy=False)
 
 
@@ -159,6 +160,21 @@ class Recording:
                 hint="The file was changed or damaged afterwards; get it again from its source, or record it again.",
             )
         return digest
+
+
+class UnwrittenRecording(Recording):
+    """A recording in memory, to be looked at before it is written."""
+
+    def __init__(self, meta: RecordingMeta, streams: Iterable[StreamData]) -> None:
+        self.path, self.meta = Path(meta.name), meta
+        there = {one.spec.name: one for one in streams}
+        self.stream_names = tuple(name for name in layout.specs_by_name(meta) if name in there)
+        self._opened = {}
+        for name in self.stream_names:
+            columns = {column: getattr(there[name], column) for column in _COLUMNS}
+            columns |= {_NOTE + label: values for label, values in there[name].annotations.items()}
+            kept = {column: values for column, values in columns.items() if values is not None}
+            self._opened[name] = LazyStream(self.path, there[name].spec, kept)
 
 
 def open_recording(path: Path) -> Recording:

@@ -37,6 +37,7 @@ _TITLES = {
     "recordings": "Recordings",
     "remarks": "Remarks of the recordings",
     "stamps": "Stamps",
+    "findings": "Found in the recordings",
     "replicates": "What the interval is over",
 }
 """Lists and tables."""

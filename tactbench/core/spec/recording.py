@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from typing import Any, Literal
+import unicodedata
+from typing import Annotated, Any, Literal
 
-from pydantic import Field
+from pydantic import AfterValidator, Field
 
 from tactbench.core.spec.quantity import Frozen
 from tactbench.core.spec.scene import Role, Scene
@@ -12,6 +13,14 @@ from tactbench.core.spec.sensor import SensorSpec, StreamSpec
 
 Scalar = str | float | int
 """What a recording says of itself under a name."""
+
+
+def composed(text: str) -> str:
+    """Return a text in Unicode's form NFC, in which equal words are equal texts: some disks write an é as two signs."""
+    return unicodedata.normalize("NFC", text)
+
+
+_Text = Annotated[str, AfterValidator(composed)]
 
 
 class PlanEntry(Frozen):
@@ -117,11 +126,11 @@ class RecordingMeta(Frozen):
     """By stream, where streams have clocks of their own; their `t_ns` are then on the host's."""
     streams: dict[str, StreamCounts] = Field(default_factory=dict)
     """By stream: what became of its rows, where they came from devices."""
-    session: str = "1"
-    trial: str = ""
+    session: _Text = "1"
+    trial: _Text = ""
     role: Role | None = None
     scene: Scene | None = None
-    labels: dict[str, Scalar] = Field(default_factory=dict)
+    labels: dict[_Text, _Text | float | int] = Field(default_factory=dict)
     """What holds for the whole recording: object, cap radius …"""
     excluded: str = ""
     """Why this recording must not be evaluated (its source calls it unreliable); empty: it may."""

@@ -127,6 +127,8 @@ class RestsOn(_Section):
     emulated: bool = False
     dagger: bool = False
     stamps: list[str] = []
+    findings: list[str] = []
+    """what was found in recordings that bears on the score, what of them was left out, classes never trained on"""
     remarks: list[str] = []
     """what recordings say of themselves; what could not be done, and why"""
     assumptions: dict[str, Any] = {}

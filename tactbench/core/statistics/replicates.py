@@ -101,7 +101,7 @@ def _of_all(name: str, members: Sequence[Row]) -> dict[str, Any]:
     if not done:
         return {**first, **_counted([first], len(members), "replicate", []), "replicates": {}, **named}
     found = _of_campaigns(done) if done[0]["simulated"] else _of_recordings(done)
-    return {**found, **named, "remarks": _remarks(members, done)}
+    return {**found, **named, "remarks": _remarks(members, done), "findings": _told(done, "findings")}
 
 
 def _of_campaigns(done: Sequence[Row]) -> dict[str, Any]:
@@ -214,12 +214,17 @@ def _added(tables: Sequence[Any]) -> Any:
 
 
 def _remarks(members: Sequence[Row], done: Sequence[Row]) -> list[str]:
-    """Return what rows remark, those of a part of the replicates with their number, and which were stopped."""
-    many = len(done)
-    counts = Counter(remark for row in done for remark in dict.fromkeys(row["remarks"]))
-    texts = [remark if n == many else f"in {n} of {many} replicates: {remark}" for remark, n in counts.items()]
+    """Return what rows remark, and which were stopped."""
     stopped = [row for row in members if row["status"] != "done"]
-    return [*texts, *(f"replicate with seed {row['seed']}: {row['status']}: {row['reason']}" for row in stopped)]
+    texts = [f"replicate with seed {row['seed']}: {row['status']}: {row['reason']}" for row in stopped]
+    return [*_told(done, "remarks"), *texts]
+
+
+def _told(done: Sequence[Row], key: str) -> list[str]:
+    """Return the texts that rows have under a key, those of a part of the replicates with their number."""
+    many = len(done)
+    counts = Counter(text for row in done for text in dict.fromkeys(row.get(key) or ()))
+    return [text if n == many else f"in {n} of {many} replicates: {text}" for text, n in counts.items()]
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,7 @@ from tactbench.core.evaluation.dataset import load_dataset
 from tactbench.core.samples import Quality
 from tactbench.plugin import Block, ChannelSpec, StreamSpec
 
-from .made import evaluated, force_task, ramp, record, sensor_of, sessions, write
+from .made import evaluated, force_task, label_task, ramp, record, sensor_of, sessions, write
 
 MS = 1_000_000
 
@@ -95,3 +95,80 @@ def test_several_sensors_and_copies_are_refused_by_name(tmp_path):
     copy = Path(shutil.copy(path, tmp_path / "again"))
     with pytest.raises(DataError, match="'a' is given twice"):
         load_dataset(force_task(), [path, copy])
+
+
+def gappy(n, at=100, by=50):
+    """Times of a recording; that called 1 has a gap."""
+    return (np.arange(200) + by * (n == 1) * (np.arange(200) >= at)) * 10 * MS
+
+
+def whole(n):
+    return ramp(n, n=200)
+
+
+def less(n, rows):
+    """A force without its first rows, in the recording called 1."""
+    X, force = whole(n)
+    force[: rows * (n == 1)] = np.nan
+    return X, force
+
+
+@pytest.mark.parametrize(
+    ("made", "more", "said"),
+    [
+        (whole, {}, None),
+        (whole, {"t_ns": gappy}, "in 1 of 3 recordings: 1 gaps in taxels and force_torque: up to 0.51 s"),
+        (whole, {"t_ns": lambda n: gappy(1, 100, 50 + n)}, "in 3 of 3 recordings, such as 0: 1 gaps"),
+        (whole, {"t_ns": gappy, "simulated": lambda n: True}, None),  # no clock can have failed
+        (lambda n: (whole(n)[0] * [1, 1, n != 1], whole(n)[1]), {}, None),  # nothing touched it
+        (lambda n: less(n, 29), {}, None),
+        (lambda n: less(n, 30), {}, "5% of 600 rows left out: 30 without a force sample"),
+        (lambda n: less(n, 200), {}, "1 of 3 recordings left out, without any force sample: 1"),
+    ],
+)  # fmt: skip
+def test_what_bears_on_a_score_stands_beside_it(tmp_path, made, more, said):
+    paths = [
+        record(tmp_path / f"{n}.h5", *made(n), session=f"{n}", **{key: of(n) for key, of in more.items()})
+        for n in range(3)
+    ]
+    found = evaluated(force_task(), paths, split="session").findings
+    assert len(found) == (said is not None)
+    assert all(text.startswith(said) for text in found)
+
+
+def test_a_fault_of_a_channel_that_the_task_does_not_look_at_is_no_finding(tmp_path):
+    t = np.arange(0.0, 1000.0, 10.0)
+    late = np.where(t > 960, t + 400, t)
+    for task, n in ((force_task(), 0), (force_task(features=("taxel", "ac_pressure")), 1)):
+        path = two_streams(tmp_path / f"{n}.h5", (t, t), (late, t), (t, t))
+        assert len(load_dataset(task, [path]).findings) == n
+
+
+def test_clocks_that_never_meet_are_an_error_with_both_spans(tmp_path):
+    t = np.arange(0.0, 1000.0, 10.0)
+    apart, good = (
+        two_streams(tmp_path / f"{name}.h5", (t, t), (t, t), (t + by, t)) for name, by in (("a", 36e5), ("b", 0))
+    )
+    spans = "slow runs from 0.000 to 0.990 s, and fz from 3600.000 to 3600.990 s: it begins 3600.000 s later"
+    with pytest.raises(DataError, match=f"near a force sample in time: in 'a', {spans}"):
+        load_dataset(force_task(), [apart])
+    (found,) = load_dataset(force_task(), [apart, good]).findings
+    assert found == f"1 of 2 recordings left out, without any force sample: a (a: {spans})"
+
+
+@pytest.mark.parametrize(
+    ("names", "n"),
+    [
+        (("Coke", "coke"), 1),
+        (("a b", "ab"), 1),
+        (("1 12", "11 2"), 0),
+        (("Stra\u00dfe", "strasse "), 1),
+        (("a", "b"), 0),
+    ],
+)
+def test_labels_that_differ_by_case_or_spaces_are_named(tmp_path, names, n):
+    paths = [record(tmp_path / f"{n}.h5", *ramp(n), labels={"kind": names[n % 2]}, session=f"{n}") for n in range(4)]
+    by_class = evaluated(label_task(), paths, "majority", split="session").findings
+    by_group = evaluated(force_task(splits=("kind",)), paths, split="kind").findings
+    assert [len(by_class), len(by_group)] == [n, n]
+    assert all(repr(name) in text for text in (*by_class, *by_group) for name in names)

@@ -105,7 +105,7 @@ def test_a_class_that_no_training_row_has_is_named(tmp_path):
     paths = [record(tmp_path / f"{n}.h5", *ramp(n), session=f"{n}", labels={"kind": "abc"[n]}) for n in range(3)]
     result = evaluated(label_task(), paths, "logistic", split="session")
     assert result.score == 0.0
-    assert "tested but never trained on: 'a' in 0; 'b' in 1; 'c' in 2" in result.remarks
+    assert "tested but never trained on: 'a' in 0; 'b' in 1; 'c' in 2" in result.findings
 
 
 def test_answers_that_overflow_are_named(tmp_path):

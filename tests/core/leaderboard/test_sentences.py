@@ -41,6 +41,7 @@ def boards(draw):
                 "published": draw(st.sampled_from([None, None, 0.2, 0.5])),
                 "dagger": draw(st.booleans()) if not rows else rows[0]["dagger"],
                 "stamps": draw(st.sampled_from([[], [], ["It leaks."]])),
+                "findings": draw(st.sampled_from([[], [], ["ms read as s?"]])),
                 "answer_delay_ms": draw(st.sampled_from([None, 20.0])),
                 "host": draw(st.sampled_from(["h", "h", "i"])),
                 "concurrency": draw(st.sampled_from([None, 1, 4])),
@@ -188,9 +189,10 @@ class Truth:
         told = re.findall(r" (\d\.\d+)", text)
         return bool(told) and known.issuperset(told)
 
-    def stamped(self, names, more):
+    def stamped(self, names, more, key="stamps"):
         """Whether these rows, and so many more, are stamped, without names all."""
-        stamped = [self.name(one) for one in self.rows if one["stamps"]]
+        names, more = names and names.split(", "), int(more or 0)
+        stamped = [self.name(one) for one in self.rows if one[key]]
         if names is None:
             return len(stamped) == len(self.rows)
         return set(stamped).issuperset(names) and len(stamped) == len(names) + more < len(self.rows)
@@ -245,7 +247,8 @@ ABOVE = {
     r"Published values: (.*?)(?:; this concerns the simulation, not the sensors)?\.": lambda t, a: t.beside(a),
 }  # fmt: skip
 BELOW = {
-    r"‡  (?:(.*?)(?: and (\d+) more)?: )?It leaks\.": lambda t, a, more: t.stamped(a and a.split(", "), int(more or 0)),
+    r"‡  (?:(.*?)(?: and (\d+) more)?: )?It leaks\.": lambda t, a, more: t.stamped(a, more),
+    r"!  (?:(.*?)(?: and (\d+) more)?: )?ms read as s\?": lambda t, a, more: t.stamped(a, more, "findings"),
     "=  each of these rows cannot be told from at least one other": lambda t: t.unsure(),
     r"–  no better than the trivial answer of its own sensor \((.*)\)":
         lambda t, b: t.bars(b, t.worse),
@@ -285,6 +288,7 @@ def holds(text, known, truth):
 def test_what_is_said_is_on_the_list_short_and_true(rows):
     (block,) = build_table(rows).blocks
     truth = Truth(rows)
+    assert block.setting.endswith(" · 2 classes") == bool(rows[0]["classes"])
     assert len(block.verdict) <= 2
     assert len(block.notes) <= 5
     for text in block.verdict:
@@ -293,10 +297,11 @@ def test_what_is_said_is_on_the_list_short_and_true(rows):
         assert holds(note.text, BELOW, truth), note
     for line in block.lines:
         if line.kind == "result":
-            marks = [mark for mark in "‡*" if mark in line.texts["notes"]]
+            marks = [mark for mark in "‡*!" if mark in line.texts["notes"]]
             marks += ["="] * (line.texts["place"].endswith("=") and truth.ranks is not None)
             marks += ["–"] * bool(line.texts["place"] == "–" and truth.better)
             explained = {note.text[0] for note in block.notes}
             assert explained.issuperset(marks), (marks, explained)
+            assert ("!" in marks) == bool(line.row["findings"])
             assert (line.texts["place"] == "–") == (line.row not in truth.better)
             assert ("*" in line.texts["notes"]) == (line.row in truth.unshown)

@@ -17,6 +17,7 @@ HONEST = ("ols", "mean", "time-index")
 ENDS = {
     "evil-raise": ("failed", None, "RuntimeError: out of breath"),
     "evil-eat": ("out-of-memory", None, "more than 200 MB"),
+    "evil-latin": ("failed", None, r"ValueError: sh\udce9lf/levels.txt is not there"),
     "evil-import": ("crashed", 6, "SIGABRT"),
     "evil-patch": ("done", None, ""),
 }
@@ -57,6 +58,21 @@ def test_a_file_that_cannot_be_read_costs_its_own_cells_only(tmp_path):
     rows = json.loads(Verbs(tmp_path, here=True)(*ANY_SENSOR, code=1).stdout)
     ends = {(row["sensor"], row["status"], "flat.h5" in str(row["reason"])) for row in rows}
     assert ends == {("made", "done", False), ("icub", "failed", True)}
+
+
+@pytest.mark.parametrize(("shelf", "press"), [("sh\udce9lf", "press.h5"), ("shelf", "pr\udce9ss.h5")])
+def test_recordings_whose_names_are_no_utf8_are_evaluated_and_found_again(tmp_path, shelf, press):
+    presses(tmp_path / shelf)
+    (tmp_path / shelf / "press-0.h5").rename(tmp_path / shelf / press)
+    verbs, asked = Verbs(tmp_path, here=True), [shelf if word == "shelf" else word for word in ANY_SENSOR]
+    rows = json.loads(verbs(*asked, "--out", "out").stdout)
+    assert {row["status"] for row in rows} == {"done"}
+    assert "3 of 3 answers were found finished" in verbs(*asked, "--out", "out").stderr
+    store = Store(tmp_path / "out")
+    assert {path for row in store.rows() for _, path in store.recordings(row)} == {*(tmp_path / shelf).iterdir()}
+    for shape in ("table", "latex", "parquet", "xlsx"):
+        verbs("leaderboard", "out", "--format", shape, *(["--to", "board"] if shape in ("parquet", "xlsx") else []))
+    (tmp_path / "out" / "leaderboard.csv").read_text(encoding="utf-8")
 
 
 @pytest.mark.parametrize(

@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 from tactbench.core.errors import FolderError, FormatError
 from tactbench.core.matrix.store import Store
 from tactbench.core.matrix.store import store as STORE
-from tactbench.core.matrix.store.cell_file import read_cell
+from tactbench.core.matrix.store.cell_file import CellFile, read_cell
 from tactbench.core.samples import Answers
 from tests.conftest import ROOT
 
@@ -47,6 +47,17 @@ def test_rows_answers_and_what_the_key_is_made_of_come_back_bit_for_bit(tmp_path
     assert (found.provenance(second["made_by"]), found.provenance("unknown")) == ({"cpu": "b"}, {})
 
 
+def test_texts_that_are_no_utf8_are_written_out(tmp_path):
+    """Bytes of a file name that is no UTF-8 are lone surrogates in Python's texts."""
+    with Store(tmp_path).hold() as store:
+        store.begin({"argv": ["\udce9"]})
+        given = kept(store, "a/\udce9", "failed", reason="\udcff 𝄞", remarks=["\ud834"], params={"\udce9": 1})
+    (found,) = Store(tmp_path).rows()
+    assert found == given
+    told = {name: found[name] for name in ("cell", "reason", "remarks", "params")}
+    assert told == {"cell": r"a/\udce9", "reason": r"\udcff 𝄞", "remarks": [r"\ud834"], "params": {r"\udce9": 1}}
+
+
 def test_the_latest_of_a_name_counts(tmp_path):
     with Store(tmp_path).hold() as store:
         kept(store, "a", "timeout", key=key(1))
@@ -71,13 +82,24 @@ def test_the_latest_of_a_name_counts(tmp_path):
 
 def test_cells_that_are_named_by_their_number_among_the_repeats_are_read_under_their_seed(tmp_path):
     """Of folders written before replicates were named by their seeds, those that never had a key among them."""
-    with Store(tmp_path).hold() as store:
-        kept(store, "a/1", repeat=1, seed=3)
-        kept(store, "b/1", "failed", repeat=1, seed=3)
-    (tmp_path / "results.sqlite").unlink()
+    (tmp_path / "cells").mkdir()
+    for old in (row("a/1", repeat=1, seed=3), row("b/1", "failed", repeat=1, seed=3)):
+        file_of(tmp_path, old["cell"]).write_bytes(CellFile(old, SECTIONS).content())
     found = Store(tmp_path)
     assert [one["cell"] for one in found.rows()] == ["a/3", "b/3"]
     assert all(found.cell(one).row == one for one in found.rows())
+
+
+def test_an_answer_from_other_recordings_supersedes_the_older_one_and_that_is_known(tmp_path):
+    with Store(tmp_path).hold() as store:
+        first = kept(store, "a", key=key(1), digests=["x"])
+        kept(store, "a", key=key(2), digests=["x"])  # of another version, from the same recordings
+        kept(store, "b", key=key(3), digests=["y"])
+        assert store.superseded == []
+        kept(store, "a", key=key(4), digests=["y"])
+        assert store.superseded == ["a"]
+        store.reuse(first)
+        assert store.superseded == ["a", "a"]
 
 
 def test_a_damaged_file_is_told_left_out_and_replaced(tmp_path):

@@ -2,12 +2,15 @@
 
 import h5py
 import numpy as np
+import pytest
+
+from tests.conftest import Verbs
 
 
 def recordings(verbs, out, *more, plugins=("patching",)):
     """Return the readings of a run's recordings, by the names of the files, which hold the keys."""
-    asked = ("run", "--sensor", "icub", "--task", "force", "--estimator", "mean", "--repeats", "1")
-    verbs(*asked, "--out", out, *more, plugins=plugins)
+    asked = ("run", "--sensor", "icub", *more, "--task", "force", "--estimator", "mean", "--repeats", "1")
+    verbs(*asked, "--out", out, plugins=plugins)
     found = {}
     for path in sorted((verbs.folder / out / "recordings").rglob("*.h5")):
         with h5py.File(path) as file:
@@ -15,10 +18,25 @@ def recordings(verbs, out, *more, plugins=("patching",)):
     return found
 
 
-def test_an_effect_that_changes_numpy_when_it_is_imported_does_so_only_where_it_is_named(verbs):
-    without, unnamed = recordings(verbs, "without", plugins=()), recordings(verbs, "unnamed")
+@pytest.fixture(scope="module")
+def without(tmp_path_factory):
+    """Recordings of a run without the plugin."""
+    return recordings(Verbs(tmp_path_factory.mktemp("without")), "without", plugins=())
+
+
+def test_an_effect_that_changes_numpy_when_it_is_imported_does_so_only_where_it_is_named(verbs, without):
+    unnamed = recordings(verbs, "unnamed")
     assert without.keys() == unnamed.keys()
     assert all(np.array_equal(without[name], unnamed[name]) for name in without)
     named = recordings(verbs, "named", "--effects", "patching")
     assert named.keys().isdisjoint(without)
     assert all(not np.array_equal(a, b) for a, b in zip(named.values(), without.values(), strict=True))
+
+
+@pytest.mark.parametrize(
+    ("door", "engine"), [("effect", "isolated"), ("indenter", "isolated"), ("indenter", "in-process")]
+)
+def test_what_another_task_of_the_run_names_changes_no_recording_of_a_scene_that_does_not(shell, without, door, engine):
+    beside = recordings(shell, "beside", "--task", f"patching-{door}", "--jobs", "1", "--engine", engine)
+    assert len(beside) == len(without) + 2
+    assert all(np.array_equal(without[name], beside[name]) for name in without)

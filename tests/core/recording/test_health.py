@@ -29,6 +29,11 @@ def late(first, by_ns):
     return {"t_ns": TIMES + by_ns * (np.arange(N) >= first)}
 
 
+PRESSED = np.maximum(10 * np.sin(np.arange(N) / 12), 0)
+LATE = np.round(1000 + 100 * np.interp(np.arange(N) - 8, np.arange(N), PRESSED)[:, None] * [1, 2, 1.5]).astype(int)
+LATE += READINGS % 5
+
+
 JITTER = np.cumsum(np.random.default_rng(1).integers(5_000_000, 15_000_000, N))
 LOST = StreamCounts(received=N + 20, written=N, dropped=7, duplicates=2, gaps=5)
 
@@ -48,7 +53,10 @@ LOST = StreamCounts(received=N + 20, written=N, dropped=7, duplicates=2, gaps=5)
         ({"t_ns": JITTER}, {"irregular": "mean rate"}),
         (late(100, -50_000_000), {"backward": "row 100"}),
         (late(100, -10_000_000), {"repeated-time": "1 "}),
-        ({"clock": "none"}, {"no-clock": ""}),
+        ({"t_ns": 500 * TIMES}, {"rate": "0.2 Hz: ms read as s?"}),
+        ({"t_ns": 1_700_000_000_000_000_000 + 500 * TIMES}, {}),  # of this century: a row a press
+        ({"data": LATE, "force": PRESSED}, {"lag": "taxels is 80 ± "}),
+        ({"data": LATE, "force": PRESSED, "clock": "none"}, {"no-clock": ""}),
         ({"excluded": "it slipped off"}, {"excluded": "it slipped off"}),
         ({"force": None}, {"absent": "force_torque"}),
         ({"notes": {"object": ["ball"] * N, "press": np.arange(N)}}, {"constant-label": "object is 'ball'"}),

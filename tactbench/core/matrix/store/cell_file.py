@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from tactbench.core.errors import FormatError
-from tactbench.core.files import hdf5_image
+from tactbench.core.files import hdf5_image, utf8_json
 from tactbench.core.samples import Answers
 
 FORMAT = b"tactbench-cell 5 "
@@ -21,10 +21,10 @@ _COLUMNS = tuple(column.name for column in fields(Answers))
 
 @dataclass(frozen=True)
 class CellFile:
-    """What the file of a cell holds."""
+    """What the file of a cell holds; making one raises ValueError or TypeError if the row is not plain data."""
 
     row: dict[str, Any]
-    """As `tactbench.core.spec.row.RowModel` describes it."""
+    """As `tactbench.core.spec.row.RowModel` describes it; its texts are UTF-8 whatever was given."""
     sections: Mapping[str, Any] = field(default_factory=dict)
     """What its key is made of, by section."""
     provenance: Mapping[str, Any] = field(default_factory=dict)
@@ -33,9 +33,13 @@ class CellFile:
     answers: Mapping[str, Answers] = field(default_factory=dict)
     """By role; none of a cell that did not finish."""
 
+    def __post_init__(self) -> None:
+        text = json.dumps(self.row, allow_nan=False, ensure_ascii=False)
+        object.__setattr__(self, "row", json.loads(utf8_json(text)))
+
     @property
     def text(self) -> str:
-        """All but the answers, as JSON; raises ValueError or TypeError if the row is not plain data."""
+        """All but the answers, as JSON."""
         head = {"row": self.row, "sections": self.sections, "provenance": self.provenance, "ended_ns": self.ended_ns}
         return json.dumps(head, allow_nan=False)
 
@@ -45,7 +49,7 @@ class CellFile:
         return {role: hashlib.sha256(_table(one).tobytes()).hexdigest() for role, one in self.answers.items()}
 
     def content(self) -> bytes:
-        """Return the bytes of the file; raises ValueError or TypeError if the row is not plain data."""
+        """Return the bytes of the file."""
         import numpy as np
 
         text = self.text.encode()

@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from tactbench.core.errors import FormatError
+from tactbench.core.files import utf8_json
 from tactbench.core.matrix.store.cell_file import CellFile, read_cell
 from tactbench.core.spec.row import FORMAT
 
@@ -107,7 +108,7 @@ class Index:
 
     def recording(self, path: Path, read: Callable[[Path], Mapping[str, Any]]) -> Mapping[str, Any]:
         """Return digest, sensor and scene of a recording; `read` reads them if the file is not known as it is now."""
-        place = str(path.resolve())
+        place = utf8_json(str(path.resolve()))
         size, modified_ns = signature(path)
         found = self._all(
             "SELECT digest, sensor, scene FROM recordings WHERE path = ? AND size = ? AND modified_ns = ?",

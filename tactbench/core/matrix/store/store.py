@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from tactbench.core.errors import FolderError, FormatError
-from tactbench.core.files import replace_file, try_lock
+from tactbench.core.files import named_file, replace_file, try_lock
 from tactbench.core.matrix.store.cell_file import CellFile, read_cell
 from tactbench.core.matrix.store.index import Index
 from tactbench.core.provenance.source import digest_of, provenance_id
@@ -43,6 +43,8 @@ class Store:
     def __init__(self, folder: Path) -> None:
         self.folder = folder
         self._provenance: tuple[str, Mapping[str, Any]] = ("", {})
+        self.superseded: list[str] = []
+        """Cells whose latest answer, since this was made, is no more the one from other recordings."""
 
     @contextmanager
     def hold(self) -> Iterator[Store]:
@@ -96,8 +98,9 @@ class Store:
             If the row is not plain data; nothing is written.
         """
         kept = {**row, "made_by": self._provenance[0]}
-        self._write(CellFile(kept, sections, self._provenance[1], answers=answers or {}))
-        return kept
+        cell = CellFile(kept, sections, self._provenance[1], answers=answers or {})
+        self._write(cell)
+        return cell.row
 
     def reuse(self, row: Row) -> None:
         """Note that a finished cell was found again, under the name it has in `row`: it is the latest of that name."""
@@ -112,7 +115,11 @@ class Store:
         with writing(self.folder):
             replace_file(path, content)
             _check_written(path, cell)
-            for name, _key, status in self._files.files_of(cell.row["cell"]):
+            before = self._files.files_of(cell.row["cell"])
+            old = self._files.finished(before[0][1]) if before else None
+            if old is not None and cell.row.get("digests") not in ([], None, old.get("digests")):
+                self.superseded.append(cell.row["cell"])
+            for name, _key, status in before:
                 if status != "done" and name != path.name:  # superseded; what was finished stays for other versions
                     (path.parent / name).unlink(missing_ok=True)
                     self._files.drop(name)
@@ -158,7 +165,7 @@ class Store:
 
     def recordings(self, row: Mapping[str, Any]) -> list[tuple[str, Path | None]]:
         """Return each recording that a row names, in its order, and its file, or None if it is not there."""
-        found = [(path, self.folder / path) for path in row["recordings"]]
+        found = [(path, self.folder / named_file(path)) for path in row["recordings"]]
         return [(path, file if file.is_file() else None) for path, file in found]
 
     def beside(self, path: Path) -> str:

@@ -14,20 +14,25 @@ from typing import Any
 
 from tactbench.core.errors import MappingError, did_you_mean
 from tactbench.core.recording.mapping.model import Column
-from tactbench.core.recording.mapping.table import MESSAGE_TIMES, BagTable, plain
+from tactbench.core.recording.mapping.table import MESSAGE_TIMES, ColumnTable, plain
 
 
 @dataclass(frozen=True)
 class Topic:
-    """What is asked of a topic."""
+    """What the mapping uses of a table, and the topic that the table is in a bag."""
 
     name: str
     numbers: tuple[Column, ...]
     texts: tuple[Column, ...]
     time: Column | None
 
+    @property
+    def columns(self) -> tuple[Column, ...]:
+        """All columns that are used, each once."""
+        return tuple(dict.fromkeys((*self.numbers, *self.texts, *([] if self.time is None else [self.time]))))
 
-def read_bag(path: Path, shown: str, topics: Mapping[str, Topic]) -> dict[str, BagTable]:
+
+def read_bag(path: Path, shown: str, topics: Mapping[str, Topic]) -> dict[str, ColumnTable]:
     """Read topics of one bag in one pass, by the name of their table.
 
     Raises
@@ -35,7 +40,7 @@ def read_bag(path: Path, shown: str, topics: Mapping[str, Topic]) -> dict[str, B
     MappingError
         If the extra is missing, the bag is damaged or cut short, has no such topic, or messages lack a field.
     """
-    tables = {name: BagTable(f"{shown} {topic.name}") for name, topic in topics.items()}
+    tables = {name: ColumnTable(f"{shown} {topic.name}") for name, topic in topics.items()}
     takers: dict[int, list[Callable[[Any], None]]] = {}
     schemas: dict[int, Any] = {}
     seen: set[str] = set()
@@ -88,12 +93,12 @@ def _decoder(channel: Any, schema: Any, shown: str) -> Callable[[bytes], Any]:
         raise MappingError(
             f"{shown}: topic {channel.topic!r} is encoded as {channel.message_encoding} "
             f"({schema.encoding if schema else 'no schema'}).",
-            hint="ROS 2 messages (cdr, ros2msg) and JSON are read.",
+            hint="ROS 2 messages (cdr, ros2msg) and JSON are read; `rosbags-convert` makes ROS 2 of ROS 1.",
         )
     return found
 
 
-def _taker(table: BagTable, topic: Topic, decode: Any) -> Callable[[Any], None]:
+def _taker(table: ColumnTable, topic: Topic, decode: Any) -> Callable[[Any], None]:
     """Return what adds one message to `table`."""
     numbers = [(table.found.setdefault(column, array("d")), _path(column), column) for column in topic.numbers]
     texts = [(table.words.setdefault(column, []), _path(column), column) for column in topic.texts]

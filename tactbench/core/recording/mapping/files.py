@@ -3,18 +3,21 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
-from pathlib import Path
+from pathlib import Path, PurePosixPath
+from typing import NamedTuple
 
 from tactbench.core.errors import MappingError
 from tactbench.core.recording.mapping.arrays import read_arrays
 from tactbench.core.recording.mapping.bags import Topic, read_bag
 from tactbench.core.recording.mapping.channels import columns_of
-from tactbench.core.recording.mapping.model import Arrays, Bag, Mapping, TableSource, Xlsx
+from tactbench.core.recording.mapping.model import Arrays, Bag, Column, Mapping, Parquet, TableSource, Xlsx
+from tactbench.core.recording.mapping.parquet import read_parquet
 from tactbench.core.recording.mapping.samples import check_join
 from tactbench.core.recording.mapping.sheets import read_sheet
-from tactbench.core.recording.mapping.table import BagTable, Table
+from tactbench.core.recording.mapping.signatures import require_format
+from tactbench.core.recording.mapping.table import ColumnTable, Table, names_listed
 from tactbench.core.recording.mapping.text import read_text
 
 Words = dict[str, str]
@@ -47,24 +50,34 @@ class RawRecording:
     """Paths below the root"""
 
 
-def find(mapping: Mapping, root: Path) -> tuple[list[FileSet], tuple[str, ...]]:
-    """Return what belongs together, in the order of the first table's paths, and which files lack a partner.
+def find(mapping: Mapping, root: Path) -> tuple[list[FileSet], tuple[str, ...], tuple[str, ...]]:
+    """Return what belongs together, in the order of the first table's paths, what is left out, and other matches.
+
+    The last two are sentences.
 
     Raises
     ------
     MappingError
-        If a pattern finds no file, a path lacks the words, a file has several partners, or none has one.
+        If a pattern finds no file, or links to files that are not here, a path lacks the words, a file has several
+        partners, or none has one.
     """
     if not root.is_dir():
         raise MappingError(f"There is no folder {root}.", hint="Name the folder of the data set with --root DIR.")
-    found = {name: _matching(name, source, root) for name, source in mapping.tables.items()}
+    left_out: list[str] = []
+    none: list[str] = []
+    found = {name: _matching(name, source, root, left_out, none) for name, source in mapping.tables.items()}
     lead, *others = found
+    shared = {name: sorted({*found[lead][0].words} & {*found[name][0].words} - {"file"}) for name in others}
+    by_words: dict[str, dict[tuple[str, ...], list[FoundFile]]] = {name: {} for name in others}
+    for name, names in shared.items():
+        for file in found[name]:
+            by_words[name].setdefault(tuple(file.words[word] for word in names), []).append(file)
     sets, orphans = [], []
     used: dict[str, set[str]] = {name: set() for name in others}
     for leader in found[lead]:
         files, words = {lead: leader}, dict(leader.words)
         for name in others:
-            partner = _partner(leader, name, found[name])
+            partner = _partner(leader, name, shared[name], by_words[name])
             if isinstance(partner, str):
                 orphans.append(partner)
                 continue
@@ -78,38 +91,83 @@ def find(mapping: Mapping, root: Path) -> tuple[list[FileSet], tuple[str, ...]]:
     for name in others:
         alone = [file.shown for file in found[name] if file.shown not in used[name]]
         orphans += [f"{shown} of table {name!r} belongs to no file of table {lead!r}." for shown in alone]
-    return sets, tuple(orphans)
+    return sets, (*left_out, *orphans), tuple(none)
 
 
-def read(mapping: Mapping, files: FileSet) -> Iterator[RawRecording]:
-    """Read what belongs together; an archive may hold several recordings."""
+def read(mapping: Mapping, files: FileSet) -> list[RawRecording]:
+    """Read what belongs together: one recording, or those of an archive or of the values of a column."""
     shown = tuple(dict.fromkeys(file.shown for file in files.files.values()))
+    for name, file in files.files.items():
+        require_format(file.path, file.shown, mapping.tables[name].read.format)
     (first, source), *_ = mapping.tables.items()
     if isinstance(source.read, Arrays):
         file = files.files[first]
-        for words, array in read_arrays(file.path, file.shown, source.read, file.words):
-            yield RawRecording({first: array}, {**files.words, **words}, shown)
-        return
+        return [
+            RawRecording({first: array}, {**files.words, **words}, shown)
+            for words, array in read_arrays(file.path, file.shown, source.read, file.words)
+        ]
     tables: dict[str, Table] = {}
     topics: dict[FoundFile, dict[str, Topic]] = {}
     for name, file in files.files.items():
         how = mapping.tables[name].read
         assert not isinstance(how, Arrays)  # the model refuses an archive beside other tables
         if isinstance(how, Bag):
-            tables[name] = BagTable(file.shown)  # keeps its place; read below, all topics of a bag at once
-            topics.setdefault(file, {})[name] = _asked(mapping, name, how.topic)
+            tables[name] = ColumnTable(file.shown)  # keeps its place; read below, all topics of a bag at once
+            topics.setdefault(file, {})[name] = asked(mapping, name, how.topic)
         elif isinstance(how, Xlsx):
             tables[name] = read_sheet(file.path, file.shown, how)
+        elif isinstance(how, Parquet):
+            tables[name] = read_parquet(file.path, file.shown, asked(mapping, name))
         else:
             tables[name] = read_text(file.path, file.shown, how)
-    for file, asked in topics.items():
-        tables |= read_bag(file.path, file.shown, asked)
+    for file, wanted in topics.items():
+        tables |= read_bag(file.path, file.shown, wanted)
     check_join(mapping, tables)
-    yield from _split(mapping, RawRecording(tables, files.words, shown))
+    return list(_split(mapping, RawRecording(tables, files.words, shown)))
 
 
-def _asked(mapping: Mapping, name: str, topic: str) -> Topic:
-    """Return which fields of a topic the mapping uses; no others are kept."""
+class Shape(NamedTuple):
+    """The columns of the first file of a table, those of all files, and those that the mapping uses."""
+
+    shown: str
+    columns: tuple[Column, ...]
+    everywhere: dict[Column, None]
+    used: tuple[Column, ...]
+
+
+def require_same_shape(mapping: Mapping, raw: RawRecording, shapes: dict[str, Shape]) -> None:
+    """Raise MappingError if a table has other columns than the first file where the mapping names places."""
+    for name, table in raw.tables.items():
+        if name not in shapes:
+            shapes[name] = Shape(table.shown, table.columns, {}, asked(mapping, name).columns)
+        first = shapes[name]
+        first.everywhere.update(dict.fromkeys(table.columns))
+        by_place = [one for one in first.used if isinstance(one, int) and one < len(first.columns)]
+        if by_place and len(table.columns) != len(first.columns):
+            raise MappingError(
+                f"{table.shown} has {len(table.columns)} columns, {first.shown} has {len(first.columns)} "
+                f"(table {name!r}).",
+                hint="Repair the file, import it by another mapping, or name the columns by a header.",
+            )
+        for place in by_place:
+            if table.columns[place] != first.columns[place]:
+                raise MappingError(
+                    f"Column {place} is {table.columns[place]!r} in {table.shown} and {first.columns[place]!r} in "
+                    f"{first.shown} (table {name!r}).",
+                    hint="Name the columns by their headers instead of their places.",
+                )
+
+
+def unused_columns(shapes: dict[str, Shape]) -> Iterator[str]:
+    """Yield which columns of a table the mapping does not use."""
+    for name, (_, _, columns, used) in shapes.items():
+        left = [str(one) or str(place) for place, one in enumerate(columns) if not {one, place} & {*used}]
+        if left:
+            yield f"{len(left)} of {len(columns)} columns of table {name}: {names_listed(left)}"
+
+
+def asked(mapping: Mapping, name: str, topic: str = "") -> Topic:
+    """Return which columns of a table the mapping uses, with the topic of a bag."""
     source = mapping.tables[name]
     streams = [stream for stream in mapping.streams.values() if stream.table == name]
     numbers = [column for one in streams for group in one.channels for column in columns_of(group)]
@@ -119,17 +177,45 @@ def _asked(mapping: Mapping, name: str, topic: str) -> Topic:
     return Topic(topic, tuple(dict.fromkeys(numbers)), tuple(dict.fromkeys(texts)), time)
 
 
-def _matching(name: str, source: TableSource, root: Path) -> list[FoundFile]:
-    matches = list(root.glob(source.files))
-    paths = [path for path in matches if path.is_file()]
-    if not paths:
-        instead = f"; {matches[0]} is none" if matches else ""
+def _matching(name: str, source: TableSource, root: Path, left_out: list[str], none: list[str]) -> list[FoundFile]:
+    """Return the files of a table; other files that match are named in `left_out`, and what is no table in `none`."""
+    ending = PurePosixPath(source.files).suffix
+    ending = ending if ending[1:].isalnum() else ""
+    in_any_case = "".join(f"[{mark.lower()}{mark.upper()}]" if mark.isalpha() else mark for mark in ending)
+    pattern = f"{source.files!r} (table {name!r})"
+    kinds: dict[str, list[Path]] = {"": [], "links": [], "folders": [], "case": [], "macOS": [], "linked": []}
+    matches = root.glob(source.files.removesuffix(ending) + in_any_case)
+    for path in sorted(matches, key=lambda one: one.relative_to(root).parts):
+        kinds[_kind(path, ending)].append(path)
+    if "**" in source.files:
+        inside = source.files.partition("**")[2].lstrip("/")
+        folders = [path for path in root.glob(source.files.partition("**")[0] + "**/*") if path.is_symlink()]
+        kinds["linked"] += [path for path in folders if path.is_dir() and next(path.rglob(inside or "*"), None)]
+
+    def listing(kind: str) -> str:
+        return names_listed([path.relative_to(root).as_posix() for path in kinds[kind]])
+
+    if kinds["links"]:
         raise MappingError(
-            f"No file matches {source.files!r} (table {name!r}) in {root}{instead}.",
+            f"{len(kinds['links'])} of {len(kinds['links'] + kinds[''])} matches of {pattern} are links to files that "
+            f"are not here: {listing('links')}.",
+            hint="Fetch what git-annex keeps elsewhere: `datalad get FILE`; remove other links, or narrow the pattern.",
+        )
+    said = {
+        "case": f"files end in another case than {ending!r}",
+        "linked": "linked folders hold matches; ** does not search them",
+        "folders": "matches are folders", "macOS": "files are what macOS keeps beside others (AppleDouble)",
+    }  # fmt: skip
+    notes = {kind: f"{pattern}: {len(kinds[kind])} {said[kind]}: {listing(kind)}" for kind in said if kinds[kind]}
+    left_out += [note for kind, note in notes.items() if kind in ("case", "linked")]
+    none += [note for kind, note in notes.items() if kind in ("folders", "macOS")]
+    if not kinds[""]:
+        raise MappingError(
+            f"No file matches {pattern} in {root}{''.join(f'; {note}' for note in notes.values())}.",
             hint="Check --root: the pattern starts below it.",
         )
     found = []
-    for path in sorted(paths, key=lambda one: one.relative_to(root).parts):
+    for path in kinds[""]:
         shown = path.relative_to(root).as_posix()
         match = re.search(source.path, shown)
         if match is None:
@@ -142,13 +228,28 @@ def _matching(name: str, source: TableSource, root: Path) -> list[FoundFile]:
     return found
 
 
-def _partner(leader: FoundFile, name: str, candidates: list[FoundFile]) -> FoundFile | str:
+def _kind(path: Path, ending: str) -> str:
+    """Return which kind of match a path is; a plain file with the ending of the pattern is the empty text."""
+    if not path.exists():
+        return "links"
+    if not path.is_file():
+        return "folders"
+    if not path.name.endswith(ending):
+        return "case"
+    if not path.name.startswith("._"):
+        return ""
+    with path.open("rb") as opened:
+        return "macOS" if opened.read(4) == b"\0\x05\x16\x07" else ""
+
+
+def _partner(
+    leader: FoundFile, name: str, shared: Sequence[str], candidates: dict[tuple[str, ...], list[FoundFile]]
+) -> FoundFile | str:
     """Return the file of table `name` that belongs to a file of the first, or what to say where there is none."""
-    shared = (set(leader.words) & set(candidates[0].words)) - {"file"}
-    fitting = [one for one in candidates if all(one.words[word] == leader.words[word] for word in shared)]
+    fitting = candidates.get(tuple(leader.words[word] for word in shared), [])
     if len(fitting) == 1:
         return fitting[0]
-    what = ", ".join(f"{word} {leader.words[word]}" for word in sorted(shared)) or "no shared words"
+    what = ", ".join(f"{word} {leader.words[word]}" for word in shared) or "no shared words"
     needs = f"{leader.shown} needs one file of table {name!r} ({what}); there "
     if not fitting:
         return f"{needs}is none."

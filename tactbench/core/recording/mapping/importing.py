@@ -9,7 +9,7 @@ import shutil
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from dataclasses import replace as replaced
 from itertools import product
 from pathlib import Path
@@ -21,17 +21,17 @@ import numpy as np
 from tactbench.core.errors import MappingError, RecordingError
 from tactbench.core.files import try_lock, writable
 from tactbench.core.progress import Progress
-from tactbench.core.recording.health import MONOTONE, Finding, examine, is_copy
+from tactbench.core.recording.health import FINDINGS, MONOTONE, Finding, examine, is_copy
 from tactbench.core.recording.mapping.channels import MappedStream, device, fill, sensor_of
-from tactbench.core.recording.mapping.files import RawRecording, find, read
-from tactbench.core.recording.mapping.model import MUST_NAME_SENTINELS, Mapping, Word
-from tactbench.core.recording.mapping.samples import labels, samples, times
+from tactbench.core.recording.mapping.files import RawRecording, Shape, find, read, require_same_shape, unused_columns
+from tactbench.core.recording.mapping.model import MUST_NAME_SENTINELS, Arrays, Mapping, Word
+from tactbench.core.recording.mapping.samples import compare_clocks, labels, samples, times
 from tactbench.core.recording.mapping.table import TextTable
 from tactbench.core.recording.mapping.tasks import check_tasks, require_answerable, tasks_text, write_tasks
-from tactbench.core.recording.reader import content_digest, open_recording
+from tactbench.core.recording.reader import UnwrittenRecording, content_digest
 from tactbench.core.recording.writer import RecordingWriter
-from tactbench.core.samples import Block, FloatArray
-from tactbench.core.spec.recording import RecordingMeta, Scalar
+from tactbench.core.samples import Block, FloatArray, StreamData
+from tactbench.core.spec.recording import RecordingMeta, Scalar, composed
 from tactbench.core.spec.scene import Role
 from tactbench.core.spec.sensor import SensorSpec, StreamSpec
 from tactbench.core.spec.yaml_file import load_yaml
@@ -70,8 +70,10 @@ class ImportReport:
     files_read: int
     tasks: tuple[str, ...] = ()
     """Names of those that the mapping declares"""
-    orphans: tuple[str, ...] = ()
-    """Files that make no recording because another table has none for them, and why"""
+    left_out: tuple[str, ...] = ()
+    """Matches that make no recording, and why"""
+    unused: tuple[str, ...] = ()
+    """Matches that are no tables, and columns that the mapping does not use, a sentence a table"""
 
     @property
     def sensors(self) -> tuple[str, ...]:
@@ -129,17 +131,30 @@ def import_tables(
     sensor, reference, streams = sensor_of(loaded)
     require_answerable(loaded, streams, mapping)
     tasks = tasks_text(loaded)
-    sets, orphans = find(loaded, mapping.parent if root is None else root)
+    sets, left_out, unused = find(loaded, mapping.parent if root is None else root)
+    beside: list[Finding] = []
+    if left_out:
+        more = f" And {len(left_out) - 1} more." if left_out[1:] else ""
+        text = f"its import left files out: {left_out[0]}{more}"
+        beside.append(Finding("left-out", "warning", "", (), len(left_out), text))
     made: list[Imported] = []
+    origins: dict[str, str] = {}
+    shapes: dict[str, Shape] = {}
     progress = progress or Progress()
-    progress.begin(f"importing {mapping.stem}", len(sets))
+    one_each = not loaded.split_by and not isinstance(next(iter(loaded.tables.values())).read, Arrays)
+    if one_each:
+        progress.begin(f"importing {mapping.stem}", len(sets))
     with aside(out) as folder:
         for files in sets:
-            for raw in read(loaded, files):
+            raws = read(loaded, files)
+            if not one_each:
+                progress.begin(f"importing {raws[0].files[0]}", len(raws))
+            for raw in raws:
+                require_same_shape(loaded, raw, shapes)
                 meta = _meta(loaded, raw, sensor, reference)
-                _unique_name(meta, made)
-                made.append(_write(folder / f"{meta.name}{ENDING}", meta, loaded, raw, streams))
-            progress.advance(next(iter(files.files.values())).shown)
+                _unique_name(meta, origins)
+                made.append(_write(folder / f"{meta.name}{ENDING}", meta, loaded, raw, streams, beside))
+                progress.advance(meta.name)
         check_tasks(out, tasks, replace=replace)
         write_tasks(folder, tasks)
         placed = _fitting(made, out, replace=replace)
@@ -147,7 +162,7 @@ def import_tables(
             _place(folder.rename(folder.with_name(folder.name.replace(WAITING, PLACING))), out)
     names = tuple(task.name for task in loaded.tasks)
     shown = {file.shown for files in sets for file in files.files.values()}
-    return ImportReport(loaded.title, tuple(placed), len(shown), names, orphans)
+    return ImportReport(loaded.title, tuple(placed), len(shown), names, left_out, (*unused, *unused_columns(shapes)))
 
 
 @contextmanager
@@ -200,8 +215,14 @@ def _place(folder: Path, out: Path) -> None:
 
 
 def _write(
-    path: Path, meta: RecordingMeta, mapping: Mapping, raw: RawRecording, streams: dict[str, MappedStream]
+    path: Path,
+    meta: RecordingMeta,
+    mapping: Mapping,
+    raw: RawRecording,
+    streams: dict[str, MappedStream],
+    beside: Sequence[Finding],
 ) -> Imported:
+    """Write one recording; `beside` was found in the import as a whole."""
     counts: dict[str, int] = {}
     missing: dict[str, int] = {}
     clocks = {
@@ -209,27 +230,33 @@ def _write(
         for name, table in raw.tables.items()
         if (time := mapping.tables[name].time) is not None
     }
+    found = [*compare_clocks(mapping, raw.tables, clocks)]
     sensed: dict[str, FloatArray] = {}
     reference: dict[str, FloatArray] = {}
+    written: list[StreamData] = []
     with RecordingWriter(path, meta, keep=False) as writer:
         for name, stream in streams.items():
-            table = raw.tables[stream.source.table]
+            table, clock = raw.tables[stream.source.table], clocks.get(stream.source.table)
             read_in = samples(stream, table)
+            found.extend(read_in.findings)
             columns = zip(stream.spec.channels, np.where(read_in.quality, np.nan, read_in.data).T, strict=True)
             for channel, column in columns:
                 if stream.source.of == "sensor":
                     sensed[channel.name] = column
                 elif channel.kind in MUST_NAME_SENTINELS:
                     reference[channel.name] = column
-            writer.append(Block(name, clocks.get(stream.source.table), read_in.data, read_in.quality))
-            for label, annotation in stream.source.annotations.items():
-                writer.annotate(name, label, labels(label, annotation, table))
+            writer.append(Block(name, clock, read_in.data, read_in.quality))
+            notes = {label: labels(label, one, table) for label, one in stream.source.annotations.items()}
+            for label, values in notes.items():
+                writer.annotate(name, label, values)
+            written.append(StreamData(stream.spec, clock, read_in.data, read_in.quality, notes))
             missing.update(read_in.missing)
             counts[f"rows of {name}"] = len(table)
         counts |= {f"{channel} without a sample": number for channel, number in missing.items()}
-        writer.revise(counts=counts)
-    with open_recording(path) as written:
-        findings = (*examine(written), *_given_away(sensed, reference), *_trailing_delimiters(raw))
+        examined = examine(UnwrittenRecording(meta, written))
+        findings = (*beside, *examined, *found, *_given_away(sensed, reference), *_trailing_delimiters(raw))
+        kept = [asdict(one) for one in findings if one.severity != "info"]
+        writer.revise(counts=counts, provenance={FINDINGS: kept})
     rows = max(len(table) for table in raw.tables.values())
     return Imported(path, meta.name, rows, meta.sensor.name, missing, meta.excluded, meta.origin, findings)
 
@@ -292,12 +319,12 @@ def _derived(name: str, word: Word, words: dict[str, Scalar], origin: str) -> st
             f"The word {name!r} is made of {word.of!r}, which nothing gives; there are: {', '.join(sorted(words))}.",
             hint="Words may be made of words above them.",
         )
-    given = str(words[word.of])
+    given = composed(str(words[word.of]))
     if word.divided_by is not None:
         if not given.isdecimal():
             raise MappingError(f"{origin}: the word {word.of!r} is {given!r}, no whole number.", hint="Use `values`.")
         return str(int(given) // word.divided_by)
-    known = {str(key): value for key, value in (word.values or {}).items()}
+    known = {composed(str(key)): value for key, value in (word.values or {}).items()}
     if given not in known:
         raise MappingError(
             f"{origin}: {word.of} {given!r} has no translation for {name!r}; there are: {', '.join(known)}.",
@@ -318,14 +345,15 @@ def _clock_remarks(mapping: Mapping) -> tuple[str, ...]:
     return tuple(f"What time zero means in table {name} is not known." for name in unknown)
 
 
-def _unique_name(meta: RecordingMeta, made: Sequence[Imported]) -> None:
+def _unique_name(meta: RecordingMeta, origins: dict[str, str]) -> None:
     # Folded: on some disks Press.h5 and press.h5 are one file.
-    other = next((one for one in made if one.name.casefold() == meta.name.casefold()), None)
-    if other is not None:
+    folded = meta.name.casefold()
+    if folded in origins:
         raise MappingError(
-            f"{other.origin} and {meta.origin} would both become the recording {meta.name!r}.",
+            f"{origins[folded]} and {meta.origin} would both become the recording {meta.name!r}.",
             hint="Put a word that tells them apart into `recording.name`.",
         )
+    origins[folded] = meta.origin
 
 
 def _fitting(made: Sequence[Imported], out: Path, *, replace: bool) -> list[Imported]:

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import re
+from pathlib import PurePosixPath
 from typing import Annotated, Literal
+from zoneinfo import ZoneInfo
 
-from pydantic import Field, ValidationInfo, field_validator, model_validator
+from pydantic import AliasChoices, Field, ValidationInfo, field_validator, model_validator
 
 from tactbench.core.errors import UsageError
 from tactbench.core.spec import units
@@ -27,22 +29,40 @@ class Tabular(Frozen):
 
     header: bool
     """True: the first line names the columns. False: there is no such line, columns are numbered from 0."""
-    skip_lines: int = Field(default=0, ge=0)
-    """Lines before the header or the first row that mean nothing."""
+    skiprows: Annotated[int, Field(ge=0)] | tuple[Annotated[int, Field(ge=0)], ...] = Field(
+        default=0, validation_alias=AliasChoices("skiprows", "skip_lines")
+    )
+    """As in pandas: how many lines at the beginning mean nothing, or the places, from 0, of those that do not."""
     no_sample: tuple[str, ...] = ()
     """Cells with exactly one of these texts hold no sample, for example "" or "NA"."""
     transposed: bool = False
     """True: a line holds all samples of one channel; with `header` its first cell is the name."""
 
 
-class Csv(Tabular):
+class Written(Tabular):
+    """Rows of text; the keys are those of ``pandas.read_csv``."""
+
+    decimal: str = Field(default=".", min_length=1, max_length=1)
+    thousands: str | None = Field(default=None, min_length=1, max_length=1)
+    """What stands between groups of three digits."""
+    comment: str | None = Field(default=None, min_length=1, max_length=1)
+    """What begins a comment; it ends with the line."""
+
+    @model_validator(mode="after")
+    def _marks_differ(self) -> Written:
+        if self.thousands == self.decimal:
+            raise ValueError(f"thousands and decimal are both {self.decimal!r}")
+        return self
+
+
+class Csv(Written):
     """Cells between delimiters."""
 
     format: Literal["csv"] = "csv"
     delimiter: str = Field(default=",", min_length=1, max_length=1)
 
 
-class Text(Tabular):
+class Text(Written):
     """Cells between spaces or tabs."""
 
     format: Literal["text"] = "text"
@@ -111,6 +131,12 @@ class Bag(Frozen):
     topic: str
 
 
+class Parquet(Frozen):
+    """Columns of a Parquet file; the extra ``[parquet]``. Places of lists are columns: ``observation.state.0..5``."""
+
+    format: Literal["parquet"] = "parquet"
+
+
 class Time(Frozen):
     """The clock of a table: a column, never `row / rate`."""
 
@@ -118,12 +144,28 @@ class Time(Frozen):
     unit: str
     epoch: Literal["unix", "start", "unknown"]
     """What zero is: 1970-01-01 UTC, the beginning of the recording, or nobody knows."""
+    zone: str | None = None
+    """Time zone of dates that state none, for example ``Europe/Berlin`` or ``UTC``."""
+    wraps_at: int | None = Field(default=None, ge=2)
+    """The counter begins at 0 again instead of reaching this number, for example 4294967296."""
+    offset_s: float = 0.0
+    """Added to the stamps [s]: the known lag of one clock behind another."""
 
     @field_validator("unit")
     @classmethod
     def _is_time(cls, unit: str) -> str:
         _convertible(unit, "s")
         return unit
+
+    @field_validator("zone")
+    @classmethod
+    def _is_known(cls, zone: str | None) -> str | None:
+        try:
+            return zone and ZoneInfo(zone).key
+        except (OSError, ValueError, KeyError) as error:
+            raise ValueError(
+                f"no time zone {zone!r} is known here (a machine without zones: pip install tzdata)"
+            ) from error
 
 
 class TableSource(Frozen):
@@ -133,14 +175,14 @@ class TableSource(Frozen):
     """Which: a pattern below the root, with ``*`` within a folder and ``**`` across folders."""
     path: str = ""
     """Regular expression searched in each path; its named groups become words."""
-    read: Annotated[Csv | Text | Records | Xlsx | Npz | Npy | Mat | Bag, Field(discriminator="format")]
+    read: Annotated[Csv | Text | Records | Xlsx | Npz | Npy | Mat | Bag | Parquet, Field(discriminator="format")]
     time: Time | None = None
 
     @field_validator("files")
     @classmethod
     def _below_root(cls, files: str) -> str:
-        if files.startswith("/"):
-            raise ValueError("the pattern starts below the root folder")
+        if files.startswith("/") or ".." in PurePosixPath(files).parts:
+            raise ValueError("the pattern starts and stays below the root folder")
         return files
 
     @field_validator("path")
@@ -198,7 +240,7 @@ class ChannelGroup(Frozen):
     sentinels: tuple[float, ...] | None = None
     """Numbers in the column that mean "no sample"; a force or torque must say, if only ``[]``."""
     keep_repeated: bool = False
-    """A single value outside the range of all others and often repeated is a real reading."""
+    """Without effect: repeated values are reported, and never refused. Mappings may still have it."""
     lower: float | None = None
     upper: float | None = None
     sign: Literal[-1, 0, 1] = 0

@@ -11,7 +11,7 @@ from typing import Any
 from tactbench.core.errors import MappingError
 from tactbench.core.recording.mapping.model import Xlsx
 from tactbench.core.recording.mapping.table import TextTable, plain
-from tactbench.core.recording.mapping.text import Line, table_of
+from tactbench.core.recording.mapping.text import Line, skipped, table_of
 
 
 def read_sheet(path: Path, shown: str, how: Xlsx) -> TextTable:
@@ -34,7 +34,7 @@ def read_sheet(path: Path, shown: str, how: Xlsx) -> TextTable:
             warnings.simplefilter("ignore")  # styles and extensions that openpyxl does not know
             book = load_workbook(opened, read_only=True, data_only=True)
             sheet = _sheet(book, shown, how)
-            lines = list(_lines(sheet.iter_rows(min_row=how.skip_lines + 1, values_only=True), how.skip_lines))
+            lines = list(_lines(sheet.iter_rows(values_only=True), how))
     except MappingError:
         raise
     except Exception as error:  # whatever a damaged file makes of the library
@@ -54,10 +54,10 @@ def _sheet(book: Any, shown: str, how: Xlsx) -> Any:
     return book[name]
 
 
-def _lines(rows: Any, skipped: int) -> Iterator[Line]:
-    """Yield the rows that are not blank, without the blank cells at their ends."""
-    for number, row in enumerate(rows, skipped + 1):
-        cells = [_text(value) for value in row]
+def _lines(rows: Any, how: Xlsx) -> Iterator[Line]:
+    """Yield the rows that are neither blank nor left out, without the blank cells at their ends."""
+    for number, row in enumerate(rows, 1):
+        cells = [] if skipped(number - 1, how) else [_text(value) for value in row]
         while cells and not cells[-1]:
             cells.pop()
         if cells:

@@ -9,8 +9,8 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from tactbench.core.errors import MappingError
-from tactbench.core.recording.mapping.model import Csv, Records, Tabular, Text
-from tactbench.core.recording.mapping.table import TextTable
+from tactbench.core.recording.mapping.model import Csv, Records, Tabular, Text, Written
+from tactbench.core.recording.mapping.table import TextTable, comment_mark
 
 _DELIMITERS = {"\t": "tab", ";": "semicolon"}
 Line = tuple[int | str, list[str]]
@@ -25,15 +25,20 @@ def read_text(path: Path, shown: str, how: Csv | Text | Records) -> TextTable:
     MappingError
         If the file cannot be read, is empty, or has rows of different lengths.
     """
+    content = path.read_bytes()
     try:
-        text = path.read_text(encoding="utf-8-sig")
-    except OSError as error:
-        raise MappingError(f"{shown} cannot be read: {error.strerror}.", hint="Check its permissions.") from error
+        text = content.decode("utf-8-sig")
     except UnicodeDecodeError as error:
+        line, wrong = content[: error.start].count(b"\n") + 1, content[error.start]
         raise MappingError(
-            f"{shown} is not UTF-8 text.",
-            hint="Name what it is, `format: xlsx`, `npz` or `mat`, or save the table as CSV in UTF-8.",
+            f"{shown}:{line} is not UTF-8 text: byte 0x{wrong:02x}, {bytes([wrong]).decode('latin-1')!r} in Latin-1.",
+            hint="If the file is in Latin-1, convert it: `iconv -f LATIN1 -t UTF-8 FILE > NEW`.",
         ) from error
+    if "\0" in text:
+        raise MappingError(
+            f"{shown}:{text.count(chr(10), 0, text.index(chr(0))) + 1} has NUL bytes, as a power cut leaves them.",
+            hint="Remove the lines that have some; if all have, the file is UTF-16: `iconv -f UTF-16 -t UTF-8`.",
+        )
     if isinstance(how, Records):
         return _records(_lines(text), shown, how)
     return table_of(shown, list(_cells(text, shown, how)), how)
@@ -52,10 +57,23 @@ def table_of(shown: str, lines: list[Line], how: Tabular) -> TextTable:
     if how.header and lines:
         header = tuple(cell.strip() for cell in lines.pop(0)[1])
     if not lines:
-        raise MappingError(f"{shown} has no rows.", hint="Remove the file, or correct `header` and `skip_lines`.")
+        raise MappingError(f"{shown} has no rows.", hint="Remove the file, or correct `header` and `skiprows`.")
+    if header and (mark := comment_mark(header[0])) and len(header) < len(lines[0][1]):
+        raise MappingError(
+            f"{shown}: a comment, {header[0]!r}, stands where the header is expected.",
+            hint=f"Write `comment: {mark!r}` under `read`.",
+        )
     _same_length(shown, lines, len(header) if header else len(lines[0][1]))
     rows, places = [cells for _, cells in lines], [place for place, _ in lines]
-    return TextTable(shown, header, rows, places, how.no_sample, trailing)
+    no_sample = frozenset(text.strip() for text in how.no_sample)
+    if not isinstance(how, Written):
+        return TextTable(shown, header, rows, places, no_sample, trailing)
+    return TextTable(shown, header, rows, places, no_sample, trailing, how.decimal, how.thousands)
+
+
+def skipped(place: int, how: Tabular) -> bool:
+    """Tell whether a line, counted from 0, is left out."""
+    return place < how.skiprows if isinstance(how.skiprows, int) else place in how.skiprows
 
 
 def _trailing(lines: Sequence[Line], how: Tabular) -> bool:
@@ -67,14 +85,22 @@ def _trailing(lines: Sequence[Line], how: Tabular) -> bool:
 
 def _cells(text: str, shown: str, how: Csv | Text) -> Iterator[Line]:
     """Yield the lines that are not blank."""
-    lines = _lines(text)[how.skip_lines :]
+    # Lines that are left out stay as blank ones, so that the others keep their numbers.
+    lines = ["\n" if skipped(place, how) else line for place, line in enumerate(_lines(text))]
+    if how.comment is not None:
+        kept = (line.partition(how.comment)[0] for line in lines)
+        lines = [line if line.strip() else "\n" for line in kept]
     if isinstance(how, Text):
-        for number, line in enumerate(lines, how.skip_lines + 1):
+        for number, line in enumerate(lines, 1):
             if line.strip():
                 yield number, line.split()
         return
+    first = next((line for line in lines if line.strip()), "")
+    if first.lower().startswith("sep="):
+        hint = f"Write `skiprows: {lines.index(first) + 1}` under `read`, and `delimiter: {first[4:5]!r}`."
+        raise MappingError(f"{shown} begins with {first.strip()!r}, a line for Excel.", hint=hint)
     for mark, name in _DELIMITERS.items():
-        if lines and mark in lines[0] and how.delimiter not in lines[0]:
+        if mark in first and how.delimiter not in first:
             raise MappingError(
                 f"{shown} is separated by {name}s, and not by {how.delimiter!r}.",
                 hint=f"Write delimiter: {json.dumps(mark)} under `read`.",
@@ -83,10 +109,10 @@ def _cells(text: str, shown: str, how: Csv | Text) -> Iterator[Line]:
     try:
         for cells in reader:
             if cells:
-                yield reader.line_num + how.skip_lines, cells
+                yield reader.line_num, cells
     except csv.Error as error:
         raise MappingError(
-            f"{shown}:{reader.line_num + how.skip_lines}: {error}.", hint="Check the quotes and the delimiter."
+            f"{shown}:{reader.line_num}: {error}.", hint="Check the quotes and the delimiter."
         ) from error
 
 
@@ -98,10 +124,12 @@ def _lines(text: str) -> list[str]:
 def _same_length(shown: str, lines: Sequence[Line], wide: int) -> None:
     for number, cells in lines:
         if len(cells) != wide:
+            mark = cells and comment_mark(cells[0])
             raise MappingError(
                 f"{shown}:{number}: {len(cells)} cells, where {wide} are expected.",
-                hint="Repair the row, or correct the delimiter; a file cut short ends like this.",
-            )
+                hint=f"If this line is a comment, write `comment: {mark!r}` under `read`." if mark else
+                "Repair the row, or correct the delimiter; a file cut short ends like this.",
+            )  # fmt: skip
 
 
 def _records(lines: Sequence[str], shown: str, how: Records) -> TextTable:

@@ -2,7 +2,12 @@
 
 import functools
 
+import pytest
 import yaml
+
+from tactbench.core.errors import TactbenchError
+from tactbench.core.recording.mapping import import_tables
+from tactbench.core.recording.reader import open_recording
 
 BASE = """
 version: 1
@@ -32,3 +37,37 @@ def write_mapping(path, text="", **change):
         functools.reduce(lambda node, name: node[name], parents, said)[last] = value
     path.write_text(yaml.safe_dump(said, sort_keys=False))
     return path
+
+
+class Tables:
+    """Imports the tables in ``data`` into ``out``, by the base mapping with changes."""
+
+    def __init__(self, folder):
+        self.data, self.out, self.mapping = folder / "data", folder / "out", folder / "mapping.yaml"
+        self.data.mkdir()
+
+    def put(self, name, text):
+        (self.data / name).parent.mkdir(parents=True, exist_ok=True)
+        (self.data / name).write_bytes(text if isinstance(text, bytes) else text.encode())
+
+    def run(self, text="", *, replace=False, progress=None, **change):
+        mapping = write_mapping(self.mapping, text, **change)
+        return import_tables(mapping, root=self.data, out=self.out, progress=progress, replace=replace)
+
+    def refused(self, *says, text="", **change):
+        with pytest.raises(TactbenchError) as caught:
+            self.run(text, **change)
+        assert (caught.value.exit_code, bool(caught.value.hint)) == (2, True)
+        assert [text for text in says if text not in str(caught.value)] == []
+        assert not list(self.out.rglob("*"))
+
+
+def rows(n=40, force=lambda row: row * 1.5):
+    return "".join(f"{row * 0.01:.2f},{row},{row * 2},{row * 3 % 5},{force(row)}\n" for row in range(n))
+
+
+def read(report, number=0):
+    """Return the meta of a sound recording, and its streams by name."""
+    with open_recording(report.recordings[number].path) as recording:
+        recording.verify()
+        return recording.meta, {name: recording.read(name) for name in recording.stream_names}

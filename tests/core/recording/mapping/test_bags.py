@@ -112,10 +112,11 @@ def test_json_messages(tmp_path):
             press = {"header": {"stamp": stamp}, "data": [row, 1, np.nan if row == 3 else 2], "object": 1}
             for channel, message in ((taxels, press), (force, {"force": {"z": row}, "t": row / 8})):
                 writer.add_message(channel, t_ns, json.dumps(message).encode(), t_ns)
-    streams = imported(tmp_path, tables__force__time={"column": "t", "unit": "s", "epoch": "start"})
+    time = {"column": "t", "unit": "s", "epoch": "start", "offset_s": START / 1e9}
+    streams = imported(tmp_path, tables__force__time=time)
     assert np.isnan(streams["taxels"].data[3, 2])
     assert np.array_equal(streams["taxels"].t_ns, START + np.arange(20) * 10**7)
-    assert np.array_equal(streams["force"].t_ns, np.arange(20) * 125_000_000)
+    assert np.array_equal(streams["force"].t_ns, START + np.arange(20) * 125_000_000)
 
 
 def test_a_damaged_bag_is_refused_and_nothing_is_left(tmp_path):

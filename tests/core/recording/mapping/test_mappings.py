@@ -1,54 +1,19 @@
 """Foreign tables of every shape become recordings; every misfit is refused with its place, and nothing is left."""
 
+import re
+import unicodedata
+
 import numpy as np
 import openpyxl
 import pytest
 import scipy.io
 
-from tactbench.core.errors import MappingError, TactbenchError
-from tactbench.core.recording.mapping import import_tables
+from tactbench.core.errors import MappingError
+from tactbench.core.recording.health import marking
 from tactbench.core.recording.reader import open_recording
 from tactbench.core.samples import Quality
 
-from .made import write_mapping
-
-
-class Tables:
-    """Imports the tables in ``data`` into ``out``, by the base mapping with changes."""
-
-    def __init__(self, folder):
-        self.data, self.out, self.mapping = folder / "data", folder / "out", folder / "mapping.yaml"
-        self.data.mkdir()
-
-    def put(self, name, text):
-        (self.data / name).parent.mkdir(parents=True, exist_ok=True)
-        (self.data / name).write_bytes(text.encode())
-
-    def run(self, text="", *, replace=False, **change):
-        return import_tables(write_mapping(self.mapping, text, **change), root=self.data, out=self.out, replace=replace)
-
-    def refused(self, *says, text="", **change):
-        with pytest.raises(TactbenchError) as caught:
-            self.run(text, **change)
-        assert (caught.value.exit_code, bool(caught.value.hint)) == (2, True)
-        assert [text for text in says if text not in str(caught.value)] == []
-        assert not list(self.out.rglob("*"))
-
-
-@pytest.fixture
-def tables(tmp_path):
-    return Tables(tmp_path)
-
-
-def rows(n=40, force=lambda row: row * 1.5):
-    return "".join(f"{row * 0.01:.2f},{row},{row * 2},{row * 3 % 5},{force(row)}\n" for row in range(n))
-
-
-def read(report, number=0):
-    """Return the meta of a sound recording, and its streams by name."""
-    with open_recording(report.recordings[number].path) as recording:
-        recording.verify()
-        return recording.meta, {name: recording.read(name) for name in recording.stream_names}
+from .made import read, rows
 
 
 @pytest.mark.parametrize(("name", "cells", "lines"), [("csv", ",", "\r\n"), ("text", " ", "\n")])
@@ -240,6 +205,41 @@ def test_tables_that_do_not_belong_together(tables, files, says):
     tables.refused(says, text=JOINED)
 
 
+BY_CLOCK = """
+tables:
+  taxels: {files: pad.csv, read: {format: csv, header: false}, time: {column: 0, unit: s, epoch: unix}}
+  scale: {files: scale.csv, read: {format: csv, header: false}, time: {column: 0, unit: s, epoch: unix}}
+join: {by: clock}
+recording: {name: press, session: "1"}
+streams:
+  taxels: {table: taxels, channels: [{columns: 1, name: t, kind: taxel, unit: count}]}
+  force: {table: scale, of: reference, channels: [{columns: 1, name: fz, kind: force, unit: N, sentinels: []}]}
+"""
+
+
+def test_clocks_that_meet_in_part_or_not_at_all(tables):
+    def seconds(first, last):
+        return "".join(f"{1_700_000_000 + second},{second}\n" for second in range(first, last))
+
+    def found(**change):
+        report = tables.run(BY_CLOCK, replace=True, **change)
+        return [finding for finding in report.recordings[0].findings if finding.check in ("spans", "mixed-stamps")]
+
+    tables.put("pad.csv", seconds(0, 60))
+    tables.put("scale.csv", seconds(1, 61))
+    assert not found()
+    tables.put("scale.csv", seconds(50, 110))
+    (part,) = found()
+    assert "9 of 59 s in common: they begin 50 s and end 50 s apart" in part.message
+    assert not found(tables__scale__time__offset_s=-50)
+    assert "epoch" in found(tables__scale__time__epoch="unknown")[0].message
+    tables.put("scale.csv", seconds(3600, 3660))
+    for path in tables.out.iterdir():
+        path.unlink()
+    spans = ["2023-11-14T22:13:20.000Z to 2023-11-14T22:14:19.000Z", "2023-11-14T23:13:20.000Z", "3541 s"]
+    tables.refused("pad.csv", "scale.csv", *spans, text=BY_CLOCK)
+
+
 def test_a_file_without_a_partner_costs_its_own_recording_and_is_named(tables):
     tables.put("1_probe/sensor.csv", rows())
     tables.put("1_probe/states.csv", states())
@@ -247,7 +247,10 @@ def test_a_file_without_a_partner_costs_its_own_recording_and_is_named(tables):
     tables.put("3_probe/states.csv", states())
     report = tables.run(JOINED)
     assert [made.name for made in report.recordings] == ["1"]
-    assert [text.split()[0] for text in report.orphans] == ["2_probe/sensor.csv", "3_probe/states.csv"]
+    assert [text.split()[0] for text in report.left_out] == ["2_probe/sensor.csv", "3_probe/states.csv"]
+    with open_recording(report.recordings[0].path) as recording:
+        (mark,) = marking(recording)
+    assert re.fullmatch(r"its import left files out: 2_probe/sensor.csv .* And 1 more\.", mark.message)
 
 
 def test_one_file_of_several_sessions(tables):
@@ -271,14 +274,53 @@ def test_roles_labels_and_excluded_files(tables):
     assert (good.labels, report.excluded) == ({"weight_g": 5, "object": "good"}, {"the author says so": 1})
 
 
-def test_a_sentinel_that_nobody_named_is_refused(tables):
-    """Leaving -1 in a force must be impossible by default."""
-    tables.put("press.csv", rows(force=lambda row: -1 if row % 2 else row + 1))
+def test_sentinels_must_be_stated(tables):
+    tables.put("press.csv", rows())
     tables.refused("must state its sentinels", streams__force__channels__0__sentinels=None)
-    none = {"streams__force__channels__0__sentinels": []}
-    tables.refused("press.csv", "column 4", "-1 in 50.0 %", **none)
-    kept = tables.run(streams__force__channels__0__keep_repeated=True, **none)
-    assert not np.isnan(read(kept)[1]["force"].data).any()
+
+
+ROWS = np.arange(600)
+PRESSES = np.maximum(np.round(10 * np.sin(ROWS / 30) + 3, 1), 0)
+LEVELS = np.random.default_rng(4).uniform(2, 10, 21)[ROWS // 30]
+
+
+def some(share, value, seed=3):
+    return np.where(np.random.default_rng(seed).random(600) < share, value, PRESSES)
+
+
+def unsigned(values):
+    return np.mod(np.round(values), 2**16)
+
+
+@pytest.mark.parametrize(
+    ("column", "says"),
+    [
+        (some(0.08, 65535), "fz: 65535,"),
+        (some(0.03, -999), "`sentinels: [-999]`"),
+        (some(0.03, -1), "`sentinels: [-1]`"),
+        (np.where(ROWS % 2, -1, PRESSES), "`sentinels: [-1]`"),
+        (np.where(ROWS % 100 < 10, -1, PRESSES + 5), "`sentinels: [-1]`"),
+        (np.where(ROWS % 500 == 250, -9999, PRESSES), "`sentinels: [-9999]`"),
+        (unsigned(400 * PRESSES - 40 + ROWS % 90), "fz: jumps between 0 and 65536"),
+        (PRESSES, ""),
+        (np.minimum(PRESSES, 6), ""),
+        (np.full(600, 7), ""),
+        (np.where(ROWS % 30 < 20, np.round(LEVELS * np.sin(np.pi * (ROWS % 30) / 20), 2), 0), ""),
+        (np.where(ROWS % 30 < 20, np.round(LEVELS, 2), 0), ""),
+        (np.where(ROWS % 30 < 20, 5 + ROWS % 13 / 1000, 0), ""),
+        (np.where(ROWS % 40 < 20, 65535, 0), ""),
+        (np.random.default_rng(5).integers(0, 256, 600), ""),
+        (np.where(ROWS < 60, ROWS % 2, ROWS // 30), ""),
+    ],
+)  # fmt: skip
+def test_values_that_are_no_readings_are_reported_and_kept(tables, column, says):
+    tables.put("press.csv", rows(600, lambda row: column[row]))
+    report = tables.run(
+        streams__force__channels__0={"columns": 4, "name": "fz", "kind": "force", "unit": "N", "sentinels": []}
+    )
+    found = [finding for finding in report.recordings[0].findings if finding.check == "no-reading"]
+    assert [(one.channels, says in one.message) for one in found] == [(("fz",), True)] * bool(says)
+    assert np.array_equal(read(report)[1]["force"].data[:, 0], column)
 
 
 @pytest.mark.parametrize(
@@ -286,7 +328,8 @@ def test_a_sentinel_that_nobody_named_is_refused(tables):
     [
         ("0,1,2,3,4\n1,1,2,3\n", {}, "press.csv:2: 4 cells"),
         ("0,1,2,3,4\nsoon,1,2,3,4\n", {}, "press.csv:2: column 0: 'soon'"),
-        ("0,1,soon\n0,1,2\n", {"tables__table__read__transposed": True}, "press.csv:cell 3: column 0: 'soon'"),
+        ("0,1,soon\n0,1,2\n", {"tables__table__read__transposed": True, "tables__table__files": "press.csv"},
+         "press.csv:cell 3: column 0: 'soon'"),
         ("0,nan,2,3,4\n1,nan,2,3,5\n", {}, "column 1 (channel t1)"),
         ("0\t1\t2\t3\t4\n1\t1\t2\t3\t4\n", {}, "press.csv is separated by tabs"),
         (rows(), {"tables__table__read__header": True}, "'0.00' in column 0"),
@@ -327,7 +370,31 @@ def test_a_force_among_the_sensors_columns_is_warned_of(tables, columns):
     assert warned == ([] if columns == "1..3" else [("warning", ("t4",))])
 
 
-def test_times_in_a_wrong_unit_are_warned_of(tables):
+def test_times_in_a_wrong_unit_are_warned_of_and_that_is_kept_with_the_recording(tables):
     tables.put("press.csv", "".join(f"{10 * row},{row},2,3,{row}\n" for row in range(40)))
     (made,) = tables.run().recordings
     assert any(one.check == "rate" and one.message.endswith("ms read as s?") for one in made.findings)
+    read(tables.run())  # its content is what was written
+    with open_recording(made.path) as recording:
+        kept = recording.meta.provenance["findings"]
+        assert [one["check"] for one in kept] == [one.check for one in made.findings if one.severity != "info"]
+        assert [one.check for one in marking(recording)] == ["rate"]
+
+
+def test_a_word_in_two_forms_of_unicode_is_one(tables):
+    composed = "caf\u00e9"
+    for n, form in enumerate(("NFC", "NFD")):
+        name = unicodedata.normalize(form, composed)
+        tables.put(f"{n}-{name}.csv", "".join(f"{row},{row},2,3,{row},{name}\n" for row in range(9)))
+    report = tables.run(
+        """
+        words: {short: {of: word, values: {café: c}}}
+        recording: {name: "{n}-{short}", session: "{word}", labels: {object: "{word}"}}
+        """,
+        tables__table__path="(?P<n>.)-(?P<word>.*).csv",
+        streams__taxels__annotations={"again": {"column": 5}},
+    )
+    for number in range(2):
+        meta, streams = read(report, number)
+        assert (meta.session, meta.labels["object"]) == (composed, composed)
+        assert set(streams["taxels"].annotations["again"]) == {composed}

@@ -8,6 +8,7 @@ ESTIMATORS = {
     "evil-raise": "answers:evil_raise",
     "evil-abort": "answers:evil_abort",
     "evil-eat": "answers:evil_eat",
+    "evil-latin": "answers:evil_latin",
     "evil-import": "aborting:build",
     "evil-patch": "patch:build",
 }

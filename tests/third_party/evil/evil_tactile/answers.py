@@ -41,3 +41,9 @@ def evil_abort(*, kind, seed, threads):
 
 def evil_eat(*, kind, seed, threads):
     return Mean(_eat)
+
+
+def evil_latin(*, kind, seed, threads):
+    """Look for a file whose name is no UTF-8."""
+    print("\udce9")
+    raise ValueError("sh\udce9lf/levels.txt is not there")

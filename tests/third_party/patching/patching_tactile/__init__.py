@@ -1,19 +1,68 @@
-"""An effect that every scene calls for, in a package that changes NumPy when it is imported."""
+"""An effect that every scene calls for and an indenter, in a package that changes NumPy when it is imported."""
 
 import numpy as np
 
-from tactbench.plugin import hookimpl
+from tactbench.plugin import (
+    ChannelTarget,
+    Indenter,
+    IndenterDescriptor,
+    PlannedScene,
+    Scene,
+    TaskDescriptor,
+    TaskSpec,
+    hookimpl,
+    press_hold_release,
+)  # fmt: skip
 from tactbench.plugin.simulation import EffectDescriptor, Reason
 
 TACTBENCH_API = 2
 
 np.round = np.floor
 
+NAMING = {
+    "indenter": {"indenter": Indenter(shape="patching-bowl")},
+    "effect": {"simulation": {"effects": ("patching",)}},
+}
+
 
 @hookimpl
 def tactbench_effects():
     code = {"where": "patching_tactile:apply", "called_for": "patching_tactile:always"}
     return [EffectDescriptor(name="patching", title="Nothing", produces=("disturbance",), **code)]
+
+
+@hookimpl
+def tactbench_indenters():
+    return [IndenterDescriptor(name="patching-bowl", title="A bowl", where="patching_tactile:bowl")]
+
+
+@hookimpl
+def tactbench_tasks():
+    profile = press_hold_release(peak=2, rise=1, dwell=1, release=0.1, rest=0, rate=20)
+    asked = {"title": "Nothing", "question": "How large is the force?", "kind": "regression", "unit": "N"}
+    how = {
+        "metric": "rmse",
+        "protocols": ("deployable",),
+        "splits": ("roles",),
+        "estimators": (),
+        "baselines": ("mean",),
+    }
+    found = []
+    for what, naming in NAMING.items():
+        scenes = tuple(
+            PlannedScene(role=role, scene=Scene(name=f"{what}-{role}", session=role, profile=profile, **naming))
+            for role in ("train", "test")
+        )
+        target = ChannelTarget(kind="force", unit="N")
+        found.append(
+            TaskDescriptor(spec=TaskSpec(name=f"patching-{what}", target=target, scenes=scenes, **asked, **how))
+        )
+    return found
+
+
+def bowl(x_mm, y_mm):
+    """Return the height of a blunt body."""
+    return (x_mm**2 + y_mm**2) / 20
 
 
 def always(scene, sensor):

@@ -1,0 +1,100 @@
+"""Ctrl-C, SIGTERM and SIGHUP end what is under way in one way: by KeyboardInterrupt in the main thread."""
+
+from __future__ import annotations
+
+import atexit
+import os
+import signal
+import sys
+import threading
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from types import FrameType
+from typing import Any
+
+ENDING = tuple(getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name))
+ONE_S = 1.0
+"""Seconds in which signals count as one: a terminal that is closed, and a batch system, send several."""
+
+_raised_s = -ONE_S
+
+
+class Interrupted(KeyboardInterrupt):
+    """Raised for a signal, whose number it carries: after a KeyboardInterrupt itself, Python may end by SIGINT."""
+
+
+def interrupt(number: int, _frame: FrameType | None) -> None:
+    """Raise Interrupted; handles SIGTERM and SIGHUP."""
+    global _raised_s
+    if time.monotonic() - _raised_s >= ONE_S:
+        _raised_s = time.monotonic()
+        raise Interrupted(number)
+
+
+def end_alike() -> None:
+    """Have SIGTERM and SIGHUP raise KeyboardInterrupt as Ctrl-C does; one that is ignored (``nohup``) stays ignored."""
+    for number in _handled(signal.SIG_DFL):
+        signal.signal(number, interrupt)
+    for number in ENDING:  # what is removed when Python ends is removed whole
+        atexit.register(signal.signal, number, signal.SIG_IGN)
+    sys.unraisablehook = _again
+
+
+def _again(dropped: Any) -> None:
+    """Send a signal once more where Python dropped what it raised: in a weak reference's callback, in ``__del__``."""
+    global _raised_s
+    if isinstance(dropped.exc_value, KeyboardInterrupt):
+        _raised_s = -ONE_S
+        number = dropped.exc_value.args[0] if dropped.exc_value.args else signal.SIGINT
+        threading.Timer(0.01, os.kill, (os.getpid(), number)).start()
+    else:
+        sys.__unraisablehook__(dropped)
+
+
+@contextmanager
+def one_interrupt() -> Iterator[Callable[[], None]]:
+    """Raise KeyboardInterrupt for the first signal and ignore further ones: what it leaves time to keep is kept.
+
+    Yields what ignores them from then on. Other threads, and who has a handler of their own, are left alone.
+    """
+
+    def ignore() -> None:
+        for number in before:
+            signal.signal(number, signal.SIG_IGN)
+
+    def first(number: int, _frame: FrameType | None) -> None:
+        ignore()
+        raise Interrupted(number)
+
+    with _handling(first) as before:
+        yield ignore
+
+
+@contextmanager
+def interrupts_held() -> Iterator[None]:
+    """Hold signals back until the end, where the first of them takes effect."""
+    came: list[int] = []
+    with _handling(lambda number, _frame: came.append(number)) as before:
+        yield
+    for number in came[:1]:
+        before[number](number, None)
+
+
+@contextmanager
+def _handling(handler: Callable[[int, FrameType | None], None]) -> Iterator[dict[int, Any]]:
+    before = _handled(signal.default_int_handler, interrupt)
+    for number in before:
+        signal.signal(number, handler)
+    try:
+        yield before
+    finally:
+        for number, old in before.items():
+            signal.signal(number, old)
+
+
+def _handled(*by: Any) -> dict[int, Any]:
+    """Return the signals with one of these handlers, and that; none outside the main thread, which handles them."""
+    if threading.current_thread() is not threading.main_thread():
+        return {}
+    return {number: handler for number in ENDING if (handler := signal.getsignal(number)) in by}

@@ -1,0 +1,243 @@
+"""How late a sensor comes, against the reference beside it.
+
+A sensor that creeps, relaxes or has hysteresis follows a force in loops too, and a shift takes some of them away. It
+answers every change at once, though: what it adds is a weighted past of the force, or depends on the force's direction.
+So its taxels are explained twice: by a curve over the shifted force, and by that with the past and the direction of the
+shifted force beside it. A lag is what the second explanation needs as well as the first.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from tactbench.core.samples import FloatArray, IntArray
+
+FINEST_S = 0.01
+"""Step of the common grid; or the median step of the slower clock, if longer."""
+FEWEST_ROWS = 100
+"""Rows of a stream, and of the grid, below which nothing is looked for."""
+TIME_CONSTANTS_S = (0.05, 0.2, 0.8, 3.2)
+"""Of the past that the second explanation may use; relaxations in between are sums of two but for a few percent."""
+DEGREE = 5
+"""Of the curve: a sensor that answers late, or is clipped, has kinks."""
+SUSPECTED = 1.3
+"""By what factor a lag must make the squares smaller that the curve leaves."""
+NEEDED = 4.0
+"""The same for what the past leaves as well, but of its autocovariance at one row, in which white noise does not count.
+Of 5,376 simulated sensors without a lag, most of which creep, relax or have hysteresis, two came above it, both under a
+sine without rests; a lag of 100 ms makes it 5 to 1,000."""
+FASTEST_DRIFT = 0.05
+"""Share of a clock: no two clocks run further apart."""
+SIGNIFICANT = 4.0
+"""Standard errors."""
+LONGEST_S, MOST_ROWS = 60.0, 2000
+"""So long, or so many rows of the grid if these are longer, a recording is looked at whole; else its two ends, half as
+long each."""
+_BLOCKS = 8
+_ITERATIONS = 6
+
+
+@dataclass(frozen=True)
+class Lag:
+    """How late a sensor comes [s], and the standard error; negative where it comes early."""
+
+    beginning: tuple[float, float]
+    middle: tuple[float, float]
+    end: tuple[float, float]
+    drifts: bool
+    """Whether it changes by more than a sample and three standard errors"""
+
+
+def windows(sensor_ns: IntArray, force_ns: IntArray) -> dict[str, tuple[int, int]]:
+    """Return the stretches of time [ns] that both clocks have and a lag is looked for in, by their place."""
+    first, last = int(max(sensor_ns[0], force_ns[0])), int(min(sensor_ns[-1], force_ns[-1]))
+    longest = int(max(1e9 * LONGEST_S, MOST_ROWS * max(np.median(np.diff(times)) for times in (sensor_ns, force_ns))))
+    if last - first <= longest:
+        return {"": (first, last)}
+    return {" at the beginning": (first, first + longest // 2), " at the end": (last - longest // 2, last)}
+
+
+def find_lag(sensor_ns: IntArray, sensor: FloatArray, force_ns: IntArray, force: FloatArray) -> Lag | None:
+    """Return how late the leading component of a sensor comes against that of a reference.
+
+    Parameters
+    ----------
+    sensor_ns, force_ns
+        (n,) and (m,) increasing times [ns], of clocks that are meant to be one.
+    sensor, force
+        (n, p) and (m, q) samples, all finite.
+
+    Returns
+    -------
+    Lag or None
+        None: there is none beyond a sample and three standard errors, or what was recorded cannot tell: a slow ramp, a
+        sine without rests.
+
+    Notes
+    -----
+    Separable least squares (Golub and Pereyra 1973) in the lag and its linear change, by Gauss-Newton steps from where
+    the cross-correlation is best. The error is the jackknife's over eight stretches of time, and by how far the two
+    explanations differ.
+    """
+    if min(len(sensor), len(force)) < FEWEST_ROWS or not sensor.shape[1] or not force.shape[1]:
+        return None
+    sensor_s, force_s = (1e-9 * (times - sensor_ns[0]) for times in (sensor_ns, force_ns))
+    slower = max(float(np.median(np.diff(times))) for times in (sensor_s, force_s))
+    step = max(slower, FINEST_S)
+    edges = np.arange(max(sensor_s[0], force_s[0]), min(sensor_s[-1], force_s[-1]), step)
+    if len(edges) < FEWEST_ROWS:
+        return None
+    x, f = _leading(sensor_s, sensor, edges), _leading(force_s, force, edges)
+    best: tuple[float, FloatArray, FloatArray] | None = None
+    curve = past = np.empty((0, 0))
+    for lag, drift in _starts(x, f):
+        reach = int(0.35 * abs(lag) + abs(drift)) + 3
+        if abs(lag) + reach > len(x) / 3:
+            continue
+        if not len(past):
+            curve = _curve(f)
+            past = np.hstack([curve, _past(f, step)])
+        shifts = min(0, int(lag) - reach), max(0, int(lag) + reach)
+        full, plain = _Explained(x, past, *shifts), _Explained(x, curve, *shifts)
+        other, plain_left, _ = plain.nearest(lag, drift)
+        found, left, error = full.nearest(*other)
+        unshifted = full.left(0.0, 0.0)
+        noise = 2 * _squares(left) / np.sqrt(len(left))  # of an autocovariance, two standard errors
+        needed = _neighbours(unshifted) > NEEDED * (max(_neighbours(left), 0.0) + noise)
+        suspected = _squares(plain.left(0.0, 0.0)) > SUSPECTED * _squares(plain_left)
+        if needed and suspected and 2 * abs(found[1]) < FASTEST_DRIFT * len(x):
+            share = _squares(left) / len(left)
+            if best is None or share < best[0]:
+                best = share, found, error + np.outer(found - other, found - other) / 2 + np.diag([1 / 48, 0])
+    if best is None:
+        return None
+    _, found, error = best
+
+    def at(*weights: float) -> tuple[float, float]:
+        return step * float(found @ weights), step * float(np.sqrt(weights @ error @ weights))
+
+    def told(lag: float, error: float) -> bool:
+        return abs(lag) > max(slower, SIGNIFICANT * error)
+
+    late = Lag(at(1, -1), at(1, 0), at(1, 1), drifts=told(*at(0, 2)))
+    places = (late.beginning, late.end) if late.drifts else (late.middle,)
+    return late if any(told(*place) for place in places) else None
+
+
+class _Explained:
+    """What shifted columns explain of `x`, in the rows that have a partner at every shift between two whole ones."""
+
+    def __init__(self, x: FloatArray, columns: FloatArray, lowest: int, highest: int) -> None:
+        self._rows = np.arange(-lowest, len(x) - highest)
+        self._all = np.arange(len(x))
+        self._place = 2 * self._rows / len(x) - 1
+        self._x, self._slope = x, np.gradient(x)
+        self._base = np.linalg.qr(columns[self._rows])[0]
+
+    def _rest(self, values: FloatArray) -> FloatArray:
+        return values - self._base @ (self._base.T @ values)
+
+    def left(self, lag: float, drift: float) -> FloatArray:
+        """Return what is left of `x`, taken `lag` rows later in the middle and `drift` more at the end."""
+        return self._rest(np.interp(self._rows + lag + drift * self._place, self._all, self._x))
+
+    def nearest(self, lag: float, drift: float) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Return the best lag and drift near some, (2,), what they leave, and their covariance, (2, 2)."""
+        at, before, left = np.array([lag, drift]), np.zeros(2), self.left(lag, drift)
+        slopes = np.empty((len(left), 2))
+        best = np.inf
+        for _ in range(_ITERATIONS):
+            new = self.left(*at)
+            if _squares(new) >= best:
+                at = (at + before) / 2
+                continue
+            best, before, left = _squares(new), at, new
+            slope = np.interp(self._rows + at[0] + at[1] * self._place, self._all, self._slope)
+            slopes = np.column_stack([self._rest(slope), self._rest(slope * self._place)])
+            at = at - np.linalg.lstsq(slopes, left, rcond=None)[0]
+        block = np.arange(len(left)) * _BLOCKS // len(left)
+        moved = np.array([np.linalg.lstsq(slopes[block != b], left[block != b], rcond=None)[0] for b in range(_BLOCKS)])
+        return before, left, (_BLOCKS - 1) * np.cov(moved.T, bias=True)
+
+
+def _squares(left: FloatArray) -> float:
+    return float(left @ left)
+
+
+def _neighbours(left: FloatArray) -> float:
+    return float(left[1:] @ left[:-1])
+
+
+def _leading(times: FloatArray, values: FloatArray, edges: FloatArray) -> FloatArray:
+    """Return the leading component, as means between edges, with mean 0 and variance 1."""
+    centred = values - values.mean(axis=0)
+    component = centred @ np.linalg.eigh(centred.T @ centred)[1][:, -1]
+    area = np.concatenate([[0.0], np.cumsum((component[1:] + component[:-1]) / 2 * np.diff(times))])
+    return _standard(np.diff(np.interp(edges, times, area)))
+
+
+def _standard(values: FloatArray) -> FloatArray:
+    values = values - values.mean()
+    spread = float(values.std())
+    return values / spread if spread > 0 else values
+
+
+def _starts(x: FloatArray, f: FloatArray) -> list[tuple[float, float]]:
+    """Return lags and drifts [rows] to start from: of the whole, and of both halves."""
+    lag, gain = _correlated(x, f, len(x) // 5)
+    starts = [(float(lag), 0.0)] if gain > SUSPECTED else []
+    if starts or len(x) > 10 * FEWEST_ROWS:
+        half = len(x) // 2
+        parts = [_correlated(_standard(x[rows]), _standard(f[rows]), half // 8)
+                 for rows in (slice(half), slice(half, None))]  # fmt: skip
+        if any(gain > SUSPECTED for _, gain in parts):
+            first, second = (lag for lag, _ in parts)
+            starts.append(((first + second) / 2, float(second - first)))
+    return starts
+
+
+def _correlated(x: FloatArray, f: FloatArray, most: int) -> tuple[int, float]:
+    """Return the shortest of the best lags up to `most` rows, and by what factor it makes the squares smaller.
+
+    Of a force that repeats itself several lags are as good.
+    """
+    curve = _curve(f)[:, 2:]
+    base = np.linalg.qr(curve - curve.mean(axis=0))[0]
+    length = 2 * len(x)
+    spectra = np.conj(np.fft.rfft(base, length, axis=0)) * np.fft.rfft(x, length)[:, None]
+    lags = np.arange(-most, most + 1)
+    explained = (np.fft.irfft(spectra, length, axis=0)[lags] ** 2).sum(axis=1) * len(x) / (len(x) - abs(lags))
+    left = 1 - np.minimum(explained / max(_squares(x), 1e-300), 1)
+    good = np.flatnonzero(left <= 1.25 * left.min() + 1e-4)
+    place = int(good[np.argmin(abs(lags[good]))])
+    while 0 < place < 2 * most and min(left[place - 1], left[place + 1]) < left[place]:
+        place += -1 if left[place - 1] < left[place + 1] else 1
+    if place in (0, most, 2 * most):
+        return 0, 0.0
+    return int(lags[place]), float(left[most] / max(left[place], 1e-12))
+
+
+def _curve(f: FloatArray) -> FloatArray:
+    """Return (n, …) a constant, a trend in time, and polynomials of the force.
+
+    Polynomials of a shifted ramp are polynomials of the ramp, so that a ramp tells of no lag, whatever the curve.
+    """
+    scaled = 2 * (f - f.min()) / max(float(np.ptp(f)), 1e-300) - 1
+    polynomials = np.polynomial.chebyshev.chebvander(scaled, DEGREE)
+    return np.column_stack([np.ones_like(f), np.linspace(-1, 1, len(f)), polynomials[:, 1:]])
+
+
+def _past(f: FloatArray, step: float) -> FloatArray:
+    """Return (n, …) the force under low-passes, what may have been before the first row, and the force's direction."""
+    n, times = len(f), np.arange(len(f)) * step
+    spectrum = np.fft.rfft(f - f[0], 2 * n)
+    columns = []
+    for constant in TIME_CONSTANTS_S:
+        if constant > step:
+            decay = np.exp(-times / constant)
+            columns += [decay, np.fft.irfft(spectrum * np.fft.rfft(decay, 2 * n), 2 * n)[:n] * step / constant]
+    rate = np.convolve(np.gradient(f), np.ones(3) / 3, "same")
+    direction = np.tanh(3 * rate / max(float(rate.std()), 1e-300))
+    return np.column_stack([*columns, direction, direction * f])

@@ -1,0 +1,79 @@
+"""Reading columns of Parquet files into tables; the extra ``[parquet]``."""
+
+from __future__ import annotations
+
+import importlib
+from array import array
+from decimal import Decimal
+from pathlib import Path
+from typing import Any
+
+from tactbench.core.errors import MappingError, did_you_mean
+from tactbench.core.recording.mapping.bags import Topic
+from tactbench.core.recording.mapping.table import ColumnTable, names_listed, plain
+
+
+def read_parquet(path: Path, shown: str, used: Topic) -> ColumnTable:
+    """Read the columns that are used; the places of a list, equally long in every row, are ``name.0``, ``name.1`` ...
+
+    Raises
+    ------
+    MappingError
+        If pyarrow is not installed, the file is damaged or empty, lacks a column, lists differ in length, or there are
+        no numbers where numbers are expected.
+    """
+    try:
+        arrow, parquet = importlib.import_module("pyarrow"), importlib.import_module("pyarrow.parquet")
+    except ImportError as error:
+        raise MappingError(
+            f"{shown} is a Parquet file, which needs pyarrow: {error}.",
+            hint="Install it with `pip install 'tactbench[parquet]'`.",
+        ) from error
+    asked = [str(column) for column in used.columns]
+    try:
+        names = parquet.read_schema(path).names
+        read = parquet.read_table(path, columns=[one for one in names if {one} & {*asked, *map(_list_of, asked)}])
+    except Exception as error:  # whatever a damaged file makes of the library
+        raise MappingError(f"{shown} cannot be read as a Parquet file: {error}.", hint="Get it again.") from error
+    if not read.num_rows:
+        raise MappingError(f"{shown} has no rows.", hint="Remove the file.")
+    found: dict[str, Any] = {}
+    for name in read.column_names:
+        found |= _flat(shown, name, read.column(name))
+    every = (*found, *(name for name in names if name not in read.column_names))
+    for one in asked:
+        if one not in found:
+            hint = f"{did_you_mean(one, every)}It has: {names_listed(every)}."
+            raise MappingError(f"{shown} has no column {one!r}.", hint=hint)
+    table = ColumnTable(shown, rows=[*range(read.num_rows)], columns=every, row="row")
+    for column in used.numbers:
+        try:
+            table.found[column] = array("d", found[str(column)].cast("float64").to_numpy(zero_copy_only=False))
+        except arrow.ArrowException as error:
+            hint = f"Name another column; {error}."
+            raise MappingError(f"{shown}: {column!r} holds no numbers.", hint=hint) from error
+    for column in used.texts:
+        table.words[column] = [plain(value) for value in found[str(column)].to_pylist()]
+    if used.time is not None:
+        stamps = found[str(used.time)]
+        stamps = stamps.cast("string") if arrow.types.is_timestamp(stamps.type) else stamps
+        table.stamps.extend(Decimal(one) if isinstance(one, int) else one for one in stamps.to_pylist())
+    return table
+
+
+def _list_of(column: str) -> str:
+    return column.rpartition(".")[0]
+
+
+def _flat(shown: str, name: str, values: Any) -> dict[str, Any]:
+    """Return a column, or those of its lists."""
+    kinds, compute = importlib.import_module("pyarrow.types"), importlib.import_module("pyarrow.compute")
+    if not (kinds.is_list(values.type) or kinds.is_large_list(values.type) or kinds.is_fixed_size_list(values.type)):
+        return {name: values}
+    first, *other = compute.list_value_length(values).unique().to_pylist()
+    if other:
+        raise MappingError(
+            f"{shown}: the lists of {name!r} have {first} values, and {other[0]}.",
+            hint="Only lists of one length are read.",
+        )
+    return {f"{name}.{place}": compute.list_element(values, place) for place in range(first)}
