@@ -40,12 +40,12 @@ def test_every_condition_is_recorded_in_every_session():
 
 
 @pytest.mark.parametrize("role", ["train", "validation", "test"])
-def test_a_role_has_slips_and_a_minute_of_disturbances(role):
+def test_a_role_has_slips_and_enough_disturbance(role):
     mine = [planned.scene for planned in SLIP_SCENES if planned.role == role]
     disturbed = [scene for scene in mine if scene.labels["event"] == "disturbance"]
     assert {scene.labels["condition"].split("-")[0] for scene in disturbed} == set(DISTURBANCES)
-    # At most one false alarm a minute can be told from none.
-    assert sum(scene.profile.duration.to("s") for scene in disturbed) > 60
+    # Ten false alarms are one a minute where a bound is kept or tested; frames begin 0.6 s late.
+    assert sum(scene.profile.duration.to("s") - 0.6 for scene in disturbed) > (60 if role == "train" else 600)
     assert len(mine) - len(disturbed) >= 24
 
 

@@ -62,7 +62,7 @@ class AnsweredFold:
     validation: float | None
     """the score on validation data"""
     sizes: tuple[int, int]
-    """training and test rows, or recordings, or events and alarms"""
+    """training and test rows, or recordings; of events their number and that of the recordings tested"""
     untrained: tuple[Any, ...]
     """classes that are tested and that no training row had"""
     search_s: float
@@ -138,11 +138,7 @@ def answered_fold(
         scored = {role: rules.scored(*one, made) for role, one in given.items()}
         threshold, bounds = rules.choose(scored.get("validation", []))
         detected = tuple(Detected(one, threshold, bounds) for one in scored["test"])
-        sets = {
-            role: rules.items([(one, rules.alarms(one, threshold)) for one in several], made, number)
-            for role, several in scored.items()
-            if role == "test" or alone
-        }
+        sets = {role: rules.items(several, made, number) for role, several in scored.items() if role == "test" or alone}
     kept: dict[Role, Answers] = sets if alone else {"test": sets["test"]}
     scores = {role: metric.of(one.y_true, one.y_pred, len(made.classes)) for role, one in sets.items()}
     untrained = np.setdiff1d(fold.test.y, fold.train.y).tolist() if made.classes else []

@@ -115,9 +115,9 @@ def _balanced(sums: FloatArray, n_classes: int) -> FloatArray:
     return np.asarray(recall.sum(axis=-1) / (there > 0).sum(axis=-1))
 
 
-def _event_f1(sums: FloatArray, n_classes: int) -> FloatArray:
-    """Return F1 of the second class; rows are events and alarms."""
-    return class_f1(sums, n_classes)[..., 1]
+def _of_events(y: npt.NDArray[Any], predicted: npt.NDArray[Any], _: int) -> FloatArray:
+    """Return the summands of a mean over the rows that are events."""
+    return np.column_stack([y * predicted, y])
 
 
 METRICS = {
@@ -130,7 +130,7 @@ METRICS = {
         Metric("accuracy", "classification", True, _pairs, _accuracy),
         Metric("balanced_accuracy", "classification", True, _pairs, _balanced),
         Metric("macro_f1", "classification", True, _pairs, _macro_f1),
-        Metric("event_f1", "events", True, _pairs, _event_f1),
+        Metric("recall_area", "events", True, _of_events, ratio),
     )
 }
 

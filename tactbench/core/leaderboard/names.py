@@ -27,7 +27,7 @@ METRIC_NAMES = {
     "macro_f1": "macro F1",
     "accuracy": "accuracy",
     "balanced_accuracy": "balanced accuracy",
-    "event_f1": "event F1",
+    "recall_area": "recall area",
 }
 _SPLITS = {
     "roles": "tested on recordings apart from training",

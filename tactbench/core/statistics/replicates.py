@@ -124,6 +124,8 @@ def _of_campaigns(done: Sequence[Row]) -> dict[str, Any]:
             level = known.level if known else level
     scores = [row["score"] for row in done]
     parts = _middle([row.get("delay_parts_ms") or {} for row in here])
+    events = [row.get("events") or {} for row in done]
+    alarms = [one.get("alarms") for one in events]  # their mean is 0 only where none ever alarms
     points_of = [row.get("operating_points") or [] for row in done]
     alike = len({len(points) for points in points_of}) == 1
     covers = "" if level == LEVEL else f", {100 * level:.3g} %"
@@ -133,7 +135,7 @@ def _of_campaigns(done: Sequence[Row]) -> dict[str, Any]:
         "replicates": _kept(done) if len(done) >= FEWEST else {},
         "chosen": _chosen(done),
         "scores": _middle([row["scores"] for row in done]),
-        "events": _middle([row.get("events") or {} for row in done]),
+        "events": _middle(events) | ({} if None in alarms else {"alarms": _mean(alarms)}),
         "operating_points": [_middle(points) for points in zip(*points_of, strict=True)] if alike else [],
         "delay_parts_ms": parts,
         "answer_delay_ms": None if found.get("answer_delay_ms") is None else sum(parts.values()),
