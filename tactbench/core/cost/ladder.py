@@ -110,12 +110,12 @@ def climb(
         "remarks": list(dict.fromkeys(remark for one in timed_estimators.values() for remark in one.remarks)),
         "rounds": rounds, "threads": THREADS, "load": load, "cores": os.cpu_count(),
     }  # fmt: skip
-    return Ladder(_about(outcome) | measured, found)
+    return Ladder(_about(outcome, answers) | measured, found)
 
 
-def _about(outcome: Outcome) -> dict[str, Any]:
+def _about(outcome: Outcome, answers: Sequence[Row]) -> dict[str, Any]:
     """Return what the cells have in common."""
-    first = next((row for row in outcome.rows if row["status"] == "done"), outcome.rows[0])
+    first = next((row for row in answers if row["status"] == "done"), answers[0])
     keys = ("sensor", "task", "rig", "protocol", "split", "seed", "metric", "unit", "simulated", "dagger")
     return {
         **{key: first[key] for key in keys},

@@ -199,7 +199,7 @@ def _result(
             scores[other.name] = other.of(tested.y_true, tested.y_pred, n_classes)
     remarks = _of_answers(data)
     beside: dict[str, Any] = {}
-    floor = None
+    floor = truth = None
     if metric.kind == "regression":
         if isinstance(task.target, VectorTarget):
             scores |= vector_details(task.target, tested.y_true, tested.y_pred)
@@ -209,7 +209,8 @@ def _result(
         truth = true_force(task, made, tested)
         if floor is not None:
             own_error, interval = beyond_floor(floor, tested, unit)
-            beside |= {"reference_floor": floor.value, "score_beyond_floor": own_error}
+            beside |= {"reference_floor": floor.value, "reference_floor_se": floor.standard_error}
+            beside["score_beyond_floor"] = own_error
             beside |= {"beyond_floor_ci_low": interval.low, "beyond_floor_ci_high": interval.high}
         if truth is not None:
             interval = score_interval(metric, truth, tested.y_pred, unit, 0)
@@ -254,7 +255,7 @@ def _result(
         fold_sizes={f"fold {one.name}": list(one.sizes) for one in answered},
         split=data.split,
         sets=sets,
-        replicates=summed(metric, tested, unit, n_classes, floor),
+        replicates=summed(metric, tested, unit, n_classes, floor, truth),
         classes=classes,
         chosen=_chosen(answered) | _thresholds(answered, rules),
         search=[

@@ -138,7 +138,10 @@ class EventRules:
         lines: list[tuple[int, float, int, int, int]] = []
         for one, onset, share in zip(several, onsets, shares, strict=True):
             t_ns = np.rint(data.tables[one.place].time_s * 1e9).astype(np.int64)
-            for event, hit, at in [(0, 0.0, int(one.t_ns[0])), *((1, *pair) for pair in zip(share, onset, strict=True))]:
+            for event, hit, at in [
+                (0, 0.0, int(one.t_ns[0])),
+                *((1, *pair) for pair in zip(share, onset, strict=True)),
+            ]:
                 last = max(int(np.searchsorted(t_ns, at, side="right")) - 1, 0)
                 lines.append((event, hit, one.place, int(data.tables[one.place].row[last]), at))
         true, hits, place, row, at_ns = map(np.array, zip(*lines, strict=True))

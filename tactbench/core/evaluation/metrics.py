@@ -14,7 +14,7 @@ import numpy.typing as npt
 
 from tactbench.core.errors import UnknownNameError
 from tactbench.core.samples import FloatArray
-from tactbench.core.spec.row import HIGH_ERROR, MEDIAN_ERROR
+from tactbench.core.spec.row import HIGH_ERROR, MEDIAN_ERROR, TRUE
 from tactbench.core.spec.task import VECTOR_METRIC, VectorTarget
 
 Rows = Callable[[npt.NDArray[Any], npt.NDArray[Any], int], FloatArray]
@@ -143,7 +143,11 @@ EXCESS = Metric("excess_square", "regression", False, _squares, _excess)
 """Mean square beyond the floor of the reference, below zero where chance has it so: what errors of force are ranked by.
 Its sums are a RMSE's, then squares and degrees of freedom of the unloaded holds; no task may ask for it.
 """
-SUMMED = {**METRICS, EXCESS.name: EXCESS}
+SUMMED = {
+    **METRICS,
+    EXCESS.name: EXCESS,
+    **{TRUE + one.name: one for one in METRICS.values() if one.kind == "regression" and not one.vector},
+}
 """What replicates may be summed for."""
 
 
