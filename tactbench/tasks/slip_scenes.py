@@ -2,7 +2,7 @@
 
 A cap is pressed and held; at a moment of its own its surface begins to move, and does so to the end. In a disturbance
 the surface moves by so little that the skin follows it (the start of a motor), and the normal force changes: presses,
-taps, ripples. Every condition is recorded once in each of four sessions, two of them for training.
+taps, ripples. Every condition is recorded in each of four sessions, two of them for training.
 """
 
 from __future__ import annotations
@@ -30,14 +30,15 @@ SLIP_S = 4.6
 """Length of a recording with a slip."""
 PATTERN_S = 12.0
 """Within which a kind of disturbance does what it does, from 3 s on."""
-PATTERNS: Mapping[Role, int] = MappingProxyType({"train": 1, "validation": 9, "test": 9})
-"""How often: six recordings of nine are eleven minutes, in which one false alarm a minute is more than ten alarms."""
+TIMES: Mapping[Role, int] = MappingProxyType({"train": 1, "validation": 3, "test": 3})
+"""How many recordings there are of each disturbance, and how many patterns in each: six disturbances, nine times, are
+eleven minutes, in which one false alarm a minute is more than ten alarms."""
 DISTURBED_S = 3.0
 """Length of a recording of disturbances without its patterns."""
 START_MM = 0.02
 """How far the surface moves when a motor starts and nothing slips: a fifth of the least way that the skin of a BioTac
 follows (0.11 mm), and of the displacement that is labelled a slip."""
-SLOT_S = 120.0
+SLOT_S = 60.0
 _GOLDEN = 0.6180339887498949
 """Multiples of it modulo 1 spread evenly."""
 
@@ -113,11 +114,11 @@ def _profile(force_n: float, length_s: float, points: Points) -> ForcePath:
 
 
 def _planned(
-    name: str, session: str, number: int, surface: str, speed_mm_s: float, force_n: float, kind: str = ""
+    name: str, session: str, number: int, surface: str, speed_mm_s: float, force_n: float, kind: str = "", time: int = 0
 ) -> PlannedScene:
     """Return one recording: of a slip, or of a kind of disturbance."""
     start_s = EARLIEST_S + SPREAD_S * (_GOLDEN * number % 1.0)
-    patterns = PATTERNS[SESSIONS[session]]
+    patterns = TIMES[SESSIONS[session]]
     own = DISTURBANCES[kind](force_n, patterns) if kind else []
     slide = Slide(
         speed=assumed(speed_mm_s, "mm/s", _CHOICE),
@@ -126,7 +127,7 @@ def _planned(
         surface=SURFACES[surface],
     )
     scene = Scene(
-        name=f"{name}-{session}",
+        name=f"{name}-{session}" + (f"-{time}" if time else ""),
         indenter=Indenter(radius=assumed(20.0, "mm", _CHOICE)),
         placement=Placement(scatter=assumed(0.5, "mm", "so that no two recordings press one place")),
         profile=_profile(force_n, DISTURBED_S + PATTERN_S * patterns if kind else SLIP_S, own),
@@ -163,13 +164,14 @@ def _campaign() -> Iterator[PlannedScene]:
                     name = f"{surface}-{speed:g}mm-s-{force:g}N"
                     yield _planned(name, session, place * per_session + number, surface, speed, force)
                     number += 1
-        for kind in DISTURBANCES:
-            for force in FORCES_N:
-                surface = list(SURFACES)[(number + place) % len(SURFACES)]
-                name = f"{kind}-{force:g}N"
-                yield _planned(name, session, place * per_session + number, surface, 20.0, force, kind)
-                number += 1
+        for time in range(TIMES[SESSIONS[session]]):
+            for kind in DISTURBANCES:
+                for force in FORCES_N:
+                    surface = list(SURFACES)[(number + place) % len(SURFACES)]
+                    name = f"{kind}-{force:g}N"
+                    yield _planned(name, session, place * per_session + number, surface, 20.0, force, kind, time)
+                    number += 1
 
 
 SLIP_SCENES: tuple[PlannedScene, ...] = tuple(_campaign())
-"""24 conditions of slip and six of disturbances, once in each of four sessions."""
+"""24 conditions of slip once in each of four sessions; six of disturbances, in validation and test three times."""

@@ -136,9 +136,14 @@ def answered_fold(
         sets = {role: _rows(*one, made, number) for role, one in given.items()}
     else:
         scored = {role: rules.scored(*one, made) for role, one in given.items()}
-        threshold, bounds = rules.choose(scored.get("validation", []))
+        curves = {role: rules.curve(several) for role, several in scored.items()}
+        threshold, bounds = rules.choose(curves.get("validation"))
         detected = tuple(Detected(one, threshold, bounds) for one in scored["test"])
-        sets = {role: rules.items(several, made, number) for role, several in scored.items() if role == "test" or alone}
+        sets = {
+            role: rules.items(several, curves[role], made, number)
+            for role, several in scored.items()
+            if role == "test" or alone
+        }
     kept: dict[Role, Answers] = sets if alone else {"test": sets["test"]}
     scores = {role: metric.of(one.y_true, one.y_pred, len(made.classes)) for role, one in sets.items()}
     untrained = np.setdiff1d(fold.test.y, fold.train.y).tolist() if made.classes else []

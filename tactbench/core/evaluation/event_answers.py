@@ -87,11 +87,11 @@ class EventRules:
             found.append(Scored(place, first + self.hop_ns * np.arange(n), whole, table.slip))
         return found
 
-    def choose(self, validated: Sequence[Scored]) -> tuple[float, tuple[float, ...]]:
+    def choose(self, curve: ThresholdCurve | None) -> tuple[float, tuple[float, ...]]:
         """Return the threshold of a fold, and those of all bounds; none of a detector with a threshold of its own."""
         if self.own_threshold is not None:
             return self.own_threshold, ()
-        curve = self._curve(validated)
+        curve = curve or threshold_curve([], self.policy)
         try:
             chosen, *bounds = (
                 curve.operating_point(bound) for bound in (self.max_false_alarms_per_minute, *BOUNDS_PER_MINUTE)
@@ -108,7 +108,7 @@ class EventRules:
         """Return when a recording's alarms are known, without the time that computing takes."""
         return alarms(one.t_ns, one.score >= threshold, self.policy)
 
-    def _curve(self, several: Sequence[Scored]) -> ThresholdCurve:
+    def curve(self, several: Sequence[Scored]) -> ThresholdCurve:
         """Return the curve of recordings; that of a detector with a threshold of its own has this one point."""
         own = self.own_threshold
         scores = [one.score if own is None else np.where(one.score >= own, 1.0, np.nan) for one in several]
@@ -117,7 +117,7 @@ class EventRules:
             self.policy,
         )
 
-    def items(self, several: Sequence[Scored], data: Dataset, fold: int) -> Answers:
+    def items(self, several: Sequence[Scored], curve: ThresholdCurve, data: Dataset, fold: int) -> Answers:
         """Return what the area is a mean over: each event, with the share of the rates at which it is hit.
 
         A line of each recording, which is no event, stands before its events, so that each recording has a part in the
@@ -128,7 +128,7 @@ class EventRules:
             found = np.zeros(0)  # a fold without an event has no part in the score
         else:
             try:
-                found = self._curve(several).found_share(self.area_per_minute)
+                found = curve.found_share(self.area_per_minute)
             except DataError as error:
                 raise DataError(
                     "Recall against false alarms cannot be drawn: no disturbance to count false alarms on.",

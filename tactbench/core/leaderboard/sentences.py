@@ -15,7 +15,14 @@ from tactbench.core.leaderboard.names import Bars, Row, answer_name, grouped, he
 from tactbench.core.spec.row import LEAKS, plural
 from tactbench.core.spec.status import STOPPED
 from tactbench.core.statistics.rank import Rank, beyond_floor
-from tactbench.core.statistics.replicates import FEWEST, against_reference, count_range, counted, percent
+from tactbench.core.statistics.replicates import (
+    FEWEST,
+    against_reference,
+    count_range,
+    counted,
+    least_coverage,
+    percent,
+)
 from tactbench.core.tables.numbers import interval, score, score_with_unit
 from tactbench.core.tables.text import cut
 
@@ -287,7 +294,11 @@ def _how(board: Board) -> Iterator[Note]:
     if campaigns:
         counts = [row["n_replicates"] for row in campaigns]
         median = f"Score: median over {count_range(counts, 'campaign')}, each simulated anew with its own seed"
-        interval_of = "; interval: of that median" if any(row["ci_low"] is not None for row in campaigns) else ""
+        shown = [row["n_replicates"] for row in campaigns if row["ci_low"] is not None]
+        least = 100 * min(map(least_coverage, shown), default=0.0)
+        interval_of = (
+            f"; interval: of that median, coverage at least {least:.3g} % for any distribution" if shown else ""
+        )
         several = f"{median}{interval_of}; range: lowest … highest campaign"
         parts.append(several if max(counts) > 1 else "Score: of 1 campaign, simulated with its own seed")
     sentences = list(parts)

@@ -126,7 +126,8 @@ def _with_trivial_once(lines: Sequence[_Texts]) -> list[_Texts]:
             continue
         kept = [{name: text if name in _OF_TRIVIAL else "" for name, text in texts.items()} for texts, _ in same]
         alike = {name: text if all(one[name] == text for one in kept) else "" for name, text in kept[0].items()}
-        once = len(kept) > 1 and {one["sensor"] for one in kept} == sensors and alike["score"]
+        agree = alike["score"] and alike["against reference"] == kept[0]["against reference"]
+        once = len(kept) > 1 and {one["sensor"] for one in kept} == sensors and agree
         found += [(texts, kind) for texts in ([alike] if once else kept)]
     return found
 

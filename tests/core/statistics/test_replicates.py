@@ -13,6 +13,7 @@ from tactbench.core.statistics.replicates import (
     FEWEST,
     MedianInterval,
     against_reference,
+    least_coverage,
     median_interval,
     over_replicates,
 )
@@ -125,6 +126,14 @@ def test_it_covers_what_it_says_whatever_the_distribution(draw, n):
     covered = np.mean([one.low <= centre <= one.high for one in found])
     # Four standard errors of a share, and 0.015 by which interpolation of skewed values may be off.
     assert abs(covered - found[0].level) < 4 * np.sqrt(0.05 * 0.95 / trials) + 0.015
+
+
+@pytest.mark.parametrize("n", [7, 8, 10])
+def test_of_two_far_groups_it_covers_less_and_never_less_than_it_says(n):
+    rng, trials = np.random.default_rng(n), 4000
+    values = rng.choice([-1.0, 1.0], size=(trials, n)) + 0.1 * rng.standard_normal((trials, n))
+    covered = np.mean([found.low <= 0 <= found.high for found in map(median_interval, values)])
+    assert least_coverage(n) - 4 * np.sqrt(0.05 * 0.95 / trials) < covered < 0.95
 
 
 def forces(true, noisy, estimator, simulated=True, **more):
