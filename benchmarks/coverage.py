@@ -2,7 +2,7 @@
 
 ::
 
-    python benchmarks/coverage.py [--trials 1000] [--seed 1] [--only scores|boards|differences|ranks|errors|floor]
+    python benchmarks/coverage.py [--trials 1000] [--seed 1] [--only PART]
 
 A synthetic sensor's error has a part that stays for a session (another in the next one; "session sd" is its deviation,
 that of the rest is 1) and a part that moves slowly within it, first order with memory 0.9. The truth is the score over
@@ -30,6 +30,7 @@ from tactbench.core.evaluation.reference_floor import Floor, beyond_floor, hold_
 from tactbench.core.samples import Answers
 from tactbench.core.statistics.paired import corrected_t, difference
 from tactbench.core.statistics.ranking import ranks
+from tactbench.core.statistics.replicates import least_coverage, median_interval
 
 ROWS = 60
 MEMORY = 0.9
@@ -281,7 +282,26 @@ def beyond(trials: int, seed: int) -> None:
     table("Coverage [%] of the error beyond a floor of 0.6875 N", columns, lines)
 
 
+def medians(trials: int, seed: int) -> None:
+    """Cover the median over all campaigns by the interval of the median of a few."""
+    draws = {
+        "normal": lambda rng, shape: rng.standard_normal(shape),
+        "exponential": lambda rng, shape: rng.standard_exponential(shape) - np.log(2),
+        "two groups": lambda rng, shape: rng.choice([-1.0, 1.0], size=shape) + 0.1 * rng.standard_normal(shape),
+    }
+    lines = []
+    for name, draw in draws.items():
+        cells = [name]
+        for n in (5, 6, 7, 8, 10, 16):
+            found = map(median_interval, draw(np.random.default_rng([seed, n]), (trials, n)))
+            cells.append(f"{100 * np.mean([one.low <= 0 <= one.high for one in found]):.1f}")
+        lines.append(cells)
+    lines.append(["at least", *(f"{100 * least_coverage(n):.1f}" for n in (5, 6, 7, 8, 10, 16))])
+    table("Coverage [%] of the median by campaigns", ["scores", *map(str, (5, 6, 7, 8, 10, 16))], lines)
+
+
 PARTS = {
+    "medians": medians,
     "scores": scores,
     "boards": boards,
     "differences": differences,

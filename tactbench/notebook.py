@@ -38,7 +38,7 @@ from tactbench.core.plugins.registry import installed
 from tactbench.core.samples import Answers
 from tactbench.core.spec.declared_task import FILE
 from tactbench.core.spec.task import TaskSpec, VectorTarget
-from tactbench.core.statistics.replicates import over_replicates
+from tactbench.core.statistics.replicates import against_reference, over_replicates
 from tactbench.core.study.results import opened, shown_rows, table_of
 from tactbench.core.study.shipped import matrix_called
 from tactbench.core.study.study import Study, carry_out
@@ -184,12 +184,12 @@ class Result(Results):
     def __init__(self, rows: Sequence[Row], answers: Answers, task: TaskSpec, names: Sequence[str]) -> None:
         rows = over_replicates(rows)
         super().__init__(build_table(rows, questions={task.name: task.question}))
-        row = rows[0]
+        row, *others = map(against_reference, rows)  # what scikit-learn scores of `load_task`'s rows
         self.score: float = row["score"]
         self.interval: tuple[float, float] | None = None
         if row["ci_low"] is not None:
             self.interval = row["ci_low"], math.inf if row["ci_high"] is None else row["ci_high"]
-        self.trivial = {str(one["estimator"]): one["score"] for one in rows[1:]}
+        self.trivial = {str(one["estimator"]): one["score"] for one in others}
         self.fold_scores = {name.removeprefix("fold "): row["scores"].get(name) for name in row["fold_sizes"]}
         self.row, self.answers, self._task, self._names = row, answers, task, names
 

@@ -2,7 +2,7 @@
 
 A cap is pressed and held; at a moment of its own its surface begins to move, and does so to the end. In a disturbance
 the surface moves by so little that the skin follows it (the start of a motor), and the normal force changes: presses,
-taps, ripples. Every condition is recorded once in each of four sessions, two of them for training.
+taps, ripples. Every condition is recorded in each of four sessions, two of them for training.
 """
 
 from __future__ import annotations
@@ -28,8 +28,13 @@ EARLIEST_S, SPREAD_S = 1.6, 1.0
 """When a drag begins: at the earliest, and how much later at most, so that no clock tells it."""
 SLIP_S = 4.6
 """Length of a recording with a slip."""
-DISTURBED_S = 15.0
-"""Length of a recording of disturbances: six of them are a minute and a half."""
+PATTERN_S = 12.0
+"""Within which a kind of disturbance does what it does, from 3 s on."""
+TIMES: Mapping[Role, int] = MappingProxyType({"train": 1, "validation": 3, "test": 3})
+"""How many recordings there are of each disturbance, and how many patterns in each: six disturbances, nine times, are
+eleven minutes, in which one false alarm a minute is more than ten alarms."""
+DISTURBED_S = 3.0
+"""Length of a recording of disturbances without its patterns."""
 START_MM = 0.02
 """How far the surface moves when a motor starts and nothing slips: a fifth of the least way that the skin of a BioTac
 follows (0.11 mm), and of the displacement that is labelled a slip."""
@@ -59,28 +64,30 @@ Points = list[tuple[float, float]]
 """Times [s] and forces [N]."""
 
 
-def presses(force_n: float) -> Points:
-    """Return four releases and presses, each slower than the one before."""
+def presses(force_n: float, patterns: int) -> Points:
+    """Return four releases and presses a pattern, each slower than the one before."""
     points = []
-    for number, begin_s in enumerate((3.0, 6.0, 9.0, 12.0)):
+    for place in range(4 * patterns):
+        number, begin_s = place % 4, 3.0 + 3.0 * place
         ramp_s = 0.05 * 2.0**number
         points += [(begin_s, force_n), (begin_s + ramp_s, 0.0), (begin_s + 1.0, 0.0), (begin_s + 1.0 + ramp_s, force_n)]
     return points
 
 
-def taps(force_n: float) -> Points:
-    """Return taps of 30 ms on the pressed skin, of half a newton more, at uneven intervals."""
+def taps(force_n: float, patterns: int) -> Points:
+    """Return eight taps a pattern on the pressed skin, of 30 ms and half a newton more, at uneven intervals."""
     points = []
-    for number in range(8):
-        begin_s = 3.0 + 1.3 * number + 0.5 * (_GOLDEN * number % 1.0)
+    for number in range(8 * patterns):
+        begin_s = 3.0 + PATTERN_S * (number // 8) + 1.3 * (number % 8) + 0.5 * (_GOLDEN * number % 1.0)
         points += [(begin_s, force_n), (begin_s + 0.01, force_n + 0.5), (begin_s + 0.03, force_n)]
     return points
 
 
-def ripples(force_n: float) -> Points:
-    """Return three triangular ripples of two seconds: 5 Hz of a fifth of the force, 20 Hz and 40 Hz of less."""
+def ripples(force_n: float, patterns: int) -> Points:
+    """Return three triangular ripples a pattern, of two seconds: 5 Hz of a fifth of the force, 20 and 40 Hz of less."""
     points = []
-    for begin_s, rate_hz, share in ((3.0, 5.0, 0.2), (7.0, 20.0, 0.05), (11.0, 40.0, 0.02)):
+    for place in range(3 * patterns):
+        begin_s, (rate_hz, share) = 3.0 + 4.0 * place, ((5.0, 0.2), (20.0, 0.05), (40.0, 0.02))[place % 3]
         quarter_s = 0.25 / rate_hz
         turns = [
             (begin_s + (2 * turn + 1) * quarter_s, force_n * (1.0 + share * (-1.0) ** turn))
@@ -90,7 +97,7 @@ def ripples(force_n: float) -> Points:
     return points
 
 
-DISTURBANCES: Mapping[str, Callable[[float], Points]] = MappingProxyType(
+DISTURBANCES: Mapping[str, Callable[[float, int], Points]] = MappingProxyType(
     {"presses": presses, "taps": taps, "ripples": ripples}
 )
 """What the normal force does without any slip, by kind."""
@@ -107,11 +114,12 @@ def _profile(force_n: float, length_s: float, points: Points) -> ForcePath:
 
 
 def _planned(
-    name: str, session: str, number: int, surface: str, speed_mm_s: float, force_n: float, kind: str = ""
+    name: str, session: str, number: int, surface: str, speed_mm_s: float, force_n: float, kind: str = "", time: int = 0
 ) -> PlannedScene:
     """Return one recording: of a slip, or of a kind of disturbance."""
     start_s = EARLIEST_S + SPREAD_S * (_GOLDEN * number % 1.0)
-    own = DISTURBANCES[kind](force_n) if kind else []
+    patterns = TIMES[SESSIONS[session]]
+    own = DISTURBANCES[kind](force_n, patterns) if kind else []
     slide = Slide(
         speed=assumed(speed_mm_s, "mm/s", _CHOICE),
         start=assumed(round(start_s, 4), "s", "drawn so that no clock tells it"),
@@ -119,10 +127,10 @@ def _planned(
         surface=SURFACES[surface],
     )
     scene = Scene(
-        name=f"{name}-{session}",
+        name=f"{name}-{session}" + (f"-{time}" if time else ""),
         indenter=Indenter(radius=assumed(20.0, "mm", _CHOICE)),
         placement=Placement(scatter=assumed(0.5, "mm", "so that no two recordings press one place")),
-        profile=_profile(force_n, DISTURBED_S if kind else SLIP_S, own),
+        profile=_profile(force_n, DISTURBED_S + PATTERN_S * patterns if kind else SLIP_S, own),
         slide=slide,
         environment=Environment(
             force_noise=derived(
@@ -156,13 +164,14 @@ def _campaign() -> Iterator[PlannedScene]:
                     name = f"{surface}-{speed:g}mm-s-{force:g}N"
                     yield _planned(name, session, place * per_session + number, surface, speed, force)
                     number += 1
-        for kind in DISTURBANCES:
-            for force in FORCES_N:
-                surface = list(SURFACES)[(number + place) % len(SURFACES)]
-                name = f"{kind}-{force:g}N"
-                yield _planned(name, session, place * per_session + number, surface, 20.0, force, kind)
-                number += 1
+        for time in range(TIMES[SESSIONS[session]]):
+            for kind in DISTURBANCES:
+                for force in FORCES_N:
+                    surface = list(SURFACES)[(number + place) % len(SURFACES)]
+                    name = f"{kind}-{force:g}N"
+                    yield _planned(name, session, place * per_session + number, surface, 20.0, force, kind, time)
+                    number += 1
 
 
 SLIP_SCENES: tuple[PlannedScene, ...] = tuple(_campaign())
-"""24 conditions of slip and six of disturbances, once in each of four sessions."""
+"""24 conditions of slip once in each of four sessions; six of disturbances, in validation and test three times."""

@@ -8,7 +8,7 @@ from threadpoolctl import threadpool_limits
 
 from tactbench.core.events.labels import GROSS, INCIPIENT, STICK, UNDECIDED, slip_labels
 from tactbench.core.spec.events import THRESHOLDS
-from tactbench.tasks.slip_scenes import DISTURBANCES, REFERENCE_HZ, SESSIONS, SLIP_SCENES
+from tactbench.tasks.slip_scenes import DISTURBANCES, REFERENCE_HZ, SESSIONS, SLIP_SCENES, TIMES
 
 from .made import REGISTRY, twin
 
@@ -30,9 +30,10 @@ def columns(acquisition, stream):
 
 def test_every_condition_is_recorded_in_every_session():
     assert len(SCENES) == len(SLIP_SCENES)
-    conditions = collections.Counter(scene.labels["condition"] for scene in SCENES.values())
-    assert set(conditions.values()) == {len(SESSIONS)}
-    assert len(conditions) == 30
+    conditions = collections.Counter((scene.labels["condition"], scene.session) for scene in SCENES.values())
+    for (condition, session), times in conditions.items():
+        assert times == (TIMES[SESSIONS[session]] if condition.split("-")[0] in DISTURBANCES else 1)
+    assert len(conditions) == 30 * len(SESSIONS)
     for planned in SLIP_SCENES:
         assert planned.role == SESSIONS[planned.scene.session]
     moments = [(scene.session, scene.starts_after_s) for scene in SCENES.values()]
@@ -40,12 +41,12 @@ def test_every_condition_is_recorded_in_every_session():
 
 
 @pytest.mark.parametrize("role", ["train", "validation", "test"])
-def test_a_role_has_slips_and_a_minute_of_disturbances(role):
+def test_a_role_has_slips_and_enough_disturbance(role):
     mine = [planned.scene for planned in SLIP_SCENES if planned.role == role]
     disturbed = [scene for scene in mine if scene.labels["event"] == "disturbance"]
     assert {scene.labels["condition"].split("-")[0] for scene in disturbed} == set(DISTURBANCES)
-    # At most one false alarm a minute can be told from none.
-    assert sum(scene.profile.duration.to("s") for scene in disturbed) > 60
+    # Ten false alarms are one a minute where a bound is kept or tested; frames begin 0.6 s late.
+    assert sum(scene.profile.duration.to("s") - 0.6 for scene in disturbed) > (60 if role == "train" else 600)
     assert len(mine) - len(disturbed) >= 24
 
 
@@ -53,10 +54,10 @@ def test_no_clock_tells_when_a_slip_begins():
     starts = np.array([scene.slide.start.to("s") for scene in TESTED if scene.labels["event"] == "slip"])
     # Uniform over a second: a standard deviation of 0.289.
     assert starts.std() == pytest.approx(0.289, abs=0.03)
-    by_condition = collections.defaultdict(set)
+    by_condition = collections.defaultdict(list)
     for scene in SCENES.values():
-        by_condition[scene.labels["condition"]].add(scene.slide.start.to("s"))
-    assert all(len(found) == len(SESSIONS) for found in by_condition.values())
+        by_condition[scene.labels["condition"]].append(scene.slide.start.to("s"))
+    assert all(len(set(found)) == len(found) for found in by_condition.values())
 
 
 @pytest.mark.parametrize("sensor", ["biotac", "icub"])
@@ -69,6 +70,7 @@ def test_labels_agree_with_what_the_twin_knows(sensor):
     """
     counts = np.zeros((3, 4), dtype=int)
     scenes = [scene for scene in TESTED if "-10mm-s-" in scene.name or scene.labels["event"] == "disturbance"]
+    scenes = [scene for scene in scenes if scene.name.endswith("-test")]
     assert len(scenes) == 14
     for scene in scenes:
         acquisition = record(sensor, scene, observe=("taxel",))

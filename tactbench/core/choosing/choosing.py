@@ -162,7 +162,8 @@ class _Choosing:
         chosen = sorted((min(found, key=self.order) for found in by_sensor.values() if found), key=self.order)
         unknown = dict.fromkeys(sentence for one in chosen for sentence in self.unknown(one))
         unknown.update(dict.fromkeys(self.of_all(chosen)))
-        name = metric_name({"metric": self.task.metric, "unit": self.task.unit})
+        metric = self.answers[0]["metric"] if self.answers else self.task.metric
+        name = metric_name({"metric": metric, "unit": self.task.unit})
         quantity = name.replace(" [", " beyond the reference's noise [") if self.beyond else name
         intervals = dict.fromkeys(visible(str(one.row.get("ci_method"))) for one in chosen if one.low is not None)
         return Choice(

@@ -72,18 +72,19 @@ def _facts(found: StoredCell) -> dict[str, Any]:
 
 def _replicates(found: StoredCell) -> Iterator[Field]:
     """Yield what the cell came to over its replicates, and what each of them scored."""
+    from tactbench.core.leaderboard.names import metric_name
     from tactbench.core.statistics.replicates import counted, over_replicates, percent
     from tactbench.core.tables.numbers import delay, duration, interval, score_with_unit
 
     name = found.cell.name.removesuffix(f"/{found.cell.seed}")
     (row,) = over_replicates([row for row in found.store.rows() if row["cell"].rpartition("/")[0] == name])
     unit, many, of = str(row["unit"]), row["n_replicates"], str(row["replicate_unit"])
-    yield "score", f"{score_with_unit(row['score'], unit)} over {counted(many, of)}"
+    yield metric_name(row), f"{score_with_unit(row['score'], unit)} over {counted(many, of)}"
     if row["ci_low"] is not None:
         ends = interval(row["ci_low"], row["ci_high"], unit)
         yield f"{percent(many, of)} interval", f"{ends} {row['ci_method']}"
-    for name in ("score_beyond_floor", "reference_floor", "published"):
-        if row[name] is not None:
+    for name in ("score_beyond_floor", "reference_floor", "reference_floor_se", "reference_score", "published"):
+        if row.get(name) is not None:
             yield name.replace("_", " "), score_with_unit(row[name], unit)
     kept = found.row["replicates"]
     own = zip(kept["names"], kept["own"], strict=True) if of != "replicate" else ()

@@ -62,7 +62,7 @@ class AnsweredFold:
     validation: float | None
     """the score on validation data"""
     sizes: tuple[int, int]
-    """training and test rows, or recordings, or events and alarms"""
+    """training and test rows, or recordings; of events their number and that of the recordings tested"""
     untrained: tuple[Any, ...]
     """classes that are tested and that no training row had"""
     search_s: float
@@ -136,10 +136,11 @@ def answered_fold(
         sets = {role: _rows(*one, made, number) for role, one in given.items()}
     else:
         scored = {role: rules.scored(*one, made) for role, one in given.items()}
-        threshold, bounds = rules.choose(scored.get("validation", []))
+        curves = {role: rules.curve(several) for role, several in scored.items()}
+        threshold, bounds = rules.choose(curves.get("validation"))
         detected = tuple(Detected(one, threshold, bounds) for one in scored["test"])
         sets = {
-            role: rules.items([(one, rules.alarms(one, threshold)) for one in several], made, number)
+            role: rules.items(several, curves[role], made, number)
             for role, several in scored.items()
             if role == "test" or alone
         }

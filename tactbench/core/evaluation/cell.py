@@ -184,7 +184,8 @@ def _result(
     counts: Counter[str],
 ) -> Result:
     task, made = data.task, data.data
-    n_classes = len(made.classes)
+    classes = [] if rules else list(made.classes)
+    n_classes = len(classes)
     sets = {role: _joined([one.sets[role] for one in answered]) for role in answered[0].sets}
     tested = sets["test"]
     score = metric.of(tested.y_true, tested.y_pred, n_classes)
@@ -197,9 +198,9 @@ def _result(
     for other in METRICS.values():
         if other.kind == task.kind and other.vector == metric.vector and other is not metric:
             scores[other.name] = other.of(tested.y_true, tested.y_pred, n_classes)
-    remarks = _of_answers(data, descriptor, answered)
+    remarks = _of_answers(data)
     beside: dict[str, Any] = {}
-    floor = None
+    floor = truth = None
     if metric.kind == "regression":
         if isinstance(task.target, VectorTarget):
             scores |= vector_details(task.target, tested.y_true, tested.y_pred)
@@ -209,25 +210,26 @@ def _result(
         truth = true_force(task, made, tested)
         if floor is not None:
             own_error, interval = beyond_floor(floor, tested, unit)
-            beside |= {"reference_floor": floor.value, "score_beyond_floor": own_error}
+            beside |= {"reference_floor": floor.value, "reference_floor_se": floor.standard_error}
+            beside["score_beyond_floor"] = own_error
             beside |= {"beyond_floor_ci_low": interval.low, "beyond_floor_ci_high": interval.high}
         if truth is not None:
             interval = score_interval(metric, truth, tested.y_pred, unit, 0)
             beside["true_score"] = metric.of(truth, tested.y_pred)
             beside |= {"true_ci_low": interval.low, "true_ci_high": interval.high}
-    else:
+    elif rules is None:
         sums = metric.rows(tested.y_true, tested.y_pred, n_classes).sum(axis=0)
         beside["confusion"] = confusion(sums, n_classes).astype(np.int64).tolist()
-        if rules is None and task.answer_per != "frame":
+        if task.answer_per != "frame":
             beside["recordings_right"], beside["recordings_asked"] = recordings_right(tested) or (None, None)
-        scores |= {
-            f"F1 of {label}": float(one) for label, one in zip(made.classes, class_f1(sums, n_classes), strict=True)
-        }
+        scores |= {f"F1 of {label}": float(one) for label, one in zip(classes, class_f1(sums, n_classes), strict=True)}
     if rules is not None:
         detected = [one for fold in answered for one in fold.detected]
         latency = cost.latency_ms_p50 is not None
         compute_s = sum(cost.delay_parts_ms.get(name, 0.0) for name in ("features", "prediction")) / 1e3
         beside["events"] = rules.figures(detected, compute_s if latency else None)
+        if not beside["events"]["alarms"]:
+            remarks.append("never alarms at its operating point")
         beside["operating_points"] = rules.operating_points(detected, compute_s if latency else None)
     elif task.answer_per == "frame":
         scores |= state_figures(tested, made)
@@ -254,8 +256,8 @@ def _result(
         fold_sizes={f"fold {one.name}": list(one.sizes) for one in answered},
         split=data.split,
         sets=sets,
-        replicates=summed(metric, tested, unit, n_classes, floor),
-        classes=list(made.classes),
+        replicates=summed(metric, tested, unit, n_classes, floor, truth),
+        classes=classes,
         chosen=_chosen(answered) | _thresholds(answered, rules),
         search=[
             {**candidate.params, "k": candidate.k, "score": candidate.score, "fold": one.name}
@@ -307,7 +309,7 @@ def _part_taken(data: TaskData) -> tuple[list[RecordingMeta], dict[str, int], li
     return took_part, without_part(recorded, data.split, used), stamped
 
 
-def _of_answers(data: TaskData, descriptor: EstimatorDescriptor, answered: Sequence[AnsweredFold]) -> list[str]:
+def _of_answers(data: TaskData) -> list[str]:
     """Return what a reader of scores of recordings, frames or events must know."""
     if data.task.answer_per == "recording":
         return [
@@ -318,11 +320,6 @@ def _of_answers(data: TaskData, descriptor: EstimatorDescriptor, answered: Seque
     remarks = [band_limit(clocked(data.recorded.tables[0], data.rules))]
     if data.held_back:
         remarks.append("no recording has the role validation: thresholds are chosen on a share of the training groups")
-    if data.task.kind == "events" and any(np.isinf(one.detected[0].threshold) for one in answered):
-        remarks.append(
-            f"{descriptor.name}: no threshold kept the bound of false alarms on validation and hit anything: it never "
-            "raises an alarm"
-        )
     return remarks
 
 

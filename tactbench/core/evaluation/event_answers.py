@@ -13,8 +13,8 @@ from tactbench.core.evaluation.dataset import Dataset
 from tactbench.core.evaluation.frames import slip_target
 from tactbench.core.evaluation.metrics import METRICS
 from tactbench.core.evaluation.slip_reference import SlipReference
-from tactbench.core.events.alarms import alarms, match
-from tactbench.core.events.curve import ScoredRecording, threshold_curve
+from tactbench.core.events.alarms import alarms
+from tactbench.core.events.curve import ScoredRecording, ThresholdCurve, threshold_curve
 from tactbench.core.events.labels import GROSS, UNDECIDED
 from tactbench.core.events.metrics import EventScores, GroundTruth, displacement_at_detection, latency_s, score_events
 from tactbench.core.samples import Answers, FloatArray, IntArray, Part
@@ -61,6 +61,7 @@ class EventRules:
 
     policy: AlarmPolicy
     max_false_alarms_per_minute: float
+    area_per_minute: float
     own_threshold: float | None
     hop_ns: int
 
@@ -70,7 +71,8 @@ class EventRules:
         assert task.alarms is not None
         assert task.max_false_alarms_per_minute is not None
         hop_ns = nanoseconds(slip_target(task).hop_s)
-        return cls(task.alarms, task.max_false_alarms_per_minute, own_threshold, hop_ns)
+        area = task.area_false_alarms_per_minute
+        return cls(task.alarms, task.max_false_alarms_per_minute, area, own_threshold, hop_ns)
 
     def scored(self, part: Part, score: FloatArray, data: Dataset) -> list[Scored]:
         """Return the scores of a set, recording by recording."""
@@ -85,11 +87,11 @@ class EventRules:
             found.append(Scored(place, first + self.hop_ns * np.arange(n), whole, table.slip))
         return found
 
-    def choose(self, validated: Sequence[Scored]) -> tuple[float, tuple[float, ...]]:
+    def choose(self, curve: ThresholdCurve | None) -> tuple[float, tuple[float, ...]]:
         """Return the threshold of a fold, and those of all bounds; none of a detector with a threshold of its own."""
         if self.own_threshold is not None:
             return self.own_threshold, ()
-        curve = threshold_curve([ScoredRecording(one.t_ns, one.score, one.truth()) for one in validated], self.policy)
+        curve = curve or threshold_curve([], self.policy)
         try:
             chosen, *bounds = (
                 curve.operating_point(bound) for bound in (self.max_false_alarms_per_minute, *BOUNDS_PER_MINUTE)
@@ -106,27 +108,45 @@ class EventRules:
         """Return when a recording's alarms are known, without the time that computing takes."""
         return alarms(one.t_ns, one.score >= threshold, self.policy)
 
-    def items(self, found: Sequence[tuple[Scored, IntArray]], data: Dataset, fold: int) -> Answers:
-        """Return what F1 is counted on: events, alarms that hit none, and a line a recording.
+    def curve(self, several: Sequence[Scored]) -> ThresholdCurve:
+        """Return the curve of recordings; that of a detector with a threshold of its own has this one point."""
+        own = self.own_threshold
+        scores = [one.score if own is None else np.where(one.score >= own, 1.0, np.nan) for one in several]
+        return threshold_curve(
+            [ScoredRecording(one.t_ns, score, one.truth()) for one, score in zip(several, scores, strict=True)],
+            self.policy,
+        )
 
-        An event is true, and answered if an alarm hit it; an alarm that hit none is answered and not true; the line of
-        a recording is neither, so that each recording has a part in the interval. F1 of what is true is the F1 of
-        events. The row is the last frame before, the time that of the alarm, or of an onset that was missed.
+    def items(self, several: Sequence[Scored], curve: ThresholdCurve, data: Dataset, fold: int) -> Answers:
+        """Return what the area is a mean over: each event, with the share of the rates at which it is hit.
+
+        A line of each recording, which is no event, stands before its events, so that each recording has a part in the
+        interval. The row is the last frame before the onset, the time that of the onset.
         """
-        lines: list[tuple[int, int, int, int, int]] = []
-        for one, alarm_ns in found:
+        onsets = [one.truth().event_ns[:, 0] for one in several]
+        if not sum(map(len, onsets)):
+            found = np.zeros(0)  # a fold without an event has no part in the score
+        else:
+            try:
+                found = curve.found_share(self.area_per_minute)
+            except DataError as error:
+                raise DataError(
+                    "Recall against false alarms cannot be drawn: no disturbance to count false alarms on.",
+                    hint="Give every fold test recordings of disturbances (label `event: disturbance`).",
+                ) from error
+        shares = np.split(found, np.cumsum([len(one) for one in onsets])[:-1])
+        lines: list[tuple[int, float, int, int, int]] = []
+        for one, onset, share in zip(several, onsets, shares, strict=True):
             t_ns = np.rint(data.tables[one.place].time_s * 1e9).astype(np.int64)
-            onset = one.truth().event_ns[:, 0]
-            hit, by = match(onset, alarm_ns, self.policy)
-            own = [(int(at), 1, 1) for at in alarm_ns[by]]
-            own += [(int(at), 1, 0) for at in np.delete(onset, hit)]
-            own += [(int(at), 0, 1) for at in np.delete(alarm_ns, by)]
-            for at, true, answered in [(int(one.t_ns[0]), 0, 0), *sorted(own)]:
+            for event, hit, at in [
+                (0, 0.0, int(one.t_ns[0])),
+                *((1, *pair) for pair in zip(share, onset, strict=True)),
+            ]:
                 last = max(int(np.searchsorted(t_ns, at, side="right")) - 1, 0)
-                lines.append((true, answered, one.place, int(data.tables[one.place].row[last]), at))
-        true, answered, place, row, at_ns = np.array(lines, dtype=np.int64).T
-        none = np.full(len(row), np.nan)
-        return Answers(true, answered, place, row, np.full(len(row), fold, dtype=np.int64), at_ns * 1e-9, none)
+                lines.append((event, hit, one.place, int(data.tables[one.place].row[last]), at))
+        true, hits, place, row, at_ns = map(np.array, zip(*lines, strict=True))
+        none, number = np.full(len(lines), np.nan), np.full(len(lines), fold, dtype=np.int64)
+        return Answers(true, hits, place, row, number, at_ns * 1e-9, none)
 
     def figures(self, tested: Sequence[Detected], compute_s: float | None) -> dict[str, float]:
         """Return what is said of the events of all test recordings; what cannot be said is not there.
@@ -146,8 +166,12 @@ class EventRules:
         displacement = displacement[np.isfinite(displacement)]
         scores = self._scores(tested)
         found = {
+            "area up to false alarms per minute": self.area_per_minute,
+            "bound of false alarms per minute": self.max_false_alarms_per_minute,
             "events": float(scores.latency_s.shape[-1]),
+            "alarms": float(scores.n_alarms),
             "precision": float(scores.precision),
+            "F1": float(scores.f1),
             "misses": float(scores.n_misses),
             "onset latency p95 ms": 1e3 * (scores.latency_percentile_s(95) + late_s),
             "displacement at detection p50 mm": 1e3 * float(np.median(displacement)) if displacement.size else np.nan,

@@ -14,7 +14,7 @@ import numpy.typing as npt
 
 from tactbench.core.errors import DataError, PluginContractError, TactbenchError, UnknownNameError, UsageError
 from tactbench.core.evaluation.dataset import Dataset
-from tactbench.core.evaluation.metrics import Metric
+from tactbench.core.evaluation.metrics import METRICS, Metric
 from tactbench.core.evaluation.protocols import ProtocolSpec
 from tactbench.core.evaluation.sets import keep, part, scale_of, taken
 from tactbench.core.evaluation.splits import Assignment, inner_splits
@@ -205,6 +205,8 @@ def select(
             hint="Fix the parameters in the matrix (estimators: [{params: …}]), or use longer recordings.",
         )
     n_classes = len(data.classes)
+    if metric.kind == "events":
+        metric = METRICS["macro_f1"]  # of frames
     tried: list[Choice] = []
     for k in descriptor.window_grid:
         filtered = [[part(rows, scale, k) for rows, scale in pair] for pair in pairs]

@@ -111,8 +111,11 @@ def score_interval(
     ends = [float(scale.back(scale.there(score) + one * reach)) for one in (-1.0, 1.0)]
     low, high = min(*ends, score), max(*ends, score)
     if metric.kind != "regression":
-        right = np.trace(confusion(sums, n_classes), axis1=1, axis2=2)
-        wrong = sums.sum(axis=1) - right
+        if metric.kind == "events":
+            right, asked = sums.T
+        else:
+            right, asked = np.trace(confusion(sums, n_classes), axis1=1, axis2=2), sums.sum(axis=1)
+        wrong = asked - right
         if 1 - score < 1 / n and _few(wrong):
             low, high = _few_mistakes(score, low, high, int(np.count_nonzero(wrong)), n)
             method += f"; {np.count_nonzero(wrong)} of them with a mistake (Clopper and Pearson)"

@@ -14,7 +14,7 @@ import numpy.typing as npt
 
 from tactbench.core.errors import UnknownNameError
 from tactbench.core.samples import FloatArray
-from tactbench.core.spec.row import HIGH_ERROR, MEDIAN_ERROR
+from tactbench.core.spec.row import HIGH_ERROR, MEDIAN_ERROR, TRUE
 from tactbench.core.spec.task import VECTOR_METRIC, VectorTarget
 
 Rows = Callable[[npt.NDArray[Any], npt.NDArray[Any], int], FloatArray]
@@ -115,9 +115,9 @@ def _balanced(sums: FloatArray, n_classes: int) -> FloatArray:
     return np.asarray(recall.sum(axis=-1) / (there > 0).sum(axis=-1))
 
 
-def _event_f1(sums: FloatArray, n_classes: int) -> FloatArray:
-    """Return F1 of the second class; rows are events and alarms."""
-    return class_f1(sums, n_classes)[..., 1]
+def _of_events(y: npt.NDArray[Any], predicted: npt.NDArray[Any], _: int) -> FloatArray:
+    """Return the summands of a mean over the rows that are events."""
+    return np.column_stack([y * predicted, y])
 
 
 METRICS = {
@@ -130,7 +130,7 @@ METRICS = {
         Metric("accuracy", "classification", True, _pairs, _accuracy),
         Metric("balanced_accuracy", "classification", True, _pairs, _balanced),
         Metric("macro_f1", "classification", True, _pairs, _macro_f1),
-        Metric("event_f1", "events", True, _pairs, _event_f1),
+        Metric("recall_area", "events", True, _of_events, ratio),
     )
 }
 
@@ -143,7 +143,11 @@ EXCESS = Metric("excess_square", "regression", False, _squares, _excess)
 """Mean square beyond the floor of the reference, below zero where chance has it so: what errors of force are ranked by.
 Its sums are a RMSE's, then squares and degrees of freedom of the unloaded holds; no task may ask for it.
 """
-SUMMED = {**METRICS, EXCESS.name: EXCESS}
+SUMMED = {
+    **METRICS,
+    EXCESS.name: EXCESS,
+    **{TRUE + one.name: one for one in METRICS.values() if one.kind == "regression" and not one.vector},
+}
 """What replicates may be summed for."""
 
 

@@ -41,6 +41,13 @@ class Floor:
         """The variance of the reference, pooled over the recordings."""
         return float(ratio(sum(one.sum(axis=0) for one in self.holds.values())))
 
+    @property
+    def standard_error(self) -> float:
+        """That of :attr:`value`: of a mean of squares, correlated as they are, by the derivative of the root."""
+        squares = [one[:, 0] - one[:, 0].mean() for one in self.holds.values()]
+        variance = sum(integrated_correlation(one) * (one @ one) for one in squares)
+        return float(np.sqrt(variance) / sum(map(len, squares)) / (2.0 * self.value)) if variance else 0.0
+
     def by_replicate(self, tested: Answers, code: IntArray) -> FloatArray:
         """Return (replicates, 2) sums of squares and degrees of freedom, from (n,) the replicate of each test row.
 

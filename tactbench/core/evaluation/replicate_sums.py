@@ -7,8 +7,9 @@
      "strata": [0, 0, 1, …] or None,     which replicates may stand in for each other; None: all
      "sums": [[…], …]                    the metric's summands over each replicate
      "own": [0.61, …]                    the score of each by itself; None where the metric of it is undefined
-     "floor": [[…, …], …]}               of a RMSE whose reference has a floor: squares and degrees of freedom of its
+     "floor": [[…, …], …],               of a RMSE whose reference has a floor: squares and degrees of freedom of its
                                          unloaded holds over each replicate
+     "true": {"sums": …, "own": …}       of an error of force: both against the force that a simulated rig exerted
 
 A classification's summands are a table of true and given classes, mostly empty: a line of sums then is ``column, count,
 column, count …``. Scores follow exactly: :attr:`Metric.score` of the sum of all lines is the row's score.
@@ -20,6 +21,7 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from tactbench.core.evaluation.dataset import Dataset
 from tactbench.core.evaluation.interval import ReplicateUnits, own_scores
@@ -42,22 +44,32 @@ def replicates(data: Dataset, split: str, tested: Answers) -> ReplicateUnits:
 
 
 def summed(
-    metric: Metric, tested: Answers, unit: ReplicateUnits, n_classes: int, floor: Floor | None = None
+    metric: Metric,
+    tested: Answers,
+    unit: ReplicateUnits,
+    n_classes: int,
+    floor: Floor | None = None,
+    truth: FloatArray | None = None,
 ) -> dict[str, Any]:
-    """Return what a row keeps of its replicates."""
+    """Return what a row keeps of its replicates; `truth` is the force that was exerted, (n,), where it is known."""
     strata = unit.strata(tested.y_true, n_classes)
-    sums = unit.sums(metric.rows(tested.y_true, tested.y_pred, n_classes))
-    own = own_scores(metric, sums, n_classes)
-    kept = {
+
+    def against(y: npt.NDArray[Any]) -> dict[str, Any]:
+        sums = unit.sums(metric.rows(y, tested.y_pred, n_classes))
+        lines = [_without_needless_points(line) for line in sums.tolist()]
+        if n_classes:
+            lines = [[int(one) for place in np.flatnonzero(line) for one in (place, line[place])] for line in sums]
+        own = own_scores(metric, sums, n_classes)
+        return {"sums": lines, "own": [float(one) if np.isfinite(one) else None for one in own]}
+
+    return {
         "unit": unit.name,
         "names": list(unit.labels),
         "strata": strata.tolist() if strata.any() else None,
-        "sums": [_without_needless_points(line) for line in sums.tolist()],
-        "own": [float(one) if np.isfinite(one) else None for one in own],
+        **against(tested.y_true),
+        **({} if floor is None else {"floor": floor.by_replicate(tested, unit.codes).tolist()}),
+        **({} if truth is None else {"true": against(truth)}),
     }
-    if n_classes:
-        kept["sums"] = [[int(one) for place in np.flatnonzero(line) for one in (place, line[place])] for line in sums]
-    return kept | ({} if floor is None else {"floor": floor.by_replicate(tested, unit.codes).tolist()})
 
 
 def recordings_right(tested: Answers) -> tuple[int, int] | None:

@@ -37,8 +37,7 @@ def alarms(t_ns: IntArray, active: npt.NDArray[np.bool_], policy: AlarmPolicy) -
     segment = np.concatenate([[0], np.cumsum(apart)])
     first = t[np.concatenate([[True], apart])][segment]
     long_enough = t - first >= nanoseconds(policy.minimum_length_s)
-    _, places = np.unique(segment[long_enough], return_index=True)
-    raised = t[long_enough][places]
+    raised = t[long_enough][np.flatnonzero(np.diff(segment[long_enough], prepend=-1))]
     return np.asarray(raised[_kept(raised, nanoseconds(policy.refractory_s))])
 
 

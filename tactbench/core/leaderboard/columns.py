@@ -78,7 +78,7 @@ OF_ROWS: dict[str, Column] = {
     "range": Column("range", _range, lambda row: row.get("score_min")),
     "beyond floor": _score("beyond_floor", "score_beyond_floor"),
     "interval beyond floor": _interval("beyond_floor_interval", "beyond_floor_ci_low", "beyond_floor_ci_high"),
-    "true error": _score("true_error", "true_score"),
+    "against reference": _score("against_reference", "reference_score"),
     "recordings right": Column("recordings_right", _right, lambda row: row.get("recordings_right")),
     "published": _score("published", "published"),
     "test samples": Column("n_test", lambda row: whole(row["n_test"]), lambda row: row["n_test"]),
@@ -100,7 +100,7 @@ OF_ROWS: dict[str, Column] = {
 }
 COLUMNS = ("place", "sensor", "level", "estimator", "score", "notes", *list(OF_ROWS)[4:])
 SHOWN = {name: OF_ROWS[name].shown if name in OF_ROWS else _RANKED[name] for name in COLUMNS}
-WIDE = ("interval beyond floor", "true error", "recordings right", "test samples", "simulation", "latency p50",
+WIDE = ("interval beyond floor", "recordings right", "test samples", "simulation", "latency p50",
         "latency p95")  # fmt: skip
 """Columns that are printed only where all are asked for."""
 DEFAULT = tuple(name for name in COLUMNS if name not in WIDE)

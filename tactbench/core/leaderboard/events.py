@@ -1,4 +1,4 @@
-"""What detectors of events say besides their F1: misses, latency and false alarms."""
+"""What detectors of events say besides their recall area: misses, latency and false alarms."""
 
 from __future__ import annotations
 
@@ -37,13 +37,22 @@ def events_table(rows: Sequence[Row]) -> TextTable | None:
         texts = {name: _figure(figures, key, form) for name, (key, form) in _FIGURES.items()}
         if "misses" in figures:
             texts["misses"] += f" of {figures['events']:g}"
+        if figures.get("alarms") == 0:
+            texts["latency p50 [ms]"] = "never alarms"
         lines.append((visible(row["task"]), visible(row["sensor"]), answer_name(row), *texts.values()))
     if not lines:
         return None
-    title = "Events, at the threshold that validation recordings chose"
+    bound, area = (
+        " or ".join(dict.fromkeys(f"{row['events'][key]:g}" for row in finished if key in row["events"]))
+        for key in ("bound of false alarms per minute", "area up to false alarms per minute")
+    )
+    title = "Events, at the threshold that validation recordings chose" + (
+        f" for at most {bound} false alarm{'s' * (bound != '1')} a minute" if bound else ""
+    )
+    notes = (f"Recall area: recall, averaged over false alarms a minute from 0 to {area}. {_NOTE}" if area else _NOTE,)
     kinds = tuple("baseline" if row["is_baseline"] else "result" for row in finished)
     columns = ("task", "sensor", "estimator", *_FIGURES)
-    return TextTable(title, columns, tuple(lines), frozenset(_FIGURES), kinds=kinds, notes=(_NOTE,))
+    return TextTable(title, columns, tuple(lines), frozenset(_FIGURES), kinds=kinds, notes=notes)
 
 
 def _figure(figures: Mapping[str, float | None], key: str, form: str) -> str:

@@ -33,7 +33,7 @@ SUFFIXES = {
 """The format that a file is meant to have, by how its name ends."""
 IN_FOLDER = ("md", "csv", "json")
 """A run's result folder has these, ``leaderboard.md`` and so on; the others are made when asked for."""
-_IN_A_PAPER = ("sensor", "estimator", "score", "interval", "range", "published")
+_IN_A_PAPER = ("sensor", "estimator", "score", "interval", "range", "against reference", "published")
 _LONG = 12
 """Letters of a name in a paper from which its column breaks it."""
 

@@ -9,6 +9,7 @@ from typing import Any, TypeVar
 
 from tactbench.core.evaluation.protocols import shots
 from tactbench.core.spec.row import LOWER_IS_BETTER as LOWER_IS_BETTER
+from tactbench.core.spec.row import TRUE
 from tactbench.core.tables.text import visible
 
 Row = Mapping[str, Any]
@@ -27,7 +28,7 @@ METRIC_NAMES = {
     "macro_f1": "macro F1",
     "accuracy": "accuracy",
     "balanced_accuracy": "balanced accuracy",
-    "event_f1": "event F1",
+    "recall_area": "recall area",
 }
 _SPLITS = {
     "roles": "tested on recordings apart from training",
@@ -52,7 +53,9 @@ def answer_name(row: Row) -> str:
 def metric_name(row: Row) -> str:
     """Return the metric with its unit: ``RMSE [N]``."""
     unit = f" [{row['unit']}]" if row["unit"] != "1" else ""
-    return visible(f"{METRIC_NAMES.get(row['metric'], row['metric'])}{unit}")
+    name = row["metric"].removeprefix(TRUE)
+    true = "true " if name != row["metric"] else ""
+    return visible(f"{true}{METRIC_NAMES.get(name, name)}{unit}")
 
 
 def split_name(split: str) -> str:

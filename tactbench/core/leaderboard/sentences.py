@@ -11,11 +11,18 @@ from dataclasses import dataclass
 from operator import itemgetter
 from typing import NamedTuple
 
-from tactbench.core.leaderboard.names import Bars, Row, answer_name, grouped, held_out, sign_of
+from tactbench.core.leaderboard.names import Bars, Row, answer_name, grouped, held_out, metric_name, sign_of
 from tactbench.core.spec.row import LEAKS, plural
 from tactbench.core.spec.status import STOPPED
 from tactbench.core.statistics.rank import Rank, beyond_floor
-from tactbench.core.statistics.replicates import FEWEST, count_range, counted, percent
+from tactbench.core.statistics.replicates import (
+    FEWEST,
+    against_reference,
+    count_range,
+    counted,
+    least_coverage,
+    percent,
+)
 from tactbench.core.tables.numbers import interval, score, score_with_unit
 from tactbench.core.tables.text import cut
 
@@ -179,7 +186,8 @@ def _timed(board: Board) -> str:
 def _published(board: Board) -> str:
     """Return where published figures lie beside the intervals of ours."""
     finished = (*board.answers, *board.trivial)
-    rows = [row for row in finished if row.get("published") is not None and row["ci_low"] is not None]
+    published = [against_reference(row) for row in finished if row.get("published") is not None]
+    rows = [row for row in published if row["ci_low"] is not None]
     if not rows:
         return ""
     alone = len({row["sensor"] for row in rows}) == len(rows)
@@ -260,15 +268,24 @@ def _protocol(board: Board) -> Iterator[Note]:
 
 
 def _floors(board: Board) -> Iterator[Note]:
-    """Yield what errors beyond the floor are, where the reference errs too."""
-    known = [row for row in board.answers if row.get("reference_floor") is not None]
+    """Yield what an error of force is of where the reference errs too, and what errors beyond its floor are."""
+    finished = (*board.answers, *board.trivial)
+    simulated = next((row for row in finished if row.get("reference_score") is not None), None)
+    if simulated is not None:
+        true, noisy = (metric_name({**row, "unit": "1"}) for row in (simulated, against_reference(simulated)))
+        text = f"{true[:1].upper()}{true[1:]}: against the force exerted. {noisy}: against the noisy reference."
+        yield Note(text, printed=True)
+    known = [row for row in board.answers if row.get("score_beyond_floor") is not None]
     if not known:
         return
     parts = []
     for sensor, rows in grouped(known, lambda row: str(row["sensor"])).items():
-        floors = sorted(row["reference_floor"] for row in rows)
-        ends = dict.fromkeys(score(end, rows[0]["unit"]) for end in (floors[0], floors[-1]))
-        parts.append(f"{sensor} {' … '.join(ends)}")
+        unit, floors = rows[0]["unit"], sorted(row["reference_floor"] for row in rows)
+        ends = dict.fromkeys(score(end, unit) for end in (floors[0], floors[-1]))
+        reach = 1.96 * max(row.get("reference_floor_se") or 0.0 for row in rows)
+        least = score(((floors[-1] + reach) ** 2 - floors[-1] ** 2) ** 0.5, unit)
+        sure = f" ± {score(reach, unit)}, which resolves no error below {least}" if reach else ""
+        parts.append(f"{sensor} {' … '.join(ends)}{sure}")
     by = "; places go by it" if board.placed and board.by_floor else ""
     yield Note(f"Beyond floor: the root of RMSE² − floor²{by}. Floor: the reference's own noise ({', '.join(parts)}).")
 
@@ -280,7 +297,11 @@ def _how(board: Board) -> Iterator[Note]:
     if campaigns:
         counts = [row["n_replicates"] for row in campaigns]
         median = f"Score: median over {count_range(counts, 'campaign')}, each simulated anew with its own seed"
-        interval_of = "; interval: of that median" if any(row["ci_low"] is not None for row in campaigns) else ""
+        shown = [row["n_replicates"] for row in campaigns if row["ci_low"] is not None]
+        least = 100 * min(map(least_coverage, shown), default=0.0)
+        interval_of = (
+            f"; interval: of that median, coverage at least {least:.3g} % for any distribution" if shown else ""
+        )
         several = f"{median}{interval_of}; range: lowest … highest campaign"
         parts.append(several if max(counts) > 1 else "Score: of 1 campaign, simulated with its own seed")
     sentences = list(parts)

@@ -11,18 +11,18 @@ from tactbench.core.evaluation.protocols import is_probe
 from tactbench.core.leaderboard.columns import COLUMNS, DEFAULT, NUMERIC, SHOWN, Line
 from tactbench.core.leaderboard.names import Row, grouped, held_out, metric_name
 from tactbench.core.leaderboard.table import Block, Table
-from tactbench.core.statistics.replicates import count_range, percent
+from tactbench.core.statistics.replicates import against_reference, count_range, percent
 from tactbench.core.tables.text import command_line, visible
 from tactbench.core.tables.text_table import Entry, TextTable, finite
 
 CELL, REASON = "cell", "reason"
 """Columns of cells' names, as `why` takes them, and of why cells did not end well."""
-_OF_TRIVIAL = ("place", "sensor", "estimator", "score", "beyond floor", "published", "notes", CELL)
+_OF_TRIVIAL = ("place", "sensor", "estimator", "score", "beyond floor", "against reference", "published", "notes", CELL)
 """What a screen shows of trivial answers: nobody compares how long they take."""
 _Texts = tuple[dict[str, str], str]
 """The texts of a line by column, and its kind."""
 _FIRST_TO_GO = (
-    "cell", "latency p95", "latency p50", "simulation", "test samples", "true error", "interval beyond floor",
+    "cell", "latency p95", "latency p50", "simulation", "test samples", "interval beyond floor",
     "recordings right", "range", "training", "level", "published", "delay after touch",
 )  # fmt: skip
 """Columns that a terminal does without, in this order; those that were asked for by name are never left out."""
@@ -126,7 +126,8 @@ def _with_trivial_once(lines: Sequence[_Texts]) -> list[_Texts]:
             continue
         kept = [{name: text if name in _OF_TRIVIAL else "" for name, text in texts.items()} for texts, _ in same]
         alike = {name: text if all(one[name] == text for one in kept) else "" for name, text in kept[0].items()}
-        once = len(kept) > 1 and {one["sensor"] for one in kept} == sensors and alike["score"]
+        agree = alike["score"] and alike["against reference"] == kept[0]["against reference"]
+        once = len(kept) > 1 and {one["sensor"] for one in kept} == sensors and agree
         found += [(texts, kind) for texts in ([alike] if once else kept)]
     return found
 
@@ -153,7 +154,7 @@ def headings(names: Sequence[str], block: Block) -> tuple[str, ...]:
         counts = [row["n_replicates"] for row in units]
         interval += f" over {visible(count_range(counts, str(units[0]['replicate_unit'])))}"
     shown = {"score": metric_name(rows[0]), "interval": interval, "notes": ""}
-    shown |= {name: f"{name}{unit}" for name in ("beyond floor", "true error")}
+    shown |= {"beyond floor": f"beyond floor{unit}", "against reference": metric_name(against_reference(rows[0]))}
     return tuple(shown.get(name, name) for name in names)
 
 

@@ -12,7 +12,7 @@ from tactbench.core.evaluation.metrics import METRICS
 from tactbench.core.leaderboard.names import METRIC_NAMES, Row
 from tactbench.core.report.results import Details, Results
 from tactbench.core.samples import Answers
-from tactbench.core.spec.row import Asked, Cost, Ended, RestsOn, Scored
+from tactbench.core.spec.row import TRUE, Asked, Cost, Ended, RestsOn, Scored
 from tactbench.core.tables.text_table import ABSENT, Entry, TextTable, finite, text_table
 
 _GROUPS = {
@@ -100,7 +100,7 @@ def recording_scores(row: Row, tested: Answers | None) -> list[dict[str, Any]]:
     Of classes the share of right answers, since a recording may hold one class alone; of events nothing, since a
     recording may hold none.
     """
-    metric = METRICS.get(str(row["metric"]))
+    metric = METRICS.get(str(row["metric"]).removeprefix(TRUE))
     if tested is None or metric is None or metric.kind == "events":
         return []
     if metric.kind == "classification":

@@ -8,6 +8,7 @@ from typing import Any, Literal
 
 from tactbench.core.plugins.registry import Registry
 from tactbench.core.spec.task import Published, TaskSpec
+from tactbench.core.statistics.replicates import against_reference
 from tactbench.core.tables.numbers import interval as ends
 from tactbench.core.tables.numbers import score, signed
 from tactbench.core.tables.text import command_line
@@ -48,6 +49,7 @@ def reproduce(registry: Registry, rows: Sequence[Row]) -> list[Reproduction]:
     Tasks come in the order of the rows.
     """
     lines: list[Reproduction] = []
+    rows = list(map(against_reference, rows))
     names = list(dict.fromkeys(row["task"] for row in rows))
     order = {name: place for place, name in enumerate(names)}
     tasks = [descriptor.spec for descriptor in registry.tasks]

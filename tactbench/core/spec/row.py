@@ -9,7 +9,9 @@ from pydantic import BaseModel, ConfigDict
 
 from tactbench.core.spec.status import Status
 
-LOWER_IS_BETTER = frozenset({"rmse", "mae", "mean_euclidean_error"})
+TRUE = "true_"
+"""How the name of a metric begins whose score is against the force that a simulated rig exerted."""
+LOWER_IS_BETTER = frozenset({"rmse", "mae", "mean_euclidean_error", f"{TRUE}rmse", f"{TRUE}mae"})
 """Metrics of a row's score that are errors."""
 
 MEDIAN_ERROR, HIGH_ERROR = "median error", "95th percentile of the error"
@@ -73,6 +75,8 @@ class Scored(_Section):
     ci_method: str = ""
     reference_floor: float | None = None
     """of an error of force: the noise of the reference; None where that is not known"""
+    reference_floor_se: float | None = None
+    """its standard error"""
     score_beyond_floor: float | None = None
     beyond_floor_ci_low: float | None = None
     beyond_floor_ci_high: float | None = None
@@ -185,6 +189,12 @@ class ReplicatedRow(RowModel):
     seeds: list[float] | None = None
     score_min: float | None = None
     score_max: float | None = None
+    reference_score: float | None = None
+    """where `score` is against the true force: that against the reference as it was recorded"""
+    reference_ci_low: float | None = None
+    reference_ci_high: float | None = None
+    reference_scores: list[float] | None = None
+    """of the replicates"""
 
 
 def _members(annotation: Any) -> list[Any]:

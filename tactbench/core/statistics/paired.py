@@ -13,9 +13,10 @@ from typing import Any, Literal
 import numpy as np
 
 from tactbench.core.evaluation.interval import own_scores, student_quantile, two_sided_p
-from tactbench.core.evaluation.metrics import METRICS
+from tactbench.core.evaluation.metrics import SUMMED
 from tactbench.core.evaluation.replicate_sums import tables_of
 from tactbench.core.samples import FloatArray, IntArray
+from tactbench.core.spec.row import TRUE
 from tactbench.core.statistics.influence import PairableRows, scores_of, together
 from tactbench.core.statistics.replicates import FEWEST, counted
 
@@ -77,7 +78,7 @@ def difference(first: Row, second: Row) -> Difference:
     The verdict is *better* or *worse* if the interval neither contains 0 nor lies within the task's region of practical
     equivalence, *equivalent* if it lies within, else *undecided*: ranks follow the same rule.
     """
-    sign = METRICS[first["metric"]].sign
+    sign = SUMMED[first["metric"]].sign
     first, second = _means(first, second)
     value = float(first["score"] - second["score"])
     groups = together([first, second])
@@ -159,13 +160,13 @@ def _difference(first: Row, value: float, deviation: float, freedom: float, **mo
     if region > 0 and -region <= low and high <= region:
         verdict = "equivalent"
     elif low > 0 or high < 0:
-        verdict = "better" if value * METRICS[first["metric"]].sign > 0 else "worse"
+        verdict = "better" if value * SUMMED[first["metric"]].sign > 0 else "worse"
     return Difference(value, low, high, verdict=verdict, beyond=bool(low > region or high < -region), **more)
 
 
 def _own_scores(row: Row) -> FloatArray:
     """Return (replicates,) the score of each replicate by itself; NaN where the metric of it is undefined."""
-    metric, kept, n_classes = METRICS[row["metric"]], row["replicates"], len(row["classes"])
+    metric, kept, n_classes = SUMMED[row["metric"]], row["replicates"], len(row["classes"])
     if "scores" in kept:
         return scores_of(kept, metric.name)
     return own_scores(metric, tables_of([kept], metric.name, n_classes)[0], n_classes)
@@ -178,7 +179,7 @@ def _share_better(apart: FloatArray) -> float | None:
 
 def exchanged(first: Row, second: Row) -> tuple[float, float]:
     """Return the p-value of exchanging two rows' answers within the replicates they share, and the least it can be."""
-    metric = METRICS[first["metric"]]
+    metric = SUMMED[first["metric"]]
     if "scores" in first["replicates"]:
         apart_each = scores_of(first["replicates"], metric.name) - scores_of(second["replicates"], metric.name)
         ways, smallest = _ways(len(apart_each))
@@ -246,8 +247,14 @@ def corrected_t(differences: Sequence[float], test_over_train: float) -> FoldDif
 
 
 def over_folds(first: Row, second: Row) -> FoldDifference | None:
-    """Return the corrected test of two cells over the folds that both have; None where those hold out other units."""
-    if len({tuple((row.get("replicates") or {}).get("names", ())) for row in (first, second)}) > 1:
+    """Return the corrected test of two cells over the folds that both have; None where those hold out other units.
+
+    None also of errors against the true force: scores of folds are against the reference.
+    """
+    if (
+        first["metric"].startswith(TRUE)
+        or len({tuple((row.get("replicates") or {}).get("names", ())) for row in (first, second)}) > 1
+    ):
         return None
     sizes, other = first.get("fold_sizes") or {}, second.get("fold_sizes") or {}
     both = [name for name in sizes if name in other and name in first["scores"] and name in second["scores"]]

@@ -11,16 +11,18 @@ from operator import itemgetter
 from statistics import median, median_low
 from typing import Any
 
-from tactbench.core.spec.row import LOWER_IS_BETTER, Cost, plural
+from tactbench.core.spec.row import LOWER_IS_BETTER, TRUE, Cost, plural
 
 Row = Mapping[str, Any]
 _group = itemgetter("sensor", "task", "rig", "protocol", "split")
+_ranked_together = itemgetter("task", "protocol", "split", "simulated")
 
 FEWEST = 5
 """Replicates that an interval or a rank needs: the range of four holds the median in 87.5 % of cases only."""
 LEVEL = 0.95
 _MEDIANS = (
-    "score", "reference_floor", "score_beyond_floor", "true_score", "sim_s", "search_s", "fit_s", "predict_s",
+    "score", "reference_score", "reference_floor", "reference_floor_se", "score_beyond_floor", "true_score",
+    "sim_s", "search_s", "fit_s", "predict_s",
     "latency_ms_p50", "latency_ms_p95", "latency_ms_max", "answer_delay_ms", "peak_rss_mb", "wall_s",
 )  # fmt: skip
 """Numbers of a row whose median over replicates stands in the table."""
@@ -28,6 +30,7 @@ _INTERVALS = {
     "score": ("ci_low", "ci_high"),
     "score_beyond_floor": ("beyond_floor_ci_low", "beyond_floor_ci_high"),
     "true_score": ("true_ci_low", "true_ci_high"),
+    "reference_score": ("reference_ci_low", "reference_ci_high"),
 }
 """Where the interval of a number stands."""
 
@@ -55,13 +58,55 @@ def over_replicates(rows: Sequence[Row]) -> list[dict[str, Any]]:
     Keys that are added: `repeats` (replicates that ended, however), `n_replicates`, `replicate_unit`,
     `replicate_scores`, `seeds`, `score_min` and `score_max` (the range of the replicates' scores). `recordings_right`
     and `recordings_asked` are means over replicates.
+
+    The score that ranks is here and nowhere else decided: where all rows that may stand in one table know the error
+    against the true force, `metric` is ``true_rmse`` and `score`, intervals and replicates are of that error; the error
+    against the reference is under `reference_score`. An error beyond the floor, which estimates the true one, is then
+    left out.
     """
+    rows = _by_truth(rows)
     groups: dict[str, list[Row]] = {}
     for row in rows:
         groups.setdefault(_name(row), []).append(row)
     found = [_of_all(name, sorted(members, key=itemgetter("seed"))) for name, members in groups.items()]
     _fill_baselines(found)
     return found
+
+
+def _by_truth(rows: Sequence[Row]) -> list[Row]:
+    known: dict[tuple[Any, ...], bool] = {}
+    for row in rows:
+        if row["status"] == "done":
+            key = _ranked_together(row)
+            known[key] = known.get(key, True) and row.get("true_score") is not None
+    return [_true(row) if row["status"] == "done" and known[_ranked_together(row)] else row for row in rows]
+
+
+def _true(row: Row) -> Row:
+    if row["metric"].startswith(TRUE):
+        return row
+    kept = row.get("replicates") or {}
+    truth = kept.get("true")
+    return {
+        **row,
+        "metric": f"{TRUE}{row['metric']}",
+        **{end: row.get(f"true_{end}") for end in ("score", "ci_low", "ci_high")},
+        **{f"reference_{end}": row[end] for end in ("score", "ci_low", "ci_high")},
+        **dict.fromkeys(("score_beyond_floor", "beyond_floor_ci_low", "beyond_floor_ci_high")),
+        "replicates": {**{key: kept[key] for key in ("unit", "names", "strata")}, **truth} if truth else {},
+    }
+
+
+def against_reference(row: Row) -> Row:
+    """Return a row whose score is against the reference as it was recorded: what a published error of force is."""
+    if row.get("reference_score") is None:
+        return row
+    return {
+        **row,
+        "metric": row["metric"].removeprefix(TRUE),
+        **{end: row[f"reference_{end}"] for end in ("score", "ci_low", "ci_high")},
+        "replicate_scores": row.get("reference_scores") or [],
+    }
 
 
 def _fill_baselines(rows: Sequence[dict[str, Any]]) -> None:
@@ -124,16 +169,19 @@ def _of_campaigns(done: Sequence[Row]) -> dict[str, Any]:
             level = known.level if known else level
     scores = [row["score"] for row in done]
     parts = _middle([row.get("delay_parts_ms") or {} for row in here])
+    events = [row.get("events") or {} for row in done]
+    alarms = [one.get("alarms") for one in events]  # their mean is 0 only where none ever alarms
     points_of = [row.get("operating_points") or [] for row in done]
     alike = len({len(points) for points in points_of}) == 1
     covers = "" if level == LEVEL else f", {100 * level:.3g} %"
     return found | {
         **_counted(done, len(done), "replicate", scores),
+        **({"reference_scores": [row["reference_score"] for row in done]} if "reference_score" in first else {}),
         "ci_method": f"order statistics of {len(done)} replicates{covers}" if level else "",
         "replicates": _kept(done) if len(done) >= FEWEST else {},
         "chosen": _chosen(done),
         "scores": _middle([row["scores"] for row in done]),
-        "events": _middle([row.get("events") or {} for row in done]),
+        "events": _middle(events) | ({} if None in alarms else {"alarms": _mean(alarms)}),
         "operating_points": [_middle(points) for points in zip(*points_of, strict=True)] if alike else [],
         "delay_parts_ms": parts,
         "answer_delay_ms": None if found.get("answer_delay_ms") is None else sum(parts.values()),
@@ -151,8 +199,7 @@ def _kept(done: Sequence[Row]) -> dict[str, Any]:
         "strata": None,
         "scores": [row["score"] for row in done],
     }
-    floors = [row.get("reference_floor") for row in done]
-    if None not in floors:
+    if all(row.get("score_beyond_floor") is not None for row in done):
         kept["beyond"] = [row["score_beyond_floor"] for row in done]
         kept["excess"] = [row["score"] ** 2 - row["reference_floor"] ** 2 for row in done]
     return kept
@@ -244,7 +291,8 @@ def median_interval(values: Sequence[float]) -> MedianInterval | None:
     -----
     The interval between the k-th smallest and the k-th largest of n values holds the median with probability
     ``1 - 2 P(B < k)``, B binomial with n and 1/2, whatever the distribution is. Between the two k whose probabilities
-    enclose 95 % the ends are interpolated [1]_. The range of five values holds it in 93.75 % only: the level says so.
+    enclose 95 % the ends are interpolated [1]_: 95 % are covered of smooth distributions, of any continuous one no less
+    than :func:`least_coverage`. The range of five values holds it in 93.75 % only: the level says so.
 
     References
     ----------
@@ -255,7 +303,7 @@ def median_interval(values: Sequence[float]) -> MedianInterval | None:
     if n < FEWEST:
         return None
     ordered = sorted(map(float, values))
-    k = next(k for k in range(1, n) if _coverage(n, k + 1) < LEVEL)
+    k = _depth(n)
     held, next_held = _coverage(n, k), _coverage(n, k + 1)
     if held <= LEVEL:
         return MedianInterval(ordered[0], ordered[-1], held)
@@ -264,6 +312,16 @@ def median_interval(values: Sequence[float]) -> MedianInterval | None:
     low = ordered[k - 1] + weight * (ordered[k] - ordered[k - 1])  # of equal values exactly these
     high = ordered[n - k] - weight * (ordered[n - k] - ordered[n - k - 1])
     return MedianInterval(low, high, LEVEL)
+
+
+def least_coverage(n: int) -> float:
+    """Return what the interval of a median of `n` values, five or more, covers at least, of any distribution."""
+    return _coverage(n, 1) if n == FEWEST else _coverage(n, _depth(n) + 1)
+
+
+def _depth(n: int) -> int:
+    """Return the largest k whose k-th smallest and k-th largest of n values cover 95 %, or 1."""
+    return next(k for k in range(1, n) if _coverage(n, k + 1) < LEVEL)
 
 
 def counted(n: int, unit: str) -> str:

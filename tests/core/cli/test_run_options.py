@@ -89,7 +89,7 @@ def test_events_in_time_go_from_the_row_to_tables_why_and_cost(verbs):
     rows = json.loads(verbs("run", *asked, "--format", "json").stdout)
     by = {(row["task"], row["estimator"]): row for row in rows}
     row = by["slip", "pac-band"]
-    assert (row["metric"], row["score"], row["answer_per"]) == ("event_f1", 1.0, "frame")
+    assert (row["metric"], row["score"], row["answer_per"]) == ("recall_area", 1.0, "frame")
     assert row["events"]["false alarms per minute"] == 0
     # A window of 100 ms that fills with vibration, 20 ms more as the policy asks, a frame of 10 ms; then it computes.
     assert row["events"]["onset latency p50 ms"] < 130 + 10 * row["events"]["compute s per s of signal"]

@@ -70,15 +70,16 @@ def test_no_frame_knows_what_comes_after_it(paths, estimator):
 
 def test_a_detector_of_vibration_finds_every_slip_and_nothing_else(paths):
     result = run(paths)
-    assert (result.metric, result.score) == ("event_f1", 1.0)
+    assert (result.metric, result.score) == ("recall_area", 1.0)
     events = result.events
     assert (events["events"], events["misses"], events["false alarms per minute"]) == (3, 0, 0)
+    assert (events["alarms"], events["F1"]) == (3, 1.0)
     # The window of 0.1 s fills with louder samples after the onset, of which 10 ms (0.1 mm) pass before the label.
     # The policy asks for 20 ms of alarm more, and a frame ends every 10 ms.
     assert -10 <= events["onset latency p50 ms"] <= 120
     assert events["displacement at detection p50 mm"] == pytest.approx(events["onset latency p50 ms"] * 0.01, abs=0.1)
     assert events["frame balanced accuracy"] > 0.5  # of equal thresholds the highest is taken, and loses frames
-    assert result.confusion == [[6, 0], [0, 3]]
+    assert (result.n_test, result.confusion, result.classes) == (9, None, [])  # three slips, six recordings
     assert any("band not observable above 1000 Hz" in one for one in result.remarks)
 
 
@@ -89,6 +90,7 @@ def test_the_oracle_is_right_and_the_trivial_answers_are_not(paths):
         assert result.score == 0.0
         assert result.events["misses"] == 3
         assert result.events["frame balanced accuracy"] == 0.5
+        assert ("never alarms at its operating point" in result.remarks) == (name == "slip-never")
     assert "precision" not in run(paths, "slip-never").events
 
 
@@ -119,6 +121,24 @@ def test_without_validation_recordings_a_share_of_the_training_groups_serves(tmp
     result = run(paths)
     assert any("no recording has the role validation" in one for one in result.remarks)
     assert result.score == 1.0
+
+
+def test_a_detector_that_alarms_at_no_threshold_that_is_allowed_is_scored_by_those_that_are_not(tmp_path):
+    """Taps are louder than slips: one tap in 4 s is 15 a minute, of the 20 up to which the area goes."""
+    for name, loud in (("heard", 3.0), ("silent", 1.0)):
+        (tmp_path / name).mkdir()
+        result = run(campaign(tmp_path / name, loud=loud, tapped=5.0))
+        assert result.events["recall"] == 0
+        assert "never alarms at its operating point" in result.remarks
+        assert result.score == pytest.approx(0.25 if name == "heard" else 0.0, abs=0.1)
+
+
+def test_a_threshold_of_its_own_is_the_one_point_of_its_curve(paths):
+    """Scores of 0 and 1 at 0.5: every slip at a rate of false alarms r is worth 1 - r over the largest rate."""
+    own = REGISTRY.estimators["pac-band"].model_copy(update={"threshold": 0.0})
+    result = run(paths, own)
+    rate = result.events["false alarms per minute"]
+    assert result.score == pytest.approx(result.events["recall"] * (1 - rate / TASK.area_false_alarms_per_minute))
 
 
 def test_without_disturbances_or_a_reference_nothing_is_answered_and_what_is_missing_is_named(paths, tmp_path):

@@ -76,10 +76,10 @@ def test_the_interval_of_an_answer_with_few_mistakes_is_no_narrower_than_of_one_
     """Rows of a unit may stand or fall together: a hundred from each are no surer than ten."""
     code = np.repeat(np.arange(units), 2 * rows)
     y = np.tile([0, 1], units * rows)
-    few = [y.copy(), y.copy()]
-    for place in random.sample(range(len(y)), 2):
+    few = [y.copy(), y.copy()]  # mistakes in the second class, which events are of
+    for place in random.sample(range(1, len(y), 2), 2):
         few[1][place] ^= 1
-    few[0][random.randrange(len(y))] ^= 1
+    few[0][random.randrange(1, len(y), 2)] ^= 1
     perfect, none, one, two = (interval(y, p, code, metric, 2) for p in (y, 1 - y, *few))
     known = stats.binomtest(units, units).proportion_ci(0.95, "exact")
     assert (perfect.low, perfect.high) == pytest.approx((known.low, 1.0))

@@ -23,6 +23,21 @@ def test_the_curve_is_each_threshold_on_its_own(recordings, rules):
         assert np.array_equal(row.latency_s, alone.latency_s, equal_nan=True)
 
 
+@given(st.lists(scored_recordings(), min_size=1, max_size=2), policies, st.sampled_from([500.0, 5e3, 1e6]))
+def test_the_area_is_the_recall_of_operating_points_integrated_over_their_bounds(recordings, rules, most):
+    curve = threshold_curve(recordings, rules)
+    rate = curve.scores.false_alarms_per_minute
+    if np.isnan(rate).any() or curve.scores.latency_s.shape[1] == 0:
+        with pytest.raises(DataError, match="operating point"):
+            curve.found_share(most)
+        return
+    edges = np.unique([0.0, *rate[rate < most], most])  # between two of them the best threshold stays
+    recalls = [curve.at(curve.operating_point(bound)).recall for bound in edges[:-1]]
+    shares = curve.found_share(most)
+    assert ((shares >= 0) & (shares <= 1 + 1e-12)).all()
+    assert shares.mean() == pytest.approx(np.diff(edges) @ recalls / most)
+
+
 @given(st.lists(scored_recordings(), min_size=1, max_size=2), policies, st.sampled_from([0.0, 500.0, 1e6]))
 def test_the_operating_point_is_the_best_that_is_allowed(recordings, rules, bound):
     """The largest recall, of equal ones the larger F1, then the higher threshold; infinity where nothing is allowed."""

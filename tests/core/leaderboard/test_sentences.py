@@ -26,6 +26,7 @@ def boards(draw):
     simulated = draw(st.booleans())
     error = draw(st.booleans()) or not simulated
     floor = draw(st.sampled_from([None, 0.1])) if error and simulated else None
+    true = draw(st.booleans()) if error and simulated else False
     repeats = draw(st.integers(1, 9))
     rng = np.random.default_rng(draw(st.integers(0, 2**32 - 1)))
     common = 0.1 * rng.standard_normal(repeats)
@@ -65,10 +66,11 @@ def boards(draw):
                 continue
             for seed, one in enumerate(map(float, each), 1):
                 known = (
-                    {"reference_floor": floor, "score_beyond_floor": max(0.0, one**2 - floor**2) ** 0.5}
+                    {"reference_floor": floor, "reference_floor_se": 0.01,
+                     "score_beyond_floor": max(0.0, one**2 - floor**2) ** 0.5}
                     if floor
                     else {}
-                )
+                ) | ({"true_score": 0.9 - one / 2} if true else {})  # fmt: skip
                 cell = f"{sensor}/question/twin/deployable/{estimator}/{seed}"
                 rows.append(row(sensor, estimator, one, seed=seed, cell=cell, **known, **more))
     more = RECORDED if not simulated else {}
@@ -90,7 +92,8 @@ class Truth:
         self.rows = sorted((one for one in rows if one["status"] == "done"), key=lambda one: one["cell"])
         self.stopped = [one for one in rows if one["status"] != "done"]
         rows = self.rows
-        self.sign = 1.0 if rows[0]["metric"] == "rmse" else -1.0
+        self.true = rows[0]["metric"] == "true_rmse"
+        self.sign = 1.0 if self.true or rows[0]["metric"] == "rmse" else -1.0
         self.answers = [one for one in rows if not one["is_baseline"]]
         self.better = [one for one in self.answers if not self.reaches(one, one["score"])]
         self.worse = [one for one in self.answers if one not in self.better]
@@ -102,7 +105,7 @@ class Truth:
             self.unshown = [one for one in self.unshown if one not in same]
             self.unshown += [one for one in same if not self.clear(one)]
         self.several = len({one["sensor"] for one in rows}) > 1
-        self.floor = all(one.get("reference_floor") is not None for one in self.better)
+        self.floor = all(one.get("score_beyond_floor") is not None for one in self.better)
         self.ranks = ranked(self.better) if self.better and all(map(self.enough, self.better)) else None
 
     @staticmethod
@@ -255,10 +258,13 @@ BELOW = {
     r"\*  not shown to be better than the trivial answer of its own sensor \((.*)\)": lambda t, b: t.bars(b, t.unshown),
     r"Protocol deployable uses means and deviations of the test set, .*":
         lambda t: any(one["dagger"] for one in t.rows),
-    r"Beyond floor: the root of RMSE² − floor²(; places go by it)?\. Floor: .* \((?:[abc] 0\.1000(?:, )?)+\)\.":
-        lambda t, by: bool(by) == (bool(t.better) and t.floor),
+    # 1.96 × 0.01 either side, and sqrt(0.1196² − 0.1²).
+    r"Beyond floor: the root of RMSE² − floor²(; places go by it)?\. Floor: .* "
+    r"\((?:[abc] 0\.1000 ± 0\.0196, which resolves no error below 0\.0656(?:, )?)+\)\.":
+        lambda t, by: bool(by) == (bool(t.better) and t.floor) and not t.true,
+    r"True RMSE: against the force exerted\. RMSE: against the noisy reference\.": lambda t: t.true,
     r"(?:(Score: (?:median over (.*? campaigns), each simulated anew|of 1 campaign, simulated) with its own seed"
-    r"(; interval: of that median)?[^=.]*)(?:\. |\.$))?"
+    r"(; interval: of that median, coverage at least [\d.]+ % for any distribution)?[^=.]*)(?:\. |\.$))?"
     r"(?:Open: so few put no upper bound to the error\.?)?[ ]?"
     r"(Delay: sampling, link, window, computing; training: the final fit\.)?":
         lambda t, s, n, i, delay: t.how(i, n or "1" * ("of 1 campaign" in (s or "")), delay),

@@ -5,11 +5,15 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from tactbench.core.leaderboard.table import build_table
+from tactbench.core.leaderboard.view import grids
 from tactbench.core.statistics.paired import difference
 from tactbench.core.statistics.ranking import ranks
 from tactbench.core.statistics.replicates import (
     FEWEST,
     MedianInterval,
+    against_reference,
+    least_coverage,
     median_interval,
     over_replicates,
 )
@@ -124,3 +128,53 @@ def test_it_covers_what_it_says_whatever_the_distribution(draw, n):
     covered = np.mean([one.low <= centre <= one.high for one in found])
     # Four standard errors of a share, and 0.015 by which interpolation of skewed values may be off.
     assert abs(covered - found[0].level) < 4 * np.sqrt(0.05 * 0.95 / trials) + 0.015
+
+
+@pytest.mark.parametrize("n", [7, 8, 10])
+def test_of_two_far_groups_it_covers_less_and_never_less_than_it_says(n):
+    rng, trials = np.random.default_rng(n), 4000
+    values = rng.choice([-1.0, 1.0], size=(trials, n)) + 0.1 * rng.standard_normal((trials, n))
+    covered = np.mean([found.low <= 0 <= found.high for found in map(median_interval, values)])
+    assert least_coverage(n) - 4 * np.sqrt(0.05 * 0.95 / trials) < covered < 0.95
+
+
+def forces(true, noisy, estimator, simulated=True, **more):
+    """Rows of an answer to force, one a campaign, with its errors against the true force and the noisy reference."""
+    return [
+        one | {"true_score": value, "true_ci_low": None, "true_ci_high": None, "simulated": simulated, **more}
+        for one, value in zip(replicates(noisy, estimator=estimator, metric="rmse", unit="N"), true, strict=True)
+    ]  # fmt: skip
+
+
+NOISY = [0.690, 0.688, 0.692, 0.689, 0.691, 0.687]
+"""Errors against a reference whose noise is all that they show."""
+BETTER, WORSE = ([value + 1e-3 * place for place in range(6)] for value in (0.030, 0.060))
+
+
+def test_a_better_answer_by_the_true_force_is_first_where_the_noise_of_the_reference_hides_it():
+    rows = [*forces(BETTER, [one + 1e-4 for one in NOISY], "better"), *forces(WORSE, NOISY, "worse"),
+            *forces([1.6] * 6, [1.75] * 6, "mean", is_baseline=True)]  # fmt: skip
+    found = {one["estimator"]: one for one in over_replicates(rows)}
+    better, worse = found["better"], found["worse"]
+    assert (better["metric"], better["score"]) == ("true_rmse", pytest.approx(0.0325))
+    assert better["reference_score"] == pytest.approx(0.6896)
+    assert better["ci_low"] < 0.0325 < better["ci_high"] < worse["ci_low"]
+    assert better["baseline"] == 1.6
+    assert (better["replicate_scores"], better["reference_scores"][0]) == (BETTER, pytest.approx(0.6901))
+    assert {one: rank.place for one, rank in ranks([better, worse]).items()} == {better["cell"]: 1, worse["cell"]: 2}
+    apart = difference(better, worse)
+    assert (apart.verdict, apart.value) == ("better", pytest.approx(-0.03))
+    table = build_table([better, worse, found["mean"]])
+    assert [line.row["estimator"] for line in table.lines] == ["better", "worse", "mean"]
+    headers = grids(table)[0].headers
+    assert headers.index("true RMSE [N]") < headers.index("RMSE [N]")
+    before = against_reference(better)
+    assert (before["metric"], before["score"]) == ("rmse", better["reference_score"])
+    assert over_replicates(list(found.values())) == list(found.values())
+
+
+def test_where_one_answer_or_a_real_rig_knows_no_true_force_all_are_ranked_by_the_reference():
+    one_unknown = [*forces(BETTER, NOISY, "a"), *replicates(NOISY, estimator="b", metric="rmse")]
+    real = forces([None] * 6, NOISY, "a", simulated=False)
+    for rows in (one_unknown, real):
+        assert {(one["metric"], one.get("reference_score")) for one in over_replicates(rows)} <= {("rmse", None)}

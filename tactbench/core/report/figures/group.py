@@ -9,8 +9,7 @@ from functools import cached_property, partial
 from textwrap import fill
 from typing import TYPE_CHECKING, Any
 
-from tactbench.core.evaluation.metrics import METRICS
-from tactbench.core.leaderboard.names import METRIC_NAMES, answer_name
+from tactbench.core.leaderboard.names import METRIC_NAMES, answer_name, error_of
 from tactbench.core.matrix.store import Row
 from tactbench.core.report.figures.style import sensor_colours
 from tactbench.core.report.published import stands_beside
@@ -165,7 +164,7 @@ def groups(results: Results, remark: Callable[[str], None]) -> list[Group]:
 
 def _order(task: TaskSpec, row: Row) -> tuple[bool, float]:
     """Return what decides which of several estimators is shown: the greatest."""
-    return any(stands_beside(row, task, one) for one in task.published), METRICS[row["metric"]].sign * row["score"]
+    return any(stands_beside(row, task, one) for one in task.published), -error_of(row)
 
 
 def _panels(results: Results, rows: list[Row], remark: Callable[[str], None]) -> tuple[Panel, ...]:
