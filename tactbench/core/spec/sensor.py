@@ -268,6 +268,9 @@ class SensorSpec(Frozen):
     scenarios: dict[Annotated[str, Field(pattern=r"^[a-z][a-z0-9-]*$")], Scenario] = Field(default_factory=dict)
     """Ways of handling the sensor that its usual nuisances do not cover, by name; used where a scene's simulation asks
     for one."""
+    ranges: dict[str, PhysicalRange] = Field(default_factory=dict, exclude=True)
+    """Between what ends nuisances may lie, by the name under which a run sets them: its own, and those of a scene that
+    scale them. Left out of recordings and keys: no sample depends on it."""
     references: tuple[str, ...] = ()
     data_sheet: DataSheet = Field(default=DataSheet(), exclude=True)
     """Size, range, interface … of the device. Left out of recordings and keys: no sample depends on it."""
