@@ -7,7 +7,7 @@ from typing import Any
 
 import click
 
-from tactbench.core.cli.options import RESULTS, format_option, options
+from tactbench.core.cli.options import RESULTS, SIMULATION, format_option, options
 from tactbench.core.spec.bounds import MOST_REPEATS
 
 
@@ -20,14 +20,16 @@ from tactbench.core.spec.bounds import MOST_REPEATS
     click.option("--nuisance", "nuisances", multiple=True, metavar="NAME",
                  help="Nuisance; repeatable. Default: all whose range a sensor states."),
     click.option("--repeats", type=click.IntRange(min=1, max=MOST_REPEATS), metavar="N", help="Number of campaigns."),
+    SIMULATION,
     click.option("--jobs", type=click.IntRange(min=1), metavar="N", help="Parallel worker processes."),
     RESULTS,
 )  # fmt: skip
 @format_option("table", "md", "latex")
 @click.pass_context
 def command(
-    ctx: click.Context, /, estimator: tuple[str, ...], nuisances: tuple[str, ...], shape: str, out: Path, **asked: Any
-) -> None:
+    ctx: click.Context, /, estimator: tuple[str, ...], nuisances: tuple[str, ...], settings: tuple[str, ...],
+    shape: str, out: Path, **asked: Any,
+) -> None:  # fmt: skip
     """Show what simulated scores and the order of sensors rest on.
 
     Every nuisance is set to both ends of its range, and those that cost the most are set in pairs, on the same seeds.
@@ -40,7 +42,9 @@ def command(
     from tactbench.core.study.study import Study
     from tactbench.core.tables.terminal import remark
 
-    found, stopped = carry_out_sensitivity(Study(out=out, estimator=estimator or None, **asked), nuisances)
+    found, stopped = carry_out_sensitivity(
+        Study(out=out, estimator=estimator or None, set=settings, **asked), nuisances
+    )
     specs = {sensor.name: sensor.spec for sensor in installed().sensors}
     print_tables([sensitivity_table(one, specs) for one in found], shape)
     for row in stopped:

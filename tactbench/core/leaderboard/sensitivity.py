@@ -12,6 +12,7 @@ from typing import Any
 
 from tactbench.core.leaderboard.names import Row, answer_name, error_of, grouped, hardware_name, metric_name, sign_of
 from tactbench.core.leaderboard.pairwise import folder_comparisons
+from tactbench.core.leaderboard.sentences import ORDER_DEPENDS_ON
 from tactbench.core.matrix.store import Store
 from tactbench.core.spec.scene import RANGES
 from tactbench.core.spec.sensor import PhysicalRange, SensorSpec
@@ -21,8 +22,6 @@ from tactbench.core.tables.numbers import ABSENT, score, signed
 from tactbench.core.tables.text_table import TextTable, text_table
 
 FOLDER = "assumptions"
-KEY = "order_depends_on"
-"""Of a row: the nuisances at whose ends the order of the sensors turns round."""
 TURNED = "turns round"
 _NOTE = (
     "Each nuisance stands at one end of its range, all else as stated; the same seeds draw the same in all lines. A "
@@ -48,7 +47,7 @@ def ends_of(name: str) -> dict[str, str]:
 
 def read_variants(folder: Path) -> dict[str, list[Row]]:
     """Return the rows of every set of ends that has been computed, by its name: one a cell and replicate."""
-    return {path.parent.name: list(Store(path.parent).rows()) for path in sorted((folder / FOLDER).glob("*/cells"))}
+    return {path.parent.name: list(Store(path.parent).rows()) for path in sorted((folder / FOLDER).glob("*=*/cells"))}
 
 
 class Sensitivity:
@@ -142,7 +141,7 @@ def sensitivities(rows: Iterable[Row], variants: Mapping[str, Sequence[Row]]) ->
 
 
 def with_dependence(rows: Sequence[dict[str, Any]], store: Store) -> list[dict[str, Any]]:
-    """Return rows with the nuisances under `KEY` on which the order of the sensors depends, where it has been computed.
+    """Return rows with the nuisances on which the order of the sensors depends, where it has been computed.
 
     `rows` are those of `store`, one a cell.
     """
@@ -153,7 +152,7 @@ def with_dependence(rows: Sequence[dict[str, Any]], store: Store) -> list[dict[s
     for found in sensitivities(store.rows(), variants).values():
         names = list(dict.fromkeys(nuisance for name in found.turned() for nuisance in ends_of(name)))
         named |= {row["cell"]: names for row in found.stated.values()}
-    return [{**row, KEY: named[row["cell"]]} if row["cell"] in named else row for row in rows]
+    return [{**row, ORDER_DEPENDS_ON: named[row["cell"]]} if row["cell"] in named else row for row in rows]
 
 
 def sensitivity_table(found: Sensitivity, specs: Mapping[str, SensorSpec]) -> TextTable:
