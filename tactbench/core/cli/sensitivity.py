@@ -13,9 +13,9 @@ from tactbench.core.spec.bounds import MOST_REPEATS
 
 @click.command(name="sensitivity")
 @options(
-    click.option("--sensor", multiple=True, metavar="NAME", required=True, help="Sensor; repeatable."),
+    click.option("--sensor", multiple=True, metavar="NAME", help="Sensor; repeatable."),
     click.option("--task", metavar="NAME", required=True, help="Task."),
-    click.option("--estimator", multiple=True, metavar="NAME", help="Estimator; repeatable. Default: the first."),
+    click.option("--estimator", multiple=True, metavar="NAME", help="Estimator; repeatable."),
     click.option("--protocol", metavar="NAME", help="Evaluation protocol. Default: the task's first."),
     click.option("--nuisance", "nuisances", multiple=True, metavar="NAME",
                  help="Nuisance; repeatable. Default: all whose range a sensor states."),
@@ -36,17 +36,17 @@ def command(
     What the result folder holds already is reused; each set of ends is a folder in its folder assumptions.
     """
     from tactbench.core.cli.grid import print_tables
-    from tactbench.core.leaderboard.sensitivity import sensitivity_table
+    from tactbench.core.leaderboard.sensitivity import sensitivity_tables
+    from tactbench.core.matrix.store import Store
     from tactbench.core.plugins.registry import installed
     from tactbench.core.study.sensitivity import carry_out_sensitivity
     from tactbench.core.study.study import Study
     from tactbench.core.tables.terminal import remark
 
-    found, stopped = carry_out_sensitivity(
-        Study(out=out, estimator=estimator or None, set=settings, **asked), nuisances
-    )
+    study = Study(out=out, estimator=estimator or None, set=settings, **asked)
+    stopped = carry_out_sensitivity(study, nuisances)
     specs = {sensor.name: sensor.spec for sensor in installed().sensors}
-    print_tables([sensitivity_table(one, specs) for one in found], shape)
+    print_tables(sensitivity_tables(Store(out), specs), shape)
     for row in stopped:
         remark(f"{row['status']}: {row['cell']}: {row['reason']}")
     ctx.exit(1 if stopped else 0)

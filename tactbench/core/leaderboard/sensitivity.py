@@ -6,8 +6,7 @@ Each set of ends is a result folder of its own, ``assumptions/placement_scatter_
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from itertools import combinations, pairwise
-from pathlib import Path
+from itertools import pairwise, permutations
 from typing import Any
 
 from tactbench.core.leaderboard.names import Row, answer_name, error_of, grouped, hardware_name, metric_name, sign_of
@@ -45,11 +44,6 @@ def ends_of(name: str) -> dict[str, str]:
     return {nuisance: end for nuisance, _, end in (part.partition("=") for part in name.split(","))}
 
 
-def read_variants(folder: Path) -> dict[str, list[Row]]:
-    """Return the rows of every set of ends that has been computed, by its name: one a cell and replicate."""
-    return {path.parent.name: list(Store(path.parent).rows()) for path in sorted((folder / FOLDER).glob("*=*/cells"))}
-
-
 class Sensitivity:
     """The scores of one question, as stated and with nuisances at the ends of their ranges.
 
@@ -63,6 +57,7 @@ class Sensitivity:
 
     def __init__(self, rows: Sequence[Row], variants: Mapping[str, Sequence[Row]]) -> None:
         self.stated = {str(row["sensor"]): row for row in over_replicates(rows)}
+        self.task = str(rows[0]["task"])
         self.order = _order(self.stated)
         self.rows: dict[str, dict[str, Row]] = {}
         self.changes: dict[str, dict[str, Any]] = {}
@@ -83,13 +78,9 @@ class Sensitivity:
         sign = -sign_of(next(iter(self.stated.values())))
         return sum(sign * self.change(name, sensor) for sensor in self.stated) / len(self.stated)
 
-    def there(self, name: str) -> dict[str, Row]:
-        """Return a row for each sensor: that with a set of ends, or as stated where it has no such nuisance."""
-        return {**self.stated, **self.rows[name]}
-
     def verdict(self, name: str) -> str:
         """Return what becomes of the order of the sensors."""
-        order = _order(self.there(name))
+        order = _order({**self.stated, **self.rows[name]})
         if any((worse, better) in order for better, worse in self.order):
             return TURNED
         if not order or self.order - order:
@@ -106,83 +97,77 @@ class Sensitivity:
 def _order(rows: Mapping[str, Row]) -> set[tuple[str, str]]:
     """Return which sensor is shown to be better than which."""
     done = {sensor: row for sensor, row in rows.items() if row["status"] == "done"}
-    found = set()
-    for one, other in combinations(done, 2):
-        verdict = difference(done[one], done[other]).verdict
-        if verdict in ("better", "worse"):
-            found.add((one, other) if verdict == "better" else (other, one))
-    return found
+    pairs = permutations(done, 2)
+    return {(one, other) for one, other in pairs if difference(done[one], done[other]).verdict == "better"}
 
 
 def _order_text(rows: Mapping[str, Row]) -> str:
-    done = {sensor: row for sensor, row in rows.items() if row["status"] == "done"}
-    best_first = sorted(done, key=lambda sensor: error_of(done[sensor]))
-    order = _order(done)
-    signs = [" > " if pair in order else " ≈ " for pair in pairwise(best_first)]
-    return "".join(f"{sensor}{sign}" for sensor, sign in zip(best_first, [*signs, ""], strict=True))
+    done = sorted(
+        (sensor for sensor, row in rows.items() if row["status"] == "done"), key=lambda one: error_of(rows[one])
+    )
+    order = _order(rows)
+    return "".join(f"{' > ' if pair in order else ' ≈ '}{pair[1]}" for pair in pairwise(["", *done]))[3:]
 
 
-def sensitivities(rows: Iterable[Row], variants: Mapping[str, Sequence[Row]]) -> dict[tuple[str, ...], Sensitivity]:
-    """Return what each answer's scores rest on, by task, protocol, split, rig and estimator.
+def sensitivities(store: Store) -> dict[tuple[str, ...], Sensitivity]:
+    """Return what each answer's scores rest on, by task, protocol, split, rig and estimator, where it is computed."""
 
-    `rows` and `variants` hold one row a cell and replicate, those of trivial answers too, which are passed over.
-    """
+    def questions(rows: Iterable[Row]) -> dict[tuple[str, ...], list[Row]]:
+        answers = (row for row in rows if not row["is_baseline"])
+        return grouped(answers, lambda row: (row["task"], row["protocol"], row["split"] or "", hardware_name(row),
+                                             answer_name(row)))  # fmt: skip
 
-    def question(row: Row) -> tuple[str, ...]:
-        split = "" if row["split"] is None else str(row["split"])
-        return (row["task"], row["protocol"], split, hardware_name(row), answer_name(row))
-
-    stated = grouped((row for row in rows if not row["is_baseline"]), question)
-    found: dict[tuple[str, ...], dict[str, Sequence[Row]]] = {}
-    for name, own in variants.items():
-        for key, members in grouped((row for row in own if not row["is_baseline"]), question).items():
-            found.setdefault(key, {})[name] = members
-    return {key: Sensitivity(stated[key], some) for key, some in found.items() if key in stated}
+    folders = sorted((store.folder / FOLDER).glob("*=*/cells"))
+    variants = {path.parent.name: questions(Store(path.parent).rows()) for path in folders}
+    found = {}
+    for key, stated in questions(store.rows() if folders else ()).items():
+        own = {name: asked[key] for name, asked in variants.items() if key in asked}
+        if own:
+            found[key] = Sensitivity(stated, own)
+    return found
 
 
 def with_dependence(rows: Sequence[dict[str, Any]], store: Store) -> list[dict[str, Any]]:
-    """Return rows with the nuisances on which the order of the sensors depends, where it has been computed.
-
-    `rows` are those of `store`, one a cell.
-    """
-    variants = read_variants(store.folder)
-    if not variants:
-        return list(rows)
+    """Return rows, one a cell, with the nuisances on which the order of the sensors depends, where it is computed."""
     named: dict[str, list[str]] = {}
-    for found in sensitivities(store.rows(), variants).values():
+    for found in sensitivities(store).values():
         names = list(dict.fromkeys(nuisance for name in found.turned() for nuisance in ends_of(name)))
         named |= {row["cell"]: names for row in found.stated.values()}
     return [{**row, ORDER_DEPENDS_ON: named[row["cell"]]} if row["cell"] in named else row for row in rows]
 
 
-def sensitivity_table(found: Sensitivity, specs: Mapping[str, SensorSpec]) -> TextTable:
-    """Return the table of one question; `specs` by sensor have ranges and sources."""
-    any_row = next(iter(found.stated.values()))
-    sensors = list(found.stated)
+def sensitivity_tables(store: Store, specs: Mapping[str, SensorSpec]) -> list[TextTable]:
+    """Return a table a question; `specs`, by sensor, have ranges and sources."""
+    return [_table(found, specs) for found in sensitivities(store).values()]
+
+
+def _table(found: Sensitivity, specs: Mapping[str, SensorSpec]) -> TextTable:
+    row, sensors = next(iter(found.stated.values())), list(found.stated)
     names = sorted(found.rows, key=lambda name: (len(ends_of(name)), -max(abs(found.change(name, s)) for s in sensors)))
-    per_sensor = [column for sensor in sensors for column in (sensor, f"{sensor}: change")]
-    columns = ("nuisance", "value", "range", "source", *per_sensor, *(("order", "it") if len(sensors) > 1 else ()))
-    shipped = [score(found.stated[sensor]["score"], any_row["unit"]) for sensor in sensors]
-    first = [text for one in shipped for text in (one, "")]
-    lines = [["as stated", "", "", "", *first, _order_text(found.stated), ""][: len(columns)]]
-    notes: dict[str, None] = {_NOTE: None}
+    numeric = [column for sensor in sensors for column in (sensor, f"{sensor}: change")]
+    shipped = [text for one in found.stated.values() for text in (score(one["score"], one["unit"]), "")]
+    lines = [["as stated", "", "", "", *shipped, _order_text(found.stated)]]
+    notes = dict.fromkeys([_NOTE])
     for name in names:
         ends, own = ends_of(name), found.rows[name]
-        ranges = {one: {sensor: ranges_of(specs[sensor]).get(one) for sensor in own if sensor in specs} for one in ends}
-        value = ", ".join(_alike({s: f"{row['simulation']['nuisances'][one]:g}" for s, row in own.items()})
-                          for one in ends)  # fmt: skip
-        stated = {one: {s: given for s, given in by.items() if given is not None} for one, by in ranges.items()}
-        alone = next(iter(stated.values())) if len(ends) == 1 else {}
-        texts = [_alike({s: f"{one.lower:g} … {one.upper:g}" for s, one in alone.items()}),
-                 _alike({s: one.source.tag for s, one in alone.items()})]  # fmt: skip
+        nuisance = next(iter(ends))
+        values = (_alike({s: f"{one['simulation']['nuisances'][end]:g}" for s, one in own.items()}) for end in ends)
+        ranges = {sensor: ranges_of(specs[sensor]).get(nuisance) for sensor in own if sensor in specs}
+        alone = {sensor: one for sensor, one in ranges.items() if one is not None and len(ends) == 1}
         for sensor, one in alone.items():
-            where = f", {sensor}" if next(iter(ends)) not in RANGES else ""
-            notes[f"{next(iter(ends))}{where}: {one.source.reference} ({one.source.tag})."] = None
-        lines.append([", ".join(ends), value, *texts, *(text for s in sensors for text in _scores(found, name, s)),
-                      _order_text(found.there(name)), found.verdict(name)][: len(columns)])  # fmt: skip
-    title = " · ".join([any_row["task"], metric_name(any_row), any_row["protocol"], answer_name(any_row),
-                        hardware_name(any_row)])  # fmt: skip
-    return text_table(title, columns, lines, numeric=per_sensor, notes=tuple(notes))
+            of = f"{nuisance}, {sensor}" if nuisance not in RANGES else nuisance
+            notes[f"{of}: {one.source.reference} ({one.source.tag})."] = None
+        lines.append([
+            ", ".join(ends), ", ".join(values),
+            _alike({sensor: f"{one.lower:g} … {one.upper:g}" for sensor, one in alone.items()}),
+            _alike({sensor: one.source.tag for sensor, one in alone.items()}),
+            *(text for sensor in sensors for text in _scores(found, name, sensor)),
+            f"{_order_text({**found.stated, **own})}: {found.verdict(name)}",
+        ])  # fmt: skip
+    title = " · ".join([row["task"], metric_name(row), row["protocol"], answer_name(row), hardware_name(row)])
+    columns = ("nuisance", "value", "range", "source", *numeric, "order")[: None if len(sensors) > 1 else -1]
+    lines = [line[: len(columns)] for line in lines]
+    return text_table(title, columns, lines, numeric=numeric, notes=tuple(notes))
 
 
 def _alike(texts: Mapping[str, str]) -> str:

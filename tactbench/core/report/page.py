@@ -16,7 +16,7 @@ import tactbench
 from tactbench.core.errors import UsageError
 from tactbench.core.files import replace_file, writable
 from tactbench.core.leaderboard.columns import DEFAULT, NUMERIC
-from tactbench.core.leaderboard.sensitivity import read_variants, sensitivities, sensitivity_table
+from tactbench.core.leaderboard.sensitivity import sensitivity_tables
 from tactbench.core.leaderboard.view import REASON, View, grid
 from tactbench.core.progress import Progress
 from tactbench.core.report.cells import details
@@ -112,15 +112,13 @@ def costs_section(subject: ReportData) -> Section:
 
 def assumptions_section(subject: ReportData) -> Section:
     """Return the section of what `tactbench sensitivity` has left in the folder."""
-    store = subject.results.store
-    found = sensitivities(store.rows(), read_variants(store.folder)).values()
     specs = {sensor.name: sensor.spec for sensor in subject.results.registry.sensors}
+    tables = tuple(sensitivity_tables(subject.results.store, specs))
     lacks = (
-        "What simulated scores and the order of the sensors rest on: `tactbench sensitivity --sensor NAME --task NAME`."
+        "Which assumptions simulated scores and the order of the sensors rest on: `tactbench sensitivity --task NAME`."
     )
-    simulated = any(row["simulated"] for row in subject.rows)
-    return Section(tables=tuple(sensitivity_table(one, specs) for one in found),
-                   missing=(lacks,) if simulated and not found else ())  # fmt: skip
+    wanted = not tables and any(row["simulated"] for row in subject.rows)
+    return Section(tables=tables, missing=(lacks,) if wanted else ())
 
 
 def sensors_section(subject: ReportData) -> Section:

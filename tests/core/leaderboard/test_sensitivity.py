@@ -2,8 +2,8 @@
 
 import pytest
 
-from tactbench.core.leaderboard.sensitivity import Sensitivity, sensitivity_table
-from tactbench.core.leaderboard.table import over_all
+from tactbench.core.leaderboard.sensitivity import sensitivities, sensitivity_tables
+from tactbench.core.leaderboard.table import build_table, over_all
 from tactbench.core.matrix.store import Store
 from tactbench.core.plugins.registry import load_registry
 from tests.core.matrix import made
@@ -44,9 +44,8 @@ def store(tmp_path):
 
 
 def read(store):
-    return Sensitivity(
-        store.rows(), {name: Store(store.folder / "assumptions" / name).rows() for name in VARIANTS}
-    )  # fmt: skip
+    (found,) = sensitivities(store).values()
+    return found
 
 
 def test_the_order_turns_round_where_another_sensor_is_shown_to_be_better(store):
@@ -58,29 +57,27 @@ def test_the_order_turns_round_where_another_sensor_is_shown_to_be_better(store)
 
 
 def test_changes_are_taken_over_the_seeds_that_both_have(store):
-    fewer = keep(store.folder / "assumptions" / "fewer", {"biotac": 0.45}, {"fewer": 0.0}, seeds=range(2, 7))
-    pair = Sensitivity(store.rows(), {"fewer=lower": fewer.rows()}).changes["fewer=lower"]["biotac"]
+    keep(store.folder / "assumptions" / "fewer=lower", {"biotac": 0.45}, {"fewer": 0.0}, seeds=range(2, 7))
+    pair = read(store).changes["fewer=lower"]["biotac"]
     assert (pair.difference.paired, pair.difference.replicates) == (True, 5)
     assert pair.difference.value == pytest.approx(0.05)
 
 
 def test_the_table_has_a_line_for_each_set_with_range_source_and_order(store):
     specs = {sensor.name: sensor.spec for sensor in load_registry().sensors}
-    table = sensitivity_table(read(store), specs)
+    (table,) = sensitivity_tables(store, specs)
     lines = {(line[0], line[1]): dict(zip(table.columns, line, strict=True)) for line in table.lines}
     assert lines["as stated", ""]["order"] == "icub > biotac"
     alone = lines["placement_scatter_mm", "0"]
     assert (alone["range"], alone["source"]) == ("0 … 0.5", "assumed")
     assert alone["biotac: change"].startswith("+0.100 (+0.")
     both = lines["offset_scale, placement_scatter_mm", "0, 0"]
-    assert both["order"] == "biotac > icub"
+    assert both["order"] == "biotac > icub: turns round"
     assert lines["since_power_on_s", "0"]["icub"] == "–"
     assert any(note.startswith("offset_scale, icub: ") for note in table.notes)
 
 
 def test_the_leaderboard_names_what_the_order_depends_on_only_where_it_was_computed(store, tmp_path):
-    from tactbench.core.leaderboard.table import build_table
-
     (block,) = build_table(over_all(store, store.rows())).blocks
     assert "depends on offset_scale and placement_scatter_mm" in block.verdict[-1]
     (block,) = build_table(over_all(Store(tmp_path / "new"), store.rows())).blocks
