@@ -20,8 +20,8 @@ from tactbench.core.errors import UsageError, complaint
 from tactbench.core.spec import units
 from tactbench.core.spec.drive import ForceLoop
 from tactbench.core.spec.profile import PAPER, ForceProfile, ForceRamp
-from tactbench.core.spec.quantity import Frozen, Quantity, Source, assumed, measured, sourced
-from tactbench.core.spec.sensor import ChannelKind, PhysicalRange
+from tactbench.core.spec.quantity import Frozen, Quantity, assumed, measured, sourced
+from tactbench.core.spec.sensor import ChannelKind, ranges
 
 M = TypeVar("M", bound=BaseModel)
 
@@ -360,14 +360,10 @@ The name is field and unit, behind the part of the scene where that is not the e
 ``placement_scatter_mm``, ``drive_delay_ms``, ``surface_roughness_um``. Options, files, recordings and tables use it.
 """
 
-RANGES: Mapping[str, PhysicalRange] = {
-    "placement_scatter_mm": PhysicalRange(
-        lower=0.0, upper=0.5, unit="mm", source=Source(tag="assumed", reference="a machined seat … one fitted by hand")
-    ),
-    "placement_tilt_scatter_deg": PhysicalRange(
-        lower=0.0, upper=1.0, unit="deg", source=Source(tag="assumed", reference="none … 0.2 mm across a cap of 12 mm")
-    ),
-}
+RANGES = ranges(
+    ("placement_scatter_mm", 0.0, 0.5, "mm", "assumed", "a machined seat … one fitted by hand"),
+    ("placement_tilt_scatter_deg", 0.0, 1.0, "deg", "assumed", "none … 0.2 mm across a cap of 12 mm"),
+)
 """Between what ends nuisances of the mount may lie, by name; a sensor's spec has its own."""
 
 _MAY_BE_NEGATIVE = frozenset({

@@ -10,7 +10,7 @@ from pydantic import Field, ValidationError, model_validator
 
 from tactbench.core.errors import NotApplicable, UsageError, complaint
 from tactbench.core.spec import units
-from tactbench.core.spec.quantity import Frozen, Length, Mass, Power, Quantity, Share, Source, Time, Unit, assumed
+from tactbench.core.spec.quantity import Frozen, Length, Mass, Power, Quantity, Share, Source, Tag, Time, Unit, assumed
 from tactbench.core.spec.skin import Skin
 
 ChannelKind = Literal[
@@ -34,6 +34,14 @@ class PhysicalRange(Frozen):
 
     def __str__(self) -> str:
         return f"{self.lower:g}–{self.upper:g} {self.unit}"
+
+
+def ranges(*stated: tuple[str, float, float, str, Tag, str]) -> dict[str, PhysicalRange]:
+    """Return ranges by name, of (name, lower, upper, unit, tag, reference) each."""
+    return {
+        name: PhysicalRange(lower=lower, upper=upper, unit=unit, source=Source(tag=tag, reference=reference))
+        for name, lower, upper, unit, tag, reference in stated
+    }
 
 
 class ChannelSpec(Frozen):

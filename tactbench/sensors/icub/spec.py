@@ -4,19 +4,8 @@ from __future__ import annotations
 
 import math
 
-from tactbench.plugin import (
-    DataSheet,
-    PhysicalRange,
-    Quantity,
-    SensorSpec,
-    Source,
-    Statement,
-    assumed,
-    derived,
-    measured,
-    sourced,
-)
-from tactbench.plugin.simulation import Creep, FoamPad, Nuisances, SkinSheet
+from tactbench.plugin import DataSheet, Quantity, SensorSpec, Source, Statement, assumed, derived, measured, sourced
+from tactbench.plugin.simulation import Creep, FoamPad, Nuisances, SkinSheet, ranges
 from tactbench.sensors.icub.channels import OUTER_RADIUS_MM, STREAMS
 
 _SCHMITZ = "Schmitz et al. 2010, abstract"
@@ -80,17 +69,14 @@ NUISANCES = Nuisances(
     ),
 )
 
-RANGES = {
-    name: PhysicalRange(lower=lower, upper=upper, unit=unit, source=Source(tag=tag, reference=reference))
-    for name, lower, upper, unit, tag, reference in (
-        ("noise_scale", 0.5, 10.0, "1", "assumed", f"0.30-1.0 counts in {_GRASP}, 0.35 here; the paper's chip differs"),
-        ("offset_scale", 0.0, 4.0, "1", "measured", f"0: each recording tared; {_GRASP}: 0.07-0.48, 0.2 here"),
-        ("taxel_wander_count", 0.0, 0.2, "count", "measured", f"0.2 is an upper bound; {_GRASP}"),
-        ("taxel_gain_scatter", 0.0, 0.1, "1", "assumed", "none … twice the value; not measured on this sensor"),
-        ("taxel_creep_1_fraction", 0.04, 0.29, "1", "measured", "tacman-fp7/tactile-control: 16 % [4, 29]"),
-        ("placement_x_mm", -1.8, 1.8, "mm", "assumed", "1.8: on taxel T4; the paper does not say where its caps touch"),
-    )
-}
+RANGES = ranges(
+    ("noise_scale", 0.85, 2.9, "1", "measured", f"0.30 at rest … 1.0 count under load, 0.35 here; {_GRASP}"),
+    ("offset_scale", 0.0, 4.0, "1", "measured", f"0: each recording tared; {_GRASP}: 0.07-0.48, 0.2 here"),
+    ("taxel_wander_count", 0.0, 0.2, "count", "measured", f"0.2 is an upper bound; {_GRASP}"),
+    ("taxel_gain_scatter", 0.0, 0.1, "1", "assumed", "none … twice the value; not measured on this sensor"),
+    ("taxel_creep_1_fraction", 0.04, 0.29, "1", "measured", "tacman-fp7/tactile-control: 16 % [4, 29]"),
+    ("placement_x_mm", -1.8, 1.8, "mm", "assumed", "1.8: on taxel T4; the paper does not say where its caps touch"),
+)
 """Between what ends each may lie; factors are on the values above."""
 
 # Force range, height, mass, supply power and availability: no source read so far states them.

@@ -1,6 +1,9 @@
 """``tactbench sensitivity``: ordinary runs into folders of their own, found finished the second time."""
 
 from tactbench.core.matrix.store import Store
+from tactbench.core.plugins.registry import installed
+from tactbench.core.study.sensitivity import _singles
+from tactbench.core.study.study import Study, matrix_of
 from tests.conftest import Verbs
 
 ASKED = ("sensitivity", "--sensor", "ideal", "--sensor", "icub", "--task", "force", "--estimator", "ols", "--repeats",
@@ -28,3 +31,12 @@ def test_every_end_is_a_result_folder_and_is_computed_once(tmp_path):
 def test_what_cannot_be_set_is_refused(tmp_path):
     verbs = Verbs(tmp_path, here=True)
     assert "placement_scatter_mm" in verbs(*ASKED, "--nuisance", "placement_scater_mm", code=2).stderr
+
+
+def test_what_the_scenes_of_a_task_differ_in_is_no_assumption():
+    ends = {task: _singles(matrix_of(Study(sensor="icub", task=task), installed()), installed(), ())
+            for task in ("curvature", "contact-location")}  # fmt: skip
+    assert ("placement_x_mm", "upper") in ends["curvature"]
+    assert {nuisance for nuisance, _ in ends["curvature"]} - {nuisance for nuisance, _ in ends["contact-location"]} == {
+        "placement_x_mm"
+    }
