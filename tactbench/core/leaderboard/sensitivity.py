@@ -6,6 +6,7 @@ Each set of ends is a result folder of its own, ``assumptions/placement_scatter_
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
 from itertools import pairwise, permutations
 from typing import Any
 
@@ -16,7 +17,7 @@ from tactbench.core.matrix.store import Store
 from tactbench.core.spec.scene import RANGES
 from tactbench.core.spec.sensor import PhysicalRange, SensorSpec
 from tactbench.core.statistics.paired import difference
-from tactbench.core.statistics.replicates import over_replicates
+from tactbench.core.statistics.replicates import counted, over_replicates
 from tactbench.core.tables.numbers import ABSENT, score, signed
 from tactbench.core.tables.text_table import TextTable, text_table
 
@@ -164,10 +165,14 @@ def _table(found: Sensitivity, specs: Mapping[str, SensorSpec]) -> TextTable:
             *(text for sensor in sensors for text in _scores(found, name, sensor)),
             f"{_order_text({**found.stated, **own})}: {found.verdict(name)}",
         ])  # fmt: skip
-    title = " · ".join([row["task"], metric_name(row), row["protocol"], answer_name(row), hardware_name(row)])
+    campaigns = counted(row["n_replicates"] or 0, "campaign")
+    title = " · ".join(
+        [row["task"], metric_name(row), row["protocol"], answer_name(row), campaigns, hardware_name(row)]
+    )
     columns = ("nuisance", "value", "range", "source", *numeric, "order")[: None if len(sensors) > 1 else -1]
     lines = [line[: len(columns)] for line in lines]
-    return text_table(title, columns, lines, numeric=numeric, notes=tuple(notes))
+    table = text_table(title, columns, lines, numeric=numeric, notes=tuple(notes))
+    return replace(table, first_to_go=("source", "range"))
 
 
 def _alike(texts: Mapping[str, str]) -> str:
