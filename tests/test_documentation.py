@@ -155,6 +155,21 @@ def test_the_rows_of_the_readme_are_those_of_the_board_and_of_the_frozen_scores(
         assert f"{median:.3f}" == score, (sensor, estimator)
 
 
+def test_the_sensitivity_of_the_readme_is_that_of_its_page_and_of_the_frozen_scores():
+    page = (CHECKOUT / "docs" / "calibration.md").read_text(encoding="utf-8")
+    lines = re.findall(
+        r"^\| (?:as stated|offset_scale|placement_).*\|$", README.read_text(encoding="utf-8"), re.MULTILINE
+    )
+    assert len(lines) >= 3
+    assert [line for line in lines if line not in page] == []
+    (campaigns,) = re.findall(r"^#+ curvature · .* · forest · (\d+) campaigns", page, re.MULTILINE)
+    frozen = json.loads((CHECKOUT / "tests" / "frozen" / "default.json").read_text(encoding="utf-8"))
+    for sensor in ("biotac", "icub"):
+        seeds = range(1, int(campaigns) + 1)
+        scores = [frozen[f"{sensor}/curvature/twin/karl2016/forest/{seed}"]["score"] for seed in seeds]
+        assert f" {statistics.median(scores):.3f} |" in lines[0], sensor
+
+
 def rounded(number, like):
     """Return a number as text with the decimals of another one."""
     return f"{float(number):.{len(like.partition('.')[2])}f}" if number and like else number

@@ -20,7 +20,7 @@ from tactbench.core.plugins.rigs import effect_names, rig_context
 from tactbench.core.samples import SkinGrid, SkinState
 from tactbench.core.spec.rig import EffectDescriptor
 from tactbench.core.spec.scene import Environment, Slide, Surface
-from tactbench.core.spec.sensor import Creep, Nuisances, Scenario
+from tactbench.core.spec.sensor import Creep, Nuisances, Scenario, ranges
 from tactbench.core.spec.skin import BondedLayer, Dome, FluidBackedShell, FoamPad, SheetTable, Skin, SkinSheet
 
 __all__ = [
@@ -52,5 +52,6 @@ __all__ = [
     "TransducerFactory",
     "Verdict",
     "effect_names",
+    "ranges",
     "rig_context",
 ]

@@ -31,6 +31,7 @@ VERBS = {
     "report": ("report", "Write one HTML page of all results, with figures and published numbers."),
     "compare": ("compare", "Compare two sensors, estimators or result folders, replicate by replicate."),
     "cost": ("cost", "Measure what accuracy costs in time."),
+    "sensitivity": ("sensitivity", "Show which assumptions simulated scores rest on."),
     "choose": ("choose", "Find the sensor that meets given requirements."),
     "why": ("why", "Show what a score rests on and how a cell ended; compute it again."),
     "merge": ("merge", "Merge result folders; refuse those that contradict each other."),
@@ -117,6 +118,7 @@ def _open_streams() -> None:
 
 _KEPT = {
     "run": "What was finished is kept; the same command goes on from there.",
+    "sensitivity": "What was finished is kept; the same command goes on from there.",
     "cost": "What was finished is kept; the same command goes on from there.",
     "emulate": "The emulated devices and their links are gone.",
 }

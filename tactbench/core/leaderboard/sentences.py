@@ -31,6 +31,8 @@ MOST_NAMES = 4
 """Answers that a sentence names; it counts the others."""
 LONGEST = 300
 """Characters of a note; `why`, JSON, CSV and Parquet have the whole reason of a cell."""
+ORDER_DEPENDS_ON = "order_depends_on"
+"""Key of a row: the nuisances at whose ends the order of the sensors turns round, where that has been computed."""
 NO_BETTER, UNSHOWN, STAMPED, FOUND, SHARED = "–", "*", "‡", "!", "="
 
 
@@ -204,6 +206,8 @@ def _published(board: Board) -> str:
         listed = ", ".join(f"{name} {value}" for name, value in shown)
         parts.append(f"{listed}{verb} {where} {'our interval' if len(shown) == 1 else 'our intervals'}")
     tail = "; this concerns the simulation, not the sensors" if rows[0]["simulated"] else ""
+    named = list(dict.fromkeys(name for row in rows for name in row.get(ORDER_DEPENDS_ON) or ()))
+    tail += f". The order of the sensors depends on {' and '.join(named)} (`tactbench sensitivity`)" if named else ""
     return f"Published values: {', '.join(parts)}{tail}."
 
 

@@ -97,8 +97,10 @@ class Table:
 
 
 def over_all(store: Store, rows: Sequence[Row]) -> list[dict[str, Any]]:
-    """Return one row a cell over its replicates, with the level of its sensor and the stamps of probes."""
-    return with_leaks(with_levels(over_replicates(rows), store.folder, store.provenance))
+    """Return one row a cell over its replicates, with the level of its sensor, what its order rests on, and stamps."""
+    from tactbench.core.leaderboard.sensitivity import with_dependence  # numerics
+
+    return with_dependence(with_leaks(with_levels(over_replicates(rows), store.folder, store.provenance)), store)
 
 
 def build_table(

@@ -16,6 +16,7 @@ import tactbench
 from tactbench.core.errors import UsageError
 from tactbench.core.files import replace_file, writable
 from tactbench.core.leaderboard.columns import DEFAULT, NUMERIC
+from tactbench.core.leaderboard.sensitivity import sensitivity_tables
 from tactbench.core.leaderboard.view import REASON, View, grid
 from tactbench.core.progress import Progress
 from tactbench.core.report.cells import details
@@ -109,6 +110,17 @@ def costs_section(subject: ReportData) -> Section:
                    missing=() if tables or pictures else (lacks,))  # fmt: skip
 
 
+def assumptions_section(subject: ReportData) -> Section:
+    """Return the section of what `tactbench sensitivity` has left in the folder."""
+    specs = {sensor.name: sensor.spec for sensor in subject.results.registry.sensors}
+    tables = tuple(sensitivity_tables(subject.results.store, specs))
+    lacks = (
+        "Which assumptions simulated scores and the order of the sensors rest on: `tactbench sensitivity --task NAME`."
+    )
+    wanted = not tables and any(row["simulated"] for row in subject.rows)
+    return Section(tables=tables, missing=(lacks,) if wanted else ())
+
+
 def sensors_section(subject: ReportData) -> Section:
     """Return the comparison of the sensors that the results are about."""
     known = subject.results.registry.sensors
@@ -151,6 +163,7 @@ SECTIONS: tuple[tuple[str, str, Callable[[ReportData], Section]], ...] = (
     ("figures", "Figures", figures_section),
     ("compared", "Events and probes", compared_section),
     ("cost", "What accuracy costs in time", costs_section),
+    ("assumptions", "What simulated scores rest on", assumptions_section),
     ("sensors", "Sensors (the paper's Table I)", sensors_section),
     ("cells", "Details of each cell", cells_section),
     ("about", "Made by", about_section),

@@ -21,7 +21,7 @@ from tactbench.core.spec import units
 from tactbench.core.spec.drive import ForceLoop
 from tactbench.core.spec.profile import PAPER, ForceProfile, ForceRamp
 from tactbench.core.spec.quantity import Frozen, Quantity, assumed, measured, sourced
-from tactbench.core.spec.sensor import ChannelKind
+from tactbench.core.spec.sensor import ChannelKind, ranges
 
 M = TypeVar("M", bound=BaseModel)
 
@@ -95,6 +95,10 @@ class Placement(Frozen):
     """Slope of the indenter along the finger [angle]; positive: it stands further off towards the tip."""
     tilt_s: Quantity = assumed(0.0, "rad", "the indenter's axis is the press axis")
     """Slope of the indenter across the finger [angle]."""
+    tilt_scatter: Quantity = assumed(
+        0.0, "deg", "no source states how an exchanged cap tilts; `RANGES` has what may be"
+    )
+    """Standard deviation of both slopes from recording to recording [angle]."""
 
 
 class Environment(Frozen):
@@ -355,6 +359,12 @@ NUISANCES: Mapping[str, tuple[tuple[str, ...], str]] = dict(_nuisances())
 The name is field and unit, behind the part of the scene where that is not the environment: ``since_power_on_s``,
 ``placement_scatter_mm``, ``drive_delay_ms``, ``surface_roughness_um``. Options, files, recordings and tables use it.
 """
+
+RANGES = ranges(
+    ("placement_scatter_mm", 0.0, 0.5, "mm", "assumed", "a machined seat … one fitted by hand"),
+    ("placement_tilt_scatter_deg", 0.0, 1.0, "deg", "assumed", "none … 0.2 mm across a cap of 12 mm"),
+)
+"""Between what ends nuisances of the mount may lie, by name; a sensor's spec has its own."""
 
 _MAY_BE_NEGATIVE = frozenset({
     "ambient_degc", "indenter_temperature_degc", "placement_x_mm", "placement_s_mm", "placement_tilt_x_rad",

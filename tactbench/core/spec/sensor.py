@@ -10,7 +10,7 @@ from pydantic import Field, ValidationError, model_validator
 
 from tactbench.core.errors import NotApplicable, UsageError, complaint
 from tactbench.core.spec import units
-from tactbench.core.spec.quantity import Frozen, Length, Mass, Power, Quantity, Share, Source, Time, Unit, assumed
+from tactbench.core.spec.quantity import Frozen, Length, Mass, Power, Quantity, Share, Source, Tag, Time, Unit, assumed
 from tactbench.core.spec.skin import Skin
 
 ChannelKind = Literal[
@@ -34,6 +34,14 @@ class PhysicalRange(Frozen):
 
     def __str__(self) -> str:
         return f"{self.lower:g}–{self.upper:g} {self.unit}"
+
+
+def ranges(*stated: tuple[str, float, float, str, Tag, str]) -> dict[str, PhysicalRange]:
+    """Return ranges by name, of (name, lower, upper, unit, tag, reference) each."""
+    return {
+        name: PhysicalRange(lower=lower, upper=upper, unit=unit, source=Source(tag=tag, reference=reference))
+        for name, lower, upper, unit, tag, reference in stated
+    }
 
 
 class ChannelSpec(Frozen):
@@ -268,6 +276,9 @@ class SensorSpec(Frozen):
     scenarios: dict[Annotated[str, Field(pattern=r"^[a-z][a-z0-9-]*$")], Scenario] = Field(default_factory=dict)
     """Ways of handling the sensor that its usual nuisances do not cover, by name; used where a scene's simulation asks
     for one."""
+    ranges: dict[str, PhysicalRange] = Field(default_factory=dict, exclude=True)
+    """Between what ends nuisances may lie, by the name under which a run sets them: its own, and those of a scene that
+    scale them. Left out of recordings and keys: no sample depends on it."""
     references: tuple[str, ...] = ()
     data_sheet: DataSheet = Field(default=DataSheet(), exclude=True)
     """Size, range, interface … of the device. Left out of recordings and keys: no sample depends on it."""

@@ -30,7 +30,7 @@ _OWN_CLOCK_FROM = 2.0
 """A stream this many times faster than the sensor's slowest keeps its own clock: it is there to see fast things."""
 MOST_SAMPLES = 20_000_000
 """Samples of a stream that are still made: two and a half hours at 2200 Hz, 160 MB a channel and effect."""
-_NOT_BELOW_ZERO = ("scatter", "start", "end", "hold", "duration", "since_power_on", "force_noise")
+_NOT_BELOW_ZERO = ("scatter", "tilt_scatter", "start", "end", "hold", "duration", "since_power_on", "force_noise")
 """Fields of a scene's parts for which less than zero means nothing."""
 _LOOP = ("proportional", "integral", "delay", "motor_lag", "resolution")
 """Those of a force loop."""
@@ -159,10 +159,15 @@ def _place(run: Synthesis) -> Contact:
     """Return where the indenter meets the skin: nominal point, commanded offset, and this mounting's own scatter."""
     placement = run.scene.placement
     commanded_x, commanded_s = commanded_place_mm(run.sensor.spec, run.scene)
-    off_x, off_s = placement.scatter.to("mm") * run.of_recording("placement").standard_normal(2)
+    draws = run.of_recording("placement").standard_normal(4)
+    off_x, off_s = placement.scatter.to("mm") * draws[:2]
     x, s = commanded_x + off_x, commanded_s + off_s
     run.drawn.update(placed_x_mm=float(x), placed_s_mm=float(s))
-    tilt_x, tilt_s = (math.tan(tilt.to("rad")) for tilt in (placement.tilt_x, placement.tilt_s))
+    more_x, more_s = placement.tilt_scatter.to("rad") * draws[2:]
+    angle_x, angle_s = placement.tilt_x.to("rad") + more_x, placement.tilt_s.to("rad") + more_s
+    if placement.tilt_scatter.value:
+        run.drawn.update(tilted_x_deg=math.degrees(angle_x), tilted_s_deg=math.degrees(angle_s))
+    tilt_x, tilt_s = math.tan(angle_x), math.tan(angle_s)
     return replace(run.contact, x_mm=float(x), s_mm=float(s), tilt_x=tilt_x, tilt_s=tilt_s)
 
 

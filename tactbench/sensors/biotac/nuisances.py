@@ -9,7 +9,7 @@ fitted warm-up is taken off, and 15 s or more after a contact. What hard presses
 from __future__ import annotations
 
 from tactbench.plugin import ChannelKind, assumed, derived, measured
-from tactbench.plugin.simulation import Creep, Nuisances, Scenario
+from tactbench.plugin.simulation import Creep, Nuisances, Scenario, ranges
 
 _STEP = measured(1.0, "count", "raw channels of RF, DX and RG move in steps of one count")
 
@@ -83,6 +83,18 @@ NUISANCES: dict[ChannelKind, Nuisances] = {
         white=measured(2.4, "count", "RG, robust; the hum on top is the sensor's parameter `hum`"), step=_STEP
     ),
 }
+
+RANGES = ranges(
+    ("noise_scale", 0.9, 2.1, "1", "measured", "0.33-0.72 counts on RF and DX, 0.35 here; BioTac SP: 3.5-6"),
+    ("offset_scale", 0.0, 3.0, "1", "measured", "0: each recording tared; RF: 0.5-3 shared, 1-3 own; 1 and 2 here"),
+    ("since_power_on_s", 60.0, 3600.0, "s", "assumed", "just switched on … warm; the paper does not say"),
+    ("taxel_wander_count", 0.0, 0.5, "count", "measured", "RF: at most 0.085 untouched; 0.5 between presses"),
+    ("taxel_gain_scatter", 0.0, 0.1, "1", "assumed", "none … twice what mirror electrodes of RF agree to"),
+    ("taxel_offset_smooth", 0.0, 0.9, "1", "measured", "0: each electrode by itself; RF: 0.87-0.93, corrected"),
+    ("taxel_creep_1_fraction", 0.0, 0.12, "1", "derived", "RF: 0.11-0.12 of the response remains after release"),
+    ("placement_x_mm", -1.8, 1.8, "mm", "assumed", "half of a pad; the paper does not say where its caps touch"),
+)
+"""Between what ends each may lie; factors are on the values above."""
 
 HARD_HANDLED = Scenario(
     title="pressed hard for a minute, minutes before",

@@ -19,7 +19,7 @@ from tactbench.plugin import (
 from tactbench.plugin.simulation import Dome, FluidBackedShell, SkinSheet
 from tactbench.sensors.biotac.channels import MANUAL, STREAMS
 from tactbench.sensors.biotac.meshes import ELECTRODES_MM, MESHES, film_table, relief_table
-from tactbench.sensors.biotac.nuisances import HARD_HANDLED, NUISANCES
+from tactbench.sensors.biotac.nuisances import HARD_HANDLED, NUISANCES, RANGES
 from tactbench.sensors.biotac.thermal import THERMAL
 
 _MESH = MESHES
@@ -138,6 +138,7 @@ SPEC = SensorSpec(
     parameters=PARAMETERS,
     nuisances=NUISANCES,
     scenarios={"hard-handled": HARD_HANDLED},
+    ranges=RANGES,
     data_sheet=DATA_SHEET,
     references=(
         "Karl et al. 2016, ML-based tactile sensor calibration: A universal approach",

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from tactbench.plugin import DataSheet, Quantity, SensorSpec, Source, Statement, assumed, derived, measured, sourced
-from tactbench.plugin.simulation import Creep, FoamPad, Nuisances, SkinSheet
+from tactbench.plugin.simulation import Creep, FoamPad, Nuisances, SkinSheet, ranges
 from tactbench.sensors.icub.channels import OUTER_RADIUS_MM, STREAMS
 
 _SCHMITZ = "Schmitz et al. 2010, abstract"
@@ -69,6 +69,16 @@ NUISANCES = Nuisances(
     ),
 )
 
+RANGES = ranges(
+    ("noise_scale", 0.85, 2.9, "1", "measured", f"0.30 at rest … 1.0 count under load, 0.35 here; {_GRASP}"),
+    ("offset_scale", 0.0, 4.0, "1", "measured", f"0: each recording tared; {_GRASP}: 0.07-0.48, 0.2 here"),
+    ("taxel_wander_count", 0.0, 0.2, "count", "measured", f"0.2 is an upper bound; {_GRASP}"),
+    ("taxel_gain_scatter", 0.0, 0.1, "1", "assumed", "none … twice the value; not measured on this sensor"),
+    ("taxel_creep_1_fraction", 0.04, 0.29, "1", "measured", "tacman-fp7/tactile-control: 16 % [4, 29]"),
+    ("placement_x_mm", -1.8, 1.8, "mm", "assumed", "1.8: on taxel T4; the paper does not say where its caps touch"),
+)
+"""Between what ends each may lie; factors are on the values above."""
+
 # Force range, height, mass, supply power and availability: no source read so far states them.
 DATA_SHEET = DataSheet(
     length=sourced(14.5, "mm", _SCHMITZ),
@@ -99,6 +109,7 @@ SPEC = SensorSpec(
     skin=SKIN,
     parameters=PARAMETERS,
     nuisances={"taxel": NUISANCES},
+    ranges=RANGES,
     data_sheet=DATA_SHEET,
     references=(
         "Karl et al. 2016, ML-based tactile sensor calibration: A universal approach",

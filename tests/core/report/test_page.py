@@ -30,6 +30,7 @@ Published numbers
 Figures [1 figure]
 Events and probes
 What accuracy costs in time
+What simulated scores rest on
 Sensors (the paper's Table I)
   Sensor comparison:  iCub fingertip iCub fingertip: source
 Details of each cell [10 cells]

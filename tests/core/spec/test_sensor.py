@@ -4,6 +4,7 @@ import pytest
 from pydantic import ValidationError
 
 from tactbench.core.report.datasheet import OF_DEVICES
+from tactbench.core.spec.scene import RANGES, Scene
 from tactbench.plugin import (
     ChannelSpec,
     SensorSpec,
@@ -35,6 +36,17 @@ def test_a_site_in_two_places_is_refused(field):
     elsewhere = ChannelSpec(name="at", kind="taxel", site="a", **{field: (0.0, 0.0, 1.0)})
     with pytest.raises(ValidationError, match="site a: the place of at is not that of ax"):
         magnets(*axes("a"), elsewhere)
+
+
+def test_ranges_are_of_known_nuisances_and_hold_what_is_stated():
+    for descriptor in load_registry().sensors:
+        spec = descriptor.spec
+        stated = {**Scene(name="s").nuisances(), **{name: one.value for name, one in spec.settable().items()}}
+        stated = {"offset_scale": 1.0, **stated}
+        for name, one in {**RANGES, **spec.ranges}.items():
+            assert one.lower <= stated[name] <= one.upper, (spec.name, name)
+            assert one.lower < one.upper
+        assert "ranges" not in spec.model_dump()
 
 
 def test_every_fact_of_a_data_sheet_has_a_source_and_no_sample_depends_on_it():

@@ -85,6 +85,19 @@ def test_the_place_of_contact_is_stated_with_the_commanded_offset(sensors):
     assert 0 < np.hypot(drawn_x - assumed_x, drawn_s - assumed_s) < 5 * 0.2
 
 
+def test_the_tilt_of_each_mounting_is_drawn_beside_its_place(sensors):
+    scenes = [_scene(name, profile=ForceRamp(samples=20)).simulated_as(Simulation(nuisances=nuisances))
+              for name in ("cap", "cap again") for nuisances in ({}, {"placement_tilt_scatter_deg": 1.0})]  # fmt: skip
+    upright, tilted, _, other = (_record(sensors["icub"], scene) for scene in scenes)
+    assert upright[0].drawn["placed_x_mm"] == tilted[0].drawn["placed_x_mm"]
+    assert "tilted_x_deg" not in upright[0].drawn
+    drawn = [[one[0].drawn[f"tilted_{axis}_deg"] for axis in "xs"] for one in (tilted, other)]
+    assert len({*drawn[0], *drawn[1]}) == 4
+    assert 0 < np.abs(drawn).max() < 5
+    (stream,) = upright[0].streams
+    assert not np.array_equal(upright[1][stream.name][1], tilted[1][stream.name][1])
+
+
 def test_nuisances_that_are_set_change_the_recording_and_are_stated(sensors):
     held = _scene(profile=ForceRamp(end=q(0.0, "N"), samples=2000), environment=SILENT)
     values = {"noise_scale": 1.0, "taxel_white_count": 9.0, "taxel_step_count": 0.0, "placement_tilt_x_rad": 0.0}

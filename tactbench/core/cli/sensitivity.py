@@ -1,0 +1,52 @@
+"""``tactbench sensitivity``: which assumptions of the simulation a score rests on."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import click
+
+from tactbench.core.cli.options import RESULTS, SIMULATION, format_option, options
+from tactbench.core.spec.bounds import MOST_REPEATS
+
+
+@click.command(name="sensitivity")
+@options(
+    click.option("--sensor", multiple=True, metavar="NAME", help="Sensor; repeatable."),
+    click.option("--task", metavar="NAME", required=True, help="Task."),
+    click.option("--estimator", multiple=True, metavar="NAME", help="Estimator; repeatable."),
+    click.option("--protocol", metavar="NAME", help="Evaluation protocol. Default: the task's first."),
+    click.option("--nuisance", "nuisances", multiple=True, metavar="NAME",
+                 help="Nuisance; repeatable. Default: all whose range a sensor states."),
+    click.option("--repeats", type=click.IntRange(min=1, max=MOST_REPEATS), metavar="N", help="Number of campaigns."),
+    SIMULATION,
+    click.option("--jobs", type=click.IntRange(min=1), metavar="N", help="Parallel worker processes."),
+    RESULTS,
+)  # fmt: skip
+@format_option("table", "md", "latex")
+@click.pass_context
+def command(
+    ctx: click.Context, /, estimator: tuple[str, ...], nuisances: tuple[str, ...], settings: tuple[str, ...],
+    shape: str, out: Path, **asked: Any,
+) -> None:  # fmt: skip
+    """Show what simulated scores and the order of sensors rest on.
+
+    Every nuisance is set to both ends of its range, and those that cost the most are set in pairs, on the same seeds.
+    What the result folder holds already is reused; each set of ends is a folder in its folder assumptions.
+    """
+    from tactbench.core.cli.grid import print_tables
+    from tactbench.core.leaderboard.sensitivity import sensitivity_tables
+    from tactbench.core.matrix.store import Store
+    from tactbench.core.plugins.registry import installed
+    from tactbench.core.study.sensitivity import carry_out_sensitivity
+    from tactbench.core.study.study import Study
+    from tactbench.core.tables.terminal import remark
+
+    study = Study(out=out, estimator=estimator or None, set=settings, **asked)
+    stopped = carry_out_sensitivity(study, nuisances)
+    specs = {sensor.name: sensor.spec for sensor in installed().sensors}
+    print_tables(sensitivity_tables(Store(out), specs), shape)
+    for row in stopped:
+        remark(f"{row['status']}: {row['cell']}: {row['reason']}")
+    ctx.exit(1 if stopped else 0)

@@ -1,0 +1,194 @@
+"""What a simulated comparison rests on: scores with nuisances at the ends of their ranges, beside those as stated.
+
+Each set of ends is a result folder of its own, ``assumptions/placement_scatter_mm=lower`` inside the other's.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
+from itertools import pairwise, permutations
+from typing import Any
+
+from tactbench.core.leaderboard.names import Row, answer_name, error_of, grouped, hardware_name, metric_name, sign_of
+from tactbench.core.leaderboard.pairwise import folder_comparisons
+from tactbench.core.leaderboard.sentences import ORDER_DEPENDS_ON
+from tactbench.core.matrix.store import Store
+from tactbench.core.spec.scene import RANGES
+from tactbench.core.spec.sensor import PhysicalRange, SensorSpec
+from tactbench.core.statistics.paired import difference
+from tactbench.core.statistics.replicates import counted, over_replicates
+from tactbench.core.tables.numbers import ABSENT, score, signed
+from tactbench.core.tables.text_table import TextTable, text_table
+
+FOLDER = "assumptions"
+TURNED = "turns round"
+_NOTE = (
+    "Each nuisance stands at one end of its range, all else as stated; the same seeds draw the same in all lines. A "
+    "change is that of the mean over campaigns, with its 95 % interval over paired campaigns; a score is the median. A "
+    "sensor without numbers has no such nuisance. ≈: not told apart."
+)
+
+
+def ranges_of(spec: SensorSpec) -> dict[str, PhysicalRange]:
+    """Return between what ends a sensor's nuisances and those of its mount may lie, by name."""
+    return {**RANGES, **spec.ranges}
+
+
+def name_of(ends: Mapping[str, str]) -> str:
+    """Return the name of a folder by the end of each nuisance: ``offset_scale=lower,placement_scatter_mm=lower``."""
+    return ",".join(f"{name}={end}" for name, end in sorted(ends.items()))
+
+
+def ends_of(name: str) -> dict[str, str]:
+    """Return what the name of a folder says."""
+    return {nuisance: end for nuisance, _, end in (part.partition("=") for part in name.split(","))}
+
+
+class Sensitivity:
+    """The scores of one question, as stated and with nuisances at the ends of their ranges.
+
+    Parameters
+    ----------
+    rows
+        As stated: one a cell and replicate.
+    variants
+        The same by the name of a set of ends; a sensor that has no such nuisance is not among them.
+    """
+
+    def __init__(self, rows: Sequence[Row], variants: Mapping[str, Sequence[Row]]) -> None:
+        self.stated = {str(row["sensor"]): row for row in over_replicates(rows)}
+        self.task = str(rows[0]["task"])
+        self.order = _order(self.stated)
+        self.rows: dict[str, dict[str, Row]] = {}
+        self.changes: dict[str, dict[str, Any]] = {}
+        for name, own in variants.items():
+            seeds = {(row["sensor"], row["seed"]) for row in own}
+            same = over_replicates([row for row in rows if (row["sensor"], row["seed"]) in seeds])
+            found = over_replicates(own)
+            self.rows[name] = {str(row["sensor"]): row for row in found}
+            self.changes[name] = {pair.row["sensor"]: pair for pair in folder_comparisons(found, same, name, "stated")}
+
+    def change(self, name: str, sensor: str) -> float:
+        """Return by how much a sensor's score differs from that as stated; 0 where it has no such nuisance."""
+        pair = self.changes[name].get(sensor)
+        return 0.0 if pair is None or pair.difference is None else float(pair.difference.value)
+
+    def gain(self, name: str) -> float:
+        """Return by how much better the sensors score than as stated, the mean over them."""
+        sign = -sign_of(next(iter(self.stated.values())))
+        return sum(sign * self.change(name, sensor) for sensor in self.stated) / len(self.stated)
+
+    def verdict(self, name: str) -> str:
+        """Return what becomes of the order of the sensors."""
+        order = _order({**self.stated, **self.rows[name]})
+        if any((worse, better) in order for better, worse in self.order):
+            return TURNED
+        if not order or self.order - order:
+            return "not shown"
+        return "stays" if order == self.order else "shown here only"
+
+    def turned(self) -> list[str]:
+        """Return the sets of ends with which the order turns round; of those that hold another, the smaller one."""
+        found = [name for name in self.rows if self.verdict(name) == TURNED]
+        within = {name: ends_of(name).items() for name in found}
+        return [name for name in found if not any(within[one] < within[name] for one in found)]
+
+
+def _order(rows: Mapping[str, Row]) -> set[tuple[str, str]]:
+    """Return which sensor is shown to be better than which."""
+    done = {sensor: row for sensor, row in rows.items() if row["status"] == "done"}
+    pairs = permutations(done, 2)
+    return {(one, other) for one, other in pairs if difference(done[one], done[other]).verdict == "better"}
+
+
+def _order_text(rows: Mapping[str, Row]) -> str:
+    done = sorted(
+        (sensor for sensor, row in rows.items() if row["status"] == "done"), key=lambda one: error_of(rows[one])
+    )
+    order = _order(rows)
+    return "".join(f"{' > ' if pair in order else ' ≈ '}{pair[1]}" for pair in pairwise(["", *done]))[3:]
+
+
+def sensitivities(store: Store) -> dict[tuple[str, ...], Sensitivity]:
+    """Return what each answer's scores rest on, by task, protocol, split, rig and estimator, where it is computed."""
+
+    def questions(rows: Iterable[Row]) -> dict[tuple[str, ...], list[Row]]:
+        answers = (row for row in rows if not row["is_baseline"])
+        return grouped(answers, lambda row: (row["task"], row["protocol"], row["split"] or "", hardware_name(row),
+                                             answer_name(row)))  # fmt: skip
+
+    folders = sorted((store.folder / FOLDER).glob("*=*/cells"))
+    variants = {path.parent.name: questions(Store(path.parent).rows()) for path in folders}
+    found = {}
+    for key, stated in questions(store.rows() if folders else ()).items():
+        own = {name: asked[key] for name, asked in variants.items() if key in asked}
+        if own:
+            found[key] = Sensitivity(stated, own)
+    return found
+
+
+def with_dependence(rows: Sequence[dict[str, Any]], store: Store) -> list[dict[str, Any]]:
+    """Return rows, one a cell, with the nuisances on which the order of the sensors depends, where it is computed."""
+    named: dict[str, list[str]] = {}
+    for found in sensitivities(store).values():
+        names = list(dict.fromkeys(nuisance for name in found.turned() for nuisance in ends_of(name)))
+        named |= {row["cell"]: names for row in found.stated.values()}
+    return [{**row, ORDER_DEPENDS_ON: named[row["cell"]]} if row["cell"] in named else row for row in rows]
+
+
+def sensitivity_tables(store: Store, specs: Mapping[str, SensorSpec]) -> list[TextTable]:
+    """Return a table a question; `specs`, by sensor, have ranges and sources."""
+    return [_table(found, specs) for found in sensitivities(store).values()]
+
+
+def _table(found: Sensitivity, specs: Mapping[str, SensorSpec]) -> TextTable:
+    row, sensors = next(iter(found.stated.values())), list(found.stated)
+    names = sorted(found.rows, key=lambda name: (len(ends_of(name)), -max(abs(found.change(name, s)) for s in sensors)))
+    numeric = [column for sensor in sensors for column in (sensor, f"{sensor}: change")]
+    shipped = [text for one in found.stated.values() for text in (score(one["score"], one["unit"]), "")]
+    lines = [["as stated", "", "", "", *shipped, _order_text(found.stated)]]
+    notes = dict.fromkeys([_NOTE])
+    for name in names:
+        ends, own = ends_of(name), found.rows[name]
+        nuisance = next(iter(ends))
+        values = (_alike({s: f"{one['simulation']['nuisances'][end]:g}" for s, one in own.items()}) for end in ends)
+        ranges = {sensor: ranges_of(specs[sensor]).get(nuisance) for sensor in own if sensor in specs}
+        alone = {sensor: one for sensor, one in ranges.items() if one is not None and len(ends) == 1}
+        for sensor, one in alone.items():
+            of = f"{nuisance}, {sensor}" if nuisance not in RANGES else nuisance
+            notes[f"{of}: {one.source.reference} ({one.source.tag})."] = None
+        lines.append([
+            ", ".join(ends), ", ".join(values),
+            _alike({sensor: f"{one.lower:g} … {one.upper:g}" for sensor, one in alone.items()}),
+            _alike({sensor: one.source.tag for sensor, one in alone.items()}),
+            *(text for sensor in sensors for text in _scores(found, name, sensor)),
+            f"{_order_text({**found.stated, **own})}: {found.verdict(name)}",
+        ])  # fmt: skip
+    campaigns = counted(row["n_replicates"] or 0, "campaign")
+    title = " · ".join(
+        [row["task"], metric_name(row), row["protocol"], answer_name(row), campaigns, hardware_name(row)]
+    )
+    columns = ("nuisance", "value", "range", "source", *numeric, "order")[: None if len(sensors) > 1 else -1]
+    lines = [line[: len(columns)] for line in lines]
+    table = text_table(title, columns, lines, numeric=numeric, notes=tuple(notes))
+    return replace(table, first_to_go=("source", "range"))
+
+
+def _alike(texts: Mapping[str, str]) -> str:
+    """Return the text of all sensors, each with its name where they differ."""
+    if len(set(texts.values())) < 2:
+        return next(iter(texts.values()), "")
+    return ", ".join(f"{sensor} {text}" for sensor, text in texts.items())
+
+
+def _scores(found: Sensitivity, name: str, sensor: str) -> tuple[str, str]:
+    """Return a sensor's score with a set of ends, and how it differs from that as stated."""
+    pair = found.changes[name].get(sensor)
+    if pair is None or pair.first_row is None:
+        return ABSENT, ABSENT
+    if pair.difference is None:
+        return ABSENT, pair.refused
+    unit, apart = pair.row["unit"], pair.difference
+    ends = " … ".join(signed(end, unit) for end in (apart.low, apart.high) if end is not None)
+    return score(pair.first_row["score"], unit), signed(apart.value, unit) + (f" ({ends})" if ends else "")

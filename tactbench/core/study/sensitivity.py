@@ -1,0 +1,100 @@
+"""A task carried out with nuisances at the ends of their ranges: ordinary runs, each into a folder of its own."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from itertools import combinations
+
+from tactbench.core.errors import UnknownNameError, UsageError
+from tactbench.core.leaderboard.names import grouped
+from tactbench.core.leaderboard.sensitivity import FOLDER, ends_of, name_of, ranges_of, sensitivities
+from tactbench.core.matrix.run import EngineChoice, run_matrix
+from tactbench.core.matrix.store import Row, Store
+from tactbench.core.plugins.registry import Registry, installed
+from tactbench.core.spec.matrix import MatrixSpec
+from tactbench.core.study.progress import progress
+from tactbench.core.study.study import Study, matrix_of
+from tactbench.core.tables.terminal import remark
+
+STRONGEST = 3
+"""Nuisances that are set in pairs: those without which the sensors score best."""
+Values = Mapping[str, Mapping[str, float]]
+"""By sensor, what its nuisances are set to."""
+
+
+def carry_out_sensitivity(study: Study, nuisances: Sequence[str] = ()) -> list[Row]:
+    """Run a task as stated, and with `nuisances` (none: all) at ends; return the cells that failed.
+
+    Raises
+    ------
+    UsageError
+        If the rig is not simulated, or a name is wrong.
+    """
+    registry = installed()
+    matrix = matrix_of(study, registry)
+    if not registry.rigs[matrix.rig].simulated:
+        raise UsageError(f"Nuisances are set on simulated rigs; {matrix.rig} is not one.", hint="Leave them out.")
+    singles = _singles(matrix, registry, nuisances)
+    store, choice = Store(study.out), EngineChoice(jobs=study.jobs)
+    untimed = matrix.model_copy(update={"latency": False})  # times would be measured with nothing else at work
+    with progress() as display:
+        stopped = run_matrix(matrix, store, choice=choice, progress=display).failures
+
+        def run(ends: Mapping[str, str]) -> None:
+            remark(f"{name_of(ends)}:")
+            values = {
+                sensor: {name: value for one in ends.items() for name, value in singles[one].get(sensor, {}).items()}
+                for sensor in matrix.sensors
+            }
+            folder = Store(study.out / FOLDER / name_of(ends))
+            for own, sensors in grouped(filter(values.get, values), lambda one: tuple(values[one].items())).items():
+                nuisances = tuple(sorted({**dict(matrix.simulation.nuisances), **dict(own)}.items()))
+                simulation = matrix.simulation.model_copy(update={"nuisances": nuisances})
+                part = untimed.model_copy(update={"sensors": tuple(sensors), "simulation": simulation})
+                stopped.extend(run_matrix(part, folder, choice=choice, progress=display).failures)
+
+        for one in singles:
+            run(dict([one]))
+        for pair in combinations(_strongest(store, {choice.name for choice in matrix.tasks}, set(singles)), 2):
+            run(dict(pair))
+    return stopped
+
+
+def _singles(matrix: MatrixSpec, registry: Registry, nuisances: Sequence[str]) -> dict[tuple[str, str], Values]:
+    """Return what is set, by nuisance and end: each end that differs from what is stated.
+
+    A nuisance in which the task's scenes differ is no assumption but what the task asks about, and is left.
+
+    Raises
+    ------
+    UnknownNameError
+        If no sensor states a range of one of `nuisances`.
+    """
+    scenes = [planned.scene for choice in matrix.tasks for planned in registry.tasks[choice.name].spec.scenes]
+    specs = {name: registry.sensors[name].spec.handled(matrix.simulation.scenario) for name in matrix.sensors}
+    ranges = {name: ranges_of(spec) for name, spec in specs.items()}
+    known = list(dict.fromkeys(nuisance for own in ranges.values() for nuisance in own))
+    for nuisance in nuisances:
+        if nuisance not in known:
+            raise UnknownNameError("nuisance with a range", nuisance, known)
+    found: dict[tuple[str, str], dict[str, dict[str, float]]] = {}
+    for nuisance in nuisances or known:
+        for sensor, spec in specs.items():
+            own = {name: amount.value for name, amount in spec.settable().items()} | dict(matrix.simulation.nuisances)
+            stated = {{**scene.nuisances(), **own}.get(nuisance) for scene in scenes}
+            for end in ("lower", "upper") if nuisance in ranges[sensor] and len(stated) == 1 else ():
+                value = getattr(ranges[sensor][nuisance], end)
+                if value not in stated:
+                    found.setdefault((nuisance, end), {})[sensor] = {nuisance: value}
+    return dict(found)
+
+
+def _strongest(store: Store, tasks: set[str], singles: set[tuple[str, str]]) -> list[tuple[str, str]]:
+    """Return the nuisances without which the sensors score best, each with its better end, as far as computed."""
+    best: dict[str, tuple[float, str]] = {}
+    for one in sensitivities(store).values():
+        for name in one.rows:
+            ((nuisance, end), *more) = ends_of(name).items()
+            if one.task in tasks and (nuisance, end) in singles and not more and one.gain(name) > 0:
+                best[nuisance] = max(best.get(nuisance, (0.0, "")), (one.gain(name), end))
+    return [(nuisance, best[nuisance][1]) for nuisance in sorted(best, key=lambda one: -best[one][0])[:STRONGEST]]
