@@ -53,7 +53,8 @@ class Lag:
 def windows(sensor_ns: IntArray, force_ns: IntArray) -> dict[str, tuple[int, int]]:
     """Return the stretches of time [ns] that both clocks have and a lag is looked for in, by their place."""
     first, last = int(max(sensor_ns[0], force_ns[0])), int(min(sensor_ns[-1], force_ns[-1]))
-    longest = int(max(1e9 * LONGEST_S, MOST_ROWS * max(np.median(np.diff(times)) for times in (sensor_ns, force_ns))))
+    slower = max(float(times[-1] - times[0]) / (len(times) - 1) for times in (sensor_ns, force_ns))
+    longest = int(max(1e9 * LONGEST_S, MOST_ROWS * slower))
     if last - first <= longest:
         return {"": (first, last)}
     return {" at the beginning": (first, first + longest // 2), " at the end": (last - longest // 2, last)}
