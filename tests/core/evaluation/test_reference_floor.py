@@ -34,6 +34,15 @@ def test_the_variance_of_a_hold_is_unbiased_white_or_filtered_long_or_short(n, m
     assert Floor(holds).value == pytest.approx(SIGMA, rel=min(0.03, max(3 / np.sqrt(2 * worth), 0.015)))
 
 
+@pytest.mark.parametrize("memory", [0.0, 0.9])
+def test_the_standard_error_of_a_floor_is_the_spread_of_floors_white_or_filtered(memory):
+    rng = np.random.default_rng(12)
+    floors = [Floor({0: hold_of(low_passed(rng, 600, memory)), 1: hold_of(low_passed(rng, 600, memory))})
+              for _ in range(300)]  # fmt: skip
+    spread = np.std([one.value for one in floors])
+    assert np.mean([one.standard_error for one in floors]) == pytest.approx(spread, rel=0.15)
+
+
 def asked(error, recordings, seed):
     """What an estimator with (n,) errors of this deviation answers, a noisy reference beside it, and its floor."""
     rng, rows, hold = np.random.default_rng(seed), 4400, 600
@@ -82,6 +91,8 @@ def test_a_cell_tells_its_floor_and_the_error_against_the_true_force(tmp_path):
     assert result.score == pytest.approx(SIGMA, rel=0.1)
     assert result.true_score < 0.1, "the taxels know the force"
     assert (result.beyond_floor_ci_low, result.beyond_floor_ci_high) == (None, None), "three recordings are too few"
+    squares, rows = np.sum(result.replicates["true"]["sums"], axis=0)
+    assert np.sqrt(squares / rows) == pytest.approx(result.true_score, rel=1e-9)
     squares, freedom = np.sum(result.replicates["floor"], axis=0)
     assert np.sqrt(squares / freedom) == pytest.approx(result.reference_floor, rel=1e-9)
 

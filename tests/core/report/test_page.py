@@ -23,7 +23,7 @@ STRUCTURE = """\
 What came out [1 figure]
 Leaderboard [1 filter]
   Curvature: which of five spherical caps touches the sensor?: sensor estimator macro F1 delay after touch training
-  Force: how large is the normal force?: sensor estimator RMSE [N] beyond floor [N] published delay after touch training
+  Force: how large is the normal force?: sensor estimator true RMSE [N] RMSE [N] published delay after touch training
   Grasp-stability: will the object slip when it is lifted?: sensor estimator accuracy reason
 Published numbers
   Published numbers, and ours: number published ours ours − published verdict

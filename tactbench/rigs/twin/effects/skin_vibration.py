@@ -50,6 +50,9 @@ def apply(run: Synthesis) -> None:
         seen = run.sliding(track.t_s)
         track.vibration_mm = rough(track.t_s, track.force_n, seen.slip_mm)
         if "ac_pressure" in kinds:
+            run.drawn["remark vibration"] = (
+                "above 100 Hz ac_pressure shows stick-slip and noise alone: a steady slide is as quiet as rest"
+            )
             track.vibration_mm += np.where(track.force_n > 0, lift * seen.displacement_mm, 0.0)
     force_n = run.load.at(run.t_s)
     stiffness = table.per_mm(lambda force_n: force_n[:, None], force_n)[:, 0]
