@@ -25,7 +25,7 @@ _PREFERRED = "deployable"
 @click.option("--range-n", type=ABOVE_0, metavar="X", help="Largest normal force to measure.")
 @click.option("--rate-hz", type=ABOVE_0, metavar="X", help="Smallest rate of answers.")
 @click.option("--score", type=ABOVE_0, metavar="X",
-              help="Worst score to accept, in the task's unit; of force true or beyond the noise.")  # fmt: skip
+              help="Worst score to accept, in the task's unit; of force as it is ranked.")  # fmt: skip
 @click.option("--protocol", metavar="NAME", help="Evaluation protocol. Default: deployable.")
 @format_option("table", "json")
 def command(
