@@ -1,6 +1,7 @@
 """Freeze the scores of result folders, or compare result folders with what was frozen.
 
-Made with commit ec0567c6 (recordings made elsewhere) and 694290cd (simulated), in an environment of constraints.txt::
+Made with commit ec0567c6 (recordings made elsewhere), 694290cd (simulated) and, of slip, 48b0fcf6,
+in an environment of constraints.txt::
 
     tactbench run --out default
     tactbench run --config beyond --repeats 2 --out beyond

@@ -18,7 +18,7 @@ from tactbench.core.events.curve import ScoredRecording, ThresholdCurve, thresho
 from tactbench.core.events.labels import GROSS, UNDECIDED
 from tactbench.core.events.metrics import EventScores, GroundTruth, displacement_at_detection, latency_s, score_events
 from tactbench.core.samples import Answers, FloatArray, IntArray, Part
-from tactbench.core.spec.events import AlarmPolicy, nanoseconds
+from tactbench.core.spec.events import AREA_PER_MINUTE, AlarmPolicy, nanoseconds
 from tactbench.core.spec.task import TaskSpec
 
 OTHER_SCALES = {0.5: "halved", 2.0: "doubled"}
@@ -61,7 +61,6 @@ class EventRules:
 
     policy: AlarmPolicy
     max_false_alarms_per_minute: float
-    area_per_minute: float
     own_threshold: float | None
     hop_ns: int
 
@@ -71,8 +70,7 @@ class EventRules:
         assert task.alarms is not None
         assert task.max_false_alarms_per_minute is not None
         hop_ns = nanoseconds(slip_target(task).hop_s)
-        area = task.area_false_alarms_per_minute
-        return cls(task.alarms, task.max_false_alarms_per_minute, area, own_threshold, hop_ns)
+        return cls(task.alarms, task.max_false_alarms_per_minute, own_threshold, hop_ns)
 
     def scored(self, part: Part, score: FloatArray, data: Dataset) -> list[Scored]:
         """Return the scores of a set, recording by recording."""
@@ -128,7 +126,7 @@ class EventRules:
             found = np.zeros(0)  # a fold without an event has no part in the score
         else:
             try:
-                found = curve.found_share(self.area_per_minute)
+                found = curve.found_share(AREA_PER_MINUTE)
             except DataError as error:
                 raise DataError(
                     "Recall against false alarms cannot be drawn: no disturbance to count false alarms on.",
@@ -166,7 +164,7 @@ class EventRules:
         displacement = displacement[np.isfinite(displacement)]
         scores = self._scores(tested)
         found = {
-            "area up to false alarms per minute": self.area_per_minute,
+            "area up to false alarms per minute": AREA_PER_MINUTE,
             "bound of false alarms per minute": self.max_false_alarms_per_minute,
             "events": float(scores.latency_s.shape[-1]),
             "alarms": float(scores.n_alarms),

@@ -12,6 +12,10 @@ Seconds = Annotated[float, Field(ge=0, le=1e6)]
 """A length of time that int64 nanoseconds hold many times over."""
 
 
+AREA_PER_MINUTE = 20.0
+"""False alarms a minute up to which recall is averaged to `recall_area` [1/min] (assumed)."""
+
+
 def nanoseconds(seconds: float) -> int:
     """Return whole nanoseconds: times are compared as integers, so that rounding decides no hit."""
     return round(seconds * 1e9)

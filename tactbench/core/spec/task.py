@@ -9,7 +9,7 @@ from typing import Final, Literal
 from pydantic import Field, model_validator
 
 from tactbench.core.errors import nearest
-from tactbench.core.spec.events import AlarmPolicy, SlipTarget
+from tactbench.core.spec.events import AREA_PER_MINUTE, AlarmPolicy, SlipTarget
 from tactbench.core.spec.quantity import Frozen
 from tactbench.core.spec.scene import Role, Scene
 from tactbench.core.spec.sensor import ChannelKind
@@ -140,8 +140,6 @@ class TaskSpec(Frozen):
     """Of events: how frames become alarms, and what an alarm is held against."""
     max_false_alarms_per_minute: float | None = Field(default=None, ge=0)
     """Of events: the threshold is that of largest recall on validation recordings with at most so many [1/min]."""
-    area_false_alarms_per_minute: float = Field(default=20.0, gt=0)
-    """Of events: `recall_area` is over false alarms per minute from none up to so many [1/min]."""
     features_by: str | None = Field(default=None, pattern=WHERE)
     """``module:callable``, called with one recording, a tuple of :class:`tactbench.plugin.StreamReadings`: features of
     the task's own, name to number, the same names for every recording. They stand behind `summaries`, or alone."""
@@ -244,7 +242,7 @@ class TaskSpec(Frozen):
         """What an answer is made of, and of events what it is held against; empty where answers are of samples."""
         if self.alarms is not None:
             return (
-                f"{self.target}; {self.alarms}; recall area up to {self.area_false_alarms_per_minute:g} false alarms a "
+                f"{self.target}; {self.alarms}; recall area up to {AREA_PER_MINUTE:g} false alarms a "
                 f"minute; threshold by validation: at most {self.max_false_alarms_per_minute:g} a minute"
             )
         if isinstance(self.target, SlipTarget):

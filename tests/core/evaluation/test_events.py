@@ -12,6 +12,7 @@ from tactbench.core.evaluation.protocols import protocol_called
 from tactbench.core.evaluation.summaries import summary_of
 from tactbench.core.plugins.registry import load_registry
 from tactbench.core.samples import StreamReadings
+from tactbench.core.spec.events import AREA_PER_MINUTE
 from tactbench.plugin import Summary
 from tactbench.tasks import slip, slip_state
 from tests.core.evaluation.made import evaluated
@@ -138,7 +139,7 @@ def test_a_threshold_of_its_own_is_the_one_point_of_its_curve(paths):
     own = REGISTRY.estimators["pac-band"].model_copy(update={"threshold": 0.0})
     result = run(paths, own)
     rate = result.events["false alarms per minute"]
-    assert result.score == pytest.approx(result.events["recall"] * (1 - rate / TASK.area_false_alarms_per_minute))
+    assert result.score == pytest.approx(result.events["recall"] * (1 - rate / AREA_PER_MINUTE))
 
 
 def test_without_disturbances_or_a_reference_nothing_is_answered_and_what_is_missing_is_named(paths, tmp_path):
