@@ -192,8 +192,11 @@ def open_recording(path: Path) -> Recording:
     if not path.is_file():
         raise MissingRecordingError(f"There is no recording {path}.", hint="Check the path.")
     try:
-        # Without a lock: a finished recording never changes, and one that a viewer holds open can be read.
-        file = h5py.File(path, "r", locking=False)
+        try:
+            # Best effort: some network disks know no locks, and a finished recording never changes.
+            file = h5py.File(path, "r", locking="best-effort")
+        except BlockingIOError:  # another program holds it open for writing
+            file = h5py.File(path, "r", locking=False)
     except PermissionError as error:
         raise FormatError(f"{path} cannot be read: {error.strerror}.", hint="Check its permissions.") from error
     except (OSError, RuntimeError, ValueError) as error:

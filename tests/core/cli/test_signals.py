@@ -9,7 +9,7 @@ import pytest
 
 from tactbench.core.matrix.store import Store
 from tests.conftest import ROOT
-from tests.core.cost.test_ladder import presses
+from tests.core.cost.test_knobs import presses
 from tests.core.matrix.test_evil_cells import ASKED
 from tests.core.pool.patience import ending, processes_in, until
 
