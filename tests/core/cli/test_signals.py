@@ -1,9 +1,11 @@
 """Signals that end a command, and output that is closed."""
 
 import os
+import shutil
 import signal
 import subprocess
 import sys
+import tempfile
 
 import pytest
 
@@ -48,11 +50,13 @@ except KeyboardInterrupt:
 @pytest.fixture
 def there(tmp_path):
     """A folder, and how to start a process in it whose temporary folder is of its own."""
-    (tmp_path / "tmp").mkdir()
-    env = {**os.environ, "PYTHONPATH": str(ROOT), "TMPDIR": str(tmp_path / "tmp"), "OMP_NUM_THREADS": "1"}
+    short = tempfile.mkdtemp(prefix="t")  # addresses of sockets lie in it, of at most 107 characters
+    (tmp_path / "tmp").symlink_to(short)
+    env = {**os.environ, "PYTHONPATH": str(ROOT), "TMPDIR": short, "OMP_NUM_THREADS": "1"}
     how = {"cwd": tmp_path, "env": env, "stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True,
            "stdin": subprocess.DEVNULL, "start_new_session": True}  # fmt: skip
-    return tmp_path, how
+    yield tmp_path, how
+    shutil.rmtree(short)
 
 
 def nothing_left(folder):
