@@ -32,8 +32,9 @@ TIMES = {
 BOUGHT = ("estimator", "trees", "window k", "every n-th sample")
 """Knobs whose settings answer the same question about the same recordings: they compete for the front."""
 _KEPT = (
-    "protocol", "split", "estimator", "params", "simulation", "status", "reason", "n_replicates", "n_train", "n_test",
-    "fit_s", "latency_ms_p50", "answer_delay_ms", "delay_parts_ms", "sim_s", "remarks",
+    "score", "ci_low", "ci_high", "protocol", "split", "estimator", "params", "simulation", "status", "reason",
+    "n_replicates", "n_train", "n_test", "fit_s", "latency_ms_p50", "answer_delay_ms", "delay_parts_ms", "sim_s",
+    "remarks",
 )  # fmt: skip
 
 VERSION = 4
@@ -117,9 +118,9 @@ def measure(
     Yields
     ------
     dict
-        ``sensor``, ``task``, ``rig``, ``protocol``, ``metric``, ``unit``, ``simulated``, ``by_truth`` (scores are
-        against the force exerted), ``trivial`` (the score of the best answer that looks at nothing, or None),
-        ``replicates``, and ``settings``: a record for each setting that has ended so far, in the order of `settings`.
+        ``sensor``, ``task``, ``rig``, ``protocol``, ``metric``, ``unit``, ``simulated``, ``trivial`` (the score of the
+        best answer that looks at nothing, or None), ``replicates``, and ``settings``: a record for each setting that
+        has ended so far, in the order of `settings`.
     """
     task = matrix.tasks[0].name
     rows: dict[Simulation, dict[str, Row]] = {}
@@ -148,14 +149,13 @@ def _known(settings: Sequence[Setting], rows: Mapping[Simulation, Mapping[str, R
     for one in settings:
         for row in answers.get(one.simulation, ()):
             if one.is_of(row):
-                score, low, high = judged(row)
-                records.append({"knob": one.knob, "value": one.value, "score": score, "ci_low": low, "ci_high": high,
-                                **{key: row[key] for key in _KEPT}, "front": False})  # fmt: skip
+                kept = {key: row[key] for key in _KEPT}
+                records.append({"knob": one.knob, "value": one.value, **kept, "front": False})
     every = [row for own in answers.values() for row in own]
     first = next((row for row in every if row["status"] == "done"), every[0])
     sign = 1.0 if first["metric"] in LOWER_IS_BETTER else -1.0
     trivial: list[float] = [
-        judged(row)[0] for row in every
+        row["score"] for row in every
         if (row["is_baseline"], row["protocol"], row["split"]) == (True, first["protocol"], first["split"])
         and row["looks_at"] == "nothing" and row["status"] == "done"
     ]  # fmt: skip
@@ -168,13 +168,5 @@ def _known(settings: Sequence[Setting], rows: Mapping[Simulation, Mapping[str, R
     for best in front(competing, seconds=lambda one: one["answer_delay_ms"], error=lambda one: sign * one["score"]):
         best["front"] = True
     about = {key: first[key] for key in ("sensor", "task", "rig", "protocol", "metric", "unit", "simulated", "dagger")}
-    return {"version": VERSION, **about, "seed": seed, "by_truth": first["true_score"] is not None, "trivial": bar,
+    return {"version": VERSION, **about, "seed": seed, "trivial": bar,
             "replicates": max(row["repeats"] for row in every), "settings": records}  # fmt: skip
-
-
-def judged(row: Row) -> tuple[Any, Any, Any]:
-    """Return score and interval, None where there is none: against the truth where it is known."""
-    keys = (
-        ("score", "ci_low", "ci_high") if row["true_score"] is None else ("true_score", "true_ci_low", "true_ci_high")
-    )
-    return row[keys[0]], row[keys[1]], row[keys[2]]

@@ -191,7 +191,7 @@ class Run:
     def _record(self, requests: Sequence[RecordingRequest]) -> None:
         """Make what is not there yet."""
         self._clear(requests)
-        missing = {request.path: request for request in requests if not request.path.exists()}
+        missing = {request.path: request for request in requests if not self._is_there(request)}
         if not missing:
             return
         self.progress.begin("recording", len(missing))
@@ -207,19 +207,22 @@ class Run:
             self._clear(missing.values())  # of an interrupted run, too
 
     def _clear(self, requests: Iterable[RecordingRequest]) -> None:
-        """Remove what a simulation that was killed has left, and its damaged recordings; never what devices gave."""
+        """Remove what a simulation that was killed has left; what devices gave is never removed."""
         by_path = {request.path: request for request in requests}
         for folder in {path.parent for path in by_path}:
             for left in folder.glob("*.h5.*"):
                 request = by_path.get(left.with_name(f"{left.name.partition('.h5.')[0]}.h5"))
                 if request is not None and is_computed(request):
                     left.unlink(missing_ok=True)
-        for path, request in by_path.items():
-            if path.exists() and is_computed(request):
-                try:
-                    self.store.about(path)
-                except RecordingError:
-                    path.unlink()
+
+    def _is_there(self, request: RecordingRequest) -> bool:
+        """Return whether a recording need not be made; one of a simulation that is damaged is removed."""
+        if request.path.exists() and is_computed(request):
+            try:
+                self.store.about(request.path)
+            except RecordingError:
+                request.path.unlink()
+        return request.path.exists()
 
     def _submit_recordings(self, recorder: Engine, missing: Iterable[RecordingRequest], *, computed: bool) -> None:
         """Queue recordings: all of a real rig as one piece of work, simulated ones by seed, sensor and packages."""

@@ -47,9 +47,8 @@ def _table(known: Mapping[str, Any], title: str, settings: list[Mapping[str, Any
         }  # fmt: skip
         lines.append([Entry(texts[name], one.get(key)) for name, key in _COLUMNS.items()])
     better = "lower" if known["metric"] in LOWER_IS_BETTER else "higher"
-    truth = " against the true force" if known["by_truth"] else ""
     nothing = "" if known["trivial"] is None else f" Looking at nothing: {score(known['trivial'], known['unit'])}."
-    notes = [f"Score: {metric_name(known)}{truth}, {better} is better.{nothing}"]
+    notes = [f"Score: {metric_name(known)}, {better} is better.{nothing}"]
     kinds = ["failed" if one["status"] != "done" else "result" if one["front"] else "" for one in settings]
     return text_table(title, tuple(_COLUMNS), lines, numeric=[name for name, key in _COLUMNS.items() if key],
                       notes=notes, kinds=kinds)  # fmt: skip

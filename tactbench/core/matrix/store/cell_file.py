@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from tactbench.core.errors import FormatError
-from tactbench.core.files import hdf5_image, utf8_json
+from tactbench.core.files import hdf5_image
 from tactbench.core.samples import Answers
 
 FORMAT = b"tactbench-cell 5 "
@@ -21,10 +21,10 @@ _COLUMNS = tuple(column.name for column in fields(Answers))
 
 @dataclass(frozen=True)
 class CellFile:
-    """What the file of a cell holds; making one raises ValueError or TypeError if the row is not plain data."""
+    """What the file of a cell holds."""
 
     row: dict[str, Any]
-    """As `tactbench.core.spec.row.RowModel` describes it; its texts are UTF-8 whatever was given."""
+    """As `tactbench.core.spec.row.RowModel` describes it."""
     sections: Mapping[str, Any] = field(default_factory=dict)
     """What its key is made of, by section."""
     provenance: Mapping[str, Any] = field(default_factory=dict)
@@ -32,10 +32,6 @@ class CellFile:
     """When it was written, nanoseconds since the epoch: of two files of one cell the later counts."""
     answers: Mapping[str, Answers] = field(default_factory=dict)
     """By role; none of a cell that did not finish."""
-
-    def __post_init__(self) -> None:
-        text = json.dumps(self.row, allow_nan=False, ensure_ascii=False)
-        object.__setattr__(self, "row", json.loads(utf8_json(text)))
 
     @property
     def text(self) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import errno
+import json
 import os
 import time
 from collections.abc import Iterator, Mapping
@@ -13,7 +14,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from tactbench.core.errors import FolderError, FormatError
-from tactbench.core.files import named_file, replace_file, try_lock
+from tactbench.core.files import named_file, replace_file, try_lock, utf8_json
 from tactbench.core.matrix.store.cell_file import CellFile, read_cell
 from tactbench.core.matrix.store.index import Index
 from tactbench.core.provenance.source import digest_of, provenance_id
@@ -97,10 +98,11 @@ class Store:
         ValueError, TypeError
             If the row is not plain data; nothing is written.
         """
-        kept = {**row, "made_by": self._provenance[0]}
-        cell = CellFile(kept, sections, self._provenance[1], answers=answers or {})
-        self._write(cell)
-        return cell.row
+        # Texts of a row are UTF-8 from here on, whatever was given: a name of a file may hold any byte.
+        text = json.dumps({**row, "made_by": self._provenance[0]}, allow_nan=False, ensure_ascii=False)
+        kept: Row = json.loads(utf8_json(text))
+        self._write(CellFile(kept, sections, self._provenance[1], answers=answers or {}))
+        return kept
 
     def reuse(self, row: Row) -> None:
         """Note that a finished cell was found again, under the name it has in `row`: it is the latest of that name."""

@@ -175,11 +175,12 @@ def aside(out: Path) -> Iterator[Path]:
     made = [folder for folder in (out, *out.parents) if not folder.exists()]
     with writable(out):
         out.mkdir(parents=True, exist_ok=True)
-        for name, end in ((WAITING, _remove), (PLACING, _place)):
-            for left in out.glob(f"{name}*"):
-                with _locked(left) as free:
-                    if free:
-                        end(left, out)
+        for left in (*out.glob(f"{WAITING}*"), *out.glob(f"{PLACING}*")):
+            with _locked(left) as free:
+                if free and left.name.startswith(PLACING):
+                    _place(left, out)
+                elif free:
+                    _remove(left)
         folder = Path(mkdtemp(prefix=WAITING, dir=out))
     try:
         with _locked(folder):
@@ -203,7 +204,7 @@ def _locked(folder: Path) -> Iterator[bool]:
         os.close(lock)
 
 
-def _remove(folder: Path, _out: Path | None = None) -> None:
+def _remove(folder: Path) -> None:
     shutil.rmtree(folder, ignore_errors=True)
 
 

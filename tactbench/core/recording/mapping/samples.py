@@ -13,7 +13,7 @@ from tactbench.core.errors import MappingError
 from tactbench.core.recording.health import Finding, listed
 from tactbench.core.recording.mapping.channels import MappedChannel, MappedStream
 from tactbench.core.recording.mapping.model import Annotation, Bag, Mapping, Time
-from tactbench.core.recording.mapping.table import Table, nanoseconds_per
+from tactbench.core.recording.mapping.table import MESSAGE_TIMES, Table, nanoseconds_per
 from tactbench.core.samples import FloatArray, IntArray, Quality
 from tactbench.core.spec import units
 from tactbench.core.spec.recording import composed
@@ -214,7 +214,7 @@ def compare_clocks(mapping: Mapping, tables: dict[str, Table], clocks: dict[str,
         source = mapping.tables[name]
         time = source.time
         assert time is not None  # it has a clock
-        logged = isinstance(source.read, Bag) and time.column in ("log_time", "publish_time")
+        logged = isinstance(source.read, Bag) and time.column in MESSAGE_TIMES
         kinds.setdefault(f"{time.column if logged else 'a column'} (epoch {time.epoch})", []).append(name)
     if len(kinds) > 1:
         said = "; ".join(f"{' and '.join(names)} by {kind}" for kind, names in kinds.items())

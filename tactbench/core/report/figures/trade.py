@@ -58,8 +58,7 @@ def draw_trade(known: Mapping[str, Any]) -> Any:
     for axis, time in zip(axes[0], times, strict=True):  # now the limits, which all share, are known
         _names(axis, {knob: path[-1]["score"] for knob, path in paths.items() if TIMES[knob] == time and time})
     better = "lower" if known["metric"] in LOWER_IS_BETTER else "higher"
-    truth = " against the true force" if known["by_truth"] else ""
-    axes[0][0].set_ylabel(f"{metric_name(known)}{truth}, {better} is better")
+    axes[0][0].set_ylabel(f"{metric_name(known)}, {better} is better")
     figure.suptitle(visible(title_of(known)))
     return figure
 
