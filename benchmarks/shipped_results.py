@@ -1,7 +1,7 @@
 """Makes the results that come with tactbench, which `tactbench choose` reads where there are no others.
 
 The default matrix under `deployable` and `karl2016`, by the command line, into a new folder; of its rows the keys that
-choosing needs go to `examples/results/default.json`, one row a line.
+`choose` needs go to `examples/results/default.json`, one row a line.
 
     python benchmarks/shipped_results.py [--out FOLDER] [--repeats N]
 """

@@ -180,7 +180,7 @@ def records(table: Table) -> Iterator[tuple[dict[str, Any], dict[str, str]]]:
         one = line.placing
         ranks = (one.place, one.low, one.high, one.tied) if one else (None, None, None, None)
         row = {key: line.row.get(key) for key in chosen} | dict(zip(RANK_KEYS, ranks, strict=True))
-        yield row, {SHOWN[name]: text for name, text in line.texts.items()}
+        yield row, {SHOWN.get(name, name.replace(" ", "_")): text for name, text in line.texts.items()}
 
 
 def flat_records(table: Table) -> tuple[list[str], list[list[Any]]]:

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
+from typing import Any
 
 import tactbench
 from tactbench.core.errors import ConfigError, UnknownNameError
 from tactbench.core.spec.matrix import MatrixSpec
+from tactbench.core.spec.row import ReplicatedRow
 from tactbench.core.spec.yaml_file import load_yaml
+from tactbench.core.statistics.replicates import over_replicates
 
 
 def shipped(name: str, in_checkout: str) -> Path:
@@ -25,9 +29,22 @@ def shipped(name: str, in_checkout: str) -> Path:
     raise ConfigError(name, None, "tactbench was installed without it.", hint="Install tactbench again.")
 
 
-def shipped_results() -> Path:
-    """Return the file of results that came with tactbench; raises ConfigError if the installation has lost it."""
-    return shipped("results/default.json", "examples/results/default.json")
+def shipped_rows() -> tuple[list[dict[str, Any]], str]:
+    """Return the rows of the results that came with tactbench, one a cell, and how they were made.
+
+    Raises
+    ------
+    ConfigError
+        If the installation has lost them.
+    """
+    file = shipped("results/default.json", "examples/results/default.json")
+    made = json.loads(file.read_text(encoding="utf-8"))
+    unknown = ReplicatedRow(cell="", status="done").model_dump()
+    origin = (
+        f"the results that came with tactbench ({made['command']} of version {made['version']}, seed {made['seed']}, "
+        f"{made['replicates']}; times of another machine)"
+    )
+    return over_replicates([unknown | row for row in made["rows"]]), origin
 
 
 def packaged_matrices() -> dict[str, Path]:

@@ -1,1 +1,0 @@
-"""Which sensor meets a wish."""

@@ -1,0 +1,138 @@
+"""Which sensors meet given requirements: columns of the leaderboard that say so.
+
+A requirement is met, missed or unknown. What no source states is unknown, and so is what is only assumed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from operator import itemgetter
+from typing import Any, NamedTuple
+
+from tactbench.core.leaderboard.columns import Line
+from tactbench.core.leaderboard.names import Row, no_better, sensor_name
+from tactbench.core.leaderboard.sentences import Note
+from tactbench.core.leaderboard.table import Block, Table
+from tactbench.core.spec.sensor import SensorSpec
+from tactbench.core.spec.task import TaskSpec
+from tactbench.core.spec.units import conversion
+from tactbench.core.tables.numbers import duration
+
+MET, MISSED, UNKNOWN = "met", "missed", "unknown"
+"""How each text of a column of requirements begins."""
+ANSWER, DELAY, RANGE, RATE = "answer", "answer delay", "force range", "rate"
+COLUMNS = ("sensor", "estimator", "score", "notes", "interval", "beyond floor", DELAY, RANGE, RATE, ANSWER)
+_PARTS = ("sampling", "link", "window", "features", "prediction")
+"""Parts of the delay of an answer from readings."""
+
+
+class Requirements(NamedTuple):
+    """What a sensor and its answers must reach; None: no requirement."""
+
+    max_delay_ms: float | None = None
+    """Largest time from a touch to the answer [ms]."""
+    range_n: float | None = None
+    """Largest normal force that must be measured [N]."""
+    rate_hz: float | None = None
+    """Smallest rate of answers [Hz]."""
+
+
+def held_against(table: Table, required: Requirements, task: TaskSpec, sensors: Mapping[str, SensorSpec]) -> Table:
+    """Return the answers of a table of one task with a column for each requirement.
+
+    An answer that misses fewer requirements comes first, then one of which less is unknown, then one of a better place;
+    trivial answers are left out, and those that cannot be used come last.
+
+    Parameters
+    ----------
+    sensors
+        Specs by name; the range and the rate of a sensor that is not among them are unknown.
+    """
+    blocks = tuple(_block(block, required, task, sensors) for block in table.blocks)
+    return replace(table, blocks=tuple(block for block in blocks if block.lines), sections=())
+
+
+def _block(block: Block, required: Requirements, task: TaskSpec, sensors: Mapping[str, SensorSpec]) -> Block:
+    found: list[tuple[tuple[bool, int, int], Line]] = []
+    for line in block.lines:
+        if not line.row["is_baseline"]:
+            texts = standing(line.row, required, task, sensors.get(line.row["sensor"]))
+            states = [text.partition(":")[0] for text in texts.values()]
+            order = texts.get(ANSWER, "").startswith(MISSED), states.count(MISSED), states.count(UNKNOWN)
+            found.append((order, replace(line, texts=dict.fromkeys(COLUMNS, "") | dict(line.texts) | texts)))
+    found.sort(key=itemgetter(0))  # equal ones stay in the order of their places
+    meet = dict.fromkeys(sensor_name(line.row) for order, line in found if not any(order))
+    verdict = f"All requirements are met by {', '.join(meet)}." if meet else "No answer is known to meet all of them."
+    lines = tuple(line for _, line in found)
+    notes = block.notes + _pressed(lines, required, task)
+    return replace(block, lines=lines, verdict=(verdict,) * (required != Requirements()), notes=notes)
+
+
+def _pressed(lines: tuple[Line, ...], required: Requirements, task: TaskSpec) -> tuple[Note, ...]:
+    """Return a note where the presses behind the scores do not reach the required force, or do not state theirs."""
+    if required.range_n is None or not lines:
+        return ()
+    if not lines[0].row["simulated"]:
+        return (Note("Up to which force these scores hold is unknown: the rows do not state how large it was."),)
+    most_n = max((planned.scene.profile.largest_n for planned in task.scenes), default=0.0)
+    beyond = f"Scores are of forces up to {most_n:.3g} N; errors at larger ones are unknown."
+    return (Note(beyond),) if required.range_n > most_n else ()
+
+
+def standing(row: Row, required: Requirements, task: TaskSpec, spec: SensorSpec | None) -> dict[str, str]:
+    """Return how a row stands to each requirement, by column: ``met: 30 N``, ``missed: 50 Hz``, ``unknown: …``."""
+    if spec is not None and not spec.data_sheet.exists:
+        return {ANSWER: f"{MISSED}: the sensor is a definition, no device"}
+    if row["status"] != "done":
+        return {ANSWER: f"{MISSED}: the cell is {row['status']}"}
+    if no_better(row):
+        return {ANSWER: f"{MISSED}: no better than a trivial answer"}
+    rate_hz = _stated_rate_hz(task, spec)
+    found = {ANSWER: f"{UNKNOWN}: no trivial answer beside it"} if row.get("baseline") is None else {}
+    if required.max_delay_ms is not None:
+        found[DELAY] = _delay(row, required.max_delay_ms, stated=rate_hz is not None)
+    if required.range_n is not None:
+        found[RANGE] = _range(spec, required.range_n)
+    if required.rate_hz is not None:
+        found[RATE] = _rate(row, rate_hz, required.rate_hz)
+    return found
+
+
+def _delay(row: Row, most_ms: float, *, stated: bool) -> str:
+    """Compare the parts of a delay that are known: their sum is its lower bound."""
+    timed: dict[str, Any] = row.get("delay_parts_ms") or {}
+    parts = {name: timed[name] for name in timed if stated or name != "sampling"}
+    needed = _PARTS if row["looks_at"] == "features" else ("prediction",)
+    lacking = [name for name in needed if name not in parts]
+    text = f"{'at least ' if lacking else ''}{duration(sum(parts.values()) * 1e-3)}"
+    if sum(parts.values()) > most_ms:
+        return f"{MISSED}: {text}"
+    return f"{UNKNOWN}: {text}, without {', '.join(lacking)}" if lacking else f"{MET}: {text}"
+
+
+def _range(spec: SensorSpec | None, least_n: float) -> str:
+    stated = spec.data_sheet.force_range if spec else None
+    if stated is None or stated.source.tag == "assumed":
+        return f"{UNKNOWN}: not stated" if stated is None else f"{UNKNOWN}: {stated} is assumed"
+    upper_n = stated.upper * conversion(stated.unit, "N")
+    return f"{MET if upper_n >= least_n else MISSED}: {upper_n:.3g} N"
+
+
+def _rate(row: Row, sampled_hz: float | None, least_hz: float) -> str:
+    """Compare the rate of the sensor, and of answers computed one after the other: the smaller one counts."""
+    answered_hz = 1e3 / row["latency_ms_p50"] if row.get("latency_ms_p50") else None
+    known = [rate for rate in (sampled_hz, answered_hz) if rate is not None]
+    if known and min(known) < least_hz:
+        return f"{MISSED}: {min(known):.3g} Hz"
+    if sampled_hz is None:
+        return f"{UNKNOWN}: no source states the sampling rate"
+    return f"{UNKNOWN}: answers are not timed" if answered_hz is None else f"{MET}: {min(known):.3g} Hz"
+
+
+def _stated_rate_hz(task: TaskSpec, spec: SensorSpec | None) -> float | None:
+    """Return the rate of the slowest stream with channels that answers read; None where no source states one."""
+    used = [one for one in spec.streams if any(each.kind in task.features for each in one.channels)] if spec else []
+    rates = [one.rate_hz if one.rate_source is not None and one.rate_source.tag != "assumed" else None for one in used]
+    known = [rate for rate in rates if rate is not None]
+    return min(known) if known and len(known) == len(used) else None
