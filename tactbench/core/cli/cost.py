@@ -69,7 +69,7 @@ def _show_knobs(
     from tactbench.core.matrix.run import EngineChoice
     from tactbench.core.plugins.declared import declared_in, with_declared
     from tactbench.core.plugins.registry import load_registry
-    from tactbench.core.report.costs import told, trade_tables, write_trade
+    from tactbench.core.report.costs import trade_tables, write_trade
     from tactbench.core.spec.matrix import MatrixSpec, TaskChoice
     from tactbench.core.study.progress import progress
     from tactbench.core.study.shipped import matrix_called
@@ -95,9 +95,6 @@ def _show_knobs(
                     matrix, settings, folder, repeats=repeats or (REPLICATES if rig.simulated else 1),
                     choice=EngineChoice(jobs=jobs), recordings=recordings, progress=display,
                 ):  # fmt: skip
-                    with display.paused():
-                        for line in told(known, found.get(place)):
-                            remark(line)
                     found[place] = known
                     write_trade(known, place)
     finally:  # also what there is when it is stopped
@@ -107,4 +104,4 @@ def _show_knobs(
         for place, known in found.items():
             if shape == "table":
                 print_tables(trade_tables(known))
-            remark(f"Files: {place}.json, .csv, .png, .pdf")
+            remark(f"Files: {place}.json, .png, .pdf")

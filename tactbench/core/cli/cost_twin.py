@@ -91,8 +91,9 @@ _KEYS = ("sensor", "observable", *_COLUMNS)
 
 
 def _write(points: Sequence[CostPoint], records: Sequence[dict[str, Any]], study: CostStudy, folder: Path) -> None:
-    from tactbench.core.cost.precision import draw
     from tactbench.core.files import replace_file, writable
+    from tactbench.core.report.figures.style import save, styled
+    from tactbench.core.report.figures.trade import draw_precision
     from tactbench.core.tables.csv_text import csv_of_records
     from tactbench.core.tables.text import json_text
 
@@ -101,5 +102,6 @@ def _write(points: Sequence[CostPoint], records: Sequence[dict[str, Any]], study
         replace_file(folder / "twin.csv", csv_of_records(records).encode())
         replace_file(folder / "twin.json", (json_text(records, indent=1) + "\n").encode())
         if points:
-            draw(points, study.title, [folder / "twin.png", folder / "twin.pdf"])
+            with styled():
+                save(draw_precision(points, study.title), folder / "twin")
     remark(f"Files: {folder}/twin.csv, .json{', .png, .pdf' if points else ''}")

@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from tactbench.core.cost.knobs import TIMES
 from tactbench.core.files import replace_file, writable
 from tactbench.core.leaderboard.names import LOWER_IS_BETTER, metric_name
-from tactbench.core.report.figures.style import styled
-from tactbench.core.report.figures.trade import ACROSS, draw_trade, title_of
-from tactbench.core.tables.csv_text import csv_of_records
+from tactbench.core.report.figures.style import save, styled
+from tactbench.core.report.figures.trade import draw_trade, title_of
 from tactbench.core.tables.numbers import delay, duration, interval, score
 from tactbench.core.tables.text import json_text
 from tactbench.core.tables.text_table import Entry, TextTable, text_table
@@ -54,37 +52,15 @@ def _table(known: Mapping[str, Any], title: str, settings: list[Mapping[str, Any
                       notes=notes, kinds=kinds)  # fmt: skip
 
 
-def told(known: Mapping[str, Any], before: Mapping[str, Any] | None) -> Iterator[str]:
-    """Yield a sentence for each setting that was not known before, or one for a replicate that was not."""
-    if before is not None and known["replicates"] > before["replicates"]:
-        yield f"{known['sensor']}, {known['task']}: {known['replicates']} replicates"
-        return
-    had = {(one["knob"], one["value"]) for one in before["settings"]} if before else set()
-    for one in known["settings"]:
-        if (one["knob"], one["value"]) not in had:
-            time = TIMES[one["knob"]] or "answer_delay_ms"
-            seconds = one[time] if time.endswith("_s") or one[time] is None else one[time] / 1e3
-            yield (
-                f"{known['sensor']}, {known['task']}, {one['knob']} {one['value']}: "
-                f"{score(one['score'], known['unit'])}, {ACROSS[time].partition(' [')[0]} {duration(seconds)}"
-            )
-
-
-def write_trade(known: Mapping[str, Any], place: Path) -> list[Path]:
-    """Write what is known as ``PLACE.json``, ``.csv`` (its settings alone), ``.png`` and ``.pdf``; return their paths.
+def write_trade(known: Mapping[str, Any], place: Path) -> None:
+    """Write what is known as ``PLACE.json``, ``.png`` and ``.pdf``.
 
     Raises
     ------
     UnwritableError
         If the folder cannot be written.
     """
-    json, csv, *pictures = paths = [place.with_name(f"{place.name}.{end}") for end in ("json", "csv", "png", "pdf")]
-    with writable(place.parent):
+    with writable(place.parent), styled():
         place.parent.mkdir(parents=True, exist_ok=True)
-        replace_file(json, (json_text(known, indent=1) + "\n").encode())
-        replace_file(csv, csv_of_records(known["settings"]).encode())
-        with styled():
-            figure = draw_trade(known)
-            for picture in pictures:
-                figure.savefig(picture, dpi=150)
-    return paths
+        replace_file(place.with_name(f"{place.name}.json"), (json_text(known, indent=1) + "\n").encode())
+        save(draw_trade(known), place)

@@ -21,7 +21,7 @@ def test_an_estimator_that_breaks_costs_its_own_row_only(tmp_path):
     assert (rows["ols"]["status"], rows["evil-raise"]["status"]) == ("done", "failed")
     assert "out of breath" in rows["evil-raise"]["reason"]
     files = {path.name for path in (tmp_path / "tactbench-results" / "cost").glob("made-force.*")}
-    assert files == {f"made-force.{end}" for end in ("json", "csv", "png", "pdf")}
+    assert files == {f"made-force.{end}" for end in ("json", "png", "pdf")}
     assert verbs("leaderboard", code=2), "what is timed adds no row to the leaderboard"
 
 

@@ -5,16 +5,18 @@ import shutil
 import numpy as np
 import pytest
 from matplotlib import rc_context
-from sklearn.metrics import confusion_matrix, f1_score
+from sklearn.metrics import confusion_matrix
 
 from tactbench.core.matrix.run import run_matrix
 from tactbench.core.matrix.store import Store
 from tactbench.core.plugins.registry import load_registry
 from tactbench.core.progress import Progress
-from tactbench.core.report.figures import confusion, embedding_map, prediction_against_time, score_by_force
+from tactbench.core.report.figures import classification
+from tactbench.core.report.figures.classification import confusion
 from tactbench.core.report.figures.drawing import draw_figures
 from tactbench.core.report.figures.group import groups
 from tactbench.core.report.figures.published_and_ours import draw_published
+from tactbench.core.report.figures.regression import prediction_against_time
 from tactbench.core.report.figures.style import styled
 from tactbench.core.report.published import reproduce
 from tactbench.core.report.results import Results, open_results
@@ -26,7 +28,7 @@ from .unrendered import unrendered
 
 PUBLISHED = ["published-and-ours"]
 FORCE = ["prediction-against-time", "residuals"]
-CURVATURE = ["confusion", "score-by-force", "embedding"]
+CURVATURE = ["confusion", "embedding"]
 LOST = ("curvature", "forest", "ideal")
 
 
@@ -55,8 +57,8 @@ def draw(folder, out):
     said = []
     out.mkdir(exist_ok=True)
     with pytest.MonkeyPatch.context() as patch:  # t-SNE takes most of the time of figures
-        patch.setattr(embedding_map, "ITERATIONS", 250)
-        patch.setattr(embedding_map, "AT_MOST", 100)
+        patch.setattr(classification, "ITERATIONS", 250)
+        patch.setattr(classification, "AT_MOST", 100)
         return draw_figures(opened(folder), out, Progress(), said.append), said
 
 
@@ -110,7 +112,7 @@ def test_folds_have_figures_of_their_test_sets(finished, tmp_path):
     run_matrix(matrix, Store(tmp_path / "folds"), choice=IN_THIS_PROCESS, recordings=finished / "recordings")
     with unrendered():
         drawn, said = draw(tmp_path / "folds", tmp_path / "figures")
-    assert kinds(drawn) == ["confusion", "score-by-force", "residuals"]
+    assert kinds(drawn) == ["confusion", "residuals"]
     assert all("‡: leaks" in one.caption for one in drawn)
     assert len(said) == 2, "of training sets and of an embedding there are several"
 
@@ -127,7 +129,7 @@ def test_without_a_published_number_the_best_estimator_is_shown(finished, tmp_pa
 
 def drawn(make, group):
     with styled():
-        return make.draw(group)
+        return make(group)
 
 
 def test_confusion_shows_the_row_s_own_counts_and_those_of_the_validation_set(finished):
@@ -158,24 +160,6 @@ def test_prediction_against_time_shows_every_answer(finished):
             np.testing.assert_array_equal(line.get_xdata(), answers.time_s)
             error = np.sqrt(np.mean((answers.y_true - answers.y_pred) ** 2))
             assert here.texts[0].get_text() == f"RMSE {error:.4f} N"
-
-
-def test_banded_scores_are_those_of_scikit_learn_on_the_same_rows(finished):
-    group = group_of(finished, "curvature")
-    lines = {line.get_label(): line for line in drawn(score_by_force, group).figure.axes[0].get_lines()}
-    for panel in group.panels:
-        test = panel.answers["test"]
-        force = score_by_force.smoothed_force(test)
-        scores, rows = score_by_force.banded(group, panel)
-        masks = (force < 1.5, (force >= 1.5) & (force < 3.0), force >= 3.0)
-        expected = [
-            f1_score(test.y_true[mask], test.y_pred[mask], labels=range(5), average="macro", zero_division=0.0)
-            for mask in masks
-        ]
-        assert rows == [mask.sum() for mask in masks]
-        # Sums of whole counts: only the order of a mean of five differs.
-        assert scores == pytest.approx(expected, rel=1e-12)
-        assert list(lines[panel.sensor].get_ydata()) == scores
 
 
 def test_each_number_stands_at_its_place(finished):

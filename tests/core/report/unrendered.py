@@ -2,7 +2,6 @@
 
 from base64 import b64decode
 from contextlib import contextmanager
-from pathlib import Path
 
 import pytest
 
@@ -11,19 +10,15 @@ PIXEL = b64decode("iVBORw0KGgoAAAANSUhEUgAAAAEAAAABCAAAAAA6fptVAAAACklEQVR4nGNgA
 
 def _save(figure, to, **options):
     """Lay the figure out and draw it on nothing, and save a picture of one pixel."""
-    ending = to.suffix[1:] if isinstance(to, Path) else options["format"]
-    if ending != "pdf":
-        figure.draw_without_rendering()  # once: the same figure is saved as PNG too
-    if isinstance(to, Path):
-        to.write_bytes(PIXEL)
-    else:
-        to.write(PIXEL)
+    if options["format"] == "png":
+        figure.draw_without_rendering()  # once: the same figure is saved as PDF too
+    to.write(PIXEL)
 
 
 @contextmanager
 def unrendered():
     """Leave out rendering and encoding, and most steps of an embedding: they take most of the time of figures."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("tactbench.core.report.figures.embedding_map.ITERATIONS", 250)
+        patch.setattr("tactbench.core.report.figures.classification.ITERATIONS", 250)
         patch.setattr("matplotlib.figure.Figure.savefig", _save)
         yield

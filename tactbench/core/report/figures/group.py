@@ -5,11 +5,12 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from functools import cached_property, partial
+from functools import cached_property
+from operator import itemgetter
 from textwrap import fill
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, NamedTuple
 
-from tactbench.core.leaderboard.names import METRIC_NAMES, answer_name, error_of
+from tactbench.core.leaderboard.names import METRIC_NAMES, answer_name, error_of, grouped
 from tactbench.core.matrix.store import Row
 from tactbench.core.report.figures.style import sensor_colours
 from tactbench.core.report.published import stands_beside
@@ -23,10 +24,14 @@ if TYPE_CHECKING:
 
 _LINE = 64
 """Letters that fit above a column, wide ones too."""
+MARKS = {
+    "simulated": "SIM: simulated, no hardware was touched.",
+    "dagger": "†: each set, the test set too, is scaled by its own mean and deviation.",
+}
+"""By the key of a row that the mark stands for."""
 
 
-@dataclass(frozen=True)
-class Sketch:
+class Sketch(NamedTuple):
     """A figure before it is saved."""
 
     name: str
@@ -36,8 +41,7 @@ class Sketch:
     figure: Figure
 
 
-@dataclass(frozen=True)
-class Panel:
+class Panel(NamedTuple):
     """One sensor's cell, with what it answered."""
 
     row: Row
@@ -76,17 +80,14 @@ class Group:
 
     @property
     def quantity(self) -> str:
-        """What the task asks for, in words."""
+        """The quantity that the task predicts, in words."""
         target = self.task.target
         if isinstance(target, SlipTarget):
             return "state of slip"
         if isinstance(target, LabelTarget):
             return target.name.removesuffix(f"_{target.unit}").replace("_", " ")
-        return (
-            f"{target.kind} ({', '.join(target.names)})"
-            if isinstance(target, VectorTarget)
-            else target.kind.replace("_", " ")
-        )
+        components = f" ({', '.join(target.names)})" if isinstance(target, VectorTarget) else ""
+        return target.kind.replace("_", " ") + components
 
     @property
     def unit(self) -> str:
@@ -97,9 +98,9 @@ class Group:
     def sketch(self, kind: str, title: str, caption: str, figure: Figure) -> Sketch:
         """Return the group's figure of a kind, with a heading, and what its marks mean in the caption."""
         row = self.row
-        parts = (kind, row["task"], row["protocol"], row["split"], answer_name(row))
-        words = "-".join(filter(None, (*parts, "" if row["simulated"] else row["rig"])))
-        name = re.sub(r"[^a-z0-9]+", "-", words.lower()).strip("-")
+        words = [kind, row["task"], row["protocol"], row["split"], answer_name(row)]
+        words += [] if row["simulated"] else [row["rig"]]
+        name = re.sub(r"[^a-z0-9]+", "-", "-".join(filter(None, words)).lower()).strip("-")
         # Of several replicates, or of several seeds of the same recordings, a figure of single answers shows one.
         shown = f"replicate with seed {row['seed']}" if row["repeats"] > 1 else ""
         heading = [row["task"], answer_name(row), row["protocol"] + (" †" if row["dagger"] else "")]
@@ -110,18 +111,6 @@ class Group:
         marks = [MARKS[key] for key in MARKS if row[key]] + [f"‡: {stamp}" for stamp in row["stamps"]]
         marks += [f"Shown: {shown}; the tables are over all of them."] if shown else []
         return Sketch(name, title, " ".join((caption, *marks)), figure)
-
-
-MARKS = {
-    "simulated": "SIM: simulated, no hardware was touched.",
-    "dagger": "†: each set, the test set too, is scaled by its own mean and deviation.",
-}
-"""By the key of a row that the mark stands for."""
-
-
-def class_name(one: Any) -> str:
-    """Return a class as it is shown."""
-    return f"{one:g}" if isinstance(one, int | float) else str(one)
 
 
 def with_unit(words: str, unit: str) -> str:
@@ -136,44 +125,31 @@ def groups(results: Results, remark: Callable[[str], None]) -> list[Group]:
     of any sensor; of several replicates the one whose answers the cell's row leads to. `remark` is called with a
     sentence on what is not shown.
     """
-    alike: dict[tuple[Any, ...], list[Row]] = {}
     for trouble in results.store.troubles:
         remark(trouble)
-    for row in results.rows:
-        if row["status"] == "done":
-            alike.setdefault((row["task"], row["protocol"], row["split"], row["rig"]), []).append(row)
+    done = [row for row in results.rows if row["status"] == "done" and not row["is_baseline"]]
+    alike = grouped(done, itemgetter("task", "protocol", "split", "rig"))
     found = []
     for (name, protocol, split, _), rows in alike.items():
-        answers = [row for row in rows if not row["is_baseline"]]
-        names = list(dict.fromkeys(map(answer_name, answers)))
-        if name not in results.registry.tasks or not names:
-            remark(
-                f"No figures of {name} under {protocol}, split {split}: no such task, or no cell done but baselines."
-            )
+        where = f"{name} under {protocol}, split {split}"
+        if name not in results.registry.tasks:
+            remark(f"No figures of {where}: the task is not installed.")
             continue
         task = results.registry.tasks[name].spec
-        shown = answer_name(max(answers, key=partial(_order, task)))
-        if len(names) > 1:
-            others = ", ".join(one for one in names if one != shown)
-            remark(f"Figures of {name} under {protocol}, split {split} show {shown}; not shown: {others}.")
-        panels = _panels(results, [row for row in answers if answer_name(row) == shown], remark)
+        beside = [row for row in rows if any(stands_beside(row, task, one) for one in task.published)]
+        shown = answer_name(min(beside or rows, key=error_of))
+        others = ", ".join(one for one in dict.fromkeys(map(answer_name, rows)) if one != shown)
+        if others:
+            remark(f"Figures of {where} show {shown}; not shown: {others}.")
+        panels: dict[str, Panel] = {}
+        for row in rows:
+            if answer_name(row) != shown:
+                continue
+            answers = results.answers(row)
+            if "test" in answers:
+                panels.setdefault(row["sensor"], Panel(results.replicate(row), answers))
+            else:
+                remark(f"{row['cell']} is in no figure: cells/{row['key']}.h5 cannot be read. Run it again.")
         if panels:
-            found.append(Group(results, task, panels))
+            found.append(Group(results, task, tuple(panels.values())))
     return found
-
-
-def _order(task: TaskSpec, row: Row) -> tuple[bool, float]:
-    """Return what decides which of several estimators is shown: the greatest."""
-    return any(stands_beside(row, task, one) for one in task.published), -error_of(row)
-
-
-def _panels(results: Results, rows: list[Row], remark: Callable[[str], None]) -> tuple[Panel, ...]:
-    """Return the first readable cell of each sensor."""
-    found: dict[str, Panel] = {}
-    for row in rows:
-        answers = results.answers(row)
-        if "test" in answers:
-            found.setdefault(row["sensor"], Panel(results.replicate(row), answers))
-        else:
-            remark(f"{row['cell']} is in no figure: cells/{row['key']}.h5 cannot be read. Run it again.")
-    return tuple(found.values())

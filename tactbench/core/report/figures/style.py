@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+import io
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
+
+from tactbench.core.files import replace_file
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -17,11 +21,13 @@ COLUMN_IN = 3.5
 PAGE_IN = 7.16
 """Width of both columns, for what does not fit in one."""
 FONT_PT = 7.0
+PNG_DPI, RASTER_DPI = 150, 300
+"""Of a picture, and of dense clouds of points inside a PDF."""
 
 BLACK, GREY = "#000000", "#767676"
 LINES = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", BLACK)
 """Of things without an order: Okabe and Ito 2008, Color universal design."""
-MARKERS = ("o", "s", "^", "D", "v", "P", "X", "*", "<", ">")
+MARKERS = "os^DvPX*<>"
 
 _RC: dict[str, Any] = {
     "font.family": "DejaVu Sans",  # comes with matplotlib: the same figure on every machine
@@ -47,6 +53,18 @@ def styled() -> Iterator[None]:
         yield
 
 
+def save(figure: Figure, place: Path) -> Path:
+    """Write ``PLACE.png`` and ``PLACE.pdf``, each whole, and return the first; the same figure is the same bytes."""
+    # Without dates, and without the version of what drew it.
+    apart = {"png": {"Software": None}, "pdf": {"CreationDate": None, "Creator": "tactbench", "Producer": None}}
+    for ending, dpi in (("png", PNG_DPI), ("pdf", RASTER_DPI)):
+        content = io.BytesIO()
+        figure.savefig(content, format=ending, dpi=dpi, metadata=apart[ending])
+        figure.set_layout_engine("none")  # the first drawing has put everything in its place
+        replace_file(place.with_name(f"{place.name}.{ending}"), content.getvalue())
+    return place.with_name(f"{place.name}.png")
+
+
 def panels(
     rows: int, columns: int, height_in: float, *, width_in: float = COLUMN_IN, **more: Any
 ) -> tuple[Figure, Any]:
@@ -55,15 +73,6 @@ def panels(
 
     figure = Figure(figsize=(width_in, rows * height_in + 0.35), layout="constrained")
     return figure, figure.subplots(rows, columns, squeeze=False, **more)
-
-
-def tiled(count: int, across: int, height_in: float, **more: Any) -> tuple[Figure, list[Axes]]:
-    """Return a figure with `count` panels, at most `across` beside each other."""
-    columns = min(count, across)
-    figure, axes = panels(-(-count // columns), columns, height_in, **more)
-    for here in axes.flat[count:]:
-        here.set_visible(False)
-    return figure, list(axes.flat[:count])
 
 
 def ordered(n: int) -> list[Any]:
@@ -76,7 +85,7 @@ def ordered(n: int) -> list[Any]:
 def sensor_colours(rows: Iterable[Mapping[str, Any]]) -> dict[str, str]:
     """Return a colour for each sensor of a folder, the same in all its figures."""
     names = sorted({str(row["sensor"]) for row in rows})
-    return {name: cycled(LINES, place) for place, name in enumerate(names)}
+    return {name: LINES[place % len(LINES)] for place, name in enumerate(names)}
 
 
 def legend(figure: Figure, shown: Iterable[Axes], **more: Any) -> None:
@@ -93,8 +102,3 @@ def corner(axes: Axes, text: str) -> None:
     """Write into the upper left corner of a panel, on a ground that keeps it legible over points."""
     ground = {"facecolor": "white", "edgecolor": "none", "alpha": 0.8, "pad": 1.0}
     axes.text(0.03, 0.97, text, transform=axes.transAxes, va="top", bbox=ground, zorder=10)
-
-
-def cycled(choices: Sequence[Any], place: int) -> Any:
-    """Return the choice at `place`, beginning again where there are too few."""
-    return choices[place % len(choices)]

@@ -1,65 +1,54 @@
-"""Score against time along each knob that `tactbench cost` turns."""
+"""What accuracy costs in time: scores along the settings that `tactbench cost` varies, errors of a simulated rig."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from tactbench.core.cost.knobs import TIMES
-from tactbench.core.leaderboard.names import LOWER_IS_BETTER, metric_name
-from tactbench.core.report.figures.style import GREY, LINES, PAGE_IN, panels
+from tactbench.core.cost.precision import SHARE, diagrams, precise
+from tactbench.core.leaderboard.names import LOWER_IS_BETTER, grouped, metric_name
+from tactbench.core.plugins.interfaces import CostPoint
+from tactbench.core.report.figures.style import BLACK, GREY, LINES, MARKERS, PAGE_IN, legend, panels
 from tactbench.core.tables.text import visible
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 ACROSS = {
     "answer_delay_ms": "answer delay [ms]", "fit_s": "training: one fit [s]", "sim_s": "simulating one campaign [s]",
-    "": "protocol",
 }  # fmt: skip
 """Time -> label of its axis."""
-LEAST_APART = 0.04
-"""Of the width of a panel, between two settings of one path that are both written."""
-_COLOURS = dict(zip(TIMES, (*LINES[:5], *LINES[:2], LINES[5]), strict=True))
 
 
-def draw_trade(known: Mapping[str, Any]) -> Any:
+def draw_trade(known: Mapping[str, Any]) -> Figure:
     """Return the figure, in the style that is set: a panel for each time, in it a path for each knob that costs it.
 
     Along each path one setting changes and all others stay as they are. Upwards is the median over replicates with its
     interval; the dashed line is the best answer that looks at nothing.
     """
-    paths: dict[str, list[Mapping[str, Any]]] = {}
-    for one in known["settings"]:
-        if one["score"] is not None and one.get(TIMES[one["knob"]], 0.0) is not None:
-            paths.setdefault(one["knob"], []).append(one)
-    paths = {knob: path for knob, path in paths.items() if len(path) > 1} or paths
-    times = [time for time in ACROSS if time in {TIMES[knob] for knob in paths}] or ["answer_delay_ms"]
-    widths = [2.0 if time == "answer_delay_ms" else 1.3 if time else 0.8 for time in times]
-    figure, axes = panels(1, len(times), 3.4, width_in=PAGE_IN, sharey=True, width_ratios=widths)
-    for axis, time in zip(axes[0], times, strict=True):
-        axis.margins(x=0.08, y=0.12)
-        own = [knob for knob in paths if TIMES[knob] == time]
-        for knob in own:
-            _path(axis, knob, paths[knob], time)
+    shown = [one for one in known["settings"] if one["score"] is not None and one.get(TIMES[one["knob"]]) is not None]
+    times = [time for time in ACROSS if any(TIMES[one["knob"]] == time for one in shown)] or ["answer_delay_ms"]
+    figure, axes = panels(1, len(times), 3.4, width_in=PAGE_IN, sharey=True)
+    for here, time in zip(axes[0], times, strict=True):
+        own = [one for one in shown if TIMES[one["knob"]] == time]
+        for knob, path in grouped(own, lambda one: str(one["knob"])).items():
+            place = list(TIMES).index(knob)
+            across, upwards = [one[time] for one in path], [one["score"] for one in path]
+            ends = [[abs(one["score"] - (one["score"] if one[end] is None else one[end])) for one in path]
+                    for end in ("ci_low", "ci_high")]  # fmt: skip
+            here.errorbar(across, upwards, ends, fmt=" ", ecolor=LINES[place % len(LINES)], elinewidth=0.6)
+            _path(here, across, upwards, place, knob, [str(one["value"]) for one in path], joined=knob != "estimator")
         if known["trivial"] is not None:
-            axis.axhline(known["trivial"], color=GREY, ls="--", lw=0.8)
-        axis.set_xlabel(ACROSS[time])
-        if time:
-            axis.set_xscale("log")
-            low, high = axis.get_xlim()
-            axis.set_xlim(low, high * (high / low) ** 0.65)  # room for the last name
-            for place, knob in enumerate(own):
-                _values(axis, paths[knob], time, _COLOURS[knob], above=place % 2 == 0)
-            axis.xaxis.set_major_formatter("{x:g}")
-            axis.xaxis.set_minor_formatter(lambda x, _: f"{x:g}" if f"{x:e}"[0] in "25" else "")
-        axis.grid(True, which="major", alpha=0.25, lw=0.5)
-    if known["trivial"] is not None:
-        axes[0][0].annotate("looks at nothing", (0.99, known["trivial"]), (0, -8), color=GREY, ha="right",
-                            xycoords=("axes fraction", "data"), textcoords="offset points")  # fmt: skip
-    for axis, time in zip(axes[0], times, strict=True):  # now the limits, which all share, are known
-        _names(axis, {knob: path[-1]["score"] for knob, path in paths.items() if TIMES[knob] == time and time})
+            here.axhline(known["trivial"], color=GREY, ls="--", lw=0.8, label="best answer that looks at nothing")
+        here.set(xlabel=ACROSS[time], xscale="log")
+        _plain_numbers(here.xaxis)
     better = "lower" if known["metric"] in LOWER_IS_BETTER else "higher"
     axes[0][0].set_ylabel(f"{metric_name(known)}, {better} is better")
     figure.suptitle(visible(title_of(known)))
+    legend(figure, axes.flat)
     return figure
 
 
@@ -71,39 +60,57 @@ def title_of(known: Mapping[str, Any]) -> str:
     return f"{known['sensor']}, {known['task']} · {known['protocol']}{simulated} · {several}{bars}"
 
 
-def _path(axis: Any, knob: str, path: Sequence[Mapping[str, Any]], time: str) -> None:
-    colour = _COLOURS[knob]
-    across = [one[time] for one in path] if time else list(range(len(path)))
-    upwards = [one["score"] for one in path]
-    low, high = ([one["score"] if one[end] is None else one[end] for one in path] for end in ("ci_low", "ci_high"))
-    bars = [
-        [max(0.0, score - end) for score, end in zip(upwards, low, strict=True)],
-        [max(0.0, end - score) for score, end in zip(upwards, high, strict=True)],
-    ]
-    joined = "o-" if time and knob != "estimator" else "o"
-    axis.errorbar(across, upwards, yerr=bars, color=colour, fmt=joined, ms=3, lw=1.2, elinewidth=0.6)
-    if not time:
-        axis.set_xticks(across, [visible(one["value"]) for one in path], rotation=90, fontsize=6)
+def draw_precision(points: Sequence[CostPoint], title: str) -> Figure:
+    """Return the figure of a simulated rig, in the style that is set: error against seconds, one panel an observable.
+
+    The grey line joins the points that no other one beats in both; the dashed line is a third of the observable's
+    noise.
+    """
+    found = diagrams(points)
+    figure, axes = panels(-(-len(found) // 2), min(2, len(found)), 3.0, width_in=PAGE_IN)
+    for here in axes.flat[len(found) :]:
+        here.set_visible(False)
+    families = list(dict.fromkeys(map(_family, points)))
+    for here, ((subject, observable), group) in zip(axes.flat, found.items(), strict=False):
+        for family, own in grouped(group, _family).items():
+            across, upwards = [one.seconds for one in own], [_least(one) for one in own]
+            texts = ["default" if one.default else "" for one in own]
+            _path(here, across, upwards, families.index(family), family, texts, joined=False)
+        best = precise(group)
+        here.plot([one.seconds for one in best], [_least(one) for one in best], "-", color=GREY, lw=0.8, zorder=0)
+        if math.isfinite(group[0].floor):
+            here.axhline(SHARE * group[0].floor, color=BLACK, ls="--", lw=0.8, label="a third of the noise")
+        here.set(title=f"{subject}, {observable}", xlabel="seconds per recording", xscale="log", yscale="log",
+                 ylabel=f"error, rms [{group[0].unit}]")  # fmt: skip
+        _plain_numbers(here.xaxis)
+        _plain_numbers(here.yaxis)
+    figure.suptitle(title)
+    legend(figure, axes.flat)
+    return figure
 
 
-def _values(axis: Any, path: Sequence[Mapping[str, Any]], time: str, colour: str, *, above: bool) -> None:
-    """Write the setting at each point, but for those that stand too close to one that is written already."""
-    low, high = map(math.log, axis.get_xlim())
-    written: list[float] = []
-    for one in path[::-1]:  # the last setting always
-        x = (math.log(one[time]) - low) / (high - low)
-        if all(abs(x - other) > LEAST_APART for other in written):
-            written.append(x)
-            axis.annotate(visible(one["value"]), (one[time], one["score"]), (3, 3 if above else -8), color=colour,
-                          textcoords="offset points", fontsize=5.5)  # fmt: skip
+def _plain_numbers(axis: Any) -> None:
+    """Write 1, 2, 5, 10 … on a logarithmic axis."""
+    axis.set_major_formatter("{x:g}")
+    axis.set_minor_formatter(lambda x, _: f"{x:g}" if f"{x:e}"[0] in "25" else "")
 
 
-def _names(axis: Any, last: Mapping[str, float]) -> None:
-    """Write the knobs at the right edge, in the order in which their paths end, one above the other."""
-    low, high = axis.get_ylim()
-    y = -math.inf
-    for knob, score in sorted(last.items(), key=lambda item: item[1]):
-        y = max((score - low) / (high - low), y + 0.1)
-        name = knob if len(knob) < 10 else "\n".join(knob.rsplit(" ", 1))
-        axis.annotate(name, (0.99, y), xycoords="axes fraction", color=_COLOURS[knob], weight="bold", ha="right",
-                      va="center")  # fmt: skip
+def _family(point: CostPoint) -> str:
+    return str(point.settings.get("family", ""))
+
+
+def _least(point: CostPoint) -> float:
+    """Return an error that a logarithmic axis can show."""
+    return max(point.error, 1e-12)
+
+
+def _path(
+    here: Axes, across: Sequence[float], upwards: Sequence[float], place: int, name: str, texts: Sequence[str], *,
+    joined: bool,
+) -> None:  # fmt: skip
+    """Draw points with what each is called, joined by a line where one setting changes along them."""
+    colour, mark = LINES[place % len(LINES)], MARKERS[place % len(MARKERS)]
+    here.plot(across, upwards, mark + "-" * joined, color=colour, markersize=4, linewidth=1.0, label=visible(name))
+    for text, x, y in zip(texts, across, upwards, strict=True):
+        beside = (3, -8 if place % 2 else 3)
+        here.annotate(visible(text), (x, y), beside, textcoords="offset points", color=colour, fontsize=5.5)
