@@ -8,9 +8,10 @@ import pytest
 
 from tactbench.core.matrix.store import Store
 from tactbench.core.plugins.registry import load_registry
+from tactbench.core.progress import Progress
 from tactbench.core.report.page import make_report
 from tactbench.core.report.results import open_results
-from tests.core.report.results import draw_one, make_results
+from tests.core.report.results import make_results
 
 
 def _found(variable, *names):
@@ -48,7 +49,7 @@ def page(tmp_path_factory) -> Path:
     material = open_results(Store(folder), load_registry())
     row = next(row for row in material.rows if row["status"] == "done" and row["task"] == "force")
     row["fit_s"] = 2.5  # as on a slow machine: its neighbours' times are in milliseconds
-    return make_report(material, folder / "report", None, draw=draw_one).page
+    return make_report(material, folder / "report", Progress()).page
 
 
 @pytest.fixture

@@ -3,14 +3,10 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import click
 
-from tactbench.core.cli.options import DEFAULT_FOLDER, format_option
-
-if TYPE_CHECKING:
-    from tactbench.core.report.page import Report
+from tactbench.core.cli.options import DEFAULT_FOLDER
 
 
 @click.command(name="report")
@@ -21,13 +17,13 @@ if TYPE_CHECKING:
     metavar="DIR",
     help="Where page and figures are put; default: FOLDER/report.",
 )
-@format_option("table", "md", "json", "csv")
 @click.pass_context
-def command(ctx: click.Context, folder: Path, out: Path | None, shape: str) -> None:
+def command(ctx: click.Context, folder: Path, out: Path | None) -> None:
     """Make one page of all results in FOLDER, which is what `run --out` wrote.
 
     The published numbers are printed beside ours.
     """
+    from tactbench.core.cli.grid import print_tables
     from tactbench.core.plugins.registry import load_registry
     from tactbench.core.report.page import make_report
     from tactbench.core.report.results import open_results
@@ -41,19 +37,10 @@ def command(ctx: click.Context, folder: Path, out: Path | None, shape: str) -> N
         remark(f"{folder}: {sentence}")
     with progress() as display:
         made = make_report(results, out or folder / "report", display)
-    _print(made, shape)
+    print_tables([made.reproduction])
     for sentence in made.missing:
         remark(f"Left out: {sentence}")
     for sentence in made.broken:
         remark(f"Failed: {sentence}")
     remark(f"Page: {made.page}")
     ctx.exit(1 if made.broken else 0)
-
-
-def _print(made: Report, shape: str) -> None:
-    from tactbench.core.cli.grid import print_records, print_tables
-
-    if shape in ("json", "csv"):
-        print_records(made.records, shape)
-    else:
-        print_tables([made.reproduction], shape)

@@ -29,6 +29,8 @@ from tactbench.core.leaderboard.names import (
 )
 from tactbench.core.leaderboard.probe import build_probe, with_leaks
 from tactbench.core.leaderboard.sentences import NO_BETTER, Board, Note, above, below
+from tactbench.core.plugins.declared import with_declared_of
+from tactbench.core.plugins.registry import installed
 from tactbench.core.statistics.rank import Rank, beyond_floor, excess_of
 from tactbench.core.statistics.replicates import FEWEST, count_range, over_replicates
 from tactbench.core.tables.text import cut, visible
@@ -101,6 +103,15 @@ def over_all(store: Store, rows: Sequence[Row]) -> list[dict[str, Any]]:
     from tactbench.core.leaderboard.sensitivity import with_dependence  # numerics
 
     return with_dependence(with_leaks(with_levels(over_replicates(rows), store.folder, store.provenance)), store)
+
+
+def table_of(store: Store, rows: Sequence[Row], *, times: bool = True) -> Table:
+    """Return the leaderboard of rows of a result folder, one a cell, with their tasks' questions; see `build_table`."""
+    tasks = with_declared_of(installed(), rows).tasks
+    names = {str(row["task"]) for row in rows}.intersection(tasks.names())
+    made_by = sorted({str(row["made_by"]) for row in rows if row.get("made_by")})
+    provenance = [known for known in map(store.provenance, made_by) if known]
+    return build_table(rows, provenance, times=times, questions={name: tasks[name].spec.question for name in names})
 
 
 def build_table(

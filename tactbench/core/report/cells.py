@@ -46,14 +46,11 @@ _APART = ("classes", "confusion", "fold_sizes")
 """Keys of a row that have places of their own."""
 
 
-def details(row: Row, results: Results | None) -> Details:
-    """Return what a cell's row says, what is empty left out, and the scores of its folds and recordings.
-
-    Without `results`, scores of recordings and whatever is a table are left out.
-    """
+def details(row: Row, results: Results) -> Details:
+    """Return what a cell's row says, what is empty left out, and the scores of its folds and recordings."""
     said = {name: value for name, value in row.items() if value not in (None, "", [], {}, ())}
     of = f", replicate with seed {row['seed']}" if row["repeats"] > 1 else ""
-    tested = results.answers(row).get("test") if results and row["status"] == "done" else None
+    tested = results.answers(row).get("test") if row["status"] == "done" else None
     classes = list(map(str, row.get("classes") or ()))
     counts = zip(classes, said.get("confusion", ()), strict=False)
     records: dict[str, Sequence[Mapping[str, Any]]] = {
@@ -78,7 +75,7 @@ def details(row: Row, results: Results | None) -> Details:
         cell=str(row["cell"]),
         status=str(row["status"]),
         pairs={title: own for title, own in pairs.items() if own},
-        tables=tuple(_records(title, own) for title, own in records.items() if own and (results or "fold" in title)),
+        tables=tuple(_records(title, own) for title, own in records.items() if own),
         texts={name: str(said[name]) for name in _TEXTS if name in said},
     )
 

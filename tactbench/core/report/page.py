@@ -5,12 +5,12 @@ from __future__ import annotations
 import base64
 import json
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from importlib import resources
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import tactbench
 from tactbench.core.errors import UsageError
@@ -24,8 +24,8 @@ from tactbench.core.report.costs import trade_tables
 from tactbench.core.report.datasheet import sensor_table, table_one
 from tactbench.core.report.figures.drawing import draw_figures
 from tactbench.core.report.figures.published_and_ours import NAME as PUBLISHED
-from tactbench.core.report.published import published_table, records, reproduce
-from tactbench.core.report.results import MOST_ROWS, ReportData, Results, SavedFigure, Section
+from tactbench.core.report.published import published_table, reproduce
+from tactbench.core.report.results import MOST_CELLS, Results, SavedFigure, Section
 from tactbench.core.tables.text import command_line
 from tactbench.core.tables.text_table import WORDY, TextTable, sort_value
 
@@ -35,96 +35,74 @@ if TYPE_CHECKING:
 
 
 TITLE = "tactbench: tactile sensors, what they answer and what it costs"
-MOST_WHOLE = 200
-"""Cells of which the page has whatever there is: each further one takes a file to be read and 20 kB."""
 
 
-def answers_section(subject: ReportData) -> Section:
+def answers_section(results: Results) -> Section:
     """Return the first section: what came out in a few sentences, and published scores and ours in one picture."""
     said = (
         f"{one.title} ({one.setting.partition(' · ')[2]}) {one.verdict[0]}"
-        for one in subject.leaderboard.blocks
+        for one in results.leaderboard.blocks
         if one.verdict
     )
-    verdicts = [line.verdict for line in reproduce(subject.results.registry, subject.rows)]
+    verdicts = [line.verdict for line in reproduce(results.registry, results.rows)]
     inside, judged = verdicts.count("inside"), sum(verdict in ("inside", "outside") for verdict in verdicts)
     paragraphs = (
         "SIM: simulated by a twin of the sensor; no sensor was touched."
-        * any(row["simulated"] for row in subject.rows),
+        * any(row["simulated"] for row in results.rows),
         f"Published numbers in the interval of ours: {inside} of {judged}." if judged else "",
         *said,
     )
-    pictures = tuple(one for one in subject.drawn if one.name == PUBLISHED)
+    pictures = tuple(one for one in results.drawn if one.name == PUBLISHED)
     return Section(paragraphs=tuple(filter(None, paragraphs)), pictures=pictures)
 
 
-def leaderboards_section(subject: ReportData) -> Section:
+def leaderboards_section(results: Results) -> Section:
     """Return the section of leaderboards, failed and skipped cells with their reasons."""
-    paragraphs = ["A number leads to everything that is known about its cell."]
-    if len(subject.shown) < len(subject.rows):
-        paragraphs.append(
-            f"More than {MOST_ROWS} cells: {len(subject.shown)} of {len(subject.rows)} are shown, the first of each "
-            "table. All of them are in `leaderboard.csv` in the result folder."
-        )
     view = View(columns=(*DEFAULT, REASON))
-    tables = tuple(replace(grid(block, view), numeric=NUMERIC).compact() for block in subject.blocks)
-    return Section(paragraphs=tuple(paragraphs), tables=tables)
+    tables = tuple(replace(grid(block, view), numeric=NUMERIC).compact() for block in results.leaderboard.blocks)
+    return Section(paragraphs=("A number leads to everything that is known about its cell.",), tables=tables)
 
 
-def published_section(subject: ReportData) -> Section:
+def published_section(results: Results) -> Section:
     """Return the section of published numbers."""
-    table = published_table(subject.results.registry, subject.rows)
+    table = published_table(results.registry, results.rows)
     return Section(tables=(table,) if table.lines else ())
 
 
-def figures_section(subject: ReportData) -> Section:
+def figures_section(results: Results) -> Section:
     """Return the section of figures: those that were drawn for this page."""
-    pictures = tuple(one for one in subject.drawn if one.name != PUBLISHED)
+    pictures = tuple(one for one in results.drawn if one.name != PUBLISHED)
     paragraphs = ("The same figures lie beside this page as `figures/*.pdf` and `figures/*.png`.",) if pictures else ()
-    return Section(paragraphs=paragraphs, pictures=pictures, missing=subject.undrawn)
+    return Section(paragraphs=paragraphs, pictures=pictures, missing=results.undrawn)
 
 
-def compared_section(subject: ReportData) -> Section:
+def compared_section(results: Results) -> Section:
     """Return the tables below the leaderboard: events and probes."""
-    lacks = "What the recordings give away: `tactbench run --probe` adds shuffled rows and the first frame alone."
-    found = tuple(table.compact() for table in subject.leaderboard.sections)
-    return Section(tables=found, missing=() if found else (lacks,))
+    return Section(tables=tuple(table.compact() for table in results.leaderboard.sections))
 
 
-def costs_section(subject: ReportData) -> Section:
+def costs_section(results: Results) -> Section:
     """Return the section of what `tactbench cost` has left in the folder."""
-    folder = subject.results.store.folder
+    folder = results.store.folder / "cost"
     tables = []
-    for path in sorted((folder / "cost").glob("*.json")):
+    for path in sorted(folder.glob("*.json")):
         with suppress(KeyError, TypeError, ValueError):  # twin.json has no such table, nor has a damaged file
             tables += trade_tables(json.loads(path.read_bytes()))
-    pictures = tuple(
-        SavedFigure(path.stem, path.stem, "As `tactbench cost` has drawn it.", path)
-        for path in sorted((folder / "cost").glob("*.png"))
-    )
-    lacks = (
-        "What an answer costs in time beside its score: `tactbench cost --sensor NAME --task NAME`; of the simulation: "
-        "`tactbench cost --twin`."
-    )
-    return Section(tables=tuple(tables), pictures=pictures,
-                   missing=() if tables or pictures else (lacks,))  # fmt: skip
+    pictures = (SavedFigure(path.stem, path.stem, "As `tactbench cost` has drawn it.", path)
+                for path in sorted(folder.glob("*.png")))  # fmt: skip
+    return Section(tables=tuple(tables), pictures=tuple(pictures))
 
 
-def assumptions_section(subject: ReportData) -> Section:
+def assumptions_section(results: Results) -> Section:
     """Return the section of what `tactbench sensitivity` has left in the folder."""
-    specs = {sensor.name: sensor.spec for sensor in subject.results.registry.sensors}
-    tables = tuple(sensitivity_tables(subject.results.store, specs))
-    lacks = (
-        "Which assumptions simulated scores and the order of the sensors rest on: `tactbench sensitivity --task NAME`."
-    )
-    wanted = not tables and any(row["simulated"] for row in subject.rows)
-    return Section(tables=tables, missing=(lacks,) if wanted else ())
+    specs = {sensor.name: sensor.spec for sensor in results.registry.sensors}
+    return Section(tables=tuple(sensitivity_tables(results.store, specs)))
 
 
-def sensors_section(subject: ReportData) -> Section:
+def sensors_section(results: Results) -> Section:
     """Return the comparison of the sensors that the results are about."""
-    known = subject.results.registry.sensors
-    names = list(dict.fromkeys(str(row["sensor"]) for row in subject.rows))
+    known = results.registry.sensors
+    names = list(dict.fromkeys(str(row["sensor"]) for row in results.rows))
     specs = [known[name].spec for name in names if name in known]
     command = command_line("tactbench", "show", *(name for name in names if name in known), "--all")
     table = sensor_table("Sensor comparison", specs, table_one(specs), with_source=True).compact()
@@ -135,28 +113,25 @@ def sensors_section(subject: ReportData) -> Section:
     )
 
 
-def cells_section(subject: ReportData) -> Section:
+def cells_section(results: Results) -> Section:
     """Return the details of every cell of the leaderboard."""
-    whole = len(subject.shown) <= MOST_WHOLE
-    paragraphs = [] if whole else [
-        f"More than {MOST_WHOLE} cells: scores of recordings, effects, candidates and confusion are left out here; "
-        "each cell's own file, `cells/KEY.h5`, has them."
-    ]  # fmt: skip
-    if any(row["repeats"] > 1 for row in subject.rows):
-        paragraphs.append("Of several replicates, key, recordings, candidates and effects are those of the first.")
-    found = tuple(details(row, subject.results if whole else None) for row in subject.shown)
-    return Section(paragraphs=tuple(paragraphs), details=found)
+    if not results.anchors:
+        return Section(paragraphs=(f"These are more than {MOST_CELLS} cells: `tactbench why CELL` has their details.",))
+    several = any(row["repeats"] > 1 for row in results.rows)
+    paragraphs = ("Of several replicates, key, recordings, candidates and effects are those of the first.",) * several
+    found = tuple(details(line.row, results) for line in results.leaderboard.lines)
+    return Section(paragraphs=paragraphs, details=found)
 
 
-def about_section(subject: ReportData) -> Section:
+def about_section(results: Results) -> Section:
     """Return how many cells ended how, and who computed them, with what, where."""
-    counts = Counter(str(row["status"]) for row in subject.rows)
+    counts = Counter(str(row["status"]) for row in results.rows)
     statuses = ", ".join(f"{count} {status}" for status, count in sorted(counts.items()))
-    return Section(paragraphs=(f"Cells: {statuses}.", *subject.leaderboard.footer))
+    return Section(paragraphs=(f"Cells: {statuses}.", *results.leaderboard.footer))
 
 
 # Anchor, title and maker of each section: a section that cannot be made says so under its own title.
-SECTIONS: tuple[tuple[str, str, Callable[[ReportData], Section]], ...] = (
+SECTIONS: tuple[tuple[str, str, Callable[[Results], Section]], ...] = (
     ("answers", "What came out", answers_section),
     ("leaderboards", "Leaderboard", leaderboards_section),
     ("reproduction", "Published numbers", published_section),
@@ -180,8 +155,8 @@ class Page(NamedTuple):
     """One sentence a section that could not be made although its results are there."""
 
 
-def make_page(subject: ReportData) -> Page:
-    """Return the page: the same results give the same bytes.
+def make_page(results: Results) -> Page:
+    """Return the page: the same results give the same bytes. Sections without anything are left out.
 
     A section that cannot be made takes no other with it: it says why.
     """
@@ -189,17 +164,19 @@ def make_page(subject: ReportData) -> Page:
     broken: list[str] = []
     for anchor, title, make in SECTIONS:
         try:
-            sections.append(replace(make(subject), anchor=anchor, title=title))
+            section = make(results)
         except Exception as error:
             reason = f"This section cannot be made from these results: {type(error).__name__}: {error}"
             broken.append(f"{title}: {reason}")
-            sections.append(Section(anchor, title, missing=(reason,)))
+            section = Section(missing=(reason,))
+        if section != Section():
+            sections.append(replace(section, anchor=anchor, title=title))
     missing = [f"{section.title}: {lacked}" for section in sections for lacked in section.missing]
     html = _template().render(
         title=TITLE,
         version=tactbench.__version__,
         sections=sections,
-        anchors=subject.anchors,
+        anchors=results.anchors,
         style=_text("page.css"),
         script=_text("page.js"),
     )
@@ -223,23 +200,17 @@ def _text(name: str) -> Markup:
     return Markup((resources.files("tactbench.core.report") / "template" / name).read_text(encoding="utf-8"))
 
 
-Drawer = Callable[[Results, Path, Progress, Callable[[str], None]], Sequence[SavedFigure]]
-"""Takes the results, the folder for figures, where progress goes, and what is called with each figure left out."""
-
-
 @dataclass(frozen=True)
 class Report:
     """A report that has been written, and what it lacks."""
 
     page: Path
     reproduction: TextTable
-    records: Sequence[Mapping[str, Any]]
-    """The reproduction table for programs."""
     missing: tuple[str, ...]
     broken: tuple[str, ...]
 
 
-def make_report(results: Results, out: Path, progress: Progress, *, draw: Drawer = draw_figures) -> Report:
+def make_report(results: Results, out: Path, progress: Progress) -> Report:
     """Draw the figures and write the page: ``index.html`` and ``figures/`` in `out`.
 
     Raises
@@ -257,14 +228,13 @@ def make_report(results: Results, out: Path, progress: Progress, *, draw: Drawer
     undrawn: list[str] = []
     with writable(out):
         (out / "figures").mkdir(parents=True, exist_ok=True)
-        drawn = draw(results, out / "figures", progress, undrawn.append)
-        html, missing, broken = make_page(ReportData(results, drawn, tuple(undrawn)))
+        drawn = draw_figures(results, out / "figures", progress, undrawn.append)
+        html, missing, broken = make_page(replace(results, drawn=tuple(drawn), undrawn=tuple(undrawn)))
         # A lone surrogate, which JSON may hold, is no UTF-8: a question mark then.
         replace_file(out / "index.html", html.encode("utf-8", "replace"))
     return Report(
         page=out / "index.html",
         reproduction=published_table(results.registry, results.rows),
-        records=records(reproduce(results.registry, results.rows)),
         missing=missing,
         broken=broken,
     )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
 
@@ -94,23 +94,6 @@ def _command(task: TaskSpec, published: Published) -> str:
     if published.estimator and published.estimator not in task.baselines:  # those are run with any other
         words += ["--estimator", published.estimator]
     return command_line(*words)
-
-
-def records(lines: Iterable[Reproduction]) -> list[dict[str, Any]]:
-    """Return the lines for programs: flat, the same keys in each."""
-    found = []
-    for line in lines:
-        row, published = line.row or {}, line.published
-        found.append({
-            "title": line.title, "task": line.task.name, "sensor": row.get("sensor", published.sensor or ""),
-            "protocol": published.protocol, "estimator": row.get("estimator", published.estimator or ""),
-            "unit": line.task.unit, "published": published.score, "reference": published.reference,
-            "remark": published.remark, "cell": row.get("cell"),
-            "simulated": bool(row["simulated"]) if row else None,
-            **{name: row.get(name) for name in ("score", "ci_low", "ci_high")},
-            "verdict": line.verdict, "reason": line.reason,
-        })  # fmt: skip
-    return found
 
 
 def published_table(registry: Registry, rows: Sequence[Row]) -> TextTable:

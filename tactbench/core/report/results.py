@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from tactbench.core.errors import DataError
-from tactbench.core.leaderboard.table import Block, Table, build_table, over_all
+from tactbench.core.leaderboard.table import Table, over_all, table_of
 from tactbench.core.matrix.store import Row, Store
 from tactbench.core.plugins.declared import with_declared_of
 from tactbench.core.samples import Answers
@@ -17,6 +17,24 @@ from tactbench.core.tables.text_table import TextTable
 
 if TYPE_CHECKING:
     from tactbench.core.plugins.registry import Registry
+
+
+MOST_CELLS = 500
+"""Of more cells the page has no details: those of each take a file to be read and 20 kB."""
+
+
+@dataclass(frozen=True)
+class SavedFigure:
+    """One figure."""
+
+    name: str
+    """Short, fit for a file name and an anchor: ``force-against-time``."""
+    title: str
+    """The question that it answers."""
+    caption: str
+    """What is on the axes and how to read it, in sentences a paper could use."""
+    png: Path
+    """Its PDF lies beside it."""
 
 
 @dataclass(frozen=True)
@@ -31,12 +49,28 @@ class Results:
         One a cell, the latest of each name.
     replicates
         The rows as they are stored, one a cell and replicate, by key.
+    drawn
+        The figures of these results.
     """
 
     store: Store
     registry: Registry
     rows: tuple[Row, ...]
     replicates: Mapping[str, Row] = field(default_factory=dict)
+    drawn: tuple[SavedFigure, ...] = ()
+    undrawn: tuple[str, ...] = ()
+    """Why figures are missing, a sentence each."""
+
+    @cached_property
+    def leaderboard(self) -> Table:
+        """The rows as ranked tables."""
+        return table_of(self.store, self.rows)
+
+    @cached_property
+    def anchors(self) -> dict[str, str]:
+        """The place on the page of the details of each cell, by the cell's name; of too many cells it has none."""
+        lines = self.leaderboard.lines if len(self.rows) <= MOST_CELLS else ()
+        return {str(line.row["cell"]): f"cell-{place}" for place, line in enumerate(lines, 1)}
 
     def answers(self, row: Mapping[str, Any]) -> dict[str, Answers]:
         """Return what a cell answered, by role; empty if it did not finish."""
@@ -45,11 +79,6 @@ class Results:
     def replicate(self, row: Row) -> Row:
         """Return the row of the one replicate whose answers and recordings a cell's row leads to, with their number."""
         return {**self.replicates.get(str(row["key"]), row), "repeats": row["repeats"]}
-
-    def provenance(self) -> list[dict[str, Any]]:
-        """Return what is known of the runs that the rows are from."""
-        made_by = sorted({str(row["made_by"]) for row in self.rows if row.get("made_by")})
-        return [known for known in map(self.store.provenance, made_by) if known]
 
     def recordings(self, row: Mapping[str, Any]) -> list[Path]:
         """Return the files of a cell's recordings, in the order that ``Answers.recording`` counts.
@@ -75,62 +104,6 @@ def open_results(store: Store, registry: Registry) -> Results:
     rows = store.rows()
     shown = tuple(over_all(store, rows))
     return Results(store, with_declared_of(registry, shown), shown, {str(row["key"]): row for row in rows})
-
-
-@dataclass(frozen=True)
-class SavedFigure:
-    """One figure."""
-
-    name: str
-    """Short, fit for a file name and an anchor: ``force-against-time``."""
-    title: str
-    """The question that it answers."""
-    caption: str
-    """What is on the axes and how to read it, in sentences a paper could use."""
-    png: Path
-    """Its PDF lies beside it."""
-
-
-MOST_ROWS = 2_000
-"""Of the page: of more, it shows the first of each block."""
-
-
-@dataclass(frozen=True)
-class ReportData:
-    """Everything that a page is about."""
-
-    results: Results
-    drawn: Sequence[SavedFigure] = ()
-    undrawn: tuple[str, ...] = ()
-    """Why figures are missing, a sentence each."""
-
-    @property
-    def rows(self) -> tuple[Row, ...]:
-        """One a cell."""
-        return self.results.rows
-
-    @cached_property
-    def leaderboard(self) -> Table:
-        """The rows as ranked tables."""
-        questions = {one.name: one.spec.question for one in self.results.registry.tasks}
-        return build_table(self.rows, self.results.provenance(), questions=questions)
-
-    @cached_property
-    def blocks(self) -> list[Block]:
-        """The blocks of the leaderboard, each with the lines that the page shows."""
-        blocks = self.leaderboard.blocks
-        most = MOST_ROWS if len(self.rows) <= MOST_ROWS else max(1, MOST_ROWS // len(blocks))
-        return [replace(block, lines=block.lines[:most]) for block in blocks]
-
-    @cached_property
-    def shown(self) -> list[Mapping[str, Any]]:
-        """The rows of these lines."""
-        return [line.row for block in self.blocks for line in block.lines]
-
-    @cached_property
-    def anchors(self) -> dict[str, str]:
-        """Where the page tells everything about a cell, by the cell's name."""
-        return {str(row["cell"]): f"cell-{place}" for place, row in enumerate(self.shown, 1)}
 
 
 @dataclass(frozen=True)

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
 
 from tactbench.core.errors import UsageError
-from tactbench.core.leaderboard.table import Table, build_table, over_all
+from tactbench.core.leaderboard.table import over_all
+from tactbench.core.leaderboard.table import table_of as table_of
 from tactbench.core.matrix.store import Row, Store
-from tactbench.core.plugins.registry import installed
 from tactbench.core.tables.terminal import remark
 
 
@@ -39,13 +37,3 @@ def shown_rows(store: Store) -> list[Row]:
     if not rows:
         raise UsageError(f"{store.folder} has no row that can be shown.", hint="Run `tactbench run` again.")
     return over_all(store, rows)
-
-
-def table_of(store: Store, rows: Sequence[Mapping[str, Any]], *, times: bool = True) -> Table:
-    """Return the leaderboard of rows, one a cell; `times` as of `build_table`. A task not installed asks nothing."""
-    tasks = installed().tasks
-    names = {str(row["task"]) for row in rows}.intersection(tasks.names())
-    questions = {name: tasks[name].spec.question for name in names}
-    made_by = sorted({str(row["made_by"]) for row in rows if row.get("made_by")})
-    provenance = [known for known in map(store.provenance, made_by) if known]
-    return build_table(rows, provenance, times=times, questions=questions)

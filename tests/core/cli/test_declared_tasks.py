@@ -87,7 +87,7 @@ def test_one_import_and_one_run_answer_a_question_of_a_table(pad):
     with unrendered():
         pad("report")
     drawn = {path.name for path in (pad.folder / "tactbench-results" / "report" / "figures").iterdir()}
-    assert "location-map-where-deployable-session-knn-replay.png" in drawn
+    assert "residuals-where-deployable-session-knn-replay.png" in drawn
     # Another question of the same recordings is another cell.
     declared = pad.folder / "rec" / "tasks.yaml"
     declared.write_text(declared.read_text().replace("unit: mm", "unit: um"))

@@ -9,7 +9,7 @@ import tactbench
 from tactbench.core.matrix.store import Store
 from tactbench.core.plugins.registry import installed
 from tactbench.core.report.page import make_page
-from tactbench.core.report.results import ReportData, open_results
+from tactbench.core.report.results import open_results
 from tests.conftest import Verbs
 from tests.core.evaluation.made import ramp, record
 from tests.here import make_here
@@ -76,5 +76,5 @@ def test_what_the_first_frame_gives_away_is_said_in_every_format(tmp_path):
         assert says in printed[shape], shape
     marks = {(row["estimator"], row["split"]): row["shown"]["marks"] for row in json.loads(printed["json"])}
     assert [marks[name, "trial"] for name in ("logistic", "majority", "chance")] == ["‡", "", ""]
-    page = make_page(ReportData(open_results(Store(tmp_path / "tactbench-results"), installed()))).html
+    page = make_page(open_results(Store(tmp_path / "tactbench-results"), installed())).html
     assert says in page

@@ -1,6 +1,7 @@
 """The page, from real results."""
 
 import re
+from dataclasses import replace
 
 import pytest
 
@@ -9,7 +10,7 @@ from tactbench.core.plugins.registry import load_registry
 from tactbench.core.report import results as sections
 from tactbench.core.report.cells import recording_scores
 from tactbench.core.report.page import answers_section, make_page
-from tactbench.core.report.results import ReportData, Results, SavedFigure, open_results
+from tactbench.core.report.results import Results, SavedFigure, open_results
 
 from .html import Reader
 from .results import draw_one
@@ -28,9 +29,6 @@ Leaderboard [1 filter]
 Published numbers
   Published numbers, and ours: number published ours ours − published verdict
 Figures [1 figure]
-Events and probes
-What accuracy costs in time
-What simulated scores rest on
 Sensors (the paper's Table I)
   Sensor comparison:  iCub fingertip iCub fingertip: source
 Details of each cell [10 cells]
@@ -45,12 +43,12 @@ def material(results):
 
 @pytest.fixture
 def subject(material, tmp_path):
-    (other,) = draw_one(material, tmp_path)
-    return ReportData(material, [other, SavedFigure("published-and-ours", "Both", "Marks.", other.png)])
+    other = draw_one(material, tmp_path)
+    return replace(material, drawn=(other, SavedFigure("published-and-ours", "Both", "Marks.", other.png)))
 
 
 def with_rows(material, *rows):
-    return ReportData(Results(material.store, material.registry, rows))
+    return Results(material.store, material.registry, rows)
 
 
 def structure(html):
@@ -88,7 +86,7 @@ def test_the_page_is_well_formed_fetches_nothing_and_is_the_same_bytes_again(sub
     assert all(what.startswith("data:") for what in loaded if what)
     (policy,) = [given["content"] for _, given in page.elements if given.get("http-equiv")]
     assert policy.startswith("default-src 'none'; img-src data:;")
-    again = ReportData(open_results(Store(results), load_registry()), subject.drawn)
+    again = replace(open_results(Store(results), load_registry()), drawn=subject.drawn)
     assert make_page(again).html == html
 
 
@@ -107,17 +105,16 @@ def test_everything_that_a_row_knows_is_on_the_page(material):
     assert "{'" not in text
 
 
-def test_a_large_board_shows_the_best_of_each_table_and_names_the_file(material, monkeypatch):
-    monkeypatch.setattr(sections, "MOST_ROWS", 6)
-    html = make_page(ReportData(material)).html
-    assert "6 of 10 are shown" in html
-    assert "<code>leaderboard.csv</code>" in html
-    assert html.count('<details class="cell') == 6
+def test_a_large_board_has_no_details_and_names_the_command(material, monkeypatch):
+    monkeypatch.setattr(sections, "MOST_CELLS", 6)
+    html = make_page(replace(material)).html
+    assert "<code>tactbench why CELL</code> has their details" in html
+    assert html.count('<details class="cell') == 0
     assert Reader(html).wrong == []
 
 
 def test_scores_of_folds_and_recordings(material):
-    text = Reader(make_page(ReportData(material)).html).text
+    text = Reader(make_page(material).html).text
     assert "Score of each fold" in text
     assert "Score of each recording" in text
     curvature = next(one for one in material.rows if one["task"] == "curvature" and one["estimator"] == "forest")

@@ -1,7 +1,5 @@
 """`tactbench report`, as a person runs it."""
 
-import json
-
 import pytest
 
 from tests.conftest import Verbs
@@ -26,13 +24,10 @@ def test_page_on_disk_table_on_stdout_the_rest_on_stderr(reported, results):
     assert not list(results.rglob("*.partial"))
 
 
-def test_the_same_table_for_programs_and_the_same_page_in_another_folder(reported, results):
+def test_the_same_page_in_another_folder(reported, results):
     verbs, _ = reported
     with unrendered():
-        found = json.loads(verbs("report", "tactbench-results", "--out", "elsewhere", "--format", "json").stdout)
-    (ours,) = [one for one in found if one["cell"] == "icub/force/twin/karl2016/lasso"]
-    assert ours["published"] == 0.7659
-    assert (ours["verdict"], ours["ci_low"], ours["ci_high"]) == ("no interval", None, None)
+        verbs("report", "tactbench-results", "--out", "elsewhere")
     page = (verbs.folder / "elsewhere" / "index.html").read_bytes()
     assert page == (results / "report" / "index.html").read_bytes()
 
