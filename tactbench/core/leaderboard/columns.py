@@ -11,7 +11,7 @@ from tactbench.core.leaderboard.names import Row, answer_name, held_out
 from tactbench.core.spec.status import STOPPED
 from tactbench.core.statistics.rank import Rank
 from tactbench.core.statistics.replicates import FEWEST
-from tactbench.core.tables.numbers import ABSENT, coarse, delay, duration, interval, score, tail, whole
+from tactbench.core.tables.numbers import ABSENT, coarse, delay, duration, interval, score, whole
 from tactbench.core.tables.text import visible
 
 Kind = Literal["result", "baseline", "failed", "skipped"]
@@ -61,12 +61,6 @@ def _range(row: Row) -> str:
     return visible(f"{each if len(scores) < FEWEST else several} by {row['replicate_unit']}")
 
 
-def _right(row: Row) -> str:
-    """Return how many recordings were classified rightly, the mean over replicates: ``3.1 of 5``."""
-    right, total = row.get("recordings_right"), row.get("recordings_asked")
-    return ABSENT if right is None or total is None else f"{right:.3g} of {total:.3g}"
-
-
 _RANKED: dict[str, str] = {"place": "rank", "notes": "marks"}
 """Columns that the block of a row decides."""
 OF_ROWS: dict[str, Column] = {
@@ -79,7 +73,6 @@ OF_ROWS: dict[str, Column] = {
     "beyond floor": _score("beyond_floor", "score_beyond_floor"),
     "interval beyond floor": _interval("beyond_floor_interval", "beyond_floor_ci_low", "beyond_floor_ci_high"),
     "against reference": _score("against_reference", "reference_score"),
-    "recordings right": Column("recordings_right", _right, lambda row: row.get("recordings_right")),
     "published": _score("published", "published"),
     "test samples": Column("n_test", lambda row: whole(row["n_test"]), lambda row: row["n_test"]),
     "delay after touch": Column(
@@ -91,17 +84,11 @@ OF_ROWS: dict[str, Column] = {
     "training": _time("fit", "fit_s"),
     "simulation": _time("sim", "sim_s"),
     "latency p50": _time("latency_p50", "latency_ms_p50", 1e3),
-    "latency p95": Column(
-        "latency_p95",
-        lambda row: tail(row.get("latency_ms_p95"), row.get("latency_ms_max"), row.get("latency_n")),
-        lambda row: (row.get("latency_ms_p95") or row.get("latency_ms_max") or 0.0) / 1e3 or None,
-        timed=True,
-    ),
+    "latency p95": _time("latency_p95", "latency_ms_p95", 1e3),
 }
 COLUMNS = ("place", "sensor", "level", "estimator", "score", "notes", *list(OF_ROWS)[4:])
 SHOWN = {name: OF_ROWS[name].shown if name in OF_ROWS else _RANKED[name] for name in COLUMNS}
-WIDE = ("interval beyond floor", "recordings right", "test samples", "simulation", "latency p50",
-        "latency p95")  # fmt: skip
+WIDE = ("interval beyond floor", "test samples", "simulation", "latency p50", "latency p95")
 """Columns that are printed only where all are asked for."""
 DEFAULT = tuple(name for name in COLUMNS if name not in WIDE)
 NUMERIC = frozenset(("place", *(name for name, column in OF_ROWS.items() if column.value)))

@@ -19,7 +19,6 @@ from tactbench.core.statistics.replicates import (
     FEWEST,
     against_reference,
     count_range,
-    counted,
     least_coverage,
     percent,
 )
@@ -106,7 +105,7 @@ def _some(names: Sequence[str]) -> str:
 
 def above(board: Board) -> tuple[str, ...]:
     """Return the sentences above a table."""
-    sentences = (_outcome(board), _timed(board) or _published(board))
+    sentences = (_outcome(board), _timed(board) or _dependence(board))
     return tuple(sentence for sentence in sentences if sentence)
 
 
@@ -153,25 +152,17 @@ def _too_few(rows: Sequence[Row]) -> str:
 
 
 def _closest(board: Board, first: Row, others: Sequence[Row]) -> str:
-    """Return the answer that the best one is least better than, in how many campaigns, and by how much."""
+    """Return the answer that is the least worse than the best one, and by how much it is worse."""
     from tactbench.core.statistics.paired import difference  # numerics
 
     unit, sign = first["unit"], -sign_of(first)
     found, second = min(((difference(first, row), row) for row in others), key=lambda pair: sign * pair[0].value)
-    name = board.name(second)
-    if found.low is None or found.high is None:
-        return f"closest is {name}"
-    low, high = sorted((sign * found.low, sign * found.high))
-    if low <= 0:  # apart by what places go by, and not by this difference
-        return f"closest is {name}"
-    by = f"{score_with_unit(sign * found.value, unit)} ({percent(None, None)} {interval(low, high, unit)}), to {name}"
-    kept = [row.get("replicates") or {} for row in (first, second)]
-    key = "beyond" if all("beyond" in one for one in kept) else "scores"
-    if not found.paired or not all(key in one for one in kept):
-        return f"its smallest difference is {by}"
-    wins = sum(sign * (one - other) > 0 for one, other in zip(*(one[key] for one in kept), strict=True))
-    of = " beyond the floor" if key == "beyond" else ""
-    return f"its smallest mean difference{of} is {by}, worse in {wins} of {counted(len(kept[0][key]), 'campaign')}"
+    ends = [sign * end for end in (found.low, found.high) if end is not None]
+    closest = f"closest is {board.name(second)}"
+    if len(ends) < 2 or min(ends) <= 0:  # apart by what places go by, and not by this difference
+        return closest
+    by = score_with_unit(sign * found.value, unit)
+    return f"{closest}, worse by {by} ({percent(None, None)} {interval(min(ends), max(ends), unit)})"
 
 
 def _timed(board: Board) -> str:
@@ -185,30 +176,10 @@ def _timed(board: Board) -> str:
     return f"{' and '.join(timed)} {reads} no sensor, only the time: such a score needs no touch."
 
 
-def _published(board: Board) -> str:
-    """Return where published figures lie beside the intervals of ours."""
-    finished = (*board.answers, *board.trivial)
-    published = [against_reference(row) for row in finished if row.get("published") is not None]
-    rows = [row for row in published if row["ci_low"] is not None]
-    if not rows:
-        return ""
-    alone = len({row["sensor"] for row in rows}) == len(rows)
-
-    def beside(row: Row) -> str:
-        value, high = row["published"], row["ci_high"]
-        return "below" if value < row["ci_low"] else "above" if high is not None and value > high else "inside"
-
-    figures = grouped(rows, beside)
-    parts: list[str] = []
-    for where, members in figures.items():
-        shown = [(row["sensor"] if alone else board.name(row), score(row["published"], row["unit"])) for row in members]
-        verb = f" {'lies' if len(shown) == 1 else 'lie'}" if not parts else ""
-        listed = ", ".join(f"{name} {value}" for name, value in shown)
-        parts.append(f"{listed}{verb} {where} {'our interval' if len(shown) == 1 else 'our intervals'}")
-    tail = "; this concerns the simulation, not the sensors" if rows[0]["simulated"] else ""
-    named = list(dict.fromkeys(name for row in rows for name in row.get(ORDER_DEPENDS_ON) or ()))
-    tail += f". The order of the sensors depends on {' and '.join(named)} (`tactbench sensitivity`)" if named else ""
-    return f"Published values: {', '.join(parts)}{tail}."
+def _dependence(board: Board) -> str:
+    """Return the nuisances on which the order of simulated sensors depends, where that has been computed."""
+    named = dict.fromkeys(name for row in board.answers for name in row.get(ORDER_DEPENDS_ON) or ())
+    return f"The order of the sensors depends on {' and '.join(named)} (`tactbench sensitivity`)." if named else ""
 
 
 def below(board: Board) -> tuple[Note, ...]:

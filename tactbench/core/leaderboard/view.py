@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 from tactbench.core.errors import UnknownNameError
 from tactbench.core.evaluation.protocols import is_probe
 from tactbench.core.leaderboard.columns import COLUMNS, DEFAULT, NUMERIC, SHOWN, Line
-from tactbench.core.leaderboard.names import Row, grouped, held_out, metric_name
+from tactbench.core.leaderboard.names import Row, held_out, metric_name
 from tactbench.core.leaderboard.table import Block, Table
 from tactbench.core.statistics.replicates import against_reference, count_range, percent
 from tactbench.core.tables.text import command_line, visible
@@ -17,13 +17,11 @@ from tactbench.core.tables.text_table import Entry, TextTable, finite
 
 CELL, REASON = "cell", "reason"
 """Columns of cells' names, as `why` takes them, and of why cells did not end well."""
-_OF_TRIVIAL = ("place", "sensor", "estimator", "score", "beyond floor", "against reference", "published", "notes", CELL)
-"""What a screen shows of trivial answers: nobody compares how long they take."""
 _Texts = tuple[dict[str, str], str]
 """The texts of a line by column, and its kind."""
 _FIRST_TO_GO = (
     "cell", "latency p95", "latency p50", "simulation", "test samples", "interval beyond floor",
-    "recordings right", "range", "training", "level", "published", "delay after touch",
+    "range", "training", "level", "published", "delay after touch",
 )  # fmt: skip
 """Columns that a terminal does without, in this order; those that were asked for by name are never left out."""
 
@@ -74,11 +72,9 @@ def grids(table: Table, view: View = DEFAULT_VIEW) -> list[TextTable]:
 def grid(block: Block, view: View = DEFAULT_VIEW) -> TextTable:
     """Return what is printed of a block; numbers have what they are sorted by, and the cell that they are from."""
     short = not view.wide and not view.columns
-    # Why a trivial answer was skipped is told once, in a note.
-    told = [one for one in block.lines if not short or one.kind != "skipped" or not one.row["is_baseline"]]
-    lines: list[_Texts] = [(_texts(line), line.kind) for line in told or block.lines]
-    if short:
-        lines = _with_trivial_once(lines)
+    # A note says once why trivial answers were skipped.
+    shown = [one for one in block.lines if not short or one.kind != "skipped" or not one.row["is_baseline"]]
+    lines: list[_Texts] = [(_texts(line), line.kind) for line in shown or block.lines]
     names = view.columns or ((*COLUMNS, CELL) if view.wide else DEFAULT)
     names = tuple(name for name in names if name in lines[0][0])
     table = TextTable(
@@ -112,24 +108,6 @@ def _texts(line: Line) -> dict[str, str]:
     }
     why = "" if row["status"] == "done" else visible(f"{row['status']}: {row['reason']}")
     return {**found, CELL: visible(str(row["cell"])), REASON: why}
-
-
-def _with_trivial_once(lines: Sequence[_Texts]) -> list[_Texts]:
-    """Return lines with the scores of trivial answers alone, one line where all sensors agree to the last digit."""
-    sensors = {texts["sensor"] for texts, kind in lines if kind in ("result", "baseline")}
-    found: list[_Texts] = []
-    for (kind, _), same in grouped(
-        lines, lambda one: (one[1], one[0]["estimator"] if one[1] == "baseline" else "")
-    ).items():
-        if kind != "baseline":
-            found += same
-            continue
-        kept = [{name: text if name in _OF_TRIVIAL else "" for name, text in texts.items()} for texts, _ in same]
-        alike = {name: text if all(one[name] == text for one in kept) else "" for name, text in kept[0].items()}
-        agree = alike["score"] and alike["against reference"] == kept[0]["against reference"]
-        once = len(kept) > 1 and {one["sensor"] for one in kept} == sensors and agree
-        found += [(texts, kind) for texts in ([alike] if once else kept)]
-    return found
 
 
 def _short(row: Row, rows: Sequence[Row]) -> str:

@@ -65,13 +65,6 @@ def delay(known_ms: float | None, parts_ms: Mapping[str, float] | None) -> str:
     return f"{least}{duration(known_ms / 1e3)}"
 
 
-def tail(p95_ms: float | None, largest_ms: float | None, calls: int | None) -> str:
-    """Return the 95th percentile of times; where there are too few calls for one, the largest of them, and says so."""
-    if p95_ms is not None:
-        return duration(p95_ms / 1e3)
-    return ABSENT if largest_ms is None else f"{duration(largest_ms / 1e3)} (largest of {calls})"
-
-
 def whole(value: int | None) -> str:
     """Return a count with thin groups of three."""
     return ABSENT if value is None else f"{value:,}".replace(",", "\u202f")
