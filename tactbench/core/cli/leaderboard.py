@@ -43,10 +43,8 @@ def _filters(command: Any) -> Any:
               help="How it is shown; default: table, or what the name of the file given with --to says.")  # fmt: skip
 @click.option("--to", "-o", "to", type=click.Path(path_type=Path, dir_okay=False), metavar="FILE",
               help="Write a file: .txt, .md, .csv, .json, .tex, .parquet, .xlsx.")  # fmt: skip
-@click.option("--no-times", "times", flag_value=False, default=True, type=bool,
-              help="Only what a seed decides, no times and hosts: the same bytes on every machine.")  # fmt: skip
 def command(
-    folder: Path, shape: str | None, to: Path | None, times: bool, best: int | None, columns: str | None, wide: bool,
+    folder: Path, shape: str | None, to: Path | None, best: int | None, columns: str | None, wide: bool,
     **filters: tuple[str, ...],
 ) -> None:  # fmt: skip
     """Show the table of all results in a folder, in any format. FOLDER is what `run --out` wrote."""
@@ -59,7 +57,7 @@ def command(
     store = opened(folder)
     every = shown_rows(store)
     rows = _only(every, filters)
-    table = table_of(store, rows, times=times)
+    table = table_of(store, rows)
     view = replace(view, all_rows=len(rows) == len(every))
     print_table(best_of(table, best) if best else table, shape, view, to=to)
 

@@ -26,8 +26,6 @@ class Column(NamedTuple):
     text: Callable[[Row], str]
     value: Callable[[Row], float | None] | None = None
     """What it is sorted by, times in seconds, intervals by their middle; None: a column of words."""
-    timed: bool = False
-    """Whether no seed decides it: it belongs to the host that was timed."""
 
 
 def _score(shown: str, key: str) -> Column:
@@ -46,7 +44,7 @@ def _time(shown: str, key: str, per_second: float = 1.0) -> Column:
     def seconds(row: Row) -> float | None:
         return None if row.get(key) is None else row[key] / per_second
 
-    return Column(shown, lambda row: duration(seconds(row)), seconds, timed=True)
+    return Column(shown, lambda row: duration(seconds(row)), seconds)
 
 
 def _range(row: Row) -> str:
@@ -65,7 +63,7 @@ _RANKED: dict[str, str] = {"place": "rank", "notes": "marks"}
 """Columns that the block of a row decides."""
 OF_ROWS: dict[str, Column] = {
     "sensor": Column("sensor", lambda row: visible(str(row["sensor"]))),
-    "level": Column("level", lambda row: visible(str(row.get(LEVEL) or ABSENT)), timed=True),
+    "level": Column("level", lambda row: visible(str(row.get(LEVEL) or ABSENT))),
     "estimator": Column("estimator", answer_name),
     "score": _score("score", "score"),
     "interval": _interval("interval", "ci_low", "ci_high"),
@@ -79,7 +77,6 @@ OF_ROWS: dict[str, Column] = {
         "answer_delay",
         lambda row: delay(row.get("answer_delay_ms"), row.get("delay_parts_ms")),
         lambda row: None if row.get("answer_delay_ms") is None else row["answer_delay_ms"] / 1e3,
-        timed=True,
     ),
     "training": _time("fit", "fit_s"),
     "simulation": _time("sim", "sim_s"),
@@ -92,11 +89,6 @@ WIDE = ("interval beyond floor", "test samples", "simulation", "latency p50", "l
 """Columns that are printed only where all are asked for."""
 DEFAULT = tuple(name for name in COLUMNS if name not in WIDE)
 NUMERIC = frozenset(("place", *(name for name, column in OF_ROWS.items() if column.value)))
-
-
-def columns(*, times: bool) -> tuple[str, ...]:
-    """Return the columns of a table with times, or of one without."""
-    return tuple(name for name in COLUMNS if times or name not in OF_ROWS or not OF_ROWS[name].timed)
 
 
 @dataclass(frozen=True)
@@ -120,16 +112,16 @@ class Line:
         return sorted_by(self.row) if sorted_by and self.kind in ("result", "baseline") else None
 
 
-def line_of(row: Row, placing: Rank | None, names: Sequence[str], marks: Sequence[str], place: str = "") -> Line:
+def line_of(row: Row, placing: Rank | None, marks: Sequence[str], place: str = "") -> Line:
     """Return the line of a row; `place` stands there where it has none."""
     if row["status"] != "done":
         texts = {"sensor": visible(str(row["sensor"])), "estimator": answer_name(row), "score": row["status"].upper()}
         kind: Kind = "failed" if row["status"] in STOPPED else "skipped"
-        return Line(row, {name: texts.get(name, "") for name in names}, kind)
+        return Line(row, {name: texts.get(name, "") for name in COLUMNS}, kind)
     if placing:
         place = f"{placing.place}=" if placing.unsure else str(placing.place)
     ranked = {"place": place, "notes": " ".join(marks)}
-    texts = {name: ranked[name] if name in ranked else OF_ROWS[name].text(row) for name in names}
+    texts = {name: ranked[name] if name in ranked else OF_ROWS[name].text(row) for name in COLUMNS}
     # An absent value is empty: the dash means one thing, that an answer has no place.
     texts = {name: "" if text == ABSENT and name != "place" else text for name, text in texts.items()}
     return Line(row, texts, "baseline" if row["is_baseline"] else "result", placing)

@@ -12,11 +12,11 @@ from typing import Any
 import tactbench
 from tactbench.core.errors import UsageError
 from tactbench.core.files import replace_file
-from tactbench.core.leaderboard.columns import SHOWN
+from tactbench.core.leaderboard.columns import COLUMNS, SHOWN
 from tactbench.core.leaderboard.sentences import NO_BETTER
 from tactbench.core.leaderboard.table import Block, Table
 from tactbench.core.leaderboard.view import DEFAULT_VIEW, WHOLE, View, document, grids
-from tactbench.core.spec.row import FORMAT, JSON_KEYS, NESTED, OF_REPLICATES, Cost
+from tactbench.core.spec.row import FORMAT, JSON_KEYS, NESTED, OF_REPLICATES
 from tactbench.core.statistics.replicates import counted
 from tactbench.core.tables import markdown as markdown_format
 from tactbench.core.tables import terminal
@@ -160,32 +160,24 @@ def write_tables(table: Table, folder: Path) -> None:
 RANK_KEYS = ("rank", "rank_low", "rank_high", "rank_tied")
 """Where a row stands in its block; they follow the keys of the row."""
 
-OF_THE_MACHINE = {*Cost.model_fields, "search", "recordings", "key", "events", "operating_points"}
-"""Keys that machine, place or hour decide, not the seed alone."""
-
 FORMAT_VERSION = "1"
+_KEYS = (*JSON_KEYS, *OF_REPLICATES)
+"""Keys of a table's records, before their ranks."""
 _RANKS = {"rank": int, "rank_low": int, "rank_high": int, "rank_tied": bool}
-
-
-def keys(table: Table) -> tuple[str, ...]:
-    """Return the keys that a table's records have, before their ranks."""
-    every = (*JSON_KEYS, *OF_REPLICATES)
-    return every if table.times else tuple(key for key in every if key not in OF_THE_MACHINE)
 
 
 def records(table: Table) -> Iterator[tuple[dict[str, Any], dict[str, str]]]:
     """Yield each line's row, ranks among it, and its texts by what their columns are called for programs."""
-    chosen = keys(table)
     for line in table.lines:
         one = line.placing
         ranks = (one.place, one.low, one.high, one.tied) if one else (None, None, None, None)
-        row = {key: line.row.get(key) for key in chosen} | dict(zip(RANK_KEYS, ranks, strict=True))
+        row = {key: line.row.get(key) for key in _KEYS} | dict(zip(RANK_KEYS, ranks, strict=True))
         yield row, {SHOWN.get(name, name.replace(" ", "_")): text for name, text in line.texts.items()}
 
 
 def flat_records(table: Table) -> tuple[list[str], list[list[Any]]]:
     """Return names of columns and lines for formats whose cells hold one value: lists and tables are JSON."""
-    names = [*keys(table), *RANK_KEYS, *(f"shown_{SHOWN[name]}" for name in table.columns)]
+    names = [*_KEYS, *RANK_KEYS, *(f"shown_{SHOWN[name]}" for name in COLUMNS)]
     return names, [[*(_flat(*one) for one in row.items()), *shown.values()] for row, shown in records(table)]
 
 

@@ -62,8 +62,6 @@ class Board:
     unranked: str
     """Why places rest on no intervals; empty where they do."""
     bars: Bars
-    times: bool
-    """Whether the table has times."""
 
     @property
     def answers(self) -> list[Row]:
@@ -282,7 +280,7 @@ def _how(board: Board) -> Iterator[Note]:
     sentences = list(parts)
     if any(row["ci_low"] is not None and row["ci_high"] is None for row in board.answers):
         sentences.append("Open: so few put no upper bound to the error")
-    if board.times and any(row.get("answer_delay_ms") is not None for row in board.answers):
+    if any(row.get("answer_delay_ms") is not None for row in board.answers):
         sentences.append("Delay: sampling, link, window, computing; training: the final fit")
     if sentences:
         yield Note(f"{'. '.join(sentences)}.")
@@ -307,7 +305,7 @@ def _compared(board: Board) -> Iterator[Note]:
 
 def _hosts(board: Board) -> Iterator[Note]:
     """Yield that times cannot be compared."""
-    timed = [row for row in board.answers if row["fit_s"] is not None] if board.times else []
+    timed = [row for row in board.answers if row["fit_s"] is not None]
     hosts = len({str(row.get("host") or "") for row in timed})
     at_once = max((int(row.get("concurrency") or 1) for row in timed), default=1)
     why = [f"taken on {hosts} hosts"] * (hosts > 1) + [f"taken while up to {at_once} cells ran"] * (at_once > 1)

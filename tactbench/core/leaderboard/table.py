@@ -14,7 +14,7 @@ from operator import itemgetter
 from typing import TYPE_CHECKING, Any
 
 from tactbench.core.evaluation.protocols import is_probe
-from tactbench.core.leaderboard.columns import Line, columns, line_of
+from tactbench.core.leaderboard.columns import Line, line_of
 from tactbench.core.leaderboard.events import events_table
 from tactbench.core.leaderboard.levels import with_levels
 from tactbench.core.leaderboard.names import (
@@ -66,13 +66,10 @@ class Table:
     """A leaderboard, ready to be shown."""
 
     blocks: tuple[Block, ...]
-    columns: tuple[str, ...]
     sections: tuple[TextTable, ...] = ()
     """Tables below the blocks: events, and what was probed."""
     provenance: tuple[Row, ...] = ()
     """Who computed this, with what, where."""
-    times: bool = True
-    """Whether the table has what no seed decides: times, memory, hosts."""
 
     @property
     def lines(self) -> list[Line]:
@@ -105,20 +102,19 @@ def over_all(store: Store, rows: Sequence[Row]) -> list[dict[str, Any]]:
     return with_dependence(with_leaks(with_levels(over_replicates(rows), store.folder, store.provenance)), store)
 
 
-def table_of(store: Store, rows: Sequence[Row], *, times: bool = True) -> Table:
+def table_of(store: Store, rows: Sequence[Row]) -> Table:
     """Return the leaderboard of rows of a result folder, one a cell, with their tasks' questions; see `build_table`."""
     tasks = with_declared_of(installed(), rows).tasks
     names = {str(row["task"]) for row in rows}.intersection(tasks.names())
     made_by = sorted({str(row["made_by"]) for row in rows if row.get("made_by")})
     provenance = [known for known in map(store.provenance, made_by) if known]
-    return build_table(rows, provenance, times=times, questions={name: tasks[name].spec.question for name in names})
+    return build_table(rows, provenance, questions={name: tasks[name].spec.question for name in names})
 
 
 def build_table(
     rows: Sequence[Row],
     provenance: Sequence[Row] = (),
     *,
-    times: bool = True,
     questions: Mapping[str, str] | None = None,
 ) -> Table:
     """Arrange `rows` into blocks, ranked, with what is said of them.
@@ -129,28 +125,23 @@ def build_table(
         Rows of one folder or of several, in any order.
     provenance
         What is known of the runs they are from: see `tactbench.core.provenance.gather`.
-    times
-        False: the table of what a seed decides, the same on every machine; no times, no hosts, no provenance.
     questions
         What tasks ask, by name.
     """
-    names = columns(times=times)
-    blocks = blocks_of(sorted(rows, key=itemgetter("cell")), names, questions or {}, times=times)
+    blocks = blocks_of(sorted(rows, key=itemgetter("cell")), questions or {})
     ordered = [line.row for block in blocks for line in block.lines]
-    sections = (events_table(ordered) if times else None, build_probe(ordered))
+    sections = (events_table(ordered), build_probe(ordered))
     found = tuple(section for section in sections if section is not None)
-    return Table(blocks, names, found, tuple(provenance) if times else (), times)
+    return Table(blocks, found, tuple(provenance))
 
 
-def blocks_of(
-    rows: Sequence[Row], columns: Sequence[str], questions: Mapping[str, str], *, times: bool
-) -> tuple[Block, ...]:
+def blocks_of(rows: Sequence[Row], questions: Mapping[str, str]) -> tuple[Block, ...]:
     """Arrange rows, in the order of their cells' names, into ranked blocks."""
     groups = sorted(_grouped(rows).items(), key=lambda group: _order(group[0]))
-    return tuple(_block(key, members, columns, questions.get(key[0], ""), times) for key, members in groups)
+    return tuple(_block(key, members, questions.get(key[0], "")) for key, members in groups)
 
 
-def _block(key: _Key, members: Sequence[Row], columns: Sequence[str], question: str, times: bool) -> Block:
+def _block(key: _Key, members: Sequence[Row], question: str) -> Block:
     task, protocol, split, hardware = key
     bars = Bars(members)
     finished = [row for row in members if row["status"] == "done"]
@@ -164,16 +155,16 @@ def _block(key: _Key, members: Sequence[Row], columns: Sequence[str], question: 
     unplaced = sorted((row for row in answers if bars.no_better(row)), key=error_of)
     trivial = sorted((row for row in finished if row["is_baseline"]), key=lambda row: (row["sensor"], error_of(row)))
     stopped = sorted((row for row in members if row["status"] != "done"), key=lambda row: row["status"])
-    board = Board(placed, unplaced, trivial, stopped, unranked, bars, times)
+    board = Board(placed, unplaced, trivial, stopped, unranked, bars)
     few = unranked == "few"
     lines = [
-        *(line_of(row, None if few else placing, columns, board.marks(row)) for row, placing in placed),
-        *(line_of(row, None, columns, board.marks(row), NO_BETTER) for row in unplaced),
+        *(line_of(row, None if few else placing, board.marks(row)) for row, placing in placed),
+        *(line_of(row, None, board.marks(row), NO_BETTER) for row in unplaced),
         *(
-            line_of(row, None, columns, board.marks(row), "oracle" if row.get("looks_at") == "reference" else "")
+            line_of(row, None, board.marks(row), "oracle" if row.get("looks_at") == "reference" else "")
             for row in trivial
         ),
-        *(line_of(row, None, columns, ()) for row in stopped),
+        *(line_of(row, None, ()) for row in stopped),
     ]
     direction = "lower" if sign_of(members[0]) > 0 else "higher"
     setting = [f"{metric_name(members[0])}, {direction} is better", f"protocol {protocol}"]

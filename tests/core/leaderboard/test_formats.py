@@ -12,9 +12,8 @@ from hypothesis import strategies as st
 from markdown_it import MarkdownIt
 
 from tactbench.core.errors import UsageError
-from tactbench.core.leaderboard.columns import SHOWN
+from tactbench.core.leaderboard.columns import COLUMNS, SHOWN
 from tactbench.core.leaderboard.formats import (
-    OF_THE_MACHINE,
     latex,
     markdown,
     rendered,
@@ -30,30 +29,30 @@ many = settings(max_examples=30)
 views = st.sampled_from((DEFAULT_VIEW, WHOLE, View(columns=("estimator", "score", "cell"))))
 
 
-def written(shape, rows, *provenance, times=True):
-    return rendered(build_table(rows, provenance, times=times), shape)
+def written(shape, rows, *provenance):
+    return rendered(build_table(rows, provenance), shape)
 
 
 @many
-@given(some_rows(), st.booleans())
-def test_json_csv_parquet_and_excel_hold_the_cells_of_the_table(rows, times):
+@given(some_rows())
+def test_json_csv_parquet_and_excel_hold_the_cells_of_the_table(rows):
     import openpyxl
     import pyarrow.parquet as pq
 
-    table = build_table(rows, times=times)
-    names = [SHOWN[name] for name in table.columns]
+    table = build_table(rows)
+    names = [SHOWN[name] for name in COLUMNS]
     lines = [tuple(line.texts.values()) for block in table.blocks for line in block.lines]
-    of_json = json.loads(written("json", rows, times=times))
+    of_json = json.loads(written("json", rows))
     assert [tuple(entry["shown"].items()) for entry in of_json] == [
         tuple(zip(names, one, strict=True)) for one in lines
     ]
-    of_csv = list(csv.DictReader(io.StringIO(written("csv", rows, times=times).decode(), newline="")))
+    of_csv = list(csv.DictReader(io.StringIO(written("csv", rows).decode(), newline="")))
     assert [tuple(entry[f"shown_{name}"] for name in names) for entry in of_csv] == lines
-    read = pq.read_table(io.BytesIO(written("parquet", rows, {"host": "one"}, times=times)))
+    read = pq.read_table(io.BytesIO(written("parquet", rows, {"host": "one"})))
     assert list(zip(*(read[f"shown_{name}"].to_pylist() for name in names), strict=True)) == lines
     assert read["score"].to_pylist() == [one["score"] for one in table.rows]
-    assert json.loads(read.schema.metadata[b"tactbench.provenance"]) == ([{"host": "one"}] if times else [])
-    sheet = openpyxl.load_workbook(io.BytesIO(written("xlsx", rows, times=times)))["leaderboard"]
+    assert json.loads(read.schema.metadata[b"tactbench.provenance"]) == [{"host": "one"}]
+    sheet = openpyxl.load_workbook(io.BytesIO(written("xlsx", rows)))["leaderboard"]
     heads, *values = sheet.iter_rows()
     place = [cell.value for cell in heads].index("shown_sensor")
     assert [line[place].value or "" for line in values] == [one[names.index("sensor")] for one in lines]
@@ -61,9 +60,9 @@ def test_json_csv_parquet_and_excel_hold_the_cells_of_the_table(rows, times):
 
 
 @many
-@given(some_rows(), st.booleans(), views)
-def test_markdown_shows_the_cells_of_the_table_as_text(rows, times, view):
-    table = build_table(rows, times=times)
+@given(some_rows(), views)
+def test_markdown_shows_the_cells_of_the_table_as_text(rows, view):
+    table = build_table(rows)
     cells, place = [], None
     for token in MarkdownIt("commonmark").enable(["table", "strikethrough"]).parse(markdown(table, view)):
         place = [] if token.type == "tr_open" else place
@@ -84,15 +83,6 @@ def test_latex_sets_signs_as_they_are_and_names_letters_that_it_lacks_by_number(
     assert tex("50 % of a_b & ü – 中") == r"50 \% of a\_\allowbreak{}b \& ü -- U+4E2D"
     labels = re.findall(r"\\label\{(tab:tactbench-[a-z0-9-]+)\}", latex(build_table([row(), row(split="trial")])))
     assert labels == ["tab:tactbench-question-1", "tab:tactbench-question-2"]
-
-
-def test_without_times_nothing_is_left_that_a_machine_decides():
-    here = row(host="here", concurrency=4, made_by="x", key="k", delay_parts_ms={"prediction": 1.0})
-    there = here | dict.fromkeys(OF_THE_MACHINE)
-    for shape in ("json", "csv", "md", "latex", "parquet"):
-        one, other = (written(shape, [rows], {"host": rows["host"]}, times=False) for rows in (here, there))
-        assert one == other
-        assert written(shape, [here]) != written(shape, [there]) or shape == "latex"
 
 
 @pytest.mark.parametrize(("library", "shape"), [("pyarrow", "parquet"), ("openpyxl", "xlsx")])
