@@ -4,7 +4,8 @@
 """
 
 from tactbench.core.plugins.registry import load_registry
-from tactbench.core.report.datasheet import parameters_markdown
+from tactbench.core.report.datasheet import quantities, sensor_table
+from tactbench.core.tables.markdown import markdown
 
 _TITLE = """# Parameters of the simulated sensors
 
@@ -19,4 +20,5 @@ Every number the twin uses, and who says so. Tags: *sourced* (stated in a docume
 def reference() -> str:
     """Return the whole document."""
     sensors = load_registry().sensors
-    return _TITLE + parameters_markdown([sensors[name].spec for name in ("biotac", "icub", "ideal")])
+    specs = [sensors[name].spec for name in ("biotac", "icub", "ideal")]
+    return _TITLE + markdown([sensor_table(one.title, [one], quantities([one]), with_source=True) for one in specs])

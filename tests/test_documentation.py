@@ -120,7 +120,7 @@ def test_the_generated_pages_have_every_verb_and_field():
     written = runpy.run_path(str(CHECKOUT / "docs" / "command_reference.py"))["reference"]()
     assert [verb for verb in cli.list_commands(click.Context(cli)) if f"\n## `tactbench {verb}`\n" not in written] == []
     written = runpy.run_path(str(CHECKOUT / "docs" / "parameter_reference.py"))["reference"]()
-    assert re.search(r"^\| taxel_white_count \| .* \| measured \| \w+", written, re.MULTILINE)
+    assert re.search(r"^\| taxel_white_count \| .* \| measured: \w+", written, re.MULTILINE)
     written = runpy.run_path(str(CHECKOUT / "docs" / "plugin_reference.py"))["rig_files"]()
     for name in (
         "zero_s",

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
 from contextlib import AbstractContextManager, nullcontext
-from typing import Any
 
 
 class Progress:
@@ -18,9 +16,6 @@ class Progress:
 
     def working(self, what: str) -> None:
         """Say what is being done now, without finishing anything."""
-
-    def show(self, rows: Sequence[Mapping[str, Any]]) -> None:
-        """Receive the rows of all complete replicates whenever one becomes complete, but for the last."""
 
     def paused(self) -> AbstractContextManager[None]:
         """Return a context in which nothing is drawn: somebody is asked something."""

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -55,10 +54,7 @@ def command(
     check_destination(shape, to)
     view = view_of(folder, wide=wide, columns=columns, shape=shape)
     store = opened(folder)
-    every = shown_rows(store)
-    rows = _only(every, filters)
-    table = table_of(store, rows)
-    view = replace(view, all_rows=len(rows) == len(every))
+    table = table_of(store, _only(shown_rows(store), filters))
     print_table(best_of(table, best) if best else table, shape, view, to=to)
 
 

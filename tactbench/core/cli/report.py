@@ -37,7 +37,7 @@ def command(ctx: click.Context, folder: Path, out: Path | None) -> None:
         remark(f"{folder}: {sentence}")
     with progress() as display:
         made = make_report(results, out or folder / "report", display)
-    print_tables([made.reproduction])
+    print_tables([table for table in [made.reproduction] if table.lines])
     for sentence in made.missing:
         remark(f"Left out: {sentence}")
     for sentence in made.broken:

@@ -22,10 +22,10 @@ if TYPE_CHECKING:
 @click.argument("names", nargs=-1, required=True)
 @click.option("--all", "everything", is_flag=True,
               help="Show every parameter of a sensor and its source.")  # fmt: skip
-@format_option("table", "json", "md")
+@format_option("table", "json")
 def command(names: tuple[str, ...], everything: bool, shape: str) -> None:
     """Show sensors side by side (Table I and data sheets), or details of anything else that is installed."""
-    from tactbench.core.errors import UnknownNameError, UsageError
+    from tactbench.core.errors import UnknownNameError
     from tactbench.core.plugins.registry import load_registry, plain
 
     registry = load_registry()
@@ -38,13 +38,6 @@ def command(names: tuple[str, ...], everything: bool, shape: str) -> None:
     if shape == "json":
         described = [{"brought by": _owner(owned), **plain(owned.descriptor, "json")} for owned in found]
         click.echo(json_text(described, indent=1))
-        return
-    if shape == "md":
-        from tactbench.core.report.datasheet import parameters_markdown
-
-        if len(sensors) < len(found):
-            raise UsageError("Only sensors can be shown as Markdown.", hint="Leave --format out, or take json.")
-        click.echo(parameters_markdown(sensors), nl=False)
         return
     if sensors:
         _sensors(sensors, everything)
@@ -122,16 +115,13 @@ def _task_tables(task: TaskSpec) -> Iterator[TextTable]:
 
 def _sensors(sensors: list[SensorSpec], everything: bool) -> None:
     from tactbench.core.cli.grid import print_tables
-    from tactbench.core.report.datasheet import data_sheets, details, sensor_table, table_one
+    from tactbench.core.report.datasheet import data_sheets, quantities, readings, sensor_table, table_one
 
-    one, sheets, more = table_one(sensors), data_sheets(sensors), details(sensors)
-    print_tables(
-        [
-            sensor_table("Sensor comparison (Table I of Karl et al. 2016)", sensors, one, with_source=everything),
-            sensor_table("Data sheet", sensors, sheets, with_source=everything),
-            sensor_table("Everything the specs state" if everything else "Readings", sensors,
-                         more if everything else more[:6], with_source=everything),
-        ]
-    )  # fmt: skip
+    tables = {
+        "Sensor comparison (Table I of Karl et al. 2016)": table_one(sensors), "Data sheet": data_sheets(sensors),
+        "Readings": readings(sensors), "Parameters": quantities(sensors) if everything else [],
+    }  # fmt: skip
+    shown = [sensor_table(title, sensors, rows, with_source=everything) for title, rows in tables.items() if rows]
+    print_tables(shown)
     if not everything:
         click.echo("Every parameter with its source: --all.")

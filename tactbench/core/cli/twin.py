@@ -17,7 +17,6 @@ if TYPE_CHECKING:
     from tactbench.core.spec.scene import Scene, Simulation
 
 _EFFECTS = ("included", "effect", "cost_ms", "change", "unit", "reason")
-_COLUMNS = ("", "what", "found", "expected", "bound", "unit", "source")
 
 
 @click.group(name="twin")
@@ -135,25 +134,14 @@ def verify(ctx: click.Context, shape: str) -> None:
         hint = "See `tactbench show` with its name."
         raise UsageError(f"The rig {rig!r} states no laws to be held against.", hint=hint)
     found: list[Verdict] = list(load_object(where)())
-    if shape != "table":
-        print_records([_record(verdict) for verdict in found], shape)
-    else:
-        kinds = ["" if verdict.met else "failed" for verdict in found]
-        lines = [_line(verdict) for verdict in found]
-        print_records(lines, shape, title=rig, numeric=("found", "expected", "bound"), kinds=kinds)
+    kinds = ["" if verdict.met else "failed" for verdict in found]
+    print_records([_record(verdict) for verdict in found], shape, title=rig, kinds=kinds)
     met = sum(verdict.met for verdict in found)
     remark(f"{met} of {len(found)} within their bounds.")
     ctx.exit(0 if met == len(found) else 1)
 
 
-def _line(verdict: Verdict) -> dict[str, str]:
-    numbers = (f"{verdict.found:.5g}", f"{verdict.expected:.5g}", f"{verdict.bound:.2g}")
-    unit = "" if verdict.unit == "1" else verdict.unit
-    met = "ok" if verdict.met else "MISS"
-    return dict(zip(_COLUMNS, (met, verdict.name, *numbers, unit, verdict.source), strict=True))
-
-
 def _record(verdict: Verdict) -> dict[str, Any]:
     numbers = {name: getattr(verdict, name) for name in ("found", "expected", "bound")}
     finite = {name: number if math.isfinite(number) else None for name, number in numbers.items()}
-    return {"what": verdict.name, "met": verdict.met, **finite, "unit": verdict.unit, "source": verdict.source}
+    return {"met": verdict.met, "what": verdict.name, **finite, "unit": verdict.unit, "source": verdict.source}

@@ -65,6 +65,7 @@ def _facts(found: StoredCell) -> dict[str, Any]:
         "simulation": row["simulation"],
         "replicates": [*_replicates(found)] if done else [],
         "rests_on": [*_rests_on(row)] if done else [],
+        "left_out": row["counts"],
         "recording_scores": _recording_scores(found) if done else {},
         "try": command_line("tactbench", "why", name, "--again", "--out", str(found.store.folder)),
     }
@@ -97,19 +98,18 @@ def _replicates(found: StoredCell) -> Iterator[Field]:
 
 def _rests_on(row: Row) -> Iterator[Field]:
     """Yield what the score of a finished replicate is made of."""
+    from tactbench.core.cli.grid import field_text
     from tactbench.core.leaderboard.names import metric_name
-    from tactbench.core.leaderboard.notes import count_texts, picked
     from tactbench.core.tables.numbers import score_with_unit
 
     yield metric_name(row), score_with_unit(row["score"], str(row["unit"]))
     yield from ((name, f"{value:.3g}") for name, value in {**row["scores"], **(row.get("events") or {})}.items())
     if row.get("chosen"):
-        yield "chosen on validation data", picked(row)
+        yield "chosen on validation data", field_text(row["chosen"])
     yield "samples to train on, all folds together", str(row["n_train"])
     yield "samples to test on", str(row["n_test"])
     yield "recordings", f"{row['n_recordings']} of {row['n_sessions']} sessions"
     yield from (("assumed", f"{name} {value}") for name, value in sorted((row.get("assumptions") or {}).items()))
-    yield from (("left out", text) for text in count_texts(row.get("counts") or {}))
     yield from (("found", str(text)) for text in row.get("findings", ()))
     yield from (("remark", str(remark)) for remark in (*row.get("remarks", ()), *row.get("stamps", ())))
 
@@ -127,7 +127,11 @@ def _print(facts: Mapping[str, Any]) -> None:
 
     kept = "reuses it" if facts["answer"] == "hit" else "computes it again"
     scores = [f"{value:.4g} of {name}" for name, value in facts["recording_scores"].items()]
-    several = {"changed": facts["reasons"], "test recordings": scores, "recordings": facts["recordings"]}
+    counts = sorted(facts["left_out"].items(), key=lambda one: -one[1])
+    several = {
+        "changed": facts["reasons"], "left out": [f"{count} {what}" for what, count in counts],
+        "test recordings": scores, "recordings": facts["recordings"],
+    }  # fmt: skip
     fields = [("cell", facts["cell"]), ("status", str(facts["status"])), ("reason", str(facts["reason"] or ""))]
     fields += [("signal", str(facts["signal"] or "")), ("tactbench run", kept), *facts["replicates"]]
     if facts["rests_on"]:

@@ -37,9 +37,6 @@ _KEPT = (
     "remarks",
 )  # fmt: skip
 
-VERSION = 4
-"""Of the file that holds what `measure` yields."""
-
 Record = dict[str, Any]
 
 
@@ -168,5 +165,5 @@ def _known(settings: Sequence[Setting], rows: Mapping[Simulation, Mapping[str, R
     for best in front(competing, seconds=lambda one: one["answer_delay_ms"], error=lambda one: sign * one["score"]):
         best["front"] = True
     about = {key: first[key] for key in ("sensor", "task", "rig", "protocol", "metric", "unit", "simulated", "dagger")}
-    return {"version": VERSION, **about, "seed": seed, "trivial": bar,
+    return {**about, "seed": seed, "trivial": bar,
             "replicates": max(row["repeats"] for row in every), "settings": records}  # fmt: skip

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 from tactbench.core.errors import UnknownNameError
 from tactbench.core.evaluation.protocols import is_probe
 from tactbench.core.leaderboard.columns import COLUMNS, DEFAULT, NUMERIC, SHOWN, Line
-from tactbench.core.leaderboard.names import Row, held_out, metric_name
+from tactbench.core.leaderboard.names import held_out, metric_name
 from tactbench.core.leaderboard.table import Block, Table
 from tactbench.core.statistics.replicates import against_reference, count_range, percent
 from tactbench.core.tables.text import command_line, visible
@@ -36,8 +36,6 @@ class View:
     """These columns instead; see `known_columns`."""
     folder: str = ""
     """The result folder, for commands that are named; empty: the default one."""
-    all_rows: bool = True
-    """Whether the folder has no other rows: a short name of a cell is then no other's."""
 
 
 DEFAULT_VIEW = View()
@@ -110,17 +108,6 @@ def _texts(line: Line) -> dict[str, str]:
     return {**found, CELL: visible(str(row["cell"])), REASON: why}
 
 
-def _short(row: Row, rows: Sequence[Row]) -> str:
-    """Return the shortest name of a cell that `why` takes: sensor, task and estimator where no other cell has them."""
-
-    def parts(one: Row) -> tuple[str, ...]:
-        names = str(one["cell"]).split("/")
-        return (*names[:2], names[-1])
-
-    alike = [one for one in rows if parts(one) == parts(row)]
-    return "/".join(parts(row)) if len(alike) == 1 else str(row["cell"])
-
-
 def headings(names: Sequence[str], block: Block) -> tuple[str, ...]:
     """Return what stands above columns: a score by its metric and unit, an interval by its level."""
     rows = [line.row for line in block.lines]
@@ -141,9 +128,8 @@ def commands(table: Table, view: View = DEFAULT_VIEW) -> tuple[str, ...]:
     where, out = ((view.folder,), ("--out", view.folder)) if view.folder else ((), ())
     first = next((line.row for line in table.lines if line.kind == "result"), table.rows[0])
     paper = "for a paper, marked “simulated”" if first["simulated"] else "for a paper"
-    name = _short(first, table.rows) if view.all_rows else str(first["cell"])
     found = {
-        command_line("tactbench", "why", name, *out): "what this score rests on",
+        command_line("tactbench", "why", str(first["cell"]), *out): "what this score rests on",
         command_line("tactbench", "report", *where): "figures and every detail",
         command_line("tactbench", "leaderboard", *where, "--format", "latex"): paper,
     }

@@ -293,7 +293,7 @@ class Run:
                 engine.submit(work, piece)
 
     def _evaluated(self, job: Job, outcome: Any, log: str) -> None:
-        """Keep what came of a cell; show all complete replicates if it completes one."""
+        """Keep what came of a cell."""
         cell = job.cell
         if isinstance(outcome, BaseException):
             self._stopped(cell, job.task, outcome, job.key, job.sections)
@@ -305,11 +305,6 @@ class Run:
             )
             self.computed += 1
         self.progress.advance(cell.name, stopped=self.rows[cell.name]["status"] in STOPPED)
-        if any(one.name not in self.rows for one in self.cells if one.seed == cell.seed):
-            return
-        left = {one.seed for one in self.cells if one.name not in self.rows}
-        if left:
-            self.progress.show([self.rows[one.name] for one in self.cells if one.seed not in left])
 
     def _stopped(
         self, cell: Cell, task: TaskSpec, why: BaseException, key: str = "", sections: Sections | None = None

@@ -15,29 +15,22 @@ from tactbench.core.tables.text import json_text
 from tactbench.core.tables.text_table import Entry, TextTable, text_table
 
 _COLUMNS = {
-    "knob": "", "setting": "", "score": "score", "95 % interval": "ci_low", "answer delay": "answer_delay_ms",
-    "training": "fit_s", "simulation": "sim_s", "remark": "",
+    "knob": "", "setting": "", "front": "", "score": "score", "95 % interval": "ci_low",
+    "answer delay": "answer_delay_ms", "training": "fit_s", "simulation": "sim_s", "remark": "",
 }  # fmt: skip
 """Column -> key of the number behind it."""
 
 
-def trade_tables(known: Mapping[str, Any]) -> list[TextTable]:
-    """Return what `tactbench.core.cost.knobs.measure` yields as tables; raises KeyError where a file of it is damaged.
+def trade_table(known: Mapping[str, Any]) -> TextTable:
+    """Return what `tactbench.core.cost.knobs.measure` yields as a table; raises KeyError where a file of it is damaged.
 
-    The first, where there is one: the settings that no other one beats in both score and answer delay, the quickest
-    first.
+    The front is of the settings that no other one beats in both score and answer delay.
     """
-    best = sorted((one for one in known["settings"] if one["front"]), key=lambda one: float(one["answer_delay_ms"]))
-    title = f"{title_of(known)}: what answer delay buys"
-    front = [_table(known, title, best).only([name for name in _COLUMNS if name not in ("simulation", "remark")])]
-    return (front if best else []) + [_table(known, title_of(known), known["settings"]).compact()]
-
-
-def _table(known: Mapping[str, Any], title: str, settings: list[Mapping[str, Any]]) -> TextTable:
     lines = []
-    for one in settings:
+    for one in known["settings"]:
         texts = {
-            "knob": one["knob"], "setting": one["value"], "score": score(one["score"], known["unit"]),
+            "knob": one["knob"], "setting": one["value"], "front": "yes" if one["front"] else "",
+            "score": score(one["score"], known["unit"]),
             "95 % interval": interval(one["ci_low"], one["ci_high"], known["unit"]),
             "answer delay": delay(one["answer_delay_ms"], one["delay_parts_ms"]), "training": duration(one["fit_s"]),
             "simulation": duration(one["sim_s"]),
@@ -46,10 +39,13 @@ def _table(known: Mapping[str, Any], title: str, settings: list[Mapping[str, Any
         lines.append([Entry(texts[name], one.get(key)) for name, key in _COLUMNS.items()])
     better = "lower" if known["metric"] in LOWER_IS_BETTER else "higher"
     nothing = "" if known["trivial"] is None else f" Looking at nothing: {score(known['trivial'], known['unit'])}."
-    notes = [f"Score: {metric_name(known)}, {better} is better.{nothing}"]
-    kinds = ["failed" if one["status"] != "done" else "result" if one["front"] else "" for one in settings]
-    return text_table(title, tuple(_COLUMNS), lines, numeric=[name for name, key in _COLUMNS.items() if key],
-                      notes=notes, kinds=kinds)  # fmt: skip
+    notes = [
+        f"Score: {metric_name(known)}, {better} is better.{nothing}",
+        "Front: no other setting is better in both score and answer delay; trees, window, rate and estimators compete.",
+    ]
+    kinds = ["failed" if one["status"] != "done" else "result" if one["front"] else "" for one in known["settings"]]
+    numeric = [name for name, key in _COLUMNS.items() if key]
+    return text_table(title_of(known), tuple(_COLUMNS), lines, numeric=numeric, notes=notes, kinds=kinds)
 
 
 def write_trade(known: Mapping[str, Any], place: Path) -> None:

@@ -56,20 +56,21 @@ def data_sheets(sensors: Sequence[SensorSpec]) -> list[Property]:
     return _properties(sensors, {name.replace("_", " "): partial(_of_device, name=name) for name in OF_DEVICES})
 
 
-def details(sensors: Sequence[SensorSpec]) -> list[Property]:
-    """Return what else the specs say: clocks, converters, rest levels, skin, parameters, noise."""
+def readings(sensors: Sequence[SensorSpec]) -> list[Property]:
+    """Return what the specs state of readings: clocks, converters, rest levels, positions."""
     looks = {
         "streams": _streams, "delay of a reading": _delay, "taxel reading": _reading, "taxel at rest": _rest,
         "under load": _sign, "positions": _positions,
     }  # fmt: skip
+    return _properties(sensors, looks)
+
+
+def quantities(sensors: Sequence[SensorSpec]) -> list[Property]:
+    """Return every quantity that the specs state: skin, parameters, noise, nuisances."""
     tables = list(map(_quantities, sensors))
     titles = dict.fromkeys(title for table in tables for title in table)
-    return _properties(sensors, looks) + [
-        Property(
-            title, tuple(_fact(one, one.source if one else None) for one in (table.get(title) for table in tables))
-        )
-        for title in titles
-    ]
+    rows = ((title, [table.get(title) for table in tables]) for title in titles)
+    return [Property(title, tuple(_fact(one, one.source if one else None) for one in row)) for title, row in rows]
 
 
 def sensor_table(
@@ -85,18 +86,6 @@ def sensor_table(
             line += [fact.text, source] if with_source else [fact.text]
         lines.append(tuple(line))
     return TextTable(title, ("", *columns), tuple(lines))
-
-
-def parameters_markdown(sensors: Sequence[SensorSpec]) -> str:
-    """Return every quantity the specs state, one table a sensor: value, tag, who says so."""
-    parts = []
-    for sensor in sensors:
-        lines = [f"## {sensor.title}", "", "| parameter | value | tag | source |", "|---|---|---|---|"]
-        for title, quantity in _quantities(sensor).items():
-            cells = (title, str(quantity), quantity.source.tag, quantity.source.reference)
-            lines.append("| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |")
-        parts.append("\n".join(lines) + "\n")
-    return "\n".join(parts)
 
 
 def _properties(sensors: Sequence[SensorSpec], looks: Mapping[str, Callable[[SensorSpec], Fact]]) -> list[Property]:

@@ -20,7 +20,7 @@ from tactbench.core.leaderboard.sensitivity import sensitivity_tables
 from tactbench.core.leaderboard.view import REASON, View, grid
 from tactbench.core.progress import Progress
 from tactbench.core.report.cells import details
-from tactbench.core.report.costs import trade_tables
+from tactbench.core.report.costs import trade_table
 from tactbench.core.report.datasheet import sensor_table, table_one
 from tactbench.core.report.figures.drawing import draw_figures
 from tactbench.core.report.figures.published_and_ours import NAME as PUBLISHED
@@ -87,7 +87,7 @@ def costs_section(results: Results) -> Section:
     tables = []
     for path in sorted(folder.glob("*.json")):
         with suppress(KeyError, TypeError, ValueError):  # twin.json has no such table, nor has a damaged file
-            tables += trade_tables(json.loads(path.read_bytes()))
+            tables.append(trade_table(json.loads(path.read_bytes())))
     pictures = (SavedFigure(path.stem, path.stem, "As `tactbench cost` has drawn it.", path)
                 for path in sorted(folder.glob("*.png")))  # fmt: skip
     return Section(tables=tuple(tables), pictures=tuple(pictures))

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any, TextIO
 
 from tactbench.core.progress import Progress
-from tactbench.core.tables.terminal import console, plain_text, remark
+from tactbench.core.tables.terminal import remark
 
 _FEW = 10
 """Stages of so few steps have no estimate of the time to go: a forest and a mean differ by orders of magnitude."""
@@ -53,23 +53,11 @@ class _Bar(Progress):
         self._shown: Any = None
         self._task: Any = None
         self._stopped = 0
-        self._text = ""
 
     def begin(self, stage: str, total: int) -> None:
         from rich.console import Console
         from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeElapsedColumn, TimeRemainingColumn
         from rich.progress import Progress as RichProgress
-        from rich.text import Text
-
-        bar = self
-
-        class Shown(RichProgress):
-            """Bars below what is known so far."""
-
-            def get_renderables(self) -> Iterator[Any]:
-                if bar._text:
-                    yield Text.from_ansi(bar._text, no_wrap=True)
-                yield from super().get_renderables()
 
         self.end()
         columns = (
@@ -82,7 +70,7 @@ class _Bar(Progress):
             TextColumn("{task.fields[now]}", markup=False),
         )
         # The terminal is handed over as it is: rich must not take over streams that cells print to.
-        self._shown = Shown(
+        self._shown = RichProgress(
             *columns, console=Console(file=self._terminal), redirect_stdout=False,
             redirect_stderr=False, transient=True,
         )  # fmt: skip
@@ -97,16 +85,6 @@ class _Bar(Progress):
 
     def working(self, what: str) -> None:
         self._shown.update(self._task, now=what, refresh=True)
-
-    def show(self, rows: Sequence[Mapping[str, Any]]) -> None:
-        """Show the table of `rows` above the bars, in place of the one before."""
-        from tactbench.core.leaderboard.table import build_table
-        from tactbench.core.leaderboard.view import grids
-        from tactbench.core.statistics.replicates import over_replicates
-
-        self._text = plain_text(grids(build_table(over_replicates(rows))), console().width)
-        if self._shown is not None:
-            self._shown.refresh()
 
     @contextmanager
     def paused(self) -> Iterator[None]:

@@ -47,7 +47,6 @@ def assert_one_clear_screen(done, *says):
         (("run", "--set", "noise_scale=-1"), "noise_scale = -1"),
         (("run", "--rig", "replay", "--recordings", ".", "--set", "noise_scale=2"), "simulated rigs"),
         (("leaderboard", os.devnull), os.devnull),
-        (("show", "force", "--format", "md"), "sensors"),
         (("record", "--sensor", "icub", "--rig", "replay", "--out", "press.h5"), "replay"),
         (("record", "--sensor", "ideal", "--indenter", "knob", "--out", "no.h5"), "Known: cap, cylinder"),
         (("choose", "--task", "shear-force"), "tactbench run --task shear-force"),

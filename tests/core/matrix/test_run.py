@@ -29,16 +29,13 @@ class Heard(Progress):
     """Receives what a run tells."""
 
     def __init__(self):
-        self.stages, self.steps, self.shown = [], [], []
+        self.stages, self.steps = [], []
 
     def begin(self, stage, total):
         self.stages.append((stage, total))
 
     def advance(self, what, *, stopped=False):
         self.steps.append(what)
-
-    def show(self, rows):
-        self.shown.append([row["cell"] for row in rows])
 
 
 def decided(rows):
@@ -69,7 +66,6 @@ def test_every_planned_cell_has_a_row_in_the_order_of_the_plan(ran):
     assert (outcome.computed, outcome.recorded, outcome.failures) == (8, 0, [])
     assert sorted(heard.steps) == sorted(names)
     assert heard.stages == [("evaluating, timed", 4), ("evaluating", 4)]
-    assert heard.shown == [names[:4]], "whenever a replicate is complete, but for the last"
     assert decided(Store(folder).rows()) == decided(outcome.rows)
     assert all(len(row["recordings"]) == 3 for row in outcome.rows)
 

@@ -171,7 +171,7 @@ def test_each_number_stands_at_its_place(finished):
         for key in ["score" if row.get("reference_score") is None else "reference_score"]  # what was published of force
     ]
     (axes,) = draw_published(Results(material.store, material.registry, tuple(rows))).figure.axes
-    lines = [line for line in reproduce(material.registry, rows) if line.row]
+    lines = reproduce(material.registry, rows)
     for marker, values in (
         ("o", [line.row["score"] for line in lines]),
         ("D", [line.published.score for line in lines]),

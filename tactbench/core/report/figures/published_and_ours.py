@@ -23,7 +23,7 @@ def draw_published(results: Results) -> Sketch | None:
     """Draw each published score beside our row, and what its replicates scored; None where no row stands beside one."""
     tasks: dict[str, list[tuple[Reproduction, Mapping[str, Any]]]] = {}
     for line in reproduce(results.registry, results.rows):
-        if line.row is not None and line.row["status"] == "done":
+        if line.row["status"] == "done":
             tasks.setdefault(line.task.name, []).append((line, line.row))
     if not tasks:
         return None
