@@ -36,8 +36,8 @@ def command(
 ) -> None:
     """Measure what accuracy costs in time, and draw it.
 
-    One setting after another is varied: trees, window, sampling rate, training sessions, protocol; with --twin the rung
-    and the tolerance of the simulation. Files go into the folder cost of the result folder, and grow with every
+    One setting after another is varied: trees, window, sampling rate, training sessions, estimators; with --twin the
+    rung and the tolerance of the simulation. Files go into the folder cost of the result folder, and grow with every
     replicate; what is there already is reused.
     """
     from tactbench.core.errors import UsageError

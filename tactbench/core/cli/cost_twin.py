@@ -14,7 +14,19 @@ if TYPE_CHECKING:
     from tactbench.core.cost.precision import Skipped
     from tactbench.core.plugins.interfaces import CostPoint, CostStudy
 
-_COLUMNS = ("marks", "way", "rung", "seconds", "error_rms", "error_worst", "unit", "noise", "reason")
+_COLUMNS = (
+    "sensor",
+    "observable",
+    "marks",
+    "way",
+    "rung",
+    "seconds",
+    "error_rms",
+    "error_worst",
+    "unit",
+    "noise",
+    "reason",
+)
 """Of a record that tables show."""
 
 
@@ -56,12 +68,7 @@ def show_twin(sensors: tuple[str, ...], out: Path, shape: str, *, rounds: int) -
 
 
 def _print(records: Sequence[dict[str, Any]], study: CostStudy, shape: str) -> None:
-    if shape != "table":
-        print_records(records, shape)
-        return
-    for named in dict.fromkeys((one["sensor"], one["observable"]) for one in records):
-        own = [one for one in records if (one["sensor"], one["observable"]) == named]
-        print_records(own, shape, title=f"{', '.join(filter(None, named))}: {study.title}", columns=_COLUMNS)
+    print_records(records, shape, title=study.title, columns=_COLUMNS)
     remark(f"{study.reference}\nenough: the quickest whose error is below a third of the noise.")
 
 
@@ -82,26 +89,19 @@ def _records(points: Sequence[CostPoint], skipped: Sequence[Skipped]) -> list[di
             })  # fmt: skip
     found += [{"sensor": one.subject, "way": one.label, "rung": one.rung or None, "reason": one.reason}
               for one in skipped]  # fmt: skip
-    keys = dict.fromkeys((*_KEYS, *(key for record in found for key in record)))
+    keys = dict.fromkeys((*_COLUMNS, *(key for record in found for key in record)))
     return [{key: record.get(key) for key in keys} for record in found]
-
-
-_KEYS = ("sensor", "observable", *_COLUMNS)
-"""Of every record, those of settings follow."""
 
 
 def _write(points: Sequence[CostPoint], records: Sequence[dict[str, Any]], study: CostStudy, folder: Path) -> None:
     from tactbench.core.files import replace_file, writable
     from tactbench.core.report.figures.style import save, styled
     from tactbench.core.report.figures.trade import draw_precision
-    from tactbench.core.tables.csv_text import csv_of_records
     from tactbench.core.tables.text import json_text
 
-    with writable(folder):
+    with writable(folder), styled():
         folder.mkdir(parents=True, exist_ok=True)
-        replace_file(folder / "twin.csv", csv_of_records(records).encode())
         replace_file(folder / "twin.json", (json_text(records, indent=1) + "\n").encode())
         if points:
-            with styled():
-                save(draw_precision(points, study.title), folder / "twin")
-    remark(f"Files: {folder}/twin.csv, .json{', .png, .pdf' if points else ''}")
+            save(draw_precision(points, study.title), folder / "twin")
+    remark(f"Files: {folder}/twin.json{', .png, .pdf' if points else ''}")

@@ -16,10 +16,9 @@ if TYPE_CHECKING:
     from tactbench.core.leaderboard.table import Table
     from tactbench.core.leaderboard.view import View
 
-TABLE_FORMATS = ("table", "json", "md", "latex", "csv", "parquet", "xlsx")
+TABLE_FORMATS = ("table", "json", "md", "latex", "csv")
 FOR_PEOPLE = ("table", "md", "latex")
 """Formats that print less than everything."""
-NO_TEXT = ("parquet", "xlsx")
 
 _FILTERS = ("sensor", "task", "protocol", "split", "estimator")
 
@@ -51,7 +50,6 @@ def command(
     from tactbench.core.study.results import opened, shown_rows, table_of
 
     shape = _format_of(shape, to)
-    check_destination(shape, to)
     view = view_of(folder, wide=wide, columns=columns, shape=shape)
     store = opened(folder)
     table = table_of(store, _only(shown_rows(store), filters))
@@ -113,28 +111,13 @@ def _format_of(shape: str | None, to: Path | None) -> str:
     return str(found)
 
 
-def check_destination(shape: str, to: Path | None = None) -> None:
-    """Refuse to write bytes to a terminal.
-
-    Raises
-    ------
-    UsageError
-        If `shape` is no text and stdout is a terminal.
-    """
-    from tactbench.core.errors import UsageError
-
-    if shape in NO_TEXT and to is None and sys.stdout.isatty():
-        raise UsageError(
-            f"{shape} is no text for a terminal.",
-            hint=f"Write it to a file: `tactbench leaderboard --to leaderboard.{shape}`, or into a pipe.",
-        )
-
-
 def print_table(table: Table, shape: str, view: View, *, to: Path | None = None) -> None:
-    """Print a leaderboard on stdout, or write it to a file, in one of `TABLE_FORMATS`.
+    """Print a leaderboard on stdout, or write it to a file.
 
     Parameters
     ----------
+    shape
+        One of `TABLE_FORMATS`; of a file also ``parquet`` or ``xlsx``.
     view
         What is printed of it in the formats `FOR_PEOPLE`.
     to

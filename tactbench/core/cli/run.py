@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from tactbench.core.cli.leaderboard import TABLE_FORMATS, check_destination, print_table, view_of
+from tactbench.core.cli.leaderboard import TABLE_FORMATS, print_table, view_of
 from tactbench.core.cli.options import RESULTS, SIMULATION, YES, FiniteRange, format_option, options
 from tactbench.core.spec.bounds import MOST_MEMORY_MB, MOST_REPEATS, MOST_SECONDS
 from tactbench.core.tables.terminal import remark
@@ -69,7 +69,6 @@ def command(
     Without options: the whole of benchmarks.yaml. Options select from it or replace its choices. What the result folder
     holds already is reused.
     """
-    check_destination(shape)
     from tactbench.core.cli.listing import tell_failed
     from tactbench.core.leaderboard.formats import write_tables
     from tactbench.core.leaderboard.table import over_all

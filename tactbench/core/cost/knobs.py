@@ -26,9 +26,8 @@ TOLERANCES = (3.0, 1.0, 0.3)
 TIMES = {
     "trees": "answer_delay_ms", "window k": "answer_delay_ms", "every n-th sample": "answer_delay_ms",
     "estimator": "answer_delay_ms", "training sessions": "fit_s", "rung": "sim_s", "tolerance": "sim_s",
-    "protocol": "",
 }  # fmt: skip
-"""Knob -> the time that is paid along it; empty: none."""
+"""Knob -> the time that is paid along it."""
 BOUGHT = ("estimator", "trees", "window k", "every n-th sample")
 """Knobs whose settings answer the same question about the same recordings: they compete for the front."""
 _KEPT = (
@@ -81,8 +80,6 @@ def settings_of(task: TaskSpec, estimators: Sequence[EstimatorDescriptor], proto
     for split in task.splits:
         if shots(split) and DEPLOYABLE.name in task.protocols:
             yield Setting("training sessions", str(shots(split)), DEPLOYABLE.name, plain, split)
-    for name in task.protocols:
-        yield Setting("protocol", name, name, plain)
     for one in estimators:
         yield Setting("estimator", one.name, protocol, EstimatorChoice(name=one.name))
 

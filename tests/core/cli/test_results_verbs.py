@@ -10,7 +10,6 @@ import pytest
 from tactbench.core.matrix.store import Store
 from tactbench.core.study.shipped import shipped_rows
 from tests.conftest import Verbs
-from tests.core.cli.terminals import on_terminal
 from tests.core.matrix import made
 
 WISH = ("--task", "force", "--max-delay-ms", "2", "--range-n", "5", "--rate-hz", "10")
@@ -40,12 +39,6 @@ def test_every_format_goes_to_a_file_named_for_it(ran):
         assert (ran.folder / f"table{suffix}").read_bytes().startswith(begins)
     assert ".xlsx" in ran("leaderboard", "out", "--to", "table.xls", code=2).stderr
     assert not (ran.folder / "table.xls").exists()
-
-
-def test_bytes_are_not_written_to_a_terminal(ran):
-    with on_terminal(["-m", "tactbench", "leaderboard", "out", "--format", "parquet"], cwd=ran.folder) as terminal:
-        assert "--to leaderboard.parquet" in terminal.read_until(None)
-        assert terminal.process.wait(30) == 2
 
 
 def test_rows_and_columns_are_chosen_by_name_and_unknown_names_are_refused_with_the_known(ran):

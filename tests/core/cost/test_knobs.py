@@ -71,7 +71,7 @@ def test_what_is_known_grows_knob_by_knob_and_all_others_stay_as_they_are(known)
     assert sizes[0] < sizes[-1]
     settings = {(one["knob"], one["value"]): one for one in known[-1]["settings"]}
     base = settings["estimator", "forest-10"]
-    for same in (("trees", "10"), ("window k", "0"), ("every n-th sample", "1"), ("protocol", "deployable")):
+    for same in (("trees", "10"), ("window k", "0"), ("every n-th sample", "1")):
         assert (settings[same]["score"], settings[same]["fit_s"]) == (base["score"], base["fit_s"]), "one cell"
     assert settings["trees", "30"]["latency_ms_p50"] > settings["trees", "3"]["latency_ms_p50"]
     # 100 Hz: a window of 21 is late by ten intervals; every tenth sample is waited for ten times as long.

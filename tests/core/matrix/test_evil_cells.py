@@ -70,8 +70,8 @@ def test_recordings_whose_names_are_no_utf8_are_evaluated_and_found_again(tmp_pa
     assert "3 of 3 answers were found finished" in verbs(*asked, "--out", "out").stderr
     store = Store(tmp_path / "out")
     assert {path for row in store.rows() for _, path in store.recordings(row)} == {*(tmp_path / shelf).iterdir()}
-    for shape in ("table", "latex", "parquet", "xlsx"):
-        verbs("leaderboard", "out", "--format", shape, *(["--to", "board"] if shape in ("parquet", "xlsx") else []))
+    for suffix in ("txt", "tex", "parquet", "xlsx"):
+        verbs("leaderboard", "out", "--to", f"board.{suffix}")
     (tmp_path / "out" / "leaderboard.csv").read_text(encoding="utf-8")
 
 
