@@ -26,7 +26,7 @@ VERBS = {
     "record": ("record", "Record one scene into one file."),
     "inspect": ("inspect", "Show what is in a recording, and whether it is healthy."),
     "import": ("import_", "Convert foreign tables, or a sensor's log, into recordings."),
-    "datasets": ("datasets", "List public data sets that can be asked by name."),
+    "datasets": ("datasets", "List public data sets that a run can name."),
     "leaderboard": ("leaderboard", "Print the table of all results in a folder, in any format."),
     "report": ("report", "Write one HTML page of all results, with figures and published numbers."),
     "compare": ("compare", "Compare two sensors, estimators or result folders, replicate by replicate."),
@@ -96,7 +96,7 @@ def main(arguments: list[str] | None = None) -> None:
         error.show()
         code = error.exit_code
     except BrokenPipeError:
-        # The reader of our output went away (`| head`): nothing to tell anybody.
+        # The reader of the output has ended (`| head`): this is no error of ours.
         sys.stderr.close()
         _discard_output()
         code = 1

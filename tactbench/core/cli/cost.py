@@ -32,7 +32,7 @@ from tactbench.core.spec.matrix import REPLICATES
 )  # fmt: skip
 @format_option("table", "json", "csv")
 def command(
-    twin: bool, sensors: tuple[str, ...], task: str | None, rounds: int, out: Path, shape: str, **asked: Any
+    twin: bool, sensors: tuple[str, ...], task: str | None, rounds: int, out: Path, shape: str, **options_given: Any
 ) -> None:
     """Measure what accuracy costs in time, and draw it.
 
@@ -43,7 +43,7 @@ def command(
     from tactbench.core.errors import UsageError
 
     if twin and task is None:
-        if any(asked.values()):
+        if any(options_given.values()):
             raise UsageError("--twin without --task takes --sensor and --rounds.", hint="Leave the others out.")
         from tactbench.core.cli.cost_twin import show_twin
 
@@ -51,10 +51,10 @@ def command(
         return
     if task is None or (len(sensors) != 1 and not twin):
         raise UsageError(
-            "Say what the cost is asked of.",
+            "A sensor and a task are expected, or --twin.",
             hint="Of estimators: --sensor NAME --task NAME, one of each. Of the simulated rig: --twin.",
         )
-    _show_knobs(sensors, task, twin, out / "cost", shape, **asked)
+    _show_knobs(sensors, task, twin, out / "cost", shape, **options_given)
 
 
 def _show_knobs(

@@ -11,7 +11,7 @@ from tactbench.core.cli.options import format_option
 @click.command(name="datasets")
 @format_option(*GRID_FORMATS)
 def command(shape: str) -> None:
-    """List public data sets: what was measured, size, licence, the citation asked for, and whether it is here already.
+    """List public data sets: what was measured, size, licence, citation, and whether it is here already.
 
     `tactbench run --dataset NAME` fetches what is missing, once. One that is not public in this form needs --root.
     """

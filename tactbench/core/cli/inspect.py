@@ -98,7 +98,7 @@ def _print(about: dict[str, Any]) -> None:
     from tactbench.core.cli.grid import field_text, print_fields, print_records
 
     meta = about["meta"]
-    effects = {taken: [one["effect"] + " (asked)" * one["asked"] for one in meta["plan"] if one["included"] is taken]
+    effects = {taken: [one["effect"] + " (forced)" * one["asked"] for one in meta["plan"] if one["included"] is taken]
                for taken in (True, False)}  # fmt: skip
     verified = "verified" if about["complete"] else "unfinished: this is what a crash left behind"
     stated: dict[str, Any] = {

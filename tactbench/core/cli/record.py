@@ -111,7 +111,7 @@ def _built(registry: Registry, name: str, devices: RigFile | None, operator: Ope
     from tactbench.core.errors import UsageError
     from tactbench.core.plugins.rigs import rig_of
 
-    # A folder is given so that a rig that replays can be built, and then be told from one that presses.
+    # With a folder a rig that replays can be built too, and be refused by its name.
     rig: Rig = rig_of(name, registry, Path(), devices, operator)  # type: ignore[assignment]
     if not hasattr(rig, "open"):
         raise UsageError(

@@ -62,7 +62,7 @@ _REASON_CHARACTERS = 200
 @format_option(*TABLE_FORMATS)
 @click.pass_context
 def command(
-    ctx: click.Context, /, shape: str, estimator: tuple[str, ...], settings: tuple[str, ...], **asked: Any
+    ctx: click.Context, /, shape: str, estimator: tuple[str, ...], settings: tuple[str, ...], **options_given: Any
 ) -> None:
     """Acquire, evaluate, rank.
 
@@ -77,7 +77,7 @@ def command(
     from tactbench.core.study.study import Study, carry_out
 
     tell_failed(installed())
-    store, outcome = carry_out(Study(estimator=estimator or None, set=settings, **asked))
+    store, outcome = carry_out(Study(estimator=estimator or None, set=settings, **options_given))
     table = table_of(store, over_all(store, outcome.rows))
     print_table(table, shape, view_of(store.folder))
     write_tables(table, store.folder)

@@ -28,7 +28,7 @@ from tactbench.core.spec.bounds import MOST_REPEATS
 @click.pass_context
 def command(
     ctx: click.Context, /, estimator: tuple[str, ...], nuisances: tuple[str, ...], settings: tuple[str, ...],
-    shape: str, out: Path, **asked: Any,
+    shape: str, out: Path, **options_given: Any,
 ) -> None:  # fmt: skip
     """Show what simulated scores and the order of sensors rest on.
 
@@ -43,7 +43,7 @@ def command(
     from tactbench.core.study.study import Study
     from tactbench.core.tables.terminal import remark
 
-    study = Study(out=out, estimator=estimator or None, set=settings, **asked)
+    study = Study(out=out, estimator=estimator or None, set=settings, **options_given)
     stopped = carry_out_sensitivity(study, nuisances)
     specs = {sensor.name: sensor.spec for sensor in installed().sensors}
     print_tables(sensitivity_tables(Store(out), specs), shape)

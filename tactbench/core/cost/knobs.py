@@ -51,15 +51,15 @@ class Setting(NamedTuple):
 
     @property
     def choice(self) -> TaskChoice:
-        """What is asked of the task; its name is still to be given."""
+        """The choice of a task; its name is still to be given."""
         own = () if self.split is None else (self.split,)
         return TaskChoice(name="", protocol=(self.protocol,), split=own, estimators=(self.estimator,))
 
     def is_of(self, row: Row) -> bool:
         """Tell whether a row of this simulation answers it."""
         way = self.protocol if self.split is None else f"{self.protocol}:{self.split}"
-        asked = (way, self.estimator.name, dict(self.estimator.params))
-        return (str(row["cell"]).split("/")[3], row["estimator"], row["params"]) == asked
+        wanted = (way, self.estimator.name, dict(self.estimator.params))
+        return (str(row["cell"]).split("/")[3], row["estimator"], row["params"]) == wanted
 
 
 def settings_of(task: TaskSpec, estimators: Sequence[EstimatorDescriptor], protocol: str) -> Iterator[Setting]:
@@ -122,13 +122,13 @@ def measure(
         pieces: dict[tuple[Simulation, str], list[Setting]] = {}
         for one in settings:
             pieces.setdefault((one.simulation, "" if replicate else one.knob), []).append(one)
-        for (simulation, _), asked in pieces.items():
+        for (simulation, _), piece in pieces.items():
             own = folder
             if simulation != Simulation():
-                own = folder / "-".join((asked[0].knob, asked[0].value))
+                own = folder / "-".join((piece[0].knob, piece[0].value))
             change = {
                 "seed": matrix.seed + replicate, "repeats": 1, "latency": replicate == 0, "simulation": simulation,
-                "tasks": tuple(one.choice.model_copy(update={"name": task}) for one in asked),
+                "tasks": tuple(one.choice.model_copy(update={"name": task}) for one in piece),
             }  # fmt: skip
             outcome = run_matrix(
                 matrix.model_copy(update=change), Store(own), choice=choice, recordings=recordings, progress=progress

@@ -86,7 +86,7 @@ OF_ROWS: dict[str, Column] = {
 COLUMNS = ("place", "sensor", "level", "estimator", "score", "notes", *list(OF_ROWS)[4:])
 SHOWN = {name: OF_ROWS[name].shown if name in OF_ROWS else _RANKED[name] for name in COLUMNS}
 WIDE = ("interval beyond floor", "test samples", "simulation", "latency p50", "latency p95")
-"""Columns that are printed only where all are asked for."""
+"""Columns that are printed only with all others."""
 DEFAULT = tuple(name for name in COLUMNS if name not in WIDE)
 NUMERIC = frozenset(("place", *(name for name, column in OF_ROWS.items() if column.value)))
 

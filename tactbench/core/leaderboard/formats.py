@@ -32,7 +32,7 @@ SUFFIXES = {
 }  # fmt: skip
 """The format that a file is meant to have, by how its name ends."""
 IN_FOLDER = ("md", "csv", "json")
-"""A run's result folder has these, ``leaderboard.md`` and so on; the others are made when asked for."""
+"""A run's result folder has these, ``leaderboard.md`` and so on; `tactbench leaderboard` writes the others."""
 _IN_A_PAPER = ("sensor", "estimator", "score", "interval", "range", "against reference", "published")
 _LONG = 12
 """Letters of a name in a paper from which its column breaks it."""
@@ -60,7 +60,7 @@ def latex(table: Table, view: View = DEFAULT_VIEW) -> str:
 
 
 def _in_a_paper(block: Block, grid: TextTable, names: Sequence[str], number: int) -> str:
-    """Return a block as LaTeX; a paper gives no commands, and no places unless they were asked for."""
+    """Return a block as LaTeX; it has no commands, and no places unless they are among `names`."""
     # Cells without a score stand above the rule: trivial answers alone are below it.
     order = sorted(range(len(grid.lines)), key=lambda place: grid.kinds[place] == "baseline")
     lines = [dict(zip(grid.columns, grid.lines[place], strict=True)) for place in order]
@@ -126,7 +126,7 @@ def rendered(table: Table, shape: str, view: View = WHOLE, width: int = 240) -> 
     Raises
     ------
     UsageError
-        If Parquet or Excel is asked for and its library is not installed.
+        If the library of Parquet or Excel is not installed.
     """
     if shape == "table":
         return plain_text(table, width, view).encode("utf-8", "backslashreplace")
@@ -235,7 +235,7 @@ def _kind(name: str) -> type:
 
 
 def xlsx(table: Table) -> bytes:
-    """Return a table's records as a workbook: numbers as numbers, no formula, and a sheet of what is said of them.
+    """Return a table's records as a workbook: numbers as numbers, no formula, and a sheet of notes.
 
     Raises
     ------
@@ -248,8 +248,8 @@ def xlsx(table: Table) -> bytes:
         raise _lacking("An Excel file", "openpyxl", "xlsx", error) from error
     book = Workbook(write_only=True)
     names, lines = flat_records(table)
-    said = [one for block in table.blocks for one in (block.title, block.setting, block.origin, *block.verdict)]
-    sheets = {"leaderboard": [names, *lines], "notes": [[one] for one in (*said, *table.notes, *table.footer)]}
+    notes = [one for block in table.blocks for one in (block.title, block.setting, block.origin, *block.verdict)]
+    sheets = {"leaderboard": [names, *lines], "notes": [[one] for one in (*notes, *table.notes, *table.footer)]}
     for title, rows in sheets.items():
         sheet = book.create_sheet(title)
         for row in rows:

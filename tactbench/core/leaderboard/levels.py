@@ -23,7 +23,7 @@ _LEVELS = ("none", "bronze", "silver", "gold")
 
 
 def identity_of(package: str, provenance: Mapping[str, Any]) -> dict[str, str]:
-    """Return what tells one state of a plugin's package from another, of `gather`'s provenance; empty: not known."""
+    """Return what identifies one state of a plugin's package, from the provenance of a run; empty: not known."""
     if package == PACKAGE:
         return {name: str(provenance[name]) for name in ("tactbench", "commit") if name in provenance}
     for one in provenance.get("plugins", ()):

@@ -17,9 +17,9 @@ _Key = TypeVar("_Key")
 _Value = TypeVar("_Value")
 
 SIMULATED = "SIM (twin)"
-"""What is said of simulated rows in place of a rig."""
+"""What stands in place of the rig of simulated rows."""
 EMULATED = "EMULATED"
-"""What is said of rows whose recordings came from emulated devices, before their rig."""
+"""What stands before the rig of rows whose recordings came from emulated devices."""
 METRIC_NAMES = {
     "rmse": "RMSE",
     "mae": "MAE",
@@ -130,7 +130,7 @@ class Bars:
     def unshown(self, row: Row) -> bool:
         """Return whether the interval of an answer holds the score of the trivial one, or lies beyond it.
 
-        On recordings that of their paired difference tells, where both were tested on the same units.
+        On recordings the interval of their paired difference decides, where both were tested on the same units.
         """
         if row["cell"] not in self._unshown:  # a difference takes thousands of exchanges, and several notes ask
             self._unshown[row["cell"]] = self._holds(row)

@@ -17,7 +17,7 @@ LEAK_SHARE = 0.5
 """Share of the skill (score beyond the trivial answer's) from which on the first frame's is called a leak: what came
 before the contact then explains as much as all that the contact adds."""
 TAIL = 0.025
-"""Probability that guessing does as well, below which the first frame is said to tell something: the tail of the
+"""Probability that guessing does as well, below which a first frame predicts better than a guess: the tail of the
 leaderboard's 95 % intervals."""
 FEWEST = 5
 """Recordings from which on an error of first frames has an interval."""
@@ -53,13 +53,13 @@ def build_probe(rows: Sequence[Row]) -> TextTable | None:
 def with_leaks(rows: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
     """Return rows, with a stamp where the first frame gives an answer away: the mark of whatever table shows them."""
 
-    def told(row: Row) -> str:
+    def scored(row: Row) -> str:
         return score_with_unit(row["score"], row["unit"])
 
     found = {
-        row["cell"]: f"{LEAKS}first frame alone {told(first)} of {told(row)}."
+        row["cell"]: f"{LEAKS}first frame alone {scored(first)} of {scored(row)}."
         for row, first, _ in _probed(rows)
-        if first is not None and _told_by_first(row, first) == "LEAK"
+        if first is not None and _of_first_frame(row, first) == "LEAK"
     }
     return [{**row, "stamps": [*row["stamps"], found[row["cell"]]]} if row["cell"] in found else row for row in rows]
 
@@ -107,8 +107,8 @@ def _verdicts(row: Row, shuffled: Row | None, first: Row | None, bars: Bars) -> 
     if bars.trivial(row) is not None and (bars.no_better(row) or bars.unshown(row)):
         yield "TRIVIAL" if bars.no_better(row) else "TRIVIAL?"
     leaks = any(str(stamp).startswith(LEAKS) for stamp in row["stamps"])
-    if told := "LEAK" if leaks else _told_by_first(row, first):
-        yield told
+    if verdict := "LEAK" if leaks else _of_first_frame(row, first):
+        yield verdict
     if shuffled is not None and shuffled["status"] == "done":
         best = row[WORSE_END[-sign]]
         if best is None:
@@ -117,8 +117,8 @@ def _verdicts(row: Row, shuffled: Row | None, first: Row | None, bars: Bars) -> 
             yield "OPTIMISTIC"
 
 
-def _told_by_first(row: Row, first: Row | None) -> str:
-    """Return what first frames tell of an answer: LEAK, PART, that it cannot be said, or nothing."""
+def _of_first_frame(row: Row, first: Row | None) -> str:
+    """Return how much of an answer the first frame explains: LEAK, PART, that it is unknown, or nothing."""
     sign, trivial = sign_of(row), row["baseline"]
     if first is None or first["status"] != "done" or trivial is None:
         return ""

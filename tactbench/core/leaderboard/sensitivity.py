@@ -26,7 +26,7 @@ TURNED = "turns round"
 _NOTE = (
     "Each nuisance stands at one end of its range, all else as stated; the same seeds draw the same in all lines. A "
     "change is that of the mean over campaigns, with its 95 % interval over paired campaigns; a score is the median. A "
-    "sensor without numbers has no such nuisance. ≈: not told apart."
+    "sensor without numbers has no such nuisance. ≈: not shown to differ."
 )
 
 
@@ -122,7 +122,7 @@ def sensitivities(store: Store) -> dict[tuple[str, ...], Sensitivity]:
     variants = {path.parent.name: questions(Store(path.parent).rows()) for path in folders}
     found = {}
     for key, stated in questions(store.rows() if folders else ()).items():
-        own = {name: asked[key] for name, asked in variants.items() if key in asked}
+        own = {name: rows[key] for name, rows in variants.items() if key in rows}
         if own:
             found[key] = Sensitivity(stated, own)
     return found

@@ -1,7 +1,7 @@
-"""What is said above and below a block: a closed list, each with the condition under which it is true.
+"""The sentences above and below a block: a closed list, each with the condition under which it is true.
 
 docs/tables.md has the list. At most two sentences stand above and five notes below; what comes first here comes first
-there. Everything else that is known of a row is told by ``tactbench why`` and by the report.
+there. ``tactbench why`` and the report have everything else that is known of a row.
 """
 
 from __future__ import annotations
@@ -74,7 +74,7 @@ class Board:
         return beyond_floor([row for row, _ in self.placed])
 
     def name(self, row: Row) -> str:
-        """Return what tells a row from the others: the estimator, with the sensor where there are several."""
+        """Return the name of a row in a sentence: its estimator, with the sensor where there are several."""
         several = len({one["sensor"] for one in (*self.answers, *self.trivial)}) > 1
         return f"{row['sensor']}/{answer_name(row)}" if several else answer_name(row)
 
@@ -108,7 +108,7 @@ def above(board: Board) -> tuple[str, ...]:
 
 
 def _outcome(board: Board) -> str:
-    """Return who is best, or that it cannot be told."""
+    """Return which answer is best, or why none is shown to be."""
     if not board.placed:
         count = len(board.unplaced)
         whom = "The only answer scores no" if count == 1 else f"None of {count} answers scores"
@@ -132,10 +132,10 @@ def _outcome(board: Board) -> str:
             return "" if board.unplaced else f"{name} is the only answer."
         only = "the only answer" if not board.unplaced else f"the only of {len(board.answers)} answers that is"
         return f"{where}{name} is {only} better than the trivial one of its own sensor ({board.bars_of([first])})."
-    # Who shares its place is told from it by pairs alone, of which among many some are apart by chance.
+    # Answers of the same place differ from it in single pairs at most, and of many pairs some differ by chance.
     alike = [row for row, rank in others if rank.place == leader.place or not rank.behind]
     if alike:
-        return f"{where}{name} has {quality}; {_some(list(map(board.name, alike)))} cannot be told from it."
+        return f"{where}{name} has {quality}; {_some(list(map(board.name, alike)))} cannot be distinguished from it."
     return f"{where}{name} is best; {_closest(board, first, [row for row, _ in others])}."
 
 
@@ -204,7 +204,7 @@ def _ended(board: Board, stopped: bool) -> Iterator[Note]:
     names = list(dict.fromkeys(f"{row['sensor']}/{answer_name(row)}" for row in alike))
     others = f"; {len(rows) - len(alike)} more ended otherwise" if len(rows) > len(alike) else ""
     text = f"{_some(names)} {rows[0]['status']}{others}: {str(rows[0]['reason']).rstrip('.')}."
-    yield Note(text, " `tactbench why CELL` tells more." if stopped and all(row["made_by"] for row in rows) else "")
+    yield Note(text, " `tactbench why CELL` shows more." if stopped and all(row["made_by"] for row in rows) else "")
 
 
 def _marks(board: Board) -> Iterator[Note]:
@@ -215,14 +215,14 @@ def _marks(board: Board) -> Iterator[Note]:
         if not texts:
             continue
         lead = LEAKS if all(text.startswith(LEAKS) for text in texts) else ""
-        told = "; ".join(
+        texts_of = "; ".join(
             f"{_some([board.name(row) for _, row in of])}: " * (len(of) < len(finished))
             + text.removeprefix(lead).rstrip(".")
             for text, of in texts.items()
         )
-        yield Note(f"{mark}  {lead}{told}{'' if told.endswith('?') else '.'}", printed=True)
+        yield Note(f"{mark}  {lead}{texts_of}{'' if texts_of.endswith('?') else '.'}", printed=True)
     if any(rank.unsure for _, rank in board.placed) and not board.unranked:
-        yield Note(f"{SHARED}  each of these rows cannot be told from at least one other")
+        yield Note(f"{SHARED}  each of these rows cannot be distinguished from at least one other")
     of_own = "better than the trivial answer of its own sensor"
     if board.unplaced and board.placed:
         yield Note(f"{NO_BETTER}  no {of_own} ({board.bars_of(board.unplaced)})", printed=True)
@@ -297,7 +297,7 @@ def _compared(board: Board) -> Iterator[Note]:
     trivial = [bar for row in rows if (bar := board.bars.score(row)) is not None]
     if not rows[0]["classes"] and trivial and max(trivial) > 1.05 * min(trivial):
         ends = (score(end, rows[0]["unit"]) for end in (min(trivial), max(trivial)))
-        parts.append(f"what is asked differs between sensors (trivial answers {' … '.join(ends)})")
+        parts.append(f"the targets differ between sensors (trivial answers {' … '.join(ends)})")
     if {row.get("n_specimens") for row in rows} == {1}:
         parts.append("one specimen of each sensor: how specimens differ is not known")
     yield Note(f"Places: {'; '.join(parts)}.", printed=True)

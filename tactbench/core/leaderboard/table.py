@@ -117,7 +117,7 @@ def build_table(
     *,
     questions: Mapping[str, str] | None = None,
 ) -> Table:
-    """Arrange `rows` into blocks, ranked, with what is said of them.
+    """Arrange `rows` into ranked blocks, with their sentences and notes.
 
     Parameters
     ----------
@@ -200,7 +200,7 @@ def _order(key: _Key) -> tuple[Any, ...]:
 def _grouped(rows: Sequence[Row]) -> dict[_Key, list[Row]]:
     """Group rows by what must not be mixed.
 
-    A cell that was not begun knows neither its split, if nobody asked for one, nor whether it would have been
+    A cell that was not begun knows neither its split, unless one was chosen, nor whether it would have been
     simulated: it stands with the finished cells of its rig, if these agree.
     """
     done = [row for row in rows if row["status"] == "done"]
@@ -208,9 +208,9 @@ def _grouped(rows: Sequence[Row]) -> dict[_Key, list[Row]]:
     near = {key: (*key[:2], members[0]["rig"]) for key, members in groups.items()}
     for row in rows:
         if row["status"] != "done":
-            asked = (row["task"], row["protocol"], row["rig"])
-            found = [key for key, rig in near.items() if rig == asked and row["split"] in (None, key[2])]
-            alone = (*asked[:2], row["split"] or "", hardware_name(row))
+            question = (row["task"], row["protocol"], row["rig"])
+            found = [key for key, rig in near.items() if rig == question and row["split"] in (None, key[2])]
+            alone = (*question[:2], row["split"] or "", hardware_name(row))
             groups.setdefault(found[0] if len(found) == 1 else alone, []).append(row)
     return groups
 
@@ -241,7 +241,7 @@ def errors(results: Sequence[Row]) -> list[float]:
     """Return what answers of one metric are ordered by, the lower the better.
 
     The score; of errors of force the mean square beyond the floor of the reference, if all of them have one. It may be
-    below zero, where the error beyond the floor is 0: two answers of one sensor differ by more than its floor tells.
+    below zero, where the error beyond the floor is 0, so that two answers of one sensor keep their order.
     """
     if beyond_floor(results):
         return [one if math.isfinite(one) else math.inf for one in map(excess_of, results)]

@@ -23,7 +23,7 @@ _FIRST_TO_GO = (
     "cell", "latency p95", "latency p50", "simulation", "test samples", "interval beyond floor",
     "range", "training", "level", "published", "delay after touch",
 )  # fmt: skip
-"""Columns that a terminal does without, in this order; those that were asked for by name are never left out."""
+"""Columns that a terminal leaves out first, in this order; those that are chosen by name are never left out."""
 
 
 @dataclass(frozen=True)
@@ -43,7 +43,7 @@ WHOLE = View(wide=True)
 
 
 def known_columns(names: Sequence[str]) -> tuple[str, ...]:
-    """Return the names of columns that a person asks for by these or by their names for programs (``rank``).
+    """Return the names of columns that are given by these or by their names for programs (``rank``).
 
     Raises
     ------
@@ -89,7 +89,7 @@ def grid(block: Block, view: View = DEFAULT_VIEW) -> TextTable:
         first_to_go=() if view.columns else tuple(n for n in _FIRST_TO_GO if n != "range" or _has(lines, "interval")),
         unbroken=frozenset({CELL}),
     )
-    # A column of dashes says that nobody has a place.
+    # A column of dashes shows that no answer has a place.
     keep = ("place",) if any(texts["place"] for texts, _ in lines) else ()
     return table if view.columns else table.compact(keep)
 

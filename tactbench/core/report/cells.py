@@ -47,12 +47,12 @@ _APART = ("classes", "confusion", "fold_sizes")
 
 
 def details(row: Row, results: Results) -> Details:
-    """Return what a cell's row says, what is empty left out, and the scores of its folds and recordings."""
-    said = {name: value for name, value in row.items() if value not in (None, "", [], {}, ())}
+    """Return the values of a cell's row that are not empty, and the scores of its folds and recordings."""
+    known = {name: value for name, value in row.items() if value not in (None, "", [], {}, ())}
     of = f", replicate with seed {row['seed']}" if row["repeats"] > 1 else ""
     tested = results.answers(row).get("test") if row["status"] == "done" else None
     classes = list(map(str, row.get("classes") or ()))
-    counts = zip(classes, said.get("confusion", ()), strict=False)
+    counts = zip(classes, known.get("confusion", ()), strict=False)
     records: dict[str, Sequence[Mapping[str, Any]]] = {
         "Score of each fold": _folds(row),
         f"Score of each recording{of}": recording_scores(row, tested),
@@ -61,9 +61,9 @@ def details(row: Row, results: Results) -> Details:
         ],
     }
     pairs: dict[str, dict[str, str]] = {}
-    for name in dict.fromkeys((*_GROUPS, *said)):
-        value, title = said.get(name), _TITLES.get(name, name)
-        if name not in said or name in (*_TEXTS, *_APART):
+    for name in dict.fromkeys((*_GROUPS, *known)):
+        value, title = known.get(name), _TITLES.get(name, name)
+        if name not in known or name in (*_TEXTS, *_APART):
             continue
         if isinstance(value, Mapping):
             pairs[title] = {str(key): _text(one) for key, one in value.items() if not str(key).startswith("fold ")}
@@ -76,7 +76,7 @@ def details(row: Row, results: Results) -> Details:
         status=str(row["status"]),
         pairs={title: own for title, own in pairs.items() if own},
         tables=tuple(_records(title, own) for title, own in records.items() if own),
-        texts={name: str(said[name]) for name in _TEXTS if name in said},
+        texts={name: str(known[name]) for name in _TEXTS if name in known},
     )
 
 

@@ -39,18 +39,18 @@ TITLE = "tactbench: tactile sensors, what they answer and what it costs"
 
 def answers_section(results: Results) -> Section:
     """Return the first section: what came out in a few sentences, and published scores and ours in one picture."""
-    said = (
+    verdicts = (
         f"{one.title} ({one.setting.partition(' · ')[2]}) {one.verdict[0]}"
         for one in results.leaderboard.blocks
         if one.verdict
     )
-    verdicts = [line.verdict for line in reproduce(results.registry, results.rows)]
-    inside, judged = verdicts.count("inside"), sum(verdict in ("inside", "outside") for verdict in verdicts)
+    published = [line.verdict for line in reproduce(results.registry, results.rows)]
+    inside, judged = published.count("inside"), sum(verdict in ("inside", "outside") for verdict in published)
     paragraphs = (
         "SIM: simulated by a twin of the sensor; no sensor was touched."
         * any(row["simulated"] for row in results.rows),
         f"Published numbers in the interval of ours: {inside} of {judged}." if judged else "",
-        *said,
+        *verdicts,
     )
     pictures = tuple(one for one in results.drawn if one.name == PUBLISHED)
     return Section(paragraphs=tuple(filter(None, paragraphs)), pictures=pictures)

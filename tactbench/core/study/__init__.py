@@ -1,1 +1,1 @@
-"""One run asked for in typed words: what the verbs and the functions of Python both call."""
+"""One run, described by options: the verbs and the functions of Python both call this room."""

@@ -1,4 +1,4 @@
-"""Whoever stands at a rig: asked on stderr, answers with Enter."""
+"""The operator of a rig: prompts go to stderr, and Enter confirms them."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ class TerminalOperator:
     Parameters
     ----------
     yes
-        Everything asked for is done already: show it and go on (``--yes``).
+        Every step is done already: prompts are shown, and none is waited for (``--yes``).
     paused
-        Entered while somebody is asked, so that nothing else draws on the terminal: ``LiveView.paused``.
+        Entered during a prompt, so that nothing else draws on the terminal: ``LiveView.paused``.
     """
 
     def __init__(self, *, yes: bool = False, paused: Callable[[], AbstractContextManager[None]] = nullcontext) -> None:
@@ -38,14 +38,16 @@ class TerminalOperator:
             return
         if not sys.stdin.isatty():
             raise RigError(
-                f"Somebody has to be there: {text}",
+                f"An operator is needed: {text}",
                 hint="Run it in a terminal, or add --yes if all of that is done already.",
             )
         with self._paused():
             _forget_typed()
             remark(f"{text}\nPress Enter when it is done, Ctrl-C to end.")
             if not sys.stdin.readline():
-                raise RigError("The question was left without an answer.", hint="Press Enter when it is done.")
+                raise RigError(
+                    "The prompt was not confirmed: standard input is closed.", hint="Press Enter when it is done."
+                )
 
 
 def _forget_typed() -> None:

@@ -1,4 +1,4 @@
-"""How a simulated rig is asked to carry out its scenes, and with which nuisances."""
+"""How a simulated rig carries out its scenes: the effects, nuisances, rung and tolerance that options set."""
 
 from __future__ import annotations
 
@@ -22,13 +22,13 @@ def simulation_of(
     settings: Iterable[str] = (),
     stated: Simulation = Simulation(),  # noqa: B008  (it never changes)
 ) -> Simulation:
-    """Return what --effects and --set ask for, laid over what a file states.
+    """Return the simulation that --effects and --set describe, laid over what a file states.
 
     Raises
     ------
     UsageError
-        If a word of --effects is not one, nobody declares what --set names, it cannot have its value, or the rig is not
-        simulated at all.
+        If --effects names no effect, --set names no nuisance or gives it a value out of its range, or the rig is not
+        simulated.
     """
     given = dict(map(_setting, settings))
     change: dict[str, Any] = {name: given.pop(name) for name in (*_NAMED, "tolerance") if name in given}

@@ -1,4 +1,4 @@
-"""One run: what is asked for in typed words, the matrix that this comes to, and how it is carried out."""
+"""One run: its options, the matrix that they describe, and how it is carried out."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ Words = Annotated[
 
 
 class Study(Frozen):
-    """What a run is asked for: the options of ``tactbench run``. What is left out, the matrix file says."""
+    """The options of ``tactbench run``. The matrix file decides what they leave open."""
 
     sensor: Words = ()
     task: Words = ()
@@ -68,7 +68,7 @@ class Study(Frozen):
 
 
 def carry_out(study: Study) -> tuple[Store, Outcome]:
-    """Run what a study asks for, and show the progress; return the result folder and how cells ended.
+    """Run a study and show the progress; return the result folder and how cells ended.
 
     Raises as `matrix_of` and `tactbench.core.matrix.run.run_matrix` do.
     """
@@ -85,7 +85,7 @@ def carry_out(study: Study) -> tuple[Store, Outcome]:
 
 
 def matrix_of(study: Study, registry: Registry) -> MatrixSpec:
-    """Return the matrix file with what the study says laid over it.
+    """Return the matrix of the file, with the options of the study laid over it.
 
     Raises
     ------
@@ -126,15 +126,15 @@ def matrix_of(study: Study, registry: Registry) -> MatrixSpec:
 
 
 def _of_datasets(study: Study, matrix: MatrixSpec) -> list[TaskChoice]:
-    """Return what each data set is asked: the study's tasks, as the matrix asks them, or else what it is for."""
+    """Return the tasks of each data set: the study's, with the options of the matrix, or else those it is meant for."""
     from tactbench.core.recording.datasets import dataset_called
 
     found = []
     for given, dataset in {given: dataset_called(given) for given in study.dataset}.items():
         for name in study.task or dict.fromkeys(dataset.source.tasks):
-            asked = TaskChoice(name=name, protocol=("deployable",))
+            plain = TaskChoice(name=name, protocol=("deployable",))
             stated = [one for one in matrix.tasks if one.name == name and one.dataset in (None, given, dataset.name)]
-            found += [one.model_copy(update={"dataset": given}) for one in stated or [asked]]
+            found += [one.model_copy(update={"dataset": given}) for one in stated or [plain]]
     return found
 
 

@@ -71,7 +71,7 @@ def _label(title: str, number: int) -> str:
 
 
 def tex(text: str) -> str:
-    """Return text that LaTeX sets as it is; a character it has no letter for is told by its number, ``U+4E2D``."""
+    """Return text that LaTeX sets as it is; a character it has no letter for is written by its number, ``U+4E2D``."""
     return "".join(map(_character, text))
 
 

@@ -74,8 +74,8 @@ class TextTable:
         if not self.lines:
             return self
         texts = zip(self.columns, zip(*self.lines, strict=True), strict=True)
-        said = [name for name, column in texts if name in keep or any(text.strip(ABSENT) for text in column)]
-        return self.only(said)
+        filled = [name for name, column in texts if name in keep or any(text.strip(ABSENT) for text in column)]
+        return self.only(filled)
 
     def only(self, names: Collection[str]) -> TextTable:
         """Return the table with these of its columns."""

@@ -30,7 +30,7 @@ def test_effects_rungs_and_scenarios_are_kept_with_the_recording(verbs):
     words = ("--profile", "ramp:duration=1", "--effects=-noise", "--set", "rung=default", "--set")
     verbs("record", "--sensor", "biotac", "--out", "a.h5", *words, "scenario=hard-handled")
     shown = verbs("inspect", "a.h5").stdout
-    assert "white-noise (asked)" in next(line for line in shown.splitlines() if line.startswith("left out "))
+    assert "white-noise (forced)" in next(line for line in shown.splitlines() if line.startswith("left out "))
     assert all(said in shown for said in ("effects = -noise", "rung = default", "scenario = hard-handled"))
 
 

@@ -214,7 +214,7 @@ QUALITY = "(?:the best score|the smallest error beyond the floor)"
 ABOVE = {
     rf"{NAME} is best; closest is (\S+?)(?:, worse by ([\d.]+)(?: N)? \(95 % ([\d.]+) … ([\d.]+)\))?\.":
         lambda t, a, b, *by: t.ahead(a, b) and t.leads(a) and (by[0] is None or t.worse_by(a, b, *map(float, by))),
-    rf"{NAME} has {QUALITY}; (.*?)(?: and \d+ more)? cannot be told from it\.":
+    rf"{NAME} has {QUALITY}; (.*?)(?: and \d+ more)? cannot be distinguished from it\.":
         lambda t, a, b: t.leads(a) and all(t.near(one) for one in b.split(", ")),
     rf"{NAME} has {QUALITY}, and is not shown to be better than the "
     r"trivial (\S+) of its own sensor\.":
@@ -236,7 +236,7 @@ ABOVE = {
 BELOW = {
     r"‡  (?:(.*?)(?: and (\d+) more)?: )?It leaks\.": lambda t, a, more: t.stamped(a, more),
     r"!  (?:(.*?)(?: and (\d+) more)?: )?ms read as s\?": lambda t, a, more: t.stamped(a, more, "findings"),
-    "=  each of these rows cannot be told from at least one other": lambda t: t.unsure(),
+    "=  each of these rows cannot be distinguished from at least one other": lambda t: t.unsure(),
     r"–  no better than the trivial answer of its own sensor \((.*)\)":
         lambda t, b: t.bars(b, t.worse),
     r"\*  not shown to be better than the trivial answer of its own sensor \((.*)\)": lambda t, b: t.bars(b, t.unshown),
@@ -253,7 +253,7 @@ BELOW = {
     r"(Delay: sampling, link, window, computing; training: the final fit\.)?":
         lambda t, s, n, i, delay: t.how(i, n or "1" * ("of 1 campaign" in (s or "")), delay),
     r"Places: (paired over (?:sessions|recordings|presses), which all rows share|unpaired: .* differ between rows)"
-    r"(?:; what is asked differs between sensors \([^)]*\))?"
+    r"(?:; the targets differ between sensors \([^)]*\))?"
     r"(; one specimen of each sensor: how specimens differ is not known)?\.":
         lambda t, pairs, one: pairs.startswith("paired") == t.shared()
         and bool(one) == ({o["n_specimens"] for o in t.better} == {1}),
