@@ -10,12 +10,13 @@ import click
 from tactbench.core.cli.options import EFFECTS, format_option
 
 if TYPE_CHECKING:
-    from tactbench.core.cost.task_score import TaskScore
+    from tactbench.core.matrix.store import Row
     from tactbench.core.plugins.interfaces import Explained, Explaining, Verdict
     from tactbench.core.plugins.registry import Registry
     from tactbench.core.spec.rig import SensorDescriptor
     from tactbench.core.spec.scene import Scene, Simulation
 
+_SCORES = ("effects", "estimator", "metric", "unit", "score", "sim_s", "reason")
 _EFFECTS = ("included", "effect", "cost_ms", "change", "unit", "reason")
 
 
@@ -36,8 +37,6 @@ def explain(sensor_name: str, task_name: str, rounds: int, effects: str | None, 
 
     It ends with the task's score with the effects chosen beside that with all of them.
     """
-    from dataclasses import asdict
-
     from tactbench.core.cli.grid import print_records
     from tactbench.core.errors import UsageError
     from tactbench.core.plugins.registry import load_object, load_registry
@@ -66,19 +65,17 @@ def explain(sensor_name: str, task_name: str, rounds: int, effects: str | None, 
         if shape == "table":
             kinds = ["" if one["included"] else "skipped" for one in found]
             title = f"{sensor_name}, {task_name}: {group[0].name}, {len(group)} scenes with these effects"
-            costs = [None if row["cost_s"] is None else round(1e3 * row["cost_s"], 2) for row in found]
-            lines = [{**row, "cost_ms": cost} for row, cost in zip(found, costs, strict=True)]
-            print_records(lines, shape, title=title, columns=_EFFECTS, kinds=kinds)
+            print_records(found, shape, title=title, columns=_EFFECTS, kinds=kinds)
         records += [{**about, **one} for one in found]
     scores = _scores(registry, rig_name, sensor_name, task_name, simulation) if rounds else {}
     if shape == "table":
         remark("change: what leaving out an effect changes, about; of an effect left out, at most; 0: exactly nothing.")
-        table = [{"effects": name, **asdict(one)} for name, one in scores.items()]
-        print_records(table, shape, title="Score with the effects chosen and with all of them (SIM)")
+        table = [{"effects": name, **row} for name, row in scores.items()]
+        print_records(table, shape, title="Score with the effects chosen and with all of them (SIM)", columns=_SCORES)
         return
     for name, one in scores.items():
         more = "" if name == "chosen" else "_all_effects"
-        added = {f"score{more}": one.score, f"sim_s{more}": one.sim_s, f"score_reason{more}": one.reason}
+        added = {f"score{more}": one["score"], f"sim_s{more}": one["sim_s"], f"score_reason{more}": one["reason"]}
         records = [{**record, **added} for record in records]
     print_records(records, shape)
 
@@ -92,8 +89,8 @@ def _alike(rig: Explaining, sensor: SensorDescriptor, scenes: list[Scene]) -> li
     return list(groups.values())
 
 
-def _scores(registry: Registry, rig: str, sensor: str, task: str, simulation: Simulation) -> dict[str, TaskScore]:
-    """Return the task's score with the effects chosen, and with all of them."""
+def _scores(registry: Registry, rig: str, sensor: str, task: str, simulation: Simulation) -> dict[str, Row]:
+    """Return the row of a quick estimator with the effects chosen, and with all of them."""
     from tactbench.core.cost.task_score import quick_estimator, task_score
     from tactbench.core.study.progress import progress
 
@@ -107,10 +104,10 @@ def _scores(registry: Registry, rig: str, sensor: str, task: str, simulation: Si
 
 
 def _effect(row: Explained) -> dict[str, Any]:
-    entry = row.entry
+    entry, cost_ms = row.entry, None if row.cost_s is None else round(1e3 * row.cost_s, 2)
     return {
         "effect": entry.effect, "included": entry.included, "asked": entry.asked, "reason": entry.reason,
-        "change": entry.change, "unit": entry.unit, "cost_s": row.cost_s, "remark": row.remark,
+        "change": entry.change, "unit": entry.unit, "cost_ms": cost_ms, "remark": row.remark,
     }  # fmt: skip
 
 

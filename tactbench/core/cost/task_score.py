@@ -3,32 +3,15 @@
 from __future__ import annotations
 
 import tempfile
-from dataclasses import dataclass
 from pathlib import Path
 
 from tactbench.core.errors import UsageError
 from tactbench.core.matrix.run import run_matrix
-from tactbench.core.matrix.store import Store
+from tactbench.core.matrix.store import Row, Store
 from tactbench.core.plugins.registry import Registry
 from tactbench.core.progress import Progress
 from tactbench.core.spec.matrix import EstimatorChoice, MatrixSpec, TaskChoice
 from tactbench.core.spec.scene import Simulation
-
-
-@dataclass(frozen=True)
-class TaskScore:
-    """A score, and what making its recordings took."""
-
-    task: str
-    estimator: str
-    metric: str
-    unit: str
-    score: float | None
-    """None: there is none, and `reason` says why."""
-    sim_s: float | None
-    """The processor's seconds for all recordings, files not counted."""
-    recordings: int
-    reason: str = ""
 
 
 def quick_estimator(registry: Registry, task: str) -> str:
@@ -54,8 +37,8 @@ def quick_estimator(registry: Registry, task: str) -> str:
 
 def task_score(
     registry: Registry, rig: str, sensor: str, task: str, simulation: Simulation, *, estimator: str, progress: Progress
-) -> TaskScore:
-    """Record every scene of `task` as `simulation` asks, and answer it; nothing is kept.
+) -> Row:
+    """Record every scene of `task` by `simulation` and return the row of its cell; no file is kept.
 
     Everything is made anew, in processes of its own: no table of an earlier call makes a later one quicker.
 
@@ -70,7 +53,4 @@ def task_score(
     )
     with tempfile.TemporaryDirectory(prefix="tactbench-score-") as folder:
         outcome = run_matrix(matrix, Store(Path(folder)), progress=progress)
-    row = next(row for row in outcome.rows if row["estimator"] == estimator)
-    return TaskScore(
-        task, estimator, row["metric"], row["unit"], row["score"], row["sim_s"], len(row["recordings"]), row["reason"]
-    )
+    return next(row for row in outcome.rows if row["estimator"] == estimator)

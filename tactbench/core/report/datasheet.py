@@ -57,12 +57,8 @@ def data_sheets(sensors: Sequence[SensorSpec]) -> list[Property]:
 
 
 def readings(sensors: Sequence[SensorSpec]) -> list[Property]:
-    """Return what the specs state of readings: clocks, converters, rest levels, positions."""
-    looks = {
-        "streams": _streams, "delay of a reading": _delay, "taxel reading": _reading, "taxel at rest": _rest,
-        "under load": _sign, "positions": _positions,
-    }  # fmt: skip
-    return _properties(sensors, looks)
+    """Return what the specs state of readings: clocks, delay, range of a converter."""
+    return _properties(sensors, {"streams": _streams, "delay of a reading": _delay, "taxel reading": _reading})
 
 
 def quantities(sensors: Sequence[SensorSpec]) -> list[Property]:
@@ -134,25 +130,6 @@ def _reading(sensor: SensorSpec) -> Fact:
     for one in sensor.channels("taxel"):  # they are alike
         return Fact(one.unit if one.lower is None or one.upper is None else f"{one.lower:g}–{one.upper:g} {one.unit}")
     return Fact(ABSENT)
-
-
-def _rest(sensor: SensorSpec) -> Fact:
-    rests = sorted((one.rest for one in sensor.channels("taxel") if one.rest is not None), key=lambda one: one.value)
-    if not rests:
-        return Fact(ABSENT)
-    values = dict.fromkeys(f"{rest.value:.4g}" for rest in (rests[0], rests[-1]))
-    return _fact(f"{'–'.join(values)} {rests[0].unit}", rests[0].source)
-
-
-def _sign(sensor: SensorSpec) -> Fact:
-    words = {1: "rises", -1: "falls", 0: "rises or falls"}
-    return Fact(", ".join(dict.fromkeys(words[channel.sign] for channel in sensor.channels("taxel"))) or ABSENT)
-
-
-def _positions(sensor: SensorSpec) -> Fact:
-    taxels = sensor.channels("taxel")
-    placed = [channel for channel in taxels if channel.position_m]
-    return _fact(f"{len(placed)} of {len(taxels)} known", placed[0].position_source) if placed else Fact(ABSENT)
 
 
 def _quantities(sensor: SensorSpec) -> dict[str, Quantity]:

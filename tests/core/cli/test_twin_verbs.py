@@ -17,7 +17,7 @@ def verbs(tmp_path):
 def test_a_plan_is_explained_with_reasons_costs_and_bounds(verbs):
     rows = {row["effect"]: row for row in json.loads(verbs(*EXPLAIN, "--effects=-force-noise").stdout)}
     assert rows["contact"]["included"]
-    assert rows["contact"]["cost_s"] > 0
+    assert rows["contact"]["cost_ms"] > 0
     assert (rows["core"]["included"], rows["core"]["change"]) == (False, 0)
     assert all(row["reason"] for row in rows.values())
     assert rows["creep"]["scenes"] == 3
