@@ -50,7 +50,8 @@ def command(
             hint=f"Make some: `tactbench run --task {task.name} --protocol {protocol}`.",
         )
     specs = {one.name: one.spec for one in registry.sensors}
-    table = held_against(build_table(found), Requirements(max_delay_ms, range_n, rate_hz), task, specs)
+    table = build_table(found, questions={task.name: task.question})
+    table = held_against(table, Requirements(max_delay_ms, range_n, rate_hz), task, specs)
     if shape == "json":
         click.echo(json_array(table), nl=False)
     else:

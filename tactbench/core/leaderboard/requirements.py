@@ -22,7 +22,7 @@ from tactbench.core.tables.numbers import duration
 MET, MISSED, UNKNOWN = "met", "missed", "unknown"
 """How each text of a column of requirements begins."""
 ANSWER, DELAY, RANGE, RATE = "answer", "answer delay", "force range", "rate"
-COLUMNS = ("sensor", "estimator", "score", "notes", "interval", "beyond floor", DELAY, RANGE, RATE, ANSWER)
+COLUMNS = ("place", "sensor", "estimator", "score", "notes", "interval", "beyond floor", DELAY, RANGE, RATE, ANSWER)
 _PARTS = ("sampling", "link", "window", "features", "prediction")
 """Parts of the delay of an answer from readings."""
 
@@ -64,9 +64,10 @@ def _block(block: Block, required: Requirements, task: TaskSpec, sensors: Mappin
     found.sort(key=itemgetter(0))  # equal ones stay in the order of their places
     meet = dict.fromkeys(sensor_name(line.row) for order, line in found if not any(order))
     verdict = f"All requirements are met by {', '.join(meet)}." if meet else "No answer is known to meet all of them."
+    verdicts = (verdict,) * (required != Requirements()) + block.verdict
     lines = tuple(line for _, line in found)
     notes = block.notes + _pressed(lines, required, task)
-    return replace(block, lines=lines, verdict=(verdict,) * (required != Requirements()), notes=notes)
+    return replace(block, lines=lines, verdict=verdicts, notes=notes)
 
 
 def _pressed(lines: tuple[Line, ...], required: Requirements, task: TaskSpec) -> tuple[Note, ...]:

@@ -133,14 +133,14 @@ def groups(results: Results, remark: Callable[[str], None]) -> list[Group]:
     for (name, protocol, split, _), rows in alike.items():
         where = f"{name} under {protocol}, split {split}"
         if name not in results.registry.tasks:
-            remark(f"No figures of {where}: the task is not installed.")
+            remark(f"{where}: the task is not installed.")
             continue
         task = results.registry.tasks[name].spec
         beside = [row for row in rows if any(stands_beside(row, task, one) for one in task.published)]
         shown = answer_name(min(beside or rows, key=error_of))
         others = ", ".join(one for one in dict.fromkeys(map(answer_name, rows)) if one != shown)
         if others:
-            remark(f"Figures of {where} show {shown}; not shown: {others}.")
+            remark(f"{where}: {shown} is shown; not shown: {others}.")
         panels: dict[str, Panel] = {}
         for row in rows:
             if answer_name(row) != shown:
