@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import textwrap
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import click
 
 from tactbench.core.tables.text import json_text, visible
+from tactbench.core.tables.text_table import field_text as field_text
+from tactbench.core.tables.text_table import records_table
 
 if TYPE_CHECKING:
     from tactbench.core.tables.text_table import TextTable
@@ -41,43 +43,23 @@ def print_fields(fields: Sequence[tuple[str, str]]) -> None:
         click.echo("\n".join(lines))
 
 
-def field_text(value: Any) -> str:
-    """Return a value in a line; empty for none."""
-    from pydantic import BaseModel
-
-    if isinstance(value, BaseModel):
-        value = value.model_dump(mode="json")
-    if isinstance(value, dict):
-        return ", ".join(f"{name} = {text}" for name, one in value.items() if (text := field_text(one)))
-    if isinstance(value, list | tuple):
-        return ", ".join(map(field_text, value))
-    if isinstance(value, bool):
-        return "yes" if value else "no"
-    return f"{value:.5g}" if isinstance(value, float) else "" if value is None else str(value)
-
-
 def print_records(
     records: Sequence[Mapping[str, Any]], shape: str, *, title: str = "", columns: Sequence[str] = (),
-    numeric: Collection[str] = (), kinds: Sequence[str] = (),
+    kinds: Sequence[str] = (),
 ) -> None:  # fmt: skip
     """Print records on stdout as ``json``, ``csv`` or ``table``; their keys are those of the first.
 
     Parameters
     ----------
-    title, columns, numeric, kinds
-        Of a table: its title; the keys that it shows (default: all), but for those without any entry; those of texts
-        that are aligned to the right, as numbers are; and one word a record, by which it looks, see
-        `tactbench.core.tables.terminal`.
+    title, columns, kinds
+        Of a table: its title; the keys that it shows (default: all), but for those without any entry; and one word a
+        record, by which it looks, see `tactbench.core.tables.terminal`.
     """
     from tactbench.core.tables.csv_text import csv_of_records
-    from tactbench.core.tables.text_table import text_table
 
     if shape == "json":
         click.echo(json_text(list(records), indent=1))
     elif shape == "csv":
         click.echo(csv_of_records(records), nl=False)
     elif records:
-        shown = columns or tuple(records[0])
-        numbers = (name for name in shown if any(type(one.get(name)) in (int, float) for one in records))
-        lines = [[field_text(one.get(name)) for name in shown] for one in records]
-        print_tables([text_table(title, shown, lines, numeric={*numeric, *numbers}, kinds=kinds)])
+        print_tables([records_table(title, records, columns or tuple(records[0]), kinds=kinds)])

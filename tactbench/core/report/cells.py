@@ -13,7 +13,7 @@ from tactbench.core.leaderboard.names import METRIC_NAMES, Row
 from tactbench.core.report.results import Details, Results
 from tactbench.core.samples import Answers
 from tactbench.core.spec.row import TRUE, Asked, Cost, Ended, RestsOn, Scored
-from tactbench.core.tables.text_table import ABSENT, Entry, TextTable, finite, text_table
+from tactbench.core.tables.text_table import field_text, records_table
 
 _GROUPS = {
     **dict.fromkeys(Asked.model_fields, "Configuration"),
@@ -75,7 +75,7 @@ def details(row: Row, results: Results) -> Details:
         cell=str(row["cell"]),
         status=str(row["status"]),
         pairs={title: own for title, own in pairs.items() if own},
-        tables=tuple(_records(title, own) for title, own in records.items() if own),
+        tables=tuple(records_table(title, own) for title, own in records.items() if own),
         texts={name: str(known[name]) for name in _TEXTS if name in known},
     )
 
@@ -112,18 +112,7 @@ def recording_scores(row: Row, tested: Answers | None) -> list[dict[str, Any]]:
     return found
 
 
-def _records(title: str, records: Sequence[Mapping[str, Any]]) -> TextTable:
-    columns = list(dict.fromkeys(str(name) for record in records for name in record))
-    numeric = [name for name in columns if any(finite(record.get(name)) is not None for record in records)]
-    lines = [[Entry(_text(record.get(name)), finite(record.get(name))) for name in columns] for record in records]
-    return text_table(title, columns, lines, numeric=numeric)
-
-
 def _text(value: Any) -> str:
-    if value is None or value == "":
-        return ABSENT
-    if isinstance(value, bool):
-        return "yes" if value else "no"
-    if isinstance(value, list | tuple):
-        return ("\n" if any(isinstance(one, str) for one in value) else ", ").join(map(_text, value))
-    return f"{value:.6g}" if isinstance(value, float) else str(value)
+    """Return a value; of texts one a line."""
+    lines = isinstance(value, list | tuple) and any(isinstance(one, str) for one in value)
+    return "\n".join(map(field_text, value)) if lines else field_text(value)

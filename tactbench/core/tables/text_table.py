@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Iterable, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 from tactbench.core.tables.numbers import ABSENT as ABSENT
 
@@ -117,3 +118,28 @@ def text_table(
     """Return a table without the columns in which no line says anything."""
     given = tuple(map(tuple, lines))
     return TextTable(title, tuple(columns), given, frozenset(numeric), kinds=tuple(kinds), notes=tuple(notes)).compact()
+
+
+def records_table(
+    title: str, records: Sequence[Mapping[str, Any]], columns: Sequence[str] = (), *, kinds: Sequence[str] = ()
+) -> TextTable:
+    """Return a table of records: these of their keys, by default all of them; numbers stand to the right."""
+    shown = columns or tuple(dict.fromkeys(name for record in records for name in record))
+    lines = [[Entry(field_text(one.get(name)), finite(one.get(name))) for name in shown] for one in records]
+    numeric = [name for name in shown if any(finite(one.get(name)) is not None for one in records)]
+    return text_table(title, shown, lines, numeric=numeric, kinds=kinds)
+
+
+def field_text(value: Any) -> str:
+    """Return a value in a line; empty for none."""
+    from pydantic import BaseModel
+
+    if isinstance(value, BaseModel):
+        value = value.model_dump(mode="json")
+    if isinstance(value, Mapping):
+        return ", ".join(f"{name} = {text}" for name, one in value.items() if (text := field_text(one)))
+    if isinstance(value, list | tuple):
+        return ", ".join(map(field_text, value))
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    return f"{value:.5g}" if isinstance(value, float) else "" if value is None else str(value)
