@@ -106,7 +106,7 @@ def main(arguments: list[str] | None = None) -> None:
 
 
 def _open_streams() -> None:
-    """Have what is printed be no error: streams that are closed lead nowhere, what is no UTF-8 is written out."""
+    """Open closed streams on the null device and escape text that is no UTF-8, so that printing never fails."""
     for number, name in enumerate(("stdin", "stdout", "stderr")):
         if getattr(sys, name) is None:  # a file that is opened later would get this number, and what is printed
             stream = open(os.devnull, "w" if number else "r", errors="backslashreplace")  # noqa: PTH123, SIM115
@@ -122,7 +122,7 @@ _KEPT = {
     "cost": "What was finished is kept; the same command goes on from there.",
     "emulate": "The emulated devices and their links are gone.",
 }
-"""What is left of a verb that was interrupted."""
+"""What remains of an interrupted verb, as a message."""
 
 
 def _interrupted(arguments: list[str] | None, error: BaseException) -> int:
@@ -132,11 +132,11 @@ def _interrupted(arguments: list[str] | None, error: BaseException) -> int:
 
 
 _REFUSALS = frozenset(getattr(errno, name, 0) for name in ("ENOSPC", "EDQUOT", "EFBIG", "EIO", "EBADF"))
-"""Of a write to standard output, which has no name of a file: the disk is full, the terminal gone."""
+"""Error numbers of writes to standard output that fail: the disk is full, or the terminal is gone."""
 
 
 def _discard_output() -> None:
-    """Lead standard output nowhere, so that what it still holds is not refused once more when Python ends."""
+    """Send standard output to the null device, so that flushing its buffer at exit raises no second error."""
     os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 

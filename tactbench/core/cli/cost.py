@@ -61,7 +61,7 @@ def _show_knobs(
     sensors: tuple[str, ...], task: str, twin: bool, folder: Path, shape: str, *, estimators: tuple[str, ...],
     recordings: Path | None, protocol: str | None, repeats: int | None, jobs: int | None,
 ) -> None:  # fmt: skip
-    """Vary what an answer, or with `twin` the simulation, takes; print and write what is known, also when stopped."""
+    """Measure the settings of an estimator, or of the simulation; print and write the results, also when stopped."""
     from tactbench.core.cli.grid import print_records, print_tables
     from tactbench.core.cost.knobs import measure, settings_of, simulations_of
     from tactbench.core.cost.task_score import quick_estimator

@@ -27,7 +27,7 @@ _COLUMNS = (
     "noise",
     "reason",
 )
-"""Of a record that tables show."""
+"""Keys of a record that tables show."""
 
 
 def show_twin(sensors: tuple[str, ...], out: Path, shape: str, *, rounds: int) -> None:
@@ -73,7 +73,7 @@ def _print(records: Sequence[dict[str, Any]], study: CostStudy, shape: str) -> N
 
 
 def _records(points: Sequence[CostPoint], skipped: Sequence[Skipped]) -> list[dict[str, Any]]:
-    """Return every way as a flat record: what it takes, how far off it is, and its settings."""
+    """Return every point as a flat record with its time, its error and its settings."""
     from tactbench.core.cost.precision import diagrams, precise, quickest_enough
 
     found = []

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 _COLUMNS = ("stream", "of", "rows", "mean_rate_hz", "stated_rate_hz", "seconds", "channels", "annotations")
 _STRUCTURES = ("scene", "plan", "clocks", "streams", "drawn", "provenance")
-"""Of a recording's meta data, with a form of their own or none on the screen; JSON has them."""
+"""Keys of the meta data that the screen shows in another form or not at all; JSON has them."""
 
 
 @click.command(name="inspect")

@@ -57,7 +57,7 @@ def command(
 
 
 def _only(rows: list[dict[str, Any]], filters: Mapping[str, Sequence[str]]) -> list[dict[str, Any]]:
-    """Return the rows that are asked for; raises UsageError for a name that none has, or where none is left."""
+    """Return the rows that pass the filters; raises UsageError for an unknown name, or where no row is left."""
     from tactbench.core.errors import UnknownNameError, UsageError
 
     kept = rows
@@ -75,7 +75,7 @@ def _only(rows: list[dict[str, Any]], filters: Mapping[str, Sequence[str]]) -> l
 
 
 def view_of(folder: Path, *, wide: bool = False, columns: str | None = None, shape: str = "table") -> View:
-    """Return what is printed of a table.
+    """Return which columns of a table are printed.
 
     Parameters
     ----------
@@ -100,7 +100,7 @@ def view_of(folder: Path, *, wide: bool = False, columns: str | None = None, sha
 
 
 def _format_of(shape: str | None, to: Path | None) -> str:
-    """Return the format asked for, or what the name of the file says; raises UsageError if neither says one."""
+    """Return the given format, or that of the file's suffix; raises UsageError if the suffix is unknown."""
     from tactbench.core.errors import UsageError
     from tactbench.core.leaderboard.formats import SUFFIXES
 

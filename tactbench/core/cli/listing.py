@@ -1,4 +1,4 @@
-"""``tactbench list``: what there is to choose from, and which plugins could not be used."""
+"""``tactbench list``: everything that is installed, and the plugins that could not be loaded."""
 
 from __future__ import annotations
 
@@ -74,7 +74,7 @@ def _plugins(registry: Registry, shape: str) -> None:
 
 
 def tell_failed(registry: Registry) -> None:
-    """Say on stderr which plugins could not be used; nothing if all could."""
+    """Print to stderr which plugins could not be loaded; print nothing if all could."""
     from tactbench.core.tables.terminal import remark
 
     if registry.failures or registry.refused:

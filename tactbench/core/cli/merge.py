@@ -39,7 +39,7 @@ def command(ctx: click.Context, folders: tuple[Path, ...], out: Path) -> None:
 
 
 def _write_tables(folders: Sequence[Path], merged: Path) -> None:
-    """Write what was checked of sensors, and what `tactbench leaderboard` shows, into a merged folder."""
+    """Write the conformance levels of the sensors and the tables of the leaderboard into a merged folder."""
     from tactbench.core.leaderboard.formats import write_tables
     from tactbench.core.leaderboard.levels import merge_levels
     from tactbench.core.matrix.store import Store

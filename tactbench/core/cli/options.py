@@ -13,7 +13,7 @@ Command = Callable[..., Any]
 
 
 class FiniteRange(click.FloatRange):
-    """A range of numbers without NaN, which compares as inside of every range, and without infinity."""
+    """A range of finite numbers: click alone accepts NaN in every range."""
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
         """Return the number; fails with a usage error."""
@@ -60,4 +60,4 @@ SIMULATION = options(
         help="Set a nuisance (placement_scatter_mm=0.3), or rung, tolerance or scenario of the simulation; repeatable.",
     ),
 )  # fmt: skip
-"""Given to `tactbench.core.study.simulation.simulation_of`."""
+"""Options that `tactbench.core.study.simulation.simulation_of` reads."""

@@ -101,7 +101,7 @@ def command(
 
 
 def _interrupted(path: Path) -> bool:
-    """Whether there is a recording that was cut short."""
+    """Return whether the file exists and holds a recording that was interrupted."""
     from tactbench.core.recording.reader import read_meta
 
     return path.exists() and read_meta(path).excluded.startswith("interrupted")

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from tactbench.core.matrix.store import Store
 
 _REASON_CHARACTERS = 200
-"""Of a reason that are shown; the whole of it is in the row."""
+"""Characters of a reason that are printed; the row has the whole of it."""
 
 
 @click.command(name="run")
@@ -86,7 +86,7 @@ def command(
 
 
 def _farewell(outcome: Outcome, store: Store) -> None:
-    """Say what there is now, and where it lies."""
+    """Print how many cells were computed, and where the files are."""
     folder = store.folder
     found = len(outcome.rows) - outcome.computed
     remark(f"\n{found} of {len(outcome.rows)} answers were found finished, {outcome.computed} computed now; "
@@ -99,7 +99,7 @@ def _farewell(outcome: Outcome, store: Store) -> None:
 
 
 def tell_stopped(rows: Sequence[Mapping[str, Any]], folder: Path) -> None:
-    """Name every cell of `rows` with its reason in one line, and the commands that look into it."""
+    """Print a line for every cell of `rows` with its reason, and the commands that show its details."""
     if not rows:
         return
     remark(f"\nStopped: {len(rows)}.")

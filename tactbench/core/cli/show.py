@@ -51,11 +51,11 @@ def _owner(owned: Owned[Any]) -> str:
 
 
 _HIDDEN = ("name", "scenes", "campaigns", "published", "protocols", "dimensions", "parameters")
-"""Of what is stated: has a table of its own, or none on the screen; JSON has it."""
+"""Fields of a descriptor that have a table of their own or are not printed; JSON has them."""
 
 
 def _page(owned: Owned[Any]) -> None:
-    """Print what a descriptor states, field by field, and its scenes or parameters as tables."""
+    """Print the fields of a descriptor, and its scenes or parameters as tables."""
     from tactbench.core.cli.grid import field_text, print_fields, print_tables
     from tactbench.core.leaderboard.names import LOWER_IS_BETTER
     from tactbench.core.spec.rig import TaskDescriptor

@@ -81,7 +81,7 @@ def explain(sensor_name: str, task_name: str, rounds: int, effects: str | None, 
 
 
 def _alike(rig: Explaining, sensor: SensorDescriptor, scenes: list[Scene]) -> list[list[Scene]]:
-    """Group scenes by the effects they get."""
+    """Group scenes that are simulated with the same effects."""
     groups: dict[tuple[tuple[str, bool], ...], list[Scene]] = {}
     for scene in scenes:
         plan = tuple((row.entry.effect, row.entry.included) for row in rig.explain(sensor, scene))

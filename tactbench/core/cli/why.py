@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from tactbench.core.matrix.why import StoredCell
 
 Field = tuple[str, str]
-"""A name, and a value with its unit."""
+"""A name, and a text of the value with its unit."""
 _TAIL = 15
 """Lines of a traceback or log that are shown; the whole of it stands in ``--format json``."""
 _FIELDS = 12
@@ -72,7 +72,7 @@ def _facts(found: StoredCell) -> dict[str, Any]:
 
 
 def _replicates(found: StoredCell) -> Iterator[Field]:
-    """Yield what the cell came to over its replicates, and what each of them scored."""
+    """Yield the scores and times of the cell over its replicates, and the score of each of them."""
     from tactbench.core.leaderboard.names import metric_name
     from tactbench.core.statistics.replicates import counted, over_replicates, percent
     from tactbench.core.tables.numbers import delay, duration, interval, score_with_unit
@@ -97,7 +97,7 @@ def _replicates(found: StoredCell) -> Iterator[Field]:
 
 
 def _rests_on(row: Row) -> Iterator[Field]:
-    """Yield what the score of a finished replicate is made of."""
+    """Yield the metrics, samples, recordings and assumptions behind the score of a finished replicate."""
     from tactbench.core.cli.grid import field_text
     from tactbench.core.leaderboard.names import metric_name
     from tactbench.core.tables.numbers import score_with_unit

@@ -1,1 +1,1 @@
-"""What accuracy costs in time: fronts, tables and figures of points."""
+"""Measures what accuracy costs in time, of estimators and of a simulated rig."""

@@ -1,4 +1,4 @@
-"""What accuracy costs in time along one knob after another: each setting is an ordinary cell of the matrix."""
+"""Varies one setting after another and measures scores and times; each setting is an ordinary cell of the matrix."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ TIMES = {
     "trees": "answer_delay_ms", "window k": "answer_delay_ms", "every n-th sample": "answer_delay_ms",
     "estimator": "answer_delay_ms", "training sessions": "fit_s", "rung": "sim_s", "tolerance": "sim_s",
 }  # fmt: skip
-"""Knob -> the time that is paid along it."""
+"""Time that each knob costs."""
 BOUGHT = ("estimator", "trees", "window k", "every n-th sample")
 """Knobs whose settings answer the same question about the same recordings: they compete for the front."""
 _KEPT = (
@@ -56,14 +56,14 @@ class Setting(NamedTuple):
         return TaskChoice(name="", protocol=(self.protocol,), split=own, estimators=(self.estimator,))
 
     def is_of(self, row: Row) -> bool:
-        """Tell whether a row of this simulation answers it."""
+        """Return whether a row of this simulation belongs to the setting."""
         way = self.protocol if self.split is None else f"{self.protocol}:{self.split}"
         wanted = (way, self.estimator.name, dict(self.estimator.params))
         return (str(row["cell"]).split("/")[3], row["estimator"], row["params"]) == wanted
 
 
 def settings_of(task: TaskSpec, estimators: Sequence[EstimatorDescriptor], protocol: str) -> Iterator[Setting]:
-    """Yield what is tried of the first of `estimators`, and all of them as they are."""
+    """Yield the settings of the first of `estimators`, and all of them with their defaults."""
     first = estimators[0]
     plain = EstimatorChoice(name=first.name)
     own = first.params.get("n_estimators")
@@ -85,7 +85,7 @@ def settings_of(task: TaskSpec, estimators: Sequence[EstimatorDescriptor], proto
 
 
 def simulations_of(rig: RigDescriptor, estimator: EstimatorDescriptor, protocol: str) -> Iterator[Setting]:
-    """Yield what is tried of a simulated rig: its rungs but the dearest, and tolerances."""
+    """Yield the settings of a simulated rig: its rungs except for the dearest, and tolerances."""
     plain = EstimatorChoice(name=estimator.name)
     for rung in rig.rungs[:-1]:
         yield Setting("rung", rung, protocol, plain, None, Simulation(rung=rung))
@@ -97,7 +97,7 @@ def measure(
     matrix: MatrixSpec, settings: Sequence[Setting], folder: Path, *, repeats: int, choice: EngineChoice | None = None,
     recordings: Path | None = None, progress: Progress,
 ) -> Iterator[dict[str, Any]]:  # fmt: skip
-    """Yield what is known so far, after each knob of the first replicate and after each further replicate.
+    """Yield the results so far, after each knob of the first replicate and after each further replicate.
 
     Parameters
     ----------

@@ -12,7 +12,7 @@ from tactbench.core.progress import Progress
 
 P = TypeVar("P")
 SHARE = 1 / 3
-"""Of an observable's noise: an error below it changes no score much."""
+"""Share of an observable's noise; a smaller error changes scores little."""
 
 
 def front(points: Sequence[P], *, seconds: Callable[[P], float], error: Callable[[P], float]) -> list[P]:
@@ -33,7 +33,7 @@ def front(points: Sequence[P], *, seconds: Callable[[P], float], error: Callable
 
 
 class Skipped(NamedTuple):
-    """A way that a sensor cannot have."""
+    """A way of simulating that is not possible for a sensor."""
 
     subject: str
     label: str
@@ -43,7 +43,7 @@ class Skipped(NamedTuple):
 
 
 def measured(study: CostStudy, subject: str, progress: Progress) -> Iterator[CostPoint | Skipped]:
-    """Carry out the jobs of a study; yield its points as they come, and of what its subject cannot have why not."""
+    """Carry out the jobs of a study; yield its points, and the reasons of jobs that are not possible."""
     progress.begin(subject, len(study.jobs))
     for job in study.jobs:
         progress.working(job.label)

@@ -1,4 +1,4 @@
-"""The score of one task with recordings that a simulated rig makes for it: what a way of simulating does to it."""
+"""Scores one task on recordings that a simulated rig makes for it, to show how a simulation changes the score."""
 
 from __future__ import annotations
 

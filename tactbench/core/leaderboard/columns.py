@@ -15,17 +15,17 @@ from tactbench.core.tables.numbers import ABSENT, coarse, delay, duration, inter
 from tactbench.core.tables.text import visible
 
 Kind = Literal["result", "baseline", "failed", "skipped"]
-"""Of a line: an answer, a trivial one, a cell that did not end well or was not begun."""
+"""Kind of a line: an answer, a trivial answer, a cell that failed, or one that was skipped."""
 
 
 class Column(NamedTuple):
-    """A column that a row fills by itself."""
+    """A column whose text depends on its row alone."""
 
     shown: str
-    """What it is called where programs read its text: ``shown`` in JSON, ``shown_…`` in CSV and Parquet."""
+    """Name of its text for programs: a key of ``shown`` in JSON, ``shown_…`` in CSV and Parquet."""
     text: Callable[[Row], str]
     value: Callable[[Row], float | None] | None = None
-    """What it is sorted by, times in seconds, intervals by their middle; None: a column of words."""
+    """Number that it is sorted by, times in seconds, intervals by their middle; None for a column of words."""
 
 
 def _score(shown: str, key: str) -> Column:
@@ -48,7 +48,7 @@ def _time(shown: str, key: str, per_second: float = 1.0) -> Column:
 
 
 def _range(row: Row) -> str:
-    """Return between what the scores of single campaigns lie; of what a split holds out each, where no interval is."""
+    """Return the lowest and highest score of campaigns; without an interval, the scores of the units held out."""
     scores, unit = row.get("replicate_scores") or [], row["unit"]
     if len(scores) < 2 or (held_out(row) and row["ci_low"] is not None):
         return ABSENT
@@ -60,7 +60,7 @@ def _range(row: Row) -> str:
 
 
 _RANKED: dict[str, str] = {"place": "rank", "notes": "marks"}
-"""Columns that the block of a row decides."""
+"""Columns whose text depends on the other rows of the block."""
 OF_ROWS: dict[str, Column] = {
     "sensor": Column("sensor", lambda row: visible(str(row["sensor"]))),
     "level": Column("level", lambda row: visible(str(row.get(LEVEL) or ABSENT))),
@@ -96,15 +96,15 @@ class Line:
     """One row as text."""
 
     row: Row = field(repr=False, compare=False)
-    """Numbers in full."""
+    """Row with all digits."""
     texts: Mapping[str, str]
-    """By column."""
+    """Texts by column."""
     kind: Kind
     placing: Rank | None = None
-    """Where it stands in its block; answers better than the trivial one of their sensor only."""
+    """Rank in its block; None for answers that are no better than the trivial one of their sensor."""
 
     def value(self, column: str) -> float | None:
-        """Return what a line is sorted by in a column of numbers; None: last."""
+        """Return the number that a line is sorted by in a column; None sorts last."""
         if column == "place":
             return self.placing.place if self.placing else None
         sorted_by = OF_ROWS[column].value if column in OF_ROWS else None
@@ -113,7 +113,7 @@ class Line:
 
 
 def line_of(row: Row, placing: Rank | None, marks: Sequence[str], place: str = "") -> Line:
-    """Return the line of a row; `place` stands there where it has none."""
+    """Return the line of a row; `place` is shown if the row has no rank."""
     if row["status"] != "done":
         texts = {"sensor": visible(str(row["sensor"])), "estimator": answer_name(row), "score": row["status"].upper()}
         kind: Kind = "failed" if row["status"] in STOPPED else "skipped"

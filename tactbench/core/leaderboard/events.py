@@ -1,4 +1,4 @@
-"""What detectors of events say besides their recall area: misses, latency and false alarms."""
+"""A table of detectors of events: misses, latency and false alarms beside their recall area."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ _FIGURES = {
     "macro F1": ("frame macro F1", ".2f"),
     "compute [s/s]": ("compute s per s of signal", ".2g"),
 }
-"""Columns, and which figure each shows how."""
+"""Key of the figure and format of each column."""
 _NOTE = (
     "Latency: from the labelled onset to the alarm, with the time that the detector computes; negative is early; over "
     "hits alone. Slipped: the median displacement from onset to alarm. Compute: seconds a second of signal."
@@ -29,7 +29,7 @@ _NOTE = (
 
 
 def events_table(rows: Sequence[Row]) -> TextTable | None:
-    """Return what finished rows say of events; None if none says anything."""
+    """Return the table of finished rows with figures of events; None if there is no such row."""
     finished = [row for row in rows if row["status"] == "done" and row.get("events")]
     lines = []
     for row in finished:

@@ -30,16 +30,16 @@ SUFFIXES = {
     ".json": "json", ".csv": "csv", ".md": "md", ".tex": "latex", ".parquet": "parquet", ".xlsx": "xlsx",
     ".txt": "table",
 }  # fmt: skip
-"""The format that a file is meant to have, by how its name ends."""
+"""Format of a file by its suffix."""
 IN_FOLDER = ("md", "csv", "json")
 """A run's result folder has these, ``leaderboard.md`` and so on; `tactbench leaderboard` writes the others."""
 _IN_A_PAPER = ("sensor", "estimator", "score", "interval", "range", "against reference", "published")
 _LONG = 12
-"""Letters of a name in a paper from which its column breaks it."""
+"""Largest number of characters of a name that its column in a paper does not break."""
 
 
 def plain_text(table: Table, width: int = 240, view: View = DEFAULT_VIEW) -> str:
-    """Return what a terminal without colours shows."""
+    """Return a leaderboard as a terminal without colours shows it."""
     return terminal.plain_text(document(table, view), width)
 
 
@@ -51,7 +51,7 @@ def markdown(table: Table, view: View = DEFAULT_VIEW) -> str:
 
 
 def latex(table: Table, view: View = DEFAULT_VIEW) -> str:
-    """Return the blocks as LaTeX, each a table for one column of a paper; what was probed goes over both."""
+    """Return the blocks as LaTeX, each a table for one column of a paper; events and probes go over both columns."""
     names = view.columns or _IN_A_PAPER
     blocks = zip(table.blocks, grids(table, replace(view, wide=False, columns=())), strict=True)
     parts = [_in_a_paper(block, grid, names, number) for number, (block, grid) in enumerate(blocks, 1)]
@@ -158,7 +158,7 @@ def write_tables(table: Table, folder: Path) -> None:
 
 
 RANK_KEYS = ("rank", "rank_low", "rank_high", "rank_tied")
-"""Where a row stands in its block; they follow the keys of the row."""
+"""Keys of the rank of a row in its block; they follow the keys of the row."""
 
 FORMAT_VERSION = "1"
 _KEYS = (*JSON_KEYS, *OF_REPLICATES)
@@ -229,7 +229,7 @@ def _lacking(what: str, library: str, extra: str, error: ImportError) -> UsageEr
 
 
 def _kind(name: str) -> type:
-    """Return what a column holds: truth values, numbers, whole numbers or text; lists and tables are text."""
+    """Return the type of a column: bool, float, int or str; lists and tables are text."""
     types = FORMAT.get(name) or {_RANKS.get(name, str)}
     return next((one for one in (bool, float, int) if one in types), str)
 

@@ -1,4 +1,4 @@
-"""What `tactbench check` found of a sensor, beside its rows: where they were made by the very package that was checked.
+"""The conformance level of a sensor beside its rows, if they were made by the package that was checked.
 
 `check NAME --out FOLDER` leaves ``conformance/NAME.json`` in a result folder.
 """
@@ -17,7 +17,7 @@ Row = dict[str, Any]
 
 FOLDER = "conformance"
 KEY = "conformance_level"
-"""Of a row, in a folder with such a file: the level, or why there is none."""
+"""Key of a row for the level, or for why there is none, in a folder with such a file."""
 NOT_CHECKED, OTHER_VERSION = "not checked", "other version"
 _LEVELS = ("none", "bronze", "silver", "gold")
 
@@ -41,12 +41,12 @@ def write_level(folder: Path, sensor: str, facts: Mapping[str, Any]) -> Path:
 
 
 def read_levels(folder: Path) -> dict[str, dict[str, Any]]:
-    """Return what was checked, by sensor."""
+    """Return the findings of the checks, by sensor."""
     return {path.stem: json.loads(path.read_bytes()) for path in sorted((folder / FOLDER).glob("*.json"))}
 
 
 def merge_levels(folders: Sequence[Path], into: Path) -> None:
-    """Write what was checked in any of `folders` into another one; of two levels of one sensor the lower one."""
+    """Write the levels of `folders` into another folder; of two levels of one sensor the lower one."""
     found = [one for folder in folders for one in read_levels(folder).items()]
     # The last one that is written stays.
     for sensor, facts in sorted(found, key=lambda one: (-_LEVELS.index(one[1]["level"]), json.dumps(one[1]))):

@@ -35,7 +35,7 @@ _SPLITS = {
     "in-session": "split in-session: each recording cut in time",
     "shuffled": "split shuffled: rows dealt at random",
 }
-"""Splits that are not named by what they keep apart."""
+"""Descriptions of splits whose name is not that of a group of recordings."""
 
 
 def sensor_name(row: Row) -> str:
@@ -89,7 +89,7 @@ def grouped(members: Iterable[_Value], key: Callable[[_Value], _Key]) -> dict[_K
 
 
 comparison_key = itemgetter("sensor", "task", "rig", "protocol", "split")
-"""What answers must share to be held against a trivial one."""
+"""Keys that an answer and the trivial answer it is compared with share."""
 WORSE_END = {1.0: "ci_high", -1.0: "ci_low"}
 """The worse end of an interval by `sign_of`: of an error, and of what is the higher the better."""
 
@@ -103,7 +103,7 @@ class Bars:
     """The score that each answer is held against: the best trivial one of its own sensor, whatever it looks at."""
 
     def __init__(self, rows: Iterable[Row]) -> None:
-        """Take the finished trivial answers from `rows`; an oracle is none."""
+        """Collect the finished trivial answers of `rows`; an oracle is no trivial answer."""
         trivial = (row for row in rows if row["is_baseline"] and row["status"] == "done")
         groups = grouped((row for row in trivial if row.get("looks_at") != "reference"), comparison_key)
         self._best = {key: min(alike, key=error_of) for key, alike in groups.items()}
@@ -114,17 +114,17 @@ class Bars:
         return self._best.get(comparison_key(row))
 
     def score(self, row: Row) -> float | None:
-        """Return its score; None where there is no trivial answer."""
+        """Return the score of the trivial answer; None if there is none."""
         trivial = self.trivial(row)
         return row.get("baseline") if trivial is None else trivial["score"]
 
     def name(self, row: Row) -> str:
-        """Return what it is called."""
+        """Return the name of the trivial answer."""
         trivial = self.trivial(row)
         return "the trivial answer" if trivial is None else answer_name(trivial)
 
     def no_better(self, row: Row) -> bool:
-        """Return whether the score of an answer is no better."""
+        """Return whether the score of an answer is no better than that of the trivial one."""
         return _reaches(error_of(row), row, self.score(row))
 
     def unshown(self, row: Row) -> bool:

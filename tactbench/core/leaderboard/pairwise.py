@@ -33,26 +33,26 @@ class PairwiseComparison:
 
     kind: Kind
     first: str
-    """name of the first sensor, estimator, protocol, split or folder"""
+    """Name of the first sensor, estimator, protocol, split or folder."""
     second: str
     first_row: Row | None
     second_row: Row | None
     refused: str
-    """why there is no difference; empty if there is one"""
+    """Reason why there is no difference; empty if there is one."""
     difference: Difference | None = None
     folds: FoldDifference | None = None
-    """the same over folds whose training data overlap, where there are several"""
+    """Difference over folds whose training data overlap, if there are several."""
     p_corrected: float | None = None
-    """p corrected for all comparisons that the matrix declares; None: exploratory"""
+    """p corrected for all comparisons that the matrix declares; None for an exploratory comparison."""
 
     @property
     def row(self) -> Row:
-        """One of the rows, for what both have."""
+        """Return one of the rows, for values that both share."""
         return next(row for row in (self.first_row, self.second_row) if row is not None)
 
     @property
     def of(self) -> str:
-        """What both have: the estimator of two sensors, the sensor of two estimators, else both."""
+        """Return what both rows share: the estimator of two sensors, the sensor of two estimators, else both."""
         return str(_key(self.kind, self.row)[-1])
 
     @property
@@ -203,7 +203,7 @@ def _line(pair: PairwiseComparison) -> tuple[str, ...]:
 
 
 def _verdict(pair: PairwiseComparison, found: Difference) -> str:
-    """Return which is better, or that it is not known."""
+    """Return which of the two is better, or that none is shown to be."""
     if found.verdict in ("equivalent", "undecided"):
         return found.verdict
     return f"{pair.first if found.verdict == 'better' else pair.second} better"
@@ -217,7 +217,7 @@ def _probability(p: float | None) -> str:
 
 
 def notes_of(comparisons: Sequence[PairwiseComparison]) -> tuple[str, ...]:
-    """Return what must be known to read the tables."""
+    """Return notes that explain the columns and the method of the tables."""
     found = [(pair, pair.difference) for pair in comparisons if pair.difference is not None]
     if not found:
         return ()

@@ -1,4 +1,4 @@
-"""What recordings give away: a score beside that of shuffled rows, of the first frame alone and of a trivial answer."""
+"""A leakage probe: each score beside those of shuffled rows, of the first frame alone and of a trivial answer."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ TAIL = 0.025
 """Probability that guessing does as well, below which a first frame predicts better than a guess: the tail of the
 leaderboard's 95 % intervals."""
 FEWEST = 5
-"""Recordings from which on an error of first frames has an interval."""
+"""Smallest number of recordings for an interval of the error of first frames."""
 COLUMNS = (
     "sensor", "task", "estimator", "split", "score", "95 % interval", "shuffled", "first frame alone",
     "trivial", "verdict",

@@ -1,4 +1,4 @@
-"""What a simulated comparison rests on: scores with nuisances at the ends of their ranges, beside those as stated.
+"""The sensitivity of a simulated comparison: scores with nuisances at the ends of their ranges.
 
 Each set of ends is a result folder of its own, ``assumptions/placement_scatter_mm=lower`` inside the other's.
 """
@@ -31,7 +31,7 @@ _NOTE = (
 
 
 def ranges_of(spec: SensorSpec) -> dict[str, PhysicalRange]:
-    """Return between what ends a sensor's nuisances and those of its mount may lie, by name."""
+    """Return the ranges of a sensor's nuisances and those of its mount, by name."""
     return {**RANGES, **spec.ranges}
 
 
@@ -41,7 +41,7 @@ def name_of(ends: Mapping[str, str]) -> str:
 
 
 def ends_of(name: str) -> dict[str, str]:
-    """Return what the name of a folder says."""
+    """Return the end of each nuisance from the name of a folder."""
     return {nuisance: end for nuisance, _, end in (part.partition("=") for part in name.split(","))}
 
 
@@ -80,7 +80,7 @@ class Sensitivity:
         return sum(sign * self.change(name, sensor) for sensor in self.stated) / len(self.stated)
 
     def verdict(self, name: str) -> str:
-        """Return what becomes of the order of the sensors."""
+        """Return whether the order of the sensors stays, turns round, or is not shown."""
         order = _order({**self.stated, **self.rows[name]})
         if any((worse, better) in order for better, worse in self.order):
             return TURNED
@@ -111,7 +111,7 @@ def _order_text(rows: Mapping[str, Row]) -> str:
 
 
 def sensitivities(store: Store) -> dict[tuple[str, ...], Sensitivity]:
-    """Return what each answer's scores rest on, by task, protocol, split, rig and estimator, where it is computed."""
+    """Return the sensitivities that have been computed, by task, protocol, split, rig and estimator."""
 
     def questions(rows: Iterable[Row]) -> dict[tuple[str, ...], list[Row]]:
         answers = (row for row in rows if not row["is_baseline"])

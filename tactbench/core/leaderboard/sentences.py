@@ -40,9 +40,9 @@ class Note(NamedTuple):
 
     text: str
     hint: str = ""
-    """What follows on a screen: a command, which a paper does not print."""
+    """Command that follows on a screen and is left out in a paper."""
     printed: bool = False
-    """Whether a paper's table needs it: it explains a mark there, or how the scores came about."""
+    """Whether a table in a paper needs it, to explain a mark or the scores."""
 
     def __str__(self) -> str:
         return f"{self.text}{self.hint}"
@@ -55,22 +55,22 @@ class Board:
     placed: Sequence[tuple[Row, Rank]]
     """Answers better than the trivial one of their sensor, in order."""
     unplaced: Sequence[Row]
-    """The other answers."""
+    """Answers that are no better than the trivial one of their sensor."""
     trivial: Sequence[Row]
     stopped: Sequence[Row]
     """Cells without a score."""
     unranked: str
-    """Why places rest on no intervals; empty where they do."""
+    """Reason why places rest on no intervals; empty if they do."""
     bars: Bars
 
     @property
     def answers(self) -> list[Row]:
-        """The answers, those with a place first."""
+        """Return the answers, those with a place first."""
         return [*(row for row, _ in self.placed), *self.unplaced]
 
     @property
     def by_floor(self) -> bool:
-        """Whether places go by errors beyond the floor."""
+        """Return whether places go by errors beyond the floor."""
         return beyond_floor([row for row, _ in self.placed])
 
     def name(self, row: Row) -> str:
@@ -164,7 +164,7 @@ def _closest(board: Board, first: Row, others: Sequence[Row]) -> str:
 
 
 def _timed(board: Board) -> str:
-    """Return what an answer reads that knows only the time, where one of its own sensor's is not shown to be better."""
+    """Return that a trivial answer knows only the time, if an answer of its sensor is not shown to be better."""
     held = [row for row in board.answers if board.bars.no_better(row) or board.bars.unshown(row)]
     bars = [trivial for row in held if (trivial := board.bars.trivial(row)) is not None]
     timed = list(dict.fromkeys(answer_name(bar) for bar in bars if bar.get("looks_at") == "time"))
@@ -208,7 +208,7 @@ def _ended(board: Board, stopped: bool) -> Iterator[Note]:
 
 
 def _marks(board: Board) -> Iterator[Note]:
-    """Yield what the marks of this table mean: at most as many notes as there may be, so that none goes unexplained."""
+    """Yield a note for each mark in the table; they are never more than the notes that may be shown."""
     finished = (*board.answers, *board.trivial)
     for mark, key in ((STAMPED, "stamps"), (FOUND, "findings")):
         texts = grouped([(str(text), row) for row in finished for text in row.get(key) or ()], itemgetter(0))
@@ -232,7 +232,7 @@ def _marks(board: Board) -> Iterator[Note]:
 
 
 def _protocol(board: Board) -> Iterator[Note]:
-    """Yield that the protocol looks at the test set."""
+    """Yield that the protocol uses the test set, if it does."""
     finished = (*board.answers, *board.trivial)
     protocol = next((row["protocol"] for row in finished if row["dagger"]), None)
     if protocol is not None:
@@ -241,7 +241,7 @@ def _protocol(board: Board) -> Iterator[Note]:
 
 
 def _floors(board: Board) -> Iterator[Note]:
-    """Yield what an error of force is of where the reference errs too, and what errors beyond its floor are."""
+    """Yield which force an error is against, and the floor that the noise of the reference sets to errors."""
     finished = (*board.answers, *board.trivial)
     simulated = next((row for row in finished if row.get("reference_score") is not None), None)
     if simulated is not None:
@@ -264,7 +264,7 @@ def _floors(board: Board) -> Iterator[Note]:
 
 
 def _how(board: Board) -> Iterator[Note]:
-    """Yield what scores, intervals, places and delays are."""
+    """Yield definitions of score, interval, range and delay."""
     parts = []
     campaigns = [row for row in board.answers if row.get("replicate_unit") == "replicate"]
     if campaigns:
@@ -287,7 +287,7 @@ def _how(board: Board) -> Iterator[Note]:
 
 
 def _compared(board: Board) -> Iterator[Note]:
-    """Yield how rows of several sensors are held against each other on recordings, and what that cannot say."""
+    """Yield how rows of several sensors are compared on recordings, and what that comparison cannot show."""
     rows = [row for row, _ in board.placed if held_out(row)]
     if board.unranked or len({row["sensor"] for row in rows}) < 2:
         return
@@ -304,7 +304,7 @@ def _compared(board: Board) -> Iterator[Note]:
 
 
 def _hosts(board: Board) -> Iterator[Note]:
-    """Yield that times cannot be compared."""
+    """Yield why times cannot be compared, if they cannot."""
     timed = [row for row in board.answers if row["fit_s"] is not None]
     hosts = len({str(row.get("host") or "") for row in timed})
     at_once = max((int(row.get("concurrency") or 1) for row in timed), default=1)

@@ -1,4 +1,4 @@
-"""From rows to the one table object that every format is made from.
+"""Builds from rows the one table object that every format renders.
 
 Rows that may be compared stand in one block; no rank spans two. Rows under different tasks, protocols or splits, and
 rows from the twin and from hardware, are not comparable. A table depends on its rows alone, never on their order. All
@@ -49,16 +49,16 @@ class Block:
     """Rows that may be compared."""
 
     title: str
-    """Task and question."""
+    """Task and its question."""
     setting: str
     """Metric, protocol and split."""
     origin: str
     """Simulated, emulated or measured."""
     lines: tuple[Line, ...]
     verdict: tuple[str, ...] = ()
-    """What its rows come to: two sentences at most."""
+    """At most two sentences on the result."""
     notes: tuple[Note, ...] = ()
-    """What marks and numbers mean: four at most."""
+    """At most five notes on marks and numbers."""
 
 
 @dataclass(frozen=True)
@@ -69,26 +69,26 @@ class Table:
     sections: tuple[TextTable, ...] = ()
     """Tables below the blocks: events, and what was probed."""
     provenance: tuple[Row, ...] = ()
-    """Who computed this, with what, where."""
+    """Versions, machine and commit of the runs."""
 
     @property
     def lines(self) -> list[Line]:
-        """The lines of all blocks."""
+        """Return the lines of all blocks."""
         return [line for block in self.blocks for line in block.lines]
 
     @property
     def rows(self) -> list[Row]:
-        """The rows, in the order of the lines."""
+        """Return the rows, in the order of the lines."""
         return [line.row for line in self.lines]
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """The notes of all blocks, each once."""
+        """Return the notes of all blocks, each once."""
         return tuple(dict.fromkeys(str(note) for block in self.blocks for note in block.notes))
 
     @property
     def footer(self) -> tuple[str, ...]:
-        """The provenance in sentences, for the files."""
+        """Return the provenance in sentences, for files."""
         from tactbench.core.provenance.gather import foot
 
         made_by = foot(self.provenance) if self.provenance else ()
@@ -232,7 +232,7 @@ def places(results: Sequence[Row]) -> tuple[dict[str, Rank], str]:
 
 
 def _may_be_placed(row: Row) -> bool:
-    """Tell whether a row has enough campaigns, or units that its split holds out, for a place; or states none."""
+    """Return whether a row has enough campaigns or held-out units for a place, or states no number of them."""
     count = row.get("n_replicates")
     return count is None or (count >= FEWEST if row.get("replicate_unit") == "replicate" else row["ci_low"] is not None)
 

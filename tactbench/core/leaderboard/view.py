@@ -1,4 +1,4 @@
-"""What of a table is printed for people."""
+"""Selects what of a table is printed for people."""
 
 from __future__ import annotations
 
@@ -28,12 +28,12 @@ _FIRST_TO_GO = (
 
 @dataclass(frozen=True)
 class View:
-    """What is printed of a table."""
+    """A selection of columns to print."""
 
     wide: bool = False
-    """All columns."""
+    """Whether all columns are printed."""
     columns: tuple[str, ...] = ()
-    """These columns instead; see `known_columns`."""
+    """Columns to print instead of the default ones; see `known_columns`."""
     folder: str = ""
     """The result folder, for commands that are named; empty: the default one."""
 
@@ -63,12 +63,12 @@ def document(table: Table, view: View = DEFAULT_VIEW) -> list[TextTable | tuple[
 
 
 def grids(table: Table, view: View = DEFAULT_VIEW) -> list[TextTable]:
-    """Return what is printed of a table's blocks."""
+    """Return the printed table of each block."""
     return [grid(block, view) for block in table.blocks]
 
 
 def grid(block: Block, view: View = DEFAULT_VIEW) -> TextTable:
-    """Return what is printed of a block; numbers have what they are sorted by, and the cell that they are from."""
+    """Return the printed table of a block; its entries have the number they are sorted by and their cell."""
     short = not view.wide and not view.columns
     # A note says once why trivial answers were skipped.
     shown = [one for one in block.lines if not short or one.kind != "skipped" or not one.row["is_baseline"]]
@@ -109,7 +109,7 @@ def _texts(line: Line) -> dict[str, str]:
 
 
 def headings(names: Sequence[str], block: Block) -> tuple[str, ...]:
-    """Return what stands above columns: a score by its metric and unit, an interval by its level."""
+    """Return the headings of columns: a score by its metric and unit, an interval by its level."""
     rows = [line.row for line in block.lines]
     unit = "" if rows[0]["unit"] == "1" else visible(f" [{rows[0]['unit']}]")
     levels = {percent(row.get("n_replicates"), row.get("replicate_unit")) for row in rows if row["ci_low"] is not None}
@@ -124,7 +124,7 @@ def headings(names: Sequence[str], block: Block) -> tuple[str, ...]:
 
 
 def commands(table: Table, view: View = DEFAULT_VIEW) -> tuple[str, ...]:
-    """Return what to do next: commands, and what each shows."""
+    """Return commands to run next, and what each shows."""
     where, out = ((view.folder,), ("--out", view.folder)) if view.folder else ((), ())
     first = next((line.row for line in table.lines if line.kind == "result"), table.rows[0])
     paper = "for a paper, marked “simulated”" if first["simulated"] else "for a paper"

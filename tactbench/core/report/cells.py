@@ -1,4 +1,4 @@
-"""Everything that is known about a cell."""
+"""Collects everything that is known about a cell, for the page."""
 
 from __future__ import annotations
 
@@ -40,10 +40,10 @@ _TITLES = {
     "findings": "Found in the recordings",
     "replicates": "What the interval is over",
 }
-"""Lists and tables."""
+"""Titles of lists and tables, by key."""
 _TEXTS = ("traceback", "log")
 _APART = ("classes", "confusion", "fold_sizes")
-"""Keys of a row that have places of their own."""
+"""Keys of a row that are shown together with others."""
 
 
 def details(row: Row, results: Results) -> Details:
@@ -113,6 +113,6 @@ def recording_scores(row: Row, tested: Answers | None) -> list[dict[str, Any]]:
 
 
 def _text(value: Any) -> str:
-    """Return a value; of texts one a line."""
+    """Return the text of a value, with one line for each text of a list."""
     lines = isinstance(value, list | tuple) and any(isinstance(one, str) for one in value)
     return "\n".join(map(field_text, value)) if lines else field_text(value)

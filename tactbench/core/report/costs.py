@@ -1,4 +1,4 @@
-"""What accuracy costs in time, as `tactbench cost` has measured it: on the terminal, on the page and as files."""
+"""Tables and files of what accuracy costs in time, as `tactbench cost` has measured it."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _COLUMNS = {
     "knob": "", "setting": "", "front": "", "score": "score", "95 % interval": "ci_low",
     "answer delay": "answer_delay_ms", "training": "fit_s", "simulation": "sim_s", "remark": "",
 }  # fmt: skip
-"""Column -> key of the number behind it."""
+"""Key of the number behind each column; empty for a column of words."""
 
 
 def trade_table(known: Mapping[str, Any]) -> TextTable:
@@ -49,7 +49,7 @@ def trade_table(known: Mapping[str, Any]) -> TextTable:
 
 
 def write_trade(known: Mapping[str, Any], place: Path) -> None:
-    """Write what is known as ``PLACE.json``, ``.png`` and ``.pdf``.
+    """Write the measured settings as ``PLACE.json``, and their figure as ``.png`` and ``.pdf``.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Sensors side by side: the rows of the paper's Table I, then what else is known, and who says so."""
+"""Compares sensors side by side: the rows of the paper's Table I, data sheets and parameters, with their sources."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from tactbench.core.tables.text_table import TextTable
 
 ABSENT = "-"
 UNKNOWN = "unknown"
-"""What stands where no source states a fact that every device has."""
+"""Text for a fact that every device has and that no source states."""
 OF_DEVICES = ("force_range", "length", "width", "height", "mass", "interface", "power", "availability")
 """Fields of a data sheet, in the order in which they are shown."""
 
@@ -27,7 +27,7 @@ _TABLE_ONE: tuple[tuple[str, ChannelKind, str], ...] = (
 
 
 class Fact(NamedTuple):
-    """One cell of the comparison."""
+    """One field of the comparison: a text, with the tag and the reference of its source."""
 
     text: str
     tag: str = ""
@@ -35,7 +35,7 @@ class Fact(NamedTuple):
 
 
 class Property(NamedTuple):
-    """A titled row: one fact a sensor."""
+    """A row of the comparison: a title, and one fact for each sensor."""
 
     title: str
     facts: tuple[Fact, ...]
@@ -72,7 +72,7 @@ def quantities(sensors: Sequence[SensorSpec]) -> list[Property]:
 def sensor_table(
     title: str, sensors: Sequence[SensorSpec], properties: Iterable[Property], *, with_source: bool
 ) -> TextTable:
-    """Return properties as a table, a column a sensor; with sources, a column more behind each."""
+    """Return properties as a table with a column for each sensor, and one for its sources if wanted."""
     columns = [name for one in sensors for name in (one.title, *([f"{one.title}: source"] if with_source else []))]
     lines = []
     for row in properties:

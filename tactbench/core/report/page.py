@@ -1,4 +1,4 @@
-"""The page: sections in order, laid into one HTML text that needs nothing from anywhere."""
+"""Makes the page: sections in order, in one HTML file that loads nothing."""
 
 from __future__ import annotations
 
@@ -124,7 +124,7 @@ def cells_section(results: Results) -> Section:
 
 
 def about_section(results: Results) -> Section:
-    """Return how many cells ended how, and who computed them, with what, where."""
+    """Return how many cells ended with each status, and the versions, machine and commit of the runs."""
     counts = Counter(str(row["status"]) for row in results.rows)
     statuses = ", ".join(f"{count} {status}" for status, count in sorted(counts.items()))
     return Section(paragraphs=(f"Cells: {statuses}.", *results.leaderboard.footer))
@@ -146,13 +146,13 @@ SECTIONS: tuple[tuple[str, str, Callable[[Results], Section]], ...] = (
 
 
 class Page(NamedTuple):
-    """The text, and what it lacks."""
+    """The HTML of a page, and what is missing from it."""
 
     html: str
     missing: tuple[str, ...]
-    """What sections lack, one sentence each, with the command that makes it."""
+    """One sentence for each thing that a section lacks."""
     broken: tuple[str, ...]
-    """One sentence a section that could not be made although its results are there."""
+    """One sentence for each section that could not be made although its results exist."""
 
 
 def make_page(results: Results) -> Page:
@@ -202,7 +202,7 @@ def _text(name: str) -> Markup:
 
 @dataclass(frozen=True)
 class Report:
-    """A report that has been written, and what it lacks."""
+    """A report that has been written, and what is missing from it."""
 
     page: Path
     reproduction: TextTable

@@ -1,4 +1,4 @@
-"""Every published number of the tasks beside ours: how the two compare in one sentence, and their table."""
+"""Compares published numbers with our scores."""
 
 from __future__ import annotations
 
@@ -28,11 +28,11 @@ class Reproduction:
     verdict: Verdict
     """`inside`: the published number lies in the interval of our score; `no interval`: too few replicates have one."""
     reason: str = ""
-    """Why there is no answer."""
+    """Reason why our row has no score."""
 
     @property
     def title(self) -> str:
-        """What was published; of a number of no certain sensor or estimator, with that of our row."""
+        """Return what was published, with our sensor and estimator where the publication names none."""
         title = self.published.title or f"{self.task.name}, {self.task.metric}"
         ours = [str(self.row[key]) for key in ("sensor", "estimator") if getattr(self.published, key) is None]
         return f"{title} ({', '.join(ours)})" if ours else title
@@ -52,7 +52,7 @@ def reproduce(registry: Registry, rows: Sequence[Row]) -> list[Reproduction]:
 
 
 def stands_beside(row: Row, task: TaskSpec, published: Published) -> bool:
-    """Tell whether `row` may be compared with a published number: as the row itself says it may."""
+    """Return whether `row` may be compared with a published number."""
     if row["task"] != task.name or row["params"] or (published.estimator is None and row["is_baseline"]):
         return False
     return task.published_for(row["sensor"], row["protocol"], row["estimator"], row["split"]) == published

@@ -1,4 +1,4 @@
-"""What a report is made of: finished cells, what they answered, the recordings behind them, and figures of them."""
+"""The parts of a report: finished cells, their answers and recordings, figures and sections."""
 
 from __future__ import annotations
 
@@ -20,12 +20,12 @@ if TYPE_CHECKING:
 
 
 MOST_CELLS = 500
-"""Of more cells the page has no details: those of each take a file to be read and 20 kB."""
+"""A page of more cells has no details: each cell takes reading a file and 20 kB."""
 
 
 @dataclass(frozen=True)
 class SavedFigure:
-    """One figure."""
+    """A figure that has been saved."""
 
     name: str
     """Short, fit for a file name and an anchor: ``force-against-time``."""
@@ -34,7 +34,7 @@ class SavedFigure:
     caption: str
     """What is on the axes and how to read it, in sentences a paper could use."""
     png: Path
-    """Its PDF lies beside it."""
+    """Path of the picture; the PDF lies beside it."""
 
 
 @dataclass(frozen=True)
@@ -59,16 +59,16 @@ class Results:
     replicates: Mapping[str, Row] = field(default_factory=dict)
     drawn: tuple[SavedFigure, ...] = ()
     undrawn: tuple[str, ...] = ()
-    """Why figures are missing, a sentence each."""
+    """One sentence for each figure that could not be made."""
 
     @cached_property
     def leaderboard(self) -> Table:
-        """The rows as ranked tables."""
+        """Return the rows as ranked tables."""
         return table_of(self.store, self.rows)
 
     @cached_property
     def anchors(self) -> dict[str, str]:
-        """The place on the page of the details of each cell, by the cell's name; of too many cells it has none."""
+        """Return the anchor of the details of each cell, by the cell's name; none of too many cells."""
         lines = self.leaderboard.lines if len(self.rows) <= MOST_CELLS else ()
         return {str(line.row["cell"]): f"cell-{place}" for place, line in enumerate(lines, 1)}
 
@@ -108,7 +108,7 @@ def open_results(store: Store, registry: Registry) -> Results:
 
 @dataclass(frozen=True)
 class Details:
-    """Everything that is known about one cell, to be unfolded."""
+    """Everything that is known about one cell; the page unfolds it."""
 
     cell: str
     status: str
@@ -130,4 +130,4 @@ class Section:
     pictures: tuple[SavedFigure, ...] = ()
     details: tuple[Details, ...] = ()
     missing: tuple[str, ...] = ()
-    """What the section lacks: one sentence each, with the command that makes it."""
+    """One sentence for each thing that the section lacks."""

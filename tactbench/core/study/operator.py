@@ -26,7 +26,7 @@ class TerminalOperator:
         self._paused = paused
 
     def prompt(self, text: str) -> None:
-        """Show `text` and wait for Enter; one pressed before it was shown does not count.
+        """Show `text` and wait for Enter; keys pressed before it was shown are ignored.
 
         Raises
         ------
@@ -51,7 +51,7 @@ class TerminalOperator:
 
 
 def _forget_typed() -> None:
-    """Drop what was typed before, where the system can."""
+    """Discard keys that were typed before, where the system can."""
     try:
         import termios
     except ImportError:  # Windows

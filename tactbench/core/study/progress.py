@@ -1,4 +1,4 @@
-"""How a long run shows what it is doing: a bar on a terminal, a line a tenth elsewhere."""
+"""Progress of a long run: a bar on a terminal, elsewhere a line for each finished tenth."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from tactbench.core.progress import Progress
 from tactbench.core.tables.terminal import remark
 
 _FEW = 10
-"""Stages of so few steps have no estimate of the time to go: a forest and a mean differ by orders of magnitude."""
+"""Stages of at most so many steps show no remaining time: fits of a forest and a mean differ by orders of magnitude."""
 
 
 @contextmanager
@@ -31,7 +31,7 @@ def progress() -> Iterator[Progress]:
 
 
 class _Lines(Progress):
-    """One line a stage and one a finished tenth of it: readable in a log."""
+    """Prints one line for each stage and for each finished tenth of it, for logs."""
 
     def begin(self, stage: str, total: int) -> None:
         self._stage, self._total, self._done, self._stopped = stage, total, 0, 0
@@ -46,7 +46,7 @@ class _Lines(Progress):
 
 
 class _Bar(Progress):
-    """A bar a stage; its clock ticks by a thread where a thread is allowed, else with each step."""
+    """Shows a bar for each stage on a terminal."""
 
     def __init__(self, terminal: TextIO) -> None:
         self._terminal = terminal
@@ -88,7 +88,7 @@ class _Bar(Progress):
 
     @contextmanager
     def paused(self) -> Iterator[None]:
-        """Take the bar off the screen meanwhile."""
+        """Hide the bar inside of the context."""
         shown = self._shown
         if shown is not None:
             shown.stop()

@@ -1,4 +1,4 @@
-"""How a result folder is opened: what can be shown of it, and what is left out."""
+"""Opens result folders, and prints which of their files cannot be read."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def opened(folder: Path) -> Store:
 
 
 def shown_rows(store: Store) -> list[Row]:
-    """Return a row for each cell of a folder; tell of files that cannot be read.
+    """Return a row for each cell of a folder, and print which files cannot be read.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Which scene a few words describe: what is pressed on a sensor, and how."""
+"""Builds the scene that ``record --indenter`` and ``--profile`` describe."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ _BY = "the command line"
 
 
 def scene_of(registry: Registry, sensor: SensorDescriptor, indenter: str | None, profile: str | None) -> Scene:
-    """Return a press with what --indenter and --profile describe; what is left open is that of the paper.
+    """Return a press with the indenter and force profile given; by default those of the paper.
 
     Raises
     ------
@@ -83,7 +83,7 @@ def _ramp(given: Mapping[str, float]) -> ForceProfile:
 
 
 def _named(text: str) -> tuple[str, dict[str, float]]:
-    """Return the name and the numbers of ``NAME:A=1,B=2``; raises UsageError naming what is none."""
+    """Return the name and the numbers of ``NAME:A=1,B=2``; raises UsageError for a value that is no number."""
     name, _, rest = text.partition(":")
     given: dict[str, float] = {}
     for part in filter(None, rest.split(",")):
@@ -99,7 +99,7 @@ def _named(text: str) -> tuple[str, dict[str, float]]:
 
 
 def _in_units(given: Mapping[str, float], parameters: Mapping[str, Parameter]) -> dict[str, Quantity]:
-    """Return numbers in the units of `parameters`; names that are none of them are left for whoever refuses them."""
+    """Return numbers in the units of `parameters`; an unknown name gets the unit 1 and is refused by the caller."""
     return {
         name: sourced(value, parameters[name].unit if name in parameters else "1", _BY) for name, value in given.items()
     }

@@ -1,4 +1,4 @@
-"""A task carried out with nuisances at the ends of their ranges: ordinary runs, each into a folder of its own."""
+"""Runs a task with nuisances at the ends of their ranges, each set of ends into a folder of its own."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ from tactbench.core.study.study import Study, matrix_of
 from tactbench.core.tables.terminal import remark
 
 STRONGEST = 3
-"""Nuisances that are set in pairs: those without which the sensors score best."""
+"""Number of nuisances that are also set in pairs: those whose absence improves the scores most."""
 Values = Mapping[str, Mapping[str, float]]
-"""By sensor, what its nuisances are set to."""
+"""Values of the nuisances by sensor."""
 
 
 def carry_out_sensitivity(study: Study, nuisances: Sequence[str] = ()) -> list[Row]:
@@ -61,7 +61,7 @@ def carry_out_sensitivity(study: Study, nuisances: Sequence[str] = ()) -> list[R
 
 
 def _singles(matrix: MatrixSpec, registry: Registry, nuisances: Sequence[str]) -> dict[tuple[str, str], Values]:
-    """Return what is set, by nuisance and end: each end that differs from what is stated.
+    """Return the values to set, by nuisance and end, for each end that differs from the stated value.
 
     A nuisance in which the task's scenes differ is no assumption but what the task asks about, and is left.
 

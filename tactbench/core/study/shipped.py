@@ -1,4 +1,4 @@
-"""What came with tactbench, and matrices by name."""
+"""Files that are installed with tactbench: results of the default matrix, and matrices by name."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from tactbench.core.statistics.replicates import over_replicates
 
 
 def shipped(name: str, in_checkout: str) -> Path:
-    """Return what came with tactbench: `name` in the installed package, or `in_checkout` in a checkout of it.
+    """Return a file that is installed with tactbench: `name` in the package, or `in_checkout` in a checkout of it.
 
     Raises
     ------
@@ -48,7 +48,7 @@ def shipped_rows() -> tuple[list[dict[str, Any]], str]:
 
 
 def packaged_matrices() -> dict[str, Path]:
-    """Return the matrices that came with tactbench, by name."""
+    """Return the files of the packaged matrices, by name."""
     return {path.stem: path for path in sorted(shipped("matrices", "examples/matrices").glob("*.yaml"))}
 
 

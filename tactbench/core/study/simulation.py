@@ -75,7 +75,7 @@ def _setting(text: str) -> tuple[str, Any]:
 
 
 def _check_effect(registry: Registry, word: str) -> None:
-    """Refuse a word of --effects that names nothing, or lacks its sign."""
+    """Raise UsageError for a word of --effects that names no effect, or lacks its sign."""
     name = word.lstrip("+-")
     effects = {name for effect in registry.effects for name in (effect.name, *effect.groups)} | {"all"}
     if name not in effects:

@@ -26,7 +26,7 @@ from tactbench.core.study.simulation import simulation_of
 
 
 def _each(given: Any) -> Any:
-    """Read one word or path as a list of one, nothing as none, and paths as words."""
+    """Return a list of words: of one word or path, of several, or an empty one for None."""
     several = () if given is None else (given,) if isinstance(given, str | os.PathLike) else given
     if not isinstance(several, Iterable):
         return given
@@ -50,7 +50,7 @@ class Study(Frozen):
     protocol: Words = ()
     split: Words = ()
     estimator: Words | None = None
-    """Trivial answers are run beside them, and alone where this is empty."""
+    """Estimators; trivial ones run beside them, and alone if this is empty."""
     config: Path | None = None
     repeats: int | None = Field(default=None, ge=1, le=MOST_REPEATS)
     seed: int | None = Field(default=None, ge=0)
@@ -139,7 +139,7 @@ def _of_datasets(study: Study, matrix: MatrixSpec) -> list[TaskChoice]:
 
 
 def _with_those_beside(choices: list[TaskChoice], registry: Registry) -> Iterator[TaskChoice]:
-    """Yield the tasks and those that are to be read beside them, answered in the same way."""
+    """Yield the tasks, each with the tasks of its field `beside` under the same protocol, split and estimators."""
     names = {choice.name for choice in choices}
     for choice in choices:
         yield choice

@@ -1,1 +1,1 @@
-"""The one table of text, and what renders it: terminal, Markdown, LaTeX, CSV, HTML."""
+"""The table of text, and its renderers for terminal, Markdown, LaTeX, CSV and HTML."""

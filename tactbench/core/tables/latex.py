@@ -17,7 +17,7 @@ _TEX = {
     "≤": r"$\le$", "≥": r"$\ge$", "−": "$-$", "µ": r"$\mu$", "μ": r"$\mu$", "²": r"$^2$", "³": r"$^3$",
     "=": r"=\allowbreak{}", "°": r"$^\circ$", "ß": r"{\ss}", "\n": " ", "\u202f": r"\,",
 }  # fmt: skip
-"""Brackets and the star are options of ``\\\\`` where they follow it: in braces they are text."""
+"""Escapes; brackets and the star stand in braces, since after ``\\\\`` they would be options."""
 
 
 def latex(tables: Iterable[TextTable]) -> str:

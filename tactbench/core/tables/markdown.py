@@ -8,7 +8,7 @@ from collections.abc import Iterable, Sequence
 from tactbench.core.tables.text_table import TextTable
 
 _ACTS = re.compile(r"[\\|*\[\]~]|(?<![^\W_])_|_(?![^\W_])")
-"""Begins something wherever it stands; an underscore does so only at the edge of a word."""
+"""Characters that are markup wherever they stand; an underscore is so at the edge of a word only."""
 
 
 def markdown(parts: Iterable[TextTable | Sequence[str]]) -> str:

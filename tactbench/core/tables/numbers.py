@@ -58,7 +58,7 @@ def duration(seconds: float | None) -> str:
 
 
 def delay(known_ms: float | None, parts_ms: Mapping[str, float] | None) -> str:
-    """Return an answer delay; of readings whose link is not known, as the least that it can be."""
+    """Return an answer delay, with ≥ where the delay of the link is not known."""
     if known_ms is None:
         return ABSENT
     least = "≥ " if parts_ms and "window" in parts_ms and "link" not in parts_ms else ""

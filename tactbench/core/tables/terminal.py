@@ -16,15 +16,15 @@ if TYPE_CHECKING:
 _STYLE = {"result": "bold", "baseline": "dim", "failed": "red", "skipped": "dim", "alarm": "yellow", "inside": "bold"}
 _GAP, _MARGIN = 2, 1
 _LEAST = 4
-"""Letters that a column of cut words keeps."""
+"""Smallest width of a column of words."""
 WITHOUT_EDGE = 400
 """Width of a table in a file or a pipe, which have no edge: enough for every column of names of ordinary length."""
 Part = TextTable | Sequence[str]
-"""Of what is printed: a table, or notes."""
+"""A table, or notes."""
 
 
 def remark(text: str) -> None:
-    """Say something beside the results, on stderr."""
+    """Print a remark to stderr, beside the results on stdout."""
     print(visible_lines(text), file=sys.stderr)
 
 

@@ -1,4 +1,4 @@
-"""Text from plugins, recordings and strangers' folders, made fit to be read: nothing in it acts on what shows it."""
+"""Makes text from plugins and recordings printable: control characters are escaped."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import unicodedata
 from typing import Any
 
 _ACTS = re.compile("[\x7f-\x9f\xad\u200b-\u200f\u2028-\u202e\u2060-\u206f\ufeff\ud800-\udfff]")
-"""Controls, marks of direction and lone surrogates."""
+"""Control characters, marks of direction and lone surrogates."""
 
 
 def visible(text: str) -> str:

@@ -1,4 +1,4 @@
-"""The one table of text: what every format for people renders."""
+"""The table of text that every format for people renders."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from typing import Any
 from tactbench.core.tables.numbers import ABSENT as ABSENT
 
 WORDY = 60
-"""Letters from which a field wraps as prose."""
+"""A field of more characters wraps as prose."""
 
 
 class Entry(str):
@@ -23,7 +23,7 @@ class Entry(str):
     """The cell that it is from, by name; a page that has a place for each cell makes a link of it."""
 
     def __new__(cls, text: str, value: float | None = None, *, cell: str = "") -> Entry:
-        """Return the text with what is known besides."""
+        """Return the text with its number and its cell."""
         entry = super().__new__(cls, text)
         entry.value, entry.cell = value, cell
         return entry
@@ -41,7 +41,7 @@ class TextTable:
     numeric: frozenset[str] = frozenset()
     """Columns aligned to the right and sorted by value."""
     headings: tuple[str, ...] = ()
-    """What stands above the columns, if not their names."""
+    """Headings of the columns, if they are not their names."""
     kinds: tuple[str, ...] = ()
     """One word a line, by which it looks other than plain: ``result``, ``baseline``, ``failed``, ``alarm`` …"""
     origin: str = ""
@@ -57,21 +57,21 @@ class TextTable:
 
     @property
     def headers(self) -> tuple[str, ...]:
-        """What stands above the columns."""
+        """Return the headings of the columns."""
         return self.headings or self.columns
 
     @property
     def right(self) -> tuple[bool, ...]:
-        """Whether each column is aligned to the right."""
+        """Return for each column whether it is aligned to the right."""
         return tuple(name in self.numeric for name in self.columns)
 
     @property
     def wordy(self) -> bool:
-        """Whether it has sentences in its fields: on a narrow screen its lines are stacked, field below field."""
+        """Return whether it has sentences in its fields; a narrow screen stacks their lines, field below field."""
         return any(len(text) > WORDY for line in self.lines for text in line)
 
     def compact(self, keep: Collection[str] = ()) -> TextTable:
-        """Return the table without the columns in which no line says anything, but for those to `keep`."""
+        """Return the table without columns that are empty in all lines, except for those to `keep`."""
         if not self.lines:
             return self
         texts = zip(self.columns, zip(*self.lines, strict=True), strict=True)
@@ -115,7 +115,7 @@ def text_table(
     notes: Sequence[str] = (),
     kinds: Sequence[str] = (),
 ) -> TextTable:
-    """Return a table without the columns in which no line says anything."""
+    """Return a table without columns that are empty in all lines."""
     given = tuple(map(tuple, lines))
     return TextTable(title, tuple(columns), given, frozenset(numeric), kinds=tuple(kinds), notes=tuple(notes)).compact()
 
@@ -131,7 +131,7 @@ def records_table(
 
 
 def field_text(value: Any) -> str:
-    """Return a value in a line; empty for none."""
+    """Return a value as text on one line; empty for None."""
     from pydantic import BaseModel
 
     if isinstance(value, BaseModel):

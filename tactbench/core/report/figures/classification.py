@@ -1,4 +1,4 @@
-"""What a classification answers, as the paper shows it: confusion matrices, and a map of the test set."""
+"""Figures of a classification as in the paper: confusion matrices, and a t-SNE map of the test set."""
 
 from __future__ import annotations
 
@@ -23,17 +23,17 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 WIDE_FROM = 7
-"""Classes from which on a figure takes both columns of a page."""
+"""A figure of at least so many classes takes both columns of a page."""
 NUMBERS_UP_TO = 14
-"""With more classes numbers no longer fit into their squares."""
+"""Largest number of classes whose numbers fit into their squares."""
 AT_MOST = 1000
-"""Points of a map: more take longer and hide each other in a column's width."""
+"""Largest number of points of a map: more take longer and hide each other in a column's width."""
 PERPLEXITY = 30.0
 ITERATIONS = 1000
 
 
 def confusion(group: Group) -> Sketch:
-    """Draw one row a sensor: left the validation set where there is one, right the test set."""
+    """Draw confusion matrices, one row a sensor: left of the validation set, if there is one, right of the test set."""
     shown = group.panels
     roles = ("validation", "test") if any("validation" in panel.answers for panel in shown) else ("test",)
     wide = max(len(panel.row["classes"]) for panel in shown) >= WIDE_FROM
@@ -86,7 +86,7 @@ def _squares(here: Axes, table: IntArray, classes: list[Any]) -> None:
 
 
 def class_name(one: Any) -> str:
-    """Return a class as it is shown."""
+    """Return the text of a class."""
     return f"{one:g}" if isinstance(one, int | float) else str(one)
 
 

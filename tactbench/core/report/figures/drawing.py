@@ -21,7 +21,7 @@ FIGURES: dict[str, tuple[Callable[[Group], Sketch], ...]] = {
     "vector": (residuals,),
     "classification": (confusion, embedding),
 }
-"""By kind of task, vectors apart, in the order of a report; each raises NotApplicable where it does not apply."""
+"""Figures by kind of task, in the order of a report; each raises NotApplicable if it cannot show a group."""
 
 
 def draw_figures(

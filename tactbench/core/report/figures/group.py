@@ -1,4 +1,4 @@
-"""Which cells stand in one figure: those that differ in nothing but the sensor. What their figures say of them."""
+"""Groups the cells of one figure, which differ in their sensor alone, and writes heading and caption of the figure."""
 
 from __future__ import annotations
 
@@ -23,19 +23,19 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _LINE = 64
-"""Letters that fit above a column, wide ones too."""
+"""Largest number of characters that fit above a column."""
 MARKS = {
     "simulated": "SIM: simulated, no hardware was touched.",
     "dagger": "†: each set, the test set too, is scaled by its own mean and deviation.",
 }
-"""By the key of a row that the mark stands for."""
+"""Explanation of each mark, by the key of a row that it stands for."""
 
 
 class Sketch(NamedTuple):
     """A figure before it is saved."""
 
     name: str
-    """Short and unique among the figures of a folder, whatever else is in it."""
+    """Name of its files, unique among the figures of a folder."""
     title: str
     caption: str
     figure: Figure
@@ -45,13 +45,13 @@ class Panel(NamedTuple):
     """One sensor's cell, with what it answered."""
 
     row: Row
-    """of the replicate that is shown"""
+    """Row of the replicate that is shown."""
     answers: Mapping[str, Answers]
-    """by role"""
+    """Answers by role."""
 
     @property
     def sensor(self) -> str:
-        """Its name."""
+        """Return the name of the sensor."""
         return str(self.row["sensor"])
 
 
@@ -65,22 +65,22 @@ class Group:
 
     @property
     def row(self) -> Row:
-        """What all panels have in common, and the first one's own."""
+        """Return the row of the first panel, which shares task, protocol, split and estimator with all others."""
         return self.panels[0].row
 
     @cached_property
     def colours(self) -> dict[str, str]:
-        """A colour a sensor, the same in all figures of the folder."""
+        """Return a colour for each sensor, the same in all figures of the folder."""
         return sensor_colours(self.results.rows)
 
     @property
     def metric(self) -> str:
-        """The metric as the tables call it."""
+        """Return the name of the metric as tables write it."""
         return METRIC_NAMES.get(self.task.metric, self.task.metric)
 
     @property
     def quantity(self) -> str:
-        """The quantity that the task predicts, in words."""
+        """Return the quantity that the task predicts, in words."""
         target = self.task.target
         if isinstance(target, SlipTarget):
             return "state of slip"
@@ -91,7 +91,7 @@ class Group:
 
     @property
     def unit(self) -> str:
-        """The unit of that."""
+        """Return the unit of the predicted quantity."""
         target = self.task.target
         return target.unit if isinstance(target, LabelTarget) else self.task.unit
 
@@ -119,7 +119,7 @@ def with_unit(words: str, unit: str) -> str:
 
 
 def groups(results: Results, remark: Callable[[str], None]) -> list[Group]:
-    """Return the groups of finished cells, a figure's worth each.
+    """Return the groups of finished cells, one for each set of figures.
 
     Of several estimators the one that stands beside a published number is shown, or else the one with the best score
     of any sensor; of several replicates the one whose answers the cell's row leads to. `remark` is called with a

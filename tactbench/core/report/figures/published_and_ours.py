@@ -1,4 +1,4 @@
-"""The first picture of a report: published scores beside ours, a panel a task."""
+"""Draws the first figure of a report: published scores beside ours, one panel a task."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ _LINE_IN = 0.24
 
 
 def draw_published(results: Results) -> Sketch | None:
-    """Draw each published score beside our row, and what its replicates scored; None where no row stands beside one."""
+    """Draw each published score beside ours and those of our replicates; return None if no row is comparable."""
     tasks: dict[str, list[tuple[Reproduction, Mapping[str, Any]]]] = {}
     for line in reproduce(results.registry, results.rows):
         if line.row["status"] == "done":

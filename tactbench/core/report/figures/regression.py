@@ -1,4 +1,4 @@
-"""What a regression answers: against time, as the paper shows it, and against the target."""
+"""Figures of a regression as in the paper: predictions against time and against the target."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from tactbench.core.tables.numbers import score_with_unit, suffix
 
 
 def prediction_against_time(group: Group) -> Sketch:
-    """Draw one row a sensor: left the training set, right the test set; the reference in grey dots.
+    """Draw predictions against time, one row a sensor: left of the training set, right of the test set.
 
     Raises
     ------

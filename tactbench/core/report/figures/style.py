@@ -1,4 +1,4 @@
-"""How figures look: a column wide, seven points, colours that the colour-blind and grey printers tell apart."""
+"""Style of all figures: a column wide, letters of seven points, colours that colour-blind readers distinguish."""
 
 from __future__ import annotations
 
@@ -22,11 +22,11 @@ PAGE_IN = 7.16
 """Width of both columns, for what does not fit in one."""
 FONT_PT = 7.0
 PNG_DPI, RASTER_DPI = 150, 300
-"""Of a picture, and of dense clouds of points inside a PDF."""
+"""Resolution of a PNG, and of dense clouds of points inside a PDF."""
 
 BLACK, GREY = "#000000", "#767676"
 LINES = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", BLACK)
-"""Of things without an order: Okabe and Ito 2008, Color universal design."""
+"""Colours of things without an order: Okabe and Ito 2008, Color universal design."""
 MARKERS = "os^DvPX*<>"
 
 _RC: dict[str, Any] = {
@@ -44,7 +44,7 @@ _RC: dict[str, Any] = {
 
 @contextmanager
 def styled() -> Iterator[None]:
-    """Draw in our style, whatever the user's matplotlibrc says."""
+    """Set the style of figures inside of the context, whatever the user's matplotlibrc sets."""
     import matplotlib
 
     with matplotlib.rc_context():
@@ -89,7 +89,7 @@ def sensor_colours(rows: Iterable[Mapping[str, Any]]) -> dict[str, str]:
 
 
 def legend(figure: Figure, shown: Iterable[Axes], **more: Any) -> None:
-    """Put below a figure what its panels name, each name once."""
+    """Add a legend below a figure with each label of its panels once."""
     entries: dict[str, Any] = {}
     for here in shown:
         handles, labels = here.get_legend_handles_labels()
@@ -99,6 +99,6 @@ def legend(figure: Figure, shown: Iterable[Axes], **more: Any) -> None:
 
 
 def corner(axes: Axes, text: str) -> None:
-    """Write into the upper left corner of a panel, on a ground that keeps it legible over points."""
+    """Write a text into the upper left corner of a panel, on a background that keeps it legible over points."""
     ground = {"facecolor": "white", "edgecolor": "none", "alpha": 0.8, "pad": 1.0}
     axes.text(0.03, 0.97, text, transform=axes.transAxes, va="top", bbox=ground, zorder=10)

@@ -1,4 +1,4 @@
-"""What accuracy costs in time: scores along the settings that `tactbench cost` varies, errors of a simulated rig."""
+"""Figures of what accuracy costs in time: scores of the settings that `cost` varies, errors of a simulated rig."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 ACROSS = {
     "answer_delay_ms": "answer delay [ms]", "fit_s": "training: one fit [s]", "sim_s": "simulating one campaign [s]",
 }  # fmt: skip
-"""Time -> label of its axis."""
+"""Label of the axis of each time."""
 
 
 def draw_trade(known: Mapping[str, Any]) -> Figure:
@@ -53,7 +53,7 @@ def draw_trade(known: Mapping[str, Any]) -> Figure:
 
 
 def title_of(known: Mapping[str, Any]) -> str:
-    """Return what holds for all settings."""
+    """Return a title with everything that all settings share."""
     simulated = " · SIM (twin)" if known["simulated"] else ""
     several = f"{known['replicates']} replicates" if known["replicates"] > 1 else "one replicate"
     bars = ", bars: 95 %" if any(one["ci_low"] is not None for one in known["settings"]) else ""
@@ -90,7 +90,7 @@ def draw_precision(points: Sequence[CostPoint], title: str) -> Figure:
 
 
 def _plain_numbers(axis: Any) -> None:
-    """Write 1, 2, 5, 10 … on a logarithmic axis."""
+    """Label a logarithmic axis with 1, 2, 5, 10 … instead of powers."""
     axis.set_major_formatter("{x:g}")
     axis.set_minor_formatter(lambda x, _: f"{x:g}" if f"{x:e}"[0] in "25" else "")
 
@@ -108,7 +108,7 @@ def _path(
     here: Axes, across: Sequence[float], upwards: Sequence[float], place: int, name: str, texts: Sequence[str], *,
     joined: bool,
 ) -> None:  # fmt: skip
-    """Draw points with what each is called, joined by a line where one setting changes along them."""
+    """Draw points with a text at each, joined by a line where one setting changes along them."""
     colour, mark = LINES[place % len(LINES)], MARKERS[place % len(MARKERS)]
     here.plot(across, upwards, mark + "-" * joined, color=colour, markersize=4, linewidth=1.0, label=visible(name))
     for text, x, y in zip(texts, across, upwards, strict=True):
