@@ -50,7 +50,7 @@ def show_twin(sensors: tuple[str, ...], out: Path, shape: str, *, rounds: int) -
     name = registry.first_rig("simulated")
     descriptor = registry.rigs[name]
     if descriptor.work_precision is None:
-        raise UsageError(f"The rig {name!r} does not say what its accuracy costs.", hint="Ask twin.")
+        raise UsageError(f"The rig {name!r} declares no study of what its accuracy costs.", hint="Use the rig twin.")
     chosen = [registry.sensors[sensor] for sensor in sensors or matrix_called().sensors]
     points: list[CostPoint] = []
     skipped: list[Skipped] = []

@@ -69,7 +69,7 @@ def _only(rows: list[dict[str, Any]], filters: Mapping[str, Sequence[str]]) -> l
         kept = [row for row in kept if not chosen or row[key] in chosen]
     if not kept:
         raise UsageError(
-            "No row is all that at once.", hint="Ask for less: see `tactbench leaderboard --columns cell`."
+            "No row passes all filters.", hint="Leave one out; `tactbench leaderboard --columns cell` names all rows."
         )
     return kept
 
@@ -91,9 +91,7 @@ def view_of(folder: Path, *, wide: bool = False, columns: str | None = None, sha
     from tactbench.core.leaderboard.view import View, known_columns
 
     if columns is not None and shape not in FOR_PEOPLE:
-        raise UsageError(
-            f"--format {shape} always holds all columns.", hint=f"--columns is for {', '.join(FOR_PEOPLE)}."
-        )
+        raise UsageError(f"--format {shape} always has all columns.", hint=f"--columns is for {', '.join(FOR_PEOPLE)}.")
     names = [name.strip() for name in columns.split(",")] if columns is not None else []
     where = "" if folder == DEFAULT_FOLDER else str(folder)
     return View(wide=wide, columns=known_columns(names), folder=where)
@@ -106,7 +104,7 @@ def _format_of(shape: str | None, to: Path | None) -> str:
 
     found = shape or ("table" if to is None else SUFFIXES.get(to.suffix.lower()))
     if found is None:
-        raise UsageError(f"The name of {to} says no format.",
+        raise UsageError(f"The suffix of {to} names no format.",
                          hint=f"Let it end in {', '.join(SUFFIXES)}, or give --format.")  # fmt: skip
     return str(found)
 

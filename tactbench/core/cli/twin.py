@@ -50,7 +50,7 @@ def explain(sensor_name: str, task_name: str, rounds: int, effects: str | None, 
     sensor = registry.sensors[sensor_name]
     rig: Explaining = load_object(registry.rigs[rig_name].where)(rig_context(registry))
     if not hasattr(rig, "explain"):
-        raise UsageError(f"The rig {rig_name!r} does not explain its plans.", hint="Ask twin.")
+        raise UsageError(f"The rig {rig_name!r} does not explain its plans.", hint="Use the rig twin.")
     scenes = [planned.scene for planned in registry.tasks[task_name].spec.scenes]
     if not scenes:
         raise UsageError(
@@ -129,7 +129,7 @@ def verify(ctx: click.Context, shape: str) -> None:
     where = registry.rigs[rig].verification
     if where is None:
         hint = "See `tactbench show` with its name."
-        raise UsageError(f"The rig {rig!r} states no laws to be held against.", hint=hint)
+        raise UsageError(f"The rig {rig!r} declares no laws to verify.", hint=hint)
     found: list[Verdict] = list(load_object(where)())
     kinds = ["" if verdict.met else "failed" for verdict in found]
     print_records([_record(verdict) for verdict in found], shape, title=rig, kinds=kinds)
