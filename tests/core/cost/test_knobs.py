@@ -20,6 +20,8 @@ from tactbench.core.evaluation.sets import prepared
 from tactbench.core.plugins.registry import load_registry
 from tactbench.core.progress import Progress
 from tactbench.core.report.costs import trade_table, write_trade
+from tactbench.core.report.figures.style import styled
+from tactbench.core.report.figures.trade import draw_precision, draw_trade
 from tactbench.core.spec.matrix import EstimatorChoice, MatrixSpec, TaskChoice
 from tactbench.plugin.simulation import CostPoint
 from tests.core.evaluation.made import record
@@ -112,6 +114,20 @@ def test_files_and_tables_say_what_is_known(known, tmp_path):
     assert fronts == [one["front"] for one in known[-1]["settings"]]
 
 
+def test_the_figure_has_a_path_for_each_knob_and_one_mark_for_each_family(known):
+    with styled():
+        drawn = draw_trade(known[-1])
+        points = [cost_point(t, 1 / t, subject=name, family=one) for name in "ab" for t, one in ((1, name), (2, "x"))]
+        panels = draw_precision(points, "Two sensors").axes
+    paths = {line.get_label(): line for axes in drawn.axes for line in axes.get_lines()}
+    for knob in ("trees", "window k", "every n-th sample"):
+        own = [one for one in known[-1]["settings"] if one["knob"] == knob]
+        assert list(paths[knob].get_xdata()) == [one["answer_delay_ms"] for one in own]
+        assert list(paths[knob].get_ydata()) == [one["score"] for one in own]
+    marks = [[line.get_marker() for line in axes.get_lines() if line.get_label() == "x"] for axes in panels]
+    assert marks[0] == marks[1]
+
+
 @pytest.mark.parametrize("name", ["deployable@every=3,k=4", "deployable@every=3", "deployable@k=4"])
 def test_options_of_a_protocol_thin_samples_and_set_the_window(shelf, registry, name):
     task, rules = registry.tasks["force"].spec, protocol_called(name)
@@ -152,10 +168,10 @@ def test_a_setting_is_of_its_own_row_only():
     assert not Setting("k", "1", "deployable", ols).is_of(row)
 
 
-def cost_point(seconds, error, *, default=False, floor=0.3):
+def cost_point(seconds, error, *, default=False, floor=0.3, subject="pad", family="newton"):
     return CostPoint(
-        subject="pad", observable="taxel", label="way", seconds=seconds, error=error, worst=2 * error, unit="count",
-        floor=floor, default=default, settings={"family": "newton"},
+        subject=subject, observable="taxel", label="way", seconds=seconds, error=error, worst=2 * error, unit="count",
+        floor=floor, default=default, settings={"family": family},
     )  # fmt: skip
 
 
