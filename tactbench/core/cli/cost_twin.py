@@ -64,7 +64,7 @@ def show_twin(sensors: tuple[str, ...], out: Path, shape: str, *, rounds: int) -
     finally:
         if study is not None and (points or skipped):
             _print(records := _records(points, skipped), study, shape)
-            _write(points, records, study, out)
+            _write(points, records, study, out / name)
 
 
 def _print(records: Sequence[dict[str, Any]], study: CostStudy, shape: str) -> None:
@@ -93,15 +93,15 @@ def _records(points: Sequence[CostPoint], skipped: Sequence[Skipped]) -> list[di
     return [{key: record.get(key) for key in keys} for record in found]
 
 
-def _write(points: Sequence[CostPoint], records: Sequence[dict[str, Any]], study: CostStudy, folder: Path) -> None:
+def _write(points: Sequence[CostPoint], records: Sequence[dict[str, Any]], study: CostStudy, place: Path) -> None:
     from tactbench.core.files import replace_file, writable
     from tactbench.core.report.figures.style import save, styled
     from tactbench.core.report.figures.trade import draw_precision
     from tactbench.core.tables.text import json_text
 
-    with writable(folder), styled():
-        folder.mkdir(parents=True, exist_ok=True)
-        replace_file(folder / "twin.json", (json_text(records, indent=1) + "\n").encode())
+    with writable(place.parent), styled():
+        place.parent.mkdir(parents=True, exist_ok=True)
+        replace_file(place.with_name(f"{place.name}.json"), (json_text(records, indent=1) + "\n").encode())
         if points:
-            save(draw_precision(points, study.title), folder / "twin")
-    remark(f"Files: {folder}/twin.json{', .png, .pdf' if points else ''}")
+            save(draw_precision(points, study.title), place)
+    remark(f"Files: {place}.json{', .png, .pdf' if points else ''}")
