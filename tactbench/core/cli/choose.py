@@ -8,6 +8,8 @@ import click
 
 from tactbench.core.cli.options import ABOVE_0, DEFAULT_FOLDER, format_option
 
+_PREFERRED = "deployable"
+
 
 @click.command(name="choose")
 @click.argument("folder", type=click.Path(path_type=Path), required=False)
@@ -15,11 +17,12 @@ from tactbench.core.cli.options import ABOVE_0, DEFAULT_FOLDER, format_option
 @click.option("--max-delay-ms", type=ABOVE_0, metavar="X", help="Largest delay from touch to answer.")
 @click.option("--range-n", type=ABOVE_0, metavar="X", help="Largest normal force to measure.")
 @click.option("--rate-hz", type=ABOVE_0, metavar="X", help="Smallest rate of answers.")
-@click.option("--protocol", metavar="NAME", default="deployable", show_default=True, help="Evaluation protocol.")
+@click.option("--protocol", metavar="NAME",
+              help="Evaluation protocol. Default: deployable, or another one if there are no results under it.")  # fmt: skip
 @format_option("table", "json")
 def command(
     folder: Path | None, task_name: str, max_delay_ms: float | None, range_n: float | None, rate_hz: float | None,
-    protocol: str, shape: str,
+    protocol: str | None, shape: str,
 ) -> None:  # fmt: skip
     """Find the sensor that meets given requirements; say which miss them, and what is unknown.
 
@@ -43,7 +46,10 @@ def command(
     origin = f"the results in {own}"
     if folder is None and task.name not in {row["task"] for row in rows}:
         rows, origin = shipped_rows()
-    found = [row for row in rows if (row["task"], row["protocol"]) == (task.name, protocol)]
+    rows = [row for row in rows if row["task"] == task.name]
+    known = [_PREFERRED, *(row["protocol"] for row in rows)]
+    protocol = protocol or next((name for name in known if name in known[1:]), _PREFERRED)
+    found = [row for row in rows if row["protocol"] == protocol]
     if not found:
         raise UsageError(
             f"There are no results of the task {task.name} under the protocol {protocol} in {own}.",

@@ -80,7 +80,7 @@ def test_results_of_ones_own_are_chosen_from_before_those_that_came_along(verbs)
     assert "unknown: not stated" in shipped.stdout, "the force range of the iCub"
     with Store(verbs.folder / "tactbench-results").hold() as store:
         made.kept(store, "icub/force/twin/karl2016/ols/1", estimator="ols", dagger=True)
-    shown = verbs("choose", *WISH, "--protocol", "karl2016")
+    shown = verbs("choose", *WISH)
     assert "protocol karl2016" in shown.stdout
     assert "the results in tactbench-results" in shown.stderr
     # A task of which the folder has nothing is answered from what came along, unless the folder was asked for.
