@@ -17,8 +17,7 @@ _PREFERRED = "deployable"
 @click.option("--max-delay-ms", type=ABOVE_0, metavar="X", help="Largest delay from touch to answer.")
 @click.option("--range-n", type=ABOVE_0, metavar="X", help="Largest normal force to measure.")
 @click.option("--rate-hz", type=ABOVE_0, metavar="X", help="Smallest rate of answers.")
-@click.option("--protocol", metavar="NAME",
-              help="Evaluation protocol. Default: deployable, or another one if there are no results under it.")  # fmt: skip
+@click.option("--protocol", metavar="NAME", help="Evaluation protocol. Default: deployable, or one with results.")
 @format_option("table", "json")
 def command(
     folder: Path | None, task_name: str, max_delay_ms: float | None, range_n: float | None, rate_hz: float | None,
@@ -47,8 +46,8 @@ def command(
     if folder is None and task.name not in {row["task"] for row in rows}:
         rows, origin = shipped_rows()
     rows = [row for row in rows if row["task"] == task.name]
-    known = [_PREFERRED, *(row["protocol"] for row in rows)]
-    protocol = protocol or next((name for name in known if name in known[1:]), _PREFERRED)
+    protocols = [row["protocol"] for row in rows] or [_PREFERRED]
+    protocol = protocol or (_PREFERRED if _PREFERRED in protocols else protocols[0])
     found = [row for row in rows if row["protocol"] == protocol]
     if not found:
         raise UsageError(
