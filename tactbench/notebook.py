@@ -16,7 +16,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import numpy.typing as npt
 from pydantic import ValidationError
 
 from tactbench.core.errors import NotApplicable, UnknownNameError, UsageError, complaint
@@ -49,6 +48,7 @@ from tactbench.recordings import AnyPath, Recordings, library, open_recordings
 
 if TYPE_CHECKING:
     import pandas
+    from matplotlib.figure import Figure
 
 Row = dict[str, Any]
 
@@ -191,7 +191,8 @@ class Result(Results):
             self.interval = row["ci_low"], math.inf if row["ci_high"] is None else row["ci_high"]
         self.trivial = {str(one["estimator"]): one["score"] for one in others}
         self.fold_scores = {name.removeprefix("fold "): row["scores"].get(name) for name in row["fold_sizes"]}
-        self.row, self.answers, self._task, self._names = row, answers, task, names
+        self.row, self.answers, self._names = row, answers, names
+        self._components = task.target.names if isinstance(task.target, VectorTarget) else ()
 
     @property
     def recording_scores(self) -> dict[str, float]:
@@ -204,21 +205,50 @@ class Result(Results):
         return found
 
     @property
-    def predictions(self) -> dict[str, npt.NDArray[Any]]:
-        """Return columns of (n,), one line a test row: ``pandas.DataFrame(result.predictions)``.
+    def predictions(self) -> pandas.DataFrame:
+        """Return a pandas DataFrame, a line a test row; raises UsageError if pandas is not installed.
 
-        recording, row (its place in the recording), time_s, fold, y_true and y_pred: class labels, numbers, or a column
-        for each component of a vector.
+        recording, row (its place in the recording), time_s, fold (its name), y_true and y_pred: class labels, numbers,
+        or a column for each component of a vector.
         """
-        one, labels, target = self.answers, np.asarray(self.row["classes"]), self._task.target
+        one, labels = self.answers, np.asarray(self.row["classes"])
         found = {"recording": np.asarray(self._names)[one.recording]}
-        found |= {"row": one.row, "time_s": one.time_s, "fold": one.fold}
+        found |= {"row": one.row, "time_s": one.time_s, "fold": np.asarray(list(self.fold_scores))[one.fold]}
         for name, values in (("y_true", one.y_true), ("y_pred", one.y_pred)):
-            if isinstance(target, VectorTarget):
-                found |= {f"{name}_{part}": column for part, column in zip(target.names, values.T, strict=True)}
+            if values.ndim > 1:
+                found |= {f"{name}_{part}": column for part, column in zip(self._components, values.T, strict=True)}
             else:
                 found[name] = labels[values] if len(labels) else values
-        return found
+        frame: pandas.DataFrame = library("pandas").DataFrame(found)
+        return frame
+
+    def plot(self) -> Figure:
+        """Draw answers over the truth, a panel a component, or how often each class is taken for which.
+
+        Returns
+        -------
+        matplotlib.figure.Figure
+            Notebooks show it. NotApplicable is raised for events: their figure is that of ``tactbench report``.
+        """
+        from matplotlib.figure import Figure
+        from sklearn.metrics import ConfusionMatrixDisplay, PredictionErrorDisplay
+
+        if self.row["events"]:
+            raise NotApplicable("Events are not drawn here.", hint="See row['operating_points'].")
+        frame, names = self.predictions, [name for name in self.predictions if name.startswith("y_true")]
+        figure = Figure(figsize=(4.5 * len(names), 4.5), layout="constrained")
+        for name, axes in zip(names, figure.subplots(1, len(names), squeeze=False)[0], strict=True):
+            part, unit = name.removeprefix("y_true").replace("_", " "), self.row["unit"]
+            drawn = {"y_true": frame[name], "y_pred": frame[name.replace("true", "pred")], "ax": axes}
+            if self.row["confusion"]:
+                more = {"values_format": ".2g", "colorbar": False, "xticks_rotation": "vertical", "cmap": "Blues"}
+                ConfusionMatrixDisplay.from_predictions(**drawn, normalize="true", **more)
+            else:
+                kind, points = "actual_vs_predicted", {"s": 4}
+                PredictionErrorDisplay.from_predictions(**drawn, kind=kind, subsample=None, scatter_kwargs=points)
+                axes.set(xlabel=f"answer{part} [{unit}]", ylabel=f"truth{part} [{unit}]")
+        figure.suptitle(f"{self.row['estimator']}: {self.row['metric']} {self.score:.3g}")
+        return figure
 
 
 def evaluate(
