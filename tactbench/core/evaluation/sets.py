@@ -175,7 +175,12 @@ def taken(of: Part, rows: Mask | IntArray) -> Part:
 
 def scale_of(protocol: ProtocolSpec, train: SetRows, other: SetRows) -> FeatureScale:
     """Return the scale of a set beside its training set, as the protocol has it."""
-    return FeatureScale(*moments((other if protocol.scaled_by == "each set" else train).X))
+    return FeatureScale(*moments(_samples((other if protocol.scaled_by == "each set" else train).X)))
+
+
+def _samples(X: FloatArray) -> FloatArray:
+    """Return (n, features), of windows (n, window, features) all their samples."""
+    return X.reshape(-1, X.shape[-1])
 
 
 def prepared(assignment: Assignment, data: Dataset, rules: ProtocolSpec, k: int, counts: Counter[str]) -> Fold:
@@ -184,7 +189,7 @@ def prepared(assignment: Assignment, data: Dataset, rules: ProtocolSpec, k: int,
     `counts` is told what was left out, and which features never change.
     """
     train = keep(data, rules, assignment.train, "training", counts)
-    for name, width in zip(data.features, np.ptp(train.X, axis=0), strict=True):
+    for name, width in zip(data.features, np.ptp(_samples(train.X), axis=0), strict=True):
         if width == 0:
             counts[f"folds in which {name} never changes in training"] += 1
 
