@@ -11,18 +11,22 @@ import random
 import shutil
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from functools import partial
+from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from pydantic import ValidationError
 
-from tactbench.core.errors import NotApplicable, UnknownNameError, UsageError, complaint
+from tactbench.core.errors import NotApplicable, UnknownNameError, UsageError, complaint, wrong
+from tactbench.core.evaluation.cell import Own
 from tactbench.core.evaluation.folds import PLAIN, TaskData
 from tactbench.core.evaluation.folds import load_task as folds_of
-from tactbench.core.evaluation.metrics import metric_called
-from tactbench.core.evaluation.protocols import is_probe
+from tactbench.core.evaluation.metrics import METRICS, Metric, metric_called, own_metric
+from tactbench.core.evaluation.protocols import PROTOCOLS, is_probe
+from tactbench.core.evaluation.splits import OwnSplit
 from tactbench.core.files import named_file
 from tactbench.core.leaderboard.formats import records, write_tables
 from tactbench.core.leaderboard.pairwise import comparisons, record_of, tables_of, with_declared
@@ -44,7 +48,7 @@ from tactbench.core.study.study import Study, carry_out
 from tactbench.core.tables.html import html
 from tactbench.core.tables.terminal import plain_text
 from tactbench.core.tables.text_table import TextTable
-from tactbench.recordings import AnyPath, Recordings, library, open_recordings
+from tactbench.recordings import AnyPath, Recordings, library, open_recordings, opened_as
 
 if TYPE_CHECKING:
     import pandas
@@ -53,9 +57,36 @@ if TYPE_CHECKING:
 Row = dict[str, Any]
 
 
-def _question(task: str | TaskSpec, recordings: Recordings, protocol: str) -> tuple[TaskSpec, str, tuple[Path, ...]]:
-    """Return a task, the JSON that declares it beside the recordings (empty: it is installed), and the files."""
-    paths = tuple(one.path for one in open_recordings(recordings))
+@dataclass(frozen=True)
+class _Question:
+    """What is asked of recordings, with all names looked up."""
+
+    task: TaskSpec
+    declared: str
+    """the JSON that declares the task beside the recordings; empty: it is installed"""
+    paths: tuple[Path, ...]
+    split: str | None
+    own: Own
+
+
+def _question(
+    task: str | TaskSpec,
+    recordings: Recordings,
+    protocol: str,
+    split: Any,
+    groups: Any,
+    window: int | None,
+    step: int | None,
+    seed: int,
+) -> _Question:
+    for name, given, least in (("window", window, 1), ("step", step, 1), ("seed", seed, 0)):
+        if given is not None and not (isinstance(given, int | np.integer) and given >= least):
+            raise wrong(name, given, f"a whole number, {least} or more")
+    if step is not None and window is None:
+        raise wrong("step", step, "rows between windows, and `window` is not given")
+    if not isinstance(protocol, str):
+        raise wrong("protocol", protocol, f"a name: {', '.join(PROTOCOLS)}")
+    paths = tuple(one.path for one in opened_as("recordings", recordings))
     folders = {path.parent for path in paths if (path.parent / FILE).is_file()}
     registry = with_declared_tasks(installed(), {one: None for each in sorted(folders) for one in declared_in(each)})
     declared = ""
@@ -63,18 +94,28 @@ def _question(task: str | TaskSpec, recordings: Recordings, protocol: str) -> tu
         owned = registry.tasks.owned(task)
         task, declared = owned.descriptor.spec, owned.declared
     if not isinstance(task, TaskSpec):
-        raise UsageError(f"{task!r} is no task.", hint="Give its name, see `tactbench list tasks`, or a TaskSpec.")
+        raise wrong("task", task, "a name of `tactbench list tasks`, one declared beside the recordings, or a TaskSpec")
     if protocol not in task.protocols and not is_probe(protocol):
         raise UnknownNameError(f"protocol of task {task.name!r}", protocol, task.protocols)
-    return task, declared, paths
+    named = split is None or isinstance(split, str)
+    if not named and not hasattr(split, "split") and not isinstance(split, Iterable):
+        raise wrong("split", split, "a name, an object with scikit-learn's `split(X, y, groups)`, or index arrays")
+    if named and groups is not None:
+        raise wrong("groups", groups, "what a splitter keeps apart, and `split` is none (`params` has those of `fit`)")
+    mine = None if named else OwnSplit(split, groups)
+    own = Own(split=mine, window=window or 0, step=step or 1)
+    return _Question(task, declared, paths, mine.name if mine else split, own)
 
 
 def load_task(
     task: str | TaskSpec,
     recordings: Recordings,
     protocol: str = "deployable",
-    split: str | None = None,
+    split: Any = None,
     *,
+    groups: Any = None,
+    window: int | None = None,
+    step: int | None = None,
     seed: int = 1,
 ) -> TaskData:
     """Return what a task asks of recordings as `X`, `y`, `groups`, `feature_names` and `folds`.
@@ -88,7 +129,15 @@ def load_task(
     protocol
         How recordings become rows; see docs/protocols.md.
     split
-        What training and test keep apart; None: the task's first that the recordings can serve.
+        What training and test keep apart, by name; an object with scikit-learn's ``split(X, y, groups)``; or pairs of
+        index arrays (train, test) over the rows of `X`. None: the task's first that the recordings can serve.
+    groups
+        What a splitter keeps apart, and what intervals are then over: the name of a label of the recordings (session,
+        object …), or an array (n,). None: there is no interval.
+    window, step
+        Rows of a window, and from its end to that of the next (1). `X` is then (n, window, features): each window lies
+        in one recording and in one fold, and has the label of its last row. Training windows that share a row with a
+        test window are in no fold.
     seed
         Of split ``shuffled``.
 
@@ -102,12 +151,13 @@ def load_task(
     Raises
     ------
     UsageError
-        If a name is unknown, or these recordings cannot be split so.
+        If an argument cannot be used, or these recordings cannot be split so.
     DataError
         If nothing is left to evaluate; its kind NotApplicable if the question cannot be asked of these recordings.
     """
-    spec, _, paths = _question(task, recordings, protocol)
-    return folds_of(spec, read_dataset(spec, paths), protocol, split, seed=seed)
+    asked = _question(task, recordings, protocol, split, groups, window, step, seed)
+    data, own = read_dataset(asked.task, asked.paths), asked.own
+    return folds_of(asked.task, data, protocol, own.split or split, seed=seed, window=own.window, step=own.step)
 
 
 class Rows(list[dict[str, Any]]):
@@ -181,7 +231,9 @@ class Result(Results):
         Truth and predictions of the test rows as arrays; classes are indices.
     """
 
-    def __init__(self, rows: Sequence[Row], answers: Answers, task: TaskSpec, names: Sequence[str]) -> None:
+    def __init__(
+        self, rows: Sequence[Row], answers: Answers, task: TaskSpec, names: Sequence[str], metric: Metric
+    ) -> None:
         rows = over_replicates(rows)
         super().__init__(build_table(rows, questions={task.name: task.question}))
         row, *others = map(against_reference, rows)  # what scikit-learn scores of `load_task`'s rows
@@ -191,17 +243,18 @@ class Result(Results):
             self.interval = row["ci_low"], math.inf if row["ci_high"] is None else row["ci_high"]
         self.trivial = {str(one["estimator"]): one["score"] for one in others}
         self.fold_scores = {name.removeprefix("fold "): row["scores"].get(name) for name in row["fold_sizes"]}
-        self.row, self.answers, self._names = row, answers, names
+        self.row, self.answers, self._names, self._metric = row, answers, names, metric
         self._components = task.target.names if isinstance(task.target, VectorTarget) else ()
 
     @property
     def recording_scores(self) -> dict[str, float]:
         """Return the score over the test rows of each recording by its name; NaN where the metric is undefined."""
-        metric, one, found = metric_called(self.row["metric"]), self.answers, {}
+        one, found = self.answers, {}
         with np.errstate(all="ignore"):
             for place in np.unique(one.recording):
                 mine = one.recording == place
-                found[self._names[place]] = metric.of(one.y_true[mine], one.y_pred[mine], len(self.row["classes"]))
+                score = self._metric.of(one.y_true[mine], one.y_pred[mine], len(self.row["classes"]))
+                found[self._names[place]] = score
         return found
 
     @property
@@ -256,8 +309,14 @@ def evaluate(
     task: str | TaskSpec,
     recordings: Recordings,
     protocol: str = "deployable",
-    split: str | None = None,
+    split: Any = None,
     *,
+    groups: Any = None,
+    metric: Any = None,
+    greater_is_better: bool | None = None,
+    params: Mapping[str, Any] | None = None,
+    window: int | None = None,
+    step: int | None = None,
     seed: int = 1,
 ) -> Result:
     """Score an estimator on recordings in this process, and the task's trivial answers beside it.
@@ -267,8 +326,17 @@ def evaluate(
     estimator
         Any object with scikit-learn's ``fit(X, y)`` and ``predict(X)``, of which each fold fits a copy, or the name of
         an installed one. Its class may be defined in a notebook. Classes in `y` are indices.
-    task, recordings, protocol, split
+    task, recordings, protocol, split, groups, window, step
         As of :func:`load_task`.
+    metric
+        Name of a metric of docs/protocols.md or of one of scikit-learn's scorers, such a scorer, or a function of (y,
+        prediction). None: the task's. A scorer whose sign is negative is an error: the score is without that sign.
+    greater_is_better
+        Whether a higher score is better: of a function, which does not say it itself.
+    params
+        What ``fit`` takes beside `X` and `y`, as of ``sklearn.model_selection.cross_validate``: arrays (n,) of a value
+        for each row of ``load_task(...).X`` are cut to the rows of a fold. ``groups`` may be the name of a label. A
+        search of parameters by cross-validation is given the groups that the split keeps apart.
     seed
         Decides resamples of intervals, split ``shuffled``, and what is drawn from the global generators of ``random``
         and numpy, whose states are afterwards as they were.
@@ -280,18 +348,57 @@ def evaluate(
     PluginContractError
         If the estimator answers with something else than a finite number, or a class, a row.
     """
-    spec, declared, paths = _question(task, recordings, protocol)
-    data = read_dataset(spec, paths)
+    asked = _question(task, recordings, protocol, split, groups, window, step, seed)
+    spec, given = asked.task, None if isinstance(estimator, str) else estimator
+    name = name_of(estimator)
+    scored = metric_of(metric, greater_is_better, spec)
+    if scored.name != spec.metric:  # what is published, or the same in use, is so by the task's own metric
+        unit = spec.unit if {scored.name, spec.metric} == {"rmse", "mae"} else "1"
+        changed = {"metric": scored.name, "unit": unit, "equivalence": None, "published": ()}
+        spec = spec.model_copy(update=changed)
+    if params is not None and (not isinstance(params, Mapping) or given is None):
+        raise wrong("params", params, "a mapping of what `fit` of an object takes to its values")
+    if window is not None and given is None:
+        raise wrong("estimator", estimator, "an object where `window` is given")
+    data = read_dataset(spec, asked.paths)
     cell = Cell(
-        sensor=data.metas[0].sensor.name, task=spec.name, rig="replay", protocol=protocol, split=split,
-        estimator=name_of(estimator), params=(), baseline=False, seed=seed, declared_task=declared,
+        sensor=data.metas[0].sensor.name, task=spec.name, rig="replay", protocol=protocol, split=asked.split,
+        estimator=name, params=(), baseline=False, seed=seed, declared_task=asked.declared,
     )  # fmt: skip
-    row, answers = _answered(cell, spec, paths, estimator)
+    own = replace(asked.own, metric=scored)
+    row, answers = _answered(cell, spec, asked.paths, replace(own, estimator=given, fit_params=params or {}))
     trivial = [replace(cell, estimator=name, baseline=True) for name in spec.baselines if name != cell.estimator]
-    rows = [row, *(_ended(one, spec, paths, one.estimator, row["simulated"]) for one in trivial)]
+    rows = [row, *(_ended(one, spec, asked.paths, own, row["simulated"]) for one in trivial)]
     counts = Counter(one.name for one in data.metas)
     names = [one.name if counts[one.name] == 1 else str(path) for one, path in zip(data.metas, data.paths, strict=True)]
-    return Result(rows, answers["test"], spec, names)
+    return Result(rows, answers["test"], spec, names, scored)
+
+
+def metric_of(given: Any, greater_is_better: bool | None, task: TaskSpec) -> Metric:
+    """Return a metric by name, of a scikit-learn scorer, or of a function of (y, prediction); None: the task's."""
+    takes = (
+        f"a metric of a {task.kind}: a name (see docs/protocols.md, or sklearn.metrics.get_scorer_names), a scorer of "
+        "predictions, or a function of (y, prediction) with `greater_is_better`"
+    )
+    own = metric_called(task.metric)
+    if (given is None and greater_is_better is None) or given == own.name:
+        return own
+    found, scorer = METRICS.get(given) if isinstance(given, str) else None, given
+    if found is not None and (found.kind, found.vector) == (own.kind, own.vector):
+        return found
+    if isinstance(given, str) and found is None:
+        metrics: Any = import_module("sklearn.metrics")
+        scorer = metrics.get_scorer(given) if given in metrics.get_scorer_names() else None
+    if own.kind == "events" or not callable(scorer):
+        raise wrong("metric", given, takes)
+    if not hasattr(scorer, "_score_func"):
+        if not isinstance(greater_is_better, bool):
+            raise wrong("greater_is_better", greater_is_better, f"True or False of a function, as `metric` is: {given}")
+        return own_metric(scorer, getattr(scorer, "__name__", type(scorer).__name__), task, greater_is_better)
+    if getattr(scorer, "_response_method", "predict") != "predict":
+        raise wrong("metric", given, takes)
+    score = partial(scorer._score_func, **scorer._kwargs)
+    return own_metric(score, scorer._score_func.__name__, task, scorer._sign > 0)
 
 
 def name_of(estimator: str | Estimator) -> str:
@@ -299,33 +406,27 @@ def name_of(estimator: str | Estimator) -> str:
     if isinstance(estimator, str):
         return estimator
     if isinstance(estimator, type) or not (hasattr(estimator, "fit") and hasattr(estimator, "predict")):
-        raise UsageError(
-            f"{estimator!r} is no estimator.",
-            hint="Give an object with fit(X, y) and predict(X), or an installed name.",
-        )
+        raise wrong("estimator", estimator, "an object with fit(X, y) and predict(X), or the name of an installed one")
     steps = [type(step).__name__ for _, step in getattr(estimator, "steps", ()) if step not in (None, "passthrough")]
     return "+".join(steps) or type(estimator).__name__
 
 
-def _answered(
-    cell: Cell, task: TaskSpec, paths: Sequence[Path], estimator: str | Estimator
-) -> tuple[Row, Mapping[str, Answers]]:
+def _answered(cell: Cell, task: TaskSpec, paths: Sequence[Path], own: Own) -> tuple[Row, Mapping[str, Answers]]:
     """Evaluate a cell here; the global generators of random numbers are afterwards as they were."""
-    given = None if isinstance(estimator, str) else estimator
-    described = installed().estimators[cell.estimator] if given is None else PLAIN
+    described = installed().estimators[cell.estimator] if own.estimator is None else PLAIN
     job = Job(cell, task, described, tuple(paths), (), "", {})
     states = random.getstate(), np.random.get_state()  # noqa: NPY002  (it is this old generator that cells seed)
     try:
-        return solve(job, given=given)
+        return solve(job, own=own)
     finally:
         random.setstate(states[0])
         np.random.set_state(states[1])  # noqa: NPY002
 
 
-def _ended(cell: Cell, task: TaskSpec, paths: Sequence[Path], estimator: str | Estimator, simulated: bool) -> Row:
+def _ended(cell: Cell, task: TaskSpec, paths: Sequence[Path], own: Own, simulated: bool) -> Row:
     """Return the row of a cell that is evaluated here, whether it finishes or not."""
     try:
-        return _answered(cell, task, paths, estimator)[0]
+        return _answered(cell, task, paths, own)[0]
     except Exception as error:
         return unanswered(cell, task, error, simulated=simulated)
 
@@ -426,4 +527,4 @@ def _beside(row: Row, name: str, given: Estimator, folder: Path) -> Row:
     if not paths:  # no answer to this question was finished
         whose = "" if row["status"] == "skipped" else f"{row['estimator']}: "
         return unanswered(cell, task, NotApplicable(f"{whose}{row['reason']}"), simulated=row["simulated"])
-    return _ended(cell, task, paths, given, row["simulated"])
+    return _ended(cell, task, paths, Own(given), row["simulated"])

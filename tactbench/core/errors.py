@@ -35,6 +35,7 @@ Every message names what was given, what was expected and the next step.
 from __future__ import annotations
 
 import difflib
+import reprlib
 from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING, Literal
 
@@ -108,6 +109,12 @@ def complaint(error: ValidationError) -> str:
     place, message = ".".join(map(str, first["loc"])), first["msg"].removeprefix("Value error, ")
     given = f" (given: {first['input']!r})" if isinstance(first["input"], str | int | float) else ""
     return f"{place}: {message}{given}" if place else message
+
+
+def wrong(argument: str, given: object, takes: str) -> UsageError:
+    """Return the error of a function in Python that was given something that its argument does not take."""
+    shown = reprlib.repr(given) if not isinstance(given, str | type) else repr(given)
+    return UsageError(f"{argument}={shown} cannot be used.", hint=f"`{argument}` takes {takes}.")
 
 
 class UnknownNameError(UsageError):

@@ -13,9 +13,9 @@ from math import isfinite
 from typing import Any, Literal, NamedTuple
 
 from tactbench.core.leaderboard.names import (
-    LOWER_IS_BETTER,
     answer_name,
     hardware_name,
+    lower_is_better,
     metric_name,
     no_better,
     sensor_name,
@@ -140,7 +140,7 @@ class _Choosing:
     def __init__(self, rows: Sequence[Row], wish: Wish, task: TaskSpec, sensors: Mapping[str, SensorSpec]) -> None:
         self.wish, self.task, self.sensors, self.rows = wish, task, sensors, rows
         done = [row for row in rows if row["status"] == "done" and not row["is_baseline"] and isfinite(row["score"])]
-        self.sign = 1.0 if task.metric in LOWER_IS_BETTER else -1.0
+        self.sign = 1.0 if lower_is_better(task.metric) else -1.0
         self.beyond = bool(done) and all(row.get("score_beyond_floor") is not None for row in done)
         self.answers = done
 
@@ -341,7 +341,7 @@ def _sampled(task: TaskSpec, spec: SensorSpec | None) -> tuple[float | None, boo
 def _score(
     value: float, end: float | None, wished: float, range_n: float | None, task: TaskSpec, pressed: float | None
 ) -> Criterion:
-    lower = task.metric in LOWER_IS_BETTER
+    lower = lower_is_better(task.metric)
     word = "above the wished error" if lower else "below the wished score"
 
     found = _compared("score", value, wished, lambda number: score_with_unit(number, task.unit), word, least=not lower)

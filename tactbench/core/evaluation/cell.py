@@ -9,7 +9,7 @@ from __future__ import annotations
 import copy
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 from typing import Any
 
@@ -29,16 +29,16 @@ from tactbench.core.evaluation.delay import (
     tail_ms,
 )
 from tactbench.core.evaluation.event_answers import EventRules, state_figures
-from tactbench.core.evaluation.fitting import builder, features_of, one_model_a_component
+from tactbench.core.evaluation.fitting import builder, features_of, one_model_a_component, routed
 from tactbench.core.evaluation.folds import PLAIN, TaskData, load_task
 from tactbench.core.evaluation.frames import band_limit, clocked
 from tactbench.core.evaluation.interval import score_interval
-from tactbench.core.evaluation.leaks import copied_channels, leak_stamps
+from tactbench.core.evaluation.leaks import copied_channels, leak_stamps, shared_groups
 from tactbench.core.evaluation.metrics import METRICS, Metric, class_f1, confusion, metric_called, vector_details
 from tactbench.core.evaluation.reference_floor import beyond_floor, reference_floor, true_force
 from tactbench.core.evaluation.replicate_sums import recordings_right, replicates, summed
 from tactbench.core.evaluation.sets import tare_s
-from tactbench.core.evaluation.splits import SHUFFLED_STAMP, SHUFFLED_WHOLE_STAMP, over_rows, used_rows, without_part
+from tactbench.core.evaluation.splits import SHUFFLED_STAMP, SHUFFLED_WHOLE_STAMP, OwnSplit, used_rows, without_part
 from tactbench.core.evaluation.summaries import with_windows
 from tactbench.core.plugins.interfaces import Estimator
 from tactbench.core.recording.completeness import INCOMPLETE
@@ -49,6 +49,19 @@ from tactbench.core.spec.row import Cost, Evaluated
 from tactbench.core.spec.scene import Role
 from tactbench.core.spec.task import TaskSpec, VectorTarget
 from tactbench.core.thread_limit import thread_limit
+
+
+@dataclass(frozen=True)
+class Own:
+    """What a caller in Python gives in place of what a cell names."""
+
+    estimator: Estimator | None = None
+    split: OwnSplit | None = None
+    metric: Metric | None = None
+    fit_params: Mapping[str, Any] = field(default_factory=dict)
+    """as of :class:`Configured`; texts are names of labels"""
+    window: int = 0
+    step: int = 1
 
 
 @dataclass(frozen=True)
@@ -70,6 +83,8 @@ class CellContext:
     """that estimator and BLAS may use"""
     latency: bool = True
     """whether to measure how long the answer to one row takes"""
+    own: Own = Own()
+    """what the caller gives in place of what is named"""
 
 
 class Result(Evaluated):
@@ -93,11 +108,17 @@ def evaluate_cell(context: CellContext, recordings: Sequence[Path] | Dataset) ->
     DataError
         If a set is empty, has one class only, or its labels never change.
     """
-    task, estimator, seed = context.task, context.estimator, context.seed
-    data = load_task(task, recordings, context.protocol, context.split, estimator=estimator, seed=seed)
-    build = builder(estimator, context.params, task, seed, context.threads)
+    task, estimator, seed, own = context.task, context.estimator, context.seed, context.own
+    data = load_task(
+        task, recordings, context.protocol, own.split or context.split, estimator=estimator, seed=seed,
+        window=own.window, step=own.step,
+    )  # fmt: skip
+    answering: Estimator | Configured | None = own.estimator
+    if answering is None:
+        build = builder(estimator, context.params, task, seed, context.threads)
+        answering = Configured(estimator, build, context.params)
     return evaluate(
-        Configured(estimator, build, context.params), data, clock=context.clock, threads=context.threads,
+        answering, data, own.metric, own.fit_params, clock=context.clock, threads=context.threads,
         latency=context.latency,
     )  # fmt: skip
 
@@ -105,6 +126,8 @@ def evaluate_cell(context: CellContext, recordings: Sequence[Path] | Dataset) ->
 def evaluate(
     estimator: Estimator | Configured,
     data: TaskData,
+    metric: Metric | None = None,
+    fit_params: Mapping[str, Any] | None = None,
     *,
     clock: Clock,
     threads: int = 1,
@@ -116,15 +139,20 @@ def evaluate(
     ----------
     estimator
         Any object with ``fit`` and ``predict``, which stays as it is; or one that is to be made anew.
+    metric
+        None: the task's.
+    fit_params
+        What else the ``fit`` of an object takes; see :func:`routed`.
     clock, threads, latency
         As in :class:`CellContext`.
     """
     if not isinstance(estimator, Configured):
         given = estimator
         named = PLAIN.model_copy(update={"name": type(given).__name__})
-        estimator = Configured(named, one_model_a_component(data.task, lambda _: copy.deepcopy(given)))
+        build = one_model_a_component(data.task, lambda _: copy.deepcopy(given))
+        estimator = Configured(named, build, fit_params=routed(given, data, fit_params or {}))
     descriptor = with_windows(estimator.descriptor, data.task, data.rules)
-    estimator, metric = replace(estimator, descriptor=descriptor), metric_called(data.task.metric)
+    estimator, metric = replace(estimator, descriptor=descriptor), metric or metric_called(data.task.metric)
     rules = EventRules.of(data.task, descriptor.threshold) if data.task.kind == "events" else None
     counts = Counter(data.data.counts)
     answered: list[AnsweredFold] = []
@@ -148,7 +176,8 @@ def _cost(
 ) -> tuple[Cost, tuple[str, ...]]:
     """Return what all folds took, and how late answers of the last fold's model are, with remarks on that."""
     recorded, task, rules = data.recorded, data.task, data.rules
-    parts, remarks = stated_delay_ms(recorded, data.data, task, rules, descriptor, fitted.k)
+    looks_back = max(fitted.k, data.window - 1)
+    parts, remarks = stated_delay_ms(recorded, data.data, task, rules, descriptor, looks_back)
     p50 = p95 = largest = calls = None
     if latency:
         waits_s = single_row_latency_s(fitted.model, features_of(fitted.fold.test, descriptor), clock)
@@ -191,7 +220,7 @@ def _result(
     score = metric.of(tested.y_true, tested.y_pred, n_classes)
     if not np.isfinite(score):
         _refuse(descriptor.name, metric, tested)
-    unit = replicates(made, data.split, tested)
+    unit = replicates(made, data.unit, tested)
     scores = {f"fold {one.name}": one.score for one in answered}
     if answered[-1].validation is not None:
         scores["validation"] = answered[-1].validation
@@ -205,9 +234,9 @@ def _result(
         if isinstance(task.target, VectorTarget):
             scores |= vector_details(task.target, tested.y_true, tested.y_pred)
             remarks.append(f"answers are vectors ({', '.join(task.target.names)}): one model per component")
-        floor, no_floor = reference_floor(task, metric, made, tested)
+        floor, no_floor = reference_floor(task, metric, data.recorded if data.window else made, tested)
         remarks.append(no_floor)
-        truth = true_force(task, made, tested)
+        truth = None if metric.function else true_force(task, made, tested)
         if floor is not None:
             own_error, interval = beyond_floor(floor, tested, unit)
             beside |= {"reference_floor": floor.value, "reference_floor_se": floor.standard_error}
@@ -218,7 +247,7 @@ def _result(
             beside["true_score"] = metric.of(truth, tested.y_pred)
             beside |= {"true_ci_low": interval.low, "true_ci_high": interval.high}
     elif rules is None:
-        sums = metric.rows(tested.y_true, tested.y_pred, n_classes).sum(axis=0)
+        sums = METRICS["accuracy"].rows(tested.y_true, tested.y_pred, n_classes).sum(axis=0)
         beside["confusion"] = confusion(sums, n_classes).astype(np.int64).tolist()
         if task.answer_per != "frame":
             beside["recordings_right"], beside["recordings_asked"] = recordings_right(tested) or (None, None)
@@ -256,7 +285,7 @@ def _result(
         fold_sizes={f"fold {one.name}": list(one.sizes) for one in answered},
         split=data.split,
         sets=sets,
-        replicates=summed(metric, tested, unit, n_classes, floor, truth),
+        replicates=summed(metric, tested, unit, n_classes, floor, truth) if data.unit else {},
         classes=classes,
         chosen=_chosen(answered) | _thresholds(answered, rules),
         search=[
@@ -289,19 +318,19 @@ def _refuse(estimator: str, metric: Metric, tested: Answers) -> None:
             f"The estimator {estimator!r} answered with numbers up to {largest:.3g}: their {metric.name} overflows.",
             hint=f"Its predict(X) must return numbers below {LARGEST:g}, in the unit of the labels.",
         )
-    raise DataError(
-        f"The {metric.name} of {len(tested)} test rows is undefined: their labels never change.",
-        hint="Choose another split.",
-    )
+    why = "no finite number" if metric.function else "undefined: their labels never change"
+    raise DataError(f"The {metric.name} of {len(tested)} test rows is {why}.", hint="Choose another split or metric.")
 
 
 def _part_taken(data: TaskData) -> tuple[list[RecordingMeta], dict[str, int], list[str]]:
     """Return the recordings that some fold uses, what no fold uses, and stamps: of leaks, of incomplete ones."""
     recorded = data.recorded
-    folds = [over_rows(one, recorded) for one in data.assignments]
+    folds = data.recorded_folds
     used = used_rows(folds)
     took_part = [one.meta for one, mask in zip(recorded.tables, used, strict=True) if (mask & one.labelled).any()]
-    if data.split != "shuffled":
+    if data.own:
+        stamps = (*shared_groups(data.unit or "recording", data), *leak_stamps(recorded, folds))
+    elif data.split != "shuffled":
         stamps = leak_stamps(recorded, folds)
     else:
         stamps = (SHUFFLED_WHOLE_STAMP if recorded.whole else SHUFFLED_STAMP,)

@@ -27,7 +27,7 @@ from tactbench.core.evaluation.slip_reference import SlipReference, slip_referen
 from tactbench.core.recording.completeness import INCOMPLETE
 from tactbench.core.recording.health import Finding, marking
 from tactbench.core.recording.reader import Recording, open_recording
-from tactbench.core.samples import FloatArray, IntArray, Quality, StreamData, StreamReadings
+from tactbench.core.samples import Answers, FloatArray, IntArray, Part, Quality, StreamData, StreamReadings
 from tactbench.core.spec.events import SlipTarget
 from tactbench.core.spec.recording import RecordingMeta
 from tactbench.core.spec.task import ChannelTarget, LabelTarget, TaskSpec, VectorTarget
@@ -101,6 +101,15 @@ class Dataset:
     def metas(self) -> tuple[RecordingMeta, ...]:
         """What the recordings say about themselves, in order."""
         return tuple(table.meta for table in self.tables)
+
+
+def at_rows(tables: Sequence[Table], columns: Sequence[npt.NDArray[Any]], rows: Part | Answers) -> npt.NDArray[Any]:
+    """Return (m, …) what columns of recordings, one of (n, …) each, have at the rows of a set."""
+    found = np.empty((len(rows), *columns[0].shape[1:]), dtype=np.result_type(*columns))
+    for place in np.unique(rows.recording):
+        mine = rows.recording == place
+        found[mine] = columns[place][np.searchsorted(tables[place].row, rows.row[mine])]
+    return found
 
 
 def thinned(data: Dataset, every: int) -> Dataset:

@@ -5,6 +5,7 @@ Each metric turns rows into a few numbers that may be summed, and sums into a sc
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
@@ -12,10 +13,10 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from tactbench.core.errors import UnknownNameError
+from tactbench.core.errors import UnknownNameError, UsageError
 from tactbench.core.samples import FloatArray
-from tactbench.core.spec.row import HIGH_ERROR, MEDIAN_ERROR, TRUE
-from tactbench.core.spec.task import VECTOR_METRIC, VectorTarget
+from tactbench.core.spec.row import DIRECTIONS, HIGH_ERROR, MEDIAN_ERROR, TRUE
+from tactbench.core.spec.task import VECTOR_METRIC, TaskSpec, VectorTarget
 
 Rows = Callable[[npt.NDArray[Any], npt.NDArray[Any], int], FloatArray]
 Score = Callable[[FloatArray, int], FloatArray]
@@ -34,6 +35,8 @@ class Metric:
     """(…, m) sums and the number of classes -> (…,) scores"""
     vector: bool = False
     """Truth and predictions are (n, components)."""
+    function: Callable[[npt.NDArray[Any], npt.NDArray[Any]], Any] | None = None
+    """(y, prediction) -> score, of a metric of the caller's own, which is no sum over rows"""
 
     @property
     def sign(self) -> float:
@@ -41,7 +44,22 @@ class Metric:
         return 1.0 if self.higher_is_better else -1.0
 
     def of(self, y: npt.NDArray[Any], predicted: npt.NDArray[Any], n_classes: int = 0) -> float:
-        """Return the score of `predicted` against `y`; infinite where squares of the answers overflow."""
+        """Return the score of `predicted` against `y`; infinite where squares of the answers overflow.
+
+        A caller's own metric is NaN where it raises ValueError; whatever else it raises becomes UsageError.
+        """
+        if self.function is not None:
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore")
+                try:
+                    return float(self.function(y, predicted))
+                except (ValueError, ArithmeticError):
+                    return float("nan")
+                except Exception as error:
+                    raise UsageError(
+                        f"The metric {self.name} cannot be computed of {len(y)} rows: {type(error).__name__}: {error}.",
+                        hint="`metric` takes a function of (y, prediction) that returns a number.",
+                    ) from error
         with np.errstate(over="ignore", invalid="ignore"):
             return float(self.score(self.rows(y, predicted, n_classes).sum(axis=0), n_classes))
 
@@ -149,6 +167,13 @@ SUMMED = {
     **{TRUE + one.name: one for one in METRICS.values() if one.kind == "regression" and not one.vector},
 }
 """What replicates may be summed for."""
+
+
+def own_metric(function: Callable[..., Any], name: str, task: TaskSpec, higher_is_better: bool) -> Metric:
+    """Return a caller's function of (y, prediction) as a metric of a task; its name tells which way is better."""
+    name += DIRECTIONS[higher_is_better]
+    vector = isinstance(task.target, VectorTarget)
+    return Metric(name, task.kind, higher_is_better, _squares, _rmse, vector=vector, function=function)
 
 
 def metric_called(name: str) -> Metric:

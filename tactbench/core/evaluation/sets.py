@@ -77,14 +77,15 @@ class FeatureScale:
 
 
 def moments(X: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return mean and deviation of each column in two passes, the deviation of a constant column exactly zero.
+    """Return mean and deviation of (n,) or of each column of (…, columns) in two passes; of a constant one exactly zero.
 
     A constant column's computed deviation is the rounding error of its mean, as large as the number of rows makes it;
     it would turn rounding into a signal. So constancy is looked up, not inferred from the deviation.
     """
-    mean = X.mean(axis=0)
-    deviation = np.sqrt(((X - mean) ** 2).mean(axis=0))
-    return mean, np.where(X.max(axis=0) > X.min(axis=0), deviation, 0.0)
+    rows = tuple(range(max(X.ndim - 1, 1)))
+    mean = X.mean(axis=rows)
+    deviation = np.sqrt(((X - mean) ** 2).mean(axis=rows))
+    return mean, np.where(X.max(axis=rows) > X.min(axis=rows), deviation, 0.0)
 
 
 @dataclass(frozen=True)
@@ -184,7 +185,7 @@ def prepared(assignment: Assignment, data: Dataset, rules: ProtocolSpec, k: int,
     `counts` is told what was left out, and which features never change.
     """
     train = keep(data, rules, assignment.train, "training", counts)
-    for name, width in zip(data.features, np.ptp(train.X, axis=0), strict=True):
+    for name, width in zip(data.features, np.ptp(train.X, axis=tuple(range(train.X.ndim - 1))), strict=True):
         if width == 0:
             counts[f"folds in which {name} never changes in training"] += 1
 

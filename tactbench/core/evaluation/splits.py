@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import re
+import warnings
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -13,10 +15,12 @@ import numpy.typing as npt
 from tactbench.core.errors import DataError, NotApplicable, UsageError
 from tactbench.core.evaluation.dataset import Dataset, Table
 from tactbench.core.evaluation.protocols import FIRST_FRAME, ProtocolSpec, shots
+from tactbench.core.samples import FloatArray
 from tactbench.core.spec.row import LEAKS
 from tactbench.core.spec.task import TaskSpec
 
 Mask = npt.NDArray[np.bool_]
+Places = npt.NDArray[np.int64]
 FOLDS = 5
 """Folds of grouped and of shuffled splits."""
 TRAIN_SHARE = 0.8
@@ -42,6 +46,54 @@ class Assignment:
     validation: tuple[Mask, ...] | None = None
     groups: str = "session"
     """Name of the groups that training and test do not share; also those of an inner split."""
+
+
+class OwnSplit:
+    """Folds that a caller gives: by an object with scikit-learn's ``split(X, y, groups)``, or as index arrays.
+
+    They are made once, so that all that is scored by them has the same, whatever the object draws.
+    """
+
+    def __init__(self, split: Any, groups: str | npt.ArrayLike | None) -> None:
+        self.groups = groups
+        self._splitter = split if hasattr(split, "split") else list(split)
+        self._folds: list[tuple[Places, Places]] = []
+
+    @property
+    def name(self) -> str:
+        """What rows and tables call it."""
+        shown = repr(self._splitter)
+        own = type(self._splitter).__name__ if " object at 0x" in shown else " ".join(shown.split())
+        return own if hasattr(self._splitter, "split") else f"{len(self._splitter)} given folds"
+
+    def folds(self, X: FloatArray, y: npt.NDArray[Any], groups: npt.NDArray[Any] | None) -> list[tuple[Places, Places]]:
+        """Return the rows of X that train and those that test, fold by fold; UsageError if they are none."""
+        if not self._folds:
+            pairs: Any = self._splitter
+            try:
+                with warnings.catch_warnings():
+                    warnings.simplefilter("ignore")  # groups that a splitter passes over tell what intervals are over
+                    pairs = list(pairs.split(X, y, groups)) if hasattr(pairs, "split") else pairs
+                self._folds = [(_places(train, len(y)), _places(test, len(y))) for train, test in pairs]
+            except (TypeError, ValueError, IndexError) as error:
+                raise UsageError(
+                    f"split={self.name} makes no folds of {len(y)} rows: {error}",
+                    hint="`split` takes a name, an object with scikit-learn's `split(X, y, groups)`, or pairs of index "
+                    "arrays (train, test) over the rows of X; what a splitter keeps apart is given as `groups`.",
+                ) from error
+        return self._folds
+
+
+def _places(given: Any, n: int) -> Places:
+    """Return the places of rows, given as such or as a mask; ValueError for anything else."""
+    found = np.asarray(given)
+    if found.dtype == bool and found.shape == (n,):
+        found = np.flatnonzero(found)
+    if found.ndim != 1 or found.dtype.kind not in "iu" or not len(found):
+        raise ValueError(f"training and test rows are index arrays, not {given!r:.80}")
+    if found.min() < 0 or found.max() >= n or len(np.unique(found)) < len(found):
+        raise ValueError(f"an index array has places beyond 0 to {n - 1}, or one of them twice")
+    return found.astype(np.int64)
 
 
 def choose_split(task: TaskSpec, protocol: ProtocolSpec, data: Dataset, requested: str | None) -> str:
@@ -344,16 +396,3 @@ def _sizes(tables: Sequence[Table], masks: Sequence[Mask], group: str) -> Counte
             values, counts = np.unique(table.groups[group][mask & table.labelled], return_counts=True)
             sizes.update(dict(zip(values.tolist(), counts.tolist(), strict=True)))
     return sizes
-
-
-def over_rows(assignment: Assignment, recorded: Dataset) -> Assignment:
-    """Return an assignment of recordings that were made to frames, or one row each, as one of all rows recorded."""
-
-    def spread(masks: tuple[Mask, ...]) -> tuple[Mask, ...]:
-        return tuple(
-            mask if len(mask) == len(table.row) else np.full(len(table.row), bool(mask[0]))
-            for mask, table in zip(masks, recorded.tables, strict=True)
-        )
-
-    validation = None if assignment.validation is None else spread(assignment.validation)
-    return replace(assignment, train=spread(assignment.train), test=spread(assignment.test), validation=validation)

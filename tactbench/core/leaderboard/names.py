@@ -8,8 +8,8 @@ from operator import itemgetter
 from typing import Any, TypeVar
 
 from tactbench.core.evaluation.protocols import shots
-from tactbench.core.spec.row import LOWER_IS_BETTER as LOWER_IS_BETTER
 from tactbench.core.spec.row import TRUE
+from tactbench.core.spec.row import lower_is_better as lower_is_better
 from tactbench.core.tables.text import visible
 
 Row = Mapping[str, Any]
@@ -70,7 +70,7 @@ def held_out(row: Row) -> bool:
 
 def sign_of(row: Row) -> float:
     """Return 1 where a lower score is better, else -1: a score times it is the lower the better."""
-    return 1.0 if row["metric"] in LOWER_IS_BETTER else -1.0
+    return 1.0 if lower_is_better(row["metric"]) else -1.0
 
 
 def hardware_name(row: Row) -> str:

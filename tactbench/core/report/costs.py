@@ -8,7 +8,7 @@ from typing import Any
 
 from tactbench.core.cost.knobs import TIMES
 from tactbench.core.files import replace_file, writable
-from tactbench.core.leaderboard.names import LOWER_IS_BETTER, metric_name
+from tactbench.core.leaderboard.names import lower_is_better, metric_name
 from tactbench.core.report.figures.style import styled
 from tactbench.core.report.figures.trade import ACROSS, draw_trade, title_of
 from tactbench.core.tables.csv_text import csv_of_records
@@ -46,7 +46,7 @@ def _table(known: Mapping[str, Any], title: str, settings: list[Mapping[str, Any
             "remark": "" if one["status"] == "done" else f"{one['status']}: {one['reason']}",
         }  # fmt: skip
         lines.append([Entry(texts[name], one.get(key)) for name, key in _COLUMNS.items()])
-    better = "lower" if known["metric"] in LOWER_IS_BETTER else "higher"
+    better = "lower" if lower_is_better(known["metric"]) else "higher"
     nothing = "" if known["trivial"] is None else f" Looking at nothing: {score(known['trivial'], known['unit'])}."
     notes = [f"Score: {metric_name(known)}, {better} is better.{nothing}"]
     kinds = ["failed" if one["status"] != "done" else "result" if one["front"] else "" for one in settings]

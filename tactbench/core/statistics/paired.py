@@ -16,7 +16,7 @@ from tactbench.core.evaluation.interval import own_scores, student_quantile, two
 from tactbench.core.evaluation.metrics import SUMMED
 from tactbench.core.evaluation.replicate_sums import tables_of
 from tactbench.core.samples import FloatArray, IntArray
-from tactbench.core.spec.row import TRUE
+from tactbench.core.spec.row import TRUE, lower_is_better
 from tactbench.core.statistics.influence import PairableRows, scores_of, together
 from tactbench.core.statistics.replicates import FEWEST, counted
 
@@ -68,7 +68,7 @@ def difference(first: Row, second: Row) -> Difference:
     Cameron, Gelbach and Miller 2008 on t with few clusters), which widens by itself where there are few. The p-value is
     that of exchanging the two answers within replicates, each way as likely as another if there is no difference: all
     2^n ways up to 12 replicates, else 9,999 drawn (Phipson and Smyth 2010 on counting the observed one). With n
-    replicates it cannot be below 2 / 2^n.
+    replicates it cannot be below 2 / 2^n. By a metric of the caller's own, which is no sum, it is that of Student's t.
 
     Where each replicate has a score of its own, the difference is that of the means over replicates; of errors of force
     that have a floor, of what is beyond it.
@@ -78,7 +78,7 @@ def difference(first: Row, second: Row) -> Difference:
     The verdict is *better* or *worse* if the interval neither contains 0 nor lies within the task's region of practical
     equivalence, *equivalent* if it lies within, else *undecided*: ranks follow the same rule.
     """
-    sign = SUMMED[first["metric"]].sign
+    sign = -1.0 if lower_is_better(first["metric"]) else 1.0
     first, second = _means(first, second)
     value = float(first["score"] - second["score"])
     groups = together([first, second])
@@ -107,7 +107,10 @@ def _paired(first: Row, second: Row, value: float, sign: float, group: PairableR
     carried = group.influence[0] - group.influence[1]
     deviation = float(np.sqrt(carried @ carried))
     n = len(group.names)
-    p, smallest = exchanged(first, second)
+    if "without" in first["replicates"]:  # answers that were exchanged have no score that can be added up
+        p, smallest = two_sided_p(value / deviation, group.freedom) if deviation > 0 else None, 0.0
+    else:
+        p, smallest = exchanged(first, second)
     unit = str(first["replicates"]["unit"])
     over = f"paired over {counted(n, unit)}"
     if first["replicates"].get("of") == "beyond":
@@ -160,15 +163,18 @@ def _difference(first: Row, value: float, deviation: float, freedom: float, **mo
     if region > 0 and -region <= low and high <= region:
         verdict = "equivalent"
     elif low > 0 or high < 0:
-        verdict = "better" if value * SUMMED[first["metric"]].sign > 0 else "worse"
+        verdict = "better" if (value < 0) == lower_is_better(first["metric"]) else "worse"
     return Difference(value, low, high, verdict=verdict, beyond=bool(low > region or high < -region), **more)
 
 
 def _own_scores(row: Row) -> FloatArray:
     """Return (replicates,) the score of each replicate by itself; NaN where the metric of it is undefined."""
-    metric, kept, n_classes = SUMMED[row["metric"]], row["replicates"], len(row["classes"])
+    kept, n_classes = row["replicates"], len(row["classes"])
     if "scores" in kept:
-        return scores_of(kept, metric.name)
+        return scores_of(kept, row["metric"])
+    if "without" in kept:
+        return np.asarray(kept["own"], dtype=np.float64)
+    metric = SUMMED[row["metric"]]
     return own_scores(metric, tables_of([kept], metric.name, n_classes)[0], n_classes)
 
 
@@ -179,12 +185,12 @@ def _share_better(apart: FloatArray) -> float | None:
 
 def exchanged(first: Row, second: Row) -> tuple[float, float]:
     """Return the p-value of exchanging two rows' answers within the replicates they share, and the least it can be."""
-    metric = SUMMED[first["metric"]]
     if "scores" in first["replicates"]:
-        apart_each = scores_of(first["replicates"], metric.name) - scores_of(second["replicates"], metric.name)
+        own, other = (scores_of(one["replicates"], one["metric"]) for one in (first, second))
+        apart_each = own - other
         ways, smallest = _ways(len(apart_each))
         return _share((1.0 - 2.0 * ways) @ apart_each), smallest
-    n_classes = len(first["classes"])
+    metric, n_classes = SUMMED[first["metric"]], len(first["classes"])
     sums = tables_of([first["replicates"], second["replicates"]], metric.name, n_classes)
     ways, smallest = _ways(sums.shape[1])
     moved = ways.astype(np.float64) @ (sums[1] - sums[0])

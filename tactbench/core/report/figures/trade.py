@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from tactbench.core.cost.knobs import TIMES
-from tactbench.core.leaderboard.names import LOWER_IS_BETTER, metric_name
+from tactbench.core.leaderboard.names import lower_is_better, metric_name
 from tactbench.core.report.figures.style import GREY, LINES, PAGE_IN, panels
 from tactbench.core.tables.text import visible
 
@@ -57,7 +57,7 @@ def draw_trade(known: Mapping[str, Any]) -> Any:
                             xycoords=("axes fraction", "data"), textcoords="offset points")  # fmt: skip
     for axis, time in zip(axes[0], times, strict=True):  # now the limits, which all share, are known
         _names(axis, {knob: path[-1]["score"] for knob, path in paths.items() if TIMES[knob] == time and time})
-    better = "lower" if known["metric"] in LOWER_IS_BETTER else "higher"
+    better = "lower" if lower_is_better(known["metric"]) else "higher"
     axes[0][0].set_ylabel(f"{metric_name(known)}, {better} is better")
     figure.suptitle(visible(title_of(known)))
     return figure

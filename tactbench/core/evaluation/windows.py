@@ -1,0 +1,66 @@
+"""Windows of consecutive rows of a recording: what models of sequences look at."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from tactbench.core.errors import NotApplicable
+from tactbench.core.evaluation.dataset import Dataset, Table
+from tactbench.core.evaluation.protocols import ProtocolSpec, without_options
+from tactbench.core.evaluation.sets import asked_for, tared
+from tactbench.core.evaluation.splits import Assignment, Mask
+from tactbench.core.spec.task import TaskSpec
+
+
+def windowed(data: Dataset, task: TaskSpec, rules: ProtocolSpec, window: int, step: int) -> Dataset:
+    """Return windows of each recording as rows to be answered, `X` (n, window, channels) in order of time.
+
+    A window has `window` consecutive rows that the protocol keeps, tared as it has it, and is labelled as its last row
+    is; the next one ends `step` rows later. Raises NotApplicable where rows are no consecutive samples.
+    """
+    if rules.three_sigma or rules.first_row_only or rules.k is not None:
+        raise NotApplicable(
+            f"Protocol {rules.name!r} keeps no runs of samples as they are, which `window` needs.",
+            hint=f"Use protocol `deployable` or `{without_options(rules.name)}@every=N`.",
+        )
+    if task.answer_per == "frame" or task.summaries or task.features_by:
+        raise NotApplicable(
+            f"Task {task.name!r} makes its own features of many samples; `window` is for answers to samples.",
+            hint="Leave `window` out.",
+        )
+
+    def of(table: Table) -> Table:
+        rows = asked_for(table, rules)
+        last = np.flatnonzero(rows)[window - 1 :: step]
+        X = np.zeros((0, window, table.X.shape[1]))
+        if len(last):
+            kept = (tared(table) if rules.tare else table.X)[rows]
+            X = np.lib.stride_tricks.sliding_window_view(kept, window, axis=0)[::step].transpose(0, 2, 1)
+        columns = {name: getattr(table, name) for name in ("y", "labelled", "force", "time_s", "row")}
+        taken: dict[str, Any] = {name: None if one is None else one[last] for name, one in columns.items()}
+        groups = {name: column[last] for name, column in table.groups.items()}
+        return replace(table, X=X, **taken, groups=groups, readings=())
+
+    return replace(data, tables=tuple(map(of, data.tables)))
+
+
+def covered(windows: Mask, window: int, step: int) -> Mask:
+    """Return which rows lie in some of the windows of a recording, from the first row of its first window."""
+    rows = np.zeros((len(windows) - 1) * step + window if len(windows) else 0, dtype=bool)
+    rows[np.flatnonzero(windows)[:, None] * step + np.arange(window)] = True
+    return rows
+
+
+def apart(fold: Assignment, window: int, step: int) -> Assignment:
+    """Return a fold without the training windows that have a row in common with a test window."""
+
+    def clear(train: Mask, test: Mask) -> Mask:
+        if not (train.any() and test.any()):
+            return train
+        met = np.lib.stride_tricks.sliding_window_view(covered(test, window, step), window)[::step]
+        return np.asarray(train & ~met.any(axis=1))
+
+    return replace(fold, train=tuple(map(clear, fold.train, fold.test)))
