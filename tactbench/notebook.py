@@ -11,11 +11,13 @@ import random
 import shutil
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
+from contextlib import ExitStack
 from dataclasses import dataclass, replace
 from functools import partial
 from importlib import import_module
+from itertools import product
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from pydantic import ValidationError
@@ -29,24 +31,32 @@ from tactbench.core.evaluation.protocols import PROTOCOLS, is_probe
 from tactbench.core.evaluation.splits import OwnSplit
 from tactbench.core.files import named_file
 from tactbench.core.leaderboard.formats import records, write_tables
-from tactbench.core.leaderboard.pairwise import comparisons, record_of, tables_of, with_declared
-from tactbench.core.leaderboard.table import Table, build_table, over_all
+from tactbench.core.leaderboard.names import grouped
+from tactbench.core.leaderboard.pairwise import PairwiseComparison, comparisons, record_of, tables_of, with_declared
+from tactbench.core.leaderboard.table import Block, Table, build_table, over_all
 from tactbench.core.leaderboard.view import best, grids
+from tactbench.core.matrix.keys import Keys, Sections
 from tactbench.core.matrix.plan import Cell, cell_of
-from tactbench.core.matrix.solve import Job, read_dataset, solve, unanswered
+from tactbench.core.matrix.solve import Job, Solved, read_dataset, solve, unanswered
+from tactbench.core.matrix.store import Store
 from tactbench.core.plugins.declared import declared_in, with_declared_of
 from tactbench.core.plugins.declared import with_declared as with_declared_tasks
 from tactbench.core.plugins.interfaces import Estimator
 from tactbench.core.plugins.registry import installed
+from tactbench.core.provenance.gather import gather, usable_cores
+from tactbench.core.recording.reader import read_meta
 from tactbench.core.samples import Answers
 from tactbench.core.spec.declared_task import FILE
+from tactbench.core.spec.status import STOPPED
 from tactbench.core.spec.task import TaskSpec, VectorTarget
 from tactbench.core.statistics.replicates import against_reference, over_replicates
+from tactbench.core.study.progress import progress
 from tactbench.core.study.results import opened, shown_rows, table_of
 from tactbench.core.study.shipped import matrix_called
 from tactbench.core.study.study import Study, carry_out
 from tactbench.core.tables.html import html
 from tactbench.core.tables.terminal import plain_text
+from tactbench.core.tables.text import visible
 from tactbench.core.tables.text_table import TextTable
 from tactbench.recordings import AnyPath, Recordings, library, open_recordings, opened_as
 
@@ -186,7 +196,9 @@ class Results(Rows):
     """
 
     def __init__(self, table: Table) -> None:
-        super().__init__((row for row, _ in records(table)), [*grids(table), *table.sections])
+        of = ({"data": line.row["data"]} if "data" in line.row else {} for line in table.lines)
+        rows = (data | row for data, (row, _) in zip(of, records(table), strict=True))
+        super().__init__(rows, [*grids(table), *table.sections])
         self.table = table
 
     def __getitem__(self, place: Any) -> Any:
@@ -204,10 +216,17 @@ class Results(Rows):
     def compare(self, a: str, b: str, task: str | None = None) -> Rows:
         """Compare two sensors, estimators, protocols or splits replicate by replicate, as ``tactbench compare`` does.
 
-        Raises UnknownNameError if these rows have nothing of such a name, or the two are not of one kind.
+        Raises UnknownNameError if no data set has rows of both names, or the two are not of one kind.
         """
-        found = comparisons(self.table.rows, a, b, task)
-        found = with_declared(found, self.table.rows, matrix_called().comparisons)
+        found: list[PairwiseComparison] = []
+        unknown = UnknownNameError("row", a, ())
+        for rows in grouped(self.table.rows, lambda row: row.get("data")).values():
+            try:
+                found += with_declared(comparisons(rows, a, b, task), rows, matrix_called().comparisons)
+            except UnknownNameError as error:
+                unknown = error
+        if not found:
+            raise unknown
         return Rows(map(record_of, found), tables_of(found))
 
 
@@ -348,9 +367,46 @@ def evaluate(
     PluginContractError
         If the estimator answers with something else than a finite number, or a class, a row.
     """
+    mine, *trivial = _cells(
+        name_of(estimator), estimator, task, recordings, protocol, split, groups=groups, metric=metric,
+        greater_is_better=greater_is_better, params=params, window=window, step=step, seed=seed,
+    )  # fmt: skip
+    data = read_dataset(mine.task, mine.paths)
+    row, answers = _answered(mine)
+    rows = [row, *(_ended(one, row["simulated"])[0] for one in trivial)]
+    counts = Counter(one.name for one in data.metas)
+    names = [one.name if counts[one.name] == 1 else str(path) for one, path in zip(data.metas, data.paths, strict=True)]
+    return Result(rows, answers["test"], mine.task, names, mine.own.metric or metric_called(mine.task.metric))
+
+
+class _Work(NamedTuple):
+    """A cell that is evaluated here, with all names looked up."""
+
+    cell: Cell
+    task: TaskSpec
+    paths: tuple[Path, ...]
+    own: Own
+
+
+def _cells(
+    name: str,
+    estimator: str | Estimator,
+    task: str | TaskSpec,
+    recordings: Recordings,
+    protocol: str = "deployable",
+    split: Any = None,
+    *,
+    groups: Any = None,
+    metric: Any = None,
+    greater_is_better: bool | None = None,
+    params: Mapping[str, Any] | None = None,
+    window: int | None = None,
+    step: int | None = None,
+    seed: int = 1,
+) -> list[_Work]:
+    """Return the cell of an estimator, and those of the task's trivial answers; arguments as of :func:`evaluate`."""
     asked = _question(task, recordings, protocol, split, groups, window, step, seed)
     spec, given = asked.task, None if isinstance(estimator, str) else estimator
-    name = name_of(estimator)
     scored = metric_of(metric, greater_is_better, spec)
     if scored.name != spec.metric:  # what is published, or the same in use, is so by the task's own metric
         unit = spec.unit if {scored.name, spec.metric} == {"rmse", "mae"} else "1"
@@ -360,18 +416,14 @@ def evaluate(
         raise wrong("params", params, "a mapping of what `fit` of an object takes to its values")
     if window is not None and given is None:
         raise wrong("estimator", estimator, "an object where `window` is given")
-    data = read_dataset(spec, asked.paths)
     cell = Cell(
-        sensor=data.metas[0].sensor.name, task=spec.name, rig="replay", protocol=protocol, split=asked.split,
-        estimator=name, params=(), baseline=False, seed=seed, declared_task=asked.declared,
+        sensor=read_meta(asked.paths[0]).sensor.name, task=spec.name, rig="replay", protocol=protocol,
+        split=asked.split, estimator=name, params=(), baseline=False, seed=seed, declared_task=asked.declared,
     )  # fmt: skip
     own = replace(asked.own, metric=scored)
-    row, answers = _answered(cell, spec, asked.paths, replace(own, estimator=given, fit_params=params or {}))
-    trivial = [replace(cell, estimator=name, baseline=True) for name in spec.baselines if name != cell.estimator]
-    rows = [row, *(_ended(one, spec, asked.paths, own, row["simulated"]) for one in trivial)]
-    counts = Counter(one.name for one in data.metas)
-    names = [one.name if counts[one.name] == 1 else str(path) for one, path in zip(data.metas, data.paths, strict=True)]
-    return Result(rows, answers["test"], spec, names, scored)
+    trivial = [replace(cell, estimator=other, baseline=True) for other in spec.baselines if other != name]
+    mine = replace(own, estimator=given, fit_params=params or {})
+    return [_Work(cell, spec, asked.paths, mine), *(_Work(one, spec, asked.paths, own) for one in trivial)]
 
 
 def metric_of(given: Any, greater_is_better: bool | None, task: TaskSpec) -> Metric:
@@ -411,24 +463,23 @@ def name_of(estimator: str | Estimator) -> str:
     return "+".join(steps) or type(estimator).__name__
 
 
-def _answered(cell: Cell, task: TaskSpec, paths: Sequence[Path], own: Own) -> tuple[Row, Mapping[str, Answers]]:
+def _answered(work: _Work) -> Solved:
     """Evaluate a cell here; the global generators of random numbers are afterwards as they were."""
-    described = installed().estimators[cell.estimator] if own.estimator is None else PLAIN
-    job = Job(cell, task, described, tuple(paths), (), "", {})
+    described = installed().estimators[work.cell.estimator] if work.own.estimator is None else PLAIN
     states = random.getstate(), np.random.get_state()  # noqa: NPY002  (it is this old generator that cells seed)
     try:
-        return solve(job, own=own)
+        return solve(Job(work.cell, work.task, described, work.paths, (), "", {}), own=work.own)
     finally:
         random.setstate(states[0])
         np.random.set_state(states[1])  # noqa: NPY002
 
 
-def _ended(cell: Cell, task: TaskSpec, paths: Sequence[Path], own: Own, simulated: bool) -> Row:
-    """Return the row of a cell that is evaluated here, whether it finishes or not."""
+def _ended(work: _Work, simulated: bool) -> Solved:
+    """Return the row of a cell that is evaluated here, whether it finishes or not, and its answers."""
     try:
-        return _answered(cell, task, paths, own)[0]
+        return _answered(work)
     except Exception as error:
-        return unanswered(cell, task, error, simulated=simulated)
+        return unanswered(work.cell, work.task, error, simulated=simulated), {}
 
 
 Estimators = str | Estimator | list[str | Estimator] | tuple[str | Estimator, ...] | Mapping[str, str | Estimator]
@@ -441,9 +492,12 @@ def run(
     estimator: Estimators = (),
     recordings: Recordings | None = None,
     out: AnyPath = "tactbench-results",
+    data: Mapping[str, Recordings] | None = None,
+    estimators: Estimators = (),
+    tasks: str | TaskSpec | Sequence[str | TaskSpec] | Mapping[str, Any] = (),
     **options: Any,
 ) -> Results:
-    """Acquire, evaluate and rank, as ``tactbench run`` does.
+    """Acquire, evaluate and rank, as ``tactbench run`` does; or score estimators on data sets side by side.
 
     Parameters
     ----------
@@ -454,16 +508,29 @@ def run(
         are objects alone, the tasks' trivial answers are run beside them, and no other estimators.
     recordings, out
         Folder of recordings to replay, or all recordings of one; the result folder.
+    data, estimators, tasks
+        Several data sets: recordings by name, objects and names of estimators as of `estimator`, and one task or
+        several. Each data set has tables of its own, of all its sensors, and its result folder in `out`.
     **options
         Every other option of the verb by its name, with ``_`` for ``-``: ``protocol="deployable"``, ``repeats=3``,
-        ``probe=True``, ``rig_file="rig.yaml"``, ``config="beyond"``; lists for options that may be repeated.
+        ``probe=True``, ``rig_file="rig.yaml"``, ``config="beyond"``; lists for options that may be repeated. With
+        `data` the arguments of :func:`evaluate` and `jobs`, processes at once (None: all cores). Each of these, and
+        `tasks`, may be a mapping from names of data sets or of estimators: ``split={"pad": GroupKFold(3)}``.
 
     Notes
     -----
     What has a name is evaluated in processes of its own, as by the verb, and stored in `out`. Objects are evaluated
     afterwards in this process, on the recordings of the other rows, and their rows are in the returned table alone: a
     later run knows nothing of them. An option or a name that is wrong raises UsageError, and nothing is run.
+
+    With `data` everything is evaluated by joblib, without times of single answers where `jobs` is not 1. What ended is
+    found again while object, metric, data and code are the same, where that can be told: see `remarks` of a row.
     """
+    if data is not None:
+        given = {"sensor": sensor, "task": task, "estimator": estimator, "recordings": recordings}
+        if misplaced := [name for name, value in given.items() if value not in ((), None)]:
+            raise UsageError(f"`{misplaced[0]}` does not go with `data`.", hint="Use `data`, `estimators` and `tasks`.")
+        return _over_data(data, estimators, tasks, Path(out), **options)
     names, objects = _named(estimator)
     asked = {"sensor": sensor, "task": task, "recordings": _folder(recordings), "out": out, **options}
     if unknown := asked.keys() - Study.model_fields:
@@ -480,6 +547,95 @@ def run(
     each = {replace(cell_of(row), estimator="", params=(), baseline=False, timed=True): row for row in ended}
     beside = [_beside(row, name, given, store.folder) for name, given in objects.items() for row in each.values()]
     return Results(table_of(store, over_all(store, [*outcome.rows, *beside])) if beside else table)
+
+
+_OPTIONS = (
+    "protocol", "split", "groups", "metric", "greater_is_better", "params", "window", "step", "seed",
+)  # fmt: skip
+"""Arguments of :func:`evaluate` that data sets or estimators may have each their own of."""
+
+
+def _over_data(
+    data: Mapping[str, Recordings],
+    estimators: Estimators,
+    tasks: Any,
+    out: Path,
+    jobs: int | None = None,
+    **options: Any,
+) -> Results:
+    """Return the rows of estimators on data sets; see :func:`run`."""
+    names, objects = _named(estimators)
+    every: dict[str, str | Estimator] = {**objects, **dict(zip(names, names, strict=True))}
+    if not isinstance(data, Mapping) or not data:
+        raise wrong("data", data, "a mapping from names of data sets to recordings")
+    if not every:
+        raise wrong("estimators", estimators, "objects and names of estimators, at least one")
+    if jobs is not None and not (isinstance(jobs, int) and jobs > 0):
+        raise wrong("jobs", jobs, "a whole number, 1 or more")
+    if unknown := options.keys() - set(_OPTIONS):
+        raise UnknownNameError("argument of `run` with `data`", min(unknown), ("jobs", *_OPTIONS))
+
+    def chosen(value: Any, *of: str) -> Any:
+        mapped = isinstance(value, Mapping) and value and value.keys() <= {*data, *every}
+        return next((value[name] for name in of if name in value), None) if mapped else value
+
+    asked: dict[str, dict[str, _Work]] = {name: {} for name in data}
+    for name, recordings in data.items():
+        some = chosen(tasks, name)
+        if not some:
+            raise wrong("tasks", tasks, f"the task of {name!r}: a name or a TaskSpec, or several")
+        sensors = grouped(opened_as(f"data[{name!r}]", recordings), lambda one: one.sensor.name).values()
+        for task, mine in product([some] if isinstance(some, str | TaskSpec) else some, sensors):
+            for called, given in every.items():
+                own = {key: chosen(value, called, name) for key, value in options.items()}
+                stated = {key: value for key, value in own.items() if value is not None}
+                for work in _cells(called, given, task, mine, **stated):
+                    asked[name].setdefault(work.cell.name, work)
+    blocks: list[Block] = []
+    for name, rows in _side_by_side(asked, out, jobs or usable_cores()).items():
+        store = Store(out / name)
+        table = table_of(store, over_all(store, [{**row, "data": name} for row in rows]))
+        write_tables(table, store.folder)
+        blocks += [replace(one, title=f"{visible(name)} · {one.title}") for one in table.blocks]
+    return Results(replace(table, blocks=tuple(blocks), sections=()))
+
+
+def _side_by_side(asked: Mapping[str, Mapping[str, _Work]], out: Path, jobs: int) -> dict[str, list[Row]]:
+    """Return the rows of cells of data sets, each found in a result folder or evaluated in one of `jobs` processes."""
+    import joblib
+
+    keys, rows = Keys(installed()), {name: dict[str, Row]() for name in asked}
+    todo: list[tuple[str, _Work, Store, str, Sections, str]] = []
+    with ExitStack() as held, progress() as display:
+        for name, works in asked.items():
+            store = held.enter_context(Store(out / name).hold())
+            store.begin(gather(installed(), engine="joblib"))
+            for work in works.values():
+                work = work._replace(cell=replace(work.cell, timed=jobs == 1))
+                digests = {path: store.about(path)["digest"] for path in work.paths}
+                try:
+                    key, sections = keys.of_own(work.cell, work.task, work.own, digests)
+                    why = ""
+                except ValueError as error:
+                    key, sections, why = "", {}, f"computed anew at every run: its source cannot be told ({error})"
+                if (found := store.finished(key)) is None:
+                    todo.append((name, work, store, key, sections, why))
+                else:
+                    rows[name][work.cell.name] = found
+        display.begin("evaluating", len(todo))
+        calls = (joblib.delayed(_in_place)(place, one[1]) for place, one in enumerate(todo))
+        for place, (row, answers) in joblib.Parallel(jobs, return_as="generator_unordered")(calls):
+            name, work, store, key, sections, why = todo[place]
+            paths = [store.beside(path) for path in work.paths]
+            row |= {"key": key, "recordings": paths, "remarks": [*row["remarks"], *filter(None, [why])]}
+            rows[name][work.cell.name] = store.keep(row, sections, answers) if key else row
+            display.advance(work.cell.name, stopped=row["status"] in STOPPED)
+    return {name: [rows[name][cell] for cell in works] for name, works in asked.items()}
+
+
+def _in_place(place: int, work: _Work) -> tuple[int, Solved]:
+    """Return a cell's place among those that are computed, and what came of it."""
+    return place, _ended(work, simulated=False)
 
 
 def results(folder: AnyPath = "tactbench-results") -> Results:
@@ -527,4 +683,4 @@ def _beside(row: Row, name: str, given: Estimator, folder: Path) -> Row:
     if not paths:  # no answer to this question was finished
         whose = "" if row["status"] == "skipped" else f"{row['estimator']}: "
         return unanswered(cell, task, NotApplicable(f"{whose}{row['reason']}"), simulated=row["simulated"])
-    return _ended(cell, task, paths, Own(given), row["simulated"])
+    return _ended(_Work(cell, task, tuple(paths), Own(given)), row["simulated"])[0]

@@ -133,7 +133,7 @@ def test_a_result_has_what_a_row_has_and_shows_it(folder):
     assert found.row["ci_method"].startswith("jackknife over 5 sessions")
     assert found.recording_scores.keys() == set("abcde")
     assert found.recording_scores == pytest.approx(found.fold_scores)
-    assert {len(column) for column in found.predictions.values()} == {600}
+    assert len(found.predictions) == 600
     assert {row["estimator"] for row in found} == {"StandardScaler+Ridge", "mean", "time-index"}
     assert found.row["answer_delay_ms"] > 0
     assert all("StandardScaler+Ridge" in shown for shown in (repr(found), found._repr_html_()))

@@ -10,14 +10,18 @@ import json
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from tactbench.core.matrix.plan import Cell
 from tactbench.core.plugins.registry import Registry
 from tactbench.core.plugins.rigs import taking_part
-from tactbench.core.provenance.source import ANSWERING, RECORDING, digest_of, sources_of, versions
+from tactbench.core.provenance.source import ANSWERING, RECORDING, digest_of, identity_of, sources_of, versions
 from tactbench.core.spec.rig_file import RigFile
 from tactbench.core.spec.scene import Role, Scene
+from tactbench.core.spec.task import TaskSpec
+
+if TYPE_CHECKING:
+    from tactbench.core.evaluation.cell import Own
 
 Sections = dict[str, Any]
 
@@ -35,6 +39,23 @@ class Keys:
     def of_cell(self, cell: Cell, data: Mapping[Path, str]) -> tuple[str, Sections]:
         """Return the key of a cell's result and its sections; `data` are the content digests of its recordings."""
         sections = {**self._answering(cell), "configuration": configuration_of(cell)}
+        key = digest_of(_canonical({**sections, "data": list(data.values())}))
+        return key, {**sections, "data": {path.stem: digest for path, digest in data.items()}}
+
+    def of_own(self, cell: Cell, task: TaskSpec, own: Own, data: Mapping[Path, str]) -> tuple[str, Sections]:
+        """Return the key of what a caller in Python gives, and its sections; ValueError as of :func:`identity_of`."""
+        given = own.estimator, own.split, own.fit_params, own.window, own.step, own.metric and own.metric.function
+        tasks, named = self.registry.tasks, self.registry.estimators
+        modules = [task.features_by] if task.features_by else []
+        modules += [tasks.owned(task.name).module] if task.name in tasks else []
+        if own.estimator is None:
+            owned = named.owned(cell.estimator)
+            modules += [owned.module, owned.descriptor.where]
+        sections = {
+            "task": digest_of(task.model_dump_json()), "estimator": cell.estimator, "given": identity_of(given),
+            "versions": versions(named[cell.estimator].distributions if own.estimator is None else ()),
+            "source": sources_of(modules, ANSWERING), "configuration": configuration_of(cell),
+        }  # fmt: skip
         key = digest_of(_canonical({**sections, "data": list(data.values())}))
         return key, {**sections, "data": {path.stem: digest for path, digest in data.items()}}
 

@@ -119,9 +119,15 @@ def identity_of(value: Any) -> dict[str, Any]:
     tops = {name.partition(".")[0] for name in modules - script.keys()} - sys.stdlib_module_names
     places = {top: Path(getattr(sys.modules[top], "__file__", None) or "").parts for top in tops}
     installed = {top for top, parts in places.items() if {"site-packages", "dist-packages"}.intersection(parts)}
-    owners = importlib.metadata.packages_distributions()
+    owners = _distributions()
     source = sources_of(tops - installed, ()) | {
         name: hashlib.sha256(text).hexdigest() for name, text in script.items()
     }
     of = tuple(sorted({owner for top in installed for owner in owners.get(top, ())}))
     return {"object": joblib.hash(value), "versions": versions(of), "source": source}
+
+
+@lru_cache(maxsize=1)
+def _distributions() -> Mapping[str, list[str]]:
+    """Return what distributions brought each package that can be imported."""
+    return importlib.metadata.packages_distributions()
