@@ -55,6 +55,8 @@ class Recording:
 
     def __init__(self, path: AnyPath) -> None:
         self.path = Path(path)
+        self.kept: object = None
+        """What its file lasts as long as, where that lies in a folder of its own."""
 
     def __repr__(self) -> str:
         return f"<Recording {self.meta.name}: {self.sensor.name}>"
