@@ -19,7 +19,7 @@ from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import StandardScaler
 
 import tactbench
-from tactbench.core.errors import DataError, UsageError
+from tactbench.core.errors import DataError, NotApplicable, UsageError
 from tests.core.evaluation.made import grasps, label_task, ramp, record
 
 
@@ -275,7 +275,7 @@ def test_windows_that_cannot_be_are_refused(folder):
         tactbench.load_task("force", folder, window=61)
     with pytest.raises(NotApplicable, match="first-frame"):
         tactbench.load_task("force", folder, "first-frame", window=2)
-    with pytest.raises(DataError, match=r"40 rows of 5 x 3 features|of 5 x 3 features"):
+    with pytest.raises(DataError, match="of 5 x 3 features"):
         tactbench.evaluate(Ridge(), "force", folder, window=5)
 
 
