@@ -12,7 +12,7 @@ import shutil
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from contextlib import ExitStack
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 from importlib import import_module
 from itertools import product
@@ -23,11 +23,10 @@ import numpy as np
 from pydantic import ValidationError
 
 from tactbench.core.errors import NotApplicable, UnknownNameError, UsageError, complaint, wrong
-from tactbench.core.evaluation.cell import Own
 from tactbench.core.evaluation.folds import PLAIN, TaskData
 from tactbench.core.evaluation.folds import load_task as folds_of
 from tactbench.core.evaluation.metrics import METRICS, Metric, metric_called, own_metric
-from tactbench.core.evaluation.protocols import PROTOCOLS, is_probe
+from tactbench.core.evaluation.protocols import is_probe, without_options
 from tactbench.core.evaluation.splits import OwnSplit
 from tactbench.core.files import named_file
 from tactbench.core.leaderboard.formats import records, write_tables
@@ -67,35 +66,17 @@ if TYPE_CHECKING:
 Row = dict[str, Any]
 
 
-@dataclass(frozen=True)
-class _Question:
-    """What is asked of recordings, with all names looked up."""
-
-    task: TaskSpec
-    declared: str
-    """the JSON that declares the task beside the recordings; empty: it is installed"""
-    paths: tuple[Path, ...]
-    split: str | None
-    own: Own
-
-
 def _question(
-    task: str | TaskSpec,
-    recordings: Recordings,
-    protocol: str,
-    split: Any,
-    groups: Any,
-    window: int | None,
-    step: int | None,
+    task: str | TaskSpec, recordings: Recordings, protocol: str, split: Any, groups: Any, window: int | None, step: int,
     seed: int,
-) -> _Question:
-    for name, given, least in (("window", window, 1), ("step", step, 1), ("seed", seed, 0)):
-        if given is not None and not (isinstance(given, int | np.integer) and given >= least):
-            raise wrong(name, given, f"a whole number, {least} or more")
-    if step is not None and window is None:
-        raise wrong("step", step, "rows between windows, and `window` is not given")
-    if not isinstance(protocol, str):
-        raise wrong("protocol", protocol, f"a name: {', '.join(PROTOCOLS)}")
+) -> tuple[TaskSpec, str, tuple[Path, ...], dict[str, Any]]:  # fmt: skip
+    """Return a task, the JSON that declares it beside the recordings (empty: it is installed), the files, and how.
+
+    The last has what :func:`folds_of` takes.
+    """
+    for name, given, least in (("window", 1 if window is None else window, 1), ("step", step, 1), ("seed", seed, 0)):
+        if not isinstance(given, int | np.integer) or given < least or (name == "step" and given > 1 and not window):
+            raise wrong(name, given, f"a whole number, {least} or more{', beside `window`' * (name == 'step')}")
     paths = tuple(one.path for one in opened_as("recordings", recordings))
     folders = {path.parent for path in paths if (path.parent / FILE).is_file()}
     registry = with_declared_tasks(installed(), {one: None for each in sorted(folders) for one in declared_in(each)})
@@ -105,16 +86,16 @@ def _question(
         task, declared = owned.descriptor.spec, owned.declared
     if not isinstance(task, TaskSpec):
         raise wrong("task", task, "a name of `tactbench list tasks`, one declared beside the recordings, or a TaskSpec")
-    if protocol not in task.protocols and not is_probe(protocol):
-        raise UnknownNameError(f"protocol of task {task.name!r}", protocol, task.protocols)
-    named = split is None or isinstance(split, str)
-    if not named and not hasattr(split, "split") and not isinstance(split, Iterable):
-        raise wrong("split", split, "a name, an object with scikit-learn's `split(X, y, groups)`, or index arrays")
-    if named and groups is not None:
+    plain = without_options(str(protocol))
+    if plain not in task.protocols and not is_probe(plain):
+        raise UnknownNameError(f"protocol of task {task.name!r}", str(protocol), task.protocols)
+    if split is not None and not isinstance(split, str):
+        if not hasattr(split, "split") and not isinstance(split, Iterable):
+            raise wrong("split", split, "a name, an object with scikit-learn's `split(X, y, groups)`, or index arrays")
+        split = OwnSplit(split, groups)
+    elif groups is not None:
         raise wrong("groups", groups, "what a splitter keeps apart, and `split` is none (`params` has those of `fit`)")
-    mine = None if named else OwnSplit(split, groups)
-    own = Own(split=mine, window=window or 0, step=step or 1)
-    return _Question(task, declared, paths, mine.name if mine else split, own)
+    return task, declared, paths, {"split": split, "window": window or 0, "step": step, "seed": seed}
 
 
 def load_task(
@@ -125,7 +106,7 @@ def load_task(
     *,
     groups: Any = None,
     window: int | None = None,
-    step: int | None = None,
+    step: int = 1,
     seed: int = 1,
 ) -> TaskData:
     """Return what a task asks of recordings as `X`, `y`, `groups`, `feature_names` and `folds`.
@@ -165,9 +146,8 @@ def load_task(
     DataError
         If nothing is left to evaluate; its kind NotApplicable if the question cannot be asked of these recordings.
     """
-    asked = _question(task, recordings, protocol, split, groups, window, step, seed)
-    data, own = read_dataset(asked.task, asked.paths), asked.own
-    return folds_of(asked.task, data, protocol, own.split or split, seed=seed, window=own.window, step=own.step)
+    spec, _, paths, how = _question(task, recordings, protocol, split, groups, window, step, seed)
+    return folds_of(spec, read_dataset(spec, paths), protocol, **how)
 
 
 class Rows(list[dict[str, Any]]):
@@ -335,7 +315,7 @@ def evaluate(
     greater_is_better: bool | None = None,
     params: Mapping[str, Any] | None = None,
     window: int | None = None,
-    step: int | None = None,
+    step: int = 1,
     seed: int = 1,
 ) -> Result:
     """Score an estimator on recordings in this process, and the task's trivial answers beside it.
@@ -376,7 +356,7 @@ def evaluate(
     rows = [row, *(_ended(one, row["simulated"])[0] for one in trivial)]
     counts = Counter(one.name for one in data.metas)
     names = [one.name if counts[one.name] == 1 else str(path) for one, path in zip(data.metas, data.paths, strict=True)]
-    return Result(rows, answers["test"], mine.task, names, mine.own.metric or metric_called(mine.task.metric))
+    return Result(rows, answers["test"], mine.task, names, mine.how["metric"])
 
 
 class _Work(NamedTuple):
@@ -385,7 +365,8 @@ class _Work(NamedTuple):
     cell: Cell
     task: TaskSpec
     paths: tuple[Path, ...]
-    own: Own
+    how: dict[str, Any]
+    """what the caller gives in place of what is named, as of :func:`solve`"""
 
 
 def _cells(
@@ -401,56 +382,53 @@ def _cells(
     greater_is_better: bool | None = None,
     params: Mapping[str, Any] | None = None,
     window: int | None = None,
-    step: int | None = None,
+    step: int = 1,
     seed: int = 1,
 ) -> list[_Work]:
     """Return the cell of an estimator, and those of the task's trivial answers; arguments as of :func:`evaluate`."""
-    asked = _question(task, recordings, protocol, split, groups, window, step, seed)
-    spec, given = asked.task, None if isinstance(estimator, str) else estimator
+    spec, declared, paths, how = _question(task, recordings, protocol, split, groups, window, step, seed)
+    given = None if isinstance(estimator, str) else estimator
     scored = metric_of(metric, greater_is_better, spec)
     if scored.name != spec.metric:  # what is published, or the same in use, is so by the task's own metric
         unit = spec.unit if {scored.name, spec.metric} == {"rmse", "mae"} else "1"
-        changed = {"metric": scored.name, "unit": unit, "equivalence": None, "published": ()}
-        spec = spec.model_copy(update=changed)
-    if params is not None and (not isinstance(params, Mapping) or given is None):
+        spec = spec.model_copy(update={"metric": scored.name, "unit": unit, "equivalence": None, "published": ()})
+    if params is not None and (given is None or not isinstance(params, Mapping)):
         raise wrong("params", params, "a mapping of what `fit` of an object takes to its values")
-    if window is not None and given is None:
+    if window and given is None:
         raise wrong("estimator", estimator, "an object where `window` is given")
     cell = Cell(
-        sensor=read_meta(asked.paths[0]).sensor.name, task=spec.name, rig="replay", protocol=protocol,
-        split=asked.split, estimator=name, params=(), baseline=False, seed=seed, declared_task=asked.declared,
+        sensor=read_meta(paths[0]).sensor.name, task=spec.name, rig="replay", protocol=protocol,
+        split=getattr(how["split"], "name", split), estimator=name, params=(), baseline=False, seed=seed,
+        declared_task=declared,
     )  # fmt: skip
-    own = replace(asked.own, metric=scored)
+    how |= {"given": None, "metric": scored}
     trivial = [replace(cell, estimator=other, baseline=True) for other in spec.baselines if other != name]
-    mine = replace(own, estimator=given, fit_params=params or {})
-    return [_Work(cell, spec, asked.paths, mine), *(_Work(one, spec, asked.paths, own) for one in trivial)]
+    mine = _Work(cell, spec, paths, {**how, "given": given, "fit_params": params or {}})
+    return [mine, *(_Work(one, spec, paths, how) for one in trivial)]
 
 
 def metric_of(given: Any, greater_is_better: bool | None, task: TaskSpec) -> Metric:
     """Return a metric by name, of a scikit-learn scorer, or of a function of (y, prediction); None: the task's."""
-    takes = (
-        f"a metric of a {task.kind}: a name (see docs/protocols.md, or sklearn.metrics.get_scorer_names), a scorer of "
-        "predictions, or a function of (y, prediction) with `greater_is_better`"
-    )
-    own = metric_called(task.metric)
-    if (given is None and greater_is_better is None) or given == own.name:
-        return own
-    found, scorer = METRICS.get(given) if isinstance(given, str) else None, given
-    if found is not None and (found.kind, found.vector) == (own.kind, own.vector):
+    own, scorer = metric_called(task.metric), given
+    found = own if given is None else None
+    if isinstance(given, str):
+        scorers: Any = import_module("sklearn.metrics")
+        found, scorer = METRICS.get(given), scorers.get_scorer(given) if given in scorers.get_scorer_names() else None
+    by_prediction = callable(scorer) and getattr(scorer, "_response_method", "predict") == "predict"
+    alike = found is not None and (found.kind, found.vector) == (own.kind, own.vector)
+    if not alike and (found is not None or own.kind == "events" or not by_prediction):
+        takes = "a name of docs/protocols.md or of sklearn.metrics.get_scorer_names(), a scorer of predictions, or a "
+        raise wrong("metric", given, f"what scores a {own.kind}: {takes}function of (y, prediction)")
+    plain = not alike and not hasattr(scorer, "_score_func")
+    if not (isinstance(greater_is_better, bool) if plain else greater_is_better is None):
+        takes = "True or False where `metric` is a function, and nothing where it tells the direction itself"
+        raise wrong("greater_is_better", greater_is_better, takes)
+    if found is not None:
         return found
-    if isinstance(given, str) and found is None:
-        metrics: Any = import_module("sklearn.metrics")
-        scorer = metrics.get_scorer(given) if given in metrics.get_scorer_names() else None
-    if own.kind == "events" or not callable(scorer):
-        raise wrong("metric", given, takes)
-    if not hasattr(scorer, "_score_func"):
-        if not isinstance(greater_is_better, bool):
-            raise wrong("greater_is_better", greater_is_better, f"True or False of a function, as `metric` is: {given}")
-        return own_metric(scorer, getattr(scorer, "__name__", type(scorer).__name__), task, greater_is_better)
-    if getattr(scorer, "_response_method", "predict") != "predict":
-        raise wrong("metric", given, takes)
-    score = partial(scorer._score_func, **scorer._kwargs)
-    return own_metric(score, scorer._score_func.__name__, task, scorer._sign > 0)
+    if plain:
+        return own_metric(scorer, getattr(scorer, "__name__", type(scorer).__name__), task, bool(greater_is_better))
+    function = partial(scorer._score_func, **scorer._kwargs)
+    return own_metric(function, scorer._score_func.__name__, task, scorer._sign > 0)
 
 
 def name_of(estimator: str | Estimator) -> str:
@@ -465,10 +443,10 @@ def name_of(estimator: str | Estimator) -> str:
 
 def _answered(work: _Work) -> Solved:
     """Evaluate a cell here; the global generators of random numbers are afterwards as they were."""
-    described = installed().estimators[work.cell.estimator] if work.own.estimator is None else PLAIN
+    described = installed().estimators[work.cell.estimator] if work.how["given"] is None else PLAIN
     states = random.getstate(), np.random.get_state()  # noqa: NPY002  (it is this old generator that cells seed)
     try:
-        return solve(Job(work.cell, work.task, described, work.paths, (), "", {}), own=work.own)
+        return solve(Job(work.cell, work.task, described, work.paths, (), "", {}), own=work.how)
     finally:
         random.setstate(states[0])
         np.random.set_state(states[1])  # noqa: NPY002
@@ -580,6 +558,7 @@ def _over_data(
         return next((value[name] for name in of if name in value), None) if mapped else value
 
     asked: dict[str, dict[str, _Work]] = {name: {} for name in data}
+    splits: dict[tuple[Any, ...], OwnSplit] = {}
     for name, recordings in data.items():
         some = chosen(tasks, name)
         if not some:
@@ -590,6 +569,11 @@ def _over_data(
                 own = {key: chosen(value, called, name) for key, value in options.items()}
                 stated = {key: value for key, value in own.items() if value is not None}
                 for work in _cells(called, given, task, mine, **stated):
+                    if isinstance(work.how["split"], OwnSplit):  # drawn once, so that all are tested on the same folds
+                        of = name, work.cell.sensor, work.cell.task, work.how["window"], work.how["step"]
+                        work.how["split"] = splits.setdefault(of, work.how["split"])
+                        folds = {key: work.how[key] for key in ("split", "seed", "window", "step")}
+                        folds_of(work.task, read_dataset(work.task, work.paths), work.cell.protocol, **folds)
                     asked[name].setdefault(work.cell.name, work)
     blocks: list[Block] = []
     for name, rows in _side_by_side(asked, out, jobs or usable_cores()).items():
@@ -614,7 +598,7 @@ def _side_by_side(asked: Mapping[str, Mapping[str, _Work]], out: Path, jobs: int
                 work = work._replace(cell=replace(work.cell, timed=jobs == 1))
                 digests = {path: store.about(path)["digest"] for path in work.paths}
                 try:
-                    key, sections = keys.of_own(work.cell, work.task, work.own, digests)
+                    key, sections = keys.of_given(work.cell, work.task, work.how, digests)
                     why = ""
                 except ValueError as error:
                     key, sections, why = "", {}, f"computed anew at every run: its source cannot be told ({error})"
@@ -683,4 +667,4 @@ def _beside(row: Row, name: str, given: Estimator, folder: Path) -> Row:
     if not paths:  # no answer to this question was finished
         whose = "" if row["status"] == "skipped" else f"{row['estimator']}: "
         return unanswered(cell, task, NotApplicable(f"{whose}{row['reason']}"), simulated=row["simulated"])
-    return _ended(_Work(cell, task, tuple(paths), Own(given)), row["simulated"])[0]
+    return _ended(_Work(cell, task, tuple(paths), {"given": given}), row["simulated"])[0]

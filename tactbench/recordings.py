@@ -188,4 +188,7 @@ def dataset(name: str, root: AnyPath | None = None) -> list[Recording]:
     """
     from tactbench.core.recording.datasets import dataset_called
 
+    for argument, given, types in (("name", name, str), ("root", root, str | os.PathLike | None)):
+        if not isinstance(given, types):
+            raise wrong(argument, given, "a name" if argument == "name" else "a folder")
     return open_recordings(dataset_called(name).recordings(None if root is None else Path(root)))

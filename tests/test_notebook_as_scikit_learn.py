@@ -19,7 +19,7 @@ from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import StandardScaler
 
 import tactbench
-from tactbench.core.errors import DataError, UsageError
+from tactbench.core.errors import DataError, NotApplicable, UsageError
 from tests.core.evaluation.made import grasps, label_task, ramp, record
 
 
@@ -214,3 +214,79 @@ def test_weights_are_those_of_the_rows_of_the_fold(folder):
     np.testing.assert_allclose(list(found.fold_scores.values()), -theirs, rtol=1e-9)  # rounding of two scales
     plain = tactbench.evaluate(Ridge(), "force", folder)
     assert found.score != plain.score
+
+
+# Windows
+
+
+class LastOfWindow:
+    """Least squares on the last rows of windows, in plain numpy."""
+
+    def fit(self, X, y):
+        assert X.ndim == 3
+        self.seen, self.coef = X.shape, np.linalg.lstsq(self._columns(X), y, rcond=None)[0]
+        return self
+
+    def predict(self, X):
+        return self._columns(X) @ self.coef
+
+    def _columns(self, X):
+        return np.column_stack([X[:, -1], np.ones(len(X))])
+
+
+def test_windows_lie_in_one_recording_and_are_labelled_at_their_end(folder):
+    rows = tactbench.load_task("force", folder)
+    data = tactbench.load_task("force", folder, window=8, step=3)
+    ends = np.concatenate([np.arange(start + 7, start + 60, 3) for start in range(0, 360, 60)])
+    np.testing.assert_array_equal(data.X, rows.X[ends[:, None] + np.arange(-7, 1)])
+    np.testing.assert_array_equal(data.y, rows.y[ends])
+    np.testing.assert_array_equal(data.groups, rows.groups[ends])
+    assert [len(test) for _, test in data.folds] == [18] * 6
+    slow = tactbench.load_task("force", folder, "deployable@every=2", window=4)
+    np.testing.assert_array_equal(slow.X[0], rows.X[:8:2])
+
+
+def test_an_object_that_takes_windows_is_scored_with_their_delay(folder):
+    one = tactbench.evaluate(Ridge(alpha=1e-9), "force", folder)
+    found = tactbench.evaluate(LastOfWindow(), "force", folder, window=1)
+    assert found.score == pytest.approx(one.score, rel=1e-6)  # the penalty
+    longer = tactbench.evaluate(LastOfWindow(), "force", folder, window=11, step=5)
+    parts = longer.row["delay_parts_ms"]
+    # The mean over 11 samples 10 ms apart would be late by five of them: docs/glossary.md.
+    assert parts["window"] == pytest.approx(50.0, rel=1e-6)  # of the clock
+    assert longer.row["answer_delay_ms"] == pytest.approx(sum(parts.values()))
+    assert longer.interval is not None
+    assert (longer.predictions["row"][:3] == [10, 15, 20]).all()
+    assert longer.row["stamps"] == []
+
+
+@pytest.mark.parametrize("split", ["press", "in-session", KFold(4)])
+def test_no_row_stands_in_windows_of_both_sides(folder, split):
+    rows, data = tactbench.load_task("force", folder), tactbench.load_task("force", folder, split=split, window=5)
+    known = {row.tobytes(): place for place, row in enumerate(rows.X)}
+    places = np.array([[known[row.tobytes()] for row in window] for window in data.X])
+    for train, test in data.folds:
+        assert len(train)
+        assert not np.intersect1d(places[train], places[test]).size
+
+
+def test_windows_that_cannot_be_are_refused(folder):
+    with pytest.raises(DataError, match=r"windows of 61 rows"):
+        tactbench.load_task("force", folder, window=61)
+    with pytest.raises(NotApplicable, match="first-frame"):
+        tactbench.load_task("force", folder, "first-frame", window=2)
+    with pytest.raises(DataError, match="of 5 x 3 features"):
+        tactbench.evaluate(Ridge(), "force", folder, window=5)
+
+
+def test_a_scaled_window_is_that_of_the_training_windows(folder):
+    found = []
+
+    class Keeps(LastOfWindow):
+        def fit(self, X, y):
+            found.append(X)
+            return super().fit(X, y)
+
+    tactbench.evaluate(Keeps(), "force", folder, window=4)
+    np.testing.assert_allclose([one.mean(axis=(0, 1)) for one in found], 0.0, atol=1e-9)  # of values about 1000
+    np.testing.assert_allclose([one.std(axis=(0, 1)) for one in found], 1.0, rtol=1e-9)

@@ -113,7 +113,8 @@ def complaint(error: ValidationError) -> str:
 
 def wrong(argument: str, given: object, takes: str) -> UsageError:
     """Return the error of a function in Python that was given something that its argument does not take."""
-    shown = reprlib.repr(given) if not isinstance(given, str | type) else repr(given)
+    shown = repr(given) if isinstance(given, str | type) else reprlib.repr(given)
+    shown += f" of shape {given.shape}" if hasattr(given, "shape") else ""
     return UsageError(f"{argument}={shown} cannot be used.", hint=f"`{argument}` takes {takes}.")
 
 
@@ -122,7 +123,7 @@ class UnknownNameError(UsageError):
 
     def __init__(self, kind: str, given: str, known: Iterable[str]) -> None:
         names = sorted(known)
-        listing = f"Known: {', '.join(names)}." if names else f"No {kind} is installed."
+        listing = f"Known names: {', '.join(names)}." if names else f"No {kind} is installed."
         super().__init__(f"There is no {kind} called {given!r}.", hint=did_you_mean(given, names) + listing)
 
 

@@ -1,7 +1,6 @@
 """One cell: its score, and what is known of it, from recordings and an estimator.
 
-:func:`load_task` makes the folds, :func:`evaluate` does the rest for any object with ``fit`` and ``predict``;
-:func:`evaluate_cell` calls both for a cell of the matrix.
+:func:`load_task` makes the folds, :func:`evaluate_cell` does the rest, for any object with ``fit`` and ``predict`` too.
 """
 
 from __future__ import annotations
@@ -9,7 +8,7 @@ from __future__ import annotations
 import copy
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import Any
 
@@ -30,7 +29,7 @@ from tactbench.core.evaluation.delay import (
 )
 from tactbench.core.evaluation.event_answers import EventRules, state_figures
 from tactbench.core.evaluation.fitting import builder, features_of, one_model_a_component, routed
-from tactbench.core.evaluation.folds import PLAIN, TaskData, load_task
+from tactbench.core.evaluation.folds import TaskData, load_task
 from tactbench.core.evaluation.frames import band_limit, clocked
 from tactbench.core.evaluation.interval import score_interval
 from tactbench.core.evaluation.leaks import copied_channels, leak_stamps, shared_groups
@@ -38,7 +37,14 @@ from tactbench.core.evaluation.metrics import METRICS, Metric, class_f1, confusi
 from tactbench.core.evaluation.reference_floor import beyond_floor, reference_floor, true_force
 from tactbench.core.evaluation.replicate_sums import recordings_right, replicates, summed
 from tactbench.core.evaluation.sets import tare_s
-from tactbench.core.evaluation.splits import SHUFFLED_STAMP, SHUFFLED_WHOLE_STAMP, OwnSplit, used_rows, without_part
+from tactbench.core.evaluation.splits import (
+    SHUFFLED_STAMP,
+    SHUFFLED_WHOLE_STAMP,
+    OwnSplit,
+    over_rows,
+    used_rows,
+    without_part,
+)
 from tactbench.core.evaluation.summaries import with_windows
 from tactbench.core.plugins.interfaces import Estimator
 from tactbench.core.recording.completeness import INCOMPLETE
@@ -52,19 +58,6 @@ from tactbench.core.thread_limit import thread_limit
 
 
 @dataclass(frozen=True)
-class Own:
-    """What a caller in Python gives in place of what a cell names."""
-
-    estimator: Estimator | None = None
-    split: OwnSplit | None = None
-    metric: Metric | None = None
-    fit_params: Mapping[str, Any] = field(default_factory=dict)
-    """as of :class:`Configured`; texts are names of labels"""
-    window: int = 0
-    step: int = 1
-
-
-@dataclass(frozen=True)
 class CellContext:
     """What one cell asks, but for the recordings."""
 
@@ -74,7 +67,7 @@ class CellContext:
     """other than the estimator's defaults; they are not searched"""
     protocol: str
     """how recordings become X and y"""
-    split: str | None
+    split: str | OwnSplit | None
     """what is kept apart; None: the task's first that fits"""
     seed: int
     """decides everything random: the same seed gives the same score in any process"""
@@ -83,8 +76,15 @@ class CellContext:
     """that estimator and BLAS may use"""
     latency: bool = True
     """whether to measure how long the answer to one row takes"""
-    own: Own = Own()
-    """what the caller gives in place of what is named"""
+    given: Estimator | None = None
+    """an object that answers in place of `estimator`"""
+    metric: Metric | None = None
+    """None: the task's"""
+    fit_params: Mapping[str, Any] = field(default_factory=dict)
+    """of `given`; see :func:`routed`"""
+    window: int = 0
+    step: int = 1
+    """as of :func:`load_task`"""
 
 
 class Result(Evaluated):
@@ -108,59 +108,28 @@ def evaluate_cell(context: CellContext, recordings: Sequence[Path] | Dataset) ->
     DataError
         If a set is empty, has one class only, or its labels never change.
     """
-    task, estimator, seed, own = context.task, context.estimator, context.seed, context.own
+    task, descriptor, given = context.task, context.estimator, context.given
     data = load_task(
-        task, recordings, context.protocol, own.split or context.split, estimator=estimator, seed=seed,
-        window=own.window, step=own.step,
+        task, recordings, context.protocol, context.split, estimator=descriptor, seed=context.seed,
+        window=context.window, step=context.step,
     )  # fmt: skip
-    answering: Estimator | Configured | None = own.estimator
-    if answering is None:
-        build = builder(estimator, context.params, task, seed, context.threads)
-        answering = Configured(estimator, build, context.params)
-    return evaluate(
-        answering, data, own.metric, own.fit_params, clock=context.clock, threads=context.threads,
-        latency=context.latency,
-    )  # fmt: skip
-
-
-def evaluate(
-    estimator: Estimator | Configured,
-    data: TaskData,
-    metric: Metric | None = None,
-    fit_params: Mapping[str, Any] | None = None,
-    *,
-    clock: Clock,
-    threads: int = 1,
-    latency: bool = True,
-) -> Result:
-    """Answer a task with an estimator, and measure how well and at what cost.
-
-    Parameters
-    ----------
-    estimator
-        Any object with ``fit`` and ``predict``, which stays as it is; or one that is to be made anew.
-    metric
-        None: the task's.
-    fit_params
-        What else the ``fit`` of an object takes; see :func:`routed`.
-    clock, threads, latency
-        As in :class:`CellContext`.
-    """
-    if not isinstance(estimator, Configured):
-        given = estimator
-        named = PLAIN.model_copy(update={"name": type(given).__name__})
-        build = one_model_a_component(data.task, lambda _: copy.deepcopy(given))
-        estimator = Configured(named, build, fit_params=routed(given, data, fit_params or {}))
-    descriptor = with_windows(estimator.descriptor, data.task, data.rules)
-    estimator, metric = replace(estimator, descriptor=descriptor), metric or metric_called(data.task.metric)
-    rules = EventRules.of(data.task, descriptor.threshold) if data.task.kind == "events" else None
+    if given is None:
+        build = builder(descriptor, context.params, task, context.seed, context.threads)
+    else:
+        descriptor = descriptor.model_copy(update={"name": type(given).__name__})
+        build = one_model_a_component(task, lambda _: copy.deepcopy(given))
+    descriptor = with_windows(descriptor, task, data.rules)
+    fit_params = {} if given is None else routed(given, data, context.fit_params)
+    estimator = Configured(descriptor, build, context.params, fit_params)
+    metric, clock = context.metric or metric_called(task.metric), context.clock
+    rules = EventRules.of(task, descriptor.threshold) if task.kind == "events" else None
     counts = Counter(data.data.counts)
     answered: list[AnsweredFold] = []
-    with thread_limit(threads):
+    with thread_limit(context.threads):
         for number, assignment in enumerate(data.assignments):
             fitted = fitted_fold(estimator, data, assignment, metric, counts, clock)
             answered.append(answered_fold(fitted, data, descriptor, metric, rules, number, clock))
-        cost, delay_remarks = _cost(fitted, answered, data, descriptor, clock, threads, latency=latency)
+        cost, delay_remarks = _cost(fitted, answered, data, descriptor, context)
     return _result(answered, data, descriptor, metric, rules, cost, delay_remarks, counts)
 
 
@@ -169,17 +138,14 @@ def _cost(
     answered: Sequence[AnsweredFold],
     data: TaskData,
     descriptor: EstimatorDescriptor,
-    clock: Clock,
-    threads: int,
-    *,
-    latency: bool,
+    context: CellContext,
 ) -> tuple[Cost, tuple[str, ...]]:
     """Return what all folds took, and how late answers of the last fold's model are, with remarks on that."""
-    recorded, task, rules = data.recorded, data.task, data.rules
+    recorded, task, rules, clock = data.recorded, data.task, data.rules, context.clock
     looks_back = max(fitted.k, data.window - 1)
     parts, remarks = stated_delay_ms(recorded, data.data, task, rules, descriptor, looks_back)
     p50 = p95 = largest = calls = None
-    if latency:
+    if context.latency:
         waits_s = single_row_latency_s(fitted.model, features_of(fitted.fold.test, descriptor), clock)
         p50, calls = float(1e3 * np.median(waits_s)), len(waits_s)
         p95, largest = tail_ms(waits_s)
@@ -196,7 +162,7 @@ def _cost(
         latency_n=calls,
         answer_delay_ms=answer_delay_ms(parts, descriptor.looks_at),
         delay_parts_ms=parts,
-        threads=threads,
+        threads=context.threads,
         peak_rss_mb=peak_rss_mb(),
     )
     return cost, remarks
@@ -325,7 +291,7 @@ def _refuse(estimator: str, metric: Metric, tested: Answers) -> None:
 def _part_taken(data: TaskData) -> tuple[list[RecordingMeta], dict[str, int], list[str]]:
     """Return the recordings that some fold uses, what no fold uses, and stamps: of leaks, of incomplete ones."""
     recorded = data.recorded
-    folds = data.recorded_folds
+    folds = [over_rows(one, data.data, recorded) for one in data.assignments]
     used = used_rows(folds)
     took_part = [one.meta for one, mask in zip(recorded.tables, used, strict=True) if (mask & one.labelled).any()]
     if data.own:

@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from tactbench.core.errors import DataError, NotApplicable, wrong
-from tactbench.core.evaluation.dataset import Dataset, Table, at_rows, load_dataset, thinned
+from tactbench.core.evaluation.dataset import Dataset, at_rows, load_dataset, thinned
 from tactbench.core.evaluation.frames import framed
 from tactbench.core.evaluation.protocols import ProtocolSpec, protocol_called, shots, without_options
 from tactbench.core.evaluation.sets import asked_for, tare_s, tared
@@ -25,7 +25,7 @@ from tactbench.core.evaluation.splits import (
     with_validation,
 )
 from tactbench.core.evaluation.summaries import is_summarised, summarised, with_windows
-from tactbench.core.evaluation.windows import apart, covered, windowed
+from tactbench.core.evaluation.windows import apart, windowed
 from tactbench.core.samples import FloatArray, IntArray, Part
 from tactbench.core.spec.rig import EstimatorDescriptor
 from tactbench.core.spec.task import TaskSpec
@@ -128,29 +128,6 @@ class TaskData:
             found[-1][mask] = column[before : before + mask.sum()]
             before += int(mask.sum())
         return found
-
-    @property
-    def recorded_folds(self) -> tuple[Assignment, ...]:
-        """Return the folds as assignments of all rows that were recorded."""
-
-        def spread(mask: Mask, made: Table, recorded: Table) -> Mask:
-            n = len(recorded.row)
-            if self.window:
-                rows, covers = np.zeros(n, dtype=bool), covered(mask, self.window, self.step)
-                end = np.searchsorted(recorded.row, made.row[:1]).sum() - self.window + 1 + len(covers)
-                rows[end - len(covers) : end] = covers
-                return rows
-            return mask if len(mask) == n else np.full(n, bool(mask[0]))
-
-        def whole(masks: tuple[Mask, ...]) -> tuple[Mask, ...]:
-            return tuple(map(spread, masks, self.data.tables, self.recorded.tables))
-
-        return tuple(
-            replace(
-                one, train=whole(one.train), test=whole(one.test), validation=one.validation and whole(one.validation)
-            )
-            for one in self.assignments
-        )
 
     def _there(self) -> list[Mask]:
         return [asked_for(table, self.rules) & table.labelled for table in self.data.tables]

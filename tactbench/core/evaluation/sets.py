@@ -77,7 +77,7 @@ class FeatureScale:
 
 
 def moments(X: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return mean and deviation of (n,) or of each column of (…, columns) in two passes; of a constant one exactly zero.
+    """Return mean and deviation of (n,) or of each column of (…, columns) in two passes, 0 of a constant one.
 
     A constant column's computed deviation is the rounding error of its mean, as large as the number of rows makes it;
     it would turn rounding into a signal. So constancy is looked up, not inferred from the deviation.

@@ -396,3 +396,20 @@ def _sizes(tables: Sequence[Table], masks: Sequence[Mask], group: str) -> Counte
             values, counts = np.unique(table.groups[group][mask & table.labelled], return_counts=True)
             sizes.update(dict(zip(values.tolist(), counts.tolist(), strict=True)))
     return sizes
+
+
+def over_rows(assignment: Assignment, made: Dataset, recorded: Dataset) -> Assignment:
+    """Return an assignment of what recordings were made to as one of all rows recorded.
+
+    Of windows their last rows; all rows of a recording that was made to frames, or to one row.
+    """
+
+    def spread(masks: tuple[Mask, ...]) -> tuple[Mask, ...]:
+        return tuple(
+            np.isin(table.row, own.row[mask]) if own.X.ndim > 2
+            else mask if len(mask) == len(table.row) else np.full(len(table.row), bool(mask[0]))
+            for mask, own, table in zip(masks, made.tables, recorded.tables, strict=True)
+        )  # fmt: skip
+
+    validation = None if assignment.validation is None else spread(assignment.validation)
+    return replace(assignment, train=spread(assignment.train), test=spread(assignment.test), validation=validation)

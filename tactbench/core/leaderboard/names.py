@@ -16,7 +16,7 @@ Row = Mapping[str, Any]
 _Key = TypeVar("_Key")
 _Value = TypeVar("_Value")
 
-SIMULATED = "SIM (twin)"
+SIMULATED = "SIM"
 """What is said of simulated rows in place of a rig."""
 EMULATED = "EMULATED"
 """What is said of rows whose recordings came from emulated devices, before their rig."""
@@ -74,7 +74,7 @@ def sign_of(row: Row) -> float:
 
 
 def hardware_name(row: Row) -> str:
-    """Return what carried out a row's scenes: the twin, emulated devices on a rig, or a rig by its name."""
+    """Return what carried out a row's scenes: a simulation, emulated devices on a rig, or a rig by its name."""
     if row.get("emulated"):
         return f"{EMULATED} (rig {row['rig']})"
     return SIMULATED if row["simulated"] else f"rig {row['rig']}"

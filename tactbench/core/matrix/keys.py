@@ -10,7 +10,7 @@ import json
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from tactbench.core.matrix.plan import Cell
 from tactbench.core.plugins.registry import Registry
@@ -19,9 +19,6 @@ from tactbench.core.provenance.source import ANSWERING, RECORDING, digest_of, id
 from tactbench.core.spec.rig_file import RigFile
 from tactbench.core.spec.scene import Role, Scene
 from tactbench.core.spec.task import TaskSpec
-
-if TYPE_CHECKING:
-    from tactbench.core.evaluation.cell import Own
 
 Sections = dict[str, Any]
 
@@ -42,20 +39,26 @@ class Keys:
         key = digest_of(_canonical({**sections, "data": list(data.values())}))
         return key, {**sections, "data": {path.stem: digest for path, digest in data.items()}}
 
-    def of_own(self, cell: Cell, task: TaskSpec, own: Own, data: Mapping[Path, str]) -> tuple[str, Sections]:
-        """Return the key of what a caller in Python gives, and its sections; ValueError as of :func:`identity_of`."""
-        given = own.estimator, own.split, own.fit_params, own.window, own.step, own.metric and own.metric.function
-        tasks, named = self.registry.tasks, self.registry.estimators
+    def of_given(
+        self, cell: Cell, task: TaskSpec, how: Mapping[str, Any], data: Mapping[Path, str]
+    ) -> tuple[str, Sections]:
+        """Return the key of a cell that a caller in Python gives objects for, as to `solve`, and its sections.
+
+        Raises ValueError as :func:`identity_of` does.
+        """
+        tasks, metric = self.registry.tasks, how["metric"]
         modules = [task.features_by] if task.features_by else []
         modules += [tasks.owned(task.name).module] if task.name in tasks else []
-        if own.estimator is None:
-            owned = named.owned(cell.estimator)
-            modules += [owned.module, owned.descriptor.where]
+        named = self.registry.estimators.owned(cell.estimator) if how["given"] is None else None
+        modules += [named.module, named.descriptor.where] if named else []
         sections = {
-            "task": digest_of(task.model_dump_json()), "estimator": cell.estimator, "given": identity_of(given),
-            "versions": versions(named[cell.estimator].distributions if own.estimator is None else ()),
-            "source": sources_of(modules, ANSWERING), "configuration": configuration_of(cell),
-        }  # fmt: skip
+            "task": digest_of(task.model_dump_json()),
+            "estimator": cell.estimator,
+            "given": identity_of({**how, "metric": metric.function or metric.name}),
+            "versions": versions(named.descriptor.distributions if named else ()),
+            "source": sources_of(modules, ANSWERING),
+            "configuration": configuration_of(cell),
+        }
         key = digest_of(_canonical({**sections, "data": list(data.values())}))
         return key, {**sections, "data": {path.stem: digest for path, digest in data.items()}}
 

@@ -6,7 +6,7 @@ import json
 import os
 import random
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -23,7 +23,6 @@ from tactbench.core.spec.row import RowModel
 from tactbench.core.spec.task import TaskSpec
 
 if TYPE_CHECKING:
-    from tactbench.core.evaluation.cell import Own
     from tactbench.core.evaluation.dataset import Dataset
     from tactbench.core.samples import Answers
 
@@ -87,7 +86,7 @@ Solved = tuple[Row, "dict[str, Answers]"]
 """A row of plain data, and the answers by role."""
 
 
-def solve(job: Job, concurrency: int = 1, own: Own | None = None) -> Solved:
+def solve(job: Job, concurrency: int = 1, own: Mapping[str, Any] | None = None) -> Solved:
     """Evaluate one cell; raises whatever its plugins and recordings raise.
 
     Parameters
@@ -95,10 +94,10 @@ def solve(job: Job, concurrency: int = 1, own: Own | None = None) -> Solved:
     concurrency
         Pieces of work of the run that may be at work beside this one, itself included.
     own
-        What a caller in Python gives in place of what the job names.
+        Fields of :class:`CellContext` that a caller in Python gives in place of what the job names.
     """
     cell, task, estimator, recordings, *_ = job
-    if own is None or own.estimator is None:
+    if not own or own["given"] is None:
         folder = Path.cwd()
         try:
             prepare(estimator, task.kind)
@@ -106,17 +105,15 @@ def solve(job: Job, concurrency: int = 1, own: Own | None = None) -> Solved:
             os.chdir(folder)  # recordings lie relative to it, wherever a constructor has gone
     import numpy as np
 
-    from tactbench.core.evaluation.cell import CellContext, Own, evaluate_cell
+    from tactbench.core.evaluation.cell import CellContext, evaluate_cell
 
     began = time.perf_counter()
     # The global generators get the cell's seed: what is drawn from them does not depend on the cells before.
     random.seed(cell.seed)
     np.random.seed(cell.seed % 2**32)  # noqa: NPY002  (it is this old generator that libraries draw from)
     data = read_dataset(task, recordings, cell.include_incomplete)
-    context = CellContext(
-        task, estimator, dict(cell.params), cell.protocol, cell.split, seed=cell.seed, clock=time.perf_counter,
-        latency=cell.timed, own=own or Own(),
-    )  # fmt: skip
+    asked: dict[str, Any] = {"split": cell.split, "seed": cell.seed, "latency": cell.timed, **(own or {})}
+    context = CellContext(task, estimator, dict(cell.params), cell.protocol, clock=time.perf_counter, **asked)
     result = evaluate_cell(context, data)
     row = {
         **opening(cell, task),

@@ -42,7 +42,7 @@ def states(choice, place=0):
 
 def test_simulated_and_measured_rows_are_apart():
     measured, simulated = choose([answer(), answer("b", simulated=False)], Wish(), PRESSED, {})
-    assert (measured.hardware, simulated.hardware) == ("rig twin", "SIM (twin)")
+    assert (measured.hardware, simulated.hardware) == ("rig twin", "SIM")
 
 
 def test_a_miss_says_by_how_much():

@@ -57,7 +57,10 @@ def test_rows_and_columns_are_chosen_by_name_and_unknown_names_are_refused_with_
     assert "  ols  " not in best
     for more, there in (((), True), (("--no-times",), False)):
         assert ("fit_s" in ran("leaderboard", "out", *more, "--format", "csv").stdout) == there
-    for option, given, says in (("--sensor", "icup", "Known: biotac, icub"), ("--columns", "sensor,scor", "'score'")):
+    for option, given, says in (
+        ("--sensor", "icup", "Known names: biotac, icub"),
+        ("--columns", "sensor,scor", "'score'"),
+    ):
         assert says in ran("leaderboard", "out", option, given, code=2).stderr
     assert "always holds all columns" in ran("leaderboard", "out", "--columns", "#", "--format", "csv", code=2).stderr
 

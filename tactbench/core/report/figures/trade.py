@@ -65,7 +65,7 @@ def draw_trade(known: Mapping[str, Any]) -> Any:
 
 def title_of(known: Mapping[str, Any]) -> str:
     """Return what holds for all settings."""
-    simulated = " · SIM (twin)" if known["simulated"] else ""
+    simulated = " · SIM" if known["simulated"] else ""
     several = f"{known['replicates']} replicates" if known["replicates"] > 1 else "one replicate"
     bars = ", bars: 95 %" if any(one["ci_low"] is not None for one in known["settings"]) else ""
     return f"{known['sensor']}, {known['task']} · {known['protocol']}{simulated} · {several}{bars}"
