@@ -11,18 +11,20 @@ import random
 import shutil
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
+from concurrent.futures.process import BrokenProcessPool
 from contextlib import ExitStack
 from dataclasses import replace
 from functools import partial
 from importlib import import_module
 from itertools import product
 from pathlib import Path
+from pickle import PicklingError
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from pydantic import ValidationError
 
-from tactbench.core.errors import NotApplicable, UnknownNameError, UsageError, complaint, wrong
+from tactbench.core.errors import EngineError, NotApplicable, UnknownNameError, UsageError, complaint, wrong
 from tactbench.core.evaluation.folds import PLAIN, TaskData
 from tactbench.core.evaluation.folds import load_task as folds_of
 from tactbench.core.evaluation.metrics import METRICS, Metric, metric_called, own_metric
@@ -608,12 +610,18 @@ def _side_by_side(asked: Mapping[str, Mapping[str, _Work]], out: Path, jobs: int
                     rows[name][work.cell.name] = found
         display.begin("evaluating", len(todo))
         calls = (joblib.delayed(_in_place)(place, one[1]) for place, one in enumerate(todo))
-        for place, (row, answers) in joblib.Parallel(jobs, return_as="generator_unordered")(calls):
-            name, work, store, key, sections, why = todo[place]
-            paths = [store.beside(path) for path in work.paths]
-            row |= {"key": key, "recordings": paths, "remarks": [*row["remarks"], *filter(None, [why])]}
-            rows[name][work.cell.name] = store.keep(row, sections, answers) if key else row
-            display.advance(work.cell.name, stopped=row["status"] in STOPPED)
+        try:
+            for place, (row, answers) in joblib.Parallel(jobs, return_as="generator_unordered")(calls):
+                name, work, store, key, sections, why = todo[place]
+                paths = [store.beside(path) for path in work.paths]
+                row |= {"key": key, "recordings": paths, "remarks": [*row["remarks"], *filter(None, [why])]}
+                rows[name][work.cell.name] = store.keep(row, sections, answers) if key else row
+                display.advance(work.cell.name, stopped=row["status"] in STOPPED)
+        except (BrokenProcessPool, PicklingError) as error:
+            raise EngineError(
+                f"A process that evaluates them has ended, or objects cannot be sent to it: {error}",
+                hint="What has ended is kept. Give jobs=1 to evaluate the rest in this process.",
+            ) from error
     return {name: [rows[name][cell] for cell in works] for name, works in asked.items()}
 
 
