@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import atexit
 import shutil
-from collections.abc import Iterable
 from pathlib import Path
 from tempfile import mkdtemp
 from typing import Any
@@ -66,12 +65,9 @@ def from_arrays(
     """
     given: Any
     frame: Any = X if hasattr(X, "columns") else None
-    for argument, given, kind, takes in (
-        ("sensor", sensor, str, "a name"), ("task", task, str, "a name"), ("unit", unit, str | None, "a text, or None"),
-        ("simulated", simulated, bool, "True or False"),
-    ):  # fmt: skip
+    for argument, given, kind in (("unit", unit, str | None), ("simulated", simulated, bool)):
         if not isinstance(given, kind):
-            raise wrong(argument, given, takes)
+            raise wrong(argument, given, f"a value of type {kind}")
     if np.ndim(X) != 2 or not len(X):
         raise wrong("X", X, "an array (n, channels) of numbers, or a DataFrame")
     used: list[str] = []
@@ -83,7 +79,8 @@ def from_arrays(
         named = frame is not None and all(isinstance(name, str) and name in frame.columns for name in names)
         used += names if named else []
         columns[argument] = found = np.asarray(frame[given] if named else given)
-        if found.shape[:1] != (len(X),) or found.ndim > 1 + (argument == "y"):
+        gaps = argument != "y" and (found != found).any()
+        if found.shape[:1] != (len(X),) or found.ndim > 1 + (argument == "y") or gaps:
             known = "" if frame is None else f", or a name among {', '.join(map(str, frame.columns))}"
             raise wrong(argument, given, f"a value for each of {len(X)} rows of X{known}")
     readings = X if frame is None else frame.drop(columns=used)
@@ -110,14 +107,11 @@ def from_arrays(
     if numbers[0].shape[1] != max(len(parts), 1):
         raise wrong("y", y, f"{max(len(parts), 1)} values a row for task {task!r}")
     rows = np.column_stack(numbers)
-
-    def stream(first: int, several: Iterable[tuple[str, str, str]], **more: Any) -> dict[str, Any]:
-        each = [{"columns": place, "name": name, "kind": kind, "unit": of, "sentinels": ()}
-                for place, (name, kind, of) in enumerate(several, first)]  # fmt: skip
-        return {"table": "rows", "channels": each, **more}
-
-    streams = {"readings": stream(numbers[0].shape[1], [(one, "taxel", "1") for one in channels], annotations=notes)}
-    streams |= {"answers": stream(0, parts, of="reference")} if parts else {}
+    streams = {"readings": {"table": "rows", "annotations": notes, "channels": [
+        _channel(place, name, "taxel", "1") for place, name in enumerate(channels, numbers[0].shape[1])]}}  # fmt: skip
+    if parts:
+        answers = [_channel(place, *part) for place, part in enumerate(parts)]
+        streams["answers"] = {"table": "rows", "of": "reference", "channels": answers}
     time = None if time_s is None else {"column": rows.shape[1] - 1, "unit": "s", "epoch": "start"}
     own = {"name": task, "target": target.model_dump(), "splits": ("session", "in-session", "shuffled")}
     source = {"tag": "assumed", "reference": "arrays given in Python"}
@@ -141,6 +135,10 @@ def from_arrays(
     folder = Path(mkdtemp(prefix="tactbench-arrays-"))
     atexit.register(shutil.rmtree, folder, ignore_errors=True)
     return [Recording(path) for path in import_arrays(mapping, raws, folder, **about)]
+
+
+def _channel(place: int, name: str, kind: str, unit: str) -> dict[str, Any]:
+    return {"columns": place, "name": name, "kind": kind, "unit": unit, "sentinels": ()}
 
 
 def _target(answers: npt.NDArray[Any], unit: str | None) -> ChannelTarget | VectorTarget | LabelTarget:

@@ -131,8 +131,8 @@ def test_of_recordings(given):
 def test_of_data_sets(tmp_path):
     _named(lambda: tactbench.dataset("efles"), "name", "efles")
     _named(lambda: tactbench.dataset(3), "name", "3")
-    _named(lambda: tactbench.dataset("fsi", root=3), "root", "3")
-    _named(lambda: tactbench.dataset("fsi", root=tmp_path / "no"), "root", "no")
+    _named(lambda: tactbench.dataset("eflesh-shear", root=3), "root", "3")
+    _named(lambda: tactbench.dataset("eflesh-shear", root=tmp_path / "no"), "root", "no")
 
 
 def _named(call, argument, shown):

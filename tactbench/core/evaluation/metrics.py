@@ -49,17 +49,16 @@ class Metric:
         A caller's own metric is NaN where it raises ValueError; whatever else it raises becomes UsageError.
         """
         if self.function is not None:
-            with warnings.catch_warnings():
-                warnings.simplefilter("ignore")
-                try:
+            try:
+                with warnings.catch_warnings(action="ignore"):
                     return float(self.function(y, predicted))
-                except (ValueError, ArithmeticError):
-                    return float("nan")
-                except Exception as error:
-                    raise UsageError(
-                        f"The metric {self.name} cannot be computed of {len(y)} rows: {type(error).__name__}: {error}.",
-                        hint="`metric` takes a function of (y, prediction) that returns a number.",
-                    ) from error
+            except (ValueError, ArithmeticError):
+                return float("nan")
+            except Exception as error:
+                raise UsageError(
+                    f"The metric {self.name} cannot be computed of {len(y)} rows: {type(error).__name__}: {error}.",
+                    hint="`metric` takes a function of (y, prediction) that returns a number.",
+                ) from error
         with np.errstate(over="ignore", invalid="ignore"):
             return float(self.score(self.rows(y, predicted, n_classes).sum(axis=0), n_classes))
 

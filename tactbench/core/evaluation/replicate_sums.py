@@ -9,7 +9,8 @@
      "own": [0.61, …]                    the score of each by itself; None where the metric of it is undefined
      "floor": [[…, …], …],               of a RMSE whose reference has a floor: squares and degrees of freedom of its
                                          unloaded holds over each replicate
-     "without": [0.63, …],               in place of sums, of a metric of the caller's own: the score without each
+     "scores": [0.63, …],                in place of sums, of a metric of the caller's own: the jackknife's
+                                         pseudo-values, whose mean is the score and whose spread its error
      "true": {"sums": …, "own": …}       of an error of force: both against the force that a simulated rig exerted
 
 A classification's summands are a table of true and given classes, mostly empty: a line of sums then is ``column, count,
@@ -52,8 +53,11 @@ def summed(
     strata = unit.strata(tested.y_true, n_classes)
     kept = {"unit": unit.name, "names": list(unit.labels), "strata": strata.tolist() if strata.any() else None}
     if metric.function is not None:
+        score = metric.of(tested.y_true, tested.y_pred)
         own, without = unit_scores(metric, tested.y_true, tested.y_pred, unit, n_classes)
-        return {**kept, "own": _plain(own), "without": _plain(without)}
+        without = np.where(np.isfinite(without), without, score)
+        carried = score + (len(own) - 1) * (without.mean() - without)
+        return {**kept, "strata": None, "own": _plain(own), "scores": _plain(carried)}
 
     def against(y: npt.NDArray[Any]) -> dict[str, Any]:
         sums = unit.sums(metric.rows(y, tested.y_pred, n_classes))

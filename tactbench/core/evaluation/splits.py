@@ -69,11 +69,11 @@ class OwnSplit:
     def folds(self, X: FloatArray, y: npt.NDArray[Any], groups: npt.NDArray[Any] | None) -> list[tuple[Places, Places]]:
         """Return the rows of X that train and those that test, fold by fold; UsageError if they are none."""
         if not self._folds:
-            pairs: Any = self._splitter
+            given: Any = self._splitter
             try:
-                with warnings.catch_warnings():
-                    warnings.simplefilter("ignore")  # groups that a splitter passes over tell what intervals are over
-                    pairs = list(pairs.split(X, y, groups)) if hasattr(pairs, "split") else pairs
+                with warnings.catch_warnings():  # such groups tell what intervals are over
+                    warnings.filterwarnings("ignore", "The groups parameter is ignored")
+                    pairs = list(given.split(X, y, groups)) if hasattr(given, "split") else given
                 self._folds = [(_places(train, len(y)), _places(test, len(y))) for train, test in pairs]
             except (TypeError, ValueError, IndexError) as error:
                 raise UsageError(
@@ -85,15 +85,11 @@ class OwnSplit:
 
 
 def _places(given: Any, n: int) -> Places:
-    """Return the places of rows, given as such or as a mask; ValueError for anything else."""
-    found = np.asarray(given)
-    if found.dtype == bool and found.shape == (n,):
-        found = np.flatnonzero(found)
-    if found.ndim != 1 or found.dtype.kind not in "iu" or not len(found):
-        raise ValueError(f"training and test rows are index arrays, not {given!r:.80}")
-    if found.min() < 0 or found.max() >= n or len(np.unique(found)) < len(found):
-        raise ValueError(f"an index array has places beyond 0 to {n - 1}, or one of them twice")
-    return found.astype(np.int64)
+    """Return the places of rows, given as such or as a mask; ValueError or IndexError for anything else."""
+    found: Places = np.arange(n)[np.asarray(given)]
+    if len(np.unique(found)) < found.size:
+        raise ValueError("a row stands twice in one index array.")
+    return found
 
 
 def choose_split(task: TaskSpec, protocol: ProtocolSpec, data: Dataset, requested: str | None) -> str:

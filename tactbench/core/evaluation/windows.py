@@ -9,7 +9,7 @@ import numpy as np
 
 from tactbench.core.errors import NotApplicable
 from tactbench.core.evaluation.dataset import Dataset, Table
-from tactbench.core.evaluation.protocols import ProtocolSpec, without_options
+from tactbench.core.evaluation.protocols import ProtocolSpec
 from tactbench.core.evaluation.sets import asked_for, tared
 from tactbench.core.evaluation.splits import Assignment, Mask
 from tactbench.core.spec.task import TaskSpec
@@ -21,15 +21,12 @@ def windowed(data: Dataset, task: TaskSpec, rules: ProtocolSpec, window: int, st
     A window has `window` consecutive rows that the protocol keeps, tared as it has it, and is labelled as its last row
     is; the next one ends `step` rows later. Raises NotApplicable where rows are no consecutive samples.
     """
-    if rules.three_sigma or rules.first_row_only or rules.k is not None:
+    own = task.answer_per == "frame" or task.summaries or task.features_by
+    if own or rules.three_sigma or rules.first_row_only or rules.k is not None:
         raise NotApplicable(
-            f"Protocol {rules.name!r} keeps no runs of samples as they are, which `window` needs.",
-            hint=f"Use protocol `deployable` or `{without_options(rules.name)}@every=N`.",
-        )
-    if task.answer_per == "frame" or task.summaries or task.features_by:
-        raise NotApplicable(
-            f"Task {task.name!r} makes its own features of many samples; `window` is for answers to samples.",
-            hint="Leave `window` out.",
+            f"window={window} needs runs of samples as they are, which "
+            f"{f'task {task.name!r}' if own else f'protocol {rules.name!r}'} does not answer.",
+            hint="Use protocol `deployable` and a task of samples, or leave `window` out.",
         )
 
     def of(table: Table) -> Table:

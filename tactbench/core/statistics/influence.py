@@ -68,12 +68,7 @@ def scores_of(kept: Mapping[str, Any], metric: str) -> FloatArray:
 
 
 def scores_without(several: Sequence[dict[str, Any]], metric: str, n_classes: int) -> FloatArray:
-    """Return (rows, replicates) scores without each replicate, from the sums that rows with equal names keep.
-
-    Rows scored by a metric of the caller's own keep these scores themselves.
-    """
-    if "without" in several[0]:
-        return np.array([one["without"] for one in several], dtype=np.float64)
+    """Return (rows, replicates) scores without each replicate, from the sums that rows with equal names keep."""
     sums = tables_of(several, metric, n_classes)
     with np.errstate(divide="ignore", invalid="ignore"):
         return SUMMED[metric].score(sums.sum(axis=1, keepdims=True) - sums, n_classes)

@@ -68,7 +68,7 @@ def difference(first: Row, second: Row) -> Difference:
     Cameron, Gelbach and Miller 2008 on t with few clusters), which widens by itself where there are few. The p-value is
     that of exchanging the two answers within replicates, each way as likely as another if there is no difference: all
     2^n ways up to 12 replicates, else 9,999 drawn (Phipson and Smyth 2010 on counting the observed one). With n
-    replicates it cannot be below 2 / 2^n. By a metric of the caller's own, which is no sum, it is that of Student's t.
+    replicates it cannot be below 2 / 2^n.
 
     Where each replicate has a score of its own, the difference is that of the means over replicates; of errors of force
     that have a floor, of what is beyond it.
@@ -107,10 +107,7 @@ def _paired(first: Row, second: Row, value: float, sign: float, group: PairableR
     carried = group.influence[0] - group.influence[1]
     deviation = float(np.sqrt(carried @ carried))
     n = len(group.names)
-    if "without" in first["replicates"]:  # answers that were exchanged have no score that can be added up
-        p, smallest = two_sided_p(value / deviation, group.freedom) if deviation > 0 else None, 0.0
-    else:
-        p, smallest = exchanged(first, second)
+    p, smallest = exchanged(first, second)
     unit = str(first["replicates"]["unit"])
     over = f"paired over {counted(n, unit)}"
     if first["replicates"].get("of") == "beyond":
@@ -172,8 +169,6 @@ def _own_scores(row: Row) -> FloatArray:
     kept, n_classes = row["replicates"], len(row["classes"])
     if "scores" in kept:
         return scores_of(kept, row["metric"])
-    if "without" in kept:
-        return np.asarray(kept["own"], dtype=np.float64)
     metric = SUMMED[row["metric"]]
     return own_scores(metric, tables_of([kept], metric.name, n_classes)[0], n_classes)
 
@@ -185,12 +180,12 @@ def _share_better(apart: FloatArray) -> float | None:
 
 def exchanged(first: Row, second: Row) -> tuple[float, float]:
     """Return the p-value of exchanging two rows' answers within the replicates they share, and the least it can be."""
+    name = first["metric"]
     if "scores" in first["replicates"]:
-        own, other = (scores_of(one["replicates"], one["metric"]) for one in (first, second))
-        apart_each = own - other
+        apart_each = scores_of(first["replicates"], name) - scores_of(second["replicates"], name)
         ways, smallest = _ways(len(apart_each))
         return _share((1.0 - 2.0 * ways) @ apart_each), smallest
-    metric, n_classes = SUMMED[first["metric"]], len(first["classes"])
+    metric, n_classes = SUMMED[name], len(first["classes"])
     sums = tables_of([first["replicates"], second["replicates"]], metric.name, n_classes)
     ways, smallest = _ways(sums.shape[1])
     moved = ways.astype(np.float64) @ (sums[1] - sums[0])

@@ -58,7 +58,7 @@ def test_rows_and_columns_are_chosen_by_name_and_unknown_names_are_refused_with_
     for more, there in (((), True), (("--no-times",), False)):
         assert ("fit_s" in ran("leaderboard", "out", *more, "--format", "csv").stdout) == there
     for option, given, says in (
-        ("--sensor", "icup", "Known names: biotac, icub"),
+        ("--sensor", "icup", "names: biotac, icub"),
         ("--columns", "sensor,scor", "'score'"),
     ):
         assert says in ran("leaderboard", "out", option, given, code=2).stderr
