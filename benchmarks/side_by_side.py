@@ -1,4 +1,4 @@
-"""How long do twenty objects on five data sets take, beside plain ``cross_validate`` in the same number of processes?
+"""Twenty objects on five data sets: how long they take beside plain ``cross_validate`` in as many processes.
 
 ::
 

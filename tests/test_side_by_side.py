@@ -8,7 +8,7 @@ from sklearn.model_selection import GridSearchCV, GroupKFold, ShuffleSplit
 
 import tactbench
 from tactbench.core.errors import UnknownNameError, UsageError
-from tests.core.evaluation.made import grasps, sessions
+from tests.core.evaluation.made import grasps, label_task, sessions
 
 
 @pytest.fixture(scope="module")
@@ -92,7 +92,8 @@ def test_options_may_differ_between_data_sets_and_estimators(data, tmp_path):
     drawn = ShuffleSplit(3, test_size=0.2)  # without a seed: all are tested on the folds that it draws first
     found = tactbench.run(
         data=data, estimators={"mine": Ridge(), "other": Ridge(10.0)}, tasks={"soft": "force", "hard": ["force"]},
-        split={"soft": drawn}, metric={"hard": median_of_errors}, greater_is_better={"hard": False}, out=tmp_path, jobs=1,
+        split={"soft": drawn}, metric={"hard": median_of_errors}, greater_is_better={"hard": False}, jobs=1,
+        out=tmp_path,
     )  # fmt: skip
     rows = {(row["data"], row["estimator"]): row for row in found}
     assert rows["soft", "mine"]["ci_low"] is None
@@ -146,7 +147,6 @@ def test_answers_are_drawn_over_the_truth_or_as_how_often_each_class_is_taken_fo
     assert list(found.predictions) == ["recording", "row", "time_s", "fold", "y_true", "y_pred"]
     assert set(found.predictions["fold"]) == set(found.fold_scores)
 
-    grasps(tmp_path)
-    classes = tactbench.evaluate(LogisticRegression(), "grasp-stability", tmp_path)
+    classes = tactbench.evaluate(LogisticRegression(), label_task("kind"), grasps(tmp_path))
     (axes,) = classes.plot().axes
     assert axes.images[0].get_array().shape == (2, 2)
