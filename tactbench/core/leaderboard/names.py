@@ -55,7 +55,7 @@ def metric_name(row: Row) -> str:
     unit = f" [{row['unit']}]" if row["unit"] != "1" else ""
     name = row["metric"].removeprefix(TRUE)
     true = "true " if name != row["metric"] else ""
-    return visible(f"{true}{METRIC_NAMES.get(name, name)}{unit}")
+    return visible(f"{true}{METRIC_NAMES.get(name, name.partition(' (')[0])}{unit}")
 
 
 def split_name(split: str) -> str:
