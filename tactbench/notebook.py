@@ -27,7 +27,7 @@ from pydantic import ValidationError
 from tactbench.core.errors import EngineError, NotApplicable, UnknownNameError, UsageError, complaint, wrong
 from tactbench.core.evaluation.folds import PLAIN, TaskData
 from tactbench.core.evaluation.folds import load_task as folds_of
-from tactbench.core.evaluation.metrics import METRICS, Metric, metric_called, own_metric
+from tactbench.core.evaluation.metrics import METRICS, Metric, metric_called
 from tactbench.core.evaluation.protocols import is_probe, without_options
 from tactbench.core.evaluation.splits import OwnSplit
 from tactbench.core.files import named_file
@@ -48,6 +48,7 @@ from tactbench.core.provenance.gather import gather, usable_cores
 from tactbench.core.recording.reader import read_meta
 from tactbench.core.samples import Answers
 from tactbench.core.spec.declared_task import FILE
+from tactbench.core.spec.row import DIRECTIONS
 from tactbench.core.spec.status import STOPPED
 from tactbench.core.spec.task import TaskSpec, VectorTarget
 from tactbench.core.statistics.replicates import against_reference, over_replicates
@@ -427,10 +428,11 @@ def metric_of(given: Any, greater_is_better: bool | None, task: TaskSpec) -> Met
         raise wrong("greater_is_better", greater_is_better, takes)
     if found is not None:
         return found
-    if plain:
-        return own_metric(scorer, getattr(scorer, "__name__", type(scorer).__name__), task, bool(greater_is_better))
-    function = partial(scorer._score_func, **scorer._kwargs)
-    return own_metric(function, scorer._score_func.__name__, task, scorer._sign > 0)
+    function, higher = scorer, bool(greater_is_better)
+    if not plain:
+        scorer, function, higher = scorer._score_func, partial(scorer._score_func, **scorer._kwargs), scorer._sign > 0
+    name = getattr(scorer, "__name__", type(scorer).__name__) + DIRECTIONS[higher]
+    return replace(own, name=name, higher_is_better=higher, function=function)
 
 
 def name_of(estimator: str | Estimator) -> str:

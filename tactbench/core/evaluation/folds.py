@@ -58,8 +58,6 @@ class TaskData:
     """the split is the caller's own"""
     window: int = 0
     """rows of a window; 0: rows are answered one by one"""
-    step: int = 1
-    """rows from the end of a window to that of the next"""
 
     def __repr__(self) -> str:
         counts = f"X {self.X.shape}, {len(self.assignments)} folds of {len(self.data.tables)} recordings"
@@ -67,10 +65,7 @@ class TaskData:
 
     @property
     def X(self) -> FloatArray:  # noqa: N802  (as in scikit-learn)
-        """Return (n, features) readings of the rows that the protocol looks at and that have a label.
-
-        Of windows (n, window, features).
-        """
+        """Return (n, features), of windows (n, window, features), of the rows that are asked for and have a label."""
         return self._joined([tared(table) if self.rules.tare else table.X for table in self.data.tables])
 
     @property
@@ -196,10 +191,8 @@ def load_task(
     if window:
         assignments = [apart(one, window, step) for one in assignments]
     if not any(mask.any() for one in assignments for mask in one.train):
-        raise DataError(
-            f"No fold could be made of these recordings{f' in windows of {window} rows' if window else ''}.",
-            hint="Choose another split, or shorter windows." if window else "Choose another split.",
-        )
+        which = f", window={window}" if window else ""
+        raise DataError(f"No fold could be made of these recordings{which}.", hint="Choose another split or window.")
     held_back = task.kind == "events" and estimator.threshold is None and assignments[0].validation is None
     if held_back:
         assignments = [with_validation(one, data) for one in assignments]
@@ -208,7 +201,7 @@ def load_task(
             f"{estimator.name} looks at the time alone, which not all of these recordings state.",
             hint="State the clock in the mapping.",
         )
-    return TaskData(task, rules, name, recorded, data, tuple(assignments), held_back, unit, own, window, step)
+    return TaskData(task, rules, name, recorded, data, tuple(assignments), held_back, unit, own, window)
 
 
 def _own_folds(own: OwnSplit, made: TaskData) -> tuple[Dataset, str | None, list[Assignment]]:

@@ -152,8 +152,7 @@ def unit_scores(
         own, others = ([metric.of(y[mask ^ out], predicted[mask ^ out]) for mask in each] for out in (False, True))
         return np.array(own), np.array(others)
     sums = unit.sums(metric.rows(y, predicted, n_classes))
-    with np.errstate(divide="ignore", invalid="ignore"):
-        return metric.score(sums, n_classes), metric.score(sums.sum(axis=0) - sums, n_classes)
+    return own_scores(metric, sums, n_classes), own_scores(metric, sums.sum(axis=0) - sums, n_classes)
 
 
 def own_scores(metric: Metric, sums: FloatArray, n_classes: int) -> FloatArray:

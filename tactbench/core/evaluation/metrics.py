@@ -15,8 +15,8 @@ import numpy.typing as npt
 
 from tactbench.core.errors import UnknownNameError, UsageError
 from tactbench.core.samples import FloatArray
-from tactbench.core.spec.row import DIRECTIONS, HIGH_ERROR, MEDIAN_ERROR, TRUE
-from tactbench.core.spec.task import VECTOR_METRIC, TaskSpec, VectorTarget
+from tactbench.core.spec.row import HIGH_ERROR, MEDIAN_ERROR, TRUE
+from tactbench.core.spec.task import VECTOR_METRIC, VectorTarget
 
 Rows = Callable[[npt.NDArray[Any], npt.NDArray[Any], int], FloatArray]
 Score = Callable[[FloatArray, int], FloatArray]
@@ -166,13 +166,6 @@ SUMMED = {
     **{TRUE + one.name: one for one in METRICS.values() if one.kind == "regression" and not one.vector},
 }
 """What replicates may be summed for."""
-
-
-def own_metric(function: Callable[..., Any], name: str, task: TaskSpec, higher_is_better: bool) -> Metric:
-    """Return a caller's function of (y, prediction) as a metric of a task; its name tells which way is better."""
-    name += DIRECTIONS[higher_is_better]
-    vector = isinstance(task.target, VectorTarget)
-    return Metric(name, task.kind, higher_is_better, _squares, _rmse, vector=vector, function=function)
 
 
 def metric_called(name: str) -> Metric:

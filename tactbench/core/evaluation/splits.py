@@ -62,9 +62,9 @@ class OwnSplit:
     @property
     def name(self) -> str:
         """What rows and tables call it."""
-        shown = repr(self._splitter)
-        own = type(self._splitter).__name__ if " object at 0x" in shown else " ".join(shown.split())
-        return own if hasattr(self._splitter, "split") else f"{len(self._splitter)} given folds"
+        if isinstance(self._splitter, list):
+            return f"{len(self._splitter)} given folds"
+        return " ".join(repr(self._splitter).partition(" object at 0x")[0].split())
 
     def folds(self, X: FloatArray, y: npt.NDArray[Any], groups: npt.NDArray[Any] | None) -> list[tuple[Places, Places]]:
         """Return the rows of X that train and those that test, fold by fold; UsageError if they are none."""
@@ -73,7 +73,7 @@ class OwnSplit:
             try:
                 with warnings.catch_warnings():  # such groups tell what intervals are over
                     warnings.filterwarnings("ignore", "The groups parameter is ignored")
-                    pairs = list(given.split(X, y, groups)) if hasattr(given, "split") else given
+                    pairs = given if isinstance(given, list) else list(given.split(X, y, groups))
                 self._folds = [(_places(train, len(y)), _places(test, len(y))) for train, test in pairs]
             except (TypeError, ValueError, IndexError) as error:
                 raise UsageError(

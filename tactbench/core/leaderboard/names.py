@@ -8,7 +8,7 @@ from operator import itemgetter
 from typing import Any, TypeVar
 
 from tactbench.core.evaluation.protocols import shots
-from tactbench.core.spec.row import DIRECTIONS, TRUE
+from tactbench.core.spec.row import TRUE
 from tactbench.core.spec.row import lower_is_better as lower_is_better
 from tactbench.core.tables.text import visible
 
@@ -55,9 +55,7 @@ def metric_name(row: Row) -> str:
     unit = f" [{row['unit']}]" if row["unit"] != "1" else ""
     name = row["metric"].removeprefix(TRUE)
     true = "true " if name != row["metric"] else ""
-    for direction in DIRECTIONS:
-        name = name.removesuffix(direction)
-    return visible(f"{true}{METRIC_NAMES.get(name, name)}{unit}")
+    return visible(f"{true}{METRIC_NAMES.get(name, name.partition(' (')[0])}{unit}")
 
 
 def split_name(split: str) -> str:
