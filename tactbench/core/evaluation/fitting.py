@@ -24,6 +24,7 @@ from tactbench.core.plugins.interfaces import Estimator
 from tactbench.core.plugins.registry import load_object
 from tactbench.core.samples import FloatArray, Part
 from tactbench.core.spec.rig import EstimatorDescriptor
+from tactbench.core.spec.row import lower_is_better
 from tactbench.core.spec.task import TaskSpec, VectorTarget
 
 Build = Callable[[Mapping[str, Any]], Estimator]
@@ -245,5 +246,6 @@ def select(
                 answered.append(combined)
             score = metric.of(np.concatenate(truth), np.concatenate(answered), n_classes)
             tried.append(Choice(params, k, score))
-    best = max(tried, key=lambda candidate: metric.sign * candidate.score)  # of equals the first
+    best_of = min if lower_is_better(metric.name) else max
+    best = best_of(tried, key=lambda candidate: candidate.score)  # of equals the first
     return replace(best, compared=tuple(tried))

@@ -14,7 +14,7 @@ from tactbench.core.errors import DataError, NotApplicable, wrong
 from tactbench.core.evaluation.dataset import Dataset, at_rows, load_dataset, thinned
 from tactbench.core.evaluation.frames import framed
 from tactbench.core.evaluation.protocols import ProtocolSpec, protocol_called, shots, without_options
-from tactbench.core.evaluation.sets import asked_for, tare_s, tared
+from tactbench.core.evaluation.sets import apart, asked_for, tare_s, tared, windowed
 from tactbench.core.evaluation.splits import (
     SPLITS_WITHOUT_GROUPS,
     Assignment,
@@ -25,7 +25,6 @@ from tactbench.core.evaluation.splits import (
     with_validation,
 )
 from tactbench.core.evaluation.summaries import is_summarised, summarised, with_windows
-from tactbench.core.evaluation.windows import apart, windowed
 from tactbench.core.samples import FloatArray, IntArray, Part
 from tactbench.core.spec.rig import EstimatorDescriptor
 from tactbench.core.spec.task import TaskSpec
