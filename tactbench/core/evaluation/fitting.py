@@ -8,6 +8,7 @@ import warnings
 from collections import Counter
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from inspect import signature
 from typing import Any
 
 import numpy as np
@@ -108,7 +109,7 @@ def routed(estimator: Estimator, data: TaskData, given: Mapping[str, Any]) -> di
     """Return what ``fit`` of an object is given beside X and y, under the names that scikit-learn has for it.
 
     `given`, where a text under ``groups`` or ``STEP__groups`` is the name of a label; and the groups of the rows where
-    the object, or a step of it, searches parameters by a cross-validation of its own and nothing is given.
+    the object, or a step of it, searches parameters by cross-validation or names them in its ``fit``.
     """
     found = {}
     for name, value in given.items():
@@ -120,7 +121,11 @@ def routed(estimator: Estimator, data: TaskData, given: Mapping[str, Any]) -> di
         takes = sorted(routing.consumes("fit", ["groups"]))
     else:
         steps = [("groups", estimator), *((f"{name}__groups", one) for name, one in getattr(estimator, "steps", ()))]
-        takes = [name for name, one in steps if hasattr(one, "cv") and hasattr(one, "refit")]
+        search = importlib.import_module("sklearn.model_selection._search").BaseSearchCV
+        takes = [
+            name for name, one in steps
+            if isinstance(one, search) or (hasattr(one, "fit") and "groups" in signature(one.fit).parameters)
+        ]  # fmt: skip
     return {**dict.fromkeys(takes, data.groups), **found}
 
 
