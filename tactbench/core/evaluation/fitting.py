@@ -89,16 +89,17 @@ def fit(model: Estimator, X: FloatArray, y: npt.NDArray[Any], name: str, counts:
     A warning (a solver that did not converge …) is counted under the estimator's `name` and stands in the row; on
     standard error nobody would connect it with a score. Raises DataError if the estimator refuses the data.
     """
+    refused = (ValueError, ArithmeticError, *((TypeError,) if params else ()))
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
         try:
             model.fit(X, y, **params)
-        except (ValueError, ArithmeticError, np.linalg.LinAlgError) as error:
+        except refused as error:
             if isinstance(error, TactbenchError):
                 raise
-            wide = " x ".join(map(str, X.shape[1:]))
+            wide, more = " x ".join(map(str, X.shape[1:])), f", params {', '.join(params)}" if params else ""
             raise DataError(
-                f"The estimator {name!r} could not be fitted to {len(X)} rows of {wide} features: {error}",
+                f"The estimator {name!r} could not be fitted to {len(X)} rows of {wide} features{more}: {error}",
                 hint="Check its parameters, or use another estimator.",
             ) from error
     for kind in sorted({warning.category.__name__ for warning in caught}):
@@ -115,7 +116,7 @@ def routed(estimator: Estimator, data: TaskData, given: Mapping[str, Any]) -> di
     for name, value in given.items():
         rows = name.rpartition("__")[2] in ("groups", "sample_weight")
         sized = not isinstance(value, str) and np.shape(value)[:1] == data.y.shape[:1]
-        found[name] = data.per_row(f"params[{name!r}]", value) if rows or sized else value
+        found[name] = data.per_row(f"params[{name!r}]", value) if rows else np.asarray(value) if sized else value
     if importlib.import_module("sklearn").get_config()["enable_metadata_routing"]:
         routing = importlib.import_module("sklearn.utils.metadata_routing").get_routing_for_object(estimator)
         takes = sorted(routing.consumes("fit", ["groups"]))

@@ -104,7 +104,7 @@ class TaskData:
                 raise wrong(argument, given, f"a label of the recordings ({', '.join(sorted(known))}), or an array")
             return self._joined([table.groups[given] for table in self.data.tables])
         column, n = np.asarray(given), len(self.y)
-        if column.shape[:1] != (n,) or (column != column).any():  # NaN is no group, and weighs nothing
+        if column.shape != (n,) or (column != column).any():  # NaN is no group, and weighs nothing
             raise wrong(argument, given, f"the name of a label, or an array of {n} values, one for each row of X")
         return column
 
