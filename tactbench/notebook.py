@@ -432,7 +432,7 @@ def metric_of(given: Any, greater_is_better: bool | None, task: TaskSpec) -> Met
     if not plain:
         scorer, function, higher = scorer._score_func, partial(scorer._score_func, **scorer._kwargs), scorer._sign > 0
     name = getattr(scorer, "__name__", type(scorer).__name__) + DIRECTIONS[higher]
-    return replace(own, name=name, higher_is_better=higher, function=function)
+    return replace(own, name=name, function=function)
 
 
 def name_of(estimator: str | Estimator) -> str:

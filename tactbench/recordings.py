@@ -154,9 +154,10 @@ def opened_as(argument: str, given: Recordings) -> list[Recording]:
         return [given]
     takes = "recordings, files, folders or globs, one or several"
     if not isinstance(given, str | os.PathLike):
-        if not isinstance(given, Iterable):
-            raise wrong(argument, given, takes)
-        return list({one.path: one for each in given for one in opened_as(argument, each)}.values())
+        several = given if isinstance(given, Iterable) else ()
+        if found := list({one.path: one for each in several for one in opened_as(argument, each)}.values()):
+            return found
+        raise wrong(argument, given, takes)
     path = Path(given).expanduser()
     if path.is_dir():
         replay: Any = rig_of("replay", installed(), path)

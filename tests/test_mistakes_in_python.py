@@ -31,6 +31,7 @@ OF_TASKS = [
     ("recordings", "nowhere/*.h5", "nowhere"),
     ("recordings", 3, "3"),
     ("recordings", None, "None"),
+    ("recordings", [], "[]"),
     ("recordings", [Ridge()], "Ridge()"),
     ("protocol", "deployed", "deployed"),
     ("protocol", "deployable@k=x", "k=x"),
@@ -39,6 +40,8 @@ OF_TASKS = [
     ("split", 5, "5"),
     ("split", [(np.arange(5), np.arange(500, 505))], "1 given folds"),
     ("split", [1, 2], "2 given folds"),
+    ("split", [], "0 given folds"),
+    ("split", [([0, 0], [1])], "1 given folds"),
     ("split", GroupKFold(50), "GroupKFold"),
     ("groups", "session", "session"),  # of a split by name
     ("window", 0, "0"),
@@ -81,6 +84,8 @@ def test_of_tasks(folder, call, argument, given, shown):
         ("params", 3, "3", {}),
         ("params", {"sample_weight": [1.0]}, "[1.0]", {}),
         ("params", {"groups": "sesion"}, "sesion", {}),
+        ("params", {"groups": np.zeros((N, 2))}, "(120, 2)", {}),
+        ("params", {"weights": 3}, "weights", {}),
         ("params", {"sample_weight": np.ones(N)}, "sample_weight", {"estimator": "ridge"}),
     ],
 )

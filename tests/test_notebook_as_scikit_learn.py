@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 import sklearn
-from sklearn.linear_model import LogisticRegression, Ridge
+from sklearn.linear_model import LogisticRegression, LogisticRegressionCV, Ridge
 from sklearn.metrics import make_scorer, mean_absolute_error, median_absolute_error
 from sklearn.model_selection import (
     GridSearchCV,
@@ -187,6 +187,8 @@ def test_groups_reach_the_search_within_a_fold(folder):
     assert by_name.score < by_name.trivial["mean"]
     inside = make_pipeline(StandardScaler(), GridSearchCV(Ridge(), {"alpha": [0.1, 1.0]}, cv=GroupKFold(3)))
     assert tactbench.evaluate(inside, "force", folder).score < by_name.trivial["mean"]
+    own = tactbench.evaluate(LogisticRegressionCV(Cs=2, cv=2), label_task("press"), folder, split=KFold(6))
+    assert own.row["status"] == "done", "its own cross-validation takes no groups"
     presses = tactbench.evaluate(nested(), "force", folder, params={"groups": "press"})
     assert presses.score < by_name.trivial["mean"]
 

@@ -8,6 +8,7 @@ import warnings
 from collections import Counter
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from inspect import signature
 from typing import Any
 
 import numpy as np
@@ -24,6 +25,7 @@ from tactbench.core.plugins.interfaces import Estimator
 from tactbench.core.plugins.registry import load_object
 from tactbench.core.samples import FloatArray, Part
 from tactbench.core.spec.rig import EstimatorDescriptor
+from tactbench.core.spec.row import lower_is_better
 from tactbench.core.spec.task import TaskSpec, VectorTarget
 
 Build = Callable[[Mapping[str, Any]], Estimator]
@@ -87,16 +89,17 @@ def fit(model: Estimator, X: FloatArray, y: npt.NDArray[Any], name: str, counts:
     A warning (a solver that did not converge …) is counted under the estimator's `name` and stands in the row; on
     standard error nobody would connect it with a score. Raises DataError if the estimator refuses the data.
     """
+    refused = (ValueError, ArithmeticError, *((TypeError,) if params else ()))
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
         try:
             model.fit(X, y, **params)
-        except (ValueError, ArithmeticError, np.linalg.LinAlgError) as error:
+        except refused as error:
             if isinstance(error, TactbenchError):
                 raise
-            wide = " x ".join(map(str, X.shape[1:]))
+            wide, more = " x ".join(map(str, X.shape[1:])), f", params {', '.join(params)}" if params else ""
             raise DataError(
-                f"The estimator {name!r} could not be fitted to {len(X)} rows of {wide} features: {error}",
+                f"The estimator {name!r} could not be fitted to {len(X)} rows of {wide} features{more}: {error}",
                 hint="Check its parameters, or use another estimator.",
             ) from error
     for kind in sorted({warning.category.__name__ for warning in caught}):
@@ -107,19 +110,23 @@ def routed(estimator: Estimator, data: TaskData, given: Mapping[str, Any]) -> di
     """Return what ``fit`` of an object is given beside X and y, under the names that scikit-learn has for it.
 
     `given`, where a text under ``groups`` or ``STEP__groups`` is the name of a label; and the groups of the rows where
-    the object, or a step of it, searches parameters by a cross-validation of its own and nothing is given.
+    the object, or a step of it, searches parameters by cross-validation or names them in its ``fit``.
     """
     found = {}
     for name, value in given.items():
         rows = name.rpartition("__")[2] in ("groups", "sample_weight")
         sized = not isinstance(value, str) and np.shape(value)[:1] == data.y.shape[:1]
-        found[name] = data.per_row(f"params[{name!r}]", value) if rows or sized else value
+        found[name] = data.per_row(f"params[{name!r}]", value) if rows else np.asarray(value) if sized else value
     if importlib.import_module("sklearn").get_config()["enable_metadata_routing"]:
         routing = importlib.import_module("sklearn.utils.metadata_routing").get_routing_for_object(estimator)
         takes = sorted(routing.consumes("fit", ["groups"]))
     else:
         steps = [("groups", estimator), *((f"{name}__groups", one) for name, one in getattr(estimator, "steps", ()))]
-        takes = [name for name, one in steps if hasattr(one, "cv") and hasattr(one, "refit")]
+        search = importlib.import_module("sklearn.model_selection._search").BaseSearchCV
+        takes = [
+            name for name, one in steps
+            if isinstance(one, search) or (hasattr(one, "fit") and "groups" in signature(one.fit).parameters)
+        ]  # fmt: skip
     return {**dict.fromkeys(takes, data.groups), **found}
 
 
@@ -245,5 +252,6 @@ def select(
                 answered.append(combined)
             score = metric.of(np.concatenate(truth), np.concatenate(answered), n_classes)
             tried.append(Choice(params, k, score))
-    best = max(tried, key=lambda candidate: metric.sign * candidate.score)  # of equals the first
+    best_of = min if lower_is_better(metric.name) else max
+    best = best_of(tried, key=lambda candidate: candidate.score)  # of equals the first
     return replace(best, compared=tuple(tried))

@@ -14,7 +14,7 @@ from tactbench.core.errors import DataError, NotApplicable, wrong
 from tactbench.core.evaluation.dataset import Dataset, at_rows, load_dataset, thinned
 from tactbench.core.evaluation.frames import framed
 from tactbench.core.evaluation.protocols import ProtocolSpec, protocol_called, shots, without_options
-from tactbench.core.evaluation.sets import asked_for, tare_s, tared
+from tactbench.core.evaluation.sets import apart, asked_for, tare_s, tared, windowed
 from tactbench.core.evaluation.splits import (
     SPLITS_WITHOUT_GROUPS,
     Assignment,
@@ -25,7 +25,6 @@ from tactbench.core.evaluation.splits import (
     with_validation,
 )
 from tactbench.core.evaluation.summaries import is_summarised, summarised, with_windows
-from tactbench.core.evaluation.windows import apart, windowed
 from tactbench.core.samples import FloatArray, IntArray, Part
 from tactbench.core.spec.rig import EstimatorDescriptor
 from tactbench.core.spec.task import TaskSpec
@@ -105,7 +104,7 @@ class TaskData:
                 raise wrong(argument, given, f"a label of the recordings ({', '.join(sorted(known))}), or an array")
             return self._joined([table.groups[given] for table in self.data.tables])
         column, n = np.asarray(given), len(self.y)
-        if column.shape[:1] != (n,) or (column != column).any():  # NaN is no group, and weighs nothing
+        if column.shape != (n,) or (column != column).any():  # NaN is no group, and weighs nothing
             raise wrong(argument, given, f"the name of a label, or an array of {n} values, one for each row of X")
         return column
 

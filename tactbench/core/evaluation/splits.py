@@ -75,6 +75,8 @@ class OwnSplit:
                     warnings.filterwarnings("ignore", "The groups parameter is ignored")
                     pairs = given if isinstance(given, list) else list(given.split(X, y, groups))
                 self._folds = [(_places(train, len(y)), _places(test, len(y))) for train, test in pairs]
+                if not self._folds:
+                    raise ValueError("there is none.")
             except (TypeError, ValueError, IndexError) as error:
                 raise UsageError(
                     f"split={self.name} makes no folds of {len(y)} rows: {error}",

@@ -166,13 +166,7 @@ def import_tables(
 
 
 def import_arrays(mapping: Mapping, raws: Iterable[RawRecording], out: Path, **about: object) -> list[Path]:
-    """Write recordings of tables in memory, checked as those of files are; `about` is what their meta says besides.
-
-    Raises
-    ------
-    MappingError
-        If a table does not fit the mapping.
-    """
+    """Write recordings of tables in memory, as :func:`import_tables` does; their meta says what it is told `about`."""
     sensor, reference, streams = sensor_of(mapping)
     require_answerable(mapping, streams, out)
     write_tasks(out, tasks_text(mapping))
