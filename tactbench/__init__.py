@@ -8,10 +8,11 @@ from typing import TYPE_CHECKING
 from tactbench.core.on_demand import on_demand
 
 if TYPE_CHECKING:
+    from tactbench.arrays import from_arrays
     from tactbench.notebook import evaluate, load_task, results, run
     from tactbench.recordings import dataset, open_recordings
 
-__all__ = ["dataset", "evaluate", "load_task", "open_recordings", "results", "run"]
+__all__ = ["dataset", "evaluate", "from_arrays", "load_task", "open_recordings", "results", "run"]
 __version__ = "0.1.0"
 __getattr__ = on_demand(__name__)
 

@@ -11,51 +11,76 @@ import random
 import shutil
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
+from concurrent.futures.process import BrokenProcessPool
+from contextlib import ExitStack
 from dataclasses import replace
+from functools import partial
+from importlib import import_module
+from itertools import product
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from pickle import PicklingError
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 from pydantic import ValidationError
 
-from tactbench.core.errors import NotApplicable, UnknownNameError, UsageError, complaint
+from tactbench.core.errors import EngineError, NotApplicable, UnknownNameError, UsageError, complaint, wrong
 from tactbench.core.evaluation.folds import PLAIN, TaskData
 from tactbench.core.evaluation.folds import load_task as folds_of
-from tactbench.core.evaluation.metrics import metric_called
-from tactbench.core.evaluation.protocols import is_probe
+from tactbench.core.evaluation.metrics import METRICS, Metric, metric_called
+from tactbench.core.evaluation.protocols import is_probe, without_options
+from tactbench.core.evaluation.splits import OwnSplit
 from tactbench.core.files import named_file
 from tactbench.core.leaderboard.formats import records, write_tables
-from tactbench.core.leaderboard.pairwise import comparisons, record_of, tables_of, with_declared
-from tactbench.core.leaderboard.table import Table, build_table, over_all
+from tactbench.core.leaderboard.names import grouped
+from tactbench.core.leaderboard.pairwise import PairwiseComparison, comparisons, record_of, tables_of, with_declared
+from tactbench.core.leaderboard.table import Block, Table, build_table, over_all
 from tactbench.core.leaderboard.view import best, grids
+from tactbench.core.matrix.keys import Keys, Sections
 from tactbench.core.matrix.plan import Cell, cell_of
-from tactbench.core.matrix.solve import Job, read_dataset, solve, unanswered
+from tactbench.core.matrix.solve import Job, Solved, read_dataset, solve, unanswered
+from tactbench.core.matrix.store import Store
 from tactbench.core.plugins.declared import declared_in, with_declared_of
 from tactbench.core.plugins.declared import with_declared as with_declared_tasks
 from tactbench.core.plugins.interfaces import Estimator
 from tactbench.core.plugins.registry import installed
+from tactbench.core.provenance.gather import gather, usable_cores
+from tactbench.core.recording.reader import read_meta
 from tactbench.core.samples import Answers
 from tactbench.core.spec.declared_task import FILE
+from tactbench.core.spec.row import DIRECTIONS
+from tactbench.core.spec.status import STOPPED
 from tactbench.core.spec.task import TaskSpec, VectorTarget
 from tactbench.core.statistics.replicates import against_reference, over_replicates
+from tactbench.core.study.progress import progress
 from tactbench.core.study.results import opened, shown_rows, table_of
 from tactbench.core.study.shipped import matrix_called
 from tactbench.core.study.study import Study, carry_out
 from tactbench.core.tables.html import html
 from tactbench.core.tables.terminal import plain_text
+from tactbench.core.tables.text import visible
 from tactbench.core.tables.text_table import TextTable
-from tactbench.recordings import AnyPath, Recordings, library, open_recordings
+from tactbench.recordings import AnyPath, Recordings, library, open_recordings, opened_as
 
 if TYPE_CHECKING:
     import pandas
+    from matplotlib.figure import Figure
 
 Row = dict[str, Any]
 
 
-def _question(task: str | TaskSpec, recordings: Recordings, protocol: str) -> tuple[TaskSpec, str, tuple[Path, ...]]:
-    """Return a task, the JSON that declares it beside the recordings (empty: it is installed), and the files."""
-    paths = tuple(one.path for one in open_recordings(recordings))
+def _question(
+    task: str | TaskSpec, recordings: Recordings, protocol: str, split: Any, groups: Any, window: int | None, step: int,
+    seed: int,
+) -> tuple[TaskSpec, str, tuple[Path, ...], dict[str, Any]]:  # fmt: skip
+    """Return a task, the JSON that declares it beside the recordings (empty: it is installed), the files, and how.
+
+    The last has what :func:`folds_of` takes.
+    """
+    for name, given, least in (("window", 1 if window is None else window, 1), ("step", step, 1), ("seed", seed, 0)):
+        if not isinstance(given, int | np.integer) or given < least or (name == "step" and given > 1 and not window):
+            raise wrong(name, given, f"a whole number, {least} or more{', beside `window`' * (name == 'step')}")
+    paths = tuple(one.path for one in opened_as("recordings", recordings))
     folders = {path.parent for path in paths if (path.parent / FILE).is_file()}
     registry = with_declared_tasks(installed(), {one: None for each in sorted(folders) for one in declared_in(each)})
     declared = ""
@@ -63,18 +88,28 @@ def _question(task: str | TaskSpec, recordings: Recordings, protocol: str) -> tu
         owned = registry.tasks.owned(task)
         task, declared = owned.descriptor.spec, owned.declared
     if not isinstance(task, TaskSpec):
-        raise UsageError(f"{task!r} is no task.", hint="Give its name, see `tactbench list tasks`, or a TaskSpec.")
-    if protocol not in task.protocols and not is_probe(protocol):
-        raise UnknownNameError(f"protocol of task {task.name!r}", protocol, task.protocols)
-    return task, declared, paths
+        raise wrong("task", task, "a name of `tactbench list tasks`, one declared beside the recordings, or a TaskSpec")
+    plain = without_options(str(protocol))
+    if plain not in task.protocols and not is_probe(plain):
+        raise UnknownNameError(f"protocol of task {task.name!r}", str(protocol), task.protocols)
+    if split is not None and not isinstance(split, str):
+        if not hasattr(split, "split") and not isinstance(split, Iterable):
+            raise wrong("split", split, "a name, an object with scikit-learn's `split(X, y, groups)`, or index arrays")
+        split = OwnSplit(split, groups)
+    elif groups is not None:
+        raise wrong("groups", groups, "what a splitter keeps apart, and `split` is none (`params` has those of `fit`)")
+    return task, declared, paths, {"split": split, "window": window or 0, "step": step, "seed": seed}
 
 
 def load_task(
     task: str | TaskSpec,
     recordings: Recordings,
     protocol: str = "deployable",
-    split: str | None = None,
+    split: Any = None,
     *,
+    groups: Any = None,
+    window: int | None = None,
+    step: int = 1,
     seed: int = 1,
 ) -> TaskData:
     """Return what a task asks of recordings as `X`, `y`, `groups`, `feature_names` and `folds`.
@@ -88,7 +123,15 @@ def load_task(
     protocol
         How recordings become rows; see docs/protocols.md.
     split
-        What training and test keep apart; None: the task's first that the recordings can serve.
+        What training and test keep apart, by name; an object with scikit-learn's ``split(X, y, groups)``; or pairs of
+        index arrays (train, test) over the rows of `X`. None: the task's first that the recordings can serve.
+    groups
+        What a splitter keeps apart, and what intervals are then over: the name of a label of the recordings (session,
+        object …), or an array (n,). None: there is no interval.
+    window, step
+        Rows of a window, and from its end to that of the next (1). `X` is then (n, window, features): each window lies
+        in one recording and in one fold, and has the label of its last row. Training windows that share a row with a
+        test window are in no fold.
     seed
         Of split ``shuffled``.
 
@@ -102,12 +145,12 @@ def load_task(
     Raises
     ------
     UsageError
-        If a name is unknown, or these recordings cannot be split so.
+        If an argument cannot be used, or these recordings cannot be split so.
     DataError
         If nothing is left to evaluate; its kind NotApplicable if the question cannot be asked of these recordings.
     """
-    spec, _, paths = _question(task, recordings, protocol)
-    return folds_of(spec, read_dataset(spec, paths), protocol, split, seed=seed)
+    spec, _, paths, how = _question(task, recordings, protocol, split, groups, window, step, seed)
+    return folds_of(spec, read_dataset(spec, paths), protocol, **how)
 
 
 class Rows(list[dict[str, Any]]):
@@ -136,7 +179,9 @@ class Results(Rows):
     """
 
     def __init__(self, table: Table) -> None:
-        super().__init__((row for row, _ in records(table)), [*grids(table), *table.sections])
+        of = ({"data": line.row["data"]} if "data" in line.row else {} for line in table.lines)
+        rows = (data | row for data, (row, _) in zip(of, records(table), strict=True))
+        super().__init__(rows, [*grids(table), *table.sections])
         self.table = table
 
     def __getitem__(self, place: Any) -> Any:
@@ -154,10 +199,17 @@ class Results(Rows):
     def compare(self, a: str, b: str, task: str | None = None) -> Rows:
         """Compare two sensors, estimators, protocols or splits replicate by replicate, as ``tactbench compare`` does.
 
-        Raises UnknownNameError if these rows have nothing of such a name, or the two are not of one kind.
+        Raises UnknownNameError if no data set has rows of both names, or the two are not of one kind.
         """
-        found = comparisons(self.table.rows, a, b, task)
-        found = with_declared(found, self.table.rows, matrix_called().comparisons)
+        found: list[PairwiseComparison] = []
+        unknown = UnknownNameError("row", a, ())
+        for rows in grouped(self.table.rows, lambda row: row.get("data")).values():
+            try:
+                found += with_declared(comparisons(rows, a, b, task), rows, matrix_called().comparisons)
+            except UnknownNameError as error:
+                unknown = error
+        if not found:
+            raise unknown
         return Rows(map(record_of, found), tables_of(found))
 
 
@@ -181,7 +233,9 @@ class Result(Results):
         Truth and predictions of the test rows as arrays; classes are indices.
     """
 
-    def __init__(self, rows: Sequence[Row], answers: Answers, task: TaskSpec, names: Sequence[str]) -> None:
+    def __init__(
+        self, rows: Sequence[Row], answers: Answers, task: TaskSpec, names: Sequence[str], metric: Metric
+    ) -> None:
         rows = over_replicates(rows)
         super().__init__(build_table(rows, questions={task.name: task.question}))
         row, *others = map(against_reference, rows)  # what scikit-learn scores of `load_task`'s rows
@@ -191,34 +245,65 @@ class Result(Results):
             self.interval = row["ci_low"], math.inf if row["ci_high"] is None else row["ci_high"]
         self.trivial = {str(one["estimator"]): one["score"] for one in others}
         self.fold_scores = {name.removeprefix("fold "): row["scores"].get(name) for name in row["fold_sizes"]}
-        self.row, self.answers, self._task, self._names = row, answers, task, names
+        self.row, self.answers, self._names, self._metric = row, answers, names, metric
+        self._components = task.target.names if isinstance(task.target, VectorTarget) else ()
 
     @property
     def recording_scores(self) -> dict[str, float]:
         """Return the score over the test rows of each recording by its name; NaN where the metric is undefined."""
-        metric, one, found = metric_called(self.row["metric"]), self.answers, {}
+        one, found = self.answers, {}
         with np.errstate(all="ignore"):
             for place in np.unique(one.recording):
                 mine = one.recording == place
-                found[self._names[place]] = metric.of(one.y_true[mine], one.y_pred[mine], len(self.row["classes"]))
+                score = self._metric.of(one.y_true[mine], one.y_pred[mine], len(self.row["classes"]))
+                found[self._names[place]] = score
         return found
 
     @property
-    def predictions(self) -> dict[str, npt.NDArray[Any]]:
-        """Return columns of (n,), one line a test row: ``pandas.DataFrame(result.predictions)``.
+    def predictions(self) -> pandas.DataFrame:
+        """Return a pandas DataFrame, a line a test row; raises UsageError if pandas is not installed.
 
-        recording, row (its place in the recording), time_s, fold, y_true and y_pred: class labels, numbers, or a column
-        for each component of a vector.
+        recording, row (its place in the recording), time_s, fold (its name), y_true and y_pred: class labels, numbers,
+        or a column for each component of a vector.
         """
-        one, labels, target = self.answers, np.asarray(self.row["classes"]), self._task.target
+        one, labels = self.answers, np.asarray(self.row["classes"])
         found = {"recording": np.asarray(self._names)[one.recording]}
-        found |= {"row": one.row, "time_s": one.time_s, "fold": one.fold}
+        found |= {"row": one.row, "time_s": one.time_s, "fold": np.asarray(list(self.fold_scores))[one.fold]}
         for name, values in (("y_true", one.y_true), ("y_pred", one.y_pred)):
-            if isinstance(target, VectorTarget):
-                found |= {f"{name}_{part}": column for part, column in zip(target.names, values.T, strict=True)}
+            if values.ndim > 1:
+                found |= {f"{name}_{part}": column for part, column in zip(self._components, values.T, strict=True)}
             else:
                 found[name] = labels[values] if len(labels) else values
-        return found
+        frame: pandas.DataFrame = library("pandas").DataFrame(found)
+        return frame
+
+    def plot(self) -> Figure:
+        """Draw answers over the truth, a panel a component, or how often each class is taken for which.
+
+        Returns
+        -------
+        matplotlib.figure.Figure
+            Notebooks show it. NotApplicable is raised for events: their figure is that of ``tactbench report``.
+        """
+        from matplotlib.figure import Figure
+        from sklearn.metrics import ConfusionMatrixDisplay, PredictionErrorDisplay
+
+        if self.row["events"]:
+            raise NotApplicable("Events are not drawn here.", hint="See row['operating_points'].")
+        frame, names = self.predictions, [name for name in self.predictions if name.startswith("y_true")]
+        figure = Figure(figsize=(4.5 * len(names), 4.5), layout="constrained")
+        for name, axes in zip(names, figure.subplots(1, len(names), squeeze=False)[0], strict=True):
+            part, unit = name.removeprefix("y_true").replace("_", " "), self.row["unit"]
+            drawn = {"y_true": frame[name], "y_pred": frame[name.replace("true", "pred")], "ax": axes}
+            if self.row["confusion"]:
+                more = {"values_format": ".2g", "colorbar": False, "xticks_rotation": "vertical", "cmap": "Blues"}
+                ConfusionMatrixDisplay.from_predictions(**drawn, normalize="true", **more)
+            else:
+                kind, points = "actual_vs_predicted", {"s": 4}
+                PredictionErrorDisplay.from_predictions(**drawn, kind=kind, subsample=None, scatter_kwargs=points)
+                axes.set(xlabel=f"answer{part} [{unit}]", ylabel=f"truth{part} [{unit}]")
+        figure.suptitle(f"{self.row['estimator']}: {self.row['metric']} {self.score:.3g}")
+        return figure
 
 
 def evaluate(
@@ -226,8 +311,14 @@ def evaluate(
     task: str | TaskSpec,
     recordings: Recordings,
     protocol: str = "deployable",
-    split: str | None = None,
+    split: Any = None,
     *,
+    groups: Any = None,
+    metric: Any = None,
+    greater_is_better: bool | None = None,
+    params: Mapping[str, Any] | None = None,
+    window: int | None = None,
+    step: int = 1,
     seed: int = 1,
 ) -> Result:
     """Score an estimator on recordings in this process, and the task's trivial answers beside it.
@@ -237,8 +328,17 @@ def evaluate(
     estimator
         Any object with scikit-learn's ``fit(X, y)`` and ``predict(X)``, of which each fold fits a copy, or the name of
         an installed one. Its class may be defined in a notebook. Classes in `y` are indices.
-    task, recordings, protocol, split
+    task, recordings, protocol, split, groups, window, step
         As of :func:`load_task`.
+    metric
+        Name of a metric of docs/protocols.md or of one of scikit-learn's scorers, such a scorer, or a function of (y,
+        prediction). None: the task's. A scorer whose sign is negative is an error: the score is without that sign.
+    greater_is_better
+        Whether a higher score is better: of a function, which does not say it itself.
+    params
+        What ``fit`` takes beside `X` and `y`, as of ``sklearn.model_selection.cross_validate``: arrays (n,) of a value
+        for each row of ``load_task(...).X`` are cut to the rows of a fold. ``groups`` may be the name of a label. A
+        search of parameters by cross-validation is given the groups that the split keeps apart.
     seed
         Decides resamples of intervals, split ``shuffled``, and what is drawn from the global generators of ``random``
         and numpy, whose states are afterwards as they were.
@@ -250,18 +350,89 @@ def evaluate(
     PluginContractError
         If the estimator answers with something else than a finite number, or a class, a row.
     """
-    spec, declared, paths = _question(task, recordings, protocol)
-    data = read_dataset(spec, paths)
-    cell = Cell(
-        sensor=data.metas[0].sensor.name, task=spec.name, rig="replay", protocol=protocol, split=split,
-        estimator=name_of(estimator), params=(), baseline=False, seed=seed, declared_task=declared,
+    mine, *trivial = _cells(
+        name_of(estimator), estimator, task, recordings, protocol, split, groups=groups, metric=metric,
+        greater_is_better=greater_is_better, params=params, window=window, step=step, seed=seed,
     )  # fmt: skip
-    row, answers = _answered(cell, spec, paths, estimator)
-    trivial = [replace(cell, estimator=name, baseline=True) for name in spec.baselines if name != cell.estimator]
-    rows = [row, *(_ended(one, spec, paths, one.estimator, row["simulated"]) for one in trivial)]
+    data = read_dataset(mine.task, mine.paths)
+    row, answers = _answered(mine)
+    rows = [row, *(_ended(one, row["simulated"])[0] for one in trivial)]
     counts = Counter(one.name for one in data.metas)
     names = [one.name if counts[one.name] == 1 else str(path) for one, path in zip(data.metas, data.paths, strict=True)]
-    return Result(rows, answers["test"], spec, names)
+    return Result(rows, answers["test"], mine.task, names, mine.how["metric"])
+
+
+class _Work(NamedTuple):
+    """A cell that is evaluated here, with all names looked up."""
+
+    cell: Cell
+    task: TaskSpec
+    paths: tuple[Path, ...]
+    how: dict[str, Any]
+    """what the caller gives in place of what is named, as of :func:`solve`"""
+
+
+def _cells(
+    name: str,
+    estimator: str | Estimator,
+    task: str | TaskSpec,
+    recordings: Recordings,
+    protocol: str = "deployable",
+    split: Any = None,
+    *,
+    groups: Any = None,
+    metric: Any = None,
+    greater_is_better: bool | None = None,
+    params: Mapping[str, Any] | None = None,
+    window: int | None = None,
+    step: int = 1,
+    seed: int = 1,
+) -> list[_Work]:
+    """Return the cell of an estimator, and those of the task's trivial answers; arguments as of :func:`evaluate`."""
+    spec, declared, paths, how = _question(task, recordings, protocol, split, groups, window, step, seed)
+    given = None if isinstance(estimator, str) else estimator
+    scored = metric_of(metric, greater_is_better, spec)
+    if scored.name != spec.metric:  # what is published, or the same in use, is so by the task's own metric
+        unit = spec.unit if {scored.name, spec.metric} == {"rmse", "mae"} else "1"
+        spec = spec.model_copy(update={"metric": scored.name, "unit": unit, "equivalence": None, "published": ()})
+    if params is not None and (given is None or not isinstance(params, Mapping)):
+        raise wrong("params", params, "a mapping of what `fit` of an object takes to its values")
+    if window and given is None:
+        raise wrong("estimator", estimator, "an object where `window` is given")
+    cell = Cell(
+        sensor=read_meta(paths[0]).sensor.name, task=spec.name, rig="replay", protocol=protocol,
+        split=getattr(how["split"], "name", split), estimator=name, params=(), baseline=False, seed=seed,
+        declared_task=declared,
+    )  # fmt: skip
+    how |= {"given": None, "metric": scored}
+    trivial = [replace(cell, estimator=other, baseline=True) for other in spec.baselines if other != name]
+    mine = _Work(cell, spec, paths, {**how, "given": given, "fit_params": params or {}})
+    return [mine, *(_Work(one, spec, paths, how) for one in trivial)]
+
+
+def metric_of(given: Any, greater_is_better: bool | None, task: TaskSpec) -> Metric:
+    """Return a metric by name, of a scikit-learn scorer, or of a function of (y, prediction); None: the task's."""
+    own, scorer = metric_called(task.metric), given
+    found = own if given is None else None
+    if isinstance(given, str):
+        scorers: Any = import_module("sklearn.metrics")
+        found, scorer = METRICS.get(given), scorers.get_scorer(given) if given in scorers.get_scorer_names() else None
+    by_prediction = callable(scorer) and getattr(scorer, "_response_method", "predict") == "predict"
+    alike = found is not None and (found.kind, found.vector) == (own.kind, own.vector)
+    if not alike and (found is not None or own.kind == "events" or not by_prediction):
+        takes = "a name of docs/protocols.md or of sklearn.metrics.get_scorer_names(), a scorer of predictions, or a "
+        raise wrong("metric", given, f"what scores a {own.kind}: {takes}function of (y, prediction)")
+    plain = not alike and not hasattr(scorer, "_score_func")
+    if not (isinstance(greater_is_better, bool) if plain else greater_is_better is None):
+        takes = "True or False where `metric` is a function, and nothing where it tells the direction itself"
+        raise wrong("greater_is_better", greater_is_better, takes)
+    if found is not None:
+        return found
+    function, higher = scorer, bool(greater_is_better)
+    if not plain:
+        scorer, function, higher = scorer._score_func, partial(scorer._score_func, **scorer._kwargs), scorer._sign > 0
+    name = getattr(scorer, "__name__", type(scorer).__name__) + DIRECTIONS[higher]
+    return replace(own, name=name, function=function)
 
 
 def name_of(estimator: str | Estimator) -> str:
@@ -269,35 +440,28 @@ def name_of(estimator: str | Estimator) -> str:
     if isinstance(estimator, str):
         return estimator
     if isinstance(estimator, type) or not (hasattr(estimator, "fit") and hasattr(estimator, "predict")):
-        raise UsageError(
-            f"{estimator!r} is no estimator.",
-            hint="Give an object with fit(X, y) and predict(X), or an installed name.",
-        )
+        raise wrong("estimator", estimator, "an object with fit(X, y) and predict(X), or the name of an installed one")
     steps = [type(step).__name__ for _, step in getattr(estimator, "steps", ()) if step not in (None, "passthrough")]
     return "+".join(steps) or type(estimator).__name__
 
 
-def _answered(
-    cell: Cell, task: TaskSpec, paths: Sequence[Path], estimator: str | Estimator
-) -> tuple[Row, Mapping[str, Answers]]:
+def _answered(work: _Work) -> Solved:
     """Evaluate a cell here; the global generators of random numbers are afterwards as they were."""
-    given = None if isinstance(estimator, str) else estimator
-    described = installed().estimators[cell.estimator] if given is None else PLAIN
-    job = Job(cell, task, described, tuple(paths), (), "", {})
+    described = installed().estimators[work.cell.estimator] if work.how["given"] is None else PLAIN
     states = random.getstate(), np.random.get_state()  # noqa: NPY002  (it is this old generator that cells seed)
     try:
-        return solve(job, given=given)
+        return solve(Job(work.cell, work.task, described, work.paths, (), "", {}), own=work.how)
     finally:
         random.setstate(states[0])
         np.random.set_state(states[1])  # noqa: NPY002
 
 
-def _ended(cell: Cell, task: TaskSpec, paths: Sequence[Path], estimator: str | Estimator, simulated: bool) -> Row:
-    """Return the row of a cell that is evaluated here, whether it finishes or not."""
+def _ended(work: _Work, simulated: bool) -> Solved:
+    """Return the row of a cell that is evaluated here, whether it finishes or not, and its answers."""
     try:
-        return _answered(cell, task, paths, estimator)[0]
+        return _answered(work)
     except Exception as error:
-        return unanswered(cell, task, error, simulated=simulated)
+        return unanswered(work.cell, work.task, error, simulated=simulated), {}
 
 
 Estimators = str | Estimator | list[str | Estimator] | tuple[str | Estimator, ...] | Mapping[str, str | Estimator]
@@ -310,9 +474,12 @@ def run(
     estimator: Estimators = (),
     recordings: Recordings | None = None,
     out: AnyPath = "tactbench-results",
+    data: Mapping[str, Recordings] | None = None,
+    estimators: Estimators = (),
+    tasks: str | TaskSpec | Sequence[str | TaskSpec] | Mapping[str, Any] = (),
     **options: Any,
 ) -> Results:
-    """Acquire, evaluate and rank, as ``tactbench run`` does.
+    """Acquire, evaluate and rank, as ``tactbench run`` does; or score estimators on data sets side by side.
 
     Parameters
     ----------
@@ -323,16 +490,29 @@ def run(
         are objects alone, the tasks' trivial answers are run beside them, and no other estimators.
     recordings, out
         Folder of recordings to replay, or all recordings of one; the result folder.
+    data, estimators, tasks
+        Several data sets: recordings by name, objects and names of estimators as of `estimator`, and one task or
+        several. Each data set has tables of its own, of all its sensors, and its result folder in `out`.
     **options
         Every other option of the verb by its name, with ``_`` for ``-``: ``protocol="deployable"``, ``repeats=3``,
-        ``probe=True``, ``rig_file="rig.yaml"``, ``config="beyond"``; lists for options that may be repeated.
+        ``probe=True``, ``rig_file="rig.yaml"``, ``config="beyond"``; lists for options that may be repeated. With
+        `data` the arguments of :func:`evaluate` and `jobs`, processes at once (None: all cores). Each of these, and
+        `tasks`, may be a mapping from names of data sets or of estimators: ``split={"pad": GroupKFold(3)}``.
 
     Notes
     -----
     What has a name is evaluated in processes of its own, as by the verb, and stored in `out`. Objects are evaluated
     afterwards in this process, on the recordings of the other rows, and their rows are in the returned table alone: a
     later run knows nothing of them. An option or a name that is wrong raises UsageError, and nothing is run.
+
+    With `data` everything is evaluated by joblib, without times of single answers where `jobs` is not 1. What ended is
+    found again while object, metric, data and code are the same, where that can be told: see `remarks` of a row.
     """
+    if data is not None:
+        given = {"sensor": sensor, "task": task, "estimator": estimator, "recordings": recordings}
+        if misplaced := [name for name, value in given.items() if value not in ((), None)]:
+            raise UsageError(f"`{misplaced[0]}` does not go with `data`.", hint="Use `data`, `estimators` and `tasks`.")
+        return _over_data(data, estimators, tasks, Path(out), **options)
     names, objects = _named(estimator)
     asked = {"sensor": sensor, "task": task, "recordings": _folder(recordings), "out": out, **options}
     if unknown := asked.keys() - Study.model_fields:
@@ -349,6 +529,107 @@ def run(
     each = {replace(cell_of(row), estimator="", params=(), baseline=False, timed=True): row for row in ended}
     beside = [_beside(row, name, given, store.folder) for name, given in objects.items() for row in each.values()]
     return Results(table_of(store, over_all(store, [*outcome.rows, *beside])) if beside else table)
+
+
+_OPTIONS = (
+    "protocol", "split", "groups", "metric", "greater_is_better", "params", "window", "step", "seed",
+)  # fmt: skip
+"""Arguments of :func:`evaluate` that data sets or estimators may have each their own of."""
+
+
+def _over_data(
+    data: Mapping[str, Recordings],
+    estimators: Estimators,
+    tasks: Any,
+    out: Path,
+    jobs: int | None = None,
+    **options: Any,
+) -> Results:
+    """Return the rows of estimators on data sets; see :func:`run`."""
+    names, objects = _named(estimators)
+    every: dict[str, str | Estimator] = {**objects, **dict(zip(names, names, strict=True))}
+    if not isinstance(data, Mapping) or not data:
+        raise wrong("data", data, "a mapping from names of data sets to recordings")
+    if not every:
+        raise wrong("estimators", estimators, "objects and names of estimators, at least one")
+    if jobs is not None and not (isinstance(jobs, int) and jobs > 0):
+        raise wrong("jobs", jobs, "a whole number, 1 or more")
+    if unknown := options.keys() - set(_OPTIONS):
+        raise UnknownNameError("argument of `run` with `data`", min(unknown), ("jobs", *_OPTIONS))
+
+    def chosen(value: Any, *of: str) -> Any:
+        mapped = isinstance(value, Mapping) and value and value.keys() <= {*data, *every}
+        return next((value[name] for name in of if name in value), None) if mapped else value
+
+    asked: dict[str, dict[str, _Work]] = {name: {} for name in data}
+    splits: dict[tuple[Any, ...], OwnSplit] = {}
+    for name, recordings in data.items():
+        some = chosen(tasks, name)
+        if not some:
+            raise wrong("tasks", tasks, f"the task of {name!r}: a name or a TaskSpec, or several")
+        sensors = grouped(opened_as(f"data[{name!r}]", recordings), lambda one: one.sensor.name).values()
+        for task, mine in product([some] if isinstance(some, str | TaskSpec) else some, sensors):
+            for called, given in every.items():
+                own = {key: chosen(value, called, name) for key, value in options.items()}
+                stated = {key: value for key, value in own.items() if value is not None}
+                for work in _cells(called, given, task, mine, **stated):
+                    if isinstance(work.how["split"], OwnSplit):  # drawn once, so that all are tested on the same folds
+                        of = name, work.cell.sensor, work.cell.task, work.how["window"], work.how["step"]
+                        work.how["split"] = splits.setdefault(of, work.how["split"])
+                        folds = {key: work.how[key] for key in ("split", "seed", "window", "step")}
+                        folds_of(work.task, read_dataset(work.task, work.paths), work.cell.protocol, **folds)
+                    asked[name].setdefault(work.cell.name, work)
+    blocks: list[Block] = []
+    for name, rows in _side_by_side(asked, out, jobs or usable_cores()).items():
+        store = Store(out / name)
+        table = table_of(store, over_all(store, [{**row, "data": name} for row in rows]))
+        write_tables(table, store.folder)
+        blocks += [replace(one, title=f"{visible(name)} · {one.title}") for one in table.blocks]
+    return Results(replace(table, blocks=tuple(blocks), sections=()))
+
+
+def _side_by_side(asked: Mapping[str, Mapping[str, _Work]], out: Path, jobs: int) -> dict[str, list[Row]]:
+    """Return the rows of cells of data sets, each found in a result folder or evaluated in one of `jobs` processes."""
+    import joblib
+
+    keys, rows = Keys(installed()), {name: dict[str, Row]() for name in asked}
+    todo: list[tuple[str, _Work, Store, str, Sections, str]] = []
+    with ExitStack() as held, progress() as display:
+        for name, works in asked.items():
+            store = held.enter_context(Store(out / name).hold())
+            store.begin(gather(installed(), engine="joblib"))
+            for work in works.values():
+                work = work._replace(cell=replace(work.cell, timed=jobs == 1))
+                digests = {path: store.about(path)["digest"] for path in work.paths}
+                try:
+                    key, sections = keys.of_given(work.cell, work.task, work.how, digests)
+                    why = ""
+                except ValueError as error:
+                    key, sections, why = "", {}, f"computed anew at every run: its source cannot be told ({error})"
+                if (found := store.finished(key)) is None:
+                    todo.append((name, work, store, key, sections, why))
+                else:
+                    rows[name][work.cell.name] = found
+        display.begin("evaluating", len(todo))
+        calls = (joblib.delayed(_in_place)(place, one[1]) for place, one in enumerate(todo))
+        try:
+            for place, (row, answers) in joblib.Parallel(jobs, return_as="generator_unordered")(calls):
+                name, work, store, key, sections, why = todo[place]
+                paths = [store.beside(path) for path in work.paths]
+                row |= {"key": key, "recordings": paths, "remarks": [*row["remarks"], *filter(None, [why])]}
+                rows[name][work.cell.name] = store.keep(row, sections, answers) if key else row
+                display.advance(work.cell.name, stopped=row["status"] in STOPPED)
+        except (BrokenProcessPool, PicklingError) as error:
+            raise EngineError(
+                f"A process that evaluates them has ended, or objects cannot be sent to it: {error}",
+                hint="What has ended is kept. Give jobs=1 to evaluate the rest in this process.",
+            ) from error
+    return {name: [rows[name][cell] for cell in works] for name, works in asked.items()}
+
+
+def _in_place(place: int, work: _Work) -> tuple[int, Solved]:
+    """Return a cell's place among those that are computed, and what came of it."""
+    return place, _ended(work, simulated=False)
 
 
 def results(folder: AnyPath = "tactbench-results") -> Results:
@@ -396,4 +677,4 @@ def _beside(row: Row, name: str, given: Estimator, folder: Path) -> Row:
     if not paths:  # no answer to this question was finished
         whose = "" if row["status"] == "skipped" else f"{row['estimator']}: "
         return unanswered(cell, task, NotApplicable(f"{whose}{row['reason']}"), simulated=row["simulated"])
-    return _ended(cell, task, paths, given, row["simulated"])
+    return _ended(_Work(cell, task, tuple(paths), {"given": given}), row["simulated"])[0]

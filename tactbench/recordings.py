@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from tactbench.core.errors import FormatError, MissingRecordingError, UsageError
+from tactbench.core.errors import FormatError, MissingRecordingError, UsageError, wrong
 from tactbench.core.evaluation.channels import numbers
 from tactbench.core.plugins.registry import installed
 from tactbench.core.plugins.rigs import rig_of
@@ -145,13 +145,20 @@ def open_recordings(path_or_paths: Recordings) -> list[Recording]:
     list of Recording
         Each file once, those of a folder or a glob in order of their paths; MissingRecordingError if there is none.
     """
-    if isinstance(path_or_paths, Recording):
-        return [path_or_paths]
-    if isinstance(path_or_paths, Iterable) and not isinstance(path_or_paths, str):
-        return list({one.path: one for each in path_or_paths for one in open_recordings(each)}.values())
-    if not isinstance(path_or_paths, str | os.PathLike):
-        raise UsageError(f"{path_or_paths!r} is no recording.", hint="Give files, folders, globs or recordings.")
-    path = Path(path_or_paths).expanduser()
+    return opened_as("path_or_paths", path_or_paths)
+
+
+def opened_as(argument: str, given: Recordings) -> list[Recording]:
+    """Return what was given under the name of an argument as :func:`open_recordings` does."""
+    if isinstance(given, Recording):
+        return [given]
+    takes = "recordings, files, folders or globs, one or several"
+    if not isinstance(given, str | os.PathLike):
+        several = given if isinstance(given, Iterable) else ()
+        if found := list({one.path: one for each in several for one in opened_as(argument, each)}.values()):
+            return found
+        raise wrong(argument, given, takes)
+    path = Path(given).expanduser()
     if path.is_dir():
         replay: Any = rig_of("replay", installed(), path)
         return [Recording(one) for one in replay.recordings()]
@@ -159,8 +166,8 @@ def open_recordings(path_or_paths: Recordings) -> list[Recording]:
         return [Recording(path)]
     paths = sorted(glob.glob(str(path), recursive=True))  # noqa: PTH207  (it takes absolute ones too)
     if not paths:
-        raise MissingRecordingError(f"There is no recording {path}.", hint="Give a file, a folder or a glob.")
-    return open_recordings(paths)
+        raise MissingRecordingError(f"{argument}={str(given)!r}: there is no such file.", hint=f"It takes {takes}.")
+    return opened_as(argument, paths)
 
 
 def dataset(name: str, root: AnyPath | None = None) -> list[Recording]:
@@ -182,4 +189,7 @@ def dataset(name: str, root: AnyPath | None = None) -> list[Recording]:
     """
     from tactbench.core.recording.datasets import dataset_called
 
+    for argument, given, types in (("name", name, str), ("root", root, str | os.PathLike | None)):
+        if not isinstance(given, types):
+            raise wrong(argument, given, "a name" if argument == "name" else "a folder")
     return open_recordings(dataset_called(name).recordings(None if root is None else Path(root)))

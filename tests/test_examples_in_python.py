@@ -5,12 +5,13 @@ import re
 import runpy
 import sys
 
+import numpy as np
 import pytest
 
 import tactbench
-from tactbench.core.recording.mapping import import_tables
+from tactbench.plugin import Block, ChannelSpec, StreamSpec
 from tests.conftest import ROOT
-from tests.core.evaluation.made import sessions
+from tests.core.evaluation.made import ramp, sensor, sessions, write
 from tests.here import make_here
 
 
@@ -36,17 +37,23 @@ NOTEBOOK = ROOT / "examples" / "first_look.ipynb"
 
 def test_the_notebook_shows_the_score_of_its_data_set(here, monkeypatch, shared_data, tmp_path):
     monkeypatch.setenv("TACTBENCH_CACHE", str(tmp_path / "cache"))
-    tactbench.dataset("eflesh-normal", root=shared_data / "eflesh")
-    score = execute(NOTEBOOK)["found"].score
-    assert f'"{score:.3f} N, by session' in NOTEBOOK.read_text(encoding="utf-8"), (
-        "jupyter nbconvert --execute --inplace"
-    )
+    for name in ("eflesh-normal", "eflesh-shear"):
+        tactbench.dataset(name, root=shared_data / "eflesh")
+    names, shown = execute(NOTEBOOK), NOTEBOOK.read_text(encoding="utf-8")
+    for text in (f'"{names["found"].score:.3f} N, by session', f'"{names["windows"].score:.3f} N; delay'):
+        assert text in shown, "jupyter nbconvert --execute --inplace"
 
 
 def test_the_notebook_runs(here, monkeypatch, tmp_path):
-    sessions(tmp_path, "abcde", n=400)
-    found = tactbench.open_recordings(tmp_path)
-    monkeypatch.setattr(tactbench, "dataset", lambda name, root: found, raising=False)
+    sessions(tmp_path / "normal", "abcde", n=400)
+    X, force = ramp(1, n=400)
+    times_ns = np.arange(400) * 10_000_000
+    shear = StreamSpec(name="shear", channels=(ChannelSpec(name="shear", kind="force", unit="N"),))
+    blocks = Block("taxels", times_ns, X), Block("shear", times_ns, force[:, None])
+    presses = {"press": np.arange(400) // 40}
+    path = write(tmp_path / "shear.h5", sensor(), *blocks, annotations=presses, reference=(shear,), session="a")
+    made = {"eflesh-normal": tmp_path / "normal", "eflesh-shear": path}
+    monkeypatch.setattr(tactbench, "dataset", lambda name, root: tactbench.open_recordings(made[name]), raising=False)
     names = execute(NOTEBOOK)
     assert names["found"].score < names["found"].trivial["mean"]
     # Scaled by the protocol and once more by the pipeline, polynomials of readings differ in their last digits.
@@ -54,16 +61,12 @@ def test_the_notebook_runs(here, monkeypatch, tmp_path):
     assert {"StandardScaler+PolynomialFeatures+Ridge", "ridge"} < {row["estimator"] for row in names["table"]}
 
 
-def test_a_forest_on_data_sets_is_a_short_script(here, monkeypatch, shared_data, tmp_path, capsys):
-    pytest.importorskip("pandas")
-    path = ROOT / "examples" / "extra_trees.py"
-    import_tables(ROOT / "examples" / "mappings" / "eflesh-normal.yaml", root=shared_data / "eflesh", out=tmp_path)
-    monkeypatch.setattr(tactbench, "dataset", lambda name: tactbench.open_recordings(tmp_path), raising=False)
-    monkeypatch.setattr(sys, "argv", [str(path), "eflesh-normal:force"])
-    frame = runpy.run_path(str(path))["lines"]
-    assert [line["data set"] for line in frame] == ["eflesh-normal"]
-    assert all(line["score"] < line["baseline"] for line in frame)
-    assert "ci_low" in capsys.readouterr().out
+def test_models_on_data_sets_are_a_short_script(here, monkeypatch, shared_data, capsys):
+    monkeypatch.setattr(sys, "argv", ["side_by_side.py", str(shared_data)])
+    table = runpy.run_path(str(ROOT / "examples" / "side_by_side.py"), run_name="__main__")["table"]
+    assert {row["status"] for row in table if not row["is_baseline"]} == {"done"}
+    assert len({row["data"] for row in table}) == 5
+    assert "eflesh-shear · A = trees, B = window" in capsys.readouterr().out
 
 
 def test_the_page_as_it_is_written(here, monkeypatch, tmp_path):

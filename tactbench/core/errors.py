@@ -35,6 +35,7 @@ Every message names what was given, what was expected and the next step.
 from __future__ import annotations
 
 import difflib
+import reprlib
 from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING, Literal
 
@@ -110,12 +111,19 @@ def complaint(error: ValidationError) -> str:
     return f"{place}: {message}{given}" if place else message
 
 
+def wrong(argument: str, given: object, takes: str) -> UsageError:
+    """Return the error of a function in Python that was given something that its argument does not take."""
+    shown = repr(given) if isinstance(given, str | type) else reprlib.repr(given)
+    shown += f" of shape {given.shape}" if hasattr(given, "shape") else ""
+    return UsageError(f"{argument}={shown} cannot be used.", hint=f"`{argument}` takes {takes}.")
+
+
 class UnknownNameError(UsageError):
     """No thing of this kind has this name."""
 
     def __init__(self, kind: str, given: str, known: Iterable[str]) -> None:
         names = sorted(known)
-        listing = f"Known: {', '.join(names)}." if names else f"No {kind} is installed."
+        listing = f"Known names: {', '.join(names)}." if names else f"No {kind} is installed."
         super().__init__(f"There is no {kind} called {given!r}.", hint=did_you_mean(given, names) + listing)
 
 

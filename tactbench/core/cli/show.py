@@ -57,7 +57,7 @@ _HIDDEN = ("name", "scenes", "campaigns", "published", "protocols", "dimensions"
 def _page(owned: Owned[Any]) -> None:
     """Print the fields of a descriptor, and its scenes or parameters as tables."""
     from tactbench.core.cli.grid import field_text, print_fields, print_tables
-    from tactbench.core.leaderboard.names import LOWER_IS_BETTER
+    from tactbench.core.leaderboard.names import lower_is_better
     from tactbench.core.spec.rig import TaskDescriptor
     from tactbench.core.tables.text_table import text_table
 
@@ -66,7 +66,7 @@ def _page(owned: Owned[Any]) -> None:
     fields = [(type(one).__name__.removesuffix("Descriptor").lower(), one.name), ("brought by", _owner(owned))]
     fields += [(name.replace("_", " "), field_text(value)) for name, value in stated if name not in _HIDDEN]
     if isinstance(one, TaskDescriptor):
-        fields.append(("better", "lower" if stated.metric in LOWER_IS_BETTER else "higher"))
+        fields.append(("better", "lower" if lower_is_better(stated.metric) else "higher"))
         fields.append(("recordings", "" if stated.scenes else "made elsewhere: run --rig replay --recordings DIR"))
         tables = [*_task_tables(stated)]
     else:

@@ -13,7 +13,7 @@ from tactbench.core.matrix.store import Row, Store
 from tactbench.core.progress import Progress
 from tactbench.core.spec.matrix import EstimatorChoice, MatrixSpec, TaskChoice
 from tactbench.core.spec.rig import EstimatorDescriptor, RigDescriptor
-from tactbench.core.spec.row import LOWER_IS_BETTER
+from tactbench.core.spec.row import lower_is_better
 from tactbench.core.spec.scene import Simulation
 from tactbench.core.spec.task import TaskSpec
 from tactbench.core.statistics.replicates import over_replicates
@@ -147,7 +147,7 @@ def _known(settings: Sequence[Setting], rows: Mapping[Simulation, Mapping[str, R
                 records.append({"knob": one.knob, "value": one.value, **kept, "front": False})
     every = [row for own in answers.values() for row in own]
     first = next((row for row in every if row["status"] == "done"), every[0])
-    sign = 1.0 if first["metric"] in LOWER_IS_BETTER else -1.0
+    sign = 1.0 if lower_is_better(first["metric"]) else -1.0
     trivial: list[float] = [
         row["score"] for row in every
         if (row["is_baseline"], row["protocol"], row["split"]) == (True, first["protocol"], first["split"])

@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from tactbench.core.errors import DataError
-from tactbench.core.evaluation.dataset import Dataset
+from tactbench.core.evaluation.dataset import Dataset, at_rows
 from tactbench.core.evaluation.delay import Clock
 from tactbench.core.evaluation.event_answers import Detected, EventRules
 from tactbench.core.evaluation.fitting import Build, Choice, answers, asked, features_of, fit, select, voted
@@ -36,6 +36,8 @@ class Configured:
     build: Build
     params: Mapping[str, Any] = field(default_factory=dict)
     """fixed by the user: they are not searched"""
+    fit_params: Mapping[str, Any] = field(default_factory=dict)
+    """what else its ``fit`` takes; arrays of a value for each row of X are taken at the rows of each fold"""
 
 
 @dataclass(frozen=True)
@@ -103,9 +105,10 @@ def fitted_fold(
                     hint="Use protocol `deployable-untared`, or leave the recording out.",
                 )
     X = features_of(fold.train, descriptor)
+    more = {name: data.at(fold.train, one) for name, one in estimator.fit_params.items()}
     model = estimator.build(choice.params if choice else {})
     began = clock()
-    fit(model, X, fold.train.y, descriptor.name, counts)
+    fit(model, X, fold.train.y, descriptor.name, counts, **more)
     return FittedFold(fold, model, choice, k, search_s, clock() - began)
 
 
@@ -167,10 +170,7 @@ def _rows(part: Part, predicted: npt.NDArray[Any], made: Dataset, number: int) -
     """Return the answers to rows, or to recordings what their rows' answers come to, with the reference force."""
     if made.vote:
         part, predicted = voted(part, predicted, len(made.classes))
-    force = np.full(len(part), np.nan)
-    for place in np.unique(part.recording):
-        table, mine = made.tables[place], part.recording == place
-        if table.force is not None:
-            force[mine] = table.force[np.searchsorted(table.row, part.row[mine])]
+    forces = [np.full(len(one.row), np.nan) if one.force is None else one.force for one in made.tables]
+    force = at_rows(made.tables, forces, part)
     fold = np.full(len(part), number, dtype=np.int64)
     return Answers(part.y, predicted, part.recording, part.row, fold, part.time_s, force)

@@ -1,7 +1,6 @@
 """One cell: its score, and what is known of it, from recordings and an estimator.
 
-:func:`load_task` makes the folds, :func:`evaluate` does the rest for any object with ``fit`` and ``predict``;
-:func:`evaluate_cell` calls both for a cell of the matrix.
+:func:`load_task` makes the folds, :func:`evaluate_cell` does the rest, for any object with ``fit`` and ``predict`` too.
 """
 
 from __future__ import annotations
@@ -9,7 +8,7 @@ from __future__ import annotations
 import copy
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import Any
 
@@ -29,16 +28,23 @@ from tactbench.core.evaluation.delay import (
     tail_ms,
 )
 from tactbench.core.evaluation.event_answers import EventRules, state_figures
-from tactbench.core.evaluation.fitting import builder, features_of, one_model_a_component
-from tactbench.core.evaluation.folds import PLAIN, TaskData, load_task
+from tactbench.core.evaluation.fitting import builder, features_of, one_model_a_component, routed
+from tactbench.core.evaluation.folds import TaskData, load_task
 from tactbench.core.evaluation.frames import band_limit, clocked
 from tactbench.core.evaluation.interval import score_interval
-from tactbench.core.evaluation.leaks import copied_channels, leak_stamps
+from tactbench.core.evaluation.leaks import copied_channels, leak_stamps, shared_groups
 from tactbench.core.evaluation.metrics import METRICS, Metric, class_f1, confusion, metric_called, vector_details
 from tactbench.core.evaluation.reference_floor import beyond_floor, reference_floor, true_force
 from tactbench.core.evaluation.replicate_sums import recordings_right, replicates, summed
 from tactbench.core.evaluation.sets import tare_s
-from tactbench.core.evaluation.splits import SHUFFLED_STAMP, SHUFFLED_WHOLE_STAMP, over_rows, used_rows, without_part
+from tactbench.core.evaluation.splits import (
+    SHUFFLED_STAMP,
+    SHUFFLED_WHOLE_STAMP,
+    OwnSplit,
+    over_rows,
+    used_rows,
+    without_part,
+)
 from tactbench.core.evaluation.summaries import with_windows
 from tactbench.core.plugins.interfaces import Estimator
 from tactbench.core.recording.completeness import INCOMPLETE
@@ -61,7 +67,7 @@ class CellContext:
     """other than the estimator's defaults; they are not searched"""
     protocol: str
     """how recordings become X and y"""
-    split: str | None
+    split: str | OwnSplit | None
     """what is kept apart; None: the task's first that fits"""
     seed: int
     """decides everything random: the same seed gives the same score in any process"""
@@ -70,6 +76,15 @@ class CellContext:
     """that estimator and BLAS may use"""
     latency: bool = True
     """whether to measure how long the answer to one row takes"""
+    given: Estimator | None = None
+    """an object that answers in place of `estimator`"""
+    metric: Metric | None = None
+    """None: the task's"""
+    fit_params: Mapping[str, Any] = field(default_factory=dict)
+    """of `given`; see :func:`routed`"""
+    window: int = 0
+    step: int = 1
+    """as of :func:`load_task`"""
 
 
 class Result(Evaluated):
@@ -93,46 +108,28 @@ def evaluate_cell(context: CellContext, recordings: Sequence[Path] | Dataset) ->
     DataError
         If a set is empty, has one class only, or its labels never change.
     """
-    task, estimator, seed = context.task, context.estimator, context.seed
-    data = load_task(task, recordings, context.protocol, context.split, estimator=estimator, seed=seed)
-    build = builder(estimator, context.params, task, seed, context.threads)
-    return evaluate(
-        Configured(estimator, build, context.params), data, clock=context.clock, threads=context.threads,
-        latency=context.latency,
+    task, descriptor, given = context.task, context.estimator, context.given
+    data = load_task(
+        task, recordings, context.protocol, context.split, estimator=descriptor, seed=context.seed,
+        window=context.window, step=context.step,
     )  # fmt: skip
-
-
-def evaluate(
-    estimator: Estimator | Configured,
-    data: TaskData,
-    *,
-    clock: Clock,
-    threads: int = 1,
-    latency: bool = True,
-) -> Result:
-    """Answer a task with an estimator, and measure how well and at what cost.
-
-    Parameters
-    ----------
-    estimator
-        Any object with ``fit`` and ``predict``, which stays as it is; or one that is to be made anew.
-    clock, threads, latency
-        As in :class:`CellContext`.
-    """
-    if not isinstance(estimator, Configured):
-        given = estimator
-        named = PLAIN.model_copy(update={"name": type(given).__name__})
-        estimator = Configured(named, one_model_a_component(data.task, lambda _: copy.deepcopy(given)))
-    descriptor = with_windows(estimator.descriptor, data.task, data.rules)
-    estimator, metric = replace(estimator, descriptor=descriptor), metric_called(data.task.metric)
-    rules = EventRules.of(data.task, descriptor.threshold) if data.task.kind == "events" else None
+    if given is None:
+        build = builder(descriptor, context.params, task, context.seed, context.threads)
+    else:
+        descriptor = descriptor.model_copy(update={"name": type(given).__name__})
+        build = one_model_a_component(task, lambda _: copy.deepcopy(given))
+    descriptor = with_windows(descriptor, task, data.rules)
+    fit_params = {} if given is None else routed(given, data, context.fit_params)
+    estimator = Configured(descriptor, build, context.params, fit_params)
+    metric, clock = context.metric or metric_called(task.metric), context.clock
+    rules = EventRules.of(task, descriptor.threshold) if task.kind == "events" else None
     counts = Counter(data.data.counts)
     answered: list[AnsweredFold] = []
-    with thread_limit(threads):
+    with thread_limit(context.threads):
         for number, assignment in enumerate(data.assignments):
             fitted = fitted_fold(estimator, data, assignment, metric, counts, clock)
             answered.append(answered_fold(fitted, data, descriptor, metric, rules, number, clock))
-        cost, delay_remarks = _cost(fitted, answered, data, descriptor, clock, threads, latency=latency)
+        cost, delay_remarks = _cost(fitted, answered, data, descriptor, context)
     return _result(answered, data, descriptor, metric, rules, cost, delay_remarks, counts)
 
 
@@ -141,16 +138,14 @@ def _cost(
     answered: Sequence[AnsweredFold],
     data: TaskData,
     descriptor: EstimatorDescriptor,
-    clock: Clock,
-    threads: int,
-    *,
-    latency: bool,
+    context: CellContext,
 ) -> tuple[Cost, tuple[str, ...]]:
     """Return what all folds took, and how late answers of the last fold's model are, with remarks on that."""
-    recorded, task, rules = data.recorded, data.task, data.rules
-    parts, remarks = stated_delay_ms(recorded, data.data, task, rules, descriptor, fitted.k)
+    recorded, task, rules, clock = data.recorded, data.task, data.rules, context.clock
+    looks_back = max(fitted.k, data.window - 1)
+    parts, remarks = stated_delay_ms(recorded, data.data, task, rules, descriptor, looks_back)
     p50 = p95 = largest = calls = None
-    if latency:
+    if context.latency:
         waits_s = single_row_latency_s(fitted.model, features_of(fitted.fold.test, descriptor), clock)
         p50, calls = float(1e3 * np.median(waits_s)), len(waits_s)
         p95, largest = tail_ms(waits_s)
@@ -167,7 +162,7 @@ def _cost(
         latency_n=calls,
         answer_delay_ms=answer_delay_ms(parts, descriptor.looks_at),
         delay_parts_ms=parts,
-        threads=threads,
+        threads=context.threads,
         peak_rss_mb=peak_rss_mb(),
     )
     return cost, remarks
@@ -191,7 +186,7 @@ def _result(
     score = metric.of(tested.y_true, tested.y_pred, n_classes)
     if not np.isfinite(score):
         _refuse(descriptor.name, metric, tested)
-    unit = replicates(made, data.split, tested)
+    unit = replicates(made, data.unit, tested)
     scores = {f"fold {one.name}": one.score for one in answered}
     if answered[-1].validation is not None:
         scores["validation"] = answered[-1].validation
@@ -205,9 +200,9 @@ def _result(
         if isinstance(task.target, VectorTarget):
             scores |= vector_details(task.target, tested.y_true, tested.y_pred)
             remarks.append(f"answers are vectors ({', '.join(task.target.names)}): one model per component")
-        floor, no_floor = reference_floor(task, metric, made, tested)
+        floor, no_floor = reference_floor(task, metric, data.recorded if data.window else made, tested)
         remarks.append(no_floor)
-        truth = true_force(task, made, tested)
+        truth = None if metric.function else true_force(task, made, tested)
         if floor is not None:
             own_error, interval = beyond_floor(floor, tested, unit)
             beside |= {"reference_floor": floor.value, "reference_floor_se": floor.standard_error}
@@ -218,7 +213,7 @@ def _result(
             beside["true_score"] = metric.of(truth, tested.y_pred)
             beside |= {"true_ci_low": interval.low, "true_ci_high": interval.high}
     elif rules is None:
-        sums = metric.rows(tested.y_true, tested.y_pred, n_classes).sum(axis=0)
+        sums = METRICS["accuracy"].rows(tested.y_true, tested.y_pred, n_classes).sum(axis=0)
         beside["confusion"] = confusion(sums, n_classes).astype(np.int64).tolist()
         if task.answer_per != "frame":
             beside["recordings_right"], beside["recordings_asked"] = recordings_right(tested) or (None, None)
@@ -256,7 +251,7 @@ def _result(
         fold_sizes={f"fold {one.name}": list(one.sizes) for one in answered},
         split=data.split,
         sets=sets,
-        replicates=summed(metric, tested, unit, n_classes, floor, truth),
+        replicates=summed(metric, tested, unit, n_classes, floor, truth) if data.unit else {},
         classes=classes,
         chosen=_chosen(answered) | _thresholds(answered, rules),
         search=[
@@ -289,19 +284,19 @@ def _refuse(estimator: str, metric: Metric, tested: Answers) -> None:
             f"The estimator {estimator!r} answered with numbers up to {largest:.3g}: their {metric.name} overflows.",
             hint=f"Its predict(X) must return numbers below {LARGEST:g}, in the unit of the labels.",
         )
-    raise DataError(
-        f"The {metric.name} of {len(tested)} test rows is undefined: their labels never change.",
-        hint="Choose another split.",
-    )
+    why = "no finite number" if metric.function else "undefined: their labels never change"
+    raise DataError(f"The {metric.name} of {len(tested)} test rows is {why}.", hint="Choose another split or metric.")
 
 
 def _part_taken(data: TaskData) -> tuple[list[RecordingMeta], dict[str, int], list[str]]:
     """Return the recordings that some fold uses, what no fold uses, and stamps: of leaks, of incomplete ones."""
     recorded = data.recorded
-    folds = [over_rows(one, recorded) for one in data.assignments]
+    folds = [over_rows(one, data.data, recorded) for one in data.assignments]
     used = used_rows(folds)
     took_part = [one.meta for one, mask in zip(recorded.tables, used, strict=True) if (mask & one.labelled).any()]
-    if data.split != "shuffled":
+    if data.own:
+        stamps = (*shared_groups(data.unit or "recording", data), *leak_stamps(recorded, folds))
+    elif data.split != "shuffled":
         stamps = leak_stamps(recorded, folds)
     else:
         stamps = (SHUFFLED_WHOLE_STAMP if recorded.whole else SHUFFLED_STAMP,)

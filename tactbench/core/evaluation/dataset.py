@@ -27,7 +27,7 @@ from tactbench.core.evaluation.slip_reference import SlipReference, slip_referen
 from tactbench.core.recording.completeness import INCOMPLETE
 from tactbench.core.recording.health import Finding, marking
 from tactbench.core.recording.reader import Recording, open_recording
-from tactbench.core.samples import FloatArray, IntArray, Quality, StreamData, StreamReadings
+from tactbench.core.samples import Answers, FloatArray, IntArray, Part, Quality, StreamData, StreamReadings
 from tactbench.core.spec.events import SlipTarget
 from tactbench.core.spec.recording import RecordingMeta
 from tactbench.core.spec.task import ChannelTarget, LabelTarget, TaskSpec, VectorTarget
@@ -71,6 +71,12 @@ class Table:
     apart: str = ""
     """From when to when features and target have samples, if these never meet"""
 
+    def taken(self, rows: slice | IntArray) -> Table:
+        """Return some of its rows."""
+        columns = {name: getattr(self, name) for name in ("X", "y", "labelled", "force", "time_s", "row")}
+        kept: dict[str, Any] = {name: None if one is None else one[rows] for name, one in columns.items()}
+        return replace(self, **kept, groups={name: one[rows] for name, one in self.groups.items()})
+
     @property
     def slip(self) -> SlipReference:
         """The reference, of a task that asks for it."""
@@ -103,17 +109,18 @@ class Dataset:
         return tuple(table.meta for table in self.tables)
 
 
+def at_rows(tables: Sequence[Table], columns: Sequence[npt.NDArray[Any]], rows: Part | Answers) -> npt.NDArray[Any]:
+    """Return (m, …) what columns of recordings, one of (n, …) each, have at the rows of a set."""
+    found = np.empty((len(rows), *columns[0].shape[1:]), dtype=np.result_type(*columns))
+    for place in np.unique(rows.recording):
+        mine = rows.recording == place
+        found[mine] = columns[place][np.searchsorted(tables[place].row, rows.row[mine])]
+    return found
+
+
 def thinned(data: Dataset, every: int) -> Dataset:
     """Return every such row of each recording, from its first: what a sensor so many times slower would have given."""
-    if every == 1:
-        return data
-
-    def of(table: Table) -> Table:
-        columns = {name: getattr(table, name) for name in ("X", "y", "labelled", "force", "time_s", "row")}
-        kept: dict[str, Any] = {name: None if one is None else one[::every] for name, one in columns.items()}
-        return replace(table, **kept, groups={name: one[::every] for name, one in table.groups.items()})
-
-    return replace(data, tables=tuple(map(of, data.tables)))
+    return replace(data, tables=tuple(table.taken(slice(None, None, every)) for table in data.tables))
 
 
 def load_dataset(task: TaskSpec, recordings: Sequence[Path], *, include_incomplete: bool = False) -> Dataset:

@@ -49,7 +49,7 @@ def stated_delay_ms(
     recorded, made
         The recordings as they were read, and with the features that the answers used.
     k
-        Rows that the mean filter looks back.
+        Rows that the mean filter, or a window, looks back.
 
     Returns
     -------
@@ -227,7 +227,7 @@ def single_row_preparation_s(
     sets: taring if `tared`, scaling, the mean over the window. Rows of `X` stand for raw readings:
     values change no time.
     """
-    rest, scale = np.zeros(X.shape[1]), FeatureScale(np.zeros(X.shape[1]), np.ones(X.shape[1]))
+    rest, scale = np.zeros(X.shape[-1]), FeatureScale(np.zeros(X.shape[-1]), np.ones(X.shape[-1]))
     segment = np.zeros(k + 1, dtype=np.int64)
 
     def ready(readings: FloatArray) -> FloatArray:

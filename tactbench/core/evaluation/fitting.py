@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import importlib
 import itertools
 import warnings
 from collections import Counter
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from inspect import signature
 from typing import Any
 
 import numpy as np
@@ -14,6 +16,7 @@ import numpy.typing as npt
 
 from tactbench.core.errors import DataError, PluginContractError, TactbenchError, UnknownNameError, UsageError
 from tactbench.core.evaluation.dataset import Dataset
+from tactbench.core.evaluation.folds import TaskData
 from tactbench.core.evaluation.metrics import METRICS, Metric
 from tactbench.core.evaluation.protocols import ProtocolSpec
 from tactbench.core.evaluation.sets import keep, part, scale_of, taken
@@ -22,6 +25,7 @@ from tactbench.core.plugins.interfaces import Estimator
 from tactbench.core.plugins.registry import load_object
 from tactbench.core.samples import FloatArray, Part
 from tactbench.core.spec.rig import EstimatorDescriptor
+from tactbench.core.spec.row import lower_is_better
 from tactbench.core.spec.task import TaskSpec, VectorTarget
 
 Build = Callable[[Mapping[str, Any]], Estimator]
@@ -67,11 +71,11 @@ class PerComponent:
         self._build = build
         self._models: list[Estimator] = []
 
-    def fit(self, X: FloatArray, y: npt.NDArray[Any]) -> PerComponent:
+    def fit(self, X: FloatArray, y: npt.NDArray[Any], **params: Any) -> PerComponent:
         """Fit a model to X (n, p) and each column of y (n, components)."""
         self._models = [self._build() for _ in range(y.shape[1])]
         for model, column in zip(self._models, y.T, strict=True):
-            model.fit(X, np.ascontiguousarray(column))
+            model.fit(X, np.ascontiguousarray(column), **params)
         return self
 
     def predict(self, X: FloatArray) -> npt.NDArray[Any]:
@@ -79,25 +83,51 @@ class PerComponent:
         return np.column_stack([model.predict(X) for model in self._models])
 
 
-def fit(model: Estimator, X: FloatArray, y: npt.NDArray[Any], name: str, counts: Counter[str]) -> None:
-    """Fit `model` to X (n, p) and y (n,) or (n, components).
+def fit(model: Estimator, X: FloatArray, y: npt.NDArray[Any], name: str, counts: Counter[str], **params: Any) -> None:
+    """Fit `model` to X (n, p) and y (n,) or (n, components), with what else its ``fit`` takes.
 
     A warning (a solver that did not converge …) is counted under the estimator's `name` and stands in the row; on
     standard error nobody would connect it with a score. Raises DataError if the estimator refuses the data.
     """
+    refused = (ValueError, ArithmeticError, *((TypeError,) if params else ()))
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
         try:
-            model.fit(X, y)
-        except (ValueError, ArithmeticError, np.linalg.LinAlgError) as error:
+            model.fit(X, y, **params)
+        except refused as error:
             if isinstance(error, TactbenchError):
                 raise
+            wide, more = " x ".join(map(str, X.shape[1:])), f", params {', '.join(params)}" if params else ""
             raise DataError(
-                f"The estimator {name!r} could not be fitted to {len(X)} rows of {X.shape[1]} features: {error}",
+                f"The estimator {name!r} could not be fitted to {len(X)} rows of {wide} features{more}: {error}",
                 hint="Check its parameters, or use another estimator.",
             ) from error
     for kind in sorted({warning.category.__name__ for warning in caught}):
         counts[f"fits of {name} with a {kind}"] += 1
+
+
+def routed(estimator: Estimator, data: TaskData, given: Mapping[str, Any]) -> dict[str, Any]:
+    """Return what ``fit`` of an object is given beside X and y, under the names that scikit-learn has for it.
+
+    `given`, where a text under ``groups`` or ``STEP__groups`` is the name of a label; and the groups of the rows where
+    the object, or a step of it, searches parameters by cross-validation or names them in its ``fit``.
+    """
+    found = {}
+    for name, value in given.items():
+        rows = name.rpartition("__")[2] in ("groups", "sample_weight")
+        sized = not isinstance(value, str) and np.shape(value)[:1] == data.y.shape[:1]
+        found[name] = data.per_row(f"params[{name!r}]", value) if rows else np.asarray(value) if sized else value
+    if importlib.import_module("sklearn").get_config()["enable_metadata_routing"]:
+        routing = importlib.import_module("sklearn.utils.metadata_routing").get_routing_for_object(estimator)
+        takes = sorted(routing.consumes("fit", ["groups"]))
+    else:
+        steps = [("groups", estimator), *((f"{name}__groups", one) for name, one in getattr(estimator, "steps", ()))]
+        search = importlib.import_module("sklearn.model_selection._search").BaseSearchCV
+        takes = [
+            name for name, one in steps
+            if isinstance(one, search) or (hasattr(one, "fit") and "groups" in signature(one.fit).parameters)
+        ]  # fmt: skip
+    return {**dict.fromkeys(takes, data.groups), **found}
 
 
 def answers(
@@ -222,5 +252,6 @@ def select(
                 answered.append(combined)
             score = metric.of(np.concatenate(truth), np.concatenate(answered), n_classes)
             tried.append(Choice(params, k, score))
-    best = max(tried, key=lambda candidate: metric.sign * candidate.score)  # of equals the first
+    best_of = min if lower_is_better(metric.name) else max
+    best = best_of(tried, key=lambda candidate: candidate.score)  # of equals the first
     return replace(best, compared=tuple(tried))

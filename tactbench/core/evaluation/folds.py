@@ -3,21 +3,29 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from tactbench.core.errors import DataError, NotApplicable
-from tactbench.core.evaluation.dataset import Dataset, load_dataset, thinned
+from tactbench.core.errors import DataError, NotApplicable, wrong
+from tactbench.core.evaluation.dataset import Dataset, at_rows, load_dataset, thinned
 from tactbench.core.evaluation.frames import framed
-from tactbench.core.evaluation.protocols import ProtocolSpec, protocol_called, without_options
-from tactbench.core.evaluation.sets import asked_for, tare_s, tared
-from tactbench.core.evaluation.splits import Assignment, choose_split, make_splits, with_validation
+from tactbench.core.evaluation.protocols import ProtocolSpec, protocol_called, shots, without_options
+from tactbench.core.evaluation.sets import apart, asked_for, tare_s, tared, windowed
+from tactbench.core.evaluation.splits import (
+    SPLITS_WITHOUT_GROUPS,
+    Assignment,
+    Mask,
+    OwnSplit,
+    choose_split,
+    make_splits,
+    with_validation,
+)
 from tactbench.core.evaluation.summaries import is_summarised, summarised, with_windows
-from tactbench.core.samples import FloatArray, IntArray
+from tactbench.core.samples import FloatArray, IntArray, Part
 from tactbench.core.spec.rig import EstimatorDescriptor
 from tactbench.core.spec.task import TaskSpec
 
@@ -38,11 +46,17 @@ class TaskData:
     recorded: Dataset
     """the recordings as they were read"""
     data: Dataset
-    """the same as rows to be answered: samples, frames, or one row a recording"""
+    """the same as rows to be answered: samples, windows of them, frames, or one row a recording"""
     assignments: tuple[Assignment, ...]
     """which rows of each recording are for what, fold by fold"""
     held_back: bool = False
     """a share of the training groups is what thresholds are chosen on: no recording has the role validation"""
+    unit: str | None = "session"
+    """name of the groups that are held out, which intervals are over; None: the caller's own split names none"""
+    own: bool = False
+    """the split is the caller's own"""
+    window: int = 0
+    """rows of a window; 0: rows are answered one by one"""
 
     def __repr__(self) -> str:
         counts = f"X {self.X.shape}, {len(self.assignments)} folds of {len(self.data.tables)} recordings"
@@ -50,7 +64,7 @@ class TaskData:
 
     @property
     def X(self) -> FloatArray:  # noqa: N802  (as in scikit-learn)
-        """Return (n, features) readings of the rows that the protocol looks at and that have a label."""
+        """Return (n, features), of windows (n, window, features), of the rows that are asked for and have a label."""
         return self._joined([tared(table) if self.rules.tare else table.X for table in self.data.tables])
 
     @property
@@ -82,19 +96,50 @@ class TaskData:
             for one in self.assignments
         ]
 
+    def per_row(self, argument: str, given: Any) -> npt.NDArray[Any]:
+        """Return (n,) values, one for each row of `X`: an array that was given, or the labels of a name."""
+        if isinstance(given, str):
+            known = set.intersection(*(set(table.groups) for table in self.data.tables))
+            if given not in known:
+                raise wrong(argument, given, f"a label of the recordings ({', '.join(sorted(known))}), or an array")
+            return self._joined([table.groups[given] for table in self.data.tables])
+        column, n = np.asarray(given), len(self.y)
+        if column.shape != (n,) or (column != column).any():  # NaN is no group, and weighs nothing
+            raise wrong(argument, given, f"the name of a label, or an array of {n} values, one for each row of X")
+        return column
+
+    def at(self, part: Part, given: Any) -> Any:
+        """Return the values of the labelled rows of a set, of an array of one for each row of `X`; or what it is."""
+        if not isinstance(given, np.ndarray) or given.shape[:1] != self.y.shape[:1]:
+            return given
+        return at_rows(self.data.tables, self.spread(given), part)
+
+    def spread(self, column: npt.NDArray[Any]) -> list[npt.NDArray[Any]]:
+        """Return (n,) values of the rows of `X` recording by recording; rows that are not in it have an empty one."""
+        found, before = [], 0
+        for mask in self._there():
+            found.append(np.zeros((len(mask), *column.shape[1:]), dtype=column.dtype))
+            found[-1][mask] = column[before : before + mask.sum()]
+            before += int(mask.sum())
+        return found
+
+    def _there(self) -> list[Mask]:
+        return [asked_for(table, self.rules) & table.labelled for table in self.data.tables]
+
     def _joined(self, columns: Sequence[npt.NDArray[Any]]) -> npt.NDArray[Any]:
-        there = [asked_for(table, self.rules) & table.labelled for table in self.data.tables]
-        return np.concatenate([column[mask] for column, mask in zip(columns, there, strict=True)])
+        return np.concatenate([column[mask] for column, mask in zip(columns, self._there(), strict=True)])
 
 
 def load_task(
     task: TaskSpec,
     recordings: Sequence[Path] | Dataset,
     protocol: str,
-    split: str | None = None,
+    split: str | OwnSplit | None = None,
     *,
     estimator: EstimatorDescriptor = PLAIN,
     seed: int = 0,
+    window: int = 0,
+    step: int = 1,
 ) -> TaskData:
     """Return recordings as rows and folds.
 
@@ -109,6 +154,8 @@ def load_task(
         window), and whether a threshold has to be chosen.
     seed
         Of split ``shuffled``.
+    window, step
+        Rows of a window, 0 for none, and from its end to that of the next; see :func:`windowed`.
 
     Raises
     ------
@@ -126,13 +173,25 @@ def load_task(
             hint=f"Use protocol `{without_options(protocol)}`.",
         )
     recorded = thinned(recorded, rules.every)
-    split = choose_split(task, rules, recorded, split)
+    own = isinstance(split, OwnSplit)
+    name = split.name if isinstance(split, OwnSplit) else choose_split(task, rules, recorded, split)
+    if own and (rules.roles_only or rules.first_row_only):
+        raise NotApplicable(f"Protocol {protocol!r} has a split of its own, not {name}.", hint="Use `deployable`.")
     if rules.tare:
         tare_s(recorded)  # refuses recordings of which some only can be tared
     data = framed(recorded, task, rules, estimator) if frames else summarised(recorded, task, rules)
-    assignments = make_splits(data, split, seed, max(estimator.window_grid), one_by_one=split in task.campaigns)
-    if not assignments:
-        raise DataError("No fold could be made of these recordings.", hint="Choose another split.")
+    if window:
+        data = windowed(data, task, rules, window, step)
+    unit: str | None = "session" if name in SPLITS_WITHOUT_GROUPS or shots(name) else name
+    if isinstance(split, OwnSplit):
+        data, unit, assignments = _own_folds(split, TaskData(task, rules, name, recorded, data, ()))
+    else:
+        assignments = make_splits(data, name, seed, max(estimator.window_grid), one_by_one=name in task.campaigns)
+    if window:
+        assignments = [apart(one, window, step) for one in assignments]
+    if not any(mask.any() for one in assignments for mask in one.train):
+        which = f", window={window}" if window else ""
+        raise DataError(f"No fold could be made of these recordings{which}.", hint="Choose another split or window.")
     held_back = task.kind == "events" and estimator.threshold is None and assignments[0].validation is None
     if held_back:
         assignments = [with_validation(one, data) for one in assignments]
@@ -141,4 +200,19 @@ def load_task(
             f"{estimator.name} looks at the time alone, which not all of these recordings state.",
             hint="State the clock in the mapping.",
         )
-    return TaskData(task, rules, split, recorded, data, tuple(assignments), held_back)
+    return TaskData(task, rules, name, recorded, data, tuple(assignments), held_back, unit, own, window)
+
+
+def _own_folds(own: OwnSplit, made: TaskData) -> tuple[Dataset, str | None, list[Assignment]]:
+    """Return the rows with the caller's groups, what these are called, and the caller's folds."""
+    data, name, groups = made.data, own.groups if isinstance(own.groups, str) else "group", None
+    if own.groups is not None:
+        groups = made.per_row("groups", own.groups)
+        columns = made.spread(groups.astype(np.str_))
+        tables = zip(data.tables, columns, strict=True)
+        data = replace(data, tables=tuple(replace(one, groups={**one.groups, name: mine}) for one, mine in tables))
+    masks = [[made.spread(np.isin(np.arange(len(made.y)), places)) for places in fold]
+             for fold in own.folds(made.X, made.y, groups)]  # fmt: skip
+    inside = "session" if groups is None else name
+    folds = [Assignment(str(at), tuple(train), tuple(test), groups=inside) for at, (train, test) in enumerate(masks, 1)]
+    return data, None if groups is None else name, folds

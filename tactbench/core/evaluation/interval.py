@@ -96,21 +96,23 @@ def score_interval(
     .. [1] Cameron, Gelbach and Miller 2008, Bootstrap-based improvements for inference with clustered errors.
     .. [2] Clopper and Pearson 1934, The use of confidence or fiducial limits illustrated in the case of the binomial.
     """
-    rows = metric.rows(y, predicted, n_classes)
-    sums = unit.sums(rows)
-    if not unit.enough(y, n_classes) or np.isfinite(own_scores(metric, sums, n_classes)).sum() < ENOUGH_UNITS:
+    if not unit.enough(y, n_classes):
         return Interval()
-    strata, score = unit.strata(y, n_classes), float(metric.score(sums.sum(axis=0), n_classes))
-    scale = transform_of(metric.name, score, len(y))
-    without = scale.there(metric.score(sums.sum(axis=0) - sums, n_classes))
+    own, without = unit_scores(metric, y, predicted, unit, n_classes)
+    if np.isfinite(own).sum() < ENOUGH_UNITS:
+        return Interval()
+    strata, score = unit.strata(y, n_classes), metric.of(y, predicted, n_classes)
+    scale = transform_of(metric, score, len(y))
+    without = scale.there(without)
     without = np.where(np.isfinite(without), without, scale.there(score))  # R² of labels that are all alike
-    n = len(sums)
+    n = len(own)
     freedom = (n - len(np.unique(strata))) / (2 if metric.kind == "regression" else 1)
     method = f"jackknife over {n} {plural(unit.name)} (Student's t, {freedom:g} degrees of freedom, {scale.name})"
     reach = float(student_quantile(freedom)) * float(np.sqrt((influences(without, strata) ** 2).sum()))
     ends = [float(scale.back(scale.there(score) + one * reach)) for one in (-1.0, 1.0)]
     low, high = min(*ends, score), max(*ends, score)
-    if metric.kind != "regression":
+    if metric.kind != "regression" and metric.function is None:
+        sums = unit.sums(metric.rows(y, predicted, n_classes))
         if metric.kind == "events":
             right, asked = sums.T
         else:
@@ -139,6 +141,18 @@ def _few_mistakes(score: float, low: float, high: float, wrong: int, n: int) -> 
         return low, 1.0
     rare = importlib.import_module("scipy.special").betaincinv(wrong, n - wrong + 1, tail)
     return low, max(high, 1 - (1 - score) * float(rare) * n / wrong)
+
+
+def unit_scores(
+    metric: Metric, y: npt.NDArray[Any], predicted: npt.NDArray[Any], unit: ReplicateUnits, n_classes: int
+) -> tuple[FloatArray, FloatArray]:
+    """Return (units,) the score of each by itself, and (units,) those of all others together."""
+    if metric.function is not None:
+        each = [unit.codes == code for code in range(len(unit.labels))]
+        own, others = ([metric.of(y[mask ^ out], predicted[mask ^ out]) for mask in each] for out in (False, True))
+        return np.array(own), np.array(others)
+    sums = unit.sums(metric.rows(y, predicted, n_classes))
+    return own_scores(metric, sums, n_classes), own_scores(metric, sums.sum(axis=0) - sums, n_classes)
 
 
 def own_scores(metric: Metric, sums: FloatArray, n_classes: int) -> FloatArray:
@@ -191,11 +205,11 @@ class ScoreTransform:
     back: Callable[[Any], Any]
 
 
-def transform_of(metric: str, score: float, n: int) -> ScoreTransform:
+def transform_of(metric: Metric, score: float, n: int) -> ScoreTransform:
     """Return the scale of a metric on which Student's interval is to be made.
 
     The upper end of an error is infinite beyond ten times its `score`; a share of `n` rows is never nearer to 0 or 1
-    than half of one.
+    than half of one. Nothing is known of the range of a metric of the caller's own: its scale is its own.
 
     Notes
     -----
@@ -204,14 +218,16 @@ def transform_of(metric: str, score: float, n: int) -> ScoreTransform:
     one side: their logarithmic odds have (Agresti 2013, Categorical data analysis, section 3.1). Both are measured in
     ``benchmarks/coverage.py``.
     """
-    if metric in ("rmse", "mae", "mean_euclidean_error"):
+    if metric.function is not None:
+        return ScoreTransform("its own scale", np.asarray, np.asarray)
+    if metric.name in ("rmse", "mae", "mean_euclidean_error"):
         least = max(score, np.finfo(np.float64).tiny ** 0.5) / 1e3
         return ScoreTransform(
             "reciprocal scale",
             lambda x: 1.0 / np.maximum(x, least),
             lambda x: 1.0 / x if x > 1.0 / (FURTHEST * max(score, least)) else np.inf,
         )
-    if metric == "r2":
+    if metric.name == "r2":
         return ScoreTransform(
             "scale of log(1 − R²)", lambda x: np.log(np.maximum(1.0 - x, 0.5 / n)), lambda x: 1.0 - np.exp(x)
         )

@@ -5,6 +5,7 @@ Each metric turns rows into a few numbers that may be summed, and sums into a sc
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
@@ -12,7 +13,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from tactbench.core.errors import UnknownNameError
+from tactbench.core.errors import UnknownNameError, UsageError
 from tactbench.core.samples import FloatArray
 from tactbench.core.spec.row import HIGH_ERROR, MEDIAN_ERROR, TRUE
 from tactbench.core.spec.task import VECTOR_METRIC, VectorTarget
@@ -27,21 +28,31 @@ class Metric:
 
     name: str
     kind: str
-    higher_is_better: bool
     rows: Rows
     """(y, prediction, number of classes) -> (n, m) summands"""
     score: Score
     """(…, m) sums and the number of classes -> (…,) scores"""
     vector: bool = False
     """Truth and predictions are (n, components)."""
-
-    @property
-    def sign(self) -> float:
-        """1 if a higher score is better, else -1."""
-        return 1.0 if self.higher_is_better else -1.0
+    function: Callable[[npt.NDArray[Any], npt.NDArray[Any]], Any] | None = None
+    """(y, prediction) -> score, of a metric of the caller's own, which is no sum over rows"""
 
     def of(self, y: npt.NDArray[Any], predicted: npt.NDArray[Any], n_classes: int = 0) -> float:
-        """Return the score of `predicted` against `y`; infinite where squares of the answers overflow."""
+        """Return the score of `predicted` against `y`; infinite where squares of the answers overflow.
+
+        A caller's own metric is NaN where it raises ValueError; whatever else it raises becomes UsageError.
+        """
+        if self.function is not None:
+            try:
+                with warnings.catch_warnings(action="ignore"):
+                    return float(self.function(y, predicted))
+            except (ValueError, ArithmeticError):
+                return float("nan")
+            except Exception as error:
+                raise UsageError(
+                    f"The metric {self.name} cannot be computed of {len(y)} rows: {type(error).__name__}: {error}.",
+                    hint="`metric` takes a function of (y, prediction) that returns a number.",
+                ) from error
         with np.errstate(over="ignore", invalid="ignore"):
             return float(self.score(self.rows(y, predicted, n_classes).sum(axis=0), n_classes))
 
@@ -123,14 +134,14 @@ def _of_events(y: npt.NDArray[Any], predicted: npt.NDArray[Any], _: int) -> Floa
 METRICS = {
     metric.name: metric
     for metric in (
-        Metric("rmse", "regression", False, _squares, _rmse),
-        Metric("mae", "regression", False, _mean_of(np.abs), ratio),
-        Metric(VECTOR_METRIC, "regression", False, _mean_of(lambda d: np.linalg.norm(d, axis=1)), ratio, vector=True),
-        Metric("r2", "regression", True, _explained, _r2),
-        Metric("accuracy", "classification", True, _pairs, _accuracy),
-        Metric("balanced_accuracy", "classification", True, _pairs, _balanced),
-        Metric("macro_f1", "classification", True, _pairs, _macro_f1),
-        Metric("recall_area", "events", True, _of_events, ratio),
+        Metric("rmse", "regression", _squares, _rmse),
+        Metric("mae", "regression", _mean_of(np.abs), ratio),
+        Metric(VECTOR_METRIC, "regression", _mean_of(lambda d: np.linalg.norm(d, axis=1)), ratio, vector=True),
+        Metric("r2", "regression", _explained, _r2),
+        Metric("accuracy", "classification", _pairs, _accuracy),
+        Metric("balanced_accuracy", "classification", _pairs, _balanced),
+        Metric("macro_f1", "classification", _pairs, _macro_f1),
+        Metric("recall_area", "events", _of_events, ratio),
     )
 }
 
@@ -139,7 +150,7 @@ def _excess(sums: FloatArray, _: int) -> FloatArray:
     return ratio(sums) - ratio(sums[..., 2:])
 
 
-EXCESS = Metric("excess_square", "regression", False, _squares, _excess)
+EXCESS = Metric("excess_square", "regression", _squares, _excess)
 """Mean square beyond the floor of the reference, below zero where chance has it so: what errors of force are ranked by.
 Its sums are a RMSE's, then squares and degrees of freedom of the unloaded holds; no task may ask for it.
 """

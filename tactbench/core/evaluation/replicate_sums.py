@@ -9,6 +9,8 @@
      "own": [0.61, …]                    the score of each by itself; None where the metric of it is undefined
      "floor": [[…, …], …],               of a RMSE whose reference has a floor: squares and degrees of freedom of its
                                          unloaded holds over each replicate
+     "scores": [0.63, …],                in place of sums, of a metric of the caller's own: the jackknife's
+                                         pseudo-values, whose mean is the score and whose spread its error
      "true": {"sums": …, "own": …}       of an error of force: both against the force that a simulated rig exerted
 
 A classification's summands are a table of true and given classes, mostly empty: a line of sums then is ``column, count,
@@ -23,23 +25,19 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from tactbench.core.evaluation.dataset import Dataset
-from tactbench.core.evaluation.interval import ReplicateUnits, own_scores
+from tactbench.core.evaluation.dataset import Dataset, at_rows
+from tactbench.core.evaluation.interval import ReplicateUnits, own_scores, unit_scores
 from tactbench.core.evaluation.metrics import EXCESS, Metric
-from tactbench.core.evaluation.protocols import shots
 from tactbench.core.evaluation.reference_floor import Floor
-from tactbench.core.evaluation.splits import SPLITS_WITHOUT_GROUPS
 from tactbench.core.samples import Answers, FloatArray
 
 
-def replicates(data: Dataset, split: str, tested: Answers) -> ReplicateUnits:
-    """Return the unit of replication of every test row: what the split keeps apart, or else the session."""
-    name = "session" if split in SPLITS_WITHOUT_GROUPS or shots(split) else split
-    values = np.empty(len(tested), dtype=object)
-    for place in np.unique(tested.recording):
-        table, mine = data.tables[place], tested.recording == place
-        values[mine] = table.groups[name][np.searchsorted(table.row, tested.row[mine])]
-    labels, codes = np.unique(values.astype(np.str_), return_inverse=True)
+def replicates(data: Dataset, name: str | None, tested: Answers) -> ReplicateUnits:
+    """Return which unit of replication of that name every test row belongs to; None: all rows are one."""
+    if name is None:
+        return ReplicateUnits("", np.zeros(len(tested), dtype=np.int64), ("",))
+    values = at_rows(data.tables, [table.groups[name] for table in data.tables], tested)
+    labels, codes = np.unique(values, return_inverse=True)
     return ReplicateUnits(name, codes.reshape(-1).astype(np.int64), tuple(labels.tolist()))
 
 
@@ -53,23 +51,31 @@ def summed(
 ) -> dict[str, Any]:
     """Return what a row keeps of its replicates; `truth` is the force that was exerted, (n,), where it is known."""
     strata = unit.strata(tested.y_true, n_classes)
+    kept = {"unit": unit.name, "names": list(unit.labels), "strata": strata.tolist() if strata.any() else None}
+    if metric.function is not None:
+        score = metric.of(tested.y_true, tested.y_pred)
+        own, without = unit_scores(metric, tested.y_true, tested.y_pred, unit, n_classes)
+        without = np.where(np.isfinite(without), without, score)
+        carried = score + (len(own) - 1) * (without.mean() - without)
+        return {**kept, "strata": None, "own": _plain(own), "scores": _plain(carried)}
 
     def against(y: npt.NDArray[Any]) -> dict[str, Any]:
         sums = unit.sums(metric.rows(y, tested.y_pred, n_classes))
         lines = [_without_needless_points(line) for line in sums.tolist()]
         if n_classes:
             lines = [[int(one) for place in np.flatnonzero(line) for one in (place, line[place])] for line in sums]
-        own = own_scores(metric, sums, n_classes)
-        return {"sums": lines, "own": [float(one) if np.isfinite(one) else None for one in own]}
+        return {"sums": lines, "own": _plain(own_scores(metric, sums, n_classes))}
 
     return {
-        "unit": unit.name,
-        "names": list(unit.labels),
-        "strata": strata.tolist() if strata.any() else None,
+        **kept,
         **against(tested.y_true),
         **({} if floor is None else {"floor": floor.by_replicate(tested, unit.codes).tolist()}),
         **({} if truth is None else {"true": against(truth)}),
     }
+
+
+def _plain(scores: FloatArray) -> list[float | None]:
+    return [float(one) if np.isfinite(one) else None for one in scores]
 
 
 def recordings_right(tested: Answers) -> tuple[int, int] | None:

@@ -16,6 +16,7 @@ from tactbench.core.evaluation.protocols import ProtocolSpec
 from tactbench.core.evaluation.splits import Assignment, Mask
 from tactbench.core.samples import FloatArray, Fold, IntArray, Part
 from tactbench.core.spec.recording import RecordingMeta
+from tactbench.core.spec.task import TaskSpec
 
 
 def hold_s(meta: RecordingMeta) -> float:
@@ -77,14 +78,15 @@ class FeatureScale:
 
 
 def moments(X: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return mean and deviation of each column in two passes, the deviation of a constant column exactly zero.
+    """Return mean and deviation of (n,) or of each column of (…, columns) in two passes, 0 of a constant one.
 
     A constant column's computed deviation is the rounding error of its mean, as large as the number of rows makes it;
     it would turn rounding into a signal. So constancy is looked up, not inferred from the deviation.
     """
-    mean = X.mean(axis=0)
-    deviation = np.sqrt(((X - mean) ** 2).mean(axis=0))
-    return mean, np.where(X.max(axis=0) > X.min(axis=0), deviation, 0.0)
+    rows = tuple(range(max(X.ndim - 1, 1)))
+    mean = X.mean(axis=rows)
+    deviation = np.sqrt(((X - mean) ** 2).mean(axis=rows))
+    return mean, np.where(X.max(axis=rows) > X.min(axis=rows), deviation, 0.0)
 
 
 @dataclass(frozen=True)
@@ -178,13 +180,50 @@ def scale_of(protocol: ProtocolSpec, train: SetRows, other: SetRows) -> FeatureS
     return FeatureScale(*moments((other if protocol.scaled_by == "each set" else train).X))
 
 
+def windowed(data: Dataset, task: TaskSpec, rules: ProtocolSpec, window: int, step: int) -> Dataset:
+    """Return windows of each recording as rows to be answered, `X` (n, window, channels) in order of time.
+
+    A window has `window` consecutive rows that the protocol keeps, tared as it has it, and is labelled as its last row
+    is; the next one ends `step` rows later. Raises NotApplicable where rows are no consecutive samples.
+    """
+    own = task.answer_per == "frame" or task.summaries or task.features_by
+    if own or rules.three_sigma or rules.first_row_only or rules.k is not None:
+        raise NotApplicable(
+            f"window={window} needs runs of samples as they are, which "
+            f"{f'task {task.name!r}' if own else f'protocol {rules.name!r}'} does not answer.",
+            hint="Use protocol `deployable` and a task of samples, or leave `window` out.",
+        )
+
+    def of(table: Table) -> Table:
+        rows = asked_for(table, rules)
+        last = np.flatnonzero(rows)[window - 1 :: step]
+        X = np.zeros((0, window, table.X.shape[1]))
+        if len(last):
+            kept = (tared(table) if rules.tare else table.X)[rows]
+            X = np.lib.stride_tricks.sliding_window_view(kept, window, axis=0)[::step].transpose(0, 2, 1)
+        return replace(table.taken(last), X=X, readings=())
+
+    return replace(data, tables=tuple(map(of, data.tables)))
+
+
+def apart(fold: Assignment, window: int, step: int) -> Assignment:
+    """Return a fold without the training windows that have a row in common with a test window."""
+    reach = (window - 1) // step
+
+    def clear(train: Mask, test: Mask) -> Mask:
+        near = np.convolve(test, np.ones(2 * reach + 1))[reach : reach + len(test)] if len(test) else test
+        return np.asarray(train & (near < 0.5))
+
+    return replace(fold, train=tuple(map(clear, fold.train, fold.test)))
+
+
 def prepared(assignment: Assignment, data: Dataset, rules: ProtocolSpec, k: int, counts: Counter[str]) -> Fold:
     """Return X and y of one fold: kept, scaled and filtered over `k` + 1 samples as the protocol has it.
 
     `counts` is told what was left out, and which features never change.
     """
     train = keep(data, rules, assignment.train, "training", counts)
-    for name, width in zip(data.features, np.ptp(train.X, axis=0), strict=True):
+    for name, width in zip(data.features, np.ptp(train.X, axis=tuple(range(train.X.ndim - 1))), strict=True):
         if width == 0:
             counts[f"folds in which {name} never changes in training"] += 1
 

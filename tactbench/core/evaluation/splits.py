@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import re
+import warnings
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -13,10 +15,12 @@ import numpy.typing as npt
 from tactbench.core.errors import DataError, NotApplicable, UsageError
 from tactbench.core.evaluation.dataset import Dataset, Table
 from tactbench.core.evaluation.protocols import FIRST_FRAME, ProtocolSpec, shots
+from tactbench.core.samples import FloatArray
 from tactbench.core.spec.row import LEAKS
 from tactbench.core.spec.task import TaskSpec
 
 Mask = npt.NDArray[np.bool_]
+Places = npt.NDArray[np.int64]
 FOLDS = 5
 """Folds of grouped and of shuffled splits."""
 TRAIN_SHARE = 0.8
@@ -42,6 +46,52 @@ class Assignment:
     validation: tuple[Mask, ...] | None = None
     groups: str = "session"
     """Name of the groups that training and test do not share; also those of an inner split."""
+
+
+class OwnSplit:
+    """Folds that a caller gives: by an object with scikit-learn's ``split(X, y, groups)``, or as index arrays.
+
+    They are made once, so that all that is scored by them has the same, whatever the object draws.
+    """
+
+    def __init__(self, split: Any, groups: str | npt.ArrayLike | None) -> None:
+        self.groups = groups
+        self._splitter = split if hasattr(split, "split") else list(split)
+        self._folds: list[tuple[Places, Places]] = []
+
+    @property
+    def name(self) -> str:
+        """What rows and tables call it."""
+        if isinstance(self._splitter, list):
+            return f"{len(self._splitter)} given folds"
+        return " ".join(repr(self._splitter).partition(" object at 0x")[0].split())
+
+    def folds(self, X: FloatArray, y: npt.NDArray[Any], groups: npt.NDArray[Any] | None) -> list[tuple[Places, Places]]:
+        """Return the rows of X that train and those that test, fold by fold; UsageError if they are none."""
+        if not self._folds:
+            given: Any = self._splitter
+            try:
+                with warnings.catch_warnings():  # such groups tell what intervals are over
+                    warnings.filterwarnings("ignore", "The groups parameter is ignored")
+                    pairs = given if isinstance(given, list) else list(given.split(X, y, groups))
+                self._folds = [(_places(train, len(y)), _places(test, len(y))) for train, test in pairs]
+                if not self._folds:
+                    raise ValueError("there is none.")
+            except (TypeError, ValueError, IndexError) as error:
+                raise UsageError(
+                    f"split={self.name} makes no folds of {len(y)} rows: {error}",
+                    hint="`split` takes a name, an object with scikit-learn's `split(X, y, groups)`, or pairs of index "
+                    "arrays (train, test) over the rows of X; what a splitter keeps apart is given as `groups`.",
+                ) from error
+        return self._folds
+
+
+def _places(given: Any, n: int) -> Places:
+    """Return the places of rows, given as such or as a mask; ValueError or IndexError for anything else."""
+    found: Places = np.arange(n)[np.asarray(given)]
+    if len(np.unique(found)) < found.size:
+        raise ValueError("a row stands twice in one index array.")
+    return found
 
 
 def choose_split(task: TaskSpec, protocol: ProtocolSpec, data: Dataset, requested: str | None) -> str:
@@ -346,14 +396,18 @@ def _sizes(tables: Sequence[Table], masks: Sequence[Mask], group: str) -> Counte
     return sizes
 
 
-def over_rows(assignment: Assignment, recorded: Dataset) -> Assignment:
-    """Return an assignment of recordings that were made to frames, or one row each, as one of all rows recorded."""
+def over_rows(assignment: Assignment, made: Dataset, recorded: Dataset) -> Assignment:
+    """Return an assignment of what recordings were made to as one of all rows recorded.
+
+    Of windows their last rows; all rows of a recording that was made to frames, or to one row.
+    """
 
     def spread(masks: tuple[Mask, ...]) -> tuple[Mask, ...]:
         return tuple(
-            mask if len(mask) == len(table.row) else np.full(len(table.row), bool(mask[0]))
-            for mask, table in zip(masks, recorded.tables, strict=True)
-        )
+            np.isin(table.row, own.row[mask]) if own.X.ndim > 2
+            else mask if len(mask) == len(table.row) else np.full(len(table.row), bool(mask[0]))
+            for mask, own, table in zip(masks, made.tables, recorded.tables, strict=True)
+        )  # fmt: skip
 
     validation = None if assignment.validation is None else spread(assignment.validation)
     return replace(assignment, train=spread(assignment.train), test=spread(assignment.test), validation=validation)

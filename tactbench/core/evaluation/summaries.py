@@ -206,11 +206,8 @@ def in_band(stream: StreamReadings, band_hz: tuple[float, float] | None, recordi
 
 def _one_row(table: Table, features: Features) -> Table:
     """Return a recording as its last row, with other features."""
-    last = slice(-1, None)
-    labelled = np.flatnonzero(table.labelled)
-    y = table.y[labelled[:1]] if len(labelled) else table.y[last]
+    last, labelled = table.taken(slice(-1, None)), np.flatnonzero(table.labelled)
     return replace(
-        table, X=np.array([list(features.values())], dtype=np.float64), y=y, labelled=np.array([len(labelled) > 0]),
-        force=None, time_s=table.time_s[last], row=table.row[last],
-        groups={name: column[last] for name, column in table.groups.items()}, readings=(),
+        last, X=np.array([list(features.values())], dtype=np.float64), force=None, readings=(),
+        y=table.y[labelled[:1]] if len(labelled) else last.y, labelled=np.array([len(labelled) > 0]),
     )  # fmt: skip

@@ -8,15 +8,15 @@ from operator import itemgetter
 from typing import Any, TypeVar
 
 from tactbench.core.evaluation.protocols import shots
-from tactbench.core.spec.row import LOWER_IS_BETTER as LOWER_IS_BETTER
 from tactbench.core.spec.row import TRUE
+from tactbench.core.spec.row import lower_is_better as lower_is_better
 from tactbench.core.tables.text import visible
 
 Row = Mapping[str, Any]
 _Key = TypeVar("_Key")
 _Value = TypeVar("_Value")
 
-SIMULATED = "SIM (twin)"
+SIMULATED = "SIM"
 """What stands in place of the rig of simulated rows."""
 EMULATED = "EMULATED"
 """What stands before the rig of rows whose recordings came from emulated devices."""
@@ -55,7 +55,7 @@ def metric_name(row: Row) -> str:
     unit = f" [{row['unit']}]" if row["unit"] != "1" else ""
     name = row["metric"].removeprefix(TRUE)
     true = "true " if name != row["metric"] else ""
-    return visible(f"{true}{METRIC_NAMES.get(name, name)}{unit}")
+    return visible(f"{true}{METRIC_NAMES.get(name, name.partition(' (')[0])}{unit}")
 
 
 def split_name(split: str) -> str:
@@ -70,11 +70,11 @@ def held_out(row: Row) -> bool:
 
 def sign_of(row: Row) -> float:
     """Return 1 where a lower score is better, else -1: a score times it is the lower the better."""
-    return 1.0 if row["metric"] in LOWER_IS_BETTER else -1.0
+    return 1.0 if lower_is_better(row["metric"]) else -1.0
 
 
 def hardware_name(row: Row) -> str:
-    """Return what carried out a row's scenes: the twin, emulated devices on a rig, or a rig by its name."""
+    """Return what carried out a row's scenes: a simulation, emulated devices on a rig, or a rig by its name."""
     if row.get("emulated"):
         return f"{EMULATED} (rig {row['rig']})"
     return SIMULATED if row["simulated"] else f"rig {row['rig']}"

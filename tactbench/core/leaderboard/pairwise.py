@@ -12,6 +12,7 @@ from tactbench.core.leaderboard.names import Row, answer_name, grouped, hardware
 from tactbench.core.spec.matrix import ComparisonChoice
 from tactbench.core.statistics.paired import Difference, FoldDifference, difference, holm, over_folds
 from tactbench.core.tables.numbers import ABSENT, score, signed, suffix
+from tactbench.core.tables.text import visible
 from tactbench.core.tables.text_table import Entry, TextTable, finite
 
 Kind = Literal["sensors", "estimators", "protocols", "splits", "folders"]
@@ -175,7 +176,8 @@ def _title(pair: PairwiseComparison) -> str:
     protocol = [f"{row['protocol']}{' †' if row['dagger'] else ''}"] if pair.kind != "protocols" else []
     split = [split_name(row["split"])] if row["split"] and pair.kind != "splits" else []
     names = f"A = {pair.first}, B = {pair.second}"
-    return " · ".join([names, row["task"], metric_name(row), *protocol, *split, hardware_name(row)])
+    data = [visible(row["data"])] if row.get("data") else []
+    return " · ".join([*data, names, row["task"], metric_name(row), *protocol, *split, hardware_name(row)])
 
 
 def _line(pair: PairwiseComparison) -> tuple[str, ...]:

@@ -15,9 +15,10 @@ from typing import Any
 from tactbench.core.matrix.plan import Cell
 from tactbench.core.plugins.registry import Registry
 from tactbench.core.plugins.rigs import taking_part
-from tactbench.core.provenance.source import ANSWERING, RECORDING, digest_of, sources_of, versions
+from tactbench.core.provenance.source import ANSWERING, RECORDING, digest_of, identity_of, sources_of, versions
 from tactbench.core.spec.rig_file import RigFile
 from tactbench.core.spec.scene import Role, Scene
+from tactbench.core.spec.task import TaskSpec
 
 Sections = dict[str, Any]
 
@@ -35,6 +36,29 @@ class Keys:
     def of_cell(self, cell: Cell, data: Mapping[Path, str]) -> tuple[str, Sections]:
         """Return the key of a cell's result and its sections; `data` are the content digests of its recordings."""
         sections = {**self._answering(cell), "configuration": configuration_of(cell)}
+        key = digest_of(_canonical({**sections, "data": list(data.values())}))
+        return key, {**sections, "data": {path.stem: digest for path, digest in data.items()}}
+
+    def of_given(
+        self, cell: Cell, task: TaskSpec, how: Mapping[str, Any], data: Mapping[Path, str]
+    ) -> tuple[str, Sections]:
+        """Return the key of a cell that a caller in Python gives objects for, as to `solve`, and its sections.
+
+        Raises ValueError as :func:`identity_of` does.
+        """
+        tasks, metric = self.registry.tasks, how["metric"]
+        modules = [task.features_by] if task.features_by else []
+        modules += [tasks.owned(task.name).module] if task.name in tasks else []
+        named = self.registry.estimators.owned(cell.estimator) if how["given"] is None else None
+        modules += [named.module, named.descriptor.where] if named else []
+        sections = {
+            "task": digest_of(task.model_dump_json()),
+            "estimator": cell.estimator,
+            "given": identity_of({**how, "metric": metric.function or metric.name}),
+            "versions": versions(named.descriptor.distributions if named else ()),
+            "source": sources_of(modules, ANSWERING),
+            "configuration": configuration_of(cell),
+        }
         key = digest_of(_canonical({**sections, "data": list(data.values())}))
         return key, {**sections, "data": {path.stem: digest for path, digest in data.items()}}
 

@@ -6,7 +6,7 @@ import json
 import os
 import random
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -24,7 +24,6 @@ from tactbench.core.spec.task import TaskSpec
 
 if TYPE_CHECKING:
     from tactbench.core.evaluation.dataset import Dataset
-    from tactbench.core.plugins.interfaces import Estimator
     from tactbench.core.samples import Answers
 
 Row = dict[str, Any]
@@ -87,18 +86,18 @@ Solved = tuple[Row, "dict[str, Answers]"]
 """A row of plain data, and the answers by role."""
 
 
-def solve(job: Job, concurrency: int = 1, given: Estimator | None = None) -> Solved:
+def solve(job: Job, concurrency: int = 1, own: Mapping[str, Any] | None = None) -> Solved:
     """Evaluate one cell; raises whatever its plugins and recordings raise.
 
     Parameters
     ----------
     concurrency
         Pieces of work of the run that may be at work beside this one, itself included.
-    given
-        An object with ``fit`` and ``predict`` that answers in place of the job's estimator.
+    own
+        Fields of :class:`CellContext` that a caller in Python gives in place of what the job names.
     """
     cell, task, estimator, recordings, *_ = job
-    if given is None:
+    if not own or own["given"] is None:
         folder = Path.cwd()
         try:
             prepare(estimator, task.kind)
@@ -106,23 +105,16 @@ def solve(job: Job, concurrency: int = 1, given: Estimator | None = None) -> Sol
             os.chdir(folder)  # recordings lie relative to it, wherever a constructor has gone
     import numpy as np
 
-    from tactbench.core.evaluation.cell import CellContext, evaluate, evaluate_cell
-    from tactbench.core.evaluation.folds import load_task
+    from tactbench.core.evaluation.cell import CellContext, evaluate_cell
 
     began = time.perf_counter()
     # The global generators get the cell's seed: what is drawn from them does not depend on the cells before.
     random.seed(cell.seed)
     np.random.seed(cell.seed % 2**32)  # noqa: NPY002  (it is this old generator that libraries draw from)
     data = read_dataset(task, recordings, cell.include_incomplete)
-    if given is None:
-        context = CellContext(
-            task, estimator, dict(cell.params), cell.protocol, cell.split, seed=cell.seed, clock=time.perf_counter,
-            latency=cell.timed,
-        )  # fmt: skip
-        result = evaluate_cell(context, data)
-    else:
-        folds = load_task(task, data, cell.protocol, cell.split, seed=cell.seed)
-        result = evaluate(given, folds, clock=time.perf_counter, latency=cell.timed)
+    asked: dict[str, Any] = {"split": cell.split, "seed": cell.seed, "latency": cell.timed, **(own or {})}
+    context = CellContext(task, estimator, dict(cell.params), cell.protocol, clock=time.perf_counter, **asked)
+    result = evaluate_cell(context, data)
     row = {
         **opening(cell, task),
         **result.model_dump(exclude_unset=True),

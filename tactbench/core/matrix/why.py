@@ -45,9 +45,9 @@ class StoredCell:
         try:
             digests = {path: self.store.about(path)["digest"] for path in self.paths if path not in missing}
             before = self.store.cell(self.row).sections
+            key, now = Keys(self.registry).of_cell(self.cell, digests)
         except TactbenchError as error:
             return "", [str(error)]
-        key, now = Keys(self.registry).of_cell(self.cell, digests)
         if not reasons and self.store.finished(key) is not None:
             return key, []
         if missing:

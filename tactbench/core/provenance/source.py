@@ -6,6 +6,8 @@ import hashlib
 import importlib.metadata
 import importlib.util
 import json
+import pickle
+import pickletools
 import sys
 from collections.abc import Iterable, Mapping, Sequence
 from functools import lru_cache
@@ -90,3 +92,42 @@ def provenance_id(provenance: Mapping[str, Any]) -> str:
 def digest_of(text: str) -> str:
     """Return the digest that a key or an identifier is: 32 hexadecimal digits."""
     return hashlib.sha256(text.encode()).hexdigest()[:32]
+
+
+def identity_of(value: Any) -> dict[str, Any]:
+    """Return what the answers of an object depend on: a digest of its attributes, versions and sources of its classes.
+
+    Parameters
+    ----------
+    value
+        Estimators, functions, arrays or plain data. The version of an installed distribution stands for the source of
+        its classes, the file of a script for those of the script, and all files of any other package for its own.
+
+    Raises
+    ------
+    ValueError
+        If that cannot be told: of lambdas, of what is defined in a notebook or within a function.
+    """
+    import joblib
+
+    try:
+        codes = pickletools.genops(pickle.dumps(value, 2, fix_imports=False))  # this one has modules as text
+        modules = {str(argument).split()[0] for code, argument, _ in codes if code.name == "GLOBAL"}
+        script = {name: Path(sys.modules[name].__file__ or "").read_bytes() for name in modules & {"__main__"}}
+    except Exception as error:
+        raise ValueError(f"{type(error).__name__}: {error}") from error
+    tops = {name.partition(".")[0] for name in modules - script.keys()} - sys.stdlib_module_names
+    places = {top: Path(getattr(sys.modules[top], "__file__", None) or "").parts for top in tops}
+    installed = {top for top, parts in places.items() if {"site-packages", "dist-packages"}.intersection(parts)}
+    owners = _distributions()
+    source = sources_of(tops - installed, ()) | {
+        name: hashlib.sha256(text).hexdigest() for name, text in script.items()
+    }
+    of = tuple(sorted({owner for top in installed for owner in owners.get(top, ())}))
+    return {"object": joblib.hash(value), "versions": versions(of), "source": source}
+
+
+@lru_cache(maxsize=1)
+def _distributions() -> Mapping[str, list[str]]:
+    """Return what distributions brought each package that can be imported."""
+    return importlib.metadata.packages_distributions()

@@ -11,8 +11,15 @@ from tactbench.core.spec.status import Status
 
 TRUE = "true_"
 """How the name of a metric begins whose score is against the force that a simulated rig exerted."""
-LOWER_IS_BETTER = frozenset({"rmse", "mae", "mean_euclidean_error", f"{TRUE}rmse", f"{TRUE}mae"})
-"""Metrics of a row's score that are errors."""
+DIRECTIONS = (" (lower is better)", " (higher is better)")
+"""How the name of a metric ends that is the caller's own: a row tells all that a table needs."""
+
+
+def lower_is_better(metric: str) -> bool:
+    """Return whether a metric of a row's score is an error."""
+    errors = ("rmse", "mae", "mean_euclidean_error", "excess_square")
+    return metric.removeprefix(TRUE) in errors or metric.endswith(DIRECTIONS[0])
+
 
 MEDIAN_ERROR, HIGH_ERROR = "median error", "95th percentile of the error"
 """Keys of `scores` that stand beside the mean error of a vector: percentiles over the test rows."""

@@ -16,7 +16,7 @@ from tactbench.core.evaluation.interval import own_scores, student_quantile, two
 from tactbench.core.evaluation.metrics import SUMMED
 from tactbench.core.evaluation.replicate_sums import tables_of
 from tactbench.core.samples import FloatArray, IntArray
-from tactbench.core.spec.row import TRUE
+from tactbench.core.spec.row import TRUE, lower_is_better
 from tactbench.core.statistics.influence import PairableRows, scores_of, together
 from tactbench.core.statistics.replicates import FEWEST, counted
 
@@ -78,7 +78,7 @@ def difference(first: Row, second: Row) -> Difference:
     The verdict is *better* or *worse* if the interval neither contains 0 nor lies within the task's region of practical
     equivalence, *equivalent* if it lies within, else *undecided*: ranks follow the same rule.
     """
-    sign = SUMMED[first["metric"]].sign
+    sign = -1.0 if lower_is_better(first["metric"]) else 1.0
     first, second = _means(first, second)
     value = float(first["score"] - second["score"])
     groups = together([first, second])
@@ -160,15 +160,16 @@ def _difference(first: Row, value: float, deviation: float, freedom: float, **mo
     if region > 0 and -region <= low and high <= region:
         verdict = "equivalent"
     elif low > 0 or high < 0:
-        verdict = "better" if value * SUMMED[first["metric"]].sign > 0 else "worse"
+        verdict = "better" if (value < 0) == lower_is_better(first["metric"]) else "worse"
     return Difference(value, low, high, verdict=verdict, beyond=bool(low > region or high < -region), **more)
 
 
 def _own_scores(row: Row) -> FloatArray:
     """Return (replicates,) the score of each replicate by itself; NaN where the metric of it is undefined."""
-    metric, kept, n_classes = SUMMED[row["metric"]], row["replicates"], len(row["classes"])
+    kept, n_classes = row["replicates"], len(row["classes"])
     if "scores" in kept:
-        return scores_of(kept, metric.name)
+        return scores_of(kept, row["metric"])
+    metric = SUMMED[row["metric"]]
     return own_scores(metric, tables_of([kept], metric.name, n_classes)[0], n_classes)
 
 
@@ -179,12 +180,12 @@ def _share_better(apart: FloatArray) -> float | None:
 
 def exchanged(first: Row, second: Row) -> tuple[float, float]:
     """Return the p-value of exchanging two rows' answers within the replicates they share, and the least it can be."""
-    metric = SUMMED[first["metric"]]
+    name = first["metric"]
     if "scores" in first["replicates"]:
-        apart_each = scores_of(first["replicates"], metric.name) - scores_of(second["replicates"], metric.name)
+        apart_each = scores_of(first["replicates"], name) - scores_of(second["replicates"], name)
         ways, smallest = _ways(len(apart_each))
         return _share((1.0 - 2.0 * ways) @ apart_each), smallest
-    n_classes = len(first["classes"])
+    metric, n_classes = SUMMED[name], len(first["classes"])
     sums = tables_of([first["replicates"], second["replicates"]], metric.name, n_classes)
     ways, smallest = _ways(sums.shape[1])
     moved = ways.astype(np.float64) @ (sums[1] - sums[0])

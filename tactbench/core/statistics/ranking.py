@@ -9,8 +9,9 @@ import numpy as np
 import numpy.typing as npt
 
 from tactbench.core.evaluation.interval import student_quantile
-from tactbench.core.evaluation.metrics import EXCESS, SUMMED
+from tactbench.core.evaluation.metrics import EXCESS
 from tactbench.core.samples import FloatArray, IntArray
+from tactbench.core.spec.row import lower_is_better
 from tactbench.core.statistics.influence import PairableRows, scores_of, together
 from tactbench.core.statistics.rank import Rank, beyond_floor, excess_of
 
@@ -52,7 +53,7 @@ def ranks(rows: Iterable[Row]) -> dict[str, Rank]:
         return {}
     if beyond_floor(entered):
         entered = [{**row, "score": excess_of(row), "metric": EXCESS.name} for row in entered]
-    sign = SUMMED[entered[0]["metric"]].sign
+    sign = -1.0 if lower_is_better(entered[0]["metric"]) else 1.0
     entered.sort(key=lambda row: (-sign * row["score"], row["cell"]))
     error = -sign * np.array([row["score"] for row in entered], dtype=np.float64)  # the lower, the better
     groups = together(entered)
@@ -116,5 +117,5 @@ def _differed(
         for place in group.places.tolist():
             kept = rows[place]["replicates"]
             if "scores" in kept:
-                mean[place] = -SUMMED[metric].sign * scores_of(kept, metric).mean()
+                mean[place] = (1.0 if lower_is_better(metric) else -1.0) * scores_of(kept, metric).mean()
     return mean, deviation, freedom

@@ -11,7 +11,7 @@ from operator import itemgetter
 from statistics import median, median_low
 from typing import Any
 
-from tactbench.core.spec.row import LOWER_IS_BETTER, TRUE, Cost, plural
+from tactbench.core.spec.row import TRUE, Cost, lower_is_better, plural
 
 Row = Mapping[str, Any]
 _group = itemgetter("sensor", "task", "rig", "protocol", "split")
@@ -122,7 +122,7 @@ def _fill_baselines(rows: Sequence[dict[str, Any]]) -> None:
             by_group.setdefault(_group(row), []).append(row)
     bars: dict[tuple[Any, bool], float | None] = {}
     for group, members in by_group.items():
-        best = min if members[0]["metric"] in LOWER_IS_BETTER else max
+        best = min if lower_is_better(members[0]["metric"]) else max
         for timed in (False, True):
             knowing = {"reference"} if timed else {"reference", "time"}
             known = [one["score"] for one in members if one.get("looks_at") not in knowing]

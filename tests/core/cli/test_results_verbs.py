@@ -48,7 +48,7 @@ def test_rows_and_columns_are_chosen_by_name_and_unknown_names_are_refused_with_
     best = ran("leaderboard", "out", "--best", "--columns", "sensor,estimator,cell").stdout
     assert "icub    lasso      icub/force/twin/deployable/lasso\n" in best
     assert "  ols  " not in best
-    for option, given, says in (("--sensor", "icup", "Known: biotac, icub"), ("--columns", "sensor,scor", "'score'")):
+    for option, given, says in (("--sensor", "icup", "names: biotac, icub"), ("--columns", "sensor,scor", "'score'")):
         assert says in ran("leaderboard", "out", option, given, code=2).stderr
     assert "always has all columns" in ran("leaderboard", "out", "--columns", "#", "--format", "csv", code=2).stderr
 

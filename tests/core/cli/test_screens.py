@@ -48,7 +48,7 @@ def assert_one_clear_screen(done, *says):
         (("run", "--rig", "replay", "--recordings", ".", "--set", "noise_scale=2"), "simulated rigs"),
         (("leaderboard", os.devnull), os.devnull),
         (("record", "--sensor", "icub", "--rig", "replay", "--out", "press.h5"), "replay"),
-        (("record", "--sensor", "ideal", "--indenter", "knob", "--out", "no.h5"), "Known: cap, cylinder"),
+        (("record", "--sensor", "ideal", "--indenter", "knob", "--out", "no.h5"), "Known names: cap, cylinder"),
         (("choose", "--task", "shear-force"), "tactbench run --task shear-force"),
         (("cost",), "--twin"),
         (("twin", "explain", "--sensor", "icub", "--task", "grasp-stability"), "plans no scenes"),

@@ -8,12 +8,11 @@ import numpy as np
 import pytest
 
 from tactbench.core.errors import DataError, PluginContractError
-from tactbench.core.evaluation.cell import evaluate
 from tactbench.core.evaluation.fitting import answers, fit
-from tactbench.core.evaluation.folds import load_task
+from tactbench.core.evaluation.folds import PLAIN, load_task
 from tactbench.core.plugins.registry import installed
 
-from .made import evaluated, force_task, label_task, ramp, record, sessions, ticking
+from .made import evaluated, force_task, label_task, ramp, record, sessions
 
 
 class Answering:
@@ -109,7 +108,7 @@ def test_a_class_that_no_training_row_has_is_named(tmp_path):
 
 
 def test_answers_that_overflow_are_named(tmp_path):
-    data = load_task(force_task(), sessions(tmp_path, "ab", n=100), "deployable")
+    paths = sessions(tmp_path, "ab", n=100)
     far = Answering(np.full(100, 1e308))
     with pytest.raises(PluginContractError, match=r"'Answering' answered with numbers up to 1e\+308: .* overflows"):
-        evaluate(far, data, clock=ticking())
+        evaluated(force_task(), paths, PLAIN, given=far)

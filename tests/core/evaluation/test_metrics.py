@@ -66,7 +66,7 @@ def test_leaving_one_out_of_a_sum_of_means_gives_its_standard_error(strata):
 @pytest.mark.parametrize("metric", sorted(METRICS))
 @given(st.floats(0.01, 0.99))
 def test_a_scale_and_back_is_where_it_began(metric, value):
-    scale = transform_of(metric, 0.5, 1000)
+    scale = transform_of(METRICS[metric], 0.5, 1000)
     assert scale.back(scale.there(value)) == pytest.approx(value, rel=1e-9)
 
 

@@ -75,7 +75,7 @@ def test_columns_that_say_nothing_are_left_out_and_others_shown_if_asked_for():
     assert {"beyond floor [N]", "test samples", "latency p50", "cell"} <= set(grid.headers)
     (grid,) = grids(build_table([row(cell="a/b")]), View(columns=known_columns(["cell", "score", "rank", "cell"])))
     assert grid.lines == (("a/b", "0.5000", "1"),)
-    with pytest.raises(UnknownNameError, match=r"Did you mean 'score'.*Known: .*cell"):
+    with pytest.raises(UnknownNameError, match=r"Did you mean 'score'.*Known names: .*cell"):
         known_columns(["scor"])
 
 

@@ -7,7 +7,7 @@ import os
 import re
 import shutil
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import asdict, dataclass, field
 from dataclasses import replace as replaced
@@ -163,6 +163,15 @@ def import_tables(
     names = tuple(task.name for task in loaded.tasks)
     shown = {file.shown for files in sets for file in files.files.values()}
     return ImportReport(loaded.title, tuple(placed), len(shown), names, left_out, (*unused, *unused_columns(shapes)))
+
+
+def import_arrays(mapping: Mapping, raws: Iterable[RawRecording], out: Path, **about: object) -> list[Path]:
+    """Write recordings of tables in memory, as :func:`import_tables` does; their meta says what it is told `about`."""
+    sensor, reference, streams = sensor_of(mapping)
+    require_answerable(mapping, streams, out)
+    write_tasks(out, tasks_text(mapping))
+    metas = [(raw, _meta(mapping, raw, sensor, reference).model_copy(update=about)) for raw in raws]
+    return [_write(out / f"{meta.name}{ENDING}", meta, mapping, raw, streams, ()).path for raw, meta in metas]
 
 
 @contextmanager
