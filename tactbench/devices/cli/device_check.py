@@ -117,8 +117,7 @@ def _read(check: DeviceCheck, driver: Driver, seconds: float, clock: Clock) -> N
                 check.problems += _problems(found[0])
             else:
                 check.problems.append(
-                    f"Nothing came of its stream {stream.name} within {seconds:g} s. "
-                    "Is it on, connected to this port, and set to the same speed?"
+                    f"Nothing came of its stream {stream.name} within {seconds:g} s. {driver.link.silence_hint}"
                 )
 
 
