@@ -126,9 +126,7 @@ def test_it_refuses_what_it_cannot_do_and_is_in_step_again_after_noise(program):
         assert replies(link, 1)[0].number == 77
 
 
-@pytest.mark.parametrize(
-    ("hz", "runs_hz"), [(4_400_000, 4_363_636), (10_000_000, 10_000_000), (934_000, 933_852)]
-)
+@pytest.mark.parametrize(("hz", "runs_hz"), [(4_400_000, 4_363_636), (10_000_000, 10_000_000), (934_000, 933_852)])
 def test_the_clock_that_is_set_is_answered(program, hz, runs_hz):
     """240 MHz by a whole number."""
     with running(program) as link:
