@@ -27,8 +27,9 @@ def written(tmp_path, said):
     return path
 
 
-def test_the_example_is_not_refused_and_nothing_moves(capsys):
-    code, out, _ = run(["doctor", "--seconds", "0", "--rig-file", str(EXAMPLE)], capsys)
+@pytest.mark.parametrize("name", ["emulated.yaml", "fixed.yaml"])
+def test_the_examples_are_not_refused_and_nothing_moves(name, capsys):
+    code, out, _ = run(["doctor", "--seconds", "0", "--rig-file", str(EXAMPLE.with_name(name))], capsys)
     assert code == 0
     for text in ("24.7 N", "Nothing was opened", "share of the largest", "reaction", "holds without power", "ASSUMED"):
         assert text in out
