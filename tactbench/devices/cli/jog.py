@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import threading
 import time
 from collections.abc import Callable
 from contextlib import ExitStack
@@ -98,6 +99,25 @@ def move_by_steps(name: str, axis: Positioner, force: Driver, entry: ForceEntry,
         wrong = next(filter(None, found), None) or watch.old(clock(), limits)
         return ": ".join(wrong) if wrong else ""
 
+    def answer_to(text: str) -> str:
+        """Return what is answered; until then axis and force are looked at, so that nothing waits in their links."""
+        given: list[Any] = []
+
+        def wait() -> None:
+            try:
+                given.append(ask(text))
+            except BaseException as error:
+                given.append(error)
+
+        thread = threading.Thread(target=wait, daemon=True)
+        thread.start()
+        while thread.is_alive() or math.isnan(watch.force_n):
+            if look() and not thread.is_alive():
+                break
+        if isinstance(given[0], BaseException):
+            raise given[0]
+        return str(given[0]).strip()
+
     def carry_on(way: int, seconds: float) -> None:
         """Look until the axis stands; halt it where the force is wrong, unless the way leads back from there."""
         until_ns, most_n, halted = clock() + round(1e9 * seconds), abs(watch.force_n) + ceiling_n, ""
@@ -116,19 +136,15 @@ def move_by_steps(name: str, axis: Positioner, force: Driver, entry: ForceEntry,
     try:
         if not (axis.homed or axis.find_home()):
             clear = "Is it clear of the sensor, and the emergency stop within reach? Write yes: it is homed. "
-            if ask(f"The {name} is not homed. {clear}").strip() != "yes":
+            if answer_to(f"The {name} is not homed. {clear}") != "yes":
                 return
             axis.home(lambda: bool(look()))
         if not axis.enabled:
             axis.enable()
         while True:
-            for block in force.read(0.0):  # what came while the answer was waited for
-                watch.take(block, None)
             wrong = look()
-            while not wrong and math.isnan(watch.force_n):
-                wrong = look()
             where = f"{name} at {1e3 * axis.position:.3f} mm, {watch.force_n:+.3f} N{f' ({wrong})' if wrong else ''}"
-            answer = ask(f"{where}. + or -: {1e3 * STEP_M:g} mm; a number: so many mm; Enter alone: end. ").strip()
+            answer = answer_to(f"{where}. + or -: {1e3 * STEP_M:g} mm; a number: so many mm; Enter alone: end. ")
             if not answer:
                 return
             try:
