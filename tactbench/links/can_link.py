@@ -6,6 +6,7 @@ import errno
 import importlib
 import inspect
 import re
+import statistics
 import time
 from abc import abstractmethod
 from collections import Counter, deque
@@ -19,7 +20,8 @@ from tactbench.links.link import SYSTEM_ERRORS, WRITE_TIMEOUT_S, Clock, Link, ca
 WAITED_S = 60.0
 """A frame does not wait longer in a kernel's queue (assumed): a stamp that says so is not taken."""
 SYSTEMS_OWN_NS = 5_000_000
-"""Stamps that lag no more behind the system's clock are that clock's own (assumed: a wake-up takes less)."""
+"""Stamps that lag no more behind the system's clock are that clock's own, and those that scatter by more are refused
+(assumed: a wake-up takes less)."""
 LEAST_OF = 200
 """Frames of which one at least was read as it came, where none was waited for (assumed)."""
 WINDOW_NS = 5_000_000_000
@@ -107,6 +109,13 @@ class _Stamps:
         self._walls: deque[int] = deque(maxlen=4)
         self._least: deque[tuple[int, int]] = deque(maxlen=2)
         self._seen, self._known = 0, False
+        self._late: deque[int] = deque(maxlen=31)
+        """By how much stamps of frames that were waited for are older than the least age."""
+
+    @property
+    def refused(self) -> bool:
+        """Whether stamps scatter too much to be times: half of the frames that had just come were said to be old."""
+        return len(self._late) == self._late.maxlen and statistics.median(self._late) > SYSTEMS_OWN_NS
 
     def lag_ns(self) -> int:
         """Return by how much the clock of the stamps lags behind the system's; 0: it is that one, or not known yet."""
@@ -131,7 +140,9 @@ class _Stamps:
         elif age_ns < self._least[-1][1]:
             self._least[-1] = (self._least[-1][0], age_ns)
         waited_ns = age_ns - self.lag_ns()
-        return now_ns - waited_ns if 0 <= waited_ns < 1e9 * WAITED_S else now_ns
+        if waited:
+            self._late.append(waited_ns)
+        return now_ns - waited_ns if 0 <= waited_ns < 1e9 * WAITED_S and not self.refused else now_ns
 
 
 class CanBus(CanLink):
@@ -189,7 +200,7 @@ class CanBus(CanLink):
                 came = message is not None
                 if came:
                     t_ns = self._stamp(message.timestamp, waited=waited)
-                    if self._stamp.lag_ns():
+                    if self._stamp.lag_ns() or self._stamp.refused:
                         self.counts["frames stamped by another clock"] += 1
                     frame = _data_frame(message, t_ns, self.counts)
                     if frame is not None:

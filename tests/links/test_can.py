@@ -107,6 +107,18 @@ def test_stamps_of_another_clock_are_put_right(lag_s):
     assert bus.stamps.lag_ns() == pytest.approx(1e9 * lag_s, abs=1e5)
 
 
+@pytest.mark.parametrize("coarse_s", [0.05, 1.0])
+def test_stamps_that_are_too_coarse_are_refused(coarse_s):
+    bus = Bus()
+    came_s = 0.005 * np.arange(1000)
+    t_ns = []
+    for at_s in came_s:
+        bus.now_ns = round(1e9 * at_s) + 50_000
+        stamp_s = coarse_s * np.floor((at_s + 1e-9 * bus.wall_ns) / coarse_s)
+        t_ns.append(bus.stamps(stamp_s, waited=True))
+    assert np.abs(np.array(t_ns[200:]) - 1e9 * came_s[200:]).max() < 60_000
+
+
 def test_frames_that_nobody_waited_for_show_their_clock_too():
     errors_ms = Bus().errors_ms(2.0, [(0, 50_000_000)], waits=False)
     assert np.abs(errors_ms[200:]).max() < 0.06

@@ -48,7 +48,7 @@ class _Axis(NamedTuple):
             if not abs(at_m - target_m) <= self.driver.facts.near:
                 turned = (at_m - began_m) * (target_m - began_m) < 0
                 guess = ": is its direction reversed?" if turned else ""
-                fail(where, f"it is {at_m:.6g} m where {target_m:.6g} m were asked for{guess}")
+                fail(where, f"the axis is at {at_m:.6g} m where {target_m:.6g} m are expected{guess}")
         if moving:
             fail("driver.moving", f"a move has not ended {seconds:.2g} s after it began, and the axis is at its target")
 
@@ -111,12 +111,7 @@ def axis_is_homed(subject: Subject) -> None:
         if not axis.driver.homed:
             axis.refused(sum(facts.limits) / 2, "before it is homed")
         _home(axis)
-        ended_m, said_m = axis.true_m(), axis.driver.position
-        axis.wait(REST_S, lambda: False)
-        if not abs(said_m - ended_m) <= facts.near:
-            fail("driver.home", f"it says that the axis is at {said_m:g} m, and the emulator is at {ended_m:g} m")
-        if not abs(axis.true_m() - ended_m) <= facts.near:
-            fail("driver.home", f"it returns at {ended_m:g} m, and the axis goes on to {axis.true_m():g} m")
+        axis.ended("driver.home", axis.driver.position, facts.seconds(0.0, facts.speed))
 
 
 @check("device", needs="axis-is-homed")
@@ -167,17 +162,13 @@ def axis_halts_and_retreats(subject: Subject) -> None:
             with code_of("driver.move_to", subject):
                 driver.move_to(goal_m)
             axis.wait(1.0, lambda: way * (axis.true_m() - start_m) > 0.2 * (high - low))  # noqa: B023  (waited for here)
-            furthest, stays = [way * axis.true_m()], name == "halt" or math.isnan(facts.retreat)
+            stays, furthest = name == "halt" or math.isnan(facts.retreat), [way * axis.true_m()]
             with code_of(f"driver.{name}", subject):
                 getattr(driver, name)()
-            most, seconds = furthest[0] + most_m, facts.seconds(high - low, min(v, facts.retreat_speed))
-
-            def seen(way: float = way, furthest: list[float] = furthest) -> bool:
-                furthest.append(way * axis.true_m())
-                return not driver.moving
-
-            axis.wait(seconds, seen)
-            if max(furthest) > most:
-                text = f"it goes on by {1e3 * (max(furthest) - furthest[0]):.3g} mm, and {1e3 * most_m:.3g} mm follow"
+            seconds = facts.seconds(high - low, min(v, facts.retreat_speed))
+            # The condition is looked at in each step of the wait.
+            axis.wait(seconds, lambda: furthest.append(way * axis.true_m()) or not driver.moving)  # type: ignore[func-returns-value]  # noqa: B023
+            if (on_m := max(furthest) - furthest[0]) > most_m:
+                text = f"it goes on by {1e3 * on_m:.3g} mm, and {1e3 * most_m:.3g} mm follow"
                 fail(f"driver.{name}", f"{text} from the stop latency and the acceleration that it states")
             axis.ended(f"driver.{name}", axis.true_m() if stays else facts.retreat, seconds)
