@@ -17,6 +17,8 @@ PACE = {"speed_m_s": 5e-3, "acceleration_m_s2": 1.0, "corridor_m": 2e-5, "retrea
 """Options of the axis where its descriptor's `emulated_options` state no others; homing finds the lower end."""
 HOMING_S = 120.0
 """Homing takes no longer (assumed: 100 mm at 1 mm/s, and back)."""
+MOVE_S = 2.0
+"""A move of the checks takes about so long at most: an axis of a metre at 1 mm/s is not tried over all of it."""
 LOOK_S, REST_S = 1e-3, 0.3
 """Between two looks at a moving axis, and for how long it must stand where it has ended."""
 
@@ -28,6 +30,13 @@ class _Axis(NamedTuple):
     devices: EmulatedDevices
     driver: Positioner
     true_m: Callable[[], float]
+
+    def stretch(self) -> tuple[float, float]:
+        """Return the ends of a part of its travel, at most `MOVE_S` long, that begins or ends where it is."""
+        (low, high), speed = self.driver.facts.limits, self.driver.facts.speed
+        length = min(high - low, MOVE_S * speed)
+        begin = min(max(low, self.driver.position), high - length)
+        return begin, begin + length
 
     def wait(self, seconds: float, until: Callable[[], bool]) -> None:
         """Let time pass until a condition holds, for so long at most."""
@@ -123,7 +132,7 @@ def axis_goes_where_it_is_sent(subject: Subject) -> None:
     """
     with _axis(subject) as axis:
         driver, facts = axis.driver, axis.driver.facts
-        (low, high), speed = facts.limits, facts.speed
+        (low, high), speed = axis.stretch(), facts.speed
         for share in (0.5, 0.8, 0.3):
             target_m = low + share * (high - low)
             with code_of("driver.move_to", subject):
@@ -136,6 +145,7 @@ def axis_goes_where_it_is_sent(subject: Subject) -> None:
         axis.ended("driver.move_by", target_m + step_m, facts.seconds(step_m, speed))
         if not abs(by_m - target_m - step_m) <= facts.near:
             fail("driver.move_by", f"it returns {by_m:g} m and goes to {target_m + step_m:g} m")
+        low, high = facts.limits
         for beyond_m in (low - step_m, high + step_m, math.nan, math.inf):
             axis.refused(beyond_m, f"beyond its ends of travel, {low:g} to {high:g} m")
 
@@ -149,9 +159,9 @@ def axis_halts_and_retreats(subject: Subject) -> None:
     """
     with _axis(subject) as axis:
         driver, facts = axis.driver, axis.driver.facts
-        (low, high), v = facts.limits, facts.speed
         if not facts.interruptible:
             skip("it says that a move cannot be interrupted")
+        (low, high), v = axis.stretch(), facts.speed
         most_m = v * (facts.stop_latency_s + 2 * LOOK_S) + v**2 / (2 * facts.acceleration) + facts.near
         for name, goal_m in (("halt", high), ("halt", low), ("retreat", high)):
             start_m = low + 0.5 * (high - low)
@@ -161,11 +171,11 @@ def axis_halts_and_retreats(subject: Subject) -> None:
             way = math.copysign(1.0, goal_m - start_m)
             with code_of("driver.move_to", subject):
                 driver.move_to(goal_m)
-            axis.wait(1.0, lambda: way * (axis.true_m() - start_m) > 0.2 * (high - low))  # noqa: B023  (waited for here)
+            axis.wait(MOVE_S, lambda: way * (axis.true_m() - start_m) > 0.2 * (high - low))  # noqa: B023  (waited for here)
             stays, furthest = name == "halt" or math.isnan(facts.retreat), [way * axis.true_m()]
             with code_of(f"driver.{name}", subject):
                 getattr(driver, name)()
-            seconds = facts.seconds(high - low, min(v, facts.retreat_speed))
+            seconds = facts.seconds(facts.limits[1] - facts.limits[0], min(v, facts.retreat_speed))
             # The condition is looked at in each step of the wait.
             axis.wait(seconds, lambda: furthest.append(way * axis.true_m()) or not driver.moving)  # type: ignore[func-returns-value]  # noqa: B023
             if (on_m := max(furthest) - furthest[0]) > most_m:
