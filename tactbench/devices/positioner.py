@@ -303,9 +303,7 @@ class Positioner(Driver):
         except LinkTimeout:
             if self.clock() - self._asked_ns > 1e9 * SILENT_S:
                 self._asked_ns = 0
-                raise PositionerSilentError(
-                    f"{self.device} does not answer {question!r}; it sent {self._rest!r}.", hint=self.link.silence_hint
-                ) from None
+                raise PositionerSilentError(f"{self.device} does not answer {question!r}.") from None
         *lines, self._rest = self._rest.split(b"\n")
         return lines
 
