@@ -11,6 +11,11 @@ class Axis(Positioner):
     device, resolution_m = "sound-axis", 1e-6
     stop_latency_s = 0.06
 
+    def start(self):
+        self.link.discard()  # the answer to what was asked before
+        self.answered()
+        super().start()
+
     def home(self, stop=lambda: False):
         self.homed = False
         self._send(b"H\n")
