@@ -56,8 +56,8 @@ class RowDriver(Driver, Generic[L]):
 
     @property
     def counts(self) -> Mapping[str, int]:
-        """What was counted, by name."""
-        return dict(self.counted)
+        """What was counted, by name, by the driver and by its link."""
+        return {**getattr(self.link, "counts", {}), **self.counted}
 
     def start(self) -> None:
         """Drop what came before, and :meth:`begin`."""
