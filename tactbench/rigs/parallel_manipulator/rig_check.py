@@ -76,7 +76,8 @@ def check(file: RigFile) -> RigCheck:
         try:
             facts[name] = kind.facts_of(options)
         except RigError as error:
-            raise UsageError(f"{name}: {error.message}", hint=error.hint) from error
+            said = " ".join([f"{name}: {error.message}", *_axis_problems(settings, name, options)])
+            raise UsageError(said, hint=error.hint) from error
         problems += _axis_problems(settings, name, options)
         axes.append((name, *_axis_row(options)))
         most_n[name] = math.nan if options.largest_force_n is None else options.largest_force_n

@@ -111,6 +111,11 @@ def test_rails_are_held_against_the_rated_force_alone_and_together():
     assert any("joint-2's drive can exert 78.0 N" in text for text in rails(peak_current_a=12.0).problems)
 
 
+def test_a_force_beyond_any_current_is_refused_with_both_numbers():
+    with pytest.raises(UsageError, match=r"no current of 76\.9.*500\.0 N, and the weakest part bears 25 N"):
+        rails(peak_current_a=..., peak_force_n=500.0)
+
+
 def test_a_declared_force_is_sent_as_a_current_or_refused():
     assert rails(peak_current_a=..., peak_force_n=7.8).problems == ()
     found = rails(peak_current_a=..., force_constant_n_a=..., peak_force_n=7.8).problems
