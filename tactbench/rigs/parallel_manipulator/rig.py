@@ -51,11 +51,9 @@ from tactbench.rigs.parallel_manipulator.session import Session
 from tactbench.rigs.parallel_manipulator.settings import MOTOR, positioner_of, settings_of, with_limits
 
 if TYPE_CHECKING:
-    from tactbench.plugin import FloatArray, IntArray
+    from tactbench.plugin import FloatArray
     from tactbench.plugin.devices import Clock, ScenePhysics
 
-NEARLY, LEAST_ROWS = 0.1, 3
-"""Part of half of the force within which it is there, and the least rows of it on either way (assumed)."""
 STOP_S = 10.0
 """Added to the time of a retreat (assumed: a control period, and what a guard in another process takes to answer)."""
 
@@ -80,18 +78,12 @@ class PressAcquisition:
     duration_s: float
     retreat_s: float
     """A retreat takes at most."""
-    half_n: float
-    """Half of the scene's force: where the motor's places on the way in and on the way back are compared."""
-    tolerance_m: float
-    """A remark says that they differ by more."""
     events: list[Event] = field(default_factory=list)
 
     def __post_init__(self) -> None:
         self.begin_ns = self.clock()
         self._gaps_before = {name: one.gaps for name, one in self.reading.stream_counts.items()}
         self._rows: dict[str, int] = {}
-        self._way: dict[str, list[tuple[IntArray, FloatArray]]] = {self.force.stream: [], self.reference[-1].name: []}
-        self._deeper_m = math.nan
 
     def __iter__(self) -> Iterator[Block]:
         """Yield blocks of sensor, force sensor and motor until the scene is over; then unload, and retreat."""
@@ -102,29 +94,10 @@ class PressAcquisition:
                 break
         yield from self._within(self.control.blocks(), end_ns)
         self.events += self.control.events()
-        self._deeper_m = self._deeper(end_ns)
-
-    def _deeper(self, end_ns: int) -> float:
-        """Return by how much deeper the motor stood on the way back than on the way in [m]; NaN: too few rows."""
-        if not all(self._way.values()):
-            return math.nan
-        (force_ns, force_n), (motor_ns, motor_m) = (
-            map(np.concatenate, zip(*one, strict=True)) for one in self._way.values()
-        )
-        there = np.abs(force_n - self.half_n) < NEARLY * self.half_n
-        at_m = np.interp(force_ns, motor_ns, motor_m)
-        back, way_in = at_m[there & (force_ns >= end_ns)], at_m[there & (force_ns < end_ns)]
-        return float(np.median(back) - np.median(way_in)) if min(back.size, way_in.size) >= LEAST_ROWS else math.nan
 
     def _within(self, blocks: Iterator[Block], end_ns: int) -> Iterator[Block]:
         for block in blocks:
             assert block.t_ns is not None
-            if block.stream in self._way:
-                pressed = block.stream == self.force.stream
-                column = self.force.column if pressed else 0
-                zero = self.zero[block.stream][column] if pressed else 0.0
-                values = (self.force.sign if pressed else 1) * (block.data[:, column] - zero)
-                self._way[block.stream].append((block.t_ns, values))
             first, last = np.searchsorted(block.t_ns, (self.begin_ns, end_ns)).tolist()
             if last > first:
                 self._rows[block.stream] = self._rows.get(block.stream, 0) + last - first
@@ -154,13 +127,6 @@ class PressAcquisition:
             "contact mm": 1e3 * press.contact_m,
             "late control periods": self.control.late,
         }
-        if math.isfinite(self._deeper_m):
-            found["way back mm"] = 1e3 * self._deeper_m
-        if abs(self._deeper_m) > self.tolerance_m:
-            found["remark way back"] = (
-                f"At {self.half_n:.2g} N the motor stood {1e3 * self._deeper_m:.2f} mm deeper on the way back than on "
-                "the way in: its controller may have lost steps, the skin may have yielded, or a mount moved."
-            )
         for number, event in enumerate(self.events, start=1):
             at_s = 1e-9 * (event.t_ns - self.begin_ns)
             found[f"event {number}"] = f"{at_s:.3f} s, {event.state}: {event.text}"
@@ -347,8 +313,6 @@ class ParallelManipulator(Rig):
             clock=clock,
             duration_s=duration_s,
             retreat_s=facts.seconds(facts.limits[1] - facts.limits[0], facts.retreat_speed) + STOP_S,
-            half_n=0.5 * profile.largest_n,
-            tolerance_m=1e-3 * settings.heights.tolerance_mm,
             events=events,
         )
         if session.emulators is not None:

@@ -12,7 +12,6 @@ from tactbench.devices.press import PressState
 from tactbench.plugin import NotApplicable, assumed, load_registry
 from tactbench.plugin.devices import GuardState, PositionerSilentError, RigFile, ScenePhysics, largest_force_n
 from tactbench.plugin.simulation import Slide
-from tactbench.rigs.parallel_manipulator.emulated_press import EmulatedPress
 from tactbench.rigs.parallel_manipulator.motor.emulator import MotorEmulator
 from tactbench.rigs.parallel_manipulator.rig import ParallelManipulator
 from tactbench.rigs.parallel_manipulator.settings import JOINTS, settings_of
@@ -84,28 +83,6 @@ def test_the_recording_says_what_happened(five_newtons):
     events = [text for name, text in drawn.items() if name.startswith("event")]
     assert any("touch: the axis holds" in text for text in events)
     assert abs(five_newtons.press.contact_m - 1e-3 * drawn["skin mm"]) < 30e-6  # 0.05 N on 5 N/mm, and its noise
-
-
-def test_the_way_back_is_the_way_in(five_newtons):
-    drawn = five_newtons.acquisition.drawn
-    assert abs(drawn["way back mm"]) < 0.05  # 5 N/mm; 2 mm/s by some ms of the motor's and the force's times
-    assert "remark way back" not in drawn
-
-
-def test_steps_that_are_lost_below_the_ceiling_mark_the_recording(monkeypatch):
-    force_n, lost_m = EmulatedPress.force_n, []
-
-    def slipping(press, position_m):
-        if not lost_m and force_n(press, position_m) > 3.5:
-            lost_m.append(0.45e-3)
-        return force_n(press, position_m - sum(lost_m))
-
-    monkeypatch.setattr(EmulatedPress, "force_n", slipping)
-    found = on_spring(5.0, ramp(5.0, 0.5, 5.0), settings__press__error_band_n=2.5, **QUICK)
-    drawn = found.acquisition.drawn
-    assert (found.acquisition.ended, drawn["press state"]) == ("", "done")
-    assert drawn["way back mm"] == pytest.approx(0.45, abs=0.05)
-    assert "mm deeper on the way back" in drawn["remark way back"]
 
 
 def test_follows_a_slow_ramp_as_theory_says():
