@@ -75,7 +75,7 @@ def move_by_steps(name: str, axis: Positioner, force: Driver, entry: ForceEntry,
     carried out only if it goes back.
     """
     clock, pressing = axis.clock, PressingForce(entry, force.streams)
-    for device in (axis, force):
+    for device in (force, axis):
         device.identify()
         device.start()
     (stream,) = force.streams
@@ -83,6 +83,7 @@ def move_by_steps(name: str, axis: Positioner, force: Driver, entry: ForceEntry,
     came = []
     while clock() < until_ns:
         came += force.read(LOOK_S)
+        axis.update(0.0)
     low, high = axis.facts.limits
     zero = tuple(pressing.zero(came)[stream.name].tolist())
     limits = Limits(
