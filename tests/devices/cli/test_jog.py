@@ -31,7 +31,7 @@ def steps(*answers, faults=()):
 
     def ask(text):
         heard.append(text)
-        until_ns = devices.clock() + 500_000_000
+        until_ns = devices.clock() + 100_000_000
         while devices.clock() < until_ns and not over:  # somebody thinks
             pass
         return next(given)
