@@ -10,12 +10,10 @@ from __future__ import annotations
 
 import sys
 import time
-from contextlib import suppress
 
 import numpy as np
 
 from tactbench.plugin.devices import EmulatorSettings
-from tactbench.rigs.parallel_manipulator.force_torque.ati import AtiFileError, read_calibration
 from tactbench.rigs.parallel_manipulator.force_torque.net_ft.codec import (
     Command,
     DatagramError,
@@ -73,13 +71,6 @@ def main(count: int, seed: int) -> None:
                 rejected += 1
         assert decode_records(encode_record(Record(5, 0, 0, (0,) * 6)))["rdt_sequence"] == 5
     print(f"force-torque, codec: {whole} records, {rejected} datagrams rejected")
-
-    files = 0
-    for piece in pieces:
-        with suppress(AtiFileError):
-            read_calibration(piece)
-            files += 1
-    print(f"force-torque, files: {len(pieces)} read, {files} of them whole")
 
     for name, load in (("free", 0.0), ("pressing", 5000.0)):
         motor = MotorEmulator(lambda x, k=load: k * max(x, 0.0), rng)

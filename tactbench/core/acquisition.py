@@ -5,10 +5,10 @@ from __future__ import annotations
 import importlib
 import time
 from collections.abc import Callable, Mapping
-from contextlib import AbstractContextManager, nullcontext
+from contextlib import AbstractContextManager, nullcontext, suppress
 from typing import Any
 
-from tactbench.core.errors import RigError
+from tactbench.core.errors import RecordingError, RigError
 from tactbench.core.interrupts import one_interrupt
 from tactbench.core.plugins.interfaces import Acquisition, RecordingRequest, Rig
 from tactbench.core.recording.completeness import INCOMPLETE, Completeness
@@ -114,16 +114,22 @@ def acquire(
                 ignore_interrupts()
                 alarm = _stopped(acquisition, error)
                 if not simulated and any(writer.rows.values()):
-                    conclude(f"interrupted: {_why(error)}")
-                    if complete_interrupted:
-                        writer.complete()
-                if alarm and isinstance(error, KeyboardInterrupt):
-                    raise RigError(f"It was interrupted, and the rig is not as it should be: {alarm}.") from error
+                    with suppress(RecordingError):  # a disk that refuses this: the journal stays with what came before
+                        conclude(f"interrupted: {_why(error)}")
+                        if complete_interrupted:
+                            writer.complete()
+                if alarm:
+                    raise RigError(
+                        f"It was interrupted ({_why(error)}), and the rig is not as it should be: {alarm}."
+                    ) from error
                 raise
             alarm = _stopped(acquisition, RigError(lacking)) if lacking else ""
+            if alarm:
+                with suppress(RecordingError):
+                    conclude(INCOMPLETE + lacking)
+                    writer.complete()
+                raise RigError(f"The scene {request.scene.name!r} ended, and the rig is not as it should be: {alarm}.")
             conclude(lacking and INCOMPLETE + lacking)
-    if alarm:
-        raise RigError(f"The scene {request.scene.name!r} ended, and the rig is not as it should be: {alarm}.")
     return writer.meta
 
 

@@ -130,6 +130,11 @@ class PositionerOptions(Options):
         return self.peak_force_n
 
     @property
+    def force_source(self) -> str:
+        """Where :attr:`largest_force_n` comes from; a subclass whose driver sends a limit says so."""
+        return "unknown" if self.largest_force_n is None else "declared"
+
+    @property
     def holds_unpowered(self) -> bool:
         """Whether it stays where it is without power; False where that is not known."""
         return self.orientation == "horizontal" or bool(self.brake) or bool(self.counterweight)

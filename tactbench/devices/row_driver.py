@@ -28,6 +28,8 @@ class Sample(NamedTuple):
     """As many numbers as the stream has channels."""
     quality: Sequence[int] | None = None
     """A :class:`~tactbench.core.samples.Quality` each; None: all good."""
+    t_ns: int | None = None
+    """When it came, where its last piece came before what completes it; None: with what was received."""
 
 
 class RowDriver(Driver, Generic[L]):
@@ -54,8 +56,8 @@ class RowDriver(Driver, Generic[L]):
 
     @property
     def counts(self) -> Mapping[str, int]:
-        """What was counted, by name."""
-        return dict(self.counted)
+        """What was counted, by name, by the driver and by its link."""
+        return {**getattr(self.link, "counts", {}), **self.counted}
 
     def start(self) -> None:
         """Drop what came before, and :meth:`begin`."""
@@ -88,7 +90,7 @@ class RowDriver(Driver, Generic[L]):
         while not found:
             for received in link.receive_all(max(0.0, until_s - link.timer())):
                 fresh = list(self.rows(received))
-                times += [received.t_ns] * len(fresh)
+                times += [received.t_ns if row.t_ns is None else row.t_ns for row in fresh]
                 found += fresh
             if not found and link.timer() >= until_s:
                 return []

@@ -9,6 +9,10 @@ import numpy.typing as npt
 
 from tactbench.core.samples import Block, IntArray, Quality
 
+RESTARTED = 20
+"""Rows behind the highest number, each one above the one before, after which a counter has begun anew (assumed: a
+network holds back fewer datagrams in order)."""
+
 
 class Unwrap:
     """A counter of `bits` bits, counted on over its wraps.
@@ -38,6 +42,9 @@ class Unwrap:
 class SequenceCheck:
     """What the numbers of one stream's rows say: duplicates and late rows are kept out, the row after a gap is marked.
 
+    A device that was started anew counts from its beginning: after `RESTARTED` rows that seemed late, which are lost,
+    numbers go on from the highest one, with a gap of one row or more.
+
     A stream without numbers passes as it is. Its gaps are not guessed from its times: an interval of more than 1.5
     periods is as often a late host as a lost row, and only the fitted clocks can tell.
 
@@ -54,13 +61,16 @@ class SequenceCheck:
     def __init__(self) -> None:
         self.received = self.duplicates = self.late = self.gaps = 0
         self._highest: int | None = None
+        self._shift, self._behind = 0, (0, 0)
 
     def __call__(self, block: Block) -> Block | None:
         """Return `block` with the rows that are passed on, all channels of those after a gap marked; None without."""
         self.received += len(block.data)
-        numbers = block.sequence
-        if numbers is None or not len(numbers):
+        if block.sequence is None or not len(block.sequence):
             return block if len(block.data) else None
+        numbers = self._counted_on(block.sequence)
+        if self._shift:
+            block = replace(block, sequence=numbers)
         before = int(numbers[0]) - 1 if self._highest is None else self._highest
         ahead = np.maximum.accumulate(np.concatenate(([before], numbers)))
         lost = numbers - ahead[:-1] - 1
@@ -74,3 +84,26 @@ class SequenceCheck:
         quality[lost > 0] |= np.uint8(Quality.GAP)
         kept = replace(block, quality=quality).rows(lost >= 0)
         return kept if len(kept.data) else None
+
+    def _counted_on(self, numbers: IntArray) -> IntArray:
+        """Return numbers that go on where the device's counter has begun anew."""
+        numbers = numbers + self._shift
+        highest = int(numbers[0]) - 1 if self._highest is None else self._highest
+        if numbers[0] > highest and (np.diff(numbers) > 0).all():
+            self._behind = (0, 0)
+            return numbers
+        added = 0
+        for place, number in enumerate(numbers.tolist()):
+            last, rows = self._behind
+            if number + added < highest:
+                self._behind = (number, rows + 1 if number == last + 1 else 1)
+                if self._behind[1] == RESTARTED:
+                    added = highest + 2 - number
+                    # Those before were counted as late, which stands for rows that were gaps before: they are lost.
+                    self.gaps += 2 * (RESTARTED - 1)
+            elif number + added > highest:
+                self._behind = (0, 0)
+            numbers[place] += added
+            highest = max(highest, number + added)
+        self._shift += added
+        return numbers

@@ -6,16 +6,20 @@ import io
 import selectors
 import time
 from abc import abstractmethod
+from contextlib import suppress
 from typing import Literal
 
-from tactbench.links.link import WRITE_TIMEOUT_S, Clock, Link, Received, cannot_open
+from tactbench.links.link import SYSTEM_ERRORS, WRITE_TIMEOUT_S, Clock, Link, Received, cannot_open
 
 Parity = Literal["none", "even", "odd"]
+_NOT_OPENED: tuple[type[Exception], ...] = (*SYSTEM_ERRORS, ValueError)  # pyserial's own are OSErrors
 _PARITY = {"none": "N", "even": "E", "odd": "O"}
 
 
 class ByteLink(Link):
     """A byte stream in both directions: a :class:`SerialLink`, or an emulated device's."""
+
+    silence_hint = f"{Link.silence_hint} Many boards start anew when their port is opened (DTR), and need some seconds."
 
     def receive(self, timeout_s: float) -> Received:
         """Return what :meth:`read` does."""
@@ -73,7 +77,7 @@ class SerialLink(ByteLink):
                 write_timeout=WRITE_TIMEOUT_S,
                 exclusive=True,
             )
-        except (OSError, ValueError) as error:  # pyserial's own are OSErrors
+        except _NOT_OPENED as error:
             raise cannot_open(port, error) from error
         # Waiting for the file descriptor gives the earliest stamp, and leaves the port's settings alone: pyserial sets
         # all of them anew for each change of its time-out. Windows' ports, loop and rfc2217 have no descriptor.
@@ -105,7 +109,7 @@ class SerialLink(ByteLink):
                 left_s = deadline - self.timer()
                 if left_s <= 0:
                     raise self._nothing_came(timeout_s)
-        except OSError as error:
+        except SYSTEM_ERRORS as error:
             raise self._unplugged(error) from error
 
     def write(self, data: bytes) -> None:  # noqa: D102  (inherited)
@@ -116,13 +120,14 @@ class SerialLink(ByteLink):
             self._port.write(data)
         except SerialTimeoutException as error:
             raise self._not_sent(error) from error
-        except OSError as error:
+        except SYSTEM_ERRORS as error:
             raise self._unplugged(error) from error
 
     def _release(self) -> None:
         if self._ready is not None:
             self._ready.close()
         inner = getattr(self._port, "_socket", None)
-        self._port.close()
+        with suppress(*SYSTEM_ERRORS):
+            self._port.close()
         if inner is not None:  # pyserial forgets to close a socket that the other end has reset
             inner.close()

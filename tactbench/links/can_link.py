@@ -5,19 +5,40 @@ from __future__ import annotations
 import errno
 import importlib
 import inspect
+import re
+import statistics
 import time
 from abc import abstractmethod
-from collections import Counter
+from collections import Counter, deque
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from tactbench.core.errors import LinkError, UnknownNameError
-from tactbench.links.link import WRITE_TIMEOUT_S, Clock, Link, cannot_open, os_error_in
+from tactbench.links.link import SYSTEM_ERRORS, WRITE_TIMEOUT_S, Clock, Link, cannot_open, os_error_in
 
-OWN_TIME_S = 60.0
-"""A stamp of python-can no older than this is of the system's clock; other stamps (of an adapter that counts from its
-own start) are not taken. Assumed: nothing waits longer in a kernel's queue."""
+WAITED_S = 60.0
+"""A frame does not wait longer in a kernel's queue (assumed): a stamp that says so is not taken."""
+SYSTEMS_OWN_NS = 5_000_000
+"""Stamps that lag no more behind the system's clock are that clock's own, and those that scatter by more are refused
+(assumed: a wake-up takes less)."""
+LEAST_OF = 200
+"""Frames of which one at least was read as it came, where none was waited for (assumed)."""
+WINDOW_NS = 5_000_000_000
+"""The least age is looked for in this one and the one before (assumed: at 100 ppm, 1 ms meanwhile)."""
+_HEX = r"[\dA-Fa-f]"
+_SLCAN = re.compile("|".join([
+    *(rf"(?:t{_HEX}{{3}}|[Tx]{_HEX}{{8}}){n}{_HEX}{{{2 * n}}}(?:{_HEX}{{4}}(?=[tTrRx]|$))?" for n in range(9)),
+    rf"(?:r{_HEX}{{3}}|R{_HEX}{{8}})[0-8]",
+]))  # fmt: skip
+"""A data frame of n bytes, with or without the adapter's milliseconds behind it, or a remote frame."""
+
+
+def _raised(*others: type[Exception]) -> tuple[type[Exception], ...]:
+    """Return what python-can and the system raise, and others."""
+    import can
+
+    return (can.CanError, *SYSTEM_ERRORS, *others)
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,11 +96,60 @@ def _data_frame(message: Any, t_ns: int, counts: Counter[str]) -> CanFrame | Non
     return None
 
 
+class _Stamps:
+    """Puts python-can's stamps, seconds since 1970 or since an adapter's start, on a link's clock.
+
+    A stamp's age is what the system's clock says at receipt, less the stamp. A frame that was waited for has just come,
+    and of some hundred one has: the least age of late is by how much the clock of the stamps lags. Where the system's
+    clock is set meanwhile, frames that wait have stamps of before: the age is by the clock that makes it least.
+    """
+
+    def __init__(self, clock: Clock, wall: Clock = time.time_ns) -> None:
+        self._clock, self._wall = clock, wall
+        self._walls: deque[int] = deque(maxlen=4)
+        self._least: deque[tuple[int, int]] = deque(maxlen=2)
+        self._seen, self._known = 0, False
+        self._late: deque[int] = deque(maxlen=31)
+        """By how much stamps of frames that were waited for are older than the least age."""
+
+    @property
+    def refused(self) -> bool:
+        """Whether stamps scatter too much to be times: half of the frames that had just come were said to be old."""
+        return len(self._late) == self._late.maxlen and statistics.median(self._late) > SYSTEMS_OWN_NS
+
+    def lag_ns(self) -> int:
+        """Return by how much the clock of the stamps lags behind the system's; 0: it is that one, or not known yet."""
+        least_ns = min((least_ns for _, least_ns in self._least), default=0)
+        return least_ns if self._known and abs(least_ns) > SYSTEMS_OWN_NS else 0
+
+    def __call__(self, stamp_s: float, *, waited: bool) -> int:
+        """Return when a frame came, which was waited for or not."""
+        now_ns, lag_ns = self._clock(), self.lag_ns()
+        wall_ns = self._wall() - now_ns
+        if self._walls and abs(wall_ns - self._walls[-1]) < SYSTEMS_OWN_NS:
+            self._walls[-1] = wall_ns
+        else:
+            self._walls.append(wall_ns)
+        ages_ns = [now_ns + one - round(1e9 * stamp_s) for one in self._walls]
+        possible = [age_ns for age_ns in ages_ns if age_ns >= lag_ns - SYSTEMS_OWN_NS]
+        age_ns = min(possible) if possible else ages_ns[-1]
+        self._seen += 1
+        self._known |= waited or self._seen >= LEAST_OF
+        if not self._least or now_ns - self._least[-1][0] > WINDOW_NS:
+            self._least.append((now_ns, age_ns))
+        elif age_ns < self._least[-1][1]:
+            self._least[-1] = (self._least[-1][0], age_ns)
+        waited_ns = age_ns - self.lag_ns()
+        if waited:
+            self._late.append(waited_ns)
+        return now_ns - waited_ns if 0 <= waited_ns < 1e9 * WAITED_S and not self.refused else now_ns
+
+
 class CanBus(CanLink):
     """A bus behind an interface of python-can.
 
-    A frame's time is that of its ``Message.timestamp`` (of socketcan the kernel's) put on the link's clock, or that of
-    its receipt where the interface gives none by the system's clock.
+    A frame's time is that of its ``Message.timestamp`` (of socketcan the kernel's), put on the link's clock. Where
+    stamps lag behind the system's clock, the least age is taken off, and such frames are counted.
 
     Parameters
     ----------
@@ -110,22 +180,32 @@ class CanBus(CanLink):
             for option in options.keys() - known.keys() - {"bitrate"}:
                 raise UnknownNameError(f"option of a can://{interface} link", option, list(known)[2:])
             self._bus: Any = can.Bus(channel, interface, ignore_config=True, **options)
-        except (can.CanError, OSError, ValueError, TypeError, ImportError) as error:
+        except _raised(ValueError, TypeError, ImportError) as error:
             raise cannot_open(self.address, error, hint=_hint(interface, channel, error)) from error
+        self._stamp = _Stamps(clock)
+        if interface == "slcan":
+            self._tidy_lines()
+
+    def _tidy_lines(self) -> None:
+        self._read_line, self._bus._read = self._bus._read, self._slcan_frame
 
     def receive(self, timeout_s: float) -> CanFrame:  # noqa: D102  (inherited)
-        import can
-
         deadline = self._usable(timeout_s)
         left_s, came = timeout_s, True
         while came or left_s > 0:
             try:
-                message = self._bus.recv(max(0.0, left_s))
+                message = self._bus.recv(0.0)
+                if waited := message is None and left_s > 0:
+                    message = self._bus.recv(left_s)
                 came = message is not None
-                frame = _data_frame(message, self._stamp(message.timestamp), self.counts) if came else None
-                if frame is not None:
-                    return frame
-            except (can.CanError, OSError, ValueError, IndexError) as error:
+                if came:
+                    t_ns = self._stamp(message.timestamp, waited=waited)
+                    if self._stamp.lag_ns() or self._stamp.refused:
+                        self.counts["frames stamped by another clock"] += 1
+                    frame = _data_frame(message, t_ns, self.counts)
+                    if frame is not None:
+                        return frame
+            except _raised(ValueError, IndexError) as error:
                 if os_error_in(error) is not None:
                     raise self._unplugged(error) from error
                 # Bytes that are no frame. python-can's slcan would try those that are not ASCII again and again; its
@@ -135,10 +215,26 @@ class CanBus(CanLink):
             left_s = deadline - self.timer()
         raise self._nothing_came(timeout_s)
 
-    def _stamp(self, timestamp: float) -> int:
-        """Return when a message came by the link's clock, of python-can's seconds since 1970."""
-        now_ns, age_s = self._clock(), time.time() - timestamp
-        return now_ns - round(1e9 * age_s) if 0 <= age_s < OWN_TIME_S else now_ns
+    def _slcan_frame(self, timeout_s: float | None) -> str | None:
+        """Return the next frame of python-can's slcan, which takes what stands between two CR or BEL for one.
+
+        Line feeds are left out; frames whose CR was lost are given one by one; what is none is counted, and an answer
+        BEL, which is an adapter's word for an error.
+        """
+        line: str | None = self._read_line(timeout_s)
+        if not line:
+            return line
+        if line.endswith("\a"):
+            self.counts["errors of the adapter"] += 1
+        text = line.strip("\r\n\a")
+        if not text or text[0] in "dDbBzZVNF":  # FD frames, and answers to commands
+            return f"{text}\r"
+        frames = [found[0] for found in _SLCAN.finditer(text)]
+        if _SLCAN.sub("", text):
+            self.counts["unreadable frames"] += 1
+        for frame in frames[1:]:
+            self._bus._queue.put_nowait(f"{frame}\r")
+        return f"{frames[0]}\r" if frames else "\r"
 
     def send(self, frame: CanFrame) -> None:  # noqa: D102  (inherited)
         import can
@@ -152,18 +248,17 @@ class CanBus(CanLink):
             self._bus.send(message, WRITE_TIMEOUT_S)
         except can.CanTimeoutError as error:
             raise self._not_sent(error) from error
-        except (can.CanError, OSError) as error:
+        except _raised() as error:
             reason = os_error_in(error)
             if isinstance(reason, SerialTimeoutException) or (reason and reason.errno == errno.ENOBUFS):
                 raise self._not_sent(error) from error
             raise self._unplugged(error) from error
 
     def _release(self) -> None:
-        import can
 
         try:
             self._bus.shutdown()
-        except (can.CanError, OSError):
+        except _raised():
             # slcan's says goodbye before it closes its port, to an adapter that may be gone.
             self._bus.serialPortOrig.close()
 

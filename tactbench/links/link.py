@@ -13,6 +13,14 @@ from typing import Any, Self
 
 from tactbench.core.errors import LinkClosed, LinkError, LinkTimeout, LinkUnplugged
 
+try:
+    import termios
+
+    SYSTEM_ERRORS: tuple[type[Exception], ...] = (OSError, termios.error)
+except ImportError:  # Windows has none
+    SYSTEM_ERRORS = (OSError,)
+"""What the system raises: the error of terminals is no OSError, and passes pyserial where a port has gone."""
+
 Clock = Callable[[], int]
 """Returns nanoseconds of a clock that never goes back, as :func:`time.monotonic_ns` does."""
 
@@ -47,6 +55,8 @@ class Link(ABC):
     clock
         Stamps what is received.
     """
+
+    silence_hint = "Is the device on, started and set to the same speed? Then wait longer."
 
     def __init__(self, address: str, clock: Clock = time.monotonic_ns) -> None:
         self.address = address
@@ -125,7 +135,7 @@ class Link(ABC):
     def _nothing_came(self, timeout_s: float) -> LinkTimeout:
         return LinkTimeout(
             f"Nothing came from {self.address} within {timeout_s:g} s.",
-            hint="Is the device on, started and set to the same speed? Then wait longer.",
+            hint=self.silence_hint,
         )
 
     def _not_sent(self, cause: BaseException) -> LinkTimeout:
@@ -153,8 +163,9 @@ def os_error_in(error: BaseException) -> OSError | None:
     found: OSError | None = None
     cause: BaseException | None = error
     while cause is not None:
-        if isinstance(cause, OSError) and (found is None or cause.errno is not None):
-            found = cause
+        if isinstance(cause, SYSTEM_ERRORS):
+            own = cause if isinstance(cause, OSError) else OSError(*cause.args)
+            found = own if found is None or own.errno is not None else found
         cause = cause.__cause__ or cause.__context__
     return found
 

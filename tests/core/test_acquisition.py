@@ -9,7 +9,7 @@ import pytest
 from threadpoolctl import threadpool_info, threadpool_limits
 
 from tactbench.core.acquisition import acquire
-from tactbench.core.errors import LinkUnplugged, RigError
+from tactbench.core.errors import LinkUnplugged, RigError, UnwritableError
 from tactbench.core.plugins.interfaces import RecordingRequest
 from tactbench.core.recording.reader import open_recording
 from tactbench.core.recording.salvage import rescue
@@ -20,6 +20,7 @@ from tactbench.core.spec.rig_file import DeviceEntry, RigFile
 from tactbench.core.spec.scene import Scene
 from tactbench.core.spec.sensor import ChannelSpec, StreamSpec
 from tests.core.evaluation.made import FORCE, ticking
+from tests.core.pool.patience import files_up_to
 from tests.core.recording.conftest import sensor
 
 TAXELS = StreamSpec(name="taxels", dtype="uint16", rate_hz=1e3, channels=(ChannelSpec(name="t1", kind="taxel"),))
@@ -176,6 +177,26 @@ def test_a_real_rig_is_stopped_and_then_what_it_had_recorded_is_kept(tmp_path, s
     assert meta.clocks["taxels"].segments
     assert meta.streams["taxels"] == StreamCounts(received=162, written=160, dropped=2)
     assert meta.provenance["acquisition_s"] > 0
+
+
+@pytest.mark.skipif(os.name != "posix", reason="limits of files are POSIX")
+@pytest.mark.parametrize("complete", [True, False])
+@pytest.mark.parametrize("emulated", [True, False])
+@pytest.mark.parametrize("left", ["", "stand clear"])
+def test_a_full_disk_in_the_ramp_keeps_what_came_before(tmp_path, complete, emulated, left):
+    path, journal = tmp_path / "r.h5", tmp_path / "r.h5.partial"
+    entry = DeviceEntry(link="emulated")
+    file = RigFile(rig="weights", sensors={SENSOR.name: entry}) if emulated else None
+    rig = Devices(path, left=left)
+    with files_up_to(12_000), pytest.raises(RigError if left else UnwritableError, match=left or "cannot be") as caught:
+        run(path, rig, simulated=False, rig_file=file, complete_interrupted=complete)
+    assert len(rig.told) == 1  # it was stopped
+    assert "--rescue" in str(caught.value)
+    assert list(tmp_path.iterdir()) == [journal]
+    rescue(journal, path)
+    meta, taxels, _ = opened(path)
+    assert 0 < len(taxels.data) < 200
+    assert meta.excluded.startswith("interrupted")
 
 
 def test_a_scene_that_a_device_ended_is_kept_as_incomplete(tmp_path):

@@ -172,3 +172,23 @@ def test_the_driver_that_the_page_shows(monkeypatch):
         devices.advance(35_000_000)
         (block,) = driver.read(0)
     assert block.data.tolist() == [[0, 300, 0, 0]] * 3
+
+
+def test_what_its_link_counts_is_counted_too_and_rows_may_say_when_they_came():
+    class Slow(CanDriver):
+        def rows(self, received):
+            return [Sample(list(received.data), t_ns=received.t_ns - 7)]
+
+    with (
+        EmulatedDevices({"pad": EmulatedDevice("can", CanModel(settings()))}) as devices,
+        on(devices, CanDriver) as driver,
+    ):
+        driver.link.counts["unreadable frames"] += 2
+        driver.counted["other frames"] += 1
+        assert driver.counts == {"unreadable frames": 2, "other frames": 1}
+        driver.start()
+        (block,) = driver.read(0.05)
+    with EmulatedDevices({"pad": EmulatedDevice("can", CanModel(settings()))}) as devices, on(devices, Slow) as driver:
+        driver.start()
+        (earlier,) = driver.read(0.05)
+    assert (earlier.t_ns == block.t_ns - 7).all()

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import threading
 
+import can
 import pytest
 
 from tactbench.links.byte_link import SerialLink
-from tactbench.plugin.devices import LinkError, LinkTimeout
+from tactbench.plugin.devices import CanFrame, LinkError, LinkTimeout, LinkUnplugged, open_link
 from tests.links.ends import pty
 
+termios = pytest.importorskip("termios")
 pytestmark = pytest.mark.skipif(os.name != "posix", reason="pseudo-terminals are POSIX")
 
 ALL_BYTES = bytes(range(256))
@@ -20,6 +23,43 @@ ALL_BYTES = bytes(range(256))
 def far():
     with pty() as end:
         yield end
+
+
+@pytest.mark.parametrize("way", ["read", "write", "close", "open"])
+def test_an_error_of_the_terminal_is_the_links_own(far, monkeypatch, way):
+    """It is no OSError, and pyserial lets it pass: a port that goes, or that is none."""
+
+    def gone(*_, **__):
+        raise termios.error(errno.EIO, "Input/output error")
+
+    if way == "open":
+        monkeypatch.setattr("serial.serial_for_url", gone)
+        with pytest.raises(LinkError, match="cannot be opened"):
+            SerialLink(far.name)
+        return
+    with SerialLink(far.name) as link:
+        monkeypatch.setattr(link._port, way, gone)
+        if way == "close":
+            link.close()
+            return
+        with pytest.raises(LinkUnplugged, match="gone"):
+            link.read(0.1) if way == "read" and not far.write(b"x") else link.write(b"x")
+
+
+@pytest.mark.parametrize("way", ["recv", "send", "close"])
+def test_so_it_is_behind_a_can_adapter(far, monkeypatch, way):
+    def gone(*_, **__):
+        try:
+            raise termios.error(errno.EIO, "Input/output error")
+        except termios.error as error:
+            raise can.CanOperationError("Could not read from serial device") from error
+
+    link = open_link(f"can://slcan/{far.name}?bitrate=1000000&sleep_after_open=0")
+    monkeypatch.setattr(link._bus, way, gone)
+    if way != "close":
+        with pytest.raises(LinkUnplugged):
+            link.receive(0.1) if way == "recv" else link.send(CanFrame(1, b"x"))
+    link.close()
 
 
 def test_every_byte_passes_unchanged_both_ways(far):

@@ -6,8 +6,10 @@ import os
 import time
 
 import can
+import numpy as np
 import pytest
 
+from tactbench.links.can_link import _Stamps
 from tactbench.plugin.devices import CanFrame, LinkError, LinkTimeout, open_link, read_can_log
 from tests.links.ends import pty
 
@@ -17,6 +19,9 @@ FRAMES = [
     CanFrame(0x7FF, b""),
     CanFrame(0x1FFFFFFF, b"\xff" * 8, extended=True),
 ]
+
+
+needs_pty = pytest.mark.skipif(os.name != "posix", reason="pseudo-terminals are POSIX")
 
 
 def content(frame: CanFrame) -> tuple[int, bytes, bool]:
@@ -62,6 +67,97 @@ def test_a_frame_has_the_time_at_which_the_kernel_had_it_on_the_links_clock():
         assert abs(link.receive(1.0).t_ns - clock()) < 100_000_000
 
 
+class Bus:
+    """Frames every 5 ms; a reader that waits for each but for a while is held up; and two clocks."""
+
+    def __init__(self):
+        self.now_ns, self.wall_ns = 0, 1_700_000_000_000_000_000
+        self.stamps = _Stamps(lambda: self.now_ns, lambda: self.now_ns + self.wall_ns)
+
+    def errors_ms(self, lag_s, held_up, *, waits=True, steps=()):
+        """Return by how much later than it came each of 1000 frames is said to have come [ms]; steps [s] of the clock.
+
+        A frame that is read while the reader is held up is read at the end of that.
+        """
+        found, steps = [], dict(steps)
+        for number in range(1000):
+            came_ns = 5_000_000 * number
+            stamp_s = 1e-9 * (came_ns + self.wall_ns) - lag_s
+            late_ns = max([0, *(end - came_ns for begin, end in held_up if begin <= came_ns < end)])
+            after = [when for when in steps if when <= came_ns + late_ns]
+            self.now_ns = came_ns + late_ns + 50_000  # a wake-up
+            wall_ns = self.wall_ns
+            self.wall_ns += sum(steps[when] for when in after)
+            t_ns = self.stamps(stamp_s, waited=waits and not late_ns)
+            found.append(1e-6 * (t_ns - came_ns))
+            self.wall_ns = wall_ns  # frames of before have its stamps, whenever they are read
+            for when in [one for one in after if one <= came_ns]:
+                self.wall_ns += steps.pop(when)
+        return np.array(found)
+
+
+STALL = [(1_000_000_000, 1_400_000_000), (3_000_000_000, 3_100_000_000)]
+
+
+@pytest.mark.parametrize("lag_s", [0.2, 3.0, 60.0, 3600.0, -0.25, -40.0, 1_699_999_990.0])
+def test_stamps_of_another_clock_are_put_right(lag_s):
+    bus = Bus()
+    # The wake-up, and what float64 holds of seconds since 1970.
+    assert np.abs(bus.errors_ms(lag_s, STALL)).max() < 0.06
+    assert bus.stamps.lag_ns() == pytest.approx(1e9 * lag_s, abs=1e5)
+
+
+@pytest.mark.parametrize("coarse_s", [0.05, 1.0])
+def test_stamps_that_are_too_coarse_are_refused(coarse_s):
+    bus = Bus()
+    came_s = 0.005 * np.arange(1000)
+    t_ns = []
+    for at_s in came_s:
+        bus.now_ns = round(1e9 * at_s) + 50_000
+        stamp_s = coarse_s * np.floor((at_s + 1e-9 * bus.wall_ns) / coarse_s)
+        t_ns.append(bus.stamps(stamp_s, waited=True))
+    assert np.abs(np.array(t_ns[200:]) - 1e9 * came_s[200:]).max() < 60_000
+
+
+def test_frames_that_nobody_waited_for_show_their_clock_too():
+    errors_ms = Bus().errors_ms(2.0, [(0, 50_000_000)], waits=False)
+    assert np.abs(errors_ms[200:]).max() < 0.06
+
+
+@pytest.mark.parametrize("step_s", [-3600.0, -0.8, 0.8, 3600.0])
+@pytest.mark.parametrize("lag_s", [0.0, 3.0])
+def test_a_clock_that_is_set_meanwhile_loses_no_stamp(step_s, lag_s):
+    steps = [(1_200_000_000, round(1e9 * step_s)), (2_500_000_000, round(1e9 * step_s / 2))]
+    assert np.abs(Bus().errors_ms(lag_s, STALL, steps=steps)).max() < 0.06
+
+
+def test_a_process_that_is_late_from_the_start_on_knows_when_frames_came():
+    assert np.abs(Bus().errors_ms(0.0, [(0, 500_000_000)])).max() < 0.06
+
+
+@needs_pty
+@pytest.mark.parametrize(
+    ("sent", "counts"),
+    [
+        (b"t4E024001\r\nt4E124002\r\nt4E224003\r\n", {}),
+        (b"t4E024001\r\at4E124002\rt4E224003\r", {"errors of the adapter": 1}),
+        (b"t4E024001t4E124002\rt4E224003\r", {}),
+        (b"t4E0240011234t4E1240020000\rt4E2240030001\r", {}),
+        (b"t4E024001\rt4E1240t4E124002\rt4E224003\r", {"unreadable frames": 1}),
+        (b"z\rt4E024001\rZ\rt4E124002t4E5r4E52t4E224003\r", {"unreadable frames": 1, "remote and FD frames": 1}),
+    ],
+    ids=["crlf", "bel", "lost-cr", "lost-cr-with-times", "cut", "mixed"],
+)
+def test_lines_of_slcan_are_read_or_counted(sent, counts):
+    with pty() as far, open_link(f"can://slcan/{far.name}?bitrate=1000000&sleep_after_open=0") as link:
+        far.write(sent)
+        found = [content(link.receive(2.0)) for _ in range(3)]
+        with pytest.raises(LinkTimeout):
+            link.receive(0.05)
+        assert found == [(0x4E0 + n, bytes([0x40, n + 1]), False) for n in range(3)]
+        assert dict(link.counts) == counts
+
+
 def test_settings_of_the_user_are_not_read(monkeypatch):
     """python-can takes settings from the environment unless told otherwise."""
     monkeypatch.setenv("CAN_CONFIG", '{"receive_own_messages": true}')
@@ -69,9 +165,6 @@ def test_settings_of_the_user_are_not_read(monkeypatch):
         link.send(FRAMES[0])
         with pytest.raises(LinkTimeout):
             link.receive(0)
-
-
-needs_pty = pytest.mark.skipif(os.name != "posix", reason="pseudo-terminals are POSIX")
 
 
 @needs_pty

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shutil
 import subprocess
+import time
 from contextlib import contextmanager
 from itertools import pairwise
 
@@ -26,7 +27,7 @@ def program(tmp_path_factory):
     if compiler is None:
         pytest.skip("the firmware is not tried: there is no g++ here")
     built = tmp_path_factory.mktemp("firmware") / "bridge"
-    flags = ["-std=c++17", "-Wall", "-Wextra", "-Werror", "-fsanitize=address,undefined", f"-I{STUB}"]
+    flags = ["-std=c++17", "-pthread", "-Wall", "-Wextra", "-Werror", "-fsanitize=address,undefined", f"-I{STUB}"]
     subprocess.run([compiler, *flags, "-o", built, STUB / "main.cpp"], check=True)
     return built
 
@@ -79,14 +80,14 @@ def test_it_is_short():
 def test_the_link_reads_through_it(program):
     with running(program) as link:
         bridge = SpiBridge(link, speed_hz=20_000_000)
-        assert (bridge.name, bridge.firmware, bridge.holds, bridge.select_lines) == ("biotac_bridge", 1, 8, 7)
+        assert (bridge.name, bridge.firmware, bridge.holds, bridge.select_lines) == ("biotac_bridge", 2, 8, 7)
         assert bridge.speed_hz == 10_000_000
         numbers = [
             bridge.send([SpiStep(bytes([n, 0]), 1, 50), SpiStep(b"", 0, 300), SpiStep(b"\0", 2)]) for n in range(4)
         ]
         found = [bridge.receive(5.0) for _ in numbers]
         assert [one.number for one in found] == numbers
-        assert [one.data for one in found] == [(bytes([255 - n, 255]), b"", b"\xff") for n in range(4)]
+        assert [one.data for one in found] == [(bytes([255 - n, 255]), b"", b"\x64") for n in range(4)]
         begun = [one.device_us for one in found]
         assert all((b - a) % 2**32 >= 350 for a, b in pairwise(begun))  # the pauses are waited for
         frame = [SpiStep(bytes([n % 256] * 2), 1, 20) for n in range(140)]  # zero bytes, stretches without one
@@ -99,6 +100,7 @@ def test_it_refuses_what_it_cannot_do_and_is_in_step_again_after_noise(program):
     asked = [
         (Frame(Kind.BATCH, 1, step), b"not set up"),
         (Frame(Kind.SETUP, 2, b"\0\0\0\0\0"), b"clock or mode is not possible"),
+        (Frame(Kind.SETUP, 2, b"\x20\xa1\x07\0\0"), b"clock or mode is not possible"),  # 0.5 MHz: beyond its divider
         (Frame(Kind.SETUP, 3, b"\x01"), b"malformed payload"),
         (Frame(Kind.HELLO, 4, b"", 9), b"version is unknown"),
         (Frame(9, 5), b"kind is unknown"),
@@ -122,3 +124,43 @@ def test_it_refuses_what_it_cannot_do_and_is_in_step_again_after_noise(program):
             link.read(0.0)
         link.write(encode_frame(Frame(Kind.HELLO, 77)))  # answered while a batch runs
         assert replies(link, 1)[0].number == 77
+
+
+@pytest.mark.parametrize(("hz", "runs_hz"), [(4_400_000, 4_363_636), (10_000_000, 10_000_000), (934_000, 933_852)])
+def test_the_clock_that_is_set_is_answered(program, hz, runs_hz):
+    """240 MHz by a whole number."""
+    with running(program) as link:
+        assert SpiBridge(link, speed_hz=hz).speed_hz == pytest.approx(runs_hz, abs=1)
+
+
+def test_a_setup_holds_from_the_next_batch_on(program):
+    long, short = b"\0\x20\x4e\0\0" * 5, b"\x02\0\0\x01\0\0"  # 100 ms, then a byte on the second line
+    with running(program) as link:
+        link.write(encode_frame(Frame(Kind.SETUP, 1, (2_000_000).to_bytes(4, "little") + b"\0")))
+        link.write(encode_frame(Frame(Kind.BATCH, 2, long + short)))
+        link.write(encode_frame(Frame(Kind.SETUP, 3, (8_000_000).to_bytes(4, "little") + b"\0")))
+        link.write(encode_frame(Frame(Kind.BATCH, 4, short)))
+        found = {reply.number: reply.payload for reply in replies(link, 4)}
+    assert (found[2][4:], found[4][4:]) == (bytes([20]), bytes([80]))
+
+
+def test_batches_keep_their_time_while_nobody_reads_the_replies(program):
+    """Replies that the port does not take wait in the batches, of which it holds eight; nothing else waits for them."""
+    batch = b"".join(b"\x01\xf4\x01\x64\0" + bytes(100) for _ in range(9))  # nine times 100 bytes and 500 us
+    with running(program) as link:
+        SpiBridge(link, speed_hz=4_400_000)
+        for number in range(400):  # their replies are six times a pipe
+            link.write(encode_frame(Frame(Kind.BATCH, number, batch)))
+        time.sleep(0.2)
+        found, decoder = [], FrameDecoder()
+        while not found or found[-1].number != 999:
+            try:
+                found += decoder.feed(link.read(0.1).data)
+            except LinkTimeout:  # all is read: there is room again
+                link.write(encode_frame(Frame(Kind.HELLO, 999)))
+    done = [frame for frame in found if frame.kind == Kind.BATCH.reply]
+    assert decoder.damaged == 0
+    assert [frame.number for frame in done] == sorted(frame.number for frame in done)
+    begun = [int.from_bytes(frame.payload[:4], "little") for frame in done]
+    late = [later - earlier for earlier, later in pairwise(begun[:8])]
+    assert all(us >= 4500 for us in late)

@@ -182,6 +182,10 @@ class RigCheck:
     tables: tuple[CheckTable, ...]
     problems: tuple[str, ...]
     """Each a reason to refuse the file, with the next step; empty: it may be used."""
+    file: RigFile | None = None
+    """The file with all that its axes are told by the rig's settings; None: it has no axes."""
+    travel_ceiling_n: float = 0.0
+    """Norm of the force at which an axis halts that does not press."""
 
 
 @dataclass(frozen=True)

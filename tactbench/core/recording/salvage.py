@@ -39,7 +39,7 @@ def salvage(path: Path) -> Recording:
 
 
 def rescue(path: Path, target: Path) -> None:
-    """Turn an unfinished recording into a finished one at `target`; its remarks say that it broke off.
+    """Turn an unfinished recording into a finished one at `target`, excluded from evaluations since it broke off.
 
     The unfinished one stays where it is.
 
@@ -55,7 +55,9 @@ def rescue(path: Path, target: Path) -> None:
     image.require_free(target)
     journal = read_journal(path)
     meta = parse_meta(path, journal.text)
-    meta, text = _fitted(journal, meta.model_copy(update={"remarks": (*meta.remarks, REMARK)}))
+    excluded = meta.excluded or "interrupted: it broke off, and was rescued"
+    update = {"remarks": (*meta.remarks, REMARK), "excluded": excluded}
+    meta, text = _fitted(journal, meta.model_copy(update=update))
     try:
         target.parent.mkdir(parents=True, exist_ok=True)
     except OSError as error:

@@ -27,8 +27,8 @@ class RecordingWriter:
     While it is open, a journal ``<path>.partial`` (or ``<path>.2.partial`` where that is taken, and so on) holds, after
     every block, all blocks so far. Leaving the context completes the recording: times of devices are put on the host's
     clock, the file is written beside its place, read back, and renamed to `path`; only then is the journal removed.
-    When the context is left by an exception, or the recording cannot be completed, the journal of a recording that is
-    not simulated stays, and the error names the command that makes a recording of it.
+    When the context is left by an exception, or the recording cannot be completed, the journal of devices' recordings
+    stays, and the error names the command that makes a recording of it.
 
     Parameters
     ----------
@@ -87,8 +87,8 @@ class RecordingWriter:
 
     @property
     def _unique(self) -> bool:
-        """Whether the recording cannot be made again."""
-        return self._keep and not self.meta.simulated
+        """Whether the recording cannot be made again, or stands for one that cannot: of emulated devices."""
+        return self._keep and (not self.meta.simulated or self.meta.emulation is not None)
 
     @property
     def rows(self) -> Mapping[str, int]:

@@ -19,6 +19,7 @@ from tactbench.core.spec.sensor import StreamSpec
 from tactbench.devices.driver import Driver
 from tactbench.devices.rig_devices import descriptor_of, open_driver
 from tactbench.devices.sequence import SequenceCheck
+from tactbench.links.byte_link import ByteLink
 from tactbench.links.link import Clock
 
 Record = dict[str, Any]
@@ -117,8 +118,7 @@ def _read(check: DeviceCheck, driver: Driver, seconds: float, clock: Clock) -> N
                 check.problems += _problems(found[0])
             else:
                 check.problems.append(
-                    f"Nothing came of its stream {stream.name} within {seconds:g} s. "
-                    "Is it on, connected to this port, and set to the same speed?"
+                    f"Nothing came of its stream {stream.name} within {seconds:g} s. {ByteLink.silence_hint}"
                 )
 
 

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import replace
+from types import MappingProxyType
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -115,7 +116,7 @@ def opened_on(subject: Subject, entry: DeviceEntry, clock: Clock, link: Callable
 @contextmanager
 def emulated(
     subject: Subject, *faults: str, senses: Senses = lambda t_s: {}, change: Callable[[bytes], bytes] | None = None,
-    started: bool = True, **options: Any,
+    started: bool = True, of_both: Mapping[str, Any] = MappingProxyType({}), **options: Any,
 ) -> Iterator[tuple[Opened, EmulatedDevices]]:  # fmt: skip
     """Open the driver on its emulator, which has been running for some time, and start it.
 
@@ -127,17 +128,19 @@ def emulated(
         What the device senses; by default it is at rest.
     change
         What becomes of pieces on their way to the driver; byte streams then come in pieces of other sizes.
+    of_both
+        Options of driver and emulator, beside those of the emulated device.
     options
-        Beside those of the emulated device.
+        Of the driver alone.
     """
-    name, entry = subject.name, DeviceEntry(link=EMULATED, faults=faults)
+    name, entry = subject.name, DeviceEntry(link=EMULATED, faults=faults, options=dict(of_both))
     with code_of("emulator", subject):
         device = emulated_device(subject.descriptor, name, entry, senses, 1)
     if change is not None:
         device = replace(device, emulator=_Adapter(device.emulator, change))
     devices = EmulatedDevices({name: device})
     devices.advance(round(BEFORE_S * 1e9))
-    entry = entry.model_copy(update={"options": options})
+    entry = entry.model_copy(update={"options": {**of_both, **options}})
     opened = opened_on(subject, entry, devices.clock, devices.opener(name))
     try:
         if started:

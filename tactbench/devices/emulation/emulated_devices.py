@@ -145,6 +145,10 @@ class EmulatedDevices:
         link = kinds.get(kind, VirtualByteLink)(name, self._virtual, self._lines[name])
         return SpiBridge(link, speed_hz=SPI_HZ) if isinstance(link, VirtualByteLink) and kind == "spi" else link
 
+    def emulator_of(self, name: str) -> DeviceEmulator | SpiDeviceEmulator:
+        """Return a device's model."""
+        return self._devices[name].emulator
+
     def opener(self, name: str) -> Callable[[], Link]:
         """Return what opens the host's end of a device's link, as drivers are given it."""
         return partial(self.open_link, name)

@@ -241,9 +241,14 @@ class Measures(NamedTuple):
     """(...) det U; its sign is the assembly mode."""
 
 
+def links(delta: LinearDelta, p_m: FloatArray, q: FloatArray) -> FloatArray:
+    """Return the (..., 3 legs, 3) unit vectors u along the links, from joint to platform."""
+    return np.asarray((p_m[..., None, :] - delta.centre_m(q)) / delta.link_m[:, None])
+
+
 def measures(delta: LinearDelta, p_m: FloatArray, q: FloatArray) -> Measures:
     """Return the measures at places (..., 3) [m] with their joint values (..., 3)."""
-    unit = (p_m[..., None, :] - delta.centre_m(q)) / delta.link_m[:, None]
+    unit = links(delta, p_m, q)
     across = np.cross(delta.sideways, unit)
     return Measures(
         serial=np.abs(_dot(unit, delta.rail)),

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+import itertools
+import math
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from typing import Any
 
@@ -10,7 +12,7 @@ import numpy as np
 
 from tactbench.plugin import RigError, TactbenchError, UsageError, load_registry
 from tactbench.plugin.devices import CheckTable, PositionerFacts, RigCheck, RigFile, largest_force_n, read_options
-from tactbench.rigs.parallel_manipulator.kinematics import LinearDelta
+from tactbench.rigs.parallel_manipulator.kinematics import LinearDelta, links, solve_inverse
 from tactbench.rigs.parallel_manipulator.motor.codec import line_time_s
 from tactbench.rigs.parallel_manipulator.motor.profile import FaulhaberOptions
 from tactbench.rigs.parallel_manipulator.settings import (
@@ -67,15 +69,18 @@ def check(file: RigFile) -> RigCheck:
         except TactbenchError as error:
             problems.append(str(error))
 
+    most_n: dict[str, float] = {}
     for name in axes_of(settings):
         kind, given = positioner_of(registry, name, file.devices[name])
         options = read_options(kind.options_kind, given, name)
         try:
             facts[name] = kind.facts_of(options)
         except RigError as error:
-            raise UsageError(f"{name}: {error.message}", hint=error.hint) from error
+            said = " ".join([f"{name}: {error.message}", *_axis_problems(settings, name, options)])
+            raise UsageError(said, hint=error.hint) from error
         problems += _axis_problems(settings, name, options)
         axes.append((name, *_axis_row(options)))
+        most_n[name] = math.nan if options.largest_force_n is None else options.largest_force_n
         if name == MOTOR and isinstance(options, FaulhaberOptions):
             for speed_mm_s in settings.speeds_mm_s:
                 refusing(partial(options.speed, 1e-3 * speed_mm_s))
@@ -93,11 +98,16 @@ def check(file: RigFile) -> RigCheck:
     delta = settings.manipulator
     if isinstance(delta, LinearDelta):
         refusing(partial(_check_places, delta, settings))
+        together_n = _together_n(delta, settings, [most_n[name] for name in JOINTS])
+        if math.isfinite(together_n):
+            sources = ", ".join(dict.fromkeys(source for name, _, _, source, _ in axes if name in JOINTS))
+            axes.append((", ".join(JOINTS), "act together", f"{together_n:.1f} N", sources, ""))
+            problems += _too_strong(f"{', '.join(JOINTS)} together", together_n, settings)
     tables = (
-        CheckTable("axes", ("axis", "stands", "largest force of its drive", "units that are ASSUMED"), tuple(axes)),
+        CheckTable("axes", ("axis", "stands", "largest force", "by", "units that are ASSUMED"), tuple(axes)),
         CheckTable("largest forces, and the force loop", ("what", "value"), (*forces, share)),
     )
-    return RigCheck(tables, tuple(problems))
+    return RigCheck(tables, tuple(problems), file, settings.limits.travel_ceiling_n)
 
 
 def _check_places(delta: LinearDelta, settings: RigSettings) -> None:
@@ -112,17 +122,44 @@ def _check_places(delta: LinearDelta, settings: RigSettings) -> None:
         here = way(delta, here, corner, heights.clearance_m, heights.stand_off_m)[-1]
 
 
+def _together_n(delta: LinearDelta, settings: RigSettings, most_n: Sequence[float]) -> float:
+    """Return the largest norm of the force that the rails exert on the platform where it may be [N]; NaN: not known.
+
+    F = U^T S^-1 f for forces f along the rails (derived: their power is the platform's, U p' = S q'). It is linear in
+    f, so the largest is at the ends of all f.
+    """
+    heights = (settings.heights.stand_off_m, settings.heights.clearance_m)
+    places_m = np.array([(*corner, height) for corner in settings.places.corners_m() for height in heights])
+    q, missing = solve_inverse(delta, places_m)
+    if (missing > 0).any():
+        return math.nan
+    unit = links(delta, places_m, q)
+    per_newton = unit / np.einsum("pij,ij->pi", unit, delta.rail)[..., None]
+    ends = np.array(list(itertools.product((-1.0, 1.0), repeat=len(most_n)))) * most_n
+    return float(np.linalg.norm(np.einsum("si,pij->spj", ends, per_newton), axis=-1).max())
+
+
+def _too_strong(what: str, force_n: float, settings: RigSettings) -> list[str]:
+    rated_n = settings.limits.rated_force_n
+    if force_n <= rated_n:
+        return []
+    return [
+        f"{what} can exert {force_n:.1f} N, and the weakest part bears {rated_n:g} N: where the force sensor reads "
+        "wrong, that is the last bound. Lower the peak current."
+    ]
+
+
 def _axis_problems(settings: RigSettings, name: str, options: Any) -> list[str]:
-    limits, force_n, problems = settings.limits, options.largest_force_n, []
+    force_n: float | None = options.largest_force_n
+    problems: list[str] = []
     mandatory = [*_MANDATORY, *(("brake", "counterweight") if options.orientation == "vertical" else ())]
     missing = [option for option in mandatory if getattr(options, option) is None]
     if force_n is None:
         missing.append("peak_force_n (or peak current and force constant)")
-    elif name == MOTOR and force_n > limits.rated_force_n:
-        problems.append(
-            f"The {name}'s drive can exert {force_n:.1f} N, and the weakest part bears {limits.rated_force_n:g} N: "
-            "where the force sensor lies, that is the last bound. Lower the peak current."
-        )
+    elif isinstance(options, FaulhaberOptions) and options.current_limit_a is None:
+        missing.append("force_constant_n_a, without which the drive is sent no limit for the declared force")
+    if force_n is not None:
+        problems += _too_strong(f"The {name}'s drive", force_n, settings)
     if missing:
         problems.append(f"The options of {name} lack {', '.join(missing)}; nothing moves without.")
     if name == MOTOR and options.homes_towards() > 0:
@@ -145,6 +182,7 @@ def _axis_row(options: Any) -> tuple[str, ...]:
     return (
         f"{options.orientation or 'not stated'}, {without}",
         "not stated" if force_n is None else f"{force_n:.1f} N",
+        options.force_source,
         ", ".join(f"{name} {getattr(options, name):g}" for name in assumed),
     )
 

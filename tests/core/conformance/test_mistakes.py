@@ -10,11 +10,12 @@ from tactbench.core.plugins.registry import load_registry
 from tests.conftest import THIRD_PARTY
 
 SHELF = THIRD_PARTY / "flawed"
-SOUND = ("pad", "scale", "stage", "rig", "press", "task", "force", "estimator", "effect", "shape", "profile")
-PACKAGE = {"pad": "devices", "scale": "devices", "stage": "devices", "rig": "rigs", "press": "rigs"}
+SOUND = ("pad", "scale", "stage", "axis", "rig", "press", "task", "force", "estimator", "effect", "shape", "profile")
+PACKAGE = {"pad": "devices", "scale": "devices", "stage": "devices", "axis": "devices", "rig": "rigs", "press": "rigs"}
 KIND = {
-    "pad": "sensor", "scale": "device", "stage": "device", "rig": "rig", "press": "rig", "task": "task",
-    "force": "task", "estimator": "estimator", "effect": "effect", "shape": "indenter", "profile": "profile",
+    "pad": "sensor", "scale": "device", "stage": "device", "axis": "device", "rig": "rig", "press": "rig",
+    "task": "task", "force": "task", "estimator": "estimator",
+    "effect": "effect", "shape": "indenter", "profile": "profile",
 }  # fmt: skip
 PLACE, WORLD = "(2e-3, 1.5e-3, 0.0)", "super().read(timeout_s)"
 CAUGHT = """    def caught(self, timeout_s):
@@ -107,6 +108,21 @@ MISTAKES = [
     ("stage", 'unit="m"', 'unit="mm"', "device-is-fit-for-a-rig", "position.unit"),
     ("stage", 'self.link.write(b"go")', 'self.link.write(b"run"); self.link.write(b"go")',
      "device-is-fit-for-a-rig", "nobody has moved it"),
+    ("axis", '(b"S\\n")', '(b"?\\n")', "axis-halts-and-retreats", "goes on"),
+    ("axis", "self.check_move(position)", "pass", "axis-is-homed", "before it is homed"),
+    ("axis", "self.check_move(position)", "self.enabled = self.enabled or self.check_move(position)",
+     "axis-goes-where-it-is-sent", "while it moves"),
+    ("axis", "self.check_move(position)", "self.check_move(max(-4e-3, min(4e-3, position)))",
+     "axis-goes-where-it-is-sent", "m beyond its ends of travel"),
+    ("axis", ("round(1e6 * (position", "1e-6 * int(steps), idle", "+ 1e-6 * steps"),
+     ("-round(1e6 * (position", "-1e-6 * int(steps), idle", "- 1e-6 * steps"), "axis-goes-where-it-is-sent",
+     "is its direction reversed?"),
+    ("axis", "round(1e6 * (position", "round(39.37e3 * (position", "axis-goes-where-it-is-sent", "are expected"),
+    ("axis", "stop_latency_s = 0.06", "stop_latency_s = 0.01", "axis-halts-and-retreats", "goes on"),
+    ("axis", "        self.finish(stop)\n", "", "axis-is-homed", "driver.home"),
+    ("axis", "stop_latency_s = 0.06", "stop_latency_s = float('nan')", "axis-is-homed", "not all stated"),
+    ("axis", "    def update(", "    def retreat(self):\n        self.halt()\n\n    def update(",
+     "axis-halts-and-retreats", "driver.retreat: the axis is"),
     ("rig", 'unit="N"', 'unit="gf"', "force-and-seed-decide", "fz.unit"),
     ("rig", "(self.force +", "(-self.force +", "force-and-seed-decide", "is its sign turned?"),
     ("rig", "default_rng(seed)", "default_rng(0)", "force-and-seed-decide", "two seeds"),

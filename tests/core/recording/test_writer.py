@@ -75,6 +75,7 @@ def test_an_exception_leaves_the_old_file_alone_and_the_journal_of_a_real_device
         rescue(journal, tmp_path / "rescued.h5")
         with open_recording(tmp_path / "rescued.h5") as recording:
             assert (recording.meta.remarks, recording.meta.session) == (("late", REMARK), "late")
+            assert recording.meta.excluded.startswith("interrupted")  # as what Ctrl-C leaves: no evaluation takes it
             assert recording.read("taxels").annotations["object"].tolist() == ["ball", "", "Bär"]
 
 

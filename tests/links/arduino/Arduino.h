@@ -7,7 +7,10 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <thread>
 using std::min;
+#define __IMXRT1062__
+const uint32_t CCM_CBCMR = 2u << 26 | 1u << 4;  // as Teensyduino's SPI.begin() sets it: 720 MHz / 3
 enum { LOW, HIGH, OUTPUT, MSBFIRST, SPI_MODE0 = 0, SPI_MODE1 = 4, SPI_MODE2 = 8, SPI_MODE3 = 12 };
 
 inline uint32_t micros() {
@@ -17,7 +20,9 @@ inline uint32_t micros() {
 }
 
 inline uint8_t levels[64];  // of the pins
-inline void pinMode(uint8_t, uint8_t) {}
+inline void pinMode(uint8_t pin, uint8_t) {
+  if (levels[pin] == LOW) exit(3);  // an output that begins low selects a sensor
+}
 inline void digitalWrite(uint8_t pin, uint8_t level) { levels[pin] = level; }
 
 struct HostSerial {
@@ -31,9 +36,26 @@ struct HostSerial {
     if (::read(0, &byte, 1) != 1) exit(0);  // the test has closed it
     return byte;
   }
-  void write(uint8_t byte) { write(&byte, 1); }
-  void write(const uint8_t *data, size_t length) {
-    if (length && ::write(1, data, length) < 0) exit(1);
+  int availableForWrite() {
+    pollfd one = {1, POLLOUT, 0};
+    return poll(&one, 1, 0) > 0 ? 512 : 0;  // a pipe takes so much then, or it is full
+  }
+  size_t write(const uint8_t *data, size_t length) {
+    ssize_t sent = ::write(1, data, length);
+    if (sent < 0) exit(1);
+    return sent;
   }
 };
 inline HostSerial Serial;
+
+struct IntervalTimer {  // an interrupt, by a thread
+  void priority(uint8_t) {}
+  void begin(void (*call)(), float period_us) {
+    std::thread([=] {
+      for (;;) {
+        call();
+        usleep((unsigned)period_us);
+      }
+    }).detach();
+  }
+};

@@ -153,6 +153,30 @@ def test_homing_on_the_end_stop_with_little_current():
     assert place(link) == pytest.approx(0.0, abs=2 * STEP_M)
 
 
+@pytest.mark.parametrize(
+    "stated", [{"peak_current_a": 0.8}, {"peak_force_n": 5.2, "force_constant_n_a": 6.5},
+               {"peak_force_n": 5.2, "force_constant_n_a": 6.5, "peak_current_a": 1.6}],
+)  # fmt: skip
+def test_the_lower_limit_of_current_is_sent_and_read_back(stated):
+    driver, link = driver_on(motor(), **LIMITS, **stated)
+    settings = link.emulator.drive.settings
+    settings.update(LPC=5000, LCC=3000)
+    driver.start()
+    driver.home()
+    driver.confirm()
+    # The continuous current is not above the peak one; one that is lower belongs to the motor and stays.
+    assert (settings["LPC"], settings["LCC"]) == (800, 800)
+    for name in ("LPC", "LCC"):
+        settings[name] = 900
+        with pytest.raises(PositionerError, match="900"):
+            driver.confirm()
+        settings[name] = 800
+    settings["LCC"] = 300
+    driver.start()
+    driver.confirm()
+    assert settings["LCC"] == 300
+
+
 # Retreats -------------------------------------------------------------------------------------------------------------
 
 

@@ -7,6 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from tactbench.devices.sequence import SequenceCheck
 from tactbench.plugin import Quality, RigError, UsageError
 from tactbench.plugin.devices import DriverSettings, EmulatorSettings, LinkTimeout, LinkUnplugged, open_link
 from tactbench.rigs.parallel_manipulator.force_torque.net_ft.codec import (
@@ -241,6 +242,56 @@ def test_a_box_that_is_silent_or_gone():
         driver.read(0.1)
     driver.close()
     driver.close()
+
+
+class Joining(RdtEmulator):
+    """A box that sends several records in a datagram."""
+
+    joined, several, begin_s = b"", 4, 0.0
+
+    def _on_the_way(self, datagram, at_s):
+        if at_s < self.begin_s:
+            return super()._on_the_way(datagram, at_s)
+        self.joined += datagram
+        if len(self.joined) < 36 * self.several:
+            return []
+        whole, self.joined = self.joined, b""
+        return super()._on_the_way(whole, at_s)
+
+
+def test_several_records_in_a_datagram_are_refused_with_their_length():
+    joining = Joining(EmulatorSettings(lambda t: {}, np.random.default_rng(1), COUNTS))
+    driver, link = driver_on(joining)
+    for ask in (driver.identify, driver.start):
+        with pytest.raises(RigError, match=r"144 bytes came.*36 bytes"):
+            ask()
+    joining.begin_s, joining.several = link.now_s + 0.5, 7  # somebody changes it while it samples
+    driver.start()
+    with pytest.raises(RigError, match=r"252 bytes came.*36 bytes"):
+        read_for(driver, link, 5.0)
+
+
+@pytest.mark.parametrize("again_s", [0.4, 4.0])
+def test_a_box_that_is_started_anew_by_another_program_loses_next_to_nothing(again_s):
+    emulator = box()
+    driver, link = driver_on(emulator, begin_s=0.0)
+    driver.start()
+    check, kept, steps = SequenceCheck(), [], 0
+    while link.now_s < 6.0:
+        if steps == 0 and link.now_s > again_s:
+            emulator.feed(encode_request(Request(Command.START_REALTIME)), link.now_s)
+            steps = 1
+        kept += [block for block in map(check, driver.read(0.02)) if block is not None]
+    rows = sum(len(block.data) for block in kept)
+    numbers = np.concatenate([block.sequence for block in kept])
+    assert (np.diff(numbers) > 0).all()
+    assert rows == check.received - check.late
+    assert rows > 5900
+    lost = check.gaps - check.late  # what the completeness of a recording goes by
+    assert 20 <= lost <= 25
+    gaps = np.concatenate([block.quality.any(axis=1) if block.quality is not None else np.zeros(len(block.data), bool)
+                           for block in kept])  # fmt: skip
+    assert gaps.sum() == 1
 
 
 def test_other_rates_are_refused_with_the_right_one():

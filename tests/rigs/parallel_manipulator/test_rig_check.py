@@ -93,6 +93,36 @@ def test_an_axis_says_what_would_make_it_unsafe(option, value, said):
     assert re.search(said, problem)
 
 
+def rails(**options):
+    """Return what is found of the example with its rails, whose options are changed."""
+    changes = {f"devices__joint-{n}__options__{name}": value for n in (1, 2, 3) for name, value in options.items()}
+    file = with_joints(**{f"devices__joint-{n}__options__speed_m_s": 0.0018 for n in (1, 2, 3)}, **changes)
+    return check(RigFile.model_validate(file))
+
+
+def test_rails_are_held_against_the_rated_force_alone_and_together():
+    sound = rails()
+    assert sound.problems == ()
+    rows = {row[0]: row for row in sound.tables[0].rows}
+    # Vertical rails, in their middle: 3 x 1.2 A x 6.5 N/A along z.
+    assert rows["joint-1, joint-2, joint-3"][2:4] == ("23.4 N", "sent current limit, 1.2 A")
+    found = rails(peak_current_a=1.6).problems
+    assert [text for text in found if "joint-1, joint-2, joint-3 together can exert 31.2 N" in text] == list(found)
+    assert any("joint-2's drive can exert 78.0 N" in text for text in rails(peak_current_a=12.0).problems)
+
+
+def test_a_force_beyond_any_current_is_refused_with_both_numbers():
+    with pytest.raises(UsageError, match=r"no current of 76\.9.*500\.0 N, and the weakest part bears 25 N"):
+        rails(peak_current_a=..., peak_force_n=500.0)
+
+
+def test_a_declared_force_is_sent_as_a_current_or_refused():
+    assert rails(peak_current_a=..., peak_force_n=7.8).problems == ()
+    found = rails(peak_current_a=..., force_constant_n_a=..., peak_force_n=7.8).problems
+    assert len(found) == 3
+    assert all("sent no limit for the declared force" in text for text in found)
+
+
 def test_a_horizontal_axis_needs_no_brake():
     stated = {"orientation": "horizontal", "brake": ..., "counterweight": ...}
     assert problems(**{f"devices__motor__options__{name}": value for name, value in stated.items()}) == ()

@@ -20,6 +20,9 @@ def guess(value: float, unit: str) -> Quantity:
     return assumed(value, unit, WHY)
 
 
+# Sourced: Melexis, MLX90393 data sheet: fields up to 50 mT, -40 to 85 degC. A magnet that touches the chip stays below.
+RANGE = ({"lower": -50_000, "upper": 50_000}, {"lower": -40, "upper": 85})
+
 STREAM = StreamSpec(
     name="magnetometers",
     rate_hz=140.0,
@@ -28,7 +31,7 @@ STREAM = StreamSpec(
     channels=tuple(
         # Fields may have either sign, and so may their answer to a press. That the library gives uT is assumed.
         ChannelSpec(name=f"m{site}{axis}", kind="dc_temperature" if axis == "t" else "taxel",
-                    unit="degC" if axis == "t" else "uT", site=f"m{site}",
+                    unit="degC" if axis == "t" else "uT", site=f"m{site}", **RANGE[axis == "t"],
                     position_m=(1e-3 * x, 1e-3 * y, 0.0), position_source=Source(tag="assumed", reference=WHY))
         for site, (x, y) in enumerate(PLACES_MM, 1)
         for axis in "txyz"

@@ -3,13 +3,14 @@
 from collections.abc import Iterator, Sequence
 
 import numpy as np
-from tactbench.plugin import FloatArray
+from tactbench.plugin import FloatArray, Quality
 from tactbench.plugin.devices import ByteLink, Received, RowDriver, RowEmulator, Sample
 
 from tactbench_anyskin import STREAM
 
 FLOATS, END = len(STREAM.channels), b"\r\n"
 SIZE = 4 * FLOATS + len(END)
+LOWER, UPPER = (np.array([getattr(channel, end) for channel in STREAM.channels]) for end in ("lower", "upper"))
 
 
 def encode(values: Sequence[float]) -> bytes:
@@ -43,7 +44,11 @@ class AnySkinDriver(RowDriver[ByteLink]):
         """Return the frames that are complete."""
         frames, self._left, skipped = decode(self._left + received.data)
         self.counted.update({"bytes of no frame": skipped} if skipped else {})
-        return map(Sample, frames)
+        for frame in frames:
+            beyond = ~((LOWER <= frame) & (frame <= UPPER))
+            self.counted.update({"readings that no chip has": int(beyond.sum())} if beyond.any() else {})
+            marks = np.where(beyond, Quality.SUSPECT, Quality.GOOD) | np.where(np.isnan(frame), Quality.MISSING, 0)
+            yield Sample(frame, marks.tolist())
 
 
 class Emulator(RowEmulator):

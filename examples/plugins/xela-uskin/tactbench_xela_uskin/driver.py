@@ -1,4 +1,4 @@
-"""A frame a taxel; a row is complete with the last taxel's."""
+"""A frame a taxel; a row ends with the last taxel's, or where the next frame is of a taxel before it or the same."""
 
 import struct
 from collections.abc import Iterator, Sequence
@@ -32,27 +32,34 @@ class USkinOptions(Options):
 
 
 class USkinDriver(RowDriver[CanLink]):
-    """One board. Taxels that were not heard since the last row are marked as missing. How it is stopped, no source says."""
+    """One board. Taxels whose frame was lost are marked as missing. How the board is stopped, no source says."""
 
     stream, link_kind, options_kind = STREAM, CanLink, USkinOptions
 
     def begin(self) -> None:
         """Let it send."""
         self._heard: dict[int, tuple[int, ...]] = {}
+        self._last_ns = 0
         self.link.send(CanFrame(START + self.options.board, b"\x07\x00"))
 
     def rows(self, received: CanFrame) -> Iterator[Sample]:
-        """Return a row with the last taxel's frame."""
+        """Return the row that a frame completes, and the one before it where that was cut short."""
         found = decode(received)
         if found is None:
             self.counted["other frames"] += 1
             return
-        self._heard[found[0]] = found[1]
+        if self._heard and found[0] <= max(self._heard):
+            yield self._row()
+        self._heard[found[0]], self._last_ns = found[1], received.t_ns
         if found[0] == TAXELS - 1:
-            values = [self._heard.get(taxel, (0, 0, 0)) for taxel in range(TAXELS)]
-            missing = [Quality.GOOD if taxel in self._heard else Quality.MISSING for taxel in range(TAXELS)]
-            self._heard = {}
-            yield Sample(np.ravel(values).tolist(), np.repeat(missing, AXES).tolist())
+            yield self._row()
+
+    def _row(self) -> Sample:
+        values = [self._heard.get(taxel, (0, 0, 0)) for taxel in range(TAXELS)]
+        missing = [Quality.GOOD if taxel in self._heard else Quality.MISSING for taxel in range(TAXELS)]
+        self.counted.update({"frames lost": TAXELS - len(self._heard)} if len(self._heard) < TAXELS else {})
+        self._heard = {}
+        return Sample(np.ravel(values).tolist(), np.repeat(missing, AXES).tolist(), self._last_ns)
 
 
 class Emulator(RowEmulator):

@@ -38,6 +38,48 @@ def test_frames_of_others(frame):
     assert decode(frame) is None
 
 
+class Losing(Emulator):
+    """A board, some of whose frames are lost: (row, taxel)."""
+
+    lost, number = (), -1
+
+    def sent(self, values):
+        self.number += 1
+        return [frame for taxel, frame in enumerate(super().sent(values)) if (self.number, taxel) not in self.lost]
+
+
+@pytest.mark.parametrize(
+    ("lost", "rows"),
+    [
+        ({(2, 15), (3, 4)}, {2: {15}, 3: {4}}),  # the last of one row, and another one's of the next
+        ({(2, 15), (3, 0), (3, 1)}, {2: {15}, 3: {0, 1}}),
+        ({(2, taxel) for taxel in range(16)}, {}),
+        (
+            {(4, taxel) for taxel in range(8, 16)} | {(5, taxel) for taxel in range(3)},
+            {4: set(range(8, 16)), 5: {0, 1, 2}},
+        ),
+    ],
+)
+def test_rows_are_of_one_cycle_each(lost, rows):
+    model = Losing(EmulatorSettings(lambda second: {"t1z": 1000.0 + round(1e2 * second)}, np.random.default_rng(1)))
+    model.lost = lost
+    with (
+        EmulatedDevices({"pad": EmulatedDevice("can", model)}) as devices,
+        USkinDriver(DriverSettings(lambda: devices.open_link("pad"), clock=devices.clock)) as driver,
+    ):
+        driver.start()
+        blocks = [block for _ in range(10) for block in driver.read(0.01)]
+        counts = dict(driver.counts)
+    missing = {}
+    for block in blocks:
+        for row, at_ns in enumerate(block.t_ns):
+            marks = block.quality[row] if block.quality is not None else np.zeros(48)
+            if marks.any():
+                missing[round(1e-7 * at_ns) - round(1e-7 * blocks[0].t_ns[0])] = set(np.flatnonzero(marks)[::3] // 3)
+    assert missing == rows
+    assert counts == ({"frames lost": sum(map(len, rows.values()))} if rows else {})
+
+
 class OneTaxelSilent(Emulator):
     """A board whose taxel 4 does not send."""
 

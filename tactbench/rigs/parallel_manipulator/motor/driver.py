@@ -45,6 +45,7 @@ STANDING_NS = 20_000_000
 _FAULTS = OperationStatus.OVERVOLTAGE | OperationStatus.OVERTEMPERATURE
 _PROBLEMS = _FAULTS | OperationStatus.CURRENT_LIMITATION | OperationStatus.DEVIATION_ERROR
 _WATCHED = ("POS", "GRC", "OST")
+_CHANGED = "Was it without power, or set by another program? Check the option against the drive's manual."
 
 
 @dataclass(eq=False)
@@ -138,6 +139,8 @@ class FaulhaberDriver(Positioner):
         self._ask("SOR", 0)
         for setting in self._settings:
             self._keep(*setting)
+        if (most := self._largest_current()) is not None and self._sure("GCC") > most:
+            self._keep("LCC", most, "GCC")
         self._usual = self._speed = self._sure("GSP")
         self.enabled = bool(self._configuration() & Configuration.POWER_STAGE)
         if self.enabled:
@@ -231,8 +234,16 @@ class FaulhaberDriver(Positioner):
                 self._speed = setting[1]
             else:
                 self._same(*setting)
+        if (most := self._largest_current()) is not None and (found := self._sure("GCC")) > most:
+            raise PositionerError(
+                f"The motor's drive has GCC {found}, above the peak current of {most}.", hint=_CHANGED
+            )
         if self._limits:
             self._holds_limits()
+
+    def _largest_current(self) -> int | None:
+        """Return the limit of peak current in the drive's units, above which its continuous one may not be either."""
+        return next((argument for command, argument, _ in self._settings if command == "LPC"), None)
 
     def _holds_limits(self) -> None:
         if not self._configuration() & Configuration.POSITION_LIMITS:
@@ -389,7 +400,7 @@ class FaulhaberDriver(Positioner):
         if (found := self._sure(query)) != argument:
             raise PositionerError(
                 f"The motor's drive has {query} {found} where {command}{argument} was set.",
-                hint="Was it without power, or set by another program? Check the option against the drive's manual.",
+                hint=_CHANGED,
             )
 
     # What comes and goes ----------------------------------------------------------------------------------------------
@@ -486,7 +497,7 @@ def _required(options: FaulhaberOptions) -> tuple[list[_Setting], list[_Setting]
         ("AC", options.acceleration, options.acceleration_m_s2, "GAC"),
         ("DEC", options.acceleration, options.acceleration_m_s2, "GDEC"),
         ("CORRIDOR", lambda corridor_m: max(1, options.increments(corridor_m)), options.corridor_m, "GCORRIDOR"),
-        ("LPC", options.current, options.peak_current_a, "GPC"),
+        ("LPC", options.current, options.current_limit_a, "GPC"),
         ("LL", options.increments, options.upper_m, "GPL"),
         ("LL", options.increments, options.lower_m, "GNL"),
     )

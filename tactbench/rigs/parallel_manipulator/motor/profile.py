@@ -36,8 +36,9 @@ class FaulhaberOptions(PositionerOptions):
     """The drive takes a negative and a positive end of travel."""
     upper_m: float | None = Field(default=None, gt=0.0)
     peak_current_a: float | None = Field(default=None, gt=0.0)
+    """Sent to the drive as its limit of peak current; see :attr:`current_limit_a`."""
     force_constant_n_a: float | None = Field(default=None, gt=0.0)
-    """Force per current: times the peak current it is the largest force."""
+    """Force per current: times the limit of current it is the largest force."""
     homing: Literal["here", "end-stop"] = "here"
     """Where positions count from: the place at which it stands, or an end stop that is run against."""
     homing_speed_m_s: float = 0.005
@@ -46,11 +47,30 @@ class FaulhaberOptions(PositionerOptions):
     """With which it runs against an end stop."""
 
     @property
+    def current_limit_a(self) -> float | None:
+        """Limit of current that the drive is sent [A]: the lower one of `peak_current_a` and what gives `peak_force_n`.
+
+        None: neither is stated, or the force without its constant.
+        """
+        force_n, constant = self.peak_force_n, self.force_constant_n_a
+        of_force = force_n / constant if force_n is not None and constant is not None else None
+        return min((one for one in (self.peak_current_a, of_force) if one is not None), default=None)
+
+    @property
     def largest_force_n(self) -> float | None:
-        """Peak current times force constant [N]; None: one of them is not stated."""
-        if self.peak_current_a is None or self.force_constant_n_a is None:
-            return self.peak_force_n
-        return self.peak_current_a * self.force_constant_n_a
+        """Limit of current times force constant, or as declared where one of them is not stated [N]."""
+        limit = self.current_limit_a
+        return (
+            self.peak_force_n if limit is None or self.force_constant_n_a is None else limit * self.force_constant_n_a
+        )
+
+    @property
+    def force_source(self) -> str:
+        """Where :attr:`largest_force_n` comes from."""
+        if self.current_limit_a is None or self.largest_force_n is None:
+            return super().force_source
+        sent = f"sent current limit, {self.current_limit_a:g} A"
+        return sent if self.force_constant_n_a else f"declared, with {sent}"
 
     def homes_towards(self) -> int:
         """Return the sign of the homing speed against an end stop; 0: it stands."""

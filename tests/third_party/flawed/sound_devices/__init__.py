@@ -1,4 +1,4 @@
-"""A pad of four taxels, a force sensor and a stage, on serial lines."""
+"""A pad of four taxels, a force sensor, a stage and an axis that moves, on serial lines."""
 
 from tactbench.plugin import ChannelSpec, SensorDescriptor, SensorSpec, Source, StreamSpec, assumed, hookimpl
 from tactbench.plugin.devices import DeviceDescriptor
@@ -44,4 +44,6 @@ def tactbench_devices():
                          emulator="sound_devices.line:ScaleEmulator", **ON_THE_LINE),
         DeviceDescriptor(name="sound-stage", title="A stage", kind="motor", driver="sound_devices.line:Stage",
                          emulator="sound_devices.line:StageEmulator", **ON_THE_LINE),
+        DeviceDescriptor(name="sound-axis", title="An axis that moves", kind="motor", driver="sound_devices.axis:Axis",
+                         emulator="sound_devices.axis:AxisEmulator", **ON_THE_LINE),
     ]  # fmt: skip

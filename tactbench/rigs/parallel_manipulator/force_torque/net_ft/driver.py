@@ -40,6 +40,19 @@ ANSWER_S = 0.5
 """Within which a box answers, over the time its records take (assumed: a network of one cable)."""
 
 
+MOST_JOINED = 40
+"""Records that a box may put into one datagram, which it does not send before it has them (assumed)."""
+MOST_STRANGE = 100
+"""Datagrams of another length in a row after which the box sends no other ones (assumed)."""
+
+
+def _other_length(piece: Received) -> RigError:
+    return RigError(
+        f"A datagram of {len(piece.data)} bytes came, and one record of {RECORD_BYTES} bytes was expected.",
+        hint="Set the RDT buffer size on the box's web page to 1: one record a datagram.",
+    )
+
+
 class NetFtDriver(Driver):
     """A box on a datagram link.
 
@@ -63,6 +76,7 @@ class NetFtDriver(Driver):
         self._kept: list[Received] = []
         self._sampling = self._silent = False
         self._numbers, self._ticks = Unwrap(32), Unwrap(32)
+        self._strange = 0
 
     @property
     def streams(self) -> tuple[StreamSpec, ...]:
@@ -78,18 +92,19 @@ class NetFtDriver(Driver):
         return {name: count for name, count in self._counts.items() if count}
 
     def identify(self) -> Mapping[str, str]:
-        """Ask for two records; return rate and status.
+        """Look at two records; return rate and status.
 
         Raises
         ------
         LinkTimeout
             If two records in a row do not come.
         RigError
-            If the box sends at another rate than the options state.
+            If the box sends at another rate than the options state, or several records in a datagram.
         """
         self._silence()
-        self._send(Command.START_REALTIME, 2)
+        self._send(Command.START_REALTIME, 2 * MOST_JOINED)
         first, second = (decode_records(self._next().data)[0] for _ in range(2))
+        self._silence()
         every = (int(second["ft_sequence"]) - int(first["ft_sequence"])) % SEQUENCE_MODULUS
         if every != self.options.every:
             raise RigError(
@@ -123,11 +138,16 @@ class NetFtDriver(Driver):
         ------
         LinkUnplugged
             If the network says that nobody listens there.
+        RigError
+            If datagrams of another length alone come.
         """
         came, self._kept = self._kept, []
         came += self.link.receive_all(0.0 if came else timeout_s)
         whole = [piece for piece in came if len(piece.data) == RECORD_BYTES]
         self._counts["rejected"] += len(came) - len(whole)
+        self._strange = 0 if whole else self._strange + len(came)
+        if self._strange > MOST_STRANGE:
+            raise _other_length(came[-1])
         return [self._block(whole)] if whole else []
 
     def stop(self) -> None:
@@ -149,7 +169,10 @@ class NetFtDriver(Driver):
         self._silent = True
 
     def _next(self) -> Received:
-        return self.link.receive(ANSWER_S + 2 * self.options.every / SENSOR_RATE_HZ)
+        piece = self.link.receive(ANSWER_S + 2 * self.options.every / SENSOR_RATE_HZ)
+        if len(piece.data) != RECORD_BYTES:
+            raise _other_length(piece)
+        return piece
 
     def _block(self, came: list[Received]) -> Block:
         records = decode_records(b"".join(piece.data for piece in came))

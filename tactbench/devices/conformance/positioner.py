@@ -1,0 +1,184 @@
+"""Checks of an axis that moves, on its emulator in virtual time: what its driver says against where the emulator is."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import Any, NamedTuple
+
+from tactbench.core.conformance.check import Subject, check, code_of, fail, skip
+from tactbench.devices.conformance.driver import Opened, emulated
+from tactbench.devices.emulation.emulated_devices import EmulatedDevices
+from tactbench.devices.positioner import NotReadyError, Positioner
+
+PLACES = {"home_m": -4e-3, "lower_m": -4e-3, "upper_m": 4e-3, "retreat_m": -3e-3}
+PACE = {"speed_m_s": 5e-3, "acceleration_m_s2": 1.0, "corridor_m": 2e-5, "retreat_speed_m_s": 5e-3}
+"""Options of the axis where its descriptor's `emulated_options` state no others; homing finds the lower end."""
+HOMING_S = 120.0
+"""Homing takes no longer (assumed: 100 mm at 1 mm/s, and back)."""
+MOVE_S = 2.0
+"""A move of the checks takes about so long at most: an axis of a metre at 1 mm/s is not tried over all of it."""
+LOOK_S, REST_S = 1e-3, 0.3
+"""Between two looks at a moving axis, and for how long it must stand where it has ended."""
+
+
+class _Axis(NamedTuple):
+    """An axis that is started, and where its emulator is."""
+
+    opened: Opened
+    devices: EmulatedDevices
+    driver: Positioner
+    true_m: Callable[[], float]
+
+    def stretch(self) -> tuple[float, float]:
+        """Return the ends of a part of its travel, at most `MOVE_S` long, that begins or ends where it is."""
+        (low, high), speed = self.driver.facts.limits, self.driver.facts.speed
+        length = min(high - low, MOVE_S * speed)
+        begin = min(max(low, self.driver.position), high - length)
+        return begin, begin + length
+
+    def wait(self, seconds: float, until: Callable[[], bool]) -> None:
+        """Let time pass until a condition holds, for so long at most."""
+        end_ns = self.devices.clock() + round(1e9 * seconds)
+        while not until() and (before_ns := self.devices.clock()) < end_ns:
+            with code_of("driver.update", self.opened.subject):
+                self.driver.update(LOOK_S)
+            if self.devices.clock() == before_ns:
+                self.devices.advance(before_ns + round(1e9 * LOOK_S))
+
+    def ended(self, what: str, target_m: float, seconds: float) -> None:
+        """Wait for the end of a move; fail unless axis and driver are then at its target, and stay."""
+        began_m = self.true_m()
+        self.wait(seconds, lambda: not self.driver.moving)
+        moving, there_m = self.driver.moving, self.true_m()
+        self.wait(REST_S, lambda: False)
+        for where, at_m in ((what, there_m), (what, self.true_m()), ("driver.position", self.driver.position)):
+            if not abs(at_m - target_m) <= self.driver.facts.near:
+                turned = (at_m - began_m) * (target_m - began_m) < 0
+                guess = ": is its direction reversed?" if turned else ""
+                fail(where, f"the axis is at {at_m:.6g} m where {target_m:.6g} m are expected{guess}")
+        if moving:
+            fail("driver.moving", f"a move has not ended {seconds:.2g} s after it began, and the axis is at its target")
+
+    def refused(self, target_m: float, why: str) -> None:
+        """Fail unless a move is refused by NotReadyError, and nothing moves."""
+        before_m = self.true_m()
+        try:
+            with code_of("driver.move_to", self.opened.subject):
+                self.driver.move_to(target_m)
+        except AssertionError as failure:
+            if not isinstance(failure.__cause__, NotReadyError):
+                raise
+            return
+        self.wait(REST_S, lambda: False)
+        moved = f"the axis moves by {1e3 * (self.true_m() - before_m):.3g} mm"
+        fail("driver.move_to", f"it takes {target_m:g} m {why}; {moved}: call check_move() before anything is sent")
+
+
+@contextmanager
+def _axis(subject: Subject, *, homed: bool = True) -> Iterator[_Axis]:
+    kind = subject.code("driver")
+    if not (isinstance(kind, type) and issubclass(kind, Positioner)):
+        skip("it is no Positioner")
+    own = subject.descriptor.emulated_options
+    places = PLACES if own.keys().isdisjoint(PLACES) else {}
+    given = {name: value for name, value in {**places, **PACE}.items() if name not in own}
+    with emulated(subject, of_both=given) as (opened, devices):
+        emulator: Any = devices.emulator_of(subject.name)
+        if not hasattr(emulator, "position_m"):
+            fail("emulator", "it has no `position_m`: where the axis is, as its driver counts [m]")
+        driver: Any = opened.driver
+        axis = _Axis(opened, devices, driver, lambda: float(emulator.position_m))
+        if homed:
+            _home(axis)
+        yield axis
+
+
+def _home(axis: _Axis) -> None:
+    subject, driver, until_ns = axis.opened.subject, axis.driver, axis.devices.clock() + round(1e9 * HOMING_S)
+    with code_of("driver.home", subject):
+        driver.home(lambda: axis.devices.clock() > until_ns)
+    with code_of("driver.enable", subject):
+        if not driver.enabled:
+            driver.enable()
+    if not (driver.homed and driver.enabled):
+        fail("driver.homed, enabled", "they are not true after home() and enable()")
+
+
+@check("device", needs="driver-reads")
+def axis_is_homed(subject: Subject) -> None:
+    """Before homing a position means nothing, and after it everything rests on it: ceiling, ends of travel, retreat.
+
+    State resolution_m and stop_latency_s; refuse moves until home() has set `homed` (check_move); call the place that
+    homing finds `home_m`, and let home() return only once the axis stands.
+    """
+    with _axis(subject, homed=False) as axis:
+        facts = axis.driver.facts
+        if not (facts.resolution > 0 and facts.stop_latency_s >= 0 and facts.limits[0] < facts.limits[1]):
+            fail("driver.facts", f"resolution, stop latency and ends of travel are not all stated: {facts}")
+        if not axis.driver.homed:
+            axis.refused(sum(facts.limits) / 2, "before it is homed")
+        _home(axis)
+        axis.ended("driver.home", axis.driver.position, facts.seconds(0.0, facts.speed))
+
+
+@check("device", needs="axis-is-homed")
+def axis_goes_where_it_is_sent(subject: Subject) -> None:
+    """A reversed direction, another unit or ends of travel that are not kept drive an indenter through a sensor.
+
+    Positions are metres, those of a pressing axis positive into the skin. Call check_move() before a move is sent,
+    begin() after, and see() with each answer; end a move only where the controller stands at its target.
+    """
+    with _axis(subject) as axis:
+        driver, facts = axis.driver, axis.driver.facts
+        (low, high), speed = axis.stretch(), facts.speed
+        for share in (0.5, 0.8, 0.3):
+            target_m = low + share * (high - low)
+            with code_of("driver.move_to", subject):
+                target_m = driver.move_to(target_m)
+            axis.refused(target_m, "while it moves")
+            axis.ended("driver.move_to", target_m, facts.seconds(high - low, speed))
+        step_m = 0.05 * (high - low)
+        with code_of("driver.move_by", subject):
+            by_m = driver.move_by(step_m)
+        axis.ended("driver.move_by", target_m + step_m, facts.seconds(step_m, speed))
+        if not abs(by_m - target_m - step_m) <= facts.near:
+            fail("driver.move_by", f"it returns {by_m:g} m and goes to {target_m + step_m:g} m")
+        low, high = facts.limits
+        for beyond_m in (low - step_m, high + step_m, math.nan, math.inf):
+            axis.refused(beyond_m, f"beyond its ends of travel, {low:g} to {high:g} m")
+
+
+@check("device", needs="axis-goes-where-it-is-sent")
+def axis_halts_and_retreats(subject: Subject) -> None:
+    """The force is bounded by how soon a move ends: the guard computes with `stop_latency_s` and the acceleration.
+
+    Let halt() and retreat() replace the move that is under way, within the latency that the axis states; state a longer
+    one where the controller needs it, or interruptible = False where it ends every move.
+    """
+    with _axis(subject) as axis:
+        driver, facts = axis.driver, axis.driver.facts
+        if not facts.interruptible:
+            skip("it says that a move cannot be interrupted")
+        (low, high), v = axis.stretch(), facts.speed
+        most_m = v * (facts.stop_latency_s + 2 * LOOK_S) + v**2 / (2 * facts.acceleration) + facts.near
+        for name, goal_m in (("halt", high), ("halt", low), ("retreat", high)):
+            start_m = low + 0.5 * (high - low)
+            with code_of("driver.move_to", subject):
+                driver.move_to(start_m)
+            axis.ended("driver.move_to", start_m, facts.seconds(high - low, v))
+            way = math.copysign(1.0, goal_m - start_m)
+            with code_of("driver.move_to", subject):
+                driver.move_to(goal_m)
+            axis.wait(MOVE_S, lambda: way * (axis.true_m() - start_m) > 0.2 * (high - low))  # noqa: B023  (waited for here)
+            stays, furthest = name == "halt" or math.isnan(facts.retreat), [way * axis.true_m()]
+            with code_of(f"driver.{name}", subject):
+                getattr(driver, name)()
+            seconds = facts.seconds(facts.limits[1] - facts.limits[0], min(v, facts.retreat_speed))
+            # The condition is looked at in each step of the wait.
+            axis.wait(seconds, lambda: furthest.append(way * axis.true_m()) or not driver.moving)  # type: ignore[func-returns-value]  # noqa: B023
+            if (on_m := max(furthest) - furthest[0]) > most_m:
+                text = f"it goes on by {1e3 * on_m:.3g} mm, and {1e3 * most_m:.3g} mm follow"
+                fail(f"driver.{name}", f"{text} from the stop latency and the acceleration that it states")
+            axis.ended(f"driver.{name}", axis.true_m() if stays else facts.retreat, seconds)
