@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import atexit
+import re
 import shutil
 from pathlib import Path
 from tempfile import mkdtemp
@@ -79,12 +80,15 @@ def from_arrays(
         named = frame is not None and all(isinstance(name, str) and name in frame.columns for name in names)
         used += names if named else []
         columns[argument] = found = np.asarray(frame[given] if named else given)
-        gaps = argument != "y" and (found != found).any()
+        gaps = argument != "y" and ((found != found).any() or found.dtype.kind in "mM")  # a date is no number
         if found.shape[:1] != (len(X),) or found.ndim > 1 + (argument == "y") or gaps:
             known = "" if frame is None else f", or a name among {', '.join(map(str, frame.columns))}"
-            raise wrong(argument, given, f"a value for each of {len(X)} rows of X{known}")
+            what = "seconds" if argument == "time_s" else "a value"
+            raise wrong(argument, given, f"{what} for each of {len(X)} rows of X{known}")
     readings = X if frame is None else frame.drop(columns=used)
-    channels = [f"x{place}" for place in range(np.shape(X)[1])] if frame is None else list(map(str, readings.columns))
+    called = range(np.shape(X)[1]) if frame is None else readings.columns
+    channels = [re.sub(r"[^\w.-]+", "_", str(one), flags=re.ASCII) for one in called]
+    channels = [one if one[:1].isalpha() else f"x{one}" for one in channels]
     spec = installed().tasks[task].spec if task in installed().tasks else None
     target = _target(columns["y"], unit) if spec is None else spec.target
     notes, parts = {}, []

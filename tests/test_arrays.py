@@ -79,6 +79,9 @@ def test_a_frame_is_taken_by_the_names_of_its_columns():
     recordings = tactbench.from_arrays(frame, "F", time_s="t", groups="run", task="force")
     data = tactbench.load_task("force", recordings)
     assert data.feature_names == ("left", "mid", "right")
+    named = pd.DataFrame(X, columns=[0, "pad 2 (kPa)", "_c"])
+    numbered = tactbench.from_arrays(named, force, groups=groups, task="force")
+    assert tactbench.load_task("force", numbered).feature_names == ("x0", "pad_2_kPa_", "x_c")
     np.testing.assert_array_equal(data.X, X)
     with pytest.raises(UsageError, match=r"groups='ran'.*left, mid, right, F, t, run"):
         tactbench.from_arrays(frame, "F", groups="ran")

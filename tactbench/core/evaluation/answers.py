@@ -6,7 +6,7 @@ Regression, classification and events differ here in what is scored of a fold (:
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -36,8 +36,8 @@ class Configured:
     build: Build
     params: Mapping[str, Any] = field(default_factory=dict)
     """fixed by the user: they are not searched"""
-    fit_params: Mapping[str, Any] = field(default_factory=dict)
-    """what else its ``fit`` takes; arrays of a value for each row of X are taken at the rows of each fold"""
+    fit_params: Mapping[str, Callable[[Part], Any]] = field(default_factory=dict)
+    """what else its ``fit`` takes, of a training set"""
 
 
 @dataclass(frozen=True)
@@ -105,7 +105,7 @@ def fitted_fold(
                     hint="Use protocol `deployable-untared`, or leave the recording out.",
                 )
     X = features_of(fold.train, descriptor)
-    more = {name: data.at(fold.train, one) for name, one in estimator.fit_params.items()}
+    more = {name: of(fold.train) for name, of in estimator.fit_params.items()}
     model = estimator.build(choice.params if choice else {})
     began = clock()
     fit(model, X, fold.train.y, descriptor.name, counts, **more)

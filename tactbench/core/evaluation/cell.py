@@ -32,7 +32,7 @@ from tactbench.core.evaluation.fitting import builder, features_of, one_model_a_
 from tactbench.core.evaluation.folds import TaskData, load_task
 from tactbench.core.evaluation.frames import band_limit, clocked
 from tactbench.core.evaluation.interval import score_interval
-from tactbench.core.evaluation.leaks import copied_channels, leak_stamps, shared_groups
+from tactbench.core.evaluation.leaks import copied_channels, leak_stamps
 from tactbench.core.evaluation.metrics import METRICS, Metric, class_f1, confusion, metric_called, vector_details
 from tactbench.core.evaluation.reference_floor import beyond_floor, reference_floor, true_force
 from tactbench.core.evaluation.replicate_sums import recordings_right, replicates, summed
@@ -294,10 +294,8 @@ def _part_taken(data: TaskData) -> tuple[list[RecordingMeta], dict[str, int], li
     folds = [over_rows(one, data.data, recorded) for one in data.assignments]
     used = used_rows(folds)
     took_part = [one.meta for one, mask in zip(recorded.tables, used, strict=True) if (mask & one.labelled).any()]
-    if data.own:
-        stamps = (*shared_groups(data.unit or "recording", data), *leak_stamps(recorded, folds))
-    elif data.split != "shuffled":
-        stamps = leak_stamps(recorded, folds)
+    if data.split != "shuffled":
+        stamps = (*data.stamps, *leak_stamps(recorded, folds))
     else:
         stamps = (SHUFFLED_WHOLE_STAMP if recorded.whole else SHUFFLED_STAMP,)
     stamped = [*copied_channels(recorded), *stamps, *_incomplete(recorded)]

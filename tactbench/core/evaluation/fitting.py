@@ -8,6 +8,7 @@ import warnings
 from collections import Counter
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from functools import partial
 from inspect import signature
 from typing import Any
 
@@ -15,7 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from tactbench.core.errors import DataError, PluginContractError, TactbenchError, UnknownNameError, UsageError
-from tactbench.core.evaluation.dataset import Dataset
+from tactbench.core.evaluation.dataset import Dataset, at_rows
 from tactbench.core.evaluation.folds import TaskData
 from tactbench.core.evaluation.metrics import METRICS, Metric
 from tactbench.core.evaluation.protocols import ProtocolSpec
@@ -106,17 +107,20 @@ def fit(model: Estimator, X: FloatArray, y: npt.NDArray[Any], name: str, counts:
         counts[f"fits of {name} with a {kind}"] += 1
 
 
-def routed(estimator: Estimator, data: TaskData, given: Mapping[str, Any]) -> dict[str, Any]:
-    """Return what ``fit`` of an object is given beside X and y, under the names that scikit-learn has for it.
+def routed(estimator: Estimator, data: TaskData, given: Mapping[str, Any]) -> dict[str, Callable[[Part], Any]]:
+    """Return what makes of a training set what ``fit`` of an object is given beside it, by scikit-learn's names.
 
     `given`, where a text under ``groups`` or ``STEP__groups`` is the name of a label; and the groups of the rows where
     the object, or a step of it, searches parameters by cross-validation or names them in its ``fit``.
     """
-    found = {}
-    for name, value in given.items():
-        rows = name.rpartition("__")[2] in ("groups", "sample_weight")
-        sized = not isinstance(value, str) and np.shape(value)[:1] == data.y.shape[:1]
-        found[name] = data.per_row(f"params[{name!r}]", value) if rows else np.asarray(value) if sized else value
+
+    def of(name: str, value: Any) -> Callable[[Part], Any]:
+        if name.rpartition("__")[2] in ("groups", "sample_weight"):
+            value = data.per_row(f"params[{name!r}]", value)
+        if isinstance(value, str) or np.shape(value)[:1] != data.y.shape[:1]:
+            return lambda _: value
+        return partial(at_rows, data.data.tables, data.spread(np.asarray(value)))
+
     if importlib.import_module("sklearn").get_config()["enable_metadata_routing"]:
         routing = importlib.import_module("sklearn.utils.metadata_routing").get_routing_for_object(estimator)
         takes = sorted(routing.consumes("fit", ["groups"]))
@@ -127,7 +131,7 @@ def routed(estimator: Estimator, data: TaskData, given: Mapping[str, Any]) -> di
             name for name, one in steps
             if isinstance(one, search) or (hasattr(one, "fit") and "groups" in signature(one.fit).parameters)
         ]  # fmt: skip
-    return {**dict.fromkeys(takes, data.groups), **found}
+    return {name: of(name, value) for name, value in {**dict.fromkeys(takes, data.groups), **given}.items()}
 
 
 def answers(

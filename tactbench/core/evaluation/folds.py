@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from tactbench.core.errors import DataError, NotApplicable, wrong
-from tactbench.core.evaluation.dataset import Dataset, at_rows, load_dataset, thinned
+from tactbench.core.evaluation.dataset import Dataset, load_dataset, thinned
 from tactbench.core.evaluation.frames import framed
 from tactbench.core.evaluation.protocols import ProtocolSpec, protocol_called, shots, without_options
 from tactbench.core.evaluation.sets import apart, asked_for, tare_s, tared, windowed
@@ -25,8 +25,9 @@ from tactbench.core.evaluation.splits import (
     with_validation,
 )
 from tactbench.core.evaluation.summaries import is_summarised, summarised, with_windows
-from tactbench.core.samples import FloatArray, IntArray, Part
+from tactbench.core.samples import FloatArray, IntArray
 from tactbench.core.spec.rig import EstimatorDescriptor
+from tactbench.core.spec.row import LEAKS
 from tactbench.core.spec.task import TaskSpec
 
 PLAIN = EstimatorDescriptor.model_construct(name="estimator", title="", kinds=(), where="")
@@ -53,8 +54,8 @@ class TaskData:
     """a share of the training groups is what thresholds are chosen on: no recording has the role validation"""
     unit: str | None = "session"
     """name of the groups that are held out, which intervals are over; None: the caller's own split names none"""
-    own: bool = False
-    """the split is the caller's own"""
+    stamps: tuple[str, ...] = ()
+    """what the caller's own split gives away"""
     window: int = 0
     """rows of a window; 0: rows are answered one by one"""
 
@@ -107,12 +108,6 @@ class TaskData:
         if column.shape != (n,) or (column != column).any():  # NaN is no group, and weighs nothing
             raise wrong(argument, given, f"the name of a label, or an array of {n} values, one for each row of X")
         return column
-
-    def at(self, part: Part, given: Any) -> Any:
-        """Return the values of the labelled rows of a set, of an array of one for each row of `X`; or what it is."""
-        if not isinstance(given, np.ndarray) or given.shape[:1] != self.y.shape[:1]:
-            return given
-        return at_rows(self.data.tables, self.spread(given), part)
 
     def spread(self, column: npt.NDArray[Any]) -> list[npt.NDArray[Any]]:
         """Return (n,) values of the rows of `X` recording by recording; rows that are not in it have an empty one."""
@@ -173,46 +168,53 @@ def load_task(
             hint=f"Use protocol `{without_options(protocol)}`.",
         )
     recorded = thinned(recorded, rules.every)
-    own = isinstance(split, OwnSplit)
     name = split.name if isinstance(split, OwnSplit) else choose_split(task, rules, recorded, split)
-    if own and (rules.roles_only or rules.first_row_only):
+    if isinstance(split, OwnSplit) and (rules.roles_only or rules.first_row_only):
         raise NotApplicable(f"Protocol {protocol!r} has a split of its own, not {name}.", hint="Use `deployable`.")
     if rules.tare:
         tare_s(recorded)  # refuses recordings of which some only can be tared
     data = framed(recorded, task, rules, estimator) if frames else summarised(recorded, task, rules)
     if window:
         data = windowed(data, task, rules, window, step)
-    unit: str | None = "session" if name in SPLITS_WITHOUT_GROUPS or shots(name) else name
+    unit = "session" if name in SPLITS_WITHOUT_GROUPS or shots(name) else name
+    made = TaskData(task, rules, name, recorded, data, (), unit=unit, window=window)
     if isinstance(split, OwnSplit):
-        data, unit, assignments = _own_folds(split, TaskData(task, rules, name, recorded, data, ()))
+        made = _with_own_folds(made, split)
     else:
-        assignments = make_splits(data, name, seed, max(estimator.window_grid), one_by_one=name in task.campaigns)
+        folds = make_splits(data, name, seed, max(estimator.window_grid), one_by_one=name in task.campaigns)
+        made = replace(made, assignments=tuple(folds))
     if window:
-        assignments = [apart(one, window, step) for one in assignments]
-    if not any(mask.any() for one in assignments for mask in one.train):
+        made = replace(made, assignments=tuple(apart(one, window, step) for one in made.assignments))
+    if not any(mask.any() for one in made.assignments for mask in one.train):
         which = f", window={window}" if window else ""
         raise DataError(f"No fold could be made of these recordings{which}.", hint="Choose another split or window.")
-    held_back = task.kind == "events" and estimator.threshold is None and assignments[0].validation is None
-    if held_back:
-        assignments = [with_validation(one, data) for one in assignments]
+    if task.kind == "events" and estimator.threshold is None and made.assignments[0].validation is None:
+        parted = tuple(with_validation(one, made.data) for one in made.assignments)
+        made = replace(made, assignments=parted, held_back=True)
     if estimator.looks_at == "time" and any(meta.clock == "none" for meta in recorded.metas):
         raise NotApplicable(
             f"{estimator.name} looks at the time alone, which not all of these recordings state.",
             hint="State the clock in the mapping.",
         )
-    return TaskData(task, rules, name, recorded, data, tuple(assignments), held_back, unit, own, window)
+    return made
 
 
-def _own_folds(own: OwnSplit, made: TaskData) -> tuple[Dataset, str | None, list[Assignment]]:
-    """Return the rows with the caller's groups, what these are called, and the caller's folds."""
-    data, name, groups = made.data, own.groups if isinstance(own.groups, str) else "group", None
+def _with_own_folds(made: TaskData, own: OwnSplit) -> TaskData:
+    """Return rows with the caller's groups and folds, and a stamp where a group, or a recording, is on both sides."""
+    name, groups = "recording", None
+    apart_by = made.per_row("groups", name)
     if own.groups is not None:
-        groups = made.per_row("groups", own.groups)
-        columns = made.spread(groups.astype(np.str_))
-        tables = zip(data.tables, columns, strict=True)
-        data = replace(data, tables=tuple(replace(one, groups={**one.groups, name: mine}) for one, mine in tables))
-    masks = [[made.spread(np.isin(np.arange(len(made.y)), places)) for places in fold]
-             for fold in own.folds(made.X, made.y, groups)]  # fmt: skip
-    inside = "session" if groups is None else name
-    folds = [Assignment(str(at), tuple(train), tuple(test), groups=inside) for at, (train, test) in enumerate(masks, 1)]
-    return data, None if groups is None else name, folds
+        name = own.groups if isinstance(own.groups, str) else "group"
+        apart_by = groups = made.per_row("groups", own.groups)
+        each = zip(made.data.tables, made.spread(groups.astype(np.str_)), strict=True)
+        tables = tuple(replace(table, groups={**table.groups, name: mine}) for table, mine in each)
+        made = replace(made, data=replace(made.data, tables=tables))
+    folds: list[Assignment] = []
+    stamps: list[str] = []
+    for number, pair in enumerate(own.folds(made.X, made.y, groups), 1):
+        train, test = (tuple(made.spread(np.isin(np.arange(len(apart_by)), places))) for places in pair)
+        folds.append(Assignment(str(number), train, test, groups="session" if groups is None else name))
+        both = np.intersect1d(apart_by[pair[0]], apart_by[pair[1]])
+        stamps += [f"{LEAKS}split {own.name} puts {name} {one} on both sides of fold {number}." for one in both[:1]]
+    unit = None if groups is None else name
+    return replace(made, assignments=tuple(folds), unit=unit, stamps=tuple(stamps[:1]))

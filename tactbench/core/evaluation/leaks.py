@@ -9,7 +9,6 @@ import numpy as np
 import numpy.typing as npt
 
 from tactbench.core.evaluation.dataset import Dataset
-from tactbench.core.evaluation.folds import TaskData
 from tactbench.core.evaluation.splits import Assignment, Mask
 from tactbench.core.recording.health import MONOTONE, is_copy
 from tactbench.core.spec.row import LEAKS
@@ -62,18 +61,6 @@ def leak_stamps(data: Dataset, assignments: Sequence[Assignment]) -> tuple[str, 
         f"{LEAKS}{worst:.0%} of the test rows of a fold are equal to training rows, in blocks of {BLOCK}; "
         f"{pair[0]!r} repeats {pair[1]!r}.",
     )
-
-
-def shared_groups(name: str, data: TaskData) -> tuple[str, ...]:
-    """Return a stamp if rows of one group of that name train and test in one fold, else nothing."""
-    columns = [table.groups[name] for table in data.data.tables]
-    for fold in data.assignments:
-        train, test = (np.concatenate([one[mask] for one, mask in zip(columns, masks, strict=True)])
-                       for masks in (fold.train, fold.test))  # fmt: skip
-        both = np.intersect1d(train, test)
-        if len(both):
-            return (f"{LEAKS}split {data.split} puts {name} {both[0]} on both sides of fold {fold.name}.",)
-    return ()
 
 
 def _learned(fold: Assignment) -> tuple[Mask, ...]:
