@@ -7,28 +7,21 @@ from __future__ import annotations
 
 import math
 import os
-import random
 import shutil
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
-from concurrent.futures.process import BrokenProcessPool
-from contextlib import ExitStack
 from dataclasses import replace
-from functools import partial
-from importlib import import_module
 from itertools import product
 from pathlib import Path
-from pickle import PicklingError
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from pydantic import ValidationError
 
-from tactbench.core.errors import EngineError, NotApplicable, UnknownNameError, UsageError, complaint, wrong
-from tactbench.core.evaluation.folds import PLAIN, TaskData
+from tactbench.core.errors import NotApplicable, UnknownNameError, UsageError, complaint, wrong
+from tactbench.core.evaluation.folds import TaskData
 from tactbench.core.evaluation.folds import load_task as folds_of
-from tactbench.core.evaluation.metrics import METRICS, Metric, metric_called
-from tactbench.core.evaluation.protocols import is_probe, without_options
+from tactbench.core.evaluation.metrics import Metric
 from tactbench.core.evaluation.splits import OwnSplit
 from tactbench.core.files import named_file
 from tactbench.core.leaderboard.formats import records, write_tables
@@ -36,23 +29,16 @@ from tactbench.core.leaderboard.names import grouped
 from tactbench.core.leaderboard.pairwise import PairwiseComparison, comparisons, record_of, tables_of, with_declared
 from tactbench.core.leaderboard.table import Block, Table, build_table, over_all
 from tactbench.core.leaderboard.view import best, grids
-from tactbench.core.matrix.keys import Keys, Sections
-from tactbench.core.matrix.plan import Cell, cell_of
-from tactbench.core.matrix.solve import Job, Solved, read_dataset, solve, unanswered
+from tactbench.core.matrix.plan import cell_of
+from tactbench.core.matrix.solve import read_dataset, unanswered
 from tactbench.core.matrix.store import Store
-from tactbench.core.plugins.declared import declared_in, with_declared_of
-from tactbench.core.plugins.declared import with_declared as with_declared_tasks
+from tactbench.core.plugins.declared import with_declared_of
 from tactbench.core.plugins.interfaces import Estimator
 from tactbench.core.plugins.registry import installed
-from tactbench.core.provenance.gather import gather, usable_cores
-from tactbench.core.recording.reader import read_meta
+from tactbench.core.provenance.gather import usable_cores
 from tactbench.core.samples import Answers
-from tactbench.core.spec.declared_task import FILE
-from tactbench.core.spec.row import DIRECTIONS
-from tactbench.core.spec.status import STOPPED
 from tactbench.core.spec.task import TaskSpec, VectorTarget
 from tactbench.core.statistics.replicates import against_reference, over_replicates
-from tactbench.core.study.progress import progress
 from tactbench.core.study.results import opened, shown_rows, table_of
 from tactbench.core.study.shipped import matrix_called
 from tactbench.core.study.study import Study, carry_out
@@ -61,44 +47,13 @@ from tactbench.core.tables.terminal import plain_text
 from tactbench.core.tables.text import visible
 from tactbench.core.tables.text_table import TextTable
 from tactbench.recordings import AnyPath, Recordings, library, open_recordings, opened_as
+from tactbench.scoring import Estimators, Work, answered, cells_of, ended, name_of, named, question, side_by_side
 
 if TYPE_CHECKING:
     import pandas
     from matplotlib.figure import Figure
 
 Row = dict[str, Any]
-
-
-def _question(
-    task: str | TaskSpec, recordings: Recordings, protocol: str, split: Any, groups: Any, window: int | None, step: int,
-    seed: int,
-) -> tuple[TaskSpec, str, tuple[Path, ...], dict[str, Any]]:  # fmt: skip
-    """Return a task, the JSON that declares it beside the recordings (empty: it is installed), the files, and how.
-
-    The last has what :func:`folds_of` takes.
-    """
-    for name, given, least in (("window", 1 if window is None else window, 1), ("step", step, 1), ("seed", seed, 0)):
-        if not isinstance(given, int | np.integer) or given < least or (name == "step" and given > 1 and not window):
-            raise wrong(name, given, f"a whole number, {least} or more{', beside `window`' * (name == 'step')}")
-    paths = tuple(one.path for one in opened_as("recordings", recordings))
-    folders = {path.parent for path in paths if (path.parent / FILE).is_file()}
-    registry = with_declared_tasks(installed(), {one: None for each in sorted(folders) for one in declared_in(each)})
-    declared = ""
-    if isinstance(task, str):
-        owned = registry.tasks.owned(task)
-        task, declared = owned.descriptor.spec, owned.declared
-    if not isinstance(task, TaskSpec):
-        raise wrong("task", task, "a name of `tactbench list tasks`, one declared beside the recordings, or a TaskSpec")
-    plain = without_options(str(protocol))
-    if plain not in task.protocols and not is_probe(plain):
-        raise UnknownNameError(f"protocol of task {task.name!r}", str(protocol), task.protocols)
-    if split is not None and not isinstance(split, str):
-        if not hasattr(split, "split") and not isinstance(split, Iterable):
-            raise wrong("split", split, "a name, an object with scikit-learn's `split(X, y, groups)`, or index arrays")
-        split = OwnSplit(split, groups)
-    elif groups is not None:
-        raise wrong("groups", groups, "what a splitter keeps apart, and `split` is none (`params` has those of `fit`)")
-    return task, declared, paths, {"split": split, "window": window or 0, "step": step, "seed": seed}
 
 
 def load_task(
@@ -149,7 +104,7 @@ def load_task(
     DataError
         If nothing is left to evaluate; its kind NotApplicable if the question cannot be asked of these recordings.
     """
-    spec, _, paths, how = _question(task, recordings, protocol, split, groups, window, step, seed)
+    spec, _, paths, how = question(task, recordings, protocol, split, groups, window, step, seed)
     return folds_of(spec, read_dataset(spec, paths), protocol, **how)
 
 
@@ -350,121 +305,16 @@ def evaluate(
     PluginContractError
         If the estimator answers with something else than a finite number, or a class, a row.
     """
-    mine, *trivial = _cells(
+    mine, *trivial = cells_of(
         name_of(estimator), estimator, task, recordings, protocol, split, groups=groups, metric=metric,
         greater_is_better=greater_is_better, params=params, window=window, step=step, seed=seed,
     )  # fmt: skip
     data = read_dataset(mine.task, mine.paths)
-    row, answers = _answered(mine)
-    rows = [row, *(_ended(one, row["simulated"])[0] for one in trivial)]
+    row, answers = answered(mine)
+    rows = [row, *(ended(one, row["simulated"])[0] for one in trivial)]
     counts = Counter(one.name for one in data.metas)
     names = [one.name if counts[one.name] == 1 else str(path) for one, path in zip(data.metas, data.paths, strict=True)]
     return Result(rows, answers["test"], mine.task, names, mine.how["metric"])
-
-
-class _Work(NamedTuple):
-    """A cell that is evaluated here, with all names looked up."""
-
-    cell: Cell
-    task: TaskSpec
-    paths: tuple[Path, ...]
-    how: dict[str, Any]
-    """what the caller gives in place of what is named, as of :func:`solve`"""
-
-
-def _cells(
-    name: str,
-    estimator: str | Estimator,
-    task: str | TaskSpec,
-    recordings: Recordings,
-    protocol: str = "deployable",
-    split: Any = None,
-    *,
-    groups: Any = None,
-    metric: Any = None,
-    greater_is_better: bool | None = None,
-    params: Mapping[str, Any] | None = None,
-    window: int | None = None,
-    step: int = 1,
-    seed: int = 1,
-) -> list[_Work]:
-    """Return the cell of an estimator, and those of the task's trivial answers; arguments as of :func:`evaluate`."""
-    spec, declared, paths, how = _question(task, recordings, protocol, split, groups, window, step, seed)
-    given = None if isinstance(estimator, str) else estimator
-    scored = metric_of(metric, greater_is_better, spec)
-    if scored.name != spec.metric:  # what is published, or the same in use, is so by the task's own metric
-        unit = spec.unit if {scored.name, spec.metric} == {"rmse", "mae"} else "1"
-        spec = spec.model_copy(update={"metric": scored.name, "unit": unit, "equivalence": None, "published": ()})
-    if params is not None and (given is None or not isinstance(params, Mapping)):
-        raise wrong("params", params, "a mapping of what `fit` of an object takes to its values")
-    if window and given is None:
-        raise wrong("estimator", estimator, "an object where `window` is given")
-    cell = Cell(
-        sensor=read_meta(paths[0]).sensor.name, task=spec.name, rig="replay", protocol=protocol,
-        split=getattr(how["split"], "name", split), estimator=name, params=(), baseline=False, seed=seed,
-        declared_task=declared,
-    )  # fmt: skip
-    how |= {"given": None, "metric": scored}
-    trivial = [replace(cell, estimator=other, baseline=True) for other in spec.baselines if other != name]
-    mine = _Work(cell, spec, paths, {**how, "given": given, "fit_params": params or {}})
-    return [mine, *(_Work(one, spec, paths, how) for one in trivial)]
-
-
-def metric_of(given: Any, greater_is_better: bool | None, task: TaskSpec) -> Metric:
-    """Return a metric by name, of a scikit-learn scorer, or of a function of (y, prediction); None: the task's."""
-    own, scorer = metric_called(task.metric), given
-    found = own if given is None else None
-    if isinstance(given, str):
-        scorers: Any = import_module("sklearn.metrics")
-        found, scorer = METRICS.get(given), scorers.get_scorer(given) if given in scorers.get_scorer_names() else None
-    by_prediction = callable(scorer) and getattr(scorer, "_response_method", "predict") == "predict"
-    alike = found is not None and (found.kind, found.vector) == (own.kind, own.vector)
-    if not alike and (found is not None or own.kind == "events" or not by_prediction):
-        takes = "a name of docs/protocols.md or of sklearn.metrics.get_scorer_names(), a scorer of predictions, or a "
-        raise wrong("metric", given, f"what scores a {own.kind}: {takes}function of (y, prediction)")
-    plain = not alike and not hasattr(scorer, "_score_func")
-    if not (isinstance(greater_is_better, bool) if plain else greater_is_better is None):
-        takes = "True or False where `metric` is a function, and nothing where it tells the direction itself"
-        raise wrong("greater_is_better", greater_is_better, takes)
-    if found is not None:
-        return found
-    function, higher = scorer, bool(greater_is_better)
-    if not plain:
-        scorer, function, higher = scorer._score_func, partial(scorer._score_func, **scorer._kwargs), scorer._sign > 0
-    name = getattr(scorer, "__name__", type(scorer).__name__) + DIRECTIONS[higher]
-    return replace(own, name=name, function=function)
-
-
-def name_of(estimator: str | Estimator) -> str:
-    """Return what an estimator is called in tables: the name of its class, of a pipeline those of its steps."""
-    if isinstance(estimator, str):
-        return estimator
-    if isinstance(estimator, type) or not (hasattr(estimator, "fit") and hasattr(estimator, "predict")):
-        raise wrong("estimator", estimator, "an object with fit(X, y) and predict(X), or the name of an installed one")
-    steps = [type(step).__name__ for _, step in getattr(estimator, "steps", ()) if step not in (None, "passthrough")]
-    return "+".join(steps) or type(estimator).__name__
-
-
-def _answered(work: _Work) -> Solved:
-    """Evaluate a cell here; the global generators of random numbers are afterwards as they were."""
-    described = installed().estimators[work.cell.estimator] if work.how["given"] is None else PLAIN
-    states = random.getstate(), np.random.get_state()  # noqa: NPY002  (it is this old generator that cells seed)
-    try:
-        return solve(Job(work.cell, work.task, described, work.paths, (), "", {}), own=work.how)
-    finally:
-        random.setstate(states[0])
-        np.random.set_state(states[1])  # noqa: NPY002
-
-
-def _ended(work: _Work, simulated: bool) -> Solved:
-    """Return the row of a cell that is evaluated here, whether it finishes or not, and its answers."""
-    try:
-        return _answered(work)
-    except Exception as error:
-        return unanswered(work.cell, work.task, error, simulated=simulated), {}
-
-
-Estimators = str | Estimator | list[str | Estimator] | tuple[str | Estimator, ...] | Mapping[str, str | Estimator]
 
 
 def run(
@@ -513,7 +363,7 @@ def run(
         if misplaced := [name for name, value in given.items() if value not in ((), None)]:
             raise UsageError(f"`{misplaced[0]}` does not go with `data`.", hint="Use `data`, `estimators` and `tasks`.")
         return _over_data(data, estimators, tasks, Path(out), **options)
-    names, objects = _named(estimator)
+    names, objects = named(estimator)
     asked = {"sensor": sensor, "task": task, "recordings": _folder(recordings), "out": out, **options}
     if unknown := asked.keys() - Study.model_fields:
         raise UnknownNameError("argument of `run`", min(unknown), Study.model_fields)
@@ -546,7 +396,7 @@ def _over_data(
     **options: Any,
 ) -> Results:
     """Return the rows of estimators on data sets; see :func:`run`."""
-    names, objects = _named(estimators)
+    names, objects = named(estimators)
     every: dict[str, str | Estimator] = {**objects, **dict(zip(names, names, strict=True))}
     if not isinstance(data, Mapping) or not data:
         raise wrong("data", data, "a mapping from names of data sets to recordings")
@@ -561,7 +411,7 @@ def _over_data(
         mapped = isinstance(value, Mapping) and value and value.keys() <= {*data, *every}
         return next((value[name] for name in of if name in value), None) if mapped else value
 
-    asked: dict[str, dict[str, _Work]] = {name: {} for name in data}
+    asked: dict[str, dict[str, Work]] = {name: {} for name in data}
     splits: dict[tuple[Any, ...], OwnSplit] = {}
     for name, recordings in data.items():
         some = chosen(tasks, name)
@@ -572,7 +422,7 @@ def _over_data(
             for called, given in every.items():
                 own = {key: chosen(value, called, name) for key, value in options.items()}
                 stated = {key: value for key, value in own.items() if value is not None}
-                for work in _cells(called, given, task, mine, **stated):
+                for work in cells_of(called, given, task, mine, **stated):
                     if isinstance(work.how["split"], OwnSplit):  # drawn once, so that all are tested on the same folds
                         of = name, work.cell.sensor, work.cell.task, work.how["window"], work.how["step"]
                         work.how["split"] = splits.setdefault(of, work.how["split"])
@@ -580,56 +430,12 @@ def _over_data(
                         folds_of(work.task, read_dataset(work.task, work.paths), work.cell.protocol, **folds)
                     asked[name].setdefault(work.cell.name, work)
     blocks: list[Block] = []
-    for name, rows in _side_by_side(asked, out, jobs or usable_cores()).items():
+    for name, rows in side_by_side(asked, out, jobs or usable_cores()).items():
         store = Store(out / name)
         table = table_of(store, over_all(store, [{**row, "data": name} for row in rows]))
         write_tables(table, store.folder)
         blocks += [replace(one, title=f"{visible(name)} · {one.title}") for one in table.blocks]
     return Results(replace(table, blocks=tuple(blocks), sections=()))
-
-
-def _side_by_side(asked: Mapping[str, Mapping[str, _Work]], out: Path, jobs: int) -> dict[str, list[Row]]:
-    """Return the rows of cells of data sets, each found in a result folder or evaluated in one of `jobs` processes."""
-    import joblib
-
-    keys, rows = Keys(installed()), {name: dict[str, Row]() for name in asked}
-    todo: list[tuple[str, _Work, Store, str, Sections, str]] = []
-    with ExitStack() as held, progress() as display:
-        for name, works in asked.items():
-            store = held.enter_context(Store(out / name).hold())
-            store.begin(gather(installed(), engine="joblib"))
-            for work in works.values():
-                work = work._replace(cell=replace(work.cell, timed=jobs == 1))
-                digests = {path: store.about(path)["digest"] for path in work.paths}
-                try:
-                    key, sections = keys.of_given(work.cell, work.task, work.how, digests)
-                    why = ""
-                except ValueError as error:
-                    key, sections, why = "", {}, f"computed anew at every run: its source cannot be told ({error})"
-                if (found := store.finished(key)) is None:
-                    todo.append((name, work, store, key, sections, why))
-                else:
-                    rows[name][work.cell.name] = found
-        display.begin("evaluating", len(todo))
-        calls = (joblib.delayed(_in_place)(place, one[1]) for place, one in enumerate(todo))
-        try:
-            for place, (row, answers) in joblib.Parallel(jobs, return_as="generator_unordered")(calls):
-                name, work, store, key, sections, why = todo[place]
-                paths = [store.beside(path) for path in work.paths]
-                row |= {"key": key, "recordings": paths, "remarks": [*row["remarks"], *filter(None, [why])]}
-                rows[name][work.cell.name] = store.keep(row, sections, answers) if key else row
-                display.advance(work.cell.name, stopped=row["status"] in STOPPED)
-        except (BrokenProcessPool, PicklingError) as error:
-            raise EngineError(
-                f"A process that evaluates them has ended, or objects cannot be sent to it: {error}",
-                hint="What has ended is kept. Give jobs=1 to evaluate the rest in this process.",
-            ) from error
-    return {name: [rows[name][cell] for cell in works] for name, works in asked.items()}
-
-
-def _in_place(place: int, work: _Work) -> tuple[int, Solved]:
-    """Return a cell's place among those that are computed, and what came of it."""
-    return place, _ended(work, simulated=False)
 
 
 def results(folder: AnyPath = "tactbench-results") -> Results:
@@ -652,23 +458,6 @@ def _folder(recordings: Recordings | None) -> AnyPath | None:
     return folders.pop()
 
 
-def _named(estimator: Estimators) -> tuple[list[str], dict[str, Estimator]]:
-    """Return names of installed estimators, and objects by what they are called."""
-    if not isinstance(estimator, Mapping):
-        several = list(estimator) if isinstance(estimator, list | tuple) else [estimator]
-        pairs = [(name_of(one), one) for one in several]
-    else:
-        pairs = list(estimator.items())
-    objects = {name: one for name, one in pairs if not isinstance(one, str)}
-    names = [one for _, one in pairs if isinstance(one, str)]
-    if len(objects) + len(names) < len(pairs) or any(name in installed().estimators for name in objects):
-        raise UsageError(
-            f"Two estimators have one name: {', '.join(name for name, _ in pairs)}.",
-            hint="Give a mapping of names to objects, with names that no installed estimator has.",
-        )
-    return names, objects
-
-
 def _beside(row: Row, name: str, given: Estimator, folder: Path) -> Row:
     """Return the row of an object that answers what another row answered, from the same recordings."""
     cell = replace(cell_of(row), estimator=name, params=(), baseline=False)
@@ -677,4 +466,4 @@ def _beside(row: Row, name: str, given: Estimator, folder: Path) -> Row:
     if not paths:  # no answer to this question was finished
         whose = "" if row["status"] == "skipped" else f"{row['estimator']}: "
         return unanswered(cell, task, NotApplicable(f"{whose}{row['reason']}"), simulated=row["simulated"])
-    return _ended(_Work(cell, task, tuple(paths), {"given": given}), row["simulated"])[0]
+    return ended(Work(cell, task, tuple(paths), {"given": given}), row["simulated"])[0]
