@@ -134,10 +134,10 @@ class _Stream:
         return listed(names)
 
 
-def listed(names: Sequence[str]) -> str:
-    """Name channels: "t4 and t7", "E1, E2, E3 … (19 channels)"."""
-    if len(names) > MOST_LISTED:
-        return f"{', '.join(names[:3])} … ({len(names)} channels)"
+def listed(names: Sequence[str], kind: str = "channels", most: int = MOST_LISTED) -> str:
+    """Return names as a phrase: "t4 and t7"; of more than `most` the first half: "E1, E2, E3 … (19 channels)"."""
+    if len(names) > most:
+        return f"{', '.join(names[: most // 2])} … ({len(names)} {kind})"
     return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"
 
 

@@ -13,13 +13,13 @@ import numpy.typing as npt
 
 from tactbench.core.errors import MappingError, did_you_mean
 from tactbench.core.recording.mapping.channels import fill
-from tactbench.core.recording.mapping.model import Arrays, Mat, Npy
-from tactbench.core.recording.mapping.table import ArrayTable, plain
+from tactbench.core.recording.mapping.model import Arrays, Column, Mat, Npy
+from tactbench.core.recording.mapping.table import ColumnTable, plain
 
 Words = dict[str, str]
 
 
-def read_arrays(path: Path, shown: str, how: Arrays, known: Words) -> Iterator[tuple[Words, ArrayTable]]:
+def read_arrays(path: Path, shown: str, how: Arrays, known: Words) -> Iterator[tuple[Words, ColumnTable]]:
     """Yield one table a recording, with its words: ``index`` (from 0, with leading zeros) and `per_recording`.
 
     `known` are the words of the path, for names of further files.
@@ -61,7 +61,8 @@ def read_arrays(path: Path, shown: str, how: Arrays, known: Words) -> Iterator[t
     for index, rows in enumerate(ordered):
         words = {word: plain(arrays[name][index].item()) for word, name in how.per_recording.items()}
         where = f"{shown}[{f'{how.array}, ' if how.array else ''}{index}]"
-        yield {"index": f"{index:0{wide}d}", **words}, ArrayTable(where, rows)
+        columns: dict[Column, Any] = dict(enumerate(rows.T))
+        yield {"index": f"{index:0{wide}d}", **words}, ColumnTable(where, tuple(columns), range(len(rows)), columns)
 
 
 def _require_there(shown: str, names: set[str], there: Collection[str]) -> None:

@@ -9,15 +9,16 @@ from pathlib import Path, PurePosixPath
 from typing import NamedTuple
 
 from tactbench.core.errors import MappingError
+from tactbench.core.recording.health import listed
 from tactbench.core.recording.mapping.arrays import read_arrays
-from tactbench.core.recording.mapping.bags import Topic, read_bag
+from tactbench.core.recording.mapping.bags import read_bag
 from tactbench.core.recording.mapping.channels import columns_of
 from tactbench.core.recording.mapping.model import Arrays, Bag, Column, Mapping, Parquet, TableSource, Xlsx
 from tactbench.core.recording.mapping.parquet import read_parquet
 from tactbench.core.recording.mapping.samples import check_join
 from tactbench.core.recording.mapping.sheets import read_sheet
 from tactbench.core.recording.mapping.signatures import require_format
-from tactbench.core.recording.mapping.table import ColumnTable, Table, names_listed
+from tactbench.core.recording.mapping.table import Table, UsedColumns
 from tactbench.core.recording.mapping.text import read_text
 
 Words = dict[str, str]
@@ -107,23 +108,23 @@ def read(mapping: Mapping, files: FileSet) -> list[RawRecording]:
             for words, array in read_arrays(file.path, file.shown, source.read, file.words)
         ]
     tables: dict[str, Table] = {}
-    topics: dict[FoundFile, dict[str, Topic]] = {}
+    topics: dict[FoundFile, dict[str, tuple[str, UsedColumns]]] = {}
     for name, file in files.files.items():
         how = mapping.tables[name].read
         assert not isinstance(how, Arrays)  # the model refuses an archive beside other tables
         if isinstance(how, Bag):
-            tables[name] = ColumnTable(file.shown)  # keeps its place; read below, all topics of a bag at once
-            topics.setdefault(file, {})[name] = asked(mapping, name, how.topic)
+            topics.setdefault(file, {})[name] = how.topic, used_columns(mapping, name)
         elif isinstance(how, Xlsx):
             tables[name] = read_sheet(file.path, file.shown, how)
         elif isinstance(how, Parquet):
-            tables[name] = read_parquet(file.path, file.shown, asked(mapping, name))
+            tables[name] = read_parquet(file.path, file.shown, used_columns(mapping, name))
         else:
             tables[name] = read_text(file.path, file.shown, how)
     for file, wanted in topics.items():
         tables |= read_bag(file.path, file.shown, wanted)
-    check_join(mapping, tables)
-    return list(_split(mapping, RawRecording(tables, files.words, shown)))
+    ordered = {name: tables[name] for name in mapping.tables}
+    check_join(mapping, ordered)
+    return list(_split(mapping, RawRecording(ordered, files.words, shown)))
 
 
 class Shape(NamedTuple):
@@ -139,7 +140,7 @@ def require_same_shape(mapping: Mapping, raw: RawRecording, shapes: dict[str, Sh
     """Raise MappingError if a table has other columns than the first file where the mapping names places."""
     for name, table in raw.tables.items():
         if name not in shapes:
-            shapes[name] = Shape(table.shown, table.columns, {}, asked(mapping, name).columns)
+            shapes[name] = Shape(table.shown, table.columns, {}, used_columns(mapping, name).columns)
         first = shapes[name]
         first.everywhere.update(dict.fromkeys(table.columns))
         by_place = [one for one in first.used if isinstance(one, int) and one < len(first.columns)]
@@ -163,18 +164,16 @@ def unused_columns(shapes: dict[str, Shape]) -> Iterator[str]:
     for name, (_, _, columns, used) in shapes.items():
         left = [str(one) or str(place) for place, one in enumerate(columns) if not {one, place} & {*used}]
         if left:
-            yield f"{len(left)} of {len(columns)} columns of table {name}: {names_listed(left)}"
+            yield f"{len(left)} of {len(columns)} columns of table {name}: {listed(left, 'columns', 12)}"
 
 
-def asked(mapping: Mapping, name: str, topic: str = "") -> Topic:
-    """Return which columns of a table the mapping uses, with the topic of a bag."""
-    source = mapping.tables[name]
+def used_columns(mapping: Mapping, name: str) -> UsedColumns:
+    """Return which columns of a table the mapping uses."""
     streams = [stream for stream in mapping.streams.values() if stream.table == name]
     numbers = [column for one in streams for group in one.channels for column in columns_of(group)]
     texts = [note.column for one in streams for note in one.annotations.values() if note.column is not None]
     texts += mapping.split_by.values() if name == next(iter(mapping.tables)) else ()
-    time = source.time.column if source.time is not None else None
-    return Topic(topic, tuple(dict.fromkeys(numbers)), tuple(dict.fromkeys(texts)), time)
+    return UsedColumns(tuple(dict.fromkeys(numbers)), tuple(dict.fromkeys(texts)), mapping.tables[name].time)
 
 
 def _matching(name: str, source: TableSource, root: Path, left_out: list[str], none: list[str]) -> list[FoundFile]:
@@ -193,7 +192,7 @@ def _matching(name: str, source: TableSource, root: Path, left_out: list[str], n
         kinds["linked"] += [path for path in folders if path.is_dir() and next(path.rglob(inside or "*"), None)]
 
     def listing(kind: str) -> str:
-        return names_listed([path.relative_to(root).as_posix() for path in kinds[kind]])
+        return listed([path.relative_to(root).as_posix() for path in kinds[kind]], "files", 12)
 
     if kinds["links"]:
         raise MappingError(

@@ -11,9 +11,10 @@ import numpy.typing as npt
 
 from tactbench.core.errors import MappingError
 from tactbench.core.recording.health import Finding, listed
+from tactbench.core.recording.mapping.bags import MESSAGE_TIMES
 from tactbench.core.recording.mapping.channels import MappedChannel, MappedStream
 from tactbench.core.recording.mapping.model import Annotation, Bag, Mapping, Time
-from tactbench.core.recording.mapping.table import MESSAGE_TIMES, Table, nanoseconds_per
+from tactbench.core.recording.mapping.table import Table, nanoseconds_per
 from tactbench.core.samples import FloatArray, IntArray, Quality
 from tactbench.core.spec import units
 from tactbench.core.spec.recording import composed

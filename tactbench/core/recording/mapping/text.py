@@ -6,6 +6,7 @@ import csv
 import io
 import json
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from tactbench.core.errors import MappingError
@@ -66,9 +67,8 @@ def table_of(shown: str, lines: list[Line], how: Tabular) -> TextTable:
     _same_length(shown, lines, len(header) if header else len(lines[0][1]))
     rows, places = [cells for _, cells in lines], [place for place, _ in lines]
     no_sample = frozenset(text.strip() for text in how.no_sample)
-    if not isinstance(how, Written):
-        return TextTable(shown, header, rows, places, no_sample, trailing)
-    return TextTable(shown, header, rows, places, no_sample, trailing, how.decimal, how.thousands)
+    table = TextTable(shown, header or tuple(range(len(rows[0]))), places, rows, no_sample, trailing)
+    return replace(table, decimal=how.decimal, thousands=how.thousands) if isinstance(how, Written) else table
 
 
 def skipped(place: int, how: Tabular) -> bool:
@@ -165,4 +165,4 @@ def _records(lines: Sequence[str], shown: str, how: Records) -> TextTable:
             f"{shown}:{there[-1][0]}: the file ends after line {len(there) % per_row} of a record of {per_row} lines.",
             hint="The file was cut short: get it again.",
         )
-    return TextTable(shown, None, rows, begins, how.no_sample)
+    return TextTable(shown, tuple(range(len(rows[0]))), begins, rows, how.no_sample)

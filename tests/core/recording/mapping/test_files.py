@@ -11,7 +11,7 @@ def test_links_to_files_that_are_not_here_are_refused(tables):
     tables.put("a.csv", rows())
     for name in ("b.csv", "c.csv"):
         (tables.data / name).symlink_to(f"../.git/annex/objects/XX/{name}")
-    tables.refused("2 of 3 matches", "b.csv, c.csv", "datalad get")
+    tables.refused("2 of 3 matches", "b.csv", "c.csv", "datalad get")
     tables.refused("1 of 1 matches", "b.csv", tables__table__files="b.csv")
 
 
@@ -61,7 +61,7 @@ def test_a_place_is_the_same_column_in_all_files(tables):
 def test_columns_that_are_not_used_are_named_once(tables):
     for name in ("a.csv", "b.csv"):
         tables.put(name, rows().replace("\n", ",7,8\n"))
-    assert tables.run().unused == ("2 of 7 columns of table table: 5, 6",)
+    assert tables.run().unused == ("2 of 7 columns of table table: 5 and 6",)
 
 
 def test_progress_counts_recordings(tables):
