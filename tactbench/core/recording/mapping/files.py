@@ -15,7 +15,6 @@ from tactbench.core.recording.mapping.bags import read_bag
 from tactbench.core.recording.mapping.channels import columns_of
 from tactbench.core.recording.mapping.model import Arrays, Bag, Column, Mapping, Parquet, TableSource, Xlsx
 from tactbench.core.recording.mapping.parquet import read_parquet
-from tactbench.core.recording.mapping.samples import check_join
 from tactbench.core.recording.mapping.sheets import read_sheet
 from tactbench.core.recording.mapping.signatures import require_format
 from tactbench.core.recording.mapping.table import Table, UsedColumns
@@ -122,9 +121,14 @@ def read(mapping: Mapping, files: FileSet) -> list[RawRecording]:
             tables[name] = read_text(file.path, file.shown, how)
     for file, wanted in topics.items():
         tables |= read_bag(file.path, file.shown, wanted)
-    ordered = {name: tables[name] for name in mapping.tables}
-    check_join(mapping, ordered)
-    return list(_split(mapping, RawRecording(ordered, files.words, shown)))
+    lead = tables[first]
+    for name, table in tables.items():
+        if mapping.join is not None and mapping.join.by == "rows" and len(table) != len(lead):
+            raise MappingError(
+                f"{table.shown} (table {name!r}) has {len(table)} rows, {lead.shown} has {len(lead)}.",
+                hint="Tables joined by rows must be equally long; with a clock each, `by: clock` is an alternative.",
+            )
+    return list(_split(mapping, RawRecording({name: tables[name] for name in mapping.tables}, files.words, shown)))
 
 
 class Shape(NamedTuple):

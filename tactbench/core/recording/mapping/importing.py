@@ -255,7 +255,11 @@ def _write(
             counts[f"rows of {name}"] = len(table)
         counts |= {f"{channel} without a sample": number for channel, number in missing.items()}
         examined = examine(UnwrittenRecording(meta, written))
-        findings = (*beside, *examined, *found, *_given_away(sensed, reference), *_trailing_delimiters(raw))
+        for name, table in raw.tables.items():
+            if isinstance(table, TextTable) and table.trailing:
+                text = f"every line of table {name} ends with a delimiter; the empty cell behind it is left out"
+                found.append(Finding("trailing-delimiter", "info", "", (), len(table), text))
+        findings = (*beside, *examined, *found, *_given_away(sensed, reference))
         kept = [asdict(one) for one in findings if one.severity != "info"]
         writer.revise(counts=counts, provenance={FINDINGS: kept})
     rows = max(len(table) for table in raw.tables.values())
@@ -268,13 +272,6 @@ def _given_away(sensed: dict[str, FloatArray], reference: dict[str, FloatArray])
         if len(column) == len(wanted) and is_copy(column, wanted):
             text = f"{name}, a channel of the sensor, is {MONOTONE.format(force)}"
             yield Finding("target-among-features", "warning", "", (name,), 1, text)
-
-
-def _trailing_delimiters(raw: RawRecording) -> Iterator[Finding]:
-    for name, table in raw.tables.items():
-        if isinstance(table, TextTable) and table.trailing:
-            text = f"every line of table {name} ends with a delimiter; the empty cell behind it is left out"
-            yield Finding("trailing-delimiter", "info", "", (), len(table), text)
 
 
 def _meta(mapping: Mapping, raw: RawRecording, sensor: SensorSpec, reference: tuple[StreamSpec, ...]) -> RecordingMeta:

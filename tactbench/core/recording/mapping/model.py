@@ -239,8 +239,6 @@ class ChannelGroup(Frozen):
     """Unit of the column, if another."""
     sentinels: tuple[float, ...] | None = None
     """Numbers in the column that mean "no sample"; a force or torque must say, if only ``[]``."""
-    keep_repeated: bool = False
-    """Without effect: repeated values are reported, and never refused. Mappings may still have it."""
     lower: float | None = None
     upper: float | None = None
     sign: Literal[-1, 0, 1] = 0

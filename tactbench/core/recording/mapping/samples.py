@@ -169,46 +169,18 @@ def labels(name: str, annotation: Annotation, table: Table) -> npt.NDArray[Any]:
     return np.array(texts, dtype=np.str_)
 
 
-def check_join(mapping: Mapping, tables: dict[str, Table]) -> None:
-    """Compare tables joined by rows: equally long, and their times as close as the mapping promises.
-
-    Raises
-    ------
-    MappingError
-        If they differ; the message names the first row that does.
-    """
-    if mapping.join is None or mapping.join.by != "rows":
-        return
-    (first, lead), *others = tables.items()
-    for name, table in others:
-        if len(table) != len(lead):
-            raise MappingError(
-                f"{table.shown} (table {name!r}) has {len(table)} rows, {lead.shown} has {len(lead)}.",
-                hint="Tables joined by rows must be equally long; with a clock each, `by: clock` is an alternative.",
-            )
-        own, other = mapping.tables[first].time, mapping.tables[name].time
-        within = mapping.join.times_within_ms
-        if own is None or other is None or within is None:
-            continue
-        apart_ms = np.abs(times(lead, own) - times(table, other)) * 1e-6
-        if (apart_ms > within).any():
-            row = int(np.flatnonzero(apart_ms > within)[0])
-            raise MappingError(
-                f"{table.where(row)}: its time is {apart_ms[row]:.3g} ms from that of {lead.where(row)}; the mapping "
-                f"allows {within:g} ms.",
-                hint="The rows do not belong together, or `times_within_ms` is too strict.",
-            )
-
-
 def compare_clocks(mapping: Mapping, tables: dict[str, Table], clocks: dict[str, IntArray]) -> Iterator[Finding]:
-    """Yield in what the clocks of tables that are joined by them differ.
+    """Compare the clocks of joined tables, and yield in what those of tables that are joined by them differ.
 
     Raises
     ------
     MappingError
-        If two of them have no time in common; the message has both spans.
+        If times of one row differ by more than the mapping allows, or clocks have no time in common.
     """
-    if mapping.join is None or mapping.join.by != "clock":
+    if mapping.join is None or len(clocks) < 2:
+        return
+    if mapping.join.by == "rows":
+        _compare_rows(tables, clocks, mapping.join.times_within_ms or 0.0)
         return
     kinds: dict[str, list[str]] = {}
     for name in clocks:
@@ -243,6 +215,19 @@ def compare_clocks(mapping: Mapping, tables: dict[str, Table], clocks: dict[str,
             f"{begun * 1e-9:.3g} s and end {ended * 1e-9:.3g} s apart"
         )
         yield Finding("spans", "warning", "", (), 0, text)
+
+
+def _compare_rows(tables: dict[str, Table], clocks: dict[str, IntArray], within_ms: float) -> None:
+    (first, lead), *others = clocks.items()
+    for name, t_ns in others:
+        apart_ms = np.abs(lead - t_ns) * 1e-6
+        if (apart_ms > within_ms).any():
+            row = int(np.flatnonzero(apart_ms > within_ms)[0])
+            raise MappingError(
+                f"{tables[name].where(row)}: its time is {apart_ms[row]:.3g} ms from that of "
+                f"{tables[first].where(row)}; the mapping allows {within_ms:g} ms.",
+                hint="The rows do not belong together, or `times_within_ms` is too strict.",
+            )
 
 
 def _moment(mapping: Mapping, name: str, t_ns: int) -> str:

@@ -105,7 +105,7 @@ class TextTable(Table):
     cells: list[list[str]]
     no_sample: Collection[str] = ()
     trailing: bool = False
-    """Whether the lines of data ended with a delimiter that the header had not."""
+    """Whether every line of data ended with a delimiter that the header had not."""
     decimal: str = "."
     thousands: str | None = None
 
