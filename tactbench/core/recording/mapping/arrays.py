@@ -1,4 +1,4 @@
-"""Reading NumPy arrays and MATLAB files into tables; pickled objects are refused."""
+"""Readers of NumPy arrays and MATLAB files; pickled objects are refused."""
 
 from __future__ import annotations
 
@@ -20,14 +20,14 @@ Words = dict[str, str]
 
 
 def read_arrays(path: Path, shown: str, how: Arrays, known: Words) -> Iterator[tuple[Words, ColumnTable]]:
-    """Yield one table a recording, with its words: ``index`` (from 0, with leading zeros) and `per_recording`.
+    """Yield the table of each recording, with its words: ``index`` (from 0, with leading zeros) and `per_recording`.
 
-    `known` are the words of the path, for names of further files.
+    `known` are the words of the path, which are filled into the names of further files.
 
     Raises
     ------
     MappingError
-        If the file is none of its kind, lacks an array, or an array has the wrong shape or type.
+        If the file has another format or lacks an array, or an array has the wrong shape or type.
     """
     names = {how.array, *how.per_recording.values()}
     if isinstance(how, Mat):

@@ -1,4 +1,4 @@
-"""Reading topics of MCAP bags, as ROS 2 and Foxglove write them, into tables; the extra ``[mcap]``."""
+"""Reader of MCAP bags, as ROS 2 and Foxglove write them; it needs the extra ``[mcap]``."""
 
 from __future__ import annotations
 
@@ -88,7 +88,7 @@ def _records(path: Path, shown: str) -> Iterator[Any]:
 
 
 def _decoder(channel: Any, schema: Any, shown: str) -> Callable[[bytes], Any]:
-    """Return what turns the bytes of a message into fields; raises MappingError for an encoding that is not read."""
+    """Return the decoder of a topic's messages; raises MappingError for an encoding that cannot be read."""
     if channel.message_encoding == "json":
         return json.loads
     ros: Any = importlib.import_module("mcap_ros2.decoder")
@@ -121,7 +121,7 @@ def _take(record: Any, decode: Any, used: UsedColumns, values: dict[Column, Any]
 
 
 def _field(message: Any, path: tuple[str | int, ...]) -> Any:
-    """Return what lies at a path: fields of ROS 2 messages, keys of JSON, places in arrays."""
+    """Return the value at a path: of fields of ROS 2 messages, keys of JSON and places in arrays."""
     for part in path:
         message = message[part] if isinstance(part, int) or isinstance(message, dict) else getattr(message, part)
     return message

@@ -1,4 +1,4 @@
-"""Which files make which recording: patterns, words in paths, and the tables that belong together."""
+"""Search for the files of each recording: patterns, words in paths, and tables that belong together."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ Words = dict[str, str]
 
 @dataclass(frozen=True)
 class FoundFile:
-    """A file, its path below the root, and the words in that path."""
+    """A file, its path below the root folder, and the words in that path."""
 
     path: Path
     shown: str
@@ -34,7 +34,7 @@ class FoundFile:
 
 @dataclass(frozen=True)
 class FileSet:
-    """The files of one or more recordings: one for each table of the mapping."""
+    """Files that belong together, by their table, and the words of all their paths."""
 
     files: dict[str, FoundFile]
     words: Words
@@ -42,18 +42,18 @@ class FileSet:
 
 @dataclass(frozen=True)
 class RawRecording:
-    """Tables of one recording, read."""
+    """The tables of one recording as they were read, and its words."""
 
     tables: dict[str, Table]
     words: Words
     files: tuple[str, ...]
-    """Paths below the root"""
+    """Paths below the root folder."""
 
 
 def find(mapping: Mapping, root: Path) -> tuple[list[FileSet], tuple[str, ...], tuple[str, ...]]:
-    """Return what belongs together, in the order of the first table's paths, what is left out, and other matches.
+    """Return the files that belong together, in the order of the first table's paths, and sentences about the others.
 
-    The last two are sentences.
+    The sentences of the second result are about files that make no recording, those of the third about no tables.
 
     Raises
     ------
@@ -95,7 +95,7 @@ def find(mapping: Mapping, root: Path) -> tuple[list[FileSet], tuple[str, ...], 
 
 
 def read(mapping: Mapping, files: FileSet) -> list[RawRecording]:
-    """Read what belongs together: one recording, or those of an archive or of the values of a column."""
+    """Return the recordings of files that belong together: one, or those of an array or of the values of a column."""
     shown = tuple(dict.fromkeys(file.shown for file in files.files.values()))
     for name, file in files.files.items():
         require_format(file.path, file.shown, mapping.tables[name].read.format)
@@ -132,7 +132,7 @@ def read(mapping: Mapping, files: FileSet) -> list[RawRecording]:
 
 
 class Shape(NamedTuple):
-    """The columns of the first file of a table, those of all files, and those that the mapping uses."""
+    """The columns of a table: of its first file, `shown`, of all files, and those that the mapping uses."""
 
     shown: str
     columns: tuple[Column, ...]
@@ -164,7 +164,7 @@ def require_same_shape(mapping: Mapping, raw: RawRecording, shapes: dict[str, Sh
 
 
 def unused_columns(shapes: dict[str, Shape]) -> Iterator[str]:
-    """Yield which columns of a table the mapping does not use."""
+    """Yield a sentence for each table that names the columns that the mapping does not use."""
     for name, (_, _, columns, used) in shapes.items():
         left = [str(one) or str(place) for place, one in enumerate(columns) if not {one, place} & {*used}]
         if left:
@@ -181,7 +181,7 @@ def used_columns(mapping: Mapping, name: str) -> UsedColumns:
 
 
 def _matching(name: str, source: TableSource, root: Path, left_out: list[str], none: list[str]) -> list[FoundFile]:
-    """Return the files of a table; other files that match are named in `left_out`, and what is no table in `none`."""
+    """Return the files of a table; add sentences about other matches to `left_out` and, about no tables, to `none`."""
     ending = PurePosixPath(source.files).suffix
     ending = ending if ending[1:].isalnum() else ""
     in_any_case = "".join(f"[{mark.lower()}{mark.upper()}]" if mark.isalpha() else mark for mark in ending)
@@ -204,12 +204,16 @@ def _matching(name: str, source: TableSource, root: Path, left_out: list[str], n
             f"are not here: {listing('links')}.",
             hint="Fetch what git-annex keeps elsewhere: `datalad get FILE`; remove other links, or narrow the pattern.",
         )
-    said = {
+    obstacles = {
         "case": f"files end in another case than {ending!r}",
         "linked": "linked folders hold matches; ** does not search them",
         "folders": "matches are folders", "macOS": "files are what macOS keeps beside others (AppleDouble)",
     }  # fmt: skip
-    notes = {kind: f"{pattern}: {len(kinds[kind])} {said[kind]}: {listing(kind)}" for kind in said if kinds[kind]}
+    notes = {
+        kind: f"{pattern}: {len(kinds[kind])} {obstacle}: {listing(kind)}"
+        for kind, obstacle in obstacles.items()
+        if kinds[kind]
+    }
     left_out += [note for kind, note in notes.items() if kind in ("case", "linked")]
     none += [note for kind, note in notes.items() if kind in ("folders", "macOS")]
     if not kinds[""]:
@@ -232,7 +236,7 @@ def _matching(name: str, source: TableSource, root: Path, left_out: list[str], n
 
 
 def _kind(path: Path, ending: str) -> str:
-    """Return which kind of match a path is; a plain file with the ending of the pattern is the empty text."""
+    """Return the kind of a match: the empty text for a plain file with the ending of the pattern, else the obstacle."""
     if not path.exists():
         return "links"
     if not path.is_file():
@@ -248,7 +252,7 @@ def _kind(path: Path, ending: str) -> str:
 def _partner(
     leader: FoundFile, name: str, shared: Sequence[str], candidates: dict[tuple[str, ...], list[FoundFile]]
 ) -> FoundFile | str:
-    """Return the file of table `name` that belongs to a file of the first, or what to say where there is none."""
+    """Return the file of table `name` that belongs to a file of the first; where there is none, a sentence about it."""
     fitting = candidates.get(tuple(leader.words[word] for word in shared), [])
     if len(fitting) == 1:
         return fitting[0]
@@ -263,7 +267,7 @@ def _partner(
 
 
 def _split(mapping: Mapping, raw: RawRecording) -> Iterator[RawRecording]:
-    """One recording for each combination of values in the columns of `split_by`, in order of appearance."""
+    """Yield a recording for each combination of values in the columns of `split_by`, in order of appearance."""
     if not mapping.split_by:
         yield raw
         return

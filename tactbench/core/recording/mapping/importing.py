@@ -1,4 +1,4 @@
-"""The import itself: all recordings of a mapping, or none."""
+"""The import of all recordings that a mapping describes; if one of them fails, none is kept."""
 
 from __future__ import annotations
 
@@ -37,25 +37,25 @@ from tactbench.core.spec.sensor import SensorSpec, StreamSpec
 from tactbench.core.spec.yaml_file import load_yaml
 
 RIG = "import"
-"""What an imported recording says about its rig: somebody else's, made known by a mapping."""
+"""Name of the rig in imported recordings, which another laboratory has made."""
 
 ENDING = ".h5"
 WAITING, PLACING = ".importing-", ".placing-"
-"""Folders in which the recordings of an import wait, and from which they are being moved to their place."""
+"""Prefixes of the folders in which the recordings of an import wait, and from which they are moved to their place."""
 _FILE_NAME = re.compile(r"^[A-Za-z0-9][A-Za-z0-9._-]*$")
 
 
 @dataclass(frozen=True)
 class Imported:
-    """One recording that was written."""
+    """One recording that an import has written."""
 
     path: Path
     name: str
     rows: int
-    """Rows of its longest stream"""
+    """Rows of its longest stream."""
     sensor: str
     missing: dict[str, int] = field(default_factory=dict)
-    """Samples marked as missing, by channel"""
+    """Samples marked as missing, by channel."""
     excluded: str = ""
     origin: str = ""
     findings: tuple[Finding, ...] = ()
@@ -63,17 +63,17 @@ class Imported:
 
 @dataclass(frozen=True)
 class ImportReport:
-    """What an import did."""
+    """What an import has read, written and left out."""
 
     title: str
     recordings: tuple[Imported, ...]
     files_read: int
     tasks: tuple[str, ...] = ()
-    """Names of those that the mapping declares"""
+    """Names of the tasks that the mapping declares."""
     left_out: tuple[str, ...] = ()
-    """Matches that make no recording, and why"""
+    """A sentence for each kind of files that match a pattern and make no recording."""
     unused: tuple[str, ...] = ()
-    """Matches that are no tables, and columns that the mapping does not use, a sentence a table"""
+    """A sentence for each kind of matches that are no tables, and one for the columns of a table that are not used."""
 
     @property
     def sensors(self) -> tuple[str, ...]:
@@ -102,7 +102,7 @@ class ImportReport:
 def import_tables(
     mapping: Path, *, root: Path | None, out: Path, progress: Progress | None = None, replace: bool = False
 ) -> ImportReport:
-    """Turn the tables that a mapping file describes into recordings.
+    """Convert the tables that a mapping file describes into recordings.
 
     Parameters
     ----------
@@ -111,12 +111,12 @@ def import_tables(
     root
         Folder of the data set; None is the folder of the mapping file.
     out
-        Folder of the recordings. It gets all of them or, if anything is wrong, none.
+        Folder for the recordings. All of them are placed there or, if anything is wrong, none.
     progress
-        Receives every set of files that is read.
+        Receives a step for every recording.
     replace
-        Replace recordings of the same name that hold something else; otherwise they are refused. One that holds the
-        same already is left as it is.
+        Whether recordings of the same name that hold something else are replaced; otherwise they are an error. One that
+        holds the same is left as it is.
 
     Raises
     ------
@@ -167,10 +167,10 @@ def import_tables(
 
 @contextmanager
 def aside(out: Path) -> Iterator[Path]:
-    """Give the folder in which recordings wait until all of them are good; hidden, so that no rig replays it.
+    """Return a context with the folder in which recordings wait until all are written; it is hidden from rigs.
 
-    What an import that was killed has left is removed, or moved to its place if that had begun. Folders that were made
-    for an import that is refused are removed again.
+    Leftovers of an import that was killed are removed, or moved to their place where that had begun. Folders that were
+    made for an import that fails are removed again.
     """
     made = [folder for folder in (out, *out.parents) if not folder.exists()]
     with writable(out):
@@ -196,7 +196,7 @@ def aside(out: Path) -> Iterator[Path]:
 
 @contextmanager
 def _locked(folder: Path) -> Iterator[bool]:
-    """Lock the folder of an import for this process; give whether no other process has it."""
+    """Return a context with whether this process could lock the folder of an import."""
     lock = os.open(folder / ".lock", os.O_RDWR | os.O_CREAT, 0o666)
     try:
         yield bool(try_lock(lock))
@@ -209,7 +209,7 @@ def _remove(folder: Path) -> None:
 
 
 def _place(folder: Path, out: Path) -> None:
-    """Move everything that waits in `folder` to `out`; as long as the folder is there, rigs do not replay `out`."""
+    """Move the recordings in `folder` to `out`; while the folder exists, rigs do not replay `out`."""
     for path in sorted(folder.glob("[!.]*")):
         path.replace(out / path.name)
     _remove(folder)
@@ -223,7 +223,7 @@ def _write(
     streams: dict[str, MappedStream],
     beside: Sequence[Finding],
 ) -> Imported:
-    """Write one recording; `beside` was found in the import as a whole."""
+    """Write one recording with its findings, to which `beside` adds those of the import as a whole."""
     counts: dict[str, int] = {}
     missing: dict[str, int] = {}
     clocks = {
@@ -267,7 +267,7 @@ def _write(
 
 
 def _given_away(sensed: dict[str, FloatArray], reference: dict[str, FloatArray]) -> Iterator[Finding]:
-    """Yield what stands among the sensor's channels and gives a force of the reference away."""
+    """Yield a finding for each channel of the sensor that is a copy of a force of the reference."""
     for (force, wanted), (name, column) in product(reference.items(), sensed.items()):
         if len(column) == len(wanted) and is_copy(column, wanted):
             text = f"{name}, a channel of the sensor, is {MONOTONE.format(force)}"
@@ -314,8 +314,8 @@ def _meta(mapping: Mapping, raw: RawRecording, sensor: SensorSpec, reference: tu
 def _derived(name: str, word: Word, words: dict[str, Scalar], origin: str) -> str:
     if word.of not in words:
         raise MappingError(
-            f"The word {name!r} is made of {word.of!r}, which nothing gives; there are: {', '.join(sorted(words))}.",
-            hint="Words may be made of words above them.",
+            f"The word {name!r} is made of {word.of!r}, which is not known; known are: {', '.join(sorted(words))}.",
+            hint="A word may be made of the words above it, of groups of `path`, and of columns of `split_by`.",
         )
     given = composed(str(words[word.of]))
     if word.divided_by is not None:
@@ -325,7 +325,7 @@ def _derived(name: str, word: Word, words: dict[str, Scalar], origin: str) -> st
     known = {composed(str(key)): value for key, value in (word.values or {}).items()}
     if given not in known:
         raise MappingError(
-            f"{origin}: {word.of} {given!r} has no translation for {name!r}; there are: {', '.join(known)}.",
+            f"{origin}: {word.of} {given!r} has no translation under {name!r}, which has: {', '.join(known)}.",
             hint="Add it to `values`.",
         )
     return known[given]
@@ -355,7 +355,7 @@ def _unique_name(meta: RecordingMeta, origins: dict[str, str]) -> None:
 
 
 def _fitting(made: Sequence[Imported], out: Path, *, replace: bool) -> list[Imported]:
-    """Return recordings as they will lie in `out`; those that it holds already do not wait any longer."""
+    """Return the recordings with their place in `out`; those that lie there already are not moved."""
     for one in made:
         target = out / one.path.name
         if target.exists() and not replace:

@@ -1,4 +1,4 @@
-"""Reading columns of Parquet files into tables; the extra ``[parquet]``."""
+"""Reader of Parquet files; it needs the extra ``[parquet]``."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from tactbench.core.recording.mapping.table import ColumnTable, UsedColumns, no_
 
 
 def read_parquet(path: Path, shown: str, used: UsedColumns) -> ColumnTable:
-    """Read the columns that are used; the places of a list, equally long in every row, are ``name.0``, ``name.1`` ...
+    """Return the table of the columns that are used; values of lists of one length are ``name.0``, ``name.1`` ...
 
     Raises
     ------
@@ -60,7 +60,7 @@ def _list_of(column: str) -> str:
 
 
 def _flat(shown: str, name: str, values: Any) -> dict[str, Any]:
-    """Return a column, or those of its lists."""
+    """Return a column by its name, or the columns that its lists hold."""
     kinds, compute = importlib.import_module("pyarrow.types"), importlib.import_module("pyarrow.compute")
     if not (kinds.is_list(values.type) or kinds.is_large_list(values.type) or kinds.is_fixed_size_list(values.type)):
         return {name: values}

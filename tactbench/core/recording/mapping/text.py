@@ -1,4 +1,4 @@
-"""Reading text files into tables: every complaint names the file and the line."""
+"""Readers of text files; every error names the file and the line."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from tactbench.core.recording.mapping.table import TextTable, comment_mark
 
 _DELIMITERS = {"\t": "tab", ";": "semicolon"}
 Line = tuple[int | str, list[str]]
-"""Number of a line, or of a cell in each where the lines are channels, and its cells."""
+"""The cells of a row, and its line in the file; where lines are channels, the place of its cells in them."""
 
 
 def read_text(path: Path, shown: str, how: Csv | Text | Records) -> TextTable:
@@ -46,7 +46,7 @@ def read_text(path: Path, shown: str, how: Csv | Text | Records) -> TextTable:
 
 
 def table_of(shown: str, lines: list[Line], how: Tabular) -> TextTable:
-    """Return the table that lines make, the first of them its header if `how` says so."""
+    """Return the table of some lines, of which the first is the header if `how` says so."""
     header, trailing = None, _trailing(lines, how)
     if trailing:
         for _, cells in lines[how.header and not how.transposed :]:
@@ -72,19 +72,19 @@ def table_of(shown: str, lines: list[Line], how: Tabular) -> TextTable:
 
 
 def skipped(place: int, how: Tabular) -> bool:
-    """Tell whether a line, counted from 0, is left out."""
+    """Return whether a line, counted from 0, is left out."""
     return place < how.skiprows if isinstance(how.skiprows, int) else place in how.skiprows
 
 
 def _trailing(lines: Sequence[Line], how: Tabular) -> bool:
-    """Tell whether a delimiter ends every line of data, so that an empty cell stands where nothing has a name."""
+    """Return whether every line of data ends with a delimiter, and so with an empty cell that has no name."""
     data = lines[how.header and not how.transposed :]
     longer = how.transposed or (how.header and bool(data) and len(data[0][1]) == len(lines[0][1]) + 1)
     return longer and bool(data) and all(not cells[-1].strip() for _, cells in data)
 
 
 def _cells(text: str, shown: str, how: Csv | Text) -> Iterator[Line]:
-    """Yield the lines that are not blank."""
+    """Yield the lines that are not blank, cut into cells."""
     # Lines that are left out stay as blank ones, so that the others keep their numbers.
     lines = ["\n" if skipped(place, how) else line for place, line in enumerate(_lines(text))]
     if how.comment is not None:
@@ -139,7 +139,7 @@ def _records(lines: Sequence[str], shown: str, how: Records) -> TextTable:
             given = lines[0].strip() if lines else "nothing"
             raise MappingError(
                 f"{shown}:1: {given!r}, where the line {how.first_line!r} is expected.",
-                hint="Is it the file the mapping means?",
+                hint="Correct `first_line`, or the pattern of the files.",
             )
         first = 1
     there = [(number, line.split()) for number, line in enumerate(lines[first:], first + 1) if line.strip()]
