@@ -78,7 +78,6 @@ class _Stream:
         channels = self.spec.channels
         self.t_ns = stream.times()
         self._stream = stream
-        self._only: FloatArray | None = None
         self.missing, self.saturated, self.suspect = (np.zeros(len(channels), dtype=np.int64) for _ in range(3))
         self.low, self.high = np.full(len(channels), np.inf), np.full(len(channels), -np.inf)
         self.lost_before = 0
@@ -87,8 +86,6 @@ class _Stream:
         bottom, top = np.array([_ends(one) for one in channels]).T
         for block in stream.blocks():
             values, flags, missing = _numbers(block)
-            if len(values) == self.rows:
-                self._only = np.where(missing, np.nan, values)
             saturated = ((flags & Quality.SATURATED) != 0) | (values >= top) | (values <= bottom)
             self.missing += missing.sum(axis=0)
             self.saturated += (saturated & ~missing).sum(axis=0)
@@ -116,15 +113,10 @@ class _Stream:
         """Return times (n,) and samples (n, q) of the channels of a kind that have some, without incomplete rows."""
         assert self.t_ns is not None  # whoever gives times has seen them
         rows = slice(*np.searchsorted(self.t_ns, (first_ns, last_ns + 1)))
-        if self._only is None:
-            values, _, missing = _numbers(self._stream[rows])
-            values = np.where(missing, np.nan, values)
-        else:
-            values = self._only[rows]
-        wanted = [one.kind == kind for one in self.spec.channels]
-        values = values[:, wanted & (2 * self.missing < self.rows)]
-        there = np.isfinite(values).all(axis=1)
-        return self.t_ns[rows][there], values[there]
+        values, _, missing = _numbers(self._stream[rows])
+        wanted = [one.kind == kind for one in self.spec.channels] & (2 * self.missing < self.rows)
+        there = ~missing[:, wanted].any(axis=1)
+        return self.t_ns[rows][there], values[there][:, wanted]
 
     def said(self, which: npt.NDArray[Any]) -> str:
         """Name channels as people would: "taxels t4 and t7", "fz", "E1, E2, E3 … (19 channels)"."""

@@ -133,36 +133,31 @@ def _same_length(shown: str, lines: Sequence[Line], wide: int) -> None:
 
 
 def _records(lines: Sequence[str], shown: str, how: Records) -> TextTable:
-    first = 0
-    if how.first_line is not None:
-        if not lines or lines[0].strip() != how.first_line:
-            given = lines[0].strip() if lines else "nothing"
-            raise MappingError(
-                f"{shown}:1: {given!r}, where the line {how.first_line!r} is expected.",
-                hint="Correct `first_line`, or the pattern of the files.",
-            )
-        first = 1
-    there = [(number, line.split()) for number, line in enumerate(lines[first:], first + 1) if line.strip()]
+    first = lines[0].strip() if lines else "nothing"
+    if how.first_line not in (None, first):
+        raise MappingError(
+            f"{shown}:1: {first!r}, where the line {how.first_line!r} is expected.",
+            hint="Correct `first_line`, or the pattern of the files.",
+        )
+    skip = how.first_line is not None
+    there = [(number, line.split()) for number, line in enumerate(lines, 1) if number > skip and line.strip()]
     if not there:
         raise MappingError(f"{shown} has no rows.", hint="Remove the file.")
     per_row = len(how.numbers_per_line)
-    rows: list[list[str]] = []
-    begins: list[int] = []
     for place, (number, cells) in enumerate(there):
-        line = place % per_row
-        if len(cells) != how.numbers_per_line[line]:
+        wide = how.numbers_per_line[place % per_row]
+        if len(cells) != wide:
             raise MappingError(
-                f"{shown}:{number}: {len(cells)} numbers on line {line + 1} of a record, where "
-                f"{how.numbers_per_line[line]} are expected.",
+                f"{shown}:{number}: {len(cells)} numbers on line {place % per_row + 1} of a record, where {wide} are "
+                "expected.",
                 hint="Repair the record, or correct `numbers_per_line`.",
             )
-        if line == 0:
-            rows.append([])
-            begins.append(number)
-        rows[-1].extend(cells)
     if len(there) % per_row:
         raise MappingError(
             f"{shown}:{there[-1][0]}: the file ends after line {len(there) % per_row} of a record of {per_row} lines.",
             hint="The file was cut short: get it again.",
         )
-    return TextTable(shown, tuple(range(len(rows[0]))), begins, rows, how.no_sample)
+    begins = range(0, len(there), per_row)
+    rows = [[cell for _, cells in there[begin : begin + per_row] for cell in cells] for begin in begins]
+    places = [there[begin][0] for begin in begins]
+    return TextTable(shown, tuple(range(len(rows[0]))), places, rows, how.no_sample)
