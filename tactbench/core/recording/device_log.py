@@ -1,4 +1,4 @@
-"""What a device's own tools have logged becomes a recording."""
+"""Conversion of a log that a device's own tools have written into a recording."""
 
 from __future__ import annotations
 
@@ -21,11 +21,11 @@ from tactbench.core.spec.scene import Role
 
 @dataclass(frozen=True)
 class ImportedLog:
-    """One log that became a recording."""
+    """A recording that was made of a log."""
 
     meta: RecordingMeta
     rows: Mapping[str, int]
-    """By stream."""
+    """Number of rows by stream."""
     findings: tuple[Finding, ...]
 
 
@@ -40,7 +40,7 @@ def import_log(
     labels: Mapping[str, Scalar],
     replace: bool,
 ) -> ImportedLog:
-    """Turn a log of a sensor's own tools into a recording; all of it is written, or nothing.
+    """Convert a log of a sensor's own tools into a recording, which is written whole or not at all.
 
     Parameters
     ----------

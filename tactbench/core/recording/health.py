@@ -1,4 +1,4 @@
-"""Is a recording healthy? What a person would look for first, looked for every time."""
+"""Checks of the health of a recording: gaps, missing samples, stuck or equal channels, late clocks."""
 
 from __future__ import annotations
 
@@ -24,54 +24,55 @@ GAP = 5.0
 JITTER = 0.2
 """Steps whose 5th to 95th percentile spans more than this share of the median make a clock irregular."""
 MOST_LISTED = 6
-"""Channels that are named one by one."""
+"""Most channels that a message names one by one."""
 RATE_TOLERANCE = 0.05
-"""Relative difference between the stated and the measured rate that is remarked on."""
+"""Relative difference of the stated and the measured rate above which it is reported."""
 COPY = 1.0 - 1e-8
-"""Correlation from which columns are the same: digits of a table leave 1e-9 of it, noise of 80 dB leaves 1e-8."""
+"""Correlation above which two columns are the same: rounding in a table leaves 1 - 1e-9, noise of 80 dB 1 - 1e-8."""
 LAG = 5
-"""Rows, of those with both samples, that a copy may come early or late: a shift, the delay of a filter."""
+"""Most rows by which a copy comes early or late, through a shift or the delay of a filter; rows without a sample are
+not counted."""
 FEWEST_VALUES = 200
-"""Distinct values from which on it is no chance that all are in one order: noise of a thousandth of the range turns
-some twenty pairs of so many round, 0.56 n² noise / range of n."""
+"""Fewest distinct values whose common order is no chance: noise of a thousandth of the range swaps some twenty pairs of
+so many, 0.56 n² noise / range of n."""
 MONOTONE = f"but for rounding a monotone function of {{}}, at most {LAG} rows early or late"
-"""What is said of a copy."""
+"""Phrase about a copy, for messages."""
 GLANCE = 50
-"""Rows that are looked at first: whatever holds for all holds for some."""
+"""Rows that are compared first, as a rule that holds for all rows holds for some."""
 WRONG_UNIT = 50.0
-"""A rate that is off by more than this factor looks like times in a wrong unit."""
+"""Factor between the stated and the measured rate above which times are probably in a wrong unit."""
 _UNTIMED = {
     "none": "no clock stated: rows are ordered, nothing more",
     "nominal": "time stamps are row number by nominal rate, not measured",
 }
 FINDINGS = "findings"
-"""Where the provenance of a recording has what its import found."""
+"""Key of the provenance under which an import stores its findings."""
 UNMARKED = ("stuck", "duplicated", "saturated", "dead", "empty", "absent", "excluded", "target-among-features")
-"""Checks that mark no score: taxels that nothing touches are constant and alike, those pressed hard saturate; from
-`dead` on, an evaluation that needs what is not there refuses it, or tells of it in another way."""
+"""Checks that mark no score. Taxels without a touch are constant and alike, and those pressed hard saturate; from
+`dead` on, an evaluation that needs the missing data refuses the recording or reports it itself."""
 DATED_NS = 10**18
-"""Times from here on are dates, September 2001 and later: in a wrong unit they would be of another millennium."""
+"""Times from here on, September 2001, are dates, which in a wrong unit would fall into another millennium."""
 SLOWEST_HZ = 1.0
-"""No tactile sensor is known to be read more seldom: without a stated rate, a lower one looks like a wrong unit."""
+"""Lowest rate of a tactile sensor: a lower one without a stated rate looks like times in a wrong unit."""
 
 
 @dataclass(frozen=True)
 class Finding:
-    """One thing a reader of a score from this recording should know."""
+    """A fact about a recording that matters for a score from it."""
 
     check: str
     """Short name of the check, fit for a filter: stuck, dead, saturated, duplicated, missing, gaps …"""
     severity: Severity
     stream: str
-    """Empty: the whole recording"""
+    """Name of the stream; empty: the whole recording is concerned."""
     channels: tuple[str, ...]
     count: int
-    """Samples, rows or channels concerned"""
+    """Number of samples, rows or channels that are concerned."""
     message: str
 
 
 class _Stream:
-    """What the checks need to know of a stream, gathered in one pass; arrays are (channels,)."""
+    """Statistics of a stream that the checks need, gathered in one pass; arrays are (channels,)."""
 
     def __init__(self, stream: LazyStream) -> None:
         self.name, self.spec, self.rows = stream.spec.name, stream.spec, len(stream)
@@ -102,24 +103,24 @@ class _Stream:
 
     @property
     def present(self) -> npt.NDArray[np.int64]:
-        """Samples of each channel."""
+        """Number of samples of each channel."""
         return self.rows - self.missing
 
     def names(self, which: npt.NDArray[Any]) -> tuple[str, ...]:
-        """Return the names of some channels, by a mask."""
+        """Return the names of the channels that a mask takes."""
         return tuple(one.name for one, taken in zip(self.spec.channels, which, strict=True) if taken)
 
     def between(self, kind: str, first_ns: int, last_ns: int) -> tuple[IntArray, FloatArray]:
-        """Return times (n,) and samples (n, q) of the channels of a kind that have some, without incomplete rows."""
-        assert self.t_ns is not None  # whoever gives times has seen them
+        """Return times (n,) and samples (n, q) of the channels of a kind, without rows in which one has no sample."""
+        assert self.t_ns is not None  # only streams with times are compared
         rows = slice(*np.searchsorted(self.t_ns, (first_ns, last_ns + 1)))
         values, _, missing = _numbers(self._stream[rows])
         wanted = [one.kind == kind for one in self.spec.channels] & (2 * self.missing < self.rows)
         there = ~missing[:, wanted].any(axis=1)
         return self.t_ns[rows][there], values[there][:, wanted]
 
-    def said(self, which: npt.NDArray[Any]) -> str:
-        """Name channels as people would: "taxels t4 and t7", "fz", "E1, E2, E3 … (19 channels)"."""
+    def phrase(self, which: npt.NDArray[Any]) -> str:
+        """Return a phrase for the channels of a mask: "taxels t4 and t7", "fz", "E1, E2, E3 … (19 channels)"."""
         names = self.names(which)
         if len(names) <= MOST_LISTED and all(one.kind == "taxel" for one in self.spec.channels if one.name in names):
             return f"taxel{'s' if len(names) > 1 else ''} {listed(names)}"
@@ -134,14 +135,14 @@ def listed(names: Sequence[str], kind: str = "channels", most: int = MOST_LISTED
 
 
 def _numbers(block: StreamData) -> tuple[FloatArray, npt.NDArray[np.uint8], npt.NDArray[np.bool_]]:
-    """Return samples, their flags, and where there is none."""
+    """Return the samples of a block, their flags, and a mask of those that are missing."""
     values = block.data.astype(np.float64) + 0.0  # -0 and 0 are one
     flags = np.zeros((1, values.shape[1]), dtype=np.uint8) if block.quality is None else block.quality
     return values, flags, ~np.isfinite(values) | ((flags & Quality.MISSING) != 0)
 
 
 def _ends(spec: ChannelSpec) -> tuple[float, float]:
-    """Return the readings from which on a channel is saturated.
+    """Return the lowest and the highest reading at which a channel is saturated.
 
     A temperature of a room or a position at a stop may equal a stated limit; a converter's end is what counts.
     """
@@ -154,7 +155,7 @@ def _ends(spec: ChannelSpec) -> tuple[float, float]:
 
 
 def examine(recording: Recording) -> list[Finding]:
-    """Look at everything in an open recording, the worst first.
+    """Return all findings of an open recording, the worst first.
 
     Returns
     -------
@@ -190,7 +191,7 @@ def examine(recording: Recording) -> list[Finding]:
 
 
 def marking(recording: Recording) -> list[Finding]:
-    """Return what a score from an open recording has to say: what its import found, else what is found now.
+    """Return the findings that mark a score from an open recording: those of its import, or else of a check now.
 
     Where a simulation made it without devices, no clock, cable or table can have failed, and nothing is looked for.
     """
@@ -240,25 +241,25 @@ def _channels(stream: _Stream) -> Iterator[Finding]:
 
     dead = there == 0
     if dead.any():
-        yield finding("dead", "error", dead, int(dead.sum()), f"{stream.said(dead)} without a single sample")
+        yield finding("dead", "error", dead, int(dead.sum()), f"{stream.phrase(dead)} without a single sample")
     varies = (there > 1) & (stream.low < stream.high)
     stuck = (there > 1) & ~varies
     if stuck.any():
-        yield finding("stuck", "warning", stuck, int(stuck.sum()), f"{stream.said(stuck)} constant")
+        yield finding("stuck", "warning", stuck, int(stuck.sum()), f"{stream.phrase(stuck)} constant")
     full = np.flatnonzero(stream.saturated)
     for places in [full] if len(full) > MOST_LISTED else full[:, None]:
         some, count = np.isin(np.arange(len(there)), places), int(stream.saturated[places].sum())
-        text = f"{stream.said(some)} saturated in {count} of {len(places) * stream.rows} samples"
+        text = f"{stream.phrase(some)} saturated in {count} of {len(places) * stream.rows} samples"
         yield finding("saturated", "warning", some, count, text)
     for count in dict.fromkeys(stream.missing[(stream.missing > 0) & ~dead].tolist()):
         some = stream.missing == count
         yield finding(
-            "missing", "info", some, count, f"{stream.said(some)} without a sample in {count} of {stream.rows} rows"
+            "missing", "info", some, count, f"{stream.phrase(some)} without a sample in {count} of {stream.rows} rows"
         )
     suspect = stream.suspect > 0
     if suspect.any():
         count = int(stream.suspect.sum())
-        text = f"{stream.said(suspect)}: {count} samples failed parity, checksum or sequence"
+        text = f"{stream.phrase(suspect)}: {count} samples failed parity, checksum or sequence"
         yield finding("suspect", "warning", suspect, count, text)
     # Two channels that always read the same are one, wired or parsed twice; constant ones may agree by accident.
     alike: dict[bytes, list[int]] = {}
@@ -267,7 +268,7 @@ def _channels(stream: _Stream) -> Iterator[Finding]:
     for places in alike.values():
         if len(places) > 1:
             some = np.isin(np.arange(len(there)), places)
-            yield finding("duplicated", "warning", some, len(places), f"{stream.said(some)} identical")
+            yield finding("duplicated", "warning", some, len(places), f"{stream.phrase(some)} identical")
 
 
 def _rows(stream: _Stream) -> Iterator[Finding]:
@@ -323,8 +324,8 @@ def _clock(stream: str, data: _Stream) -> Iterator[Finding]:
     if data.t_ns[0] > DATED_NS:
         looks = ""
     if looks or (stated and abs(rate - stated) > RATE_TOLERANCE * stated):
-        said = f"; {stated:g} Hz are stated" if stated else ""
-        yield Finding("rate", "warning", stream, (), 0, f"{stream} runs at {rate:.4g} Hz{said}{looks}")
+        nominal = f"; {stated:g} Hz are stated" if stated else ""
+        yield Finding("rate", "warning", stream, (), 0, f"{stream} runs at {rate:.4g} Hz{nominal}{looks}")
 
 
 def _late(sensor: _Stream, reference: _Stream) -> Iterator[Finding]:
@@ -334,23 +335,23 @@ def _late(sensor: _Stream, reference: _Stream) -> Iterator[Finding]:
         return
     if any(len(t_ns) < FEWEST_ROWS or (t_ns[1:] < t_ns[:-1]).any() for t_ns in (own, other)):
         return
-    said: list[tuple[str, tuple[float, float]]] = []
+    lags: list[tuple[str, tuple[float, float]]] = []
     for place, window in windows(own, other).items():
         lag = find_lag(*sensor.between("taxel", *window), *reference.between("force", *window))
         if lag is not None:
             ends = {" at the beginning": lag.beginning, " at the end": lag.end}
-            said += (ends if lag.drifts and not place else {place: lag.middle}).items()
-    if said:
+            lags += (ends if lag.drifts and not place else {place: lag.middle}).items()
+    if lags:
         text = ", ".join(
             f"{1e3 * abs(late):.0f} ± {max(2e3 * error, 1):.0f} ms {'behind' if late > 0 else 'ahead of'} "
-            f"{reference.said(forces)}{place}"
-            for place, (late, error) in said
+            f"{reference.phrase(forces)}{place}"
+            for place, (late, error) in lags
         )
         yield Finding("lag", "warning", sensor.name, reference.names(forces), sensor.rows, f"{sensor.name} is {text}")
 
 
 def is_copy(one: FloatArray, other: FloatArray, recording: npt.NDArray[np.int64] | None = None) -> bool:
-    """Return whether a column is another under a monotone map, at most `LAG` rows early or late.
+    """Return whether a column is a monotone function of another, at most `LAG` rows early or late.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""The HDF5 file of a recording: compressed, and described so that ordinary viewers plot it."""
+"""Building and storing of the HDF5 file of a recording, compressed and described for ordinary viewers."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def store(
     replace: bool,
     sync: bool,
 ) -> str:
-    """Write a recording beside its place, read it back, and rename it to `target`; return its content digest.
+    """Write a recording beside its place, read it back and rename it to `target`; return its content digest.
 
     Of the recording, memory holds the compressed file and some chunks of each stream.
 
@@ -84,13 +84,13 @@ def store(
 
 
 def require_free(path: Path) -> None:
-    """Raise UnwritableError if there is a recording already."""
+    """Raise UnwritableError if there is a file already."""
     if path.exists():
         raise UnwritableError(f"{path} exists already.", hint="Give another name with --out, or delete that one.")
 
 
 def cannot_write(path: Path, error: OSError) -> UnwritableError:
-    """Return the error to raise when the disk refuses."""
+    """Return the error for a disk that refuses to write."""
     reason = error.strerror or error
     return UnwritableError(
         f"The recording {path} cannot be written: {reason}.",
@@ -99,7 +99,7 @@ def cannot_write(path: Path, error: OSError) -> UnwritableError:
 
 
 def build(meta: RecordingMeta, text: str, blocks: Blocks, annotations: Annotations, *, complete: bool) -> bytes:
-    """Return the HDF5 file that holds all blocks; see `store`. Its digest is of the blocks, before HDF5 has them."""
+    """Return an HDF5 file with all blocks, as for `store`. Its digest is of the blocks, before HDF5 has them."""
     return hdf5_image(lambda file: _fill(file, meta, text, blocks, annotations, complete=complete))
 
 
@@ -140,7 +140,7 @@ def _sync_folder(folder: Path) -> None:
 
 
 def _digested(blocks: Blocks, digest: layout.ContentDigest) -> Iterator[tuple[str, Columns]]:
-    """Yield blocks with quality from the first block on that has some, and add them to the digest."""
+    """Yield blocks and add them to the digest, with quality from the first block on that has some."""
     rows: Counter[str] = Counter()
     flagged = set()
     for stream, columns in blocks:
@@ -157,7 +157,7 @@ def _digested(blocks: Blocks, digest: layout.ContentDigest) -> Iterator[tuple[st
 
 
 def _gathered(blocks: Blocks) -> Iterator[tuple[str, Columns]]:
-    """Yield larger blocks, of whole chunks but for each stream's last: a chunk is then compressed once."""
+    """Yield larger blocks, of whole chunks except for the last of a stream, so that each chunk is compressed once."""
     waiting: dict[str, list[Columns]] = {}
     rows: dict[str, int] = {}
     for stream, columns in blocks:
@@ -192,7 +192,7 @@ def _extend(group: Any, columns: Columns) -> None:
 
 
 def _create(group: Any, name: str, values: npt.NDArray[Any]) -> Any:
-    """Return a new column without rows; quality may come late, and the zeros before it mean good."""
+    """Return a new column without rows; where quality comes late, the zeros before it mean good samples."""
     rest = values.shape[1:]
     return group.create_dataset(
         name, shape=(0, *rest), maxshape=(None, *rest), dtype=values.dtype, chunks=(layout.CHUNK_ROWS, *rest),
@@ -211,7 +211,7 @@ def _annotate(group: Any, label: str, column: npt.NDArray[Any]) -> None:
 
 
 def _describe(group: Any, spec: StreamSpec) -> None:
-    """Write what ordinary viewers need (NeXus: signal, axes, units)."""
+    """Write the attributes with which ordinary viewers plot a stream (NeXus: signal, axes, units)."""
     columns = {name: column for name, column in group.items() if name != "annotations"}
     attributes = group.attrs
     attributes["NX_class"] = "NXdata"
@@ -230,7 +230,7 @@ def _describe(group: Any, spec: StreamSpec) -> None:
 
 
 def _attach_scales(group: Any, columns: dict[str, Any], names: list[str]) -> None:
-    """Make times (rows, where there is no clock) and names of channels the HDF5 dimension scales of every column.
+    """Make the times (or row numbers, without a clock) and the channels' names the dimension scales of every column.
 
     Libraries of the netCDF world then read a stream with its coordinates.
     """

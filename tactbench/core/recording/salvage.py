@@ -1,4 +1,4 @@
-"""What a crash left behind: looked at, or turned into a recording that says so."""
+"""Opening of unfinished recordings, and their conversion into recordings that state so."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ REMARK = "Rescued: the recording broke off and is not whole."
 
 
 def salvage(path: Path) -> Recording:
-    """Open an unfinished recording (``….partial``): every block that had been written can be read.
+    """Open an unfinished recording (``….partial``), in which every block can be read that had been written.
 
     It may still be growing: what is there now is what is seen.
 
@@ -39,7 +39,7 @@ def salvage(path: Path) -> Recording:
 
 
 def rescue(path: Path, target: Path) -> None:
-    """Turn an unfinished recording into a finished one at `target`; its remarks say that it broke off.
+    """Convert an unfinished recording into a finished one at `target`, whose remarks say that it broke off.
 
     The unfinished one stays where it is.
 
@@ -65,7 +65,7 @@ def rescue(path: Path, target: Path) -> None:
 
 
 def _fitted(journal: Journal, meta: RecordingMeta) -> tuple[RecordingMeta, str]:
-    """Return the meta with what the blocks say: clock fits, and how many rows were written."""
+    """Return the meta with clock fits and counts of rows from the blocks, and the same as text."""
     rows: Counter[str] = Counter()
 
     def counted() -> Iterator[tuple[str, Columns]]:

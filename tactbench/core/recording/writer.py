@@ -1,4 +1,4 @@
-"""Writing a recording, so that a crash loses at most the block in flight."""
+"""Writing of recordings, of which a crash loses the last block at most."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from tactbench.core.spec.sensor import StreamSpec
 
 
 class RecordingWriter:
-    """Writes one recording; use it as a context manager.
+    """Writer of one recording, which is a context manager.
 
     While it is open, a journal ``<path>.partial`` (or ``<path>.2.partial`` where that is taken, and so on) holds, after
     every block, all blocks so far. Leaving the context completes the recording: times of devices are put on the host's
@@ -59,12 +59,12 @@ class RecordingWriter:
             for stream in meta.reference
         }
         self.content_digest = ""
-        """Digest of what was written, once the recording is complete."""
+        """Content digest, once the recording is complete."""
         self._annotations: Annotations = {}
         self._has: dict[str, tuple[bool, bool]] = {}
         self._partial: Partial
         self.journal: Path | None = None
-        """What was kept of a recording that was not completed, once the context is left."""
+        """Journal of a recording that was not completed, once the context is left; None: there is none."""
 
     def __enter__(self) -> RecordingWriter:
         if not self._replace:
@@ -92,7 +92,7 @@ class RecordingWriter:
 
     @property
     def rows(self) -> Mapping[str, int]:
-        """Rows of the streams that have had a block."""
+        """Number of rows of each stream that has had a block."""
         return self._partial.rows
 
     def complete(self) -> None:
@@ -112,7 +112,7 @@ class RecordingWriter:
         )  # fmt: skip
 
     def _blocks(self, journal: Partial) -> Iterator[tuple[str, Columns]]:
-        """Yield the blocks of the journal; RecordingError if a row that came is not there."""
+        """Yield the blocks of the journal; raises RecordingError if rows of it are lost."""
         left = dict(journal.rows)
         for stream, columns in read_blocks(journal.path):
             left[stream] -= len(columns["data"])
@@ -123,7 +123,7 @@ class RecordingWriter:
             )
 
     def _leave(self, error: BaseException | None) -> None:
-        """Close the journal; remove it unless it holds rows that are nowhere else."""
+        """Close the journal, and remove it unless it holds rows that are nowhere else."""
         journal = self._partial
         journal.close()
         if not self.content_digest and any(journal.rows.values()) and self._unique:
@@ -182,7 +182,7 @@ class RecordingWriter:
             raise image.cannot_write(self.path, error) from error
 
     def annotate(self, stream: str, name: str, values: Sequence[str] | npt.NDArray[Any]) -> None:
-        """Attach a label to every row of `stream`: text or whole numbers, one a row, after its last block.
+        """Add a label to every row of `stream`: text or whole numbers, one for each row, after its last block.
 
         Raises
         ------
@@ -234,7 +234,7 @@ class RecordingWriter:
 
 
 def _columns(block: Block, spec: StreamSpec) -> Columns:
-    """Return what is stored of `block`, by column; quality only if something is not good."""
+    """Return the columns of `block` as they are stored; quality only if a sample is not good."""
     columns: Columns = {"data": _stored(block.data, spec)}
     for name, numbers in (("t_ns", block.t_ns), ("sequence", block.sequence), ("device_ns", block.device_ns)):
         if numbers is not None:
@@ -270,7 +270,7 @@ def _stored(data: npt.NDArray[Any], spec: StreamSpec) -> npt.NDArray[Any]:
 
 
 def recovery(journal: Path, path: Path) -> str:
-    """Return in words where the rows of an unfinished recording are, and the command that makes a recording of them."""
+    """Return a sentence with the journal of an unfinished recording, and the command that makes a recording of it."""
     import shlex
 
     rescued = path.with_name(f"{path.stem}-rescued{path.suffix}") if path.exists() else path
