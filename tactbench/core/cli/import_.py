@@ -1,4 +1,4 @@
-"""``tactbench import``: foreign tables, and logs of devices, become recordings."""
+"""``tactbench import``: conversion of foreign tables and logs of devices into recordings."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from tactbench.core.recording.mapping import ImportReport
 
 MOST_NAMED = 12
-"""Findings that are printed, the worst first."""
+"""Most findings that are printed, the worst first."""
 PAIRS = "KEY=VALUE"
 
 
@@ -101,7 +101,7 @@ def _pairs(option: str, given: tuple[str, ...]) -> dict[str, Any]:
 
 
 def log_fields(made: ImportedLog, out: Path) -> Iterator[tuple[str, str]]:
-    """Yield what became of a log, field by field."""
+    """Yield the facts about an imported log, field by field."""
     meta = made.meta
     stated = {"recording": out, "sensor": meta.sensor.name, "from": meta.origin, "clock": meta.clock,
               "rows": dict(made.rows), "counted": meta.counts}  # fmt: skip
@@ -111,7 +111,7 @@ def log_fields(made: ImportedLog, out: Path) -> Iterator[tuple[str, str]]:
 
 
 def fields(report: ImportReport, folder: Path) -> Iterator[tuple[str, str]]:
-    """Yield what an import did, field by field."""
+    """Yield the facts about an import, field by field."""
     from collections import Counter
 
     stated = {

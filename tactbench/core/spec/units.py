@@ -1,4 +1,4 @@
-"""Units: a small table, by which every number can be turned into SI or its unit is refused.
+"""Units in a small table: every number can be turned into SI, or its unit is refused.
 
 Compound units are products and quotients of the names below, for example ``N/mm``, ``MPa/mm``, ``N*mm``.
 """

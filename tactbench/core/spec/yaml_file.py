@@ -1,4 +1,4 @@
-"""YAML files checked against a model: every complaint names the file and the line."""
+"""Reading of YAML files into models, with errors that name the file and the line."""
 
 from __future__ import annotations
 
@@ -17,16 +17,16 @@ Places = dict[Path_, tuple[int, yaml.Node]]
 """The line and the node of every key and item, by its path in the file."""
 
 MOST_BYTES = 2**17
-"""The largest file of this project has 12 kB."""
+"""Largest file that is read; the largest one of this project has 12 kB."""
 _INT, _FLOAT, _TEXT = (f"tag:yaml.org,2002:{name}" for name in ("int", "float", "str"))
 _KEYS = (_INT, _TEXT, "tag:yaml.org,2002:merge")
 _WHOLE = re.compile(r"-?[1-9][0-9]*|0")
 _ODD_NUMBER = re.compile(r"[-+]?(0[0-9_]|[0-9][0-9_.]*[_:])")
-"""Notations of YAML 1.1 that hardly anybody means: 010 is 8, 2025_04 is 202504, 1:30 is 90."""
+"""Numbers of YAML 1.1 that are read as others than they seem: 010 is 8, 2025_04 is 202504, 1:30 is 90."""
 
 
 def load_yaml(path: Path, model: type[M]) -> M:
-    """Read `path` and return it as a `model`.
+    """Return the file at `path` as a `model`.
 
     Raises
     ------
@@ -57,7 +57,7 @@ def load_yaml(path: Path, model: type[M]) -> M:
 
 
 def plain_value(text: str) -> Any:
-    """Return what YAML reads `text` as if that is a number, a truth value or a text, else `text` itself."""
+    """Return `text` as the number or truth value that YAML reads in it, and any other text as it is."""
     try:
         node, value = _loaded(text, "")
         _look(node, (), {}, "")
