@@ -5,7 +5,10 @@ from hypothesis import strategies as st
 from tactbench.core.errors import UsageError
 from tactbench.core.spec import units
 
-ATOMS = "1 % count rad deg K degC s ms min Hz kHz m mm um N mN gf kgf Pa hPa MPa V mV ohm kohm F pF T mT".split()
+ATOMS = [
+    "1", "%", "count", "rad", "deg", "K", "degC", "s", "ms", "min", "Hz", "kHz", "m", "mm", "N", "mN", "gf", "kgf", "Pa",
+    "MPa", "V", "mV", "ohm", "kohm", "F", "pF", "T", "mT",
+]  # fmt: skip
 
 
 @pytest.mark.parametrize(
