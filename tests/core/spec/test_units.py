@@ -6,8 +6,8 @@ from tactbench.core.errors import UsageError
 from tactbench.core.spec import units
 
 ATOMS = [
-    "1", "%", "count", "rad", "deg", "K", "degC", "s", "ms", "min", "Hz", "kHz", "m", "mm", "N", "mN", "gf", "kgf", "Pa",
-    "MPa", "V", "mV", "ohm", "kohm", "F", "pF", "T", "mT",
+    "1", "%", "count", "rad", "deg", "K", "degC", "s", "ms", "min", "Hz", "kHz", "m", "mm", "N", "mN", "gf", "kgf",
+    "Pa", "MPa", "V", "mV", "ohm", "kohm", "F", "pF", "T", "mT",
 ]  # fmt: skip
 
 

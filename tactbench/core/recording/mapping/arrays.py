@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import importlib
-import zipfile
-from collections.abc import Collection, Iterator
+from collections.abc import Iterator
+from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +13,7 @@ import numpy.typing as npt
 
 from tactbench.core.errors import MappingError, did_you_mean
 from tactbench.core.recording.mapping.channels import fill
-from tactbench.core.recording.mapping.model import Arrays, Column, Mat, Npy
+from tactbench.core.recording.mapping.model import Arrays, Column
 from tactbench.core.recording.mapping.table import ColumnTable, plain
 
 Words = dict[str, str]
@@ -29,13 +29,9 @@ def read_arrays(path: Path, shown: str, how: Arrays, known: Words) -> Iterator[t
     MappingError
         If the file has another format or lacks an array, or an array has the wrong shape or type.
     """
-    names = {how.array, *how.per_recording.values()}
-    if isinstance(how, Mat):
-        # MATLAB has no vectors, and no axis of length 1 at the end: n values are (n, 1) or (1, n).
-        arrays = {name: _shaped(values, len(how.axes) if name == how.array else 1)
-                  for name, values in _load_mat(path, shown, names).items()}  # fmt: skip
-    else:
-        arrays = _load_numpy(path, shown, how, {name: fill(name, known, shown) for name in names})
+    arrays = _load(
+        path, shown, how, {name: fill(name, known, shown) for name in (how.array, *how.per_recording.values())}
+    )
     values = arrays[how.array]
     if values.ndim != len(how.axes):
         raise MappingError(
@@ -65,49 +61,39 @@ def read_arrays(path: Path, shown: str, how: Arrays, known: Words) -> Iterator[t
         yield {"index": f"{index:0{wide}d}", **words}, ColumnTable(where, tuple(columns), range(len(rows)), columns)
 
 
-def _require_there(shown: str, names: set[str], there: Collection[str]) -> None:
-    for name in sorted(names):
-        if name not in there:
-            hint = f"{did_you_mean(name, there)}It has: {', '.join(sorted(there))}."
-            raise MappingError(f"{shown} has no array {name!r}.", hint=hint)
-
-
-def _load_numpy(path: Path, shown: str, how: Arrays, names: dict[str, str]) -> dict[str, npt.NDArray[Any]]:
+def _load(path: Path, shown: str, how: Arrays, names: dict[str, str]) -> dict[str, npt.NDArray[Any]]:
+    """Return arrays by name; `names` are the same with words filled in, which `npy` needs."""
     try:
-        if isinstance(how, Npy):
-            return {name: _load_npy(path.parent / file if file else path) for name, file in names.items()}
-        with path.open("rb") as opened, np.load(opened, allow_pickle=False) as archive:
-            _require_there(shown, {*names}, archive.files)
-            return {name: archive[name] for name in names}
-    except MappingError:
-        raise
-    except (OSError, ValueError, EOFError, zipfile.BadZipFile) as error:
-        raise MappingError(
-            f"{shown} cannot be read as a NumPy {'array' if isinstance(how, Npy) else 'archive'}: {error}.",
-            hint="Pickled objects are refused; store plain arrays with numpy.save or numpy.savez_compressed.",
-        ) from error
-
-
-def _load_npy(path: Path) -> npt.NDArray[Any]:
-    with path.open("rb") as opened:
-        return np.lib.format.read_array(opened, allow_pickle=False)
-
-
-def _load_mat(path: Path, shown: str, names: set[str]) -> dict[str, npt.NDArray[Any]]:
-    io: Any = importlib.import_module("scipy.io")
-    try:
-        _require_there(shown, names, [name for name, *_ in io.whosmat(path)])
-        found = io.loadmat(path, variable_names=sorted(names))
+        with ExitStack() as stack:
+            if how.format == "npy":
+                opened = {name: path.parent / file if file else path for name, file in names.items()}
+                return {name: np.lib.format.read_array(stack.enter_context(one.open("rb")), allow_pickle=False)
+                        for name, one in opened.items()}  # fmt: skip
+            if how.format == "mat":
+                io: Any = importlib.import_module("scipy.io")
+                there, archive = [name for name, *_ in io.whosmat(path)], io.loadmat(path, variable_names=[*names])
+            else:
+                archive = stack.enter_context(np.load(stack.enter_context(path.open("rb")), allow_pickle=False))
+                there = archive.files
+            for name in names:
+                if name not in there:
+                    hint = f"{did_you_mean(name, there)}It has: {', '.join(sorted(there))}."
+                    raise MappingError(f"{shown} has no array {name!r}.", hint=hint)
+            if how.format == "npz":
+                return {name: archive[name] for name in names}
+            return {name: _shaped(archive[name], len(how.axes) if name == how.array else 1) for name in names}
     except MappingError:
         raise
     except Exception as error:  # whatever a damaged file makes of the library
         raise MappingError(
-            f"{shown} cannot be read as a MATLAB file: {error}.", hint="Save it with -v7, or the table as CSV."
+            f"{shown} cannot be read as `format: {how.format}`: {error}.",
+            hint="Store plain arrays with numpy.save, numpy.savez_compressed or, in MATLAB, with -v7; pickled objects "
+            "are refused.",
         ) from error
-    return {name: found[name] for name in names}
 
 
 def _shaped(values: npt.NDArray[Any], axes: int) -> npt.NDArray[Any]:
+    """Return an array of MATLAB, where n values are (n, 1) or (1, n) and no last axis has length 1, with so many axes."""
     if axes == 1 and values.ndim == 2 and 1 in values.shape:
         return values.reshape(-1)
     return values.reshape(values.shape + (1,) * (axes - values.ndim))

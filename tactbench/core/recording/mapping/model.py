@@ -88,43 +88,30 @@ class Xlsx(Tabular):
 
 
 class Arrays(Frozen):
-    """Numbers in an array; keys that all formats of arrays share."""
+    """An array in a NumPy archive, in a NumPy file of its own, or in a MATLAB file of version 7 or before.
 
-    array: str
-    """Name of the array in its file."""
+    Pickled objects are refused, and arrays inside structures and cells of MATLAB are not read.
+    """
+
+    format: Literal["npz", "npy", "mat"]
+    array: str = ""
+    """Name of the array in its file; `npy` has none."""
     axes: tuple[Literal["recording", "row", "channel"], ...] = Field(min_length=1)
     """What the array's axes count, in their order; an axis that is left out has length 1. Several axes of channels are
     read as one, of which the last runs fastest."""
     per_recording: dict[Annotated[str, Field(pattern=WORD)], str] = Field(default_factory=dict)
-    """Names of arrays that hold the value of a word for each recording, by word; with `npy`, names of their files, in
-    which ``{word}`` is filled in."""
+    """Names of arrays that hold the value of a word for each recording, by word; with `npy`, names of their files in
+    the same folder, in which ``{word}`` is filled in."""
 
     @model_validator(mode="after")
     def _axes_differ(self) -> Arrays:
+        if (self.format == "npy") == bool(self.array):
+            raise ValueError("array names one of several in an npz or mat file, and nothing in an npy file")
         if max(self.axes.count("recording"), self.axes.count("row")) > 1:
             raise ValueError("axes name recording or row twice; only channel may stand several times")
         if self.per_recording and "recording" not in self.axes:
             raise ValueError("per_recording needs an axis called recording")
         return self
-
-
-class Npz(Arrays):
-    """An array in a NumPy archive; pickled objects are refused."""
-
-    format: Literal["npz"] = "npz"
-
-
-class Npy(Arrays):
-    """An array in a NumPy file of its own; those of `per_recording` lie in its folder. Pickled objects are refused."""
-
-    format: Literal["npy"] = "npy"
-    array: Literal[""] = ""
-
-
-class Mat(Arrays):
-    """An array in a MATLAB file of version 7 or before; arrays inside structures and cells are not read."""
-
-    format: Literal["mat"] = "mat"
 
 
 class Bag(Frozen):
@@ -178,7 +165,7 @@ class TableSource(Frozen):
     """Pattern of their paths below the root folder: ``*`` matches within a folder, ``**`` across folders."""
     path: str = ""
     """Regular expression that is searched for in each path; its named groups become words."""
-    read: Annotated[Csv | Text | Records | Xlsx | Npz | Npy | Mat | Bag | Parquet, Field(discriminator="format")]
+    read: Annotated[Csv | Text | Records | Xlsx | Arrays | Bag | Parquet, Field(discriminator="format")]
     time: Time | None = None
 
     @field_validator("files")
