@@ -93,7 +93,7 @@ def _load(path: Path, shown: str, how: Arrays, names: dict[str, str]) -> dict[st
 
 
 def _shaped(values: npt.NDArray[Any], axes: int) -> npt.NDArray[Any]:
-    """Return an array of MATLAB, where n values are (n, 1) or (1, n) and no last axis has length 1, with so many axes."""
+    """Return an array with so many axes; in MATLAB n values are (n, 1) or (1, n), and no last axis has length 1."""
     if axes == 1 and values.ndim == 2 and 1 in values.shape:
         return values.reshape(-1)
     return values.reshape(values.shape + (1,) * (axes - values.ndim))
