@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path, PurePosixPath
 from typing import NamedTuple
@@ -21,6 +21,13 @@ from tactbench.core.recording.mapping.table import Table, UsedColumns
 from tactbench.core.recording.mapping.text import read_text
 
 Words = dict[str, str]
+
+BROKEN_LINKS = "are links to files that are not here"
+OTHER_CASE = "have an ending in another case"
+LINKED_FOLDERS = "are linked folders, which ** does not search"
+FOLDERS = "are folders"
+APPLE_DOUBLE = "are what macOS keeps beside other files (AppleDouble)"
+_SAME_GROUPS = "Give both `path` expressions the same named groups."
 
 
 @dataclass(frozen=True)
@@ -63,35 +70,43 @@ def find(mapping: Mapping, root: Path) -> tuple[list[FileSet], tuple[str, ...], 
     """
     if not root.is_dir():
         raise MappingError(f"There is no folder {root}.", hint="Name the folder of the data set with --root DIR.")
+    found: dict[str, list[FoundFile]] = {}
     left_out: list[str] = []
-    none: list[str] = []
-    found = {name: _matching(name, source, root, left_out, none) for name, source in mapping.tables.items()}
+    no_tables: list[str] = []
+    for name, source in mapping.tables.items():
+        found[name], notes = _matching(name, source, root)
+        left_out += [note for obstacle, note in notes.items() if obstacle in (OTHER_CASE, LINKED_FOLDERS)]
+        no_tables += [note for obstacle, note in notes.items() if obstacle in (FOLDERS, APPLE_DOUBLE)]
     lead, *others = found
     shared = {name: sorted({*found[lead][0].words} & {*found[name][0].words} - {"file"}) for name in others}
-    by_words: dict[str, dict[tuple[str, ...], list[FoundFile]]] = {name: {} for name in others}
+    by_words: dict[tuple[str, ...], list[FoundFile]] = {}
     for name, names in shared.items():
         for file in found[name]:
-            by_words[name].setdefault(tuple(file.words[word] for word in names), []).append(file)
-    sets, orphans = [], []
-    used: dict[str, set[str]] = {name: set() for name in others}
+            by_words.setdefault((name, *(file.words[word] for word in names)), []).append(file)
+    sets: list[FileSet] = []
+    used = set()
     for leader in found[lead]:
         files, words = {lead: leader}, dict(leader.words)
         for name in others:
-            partner = _partner(leader, name, shared[name], by_words[name])
-            if isinstance(partner, str):
-                orphans.append(partner)
+            values = [leader.words[word] for word in shared[name]]
+            fitting = by_words.get((name, *values), [])
+            if len(fitting) == 1:
+                files[name], words = fitting[0], {**fitting[0].words, **words}
+                used.add((name, fitting[0].shown))
                 continue
-            used[name].add(partner.shown)
-            files[name] = partner
-            words = {**partner.words, **words}
+            what = ", ".join(map(" ".join, zip(shared[name], values, strict=True))) or "no shared words"
+            there = f"are {len(fitting)}: {listed([one.shown for one in fitting], 'files')}" if fitting else "is none"
+            left_out.append(f"{leader.shown} needs one file of table {name!r} ({what}); there {there}.")
+            if fitting:
+                raise MappingError(left_out[-1], hint=_SAME_GROUPS)
         if len(files) == len(found):
             sets.append(FileSet(files, words))
     if not sets:
-        raise MappingError(orphans[0], hint="Give both `path` expressions the same named groups.")
+        raise MappingError(left_out[-1], hint=_SAME_GROUPS)
     for name in others:
-        alone = [file.shown for file in found[name] if file.shown not in used[name]]
-        orphans += [f"{shown} of table {name!r} belongs to no file of table {lead!r}." for shown in alone]
-    return sets, (*left_out, *orphans), tuple(none)
+        alone = [file.shown for file in found[name] if (name, file.shown) not in used]
+        left_out += [f"{shown} of table {name!r} belongs to no file of table {lead!r}." for shown in alone]
+    return sets, tuple(left_out), tuple(no_tables)
 
 
 def read(mapping: Mapping, files: FileSet) -> list[RawRecording]:
@@ -180,50 +195,38 @@ def used_columns(mapping: Mapping, name: str) -> UsedColumns:
     return UsedColumns(tuple(dict.fromkeys(numbers)), tuple(dict.fromkeys(texts)), mapping.tables[name].time)
 
 
-def _matching(name: str, source: TableSource, root: Path, left_out: list[str], none: list[str]) -> list[FoundFile]:
-    """Return the files of a table; add sentences about other matches to `left_out` and, about no tables, to `none`."""
+def _matching(name: str, source: TableSource, root: Path) -> tuple[list[FoundFile], dict[str, str]]:
+    """Return the files of a table, and a sentence about the other matches by the obstacle to reading them."""
     ending = PurePosixPath(source.files).suffix
     ending = ending if ending[1:].isalnum() else ""
     in_any_case = "".join(f"[{mark.lower()}{mark.upper()}]" if mark.isalpha() else mark for mark in ending)
-    pattern = f"{source.files!r} (table {name!r})"
-    kinds: dict[str, list[Path]] = {"": [], "links": [], "folders": [], "case": [], "macOS": [], "linked": []}
+    kinds: dict[str, list[str]] = {"": []}
     matches = root.glob(source.files.removesuffix(ending) + in_any_case)
     for path in sorted(matches, key=lambda one: one.relative_to(root).parts):
-        kinds[_kind(path, ending)].append(path)
+        kinds.setdefault(_obstacle(path, ending), []).append(path.relative_to(root).as_posix())
     if "**" in source.files:
-        inside = source.files.partition("**")[2].lstrip("/")
-        folders = [path for path in root.glob(source.files.partition("**")[0] + "**/*") if path.is_symlink()]
-        kinds["linked"] += [path for path in folders if path.is_dir() and next(path.rglob(inside or "*"), None)]
-
-    def listing(kind: str) -> str:
-        return listed([path.relative_to(root).as_posix() for path in kinds[kind]], "files", 12)
-
-    if kinds["links"]:
+        above, _, inside = source.files.partition("**")
+        for path in root.glob(f"{above}**/*"):
+            if path.is_symlink() and path.is_dir() and next(path.rglob(inside.lstrip("/") or "*"), None):
+                kinds.setdefault(LINKED_FOLDERS, []).append(path.relative_to(root).as_posix())
+    total, pattern = sum(map(len, kinds.values())), f"{source.files!r} (table {name!r})"
+    notes = {
+        obstacle: f"{len(paths)} of {total} matches of {pattern} {obstacle}: {listed(paths, 'paths', 12)}"
+        for obstacle, paths in kinds.items()
+        if obstacle
+    }
+    if BROKEN_LINKS in notes:
         raise MappingError(
-            f"{len(kinds['links'])} of {len(kinds['links'] + kinds[''])} matches of {pattern} are links to files that "
-            f"are not here: {listing('links')}.",
+            f"{notes[BROKEN_LINKS]}.",
             hint="Fetch what git-annex keeps elsewhere: `datalad get FILE`; remove other links, or narrow the pattern.",
         )
-    obstacles = {
-        "case": f"files end in another case than {ending!r}",
-        "linked": "linked folders hold matches; ** does not search them",
-        "folders": "matches are folders", "macOS": "files are what macOS keeps beside others (AppleDouble)",
-    }  # fmt: skip
-    notes = {
-        kind: f"{pattern}: {len(kinds[kind])} {obstacle}: {listing(kind)}"
-        for kind, obstacle in obstacles.items()
-        if kinds[kind]
-    }
-    left_out += [note for kind, note in notes.items() if kind in ("case", "linked")]
-    none += [note for kind, note in notes.items() if kind in ("folders", "macOS")]
     if not kinds[""]:
         raise MappingError(
             f"No file matches {pattern} in {root}{''.join(f'; {note}' for note in notes.values())}.",
             hint="Check --root: the pattern starts below it.",
         )
     found = []
-    for path in kinds[""]:
-        shown = path.relative_to(root).as_posix()
+    for shown in kinds[""]:
         match = re.search(source.path, shown)
         if match is None:
             raise MappingError(
@@ -231,39 +234,22 @@ def _matching(name: str, source: TableSource, root: Path, left_out: list[str], n
                 hint="Make the pattern narrower, or the expression wider.",
             )
         words = {word: value or "" for word, value in match.groupdict().items()}
-        found.append(FoundFile(path, shown, {"file": path.stem, **words}))
-    return found
+        found.append(FoundFile(root / shown, shown, {"file": PurePosixPath(shown).stem, **words}))
+    return found, notes
 
 
-def _kind(path: Path, ending: str) -> str:
-    """Return the kind of a match: the empty text for a plain file with the ending of the pattern, else the obstacle."""
+def _obstacle(path: Path, ending: str) -> str:
+    """Return the obstacle to reading a match; empty for a plain file with the ending of the pattern."""
     if not path.exists():
-        return "links"
+        return BROKEN_LINKS
     if not path.is_file():
-        return "folders"
+        return FOLDERS
     if not path.name.endswith(ending):
-        return "case"
-    if not path.name.startswith("._"):
-        return ""
-    with path.open("rb") as opened:
-        return "macOS" if opened.read(4) == b"\0\x05\x16\x07" else ""
-
-
-def _partner(
-    leader: FoundFile, name: str, shared: Sequence[str], candidates: dict[tuple[str, ...], list[FoundFile]]
-) -> FoundFile | str:
-    """Return the file of table `name` that belongs to a file of the first; where there is none, a sentence about it."""
-    fitting = candidates.get(tuple(leader.words[word] for word in shared), [])
-    if len(fitting) == 1:
-        return fitting[0]
-    what = ", ".join(f"{word} {leader.words[word]}" for word in shared) or "no shared words"
-    needs = f"{leader.shown} needs one file of table {name!r} ({what}); there "
-    if not fitting:
-        return f"{needs}is none."
-    listed = ", ".join(one.shown for one in fitting[:3])
-    raise MappingError(
-        f"{needs}are {len(fitting)}: {listed}.", hint="Give both `path` expressions the same named groups."
-    )
+        return OTHER_CASE
+    if path.name.startswith("._"):
+        with path.open("rb") as opened:
+            return APPLE_DOUBLE if opened.read(4) == b"\0\x05\x16\x07" else ""
+    return ""
 
 
 def _split(mapping: Mapping, raw: RawRecording) -> Iterator[RawRecording]:
