@@ -115,12 +115,14 @@ def fields(report: ImportReport, folder: Path) -> Iterator[tuple[str, str]]:
     from collections import Counter
 
     stated = {
-        "title": report.title, "recordings": len(report.recordings), "in": folder, "sensors": report.sensors,
+        "title": report.title, "recordings": len(report.recordings), "in": folder,
+        "sensors": tuple(dict.fromkeys(one.meta.sensor.name for one in report.recordings)),
         "rows": report.rows, "files": report.files_read, "tasks declared": report.tasks,
         "rows without a sample": dict(report.missing),
     }  # fmt: skip
     yield from ((name, field_text(value)) for name, value in stated.items() if value)
-    yield from (("excluded", f"{count} recordings: {reason}") for reason, count in report.excluded.items())
+    excluded = Counter(one.meta.excluded for one in report.recordings if one.meta.excluded)
+    yield from (("excluded", f"{count} recordings: {reason}") for reason, count in excluded.items())
     yield from (("left out", one) for one in report.left_out[:MOST_NAMED])
     if len(report.left_out) > MOST_NAMED:
         yield "left out", f"{len(report.left_out) - MOST_NAMED} more files without a partner"

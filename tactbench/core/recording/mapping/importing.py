@@ -9,7 +9,7 @@ import shutil
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass
 from dataclasses import replace as replaced
 from itertools import product
 from pathlib import Path
@@ -50,15 +50,12 @@ class Imported:
     """One recording that an import has written."""
 
     path: Path
-    name: str
+    meta: RecordingMeta
     rows: int
     """Rows of its longest stream."""
-    sensor: str
-    missing: dict[str, int] = field(default_factory=dict)
+    missing: dict[str, int]
     """Samples marked as missing, by channel."""
-    excluded: str = ""
-    origin: str = ""
-    findings: tuple[Finding, ...] = ()
+    findings: tuple[Finding, ...]
 
 
 @dataclass(frozen=True)
@@ -68,17 +65,12 @@ class ImportReport:
     title: str
     recordings: tuple[Imported, ...]
     files_read: int
-    tasks: tuple[str, ...] = ()
+    tasks: tuple[str, ...]
     """Names of the tasks that the mapping declares."""
-    left_out: tuple[str, ...] = ()
+    left_out: tuple[str, ...]
     """A sentence for each kind of files that match a pattern and make no recording."""
-    unused: tuple[str, ...] = ()
+    unused: tuple[str, ...]
     """A sentence for each kind of matches that are no tables, and one for the columns of a table that are not used."""
-
-    @property
-    def sensors(self) -> tuple[str, ...]:
-        """Names of the sensors, in order of appearance."""
-        return tuple(dict.fromkeys(recording.sensor for recording in self.recordings))
 
     @property
     def rows(self) -> int:
@@ -88,15 +80,7 @@ class ImportReport:
     @property
     def missing(self) -> dict[str, int]:
         """Samples marked as missing in all recordings, by channel."""
-        counted: Counter[str] = Counter()
-        for recording in self.recordings:
-            counted.update(recording.missing)
-        return dict(counted)
-
-    @property
-    def excluded(self) -> dict[str, int]:
-        """Recordings that no evaluation will use, by reason."""
-        return dict(Counter(recording.excluded for recording in self.recordings if recording.excluded))
+        return dict(sum((Counter(recording.missing) for recording in self.recordings), Counter()))
 
 
 def import_tables(
@@ -263,7 +247,7 @@ def _write(
         kept = [asdict(one) for one in findings if one.severity != "info"]
         writer.revise(counts=counts, provenance={FINDINGS: kept})
     rows = max(len(table) for table in raw.tables.values())
-    return Imported(path, meta.name, rows, meta.sensor.name, missing, meta.excluded, meta.origin, findings)
+    return Imported(path, meta, rows, missing, findings)
 
 
 def _given_away(sensed: dict[str, FloatArray], reference: dict[str, FloatArray]) -> Iterator[Finding]:
