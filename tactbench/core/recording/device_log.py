@@ -13,7 +13,7 @@ from tactbench.core.plugins.registry import load_object
 from tactbench.core.recording.health import Finding, examine
 from tactbench.core.recording.mapping.importing import ENDING, RIG
 from tactbench.core.recording.reader import open_recording
-from tactbench.core.recording.writer import RecordingWriter
+from tactbench.core.recording.writer import write_recording
 from tactbench.core.spec.recording import RecordingMeta, Scalar
 from tactbench.core.spec.rig import SensorDescriptor
 from tactbench.core.spec.scene import Role
@@ -91,9 +91,7 @@ def import_log(
         origin=log.name,
         counts=dict(found.counts),
     )
-    with RecordingWriter(out, meta, replace=replace, keep=False) as writer:
-        for block in found.blocks:
-            writer.append(block)
+    write_recording(out, meta, found.blocks, {}, replace=replace)
     with open_recording(out) as written:
         rows = {name: len(written.stream(name)) for name in written.stream_names}
         return ImportedLog(written.meta, rows, tuple(examine(written)))

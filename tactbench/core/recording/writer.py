@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
@@ -38,9 +38,6 @@ class RecordingWriter:
         What it says about itself; :meth:`revise` changes it until the end.
     replace
         Whether a file that is there is replaced, at the end and not before.
-    keep
-        Whether the journal stays of a recording that could not be completed; False where it can be made again, from a
-        table or a log.
 
     Raises
     ------
@@ -48,16 +45,11 @@ class RecordingWriter:
         If there is a file and it is not to be replaced, or the disk refuses.
     """
 
-    def __init__(self, path: Path, meta: RecordingMeta, *, replace: bool = False, keep: bool = True) -> None:
+    def __init__(self, path: Path, meta: RecordingMeta, *, replace: bool = False) -> None:
         self.path = path
         self.meta = meta
         self._replace = replace
-        self._keep = keep
         self._specs = layout.specs_by_name(meta)
-        self._forces = {
-            stream.name: [place for place, one in enumerate(stream.channels) if one.kind in ("force", "torque")]
-            for stream in meta.reference
-        }
         self.content_digest = ""
         """Content digest, once the recording is complete."""
         self._annotations: Annotations = {}
@@ -86,11 +78,6 @@ class RecordingWriter:
         self._leave(error)
 
     @property
-    def _unique(self) -> bool:
-        """Whether the recording cannot be made again."""
-        return self._keep and not self.meta.simulated
-
-    @property
     def rows(self) -> Mapping[str, int]:
         """Number of rows of each stream that has had a block."""
         return self._partial.rows
@@ -108,7 +95,7 @@ class RecordingWriter:
             self.meta = with_clock_fits(self.meta, self._blocks(journal))
         self.content_digest = image.store(
             self.path, self.meta, layout.meta_text(self.meta), self._blocks(journal), self._annotations,
-            aside=layout.completing_path(journal.path), replace=self._replace, sync=self._unique,
+            aside=layout.completing_path(journal.path), replace=self._replace, sync=not self.meta.simulated,
         )  # fmt: skip
 
     def _blocks(self, journal: Partial) -> Iterator[tuple[str, Columns]]:
@@ -126,7 +113,7 @@ class RecordingWriter:
         """Close the journal, and remove it unless it holds rows that are nowhere else."""
         journal = self._partial
         journal.close()
-        if not self.content_digest and any(journal.rows.values()) and self._unique:
+        if not self.content_digest and any(journal.rows.values()) and not self.meta.simulated:
             self.journal = journal.path
             found = recovery(journal.path, self.path)
             if isinstance(error, TactbenchError):
@@ -168,16 +155,15 @@ class RecordingWriter:
         RecordingError
             If the disk refuses it.
         """
-        spec = self._checked(block)
-        columns = _columns(block, spec)
+        columns = stored_columns(block, self.meta, self._specs)
         has = (block.sequence is not None, block.device_ns is not None)
-        if self._has.setdefault(spec.name, has) != has:
+        if self._has.setdefault(block.stream, has) != has:
             raise RigError(
-                f"Some blocks of stream {spec.name!r} have sequence numbers or device times and some have none.",
+                f"Some blocks of stream {block.stream!r} have sequence numbers or device times and some have none.",
                 hint="Give them with all blocks of a stream, or with none.",
             )
         try:
-            self._partial.append(spec.name, columns)
+            self._partial.append(block.stream, columns)
         except OSError as error:
             raise image.cannot_write(self.path, error) from error
 
@@ -196,45 +182,90 @@ class RecordingWriter:
             raise image.cannot_write(self.path, error) from error
         self._annotations.setdefault(stream, {})[name] = column
 
-    def _checked(self, block: Block) -> StreamSpec:
-        spec = self._specs.get(block.stream)
-        if spec is None:
-            raise RigError(
-                f"A block of stream {block.stream!r} came; the recording has {', '.join(sorted(self._specs))}.",
-                hint="Declare the stream in the sensor's spec or the rig's reference.",
-            )
-        rows, wide = len(block.data), len(spec.channels)
-        for name, values, shape in (
-            ("data", block.data, (rows, wide)), ("quality", block.quality, (rows, wide)), ("t_ns", block.t_ns, (rows,)),
-            ("sequence", block.sequence, (rows,)), ("device_ns", block.device_ns, (rows,)),
-        ):  # fmt: skip
-            if values is not None and np.shape(values) != shape:
-                raise RigError(
-                    f"A block of stream {block.stream!r} has {name} of shape {np.shape(values)}, not (n, {wide})"
-                    f"{'' if name == 'data' else f' or (n,) with n = {rows}'}.",
-                    hint="A block is rows by channels, in the order of the stream's spec; give one time a row.",
-                )
-        for place in self._forces.get(block.stream, ()):
-            empty = ~np.isfinite(block.data[:, place])
-            if block.quality is not None:
-                empty &= (block.quality[:, place] & Quality.MISSING) == 0
-            if empty.any():
-                raise RigError(
-                    f"The reference {spec.channels[place].name!r} of {block.stream!r} is NaN in {int(empty.sum())} "
-                    "rows that are not marked as missing.",
-                    hint="Mark rows without a sample by the quality MISSING.",
-                )
-        if (block.t_ns is None) != (self.meta.clock == "none"):
-            has = "no times" if block.t_ns is None else "times"
-            raise RigError(
-                f"A block of stream {block.stream!r} has {has}; the recording's clock is {self.meta.clock!r}.",
-                hint="Give every block its times, or say that there is no clock; never invent one.",
-            )
-        return spec
+
+def write_recording(
+    path: Path, meta: RecordingMeta, blocks: Iterable[Block], annotations: Annotations, *, replace: bool = False
+) -> RecordingMeta:
+    """Write a recording whose blocks are all there, and can be had again: no journal is kept of it.
+
+    Parameters
+    ----------
+    path
+        Place of the recording.
+    meta
+        The meta of the recording, to which the clock fits of devices are added.
+    blocks
+        All blocks.
+    annotations
+        Labels of rows, by stream and name.
+    replace
+        Whether a file that is there is replaced.
+
+    Raises
+    ------
+    RigError
+        If a block does not fit its stream.
+    RecordingError
+        If there is a file and it is not to be replaced, or the disk refuses.
+    """
+    specs = layout.specs_by_name(meta)
+    stored = [(block.stream, stored_columns(block, meta, specs)) for block in blocks]
+    meta = with_clock_fits(meta, stored)
+    if not replace:
+        image.require_free(path)
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise image.cannot_write(path, error) from error
+    aside = layout.completing_path(path)
+    image.store(path, meta, layout.meta_text(meta), stored, annotations, aside=aside, replace=replace, sync=False)
+    return meta
 
 
-def _columns(block: Block, spec: StreamSpec) -> Columns:
-    """Return the columns of `block` as they are stored; quality only if a sample is not good."""
+def stored_columns(block: Block, meta: RecordingMeta, specs: Mapping[str, StreamSpec]) -> Columns:
+    """Return the columns of `block` as they are stored; quality only if a sample is not good.
+
+    Raises
+    ------
+    RigError
+        If the block does not fit its stream, one of `specs`, as :meth:`RecordingWriter.append` lists.
+    """
+    spec = specs.get(block.stream)
+    if spec is None:
+        raise RigError(
+            f"A block of stream {block.stream!r} came; the recording has {', '.join(sorted(specs))}.",
+            hint="Declare the stream in the sensor's spec or the rig's reference.",
+        )
+    rows, wide = len(block.data), len(spec.channels)
+    for name, values, shape in (
+        ("data", block.data, (rows, wide)), ("quality", block.quality, (rows, wide)), ("t_ns", block.t_ns, (rows,)),
+        ("sequence", block.sequence, (rows,)), ("device_ns", block.device_ns, (rows,)),
+    ):  # fmt: skip
+        if values is not None and np.shape(values) != shape:
+            raise RigError(
+                f"A block of stream {block.stream!r} has {name} of shape {np.shape(values)}, not (n, {wide})"
+                f"{'' if name == 'data' else f' or (n,) with n = {rows}'}.",
+                hint="A block is rows by channels, in the order of the stream's spec; give one time a row.",
+            )
+    of_reference = any(one.name == spec.name for one in meta.reference)
+    for place, channel in enumerate(spec.channels if of_reference else ()):
+        if channel.kind not in ("force", "torque"):
+            continue
+        empty = ~np.isfinite(block.data[:, place])
+        if block.quality is not None:
+            empty &= (block.quality[:, place] & Quality.MISSING) == 0
+        if empty.any():
+            raise RigError(
+                f"The reference {channel.name!r} of {block.stream!r} is NaN in {int(empty.sum())} rows that are not "
+                "marked as missing.",
+                hint="Mark rows without a sample by the quality MISSING.",
+            )
+    if (block.t_ns is None) != (meta.clock == "none"):
+        has = "no times" if block.t_ns is None else "times"
+        raise RigError(
+            f"A block of stream {block.stream!r} has {has}; the recording's clock is {meta.clock!r}.",
+            hint="Give every block its times, or state that there is no clock; never invent one.",
+        )
     columns: Columns = {"data": _stored(block.data, spec)}
     for name, numbers in (("t_ns", block.t_ns), ("sequence", block.sequence), ("device_ns", block.device_ns)):
         if numbers is not None:

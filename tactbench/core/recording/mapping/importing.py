@@ -29,8 +29,8 @@ from tactbench.core.recording.mapping.samples import compare_clocks, labels, sam
 from tactbench.core.recording.mapping.table import TextTable
 from tactbench.core.recording.mapping.tasks import check_tasks, require_answerable, tasks_text, write_tasks
 from tactbench.core.recording.reader import UnwrittenRecording, content_digest
-from tactbench.core.recording.writer import RecordingWriter
-from tactbench.core.samples import Block, FloatArray, StreamData
+from tactbench.core.recording.writer import write_recording
+from tactbench.core.samples import Block, StreamData
 from tactbench.core.spec.recording import RecordingMeta, Scalar, composed
 from tactbench.core.spec.scene import Role
 from tactbench.core.spec.sensor import SensorSpec, StreamSpec
@@ -208,51 +208,48 @@ def _write(
     beside: Sequence[Finding],
 ) -> Imported:
     """Write one recording with its findings, to which `beside` adds those of the import as a whole."""
-    counts: dict[str, int] = {}
-    missing: dict[str, int] = {}
     clocks = {
         name: times(table, time)
         for name, table in raw.tables.items()
         if (time := mapping.tables[name].time) is not None
     }
     found = [*compare_clocks(mapping, raw.tables, clocks)]
-    sensed: dict[str, FloatArray] = {}
-    reference: dict[str, FloatArray] = {}
-    written: list[StreamData] = []
-    with RecordingWriter(path, meta, keep=False) as writer:
-        for name, stream in streams.items():
-            table, clock = raw.tables[stream.source.table], clocks.get(stream.source.table)
-            read_in = samples(stream, table)
-            found.extend(read_in.findings)
-            columns = zip(stream.spec.channels, np.where(read_in.quality, np.nan, read_in.data).T, strict=True)
-            for channel, column in columns:
-                if stream.source.of == "sensor":
-                    sensed[channel.name] = column
-                elif channel.kind in MUST_NAME_SENTINELS:
-                    reference[channel.name] = column
-            writer.append(Block(name, clock, read_in.data, read_in.quality))
-            notes = {label: labels(label, one, table) for label, one in stream.source.annotations.items()}
-            for label, values in notes.items():
-                writer.annotate(name, label, values)
-            written.append(StreamData(stream.spec, clock, read_in.data, read_in.quality, notes))
-            missing.update(read_in.missing)
-            counts[f"rows of {name}"] = len(table)
-        counts |= {f"{channel} without a sample": number for channel, number in missing.items()}
-        examined = examine(UnwrittenRecording(meta, written))
-        for name, table in raw.tables.items():
-            if isinstance(table, TextTable) and table.trailing:
-                text = f"every line of table {name} ends with a delimiter; the empty cell behind it is left out"
-                found.append(Finding("trailing-delimiter", "info", "", (), len(table), text))
-        findings = (*beside, *examined, *found, *_given_away(sensed, reference))
-        kept = [asdict(one) for one in findings if one.severity != "info"]
-        writer.revise(counts=counts, provenance={FINDINGS: kept})
-    rows = max(len(table) for table in raw.tables.values())
-    return Imported(path, meta, rows, missing, findings)
+    missing: dict[str, int] = {}
+    written: dict[str, StreamData] = {}
+    for name, stream in streams.items():
+        table, clock = raw.tables[stream.source.table], clocks.get(stream.source.table)
+        read_in = samples(stream, table)
+        found.extend(read_in.findings)
+        missing.update(read_in.missing)
+        notes = {label: labels(label, one, table) for label, one in stream.source.annotations.items()}
+        written[name] = StreamData(stream.spec, clock, read_in.data, read_in.quality, notes)
+    found += _given_away(meta, written)
+    for name, table in raw.tables.items():
+        if isinstance(table, TextTable) and table.trailing:
+            text = f"every line of table {name} ends with a delimiter; the empty cell behind it is left out"
+            found.append(Finding("trailing-delimiter", "info", "", (), len(table), text))
+    findings = (*beside, *examine(UnwrittenRecording(meta, written.values())), *found)
+    counts = {f"rows of {name}": len(one.data) for name, one in written.items()}
+    counts |= {f"{channel} without a sample": number for channel, number in missing.items()}
+    kept = [asdict(one) for one in findings if one.severity != "info"]
+    meta = meta.model_copy(update={"counts": counts, "provenance": {FINDINGS: kept}})
+    blocks = (Block(name, one.t_ns, one.data, one.quality) for name, one in written.items())
+    write_recording(path, meta, blocks, {name: dict(one.annotations) for name, one in written.items()})
+    return Imported(path, meta, max(len(table) for table in raw.tables.values()), missing, findings)
 
 
-def _given_away(sensed: dict[str, FloatArray], reference: dict[str, FloatArray]) -> Iterator[Finding]:
-    """Yield a finding for each channel of the sensor that is a copy of a force of the reference."""
-    for (force, wanted), (name, column) in product(reference.items(), sensed.items()):
+def _given_away(meta: RecordingMeta, streams: dict[str, StreamData]) -> Iterator[Finding]:
+    """Yield a finding for each channel of the sensor that is a copy of a force or torque of the reference."""
+    reference = {one.name for one in meta.reference}
+    sensed, forces = [], []
+    for stream, one in streams.items():
+        values = one.data if one.quality is None else np.where(one.quality, np.nan, one.data)
+        for channel, column in zip(one.spec.channels, values.T, strict=True):
+            if stream not in reference:
+                sensed.append((channel.name, column))
+            elif channel.kind in MUST_NAME_SENTINELS:
+                forces.append((channel.name, column))
+    for (force, wanted), (name, column) in product(forces, sensed):
         if len(column) == len(wanted) and is_copy(column, wanted):
             text = f"{name}, a channel of the sensor, is {MONOTONE.format(force)}"
             yield Finding("target-among-features", "warning", "", (name,), 1, text)

@@ -132,6 +132,8 @@ class TextTable(Table):
 
     def _as_python(self, cell: str) -> str:
         """Return a number as Python writes it; an empty text if the cell is written in another way than the table."""
+        if self.decimal == "." and self.thousands is None:
+            return cell
         whole, mark, rest = cell.partition(self.decimal)
         if self.thousands is not None and self.thousands in whole:
             first, *groups = whole.lstrip("+-").split(self.thousands)
