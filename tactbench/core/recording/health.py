@@ -63,12 +63,12 @@ class Finding:
     check: str
     """Short name of the check, fit for a filter: stuck, dead, saturated, duplicated, missing, gaps …"""
     severity: Severity
-    stream: str
-    """Name of the stream; empty: the whole recording is concerned."""
-    channels: tuple[str, ...]
-    count: int
-    """Number of samples, rows or channels that are concerned."""
     message: str
+    stream: str = ""
+    """Name of the stream; empty: the whole recording is concerned."""
+    channels: tuple[str, ...] = ()
+    count: int = 0
+    """Number of samples, rows or channels that are concerned."""
 
 
 class _Stream:
@@ -100,11 +100,6 @@ class _Stream:
             for name, column in block.annotations.items():
                 self.labels[name] |= set(np.unique(column).tolist())
         self.contents = [digest.digest() for digest in digests]
-
-    @property
-    def present(self) -> npt.NDArray[np.int64]:
-        """Number of samples of each channel."""
-        return self.rows - self.missing
 
     def names(self, which: npt.NDArray[Any]) -> tuple[str, ...]:
         """Return the names of the channels that a mask takes."""
@@ -167,15 +162,12 @@ def examine(recording: Recording) -> list[Finding]:
     clocks: dict[bytes, tuple[list[str], _Stream]] = {}
     streams: dict[str, _Stream] = {}
     for name in recording.stream_names:
-        clock = recording.meta.clocks.get(name)
         stream = _Stream(recording.stream(name))
         if stream.rows == 0:
-            found.append(Finding("empty", "error", name, (), 0, f"{name} has no rows"))
+            found.append(Finding("empty", "error", f"{name} has no rows", name))
             continue
         found.extend(_channels(stream))
-        found.extend(_rows(stream))
-        if clock is not None:
-            found.extend(_clock_fit(name, clock))
+        found.extend(_rows(stream, recording.meta.clocks.get(name)))
         if stream.t_ns is not None:
             streams[name] = stream
             clocks.setdefault(hashlib.sha256(stream.t_ns.data).digest(), ([], stream))[0].append(name)
@@ -207,14 +199,14 @@ def marking(recording: Recording) -> list[Finding]:
 def _whole(recording: Recording) -> Iterator[Finding]:
     meta = recording.meta
     if meta.excluded:
-        yield Finding("excluded", "warning", "", (), 1, f"excluded from every evaluation: {meta.excluded}")
+        yield Finding("excluded", "warning", f"excluded from every evaluation: {meta.excluded}", count=1)
     if meta.clock in _UNTIMED:
-        yield Finding("no-clock", "info", "", (), 0, _UNTIMED[meta.clock])
+        yield Finding("no-clock", "info", _UNTIMED[meta.clock])
     for name, counts in meta.streams.items():
         yield from _counts(name, counts)
     absent = [spec.name for spec in (*meta.sensor.streams, *meta.reference) if spec.name not in recording.stream_names]
     if absent:
-        yield Finding("absent", "warning", "", (), len(absent), f"declared but not recorded: {', '.join(absent)}")
+        yield Finding("absent", "warning", f"declared but not recorded: {', '.join(absent)}", count=len(absent))
 
 
 def _counts(stream: str, counts: StreamCounts) -> Iterator[Finding]:
@@ -222,72 +214,63 @@ def _counts(stream: str, counts: StreamCounts) -> Iterator[Finding]:
     lost += [f"{counts.dropped} were dropped because writing was behind"] if counts.dropped else []
     if lost:
         text = f"{stream} lost rows: {', '.join(lost)}"
-        yield Finding("lost", "warning", stream, (), counts.gaps + counts.dropped, text)
+        yield Finding("lost", "warning", text, stream, count=counts.gaps + counts.dropped)
     again = counts.duplicates + counts.late
     if again:
         text = f"{stream}: {again} rows came twice or late, and were kept out"
-        yield Finding("repeated", "info", stream, (), again, text)
+        yield Finding("repeated", "info", text, stream, count=again)
     open_rows = counts.received - counts.written - counts.dropped - again
     if open_rows:
         text = f"{stream}: {abs(open_rows)} rows {'more' if open_rows > 0 else 'fewer'} received than accounted for"
-        yield Finding("unaccounted", "warning", stream, (), abs(open_rows), text)
+        yield Finding("unaccounted", "warning", text, stream, count=abs(open_rows))
 
 
 def _channels(stream: _Stream) -> Iterator[Finding]:
-    name, there = stream.name, stream.present
+    there = stream.rows - stream.missing
 
-    def finding(check: str, severity: Severity, which: npt.NDArray[Any], count: int, text: str) -> Finding:
-        return Finding(check, severity, name, stream.names(which), count, text)
+    def finding(check: str, severity: Severity, which: npt.NDArray[np.bool_], text: str, count: int = 0) -> Finding:
+        names = stream.names(which)
+        return Finding(check, severity, f"{stream.phrase(which)}{text}", stream.name, names, count or len(names))
 
-    dead = there == 0
-    if dead.any():
-        yield finding("dead", "error", dead, int(dead.sum()), f"{stream.phrase(dead)} without a single sample")
-    varies = (there > 1) & (stream.low < stream.high)
+    dead, varies = there == 0, (there > 1) & (stream.low < stream.high)
     stuck = (there > 1) & ~varies
+    if dead.any():
+        yield finding("dead", "error", dead, " without a single sample")
     if stuck.any():
-        yield finding("stuck", "warning", stuck, int(stuck.sum()), f"{stream.phrase(stuck)} constant")
+        yield finding("stuck", "warning", stuck, " constant")
     full = np.flatnonzero(stream.saturated)
     for places in [full] if len(full) > MOST_LISTED else full[:, None]:
         some, count = np.isin(np.arange(len(there)), places), int(stream.saturated[places].sum())
-        text = f"{stream.phrase(some)} saturated in {count} of {len(places) * stream.rows} samples"
-        yield finding("saturated", "warning", some, count, text)
-    for count in dict.fromkeys(stream.missing[(stream.missing > 0) & ~dead].tolist()):
-        some = stream.missing == count
         yield finding(
-            "missing", "info", some, count, f"{stream.phrase(some)} without a sample in {count} of {stream.rows} rows"
+            "saturated", "warning", some, f" saturated in {count} of {len(places) * stream.rows} samples", count
         )
-    suspect = stream.suspect > 0
-    if suspect.any():
+    for count in dict.fromkeys(stream.missing[(stream.missing > 0) & ~dead].tolist()):
+        text = f" without a sample in {count} of {stream.rows} rows"
+        yield finding("missing", "info", stream.missing == count, text, count)
+    if stream.suspect.any():
         count = int(stream.suspect.sum())
-        text = f"{stream.phrase(suspect)}: {count} samples failed parity, checksum or sequence"
-        yield finding("suspect", "warning", suspect, count, text)
+        text = f": {count} samples failed parity, checksum or sequence"
+        yield finding("suspect", "warning", stream.suspect > 0, text, count)
     # Two channels that always read the same are one, wired or parsed twice; constant ones may agree by accident.
     alike: dict[bytes, list[int]] = {}
     for place in np.flatnonzero(varies).tolist():
         alike.setdefault(stream.contents[place], []).append(place)
     for places in alike.values():
         if len(places) > 1:
-            some = np.isin(np.arange(len(there)), places)
-            yield finding("duplicated", "warning", some, len(places), f"{stream.phrase(some)} identical")
+            yield finding("duplicated", "warning", np.isin(np.arange(len(there)), places), " identical")
 
 
-def _rows(stream: _Stream) -> Iterator[Finding]:
+def _rows(stream: _Stream, clock: StreamClock | None) -> Iterator[Finding]:
     for label, values in stream.labels.items():
         if len(values) == 1 and stream.rows > 1:
             text = f"label {label} is {next(iter(values))!r} in every row"
-            yield Finding("constant-label", "info", stream.name, (), stream.rows, text)
+            yield Finding("constant-label", "info", text, stream.name, count=stream.rows)
     if stream.lost_before:
         text = f"{stream.name}: rows were lost before {stream.lost_before} of {stream.rows} rows"
-        yield Finding("rows-before-lost", "warning", stream.name, (), stream.lost_before, text)
-
-
-def _clock_fit(name: str, clock: StreamClock) -> Iterator[Finding]:
-    if any(segment.bound_ns is None for segment in clock.segments):
-        text = f"{name}: too few rows to say how well its clock was put on the host's"
-        yield Finding("clock-bound", "info", name, (), 0, text)
-    if clock.breaks:
-        text = f"the clock of {name} began again (times: {clock.breaks})"
-        yield Finding("clock-lost", "warning", name, (), clock.breaks, text)
+        yield Finding("rows-before-lost", "warning", text, stream.name, count=stream.lost_before)
+    if clock is not None and clock.breaks:
+        text = f"the clock of {stream.name} began again (times: {clock.breaks})"
+        yield Finding("clock-lost", "warning", text, stream.name, count=clock.breaks)
 
 
 def _clock(stream: str, data: _Stream) -> Iterator[Finding]:
@@ -298,10 +281,10 @@ def _clock(stream: str, data: _Stream) -> Iterator[Finding]:
     if backward:
         row = int(np.flatnonzero(steps < 0)[0]) + 1
         text = f"time runs backwards {backward} times in {stream}, first at row {row}"
-        yield Finding("backward", "error", stream, (), backward, text)
+        yield Finding("backward", "error", text, stream, count=backward)
     if doubled:
         text = f"{doubled} of {len(data.t_ns)} time stamps of {stream} equal the one before"
-        yield Finding("repeated-time", "warning", stream, (), doubled, text)
+        yield Finding("repeated-time", "warning", text, stream, count=doubled)
     steps.sort()  # in place: there may be tens of millions
     forward = steps[backward + doubled :]
     if len(forward) < 3:
@@ -310,14 +293,14 @@ def _clock(stream: str, data: _Stream) -> Iterator[Finding]:
     gaps = len(forward) - int(np.searchsorted(forward, 1e9 * GAP * median, side="right"))
     if gaps:
         text = f"{gaps} gaps in {stream}: up to {1e-9 * forward[-1]:.3g} s, where the median step is {median:.3g} s"
-        yield Finding("gaps", "warning", stream, (), gaps, text)
+        yield Finding("gaps", "warning", text, stream, count=gaps)
     rate = (len(data.t_ns) - 1) / (float(data.t_ns[-1] - data.t_ns[0]) * 1e-9) if not backward else 1 / median
     if high - low > JITTER * median:
         text = (
             f"irregular clock in {stream}: median step {median:.3g} s, 5th to 95th percentile {low:.3g} to "
             f"{high:.3g} s, mean rate {rate:.3g} Hz"
         )
-        yield Finding("irregular", "info", stream, (), 0, text)
+        yield Finding("irregular", "info", text, stream)
     stated = data.spec.rate_hz
     slow, fast = (stated / WRONG_UNIT, stated * WRONG_UNIT) if stated else (SLOWEST_HZ, np.inf)
     looks = ": ms read as s?" if rate < slow else ": s read as ms?" if rate > fast else ""
@@ -325,7 +308,7 @@ def _clock(stream: str, data: _Stream) -> Iterator[Finding]:
         looks = ""
     if looks or (stated and abs(rate - stated) > RATE_TOLERANCE * stated):
         nominal = f"; {stated:g} Hz are stated" if stated else ""
-        yield Finding("rate", "warning", stream, (), 0, f"{stream} runs at {rate:.4g} Hz{nominal}{looks}")
+        yield Finding("rate", "warning", f"{stream} runs at {rate:.4g} Hz{nominal}{looks}", stream)
 
 
 def _late(sensor: _Stream, reference: _Stream) -> Iterator[Finding]:
@@ -347,7 +330,7 @@ def _late(sensor: _Stream, reference: _Stream) -> Iterator[Finding]:
             f"{reference.phrase(forces)}{place}"
             for place, (late, error) in lags
         )
-        yield Finding("lag", "warning", sensor.name, reference.names(forces), sensor.rows, f"{sensor.name} is {text}")
+        yield Finding("lag", "warning", f"{sensor.name} is {text}", sensor.name, reference.names(forces), sensor.rows)
 
 
 def is_copy(one: FloatArray, other: FloatArray, recording: npt.NDArray[np.int64] | None = None) -> bool:

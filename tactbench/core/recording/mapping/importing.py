@@ -120,7 +120,7 @@ def import_tables(
     if left_out:
         more = f" And {len(left_out) - 1} more." if left_out[1:] else ""
         text = f"its import left files out: {left_out[0]}{more}"
-        beside.append(Finding("left-out", "warning", "", (), len(left_out), text))
+        beside.append(Finding("left-out", "warning", text, count=len(left_out)))
     made: list[Imported] = []
     origins: dict[str, str] = {}
     shapes: dict[str, Shape] = {}
@@ -227,7 +227,7 @@ def _write(
     for name, table in raw.tables.items():
         if isinstance(table, TextTable) and table.trailing:
             text = f"every line of table {name} ends with a delimiter; the empty cell behind it is left out"
-            found.append(Finding("trailing-delimiter", "info", "", (), len(table), text))
+            found.append(Finding("trailing-delimiter", "info", text, count=len(table)))
     findings = (*beside, *examine(UnwrittenRecording(meta, written.values())), *found)
     counts = {f"rows of {name}": len(one.data) for name, one in written.items()}
     counts |= {f"{channel} without a sample": number for channel, number in missing.items()}
@@ -252,7 +252,7 @@ def _given_away(meta: RecordingMeta, streams: dict[str, StreamData]) -> Iterator
     for (force, wanted), (name, column) in product(forces, sensed):
         if len(column) == len(wanted) and is_copy(column, wanted):
             text = f"{name}, a channel of the sensor, is {MONOTONE.format(force)}"
-            yield Finding("target-among-features", "warning", "", (name,), 1, text)
+            yield Finding("target-among-features", "warning", text, channels=(name,), count=1)
 
 
 def _meta(mapping: Mapping, raw: RawRecording, sensor: SensorSpec, reference: tuple[StreamSpec, ...]) -> RecordingMeta:

@@ -194,7 +194,7 @@ def compare_clocks(mapping: Mapping, tables: dict[str, Table], clocks: dict[str,
     if len(kinds) > 1:
         stated = "; ".join(f"{' and '.join(names)} by {kind}" for kind, names in kinds.items())
         text = f"tables are joined by stamps of different kinds: {stated}"
-        yield Finding("mixed-stamps", "warning", "", (), len(kinds), text)
+        yield Finding("mixed-stamps", "warning", text, count=len(kinds))
     spans = {name: (int(t_ns.min()), int(t_ns.max())) for name, t_ns in clocks.items()}
     late, early = max(spans, key=lambda name: spans[name][0]), min(spans, key=lambda name: spans[name][1])
     common = spans[early][1] - spans[late][0]
@@ -215,7 +215,7 @@ def compare_clocks(mapping: Mapping, tables: dict[str, Table], clocks: dict[str,
             f"tables {' and '.join(spans)} have {common * 1e-9:.3g} of {longest * 1e-9:.3g} s in common: they begin "
             f"{begun * 1e-9:.3g} s and end {ended * 1e-9:.3g} s apart"
         )
-        yield Finding("spans", "warning", "", (), 0, text)
+        yield Finding("spans", "warning", text)
 
 
 def _compare_rows(tables: dict[str, Table], clocks: dict[str, IntArray], within_ms: float) -> None:
@@ -283,7 +283,7 @@ def _no_readings(stream: MappedStream, given: FloatArray) -> Iterator[Finding]:
         names, count = tuple(stream.channels[place].spec.name for place in sorted(counts)), sum(counts.values())
         share = float(f"{100 * count / (len(names) * len(given)):.1g}")  # one text for shares that differ by chance
         message = f"{listed(names)}: {text.format(share)}"
-        yield Finding("no-reading", "warning", stream.spec.name, names, count, message)
+        yield Finding("no-reading", "warning", message, stream.spec.name, names, count)
 
 
 def _jumps(column: FloatArray, period: int) -> int:
