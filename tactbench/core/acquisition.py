@@ -140,7 +140,7 @@ def _check_not_silent(acquisition: Acquisition, rows: Mapping[str, int]) -> None
         names = [stream.name for stream in streams]
         if names and not any(rows.get(name) for name in names):
             raise RigError(
-                f"Nothing came of {', '.join(names)} in the whole scene.",
+                f"No row came from {', '.join(names)} in the whole scene.",
                 hint="Is the device on, connected and set to the same speed? `tactbench doctor` asks it.",
             )
 

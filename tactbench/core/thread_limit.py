@@ -16,7 +16,7 @@ VARIABLES = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 def keep_threads() -> None:
     """Limit numerical libraries to one thread, as the table's times state; called before one is loaded.
 
-    Several threads would also sum in another order on another machine. Whoever sets these variables means it.
+    Several threads would also sum in another order on another machine. Values that are set already are kept.
     """
     for name in VARIABLES:
         os.environ.setdefault(name, "1")

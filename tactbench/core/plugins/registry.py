@@ -1,8 +1,8 @@
 """The registry of plugins: each is loaded alone, and every failure is kept as a row.
 
-Three holes of plain pluggy are closed here: a plugin that fails on import stops nobody else; two plugins giving one
-name are refused naming both distributions; a misspelt hook is an error. Plugins of other distributions are imported in
-child processes: what their import does to its process, or how that ends, is no other's, and what comes back is data.
+Three holes of plain pluggy are closed here: a plugin that fails on import stops no other; a name that two plugins give
+is refused, naming both distributions; a misspelt hook is an error. Plugins of other distributions are imported in child
+processes, which return data: whatever an import does to its process has no effect on others.
 """
 
 from __future__ import annotations

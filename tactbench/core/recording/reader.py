@@ -279,4 +279,4 @@ def parse_meta(path: Path, text: str) -> RecordingMeta:
         what = complaint(error)
     except (ValueError, UsageError) as error:
         what = str(error)
-    raise FormatError(f"{path} says something about itself that cannot be: {what}.", hint=layout.SEE)
+    raise FormatError(f"The meta of {path} is not valid: {what}.", hint=layout.SEE)

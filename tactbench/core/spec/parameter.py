@@ -80,4 +80,4 @@ def check_names(what: str, parameters: Mapping[str, Parameter], given: Iterable[
     for name in given:
         if name not in parameters:
             known = ", ".join(f"{known} [{one.unit}]" for known, one in parameters.items()) or "nothing"
-            raise UsageError(f"{what}: {name!r} is given, and it has no such number.", hint=f"It has: {known}.")
+            raise UsageError(f"{what}: {name!r} is given, which it does not have.", hint=f"It has: {known}.")

@@ -27,8 +27,8 @@ def read_bag(path: Path, shown: str, topics: Mapping[str, tuple[str, UsedColumns
     Raises
     ------
     MappingError
-        If the extra is missing, the bag is damaged or cut short, has no such topic, messages lack a field, or a time in
-        nanoseconds is said to have another unit.
+        If the extra is missing, the bag is damaged or cut short or has no such topic, messages lack a field, or the
+        mapping gives another unit for a time in nanoseconds.
     """
     values: dict[str, dict[Column, Any]] = {
         name: {one: array("d") if used.as_float(one) else [] for one in used.columns}

@@ -330,7 +330,7 @@ def _unique_name(meta: RecordingMeta, origins: dict[str, str]) -> None:
     if folded in origins:
         raise MappingError(
             f"{origins[folded]} and {meta.origin} would both become the recording {meta.name!r}.",
-            hint="Put a word that tells them apart into `recording.name`.",
+            hint="Put a word that differs between them into `recording.name`.",
         )
     origins[folded] = meta.origin
 
