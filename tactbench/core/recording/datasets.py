@@ -131,7 +131,7 @@ class DataSet:
                 there.fetch(name, downloader=download)
             except ValueError as error:  # pooch's word for a digest that differs
                 raise MissingRecordingError(
-                    f"{self.name}: {origin} is another file than the data set states: its SHA-256 is not {files[name]}.",
+                    f"{self.name}: {origin} is not the file of the data set: its SHA-256 is not {files[name]}.",
                     hint="It is not kept. Files of another state are imported with `tactbench import MAPPING`.",
                 ) from error
             except OSError as error:

@@ -136,7 +136,7 @@ class RecordingWriter:
             self.meta = RecordingMeta.model_validate({**dict(self.meta), **changes})
         except ValidationError as error:
             raise RecordingError(
-                f"The meta of the recording {self.meta.name!r} would not be valid: {complaint(error)}.", hint="Correct the rig."
+                f"The meta of {self.meta.name!r} would not be valid: {complaint(error)}.", hint="Correct the rig."
             ) from error
         try:
             self._partial.revise(self.meta.model_dump(mode="json", include=set(changes)))
