@@ -92,7 +92,7 @@ class StreamData:
     t_ns: IntArray | None
     """Times, (n,) nanoseconds, on the host's clock where there are several; None when the source has no clock."""
     data: npt.NDArray[Any]
-    """(n, channels)"""
+    """Samples, (n, channels), in the units of the stream's channels."""
     quality: npt.NDArray[np.uint8] | None
     annotations: Mapping[str, npt.NDArray[Any]] = field(default_factory=dict)
     """Labels of the rows by name, (n,) of str or int."""
@@ -145,25 +145,25 @@ class SkinState:
     grid: SkinGrid
     force_n: float
     deflection_mm: FloatArray
-    """(nx, ns), positive towards the core."""
+    """Deflection of the skin, (nx, ns), positive towards the core."""
     pressure_mpa: FloatArray
-    """(nx, ns) contact pressure."""
+    """Contact pressure, (nx, ns)."""
     thickness_mm: FloatArray
-    """(nx, ns) film or foam thickness that is left."""
+    """Remaining thickness of the film or the foam, (nx, ns)."""
     depth_mm: float
     """Approach of the indenter since first touch."""
     fluid_pressure_mpa: float
-    """Rise over rest; 0 for media without fluid."""
+    """Rise of the fluid's pressure over rest; 0 for media without fluid."""
     contact_radius_mm: float
-    """sqrt(5/2 <r²>) weighted with the contact pressure (exact for Hertz)."""
+    """Contact radius: sqrt(5/2 <r²>), weighted with the contact pressure (exact for Hertz)."""
     residual: float
     """Relative residual of the solver."""
     tangential_displacement_mm: FloatArray | None = None
-    """(2, nx, ns) how far the outer surface has moved along itself: [0] along x, [1] along s, each positive the way its
+    """Displacement of the outer surface along itself, (2, nx, ns): [0] along x, [1] along s, each positive the way its
     coordinate grows; without friction what the press squeezes aside, under a slide what that drags along as well.
     None: the sensor's spec does not say that its transducer looks at it (`reads_shear`)."""
     shear_mpa: FloatArray | None = None
-    """(2, nx, ns) shear traction of the indenter on the outer surface, in the same order: positive where it pulls the
+    """Shear traction of the indenter on the outer surface, (2, nx, ns), in the same order: positive where it pulls the
     skin the way the coordinate grows. Its sum over cells times their area is the tangential force on the sensor. Zero
     while nothing slides: contacts are pressed without friction. None: as above."""
 
@@ -173,15 +173,15 @@ class Part:
     """Rows of one role, in the form that estimators take."""
 
     X: FloatArray
-    """(n, features)"""
+    """Features, (n, features)."""
     y: npt.NDArray[Any]
-    """(n,) numbers, (n, components) vectors, or class indices 0 … n_classes-1"""
+    """Targets: (n,) numbers, (n, components) vectors, or class indices 0 … n_classes-1."""
     time_s: FloatArray
-    """(n,) seconds since the recording's first sample (row index when there is no clock)"""
+    """Times since the recording's first sample, (n,) [s]; the row index when there is no clock."""
     recording: IntArray
-    """(n,) which recording of the dataset the row is from"""
+    """Index of the row's recording in the dataset, (n,)."""
     row: IntArray
-    """(n,) which row of that recording"""
+    """Index of the row in that recording, (n,)."""
 
     def __len__(self) -> int:
         return len(self.y)
@@ -202,19 +202,19 @@ class Answers:
     """Predictions of an estimator for the rows of one role, beside the true values."""
 
     y_true: npt.NDArray[Any]
-    """(n,) numbers, (n, components) vectors, or class indices"""
+    """True values: (n,) numbers, (n, components) vectors, or class indices."""
     y_pred: npt.NDArray[Any]
     """Predictions, of the same shape."""
     recording: IntArray
-    """(n,) which recording of the cell the row is from"""
+    """Index of the row's recording in the cell, (n,)."""
     row: IntArray
-    """(n,) which row of that recording"""
+    """Index of the row in that recording, (n,)."""
     fold: IntArray
-    """(n,) fold in which the row was answered"""
+    """Fold in which the row was predicted, (n,)."""
     time_s: FloatArray
-    """(n,) seconds since the recording's first sample (row index when there is no clock)"""
+    """Times since the recording's first sample, (n,) [s]; the row index when there is no clock."""
     force_n: FloatArray
-    """(n,) reference force as recorded; NaN where there is none"""
+    """Reference force as it was recorded, (n,) [N]; NaN where there is none."""
 
     def __len__(self) -> int:
         return len(self.y_true)

@@ -83,7 +83,7 @@ class ClockFit:
 
     @property
     def breaks(self) -> int:
-        """How often the device's times went back."""
+        """Number of times that the device's times went back."""
         return self._runs.breaks
 
     def add(self, device_ns: IntArray, host_ns: IntArray) -> None:
@@ -122,7 +122,7 @@ class RunCounter:
         self._run = 0
 
         self.breaks = 0
-        """How often the times went back."""
+        """Number of times that the times went back."""
 
     def count(self, device_ns: IntArray) -> IntArray:
         """Return the number of the run of each of the next rows, (n,), from 0."""
