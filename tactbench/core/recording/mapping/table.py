@@ -123,8 +123,9 @@ class TextTable(Table):
         return f"{self.shown}:{self.places[row]}"
 
     def _numbers(self, column: Column) -> FloatArray:
-        texts = self.texts(column)
-        number = {text: self._number(text) for text in {*texts}}  # readings repeat: most columns hold few texts
+        place = self._place(column)
+        texts = [cells[place] for cells in self.cells]
+        number = {text: self._number(text.strip()) for text in {*texts}}  # readings repeat: most columns hold few texts
         return np.array([number[text] for text in texts])
 
     def _stamps(self, column: Column) -> Iterable[str]:
