@@ -140,12 +140,8 @@ def _channels(stream: str, group: ChannelGroup) -> Iterator[MappedChannel]:
 
 
 def _names(stream: str, group: ChannelGroup, columns: list[Column]) -> Iterator[str]:
-    if not group.over:
-        for column in columns:
-            yield fill(group.name, {"column": column}, f"stream {stream}")
-        return
     ways = [[*expand(values)] if isinstance(values, str) else list(values) for values in group.over.values()]
-    combinations = list(itertools.product(*ways))
+    combinations = list(itertools.product(*ways)) if ways else [()] * len(columns)
     if len(combinations) != len(columns):
         raise MappingError(
             f"Stream {stream}: {len(columns)} columns, but `over` makes {len(combinations)} names.",
