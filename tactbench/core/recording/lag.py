@@ -104,10 +104,10 @@ def find_lag(sensor_ns: IntArray, sensor: FloatArray, force_ns: IntArray, force:
         full, plain = _Explained(x, past, *shifts), _Explained(x, curve, *shifts)
         other, plain_left, _ = plain.nearest(lag, drift)
         found, left, error = full.nearest(*other)
-        unshifted = full.left(0.0, 0.0)
+        unshifted = full.residual(0.0, 0.0)
         noise = 2 * _squares(left) / np.sqrt(len(left))  # of an autocovariance, two standard errors
         needed = _neighbours(unshifted) > NEEDED * (max(_neighbours(left), 0.0) + noise)
-        suspected = _squares(plain.left(0.0, 0.0)) > SUSPECTED * _squares(plain_left)
+        suspected = _squares(plain.residual(0.0, 0.0)) > SUSPECTED * _squares(plain_left)
         if needed and suspected and 2 * abs(found[1]) < FASTEST_DRIFT * len(x):
             share = _squares(left) / len(left)
             if best is None or share < best[0]:
@@ -137,26 +137,26 @@ class _Explained:
         self._x, self._slope = x, np.gradient(x)
         self._base = np.linalg.qr(columns[self._rows])[0]
 
-    def _rest(self, values: FloatArray) -> FloatArray:
+    def _unexplained(self, values: FloatArray) -> FloatArray:
         return values - self._base @ (self._base.T @ values)
 
-    def left(self, lag: float, drift: float) -> FloatArray:
+    def residual(self, lag: float, drift: float) -> FloatArray:
         """Return the residual of `x`, taken `lag` rows later in the middle and `drift` rows more at the end."""
-        return self._rest(np.interp(self._rows + lag + drift * self._place, self._all, self._x))
+        return self._unexplained(np.interp(self._rows + lag + drift * self._place, self._all, self._x))
 
     def nearest(self, lag: float, drift: float) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Return the best lag and drift near the given ones, (2,), the residual, and their covariance, (2, 2)."""
-        at, before, left = np.array([lag, drift]), np.zeros(2), self.left(lag, drift)
+        at, before, left = np.array([lag, drift]), np.zeros(2), self.residual(lag, drift)
         slopes = np.empty((len(left), 2))
         best = np.inf
         for _ in range(_ITERATIONS):
-            new = self.left(*at)
+            new = self.residual(*at)
             if _squares(new) >= best:
                 at = (at + before) / 2
                 continue
             best, before, left = _squares(new), at, new
             slope = np.interp(self._rows + at[0] + at[1] * self._place, self._all, self._slope)
-            slopes = np.column_stack([self._rest(slope), self._rest(slope * self._place)])
+            slopes = np.column_stack([self._unexplained(slope), self._unexplained(slope * self._place)])
             at = at - np.linalg.lstsq(slopes, left, rcond=None)[0]
         block = np.arange(len(left)) * _BLOCKS // len(left)
         moved = np.array([np.linalg.lstsq(slopes[block != b], left[block != b], rcond=None)[0] for b in range(_BLOCKS)])

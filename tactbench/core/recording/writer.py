@@ -53,7 +53,7 @@ class RecordingWriter:
         self.content_digest = ""
         """Content digest, once the recording is complete."""
         self._annotations: Annotations = {}
-        self._has: dict[str, tuple[bool, bool]] = {}
+        self._optional: dict[str, tuple[bool, bool]] = {}
         self._partial: Partial
         self.journal: Path | None = None
         """Journal of a recording that was not completed, once the context is left; None: there is none."""
@@ -91,7 +91,7 @@ class RecordingWriter:
             If the disk refuses it; the journal then stays, as after a crash.
         """
         journal = self._partial
-        if any(timed for _, timed in self._has.values()):
+        if any(timed for _, timed in self._optional.values()):
             self.meta = with_clock_fits(self.meta, self._blocks(journal))
         self.content_digest = image.store(
             self.path, self.meta, layout.meta_text(self.meta), self._blocks(journal), self._annotations,
@@ -157,7 +157,7 @@ class RecordingWriter:
         """
         columns = stored_columns(block, self.meta, self._specs)
         has = (block.sequence is not None, block.device_ns is not None)
-        if self._has.setdefault(block.stream, has) != has:
+        if self._optional.setdefault(block.stream, has) != has:
             raise RigError(
                 f"Some blocks of stream {block.stream!r} have sequence numbers or device times and some have none.",
                 hint="Give them with all blocks of a stream, or with none.",

@@ -218,11 +218,11 @@ def _write(
     written: dict[str, StreamData] = {}
     for name, stream in streams.items():
         table, clock = raw.tables[stream.source.table], clocks.get(stream.source.table)
-        read_in = samples(stream, table)
-        found.extend(read_in.findings)
-        missing.update(read_in.missing)
+        taken = samples(stream, table)
+        found.extend(taken.findings)
+        missing.update(taken.missing)
         notes = {label: labels(label, one, table) for label, one in stream.source.annotations.items()}
-        written[name] = StreamData(stream.spec, clock, read_in.data, read_in.quality, notes)
+        written[name] = StreamData(stream.spec, clock, taken.data, taken.quality, notes)
     found += _given_away(meta, written)
     for name, table in raw.tables.items():
         if isinstance(table, TextTable) and table.trailing:
