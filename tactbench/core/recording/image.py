@@ -186,18 +186,22 @@ def _extend(group: Any, columns: Columns) -> None:
     start = group["data"].shape[0] if "data" in group else 0
     stop = start + len(columns["data"])
     for name, values in columns.items():
-        column = group[name] if name in group else _create(group, name, values)
-        column.resize(stop, axis=0)
-        column[start:stop] = values
+        if name in group:
+            group[name].resize(stop, axis=0)
+            group[name][start:stop] = values
+        else:
+            _create(group, name, values, start)
 
 
-def _create(group: Any, name: str, values: npt.NDArray[Any]) -> Any:
-    """Return a new column without rows; where quality comes late, the zeros before it mean good samples."""
+def _create(group: Any, name: str, values: npt.NDArray[Any], start: int = 0) -> Any:
+    """Return a new column with `values` from row `start` on; the zeros before late quality mean good samples."""
     rest = values.shape[1:]
-    return group.create_dataset(
-        name, shape=(0, *rest), maxshape=(None, *rest), dtype=values.dtype, chunks=(layout.CHUNK_ROWS, *rest),
-        compression="gzip", compression_opts=4, shuffle=True, fillvalue=0,
+    column = group.create_dataset(
+        name, shape=(start + len(values), *rest), maxshape=(None, *rest), dtype=values.dtype, compression="gzip",
+        compression_opts=4, shuffle=True, fillvalue=0, chunks=(layout.CHUNK_ROWS, *rest),
     )  # fmt: skip
+    column[start:] = values
+    return column
 
 
 def _annotate(group: Any, label: str, column: npt.NDArray[Any]) -> None:
@@ -238,10 +242,7 @@ def _attach_scales(group: Any, columns: dict[str, Any], names: list[str]) -> Non
 
     rows = columns.get("t_ns")
     if rows is None:
-        numbers = np.arange(len(columns["data"]), dtype=np.int64)
-        rows = _create(group, layout.ROWS, numbers)
-        rows.resize(len(numbers), axis=0)
-        rows[:] = numbers
+        rows = _create(group, layout.ROWS, np.arange(len(columns["data"]), dtype=np.int64))
     channels = group.create_dataset(layout.CHANNELS, data=names, dtype=h5py.string_dtype("utf-8"))
     channels.make_scale(layout.CHANNELS)
     rows.make_scale("t_ns" if "t_ns" in columns else layout.ROWS)
