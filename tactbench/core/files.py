@@ -97,5 +97,6 @@ def writable(place: Path) -> Iterator[None]:
         yield
     except OSError as error:
         raise UnwritableError(
-            f"{place} cannot be written: {error.strerror or error}.", hint="Give another with --out."
+            f"{place} cannot be written: {error.strerror or error}.",
+            hint="Check the folder's permissions and the free space, or give another with --out.",
         ) from error

@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from tactbench.core.errors import FormatError, UnwritableError
-from tactbench.core.files import hdf5_image
+from tactbench.core.files import hdf5_image, writable
 from tactbench.core.recording import format as layout
 from tactbench.core.recording.clock_fit import on_host_clock
 from tactbench.core.recording.partial import Annotations, Blocks, Columns
@@ -57,26 +57,25 @@ def store(
         is as it was.
     """
     try:
-        image = build(meta, text, blocks, annotations, complete=True)
-        with aside.open("wb") as file:
-            file.write(image)
-            file.flush()
+        with writable(target):
+            image = build(meta, text, blocks, annotations, complete=True)
+            with aside.open("wb") as file:
+                file.write(image)
+                file.flush()
+                if sync:
+                    os.fsync(file.fileno())
+            try:
+                with open_recording(aside) as written:
+                    digest = written.verify()
+            except FormatError as error:
+                raise UnwritableError(
+                    f"What is read back of {target} is not what was written.", hint="Did the disk fail?"
+                ) from error
+            if not replace:
+                require_free(target)
+            aside.replace(target)
             if sync:
-                os.fsync(file.fileno())
-        try:
-            with open_recording(aside) as written:
-                digest = written.verify()
-        except FormatError as error:
-            raise UnwritableError(
-                f"What is read back of {target} is not what was written.", hint="Did the disk fail?"
-            ) from error
-        if not replace:
-            require_free(target)
-        aside.replace(target)
-        if sync:
-            _sync_folder(target.parent)
-    except OSError as error:
-        raise cannot_write(target, error) from error
+                _sync_folder(target.parent)
     finally:
         with suppress(OSError):
             aside.unlink(missing_ok=True)
@@ -87,15 +86,6 @@ def require_free(path: Path) -> None:
     """Raise UnwritableError if there is a file already."""
     if path.exists():
         raise UnwritableError(f"{path} exists already.", hint="Give another name with --out, or delete that one.")
-
-
-def cannot_write(path: Path, error: OSError) -> UnwritableError:
-    """Return the error for a disk that refuses to write."""
-    reason = error.strerror or error
-    return UnwritableError(
-        f"The recording {path} cannot be written: {reason}.",
-        hint="Check the folder's permissions and the free space, or give another with --out.",
-    )
 
 
 def build(meta: RecordingMeta, text: str, blocks: Blocks, annotations: Annotations, *, complete: bool) -> bytes:

@@ -6,6 +6,7 @@ from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
 
+from tactbench.core.files import writable
 from tactbench.core.recording import format as layout
 from tactbench.core.recording import image
 from tactbench.core.recording.clock_fit import with_clock_fits
@@ -56,10 +57,8 @@ def rescue(path: Path, target: Path) -> None:
     journal = read_journal(path)
     meta = parse_meta(path, journal.text)
     meta, text = _fitted(journal, meta.model_copy(update={"remarks": (*meta.remarks, REMARK)}))
-    try:
+    with writable(target):
         target.parent.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise image.cannot_write(target, error) from error
     aside = layout.completing_path(target)
     image.store(target, meta, text, journal.blocks(), journal.annotations, aside=aside, replace=False, sync=True)
 

@@ -12,6 +12,7 @@ import numpy.typing as npt
 from pydantic import ValidationError
 
 from tactbench.core.errors import RecordingError, RigError, TactbenchError, complaint
+from tactbench.core.files import writable
 from tactbench.core.recording import format as layout
 from tactbench.core.recording import image
 from tactbench.core.recording.clock_fit import with_clock_fits
@@ -61,11 +62,9 @@ class RecordingWriter:
     def __enter__(self) -> RecordingWriter:
         if not self._replace:
             image.require_free(self.path)
-        try:
+        with writable(self.path):
             self.path.parent.mkdir(parents=True, exist_ok=True)
             self._partial = Partial(self.path, layout.meta_text(self.meta))
-        except OSError as error:
-            raise image.cannot_write(self.path, error) from error
         return self
 
     def __exit__(self, _kind: object, error: BaseException | None, _trace: object) -> None:
@@ -138,10 +137,8 @@ class RecordingWriter:
             raise RecordingError(
                 f"The meta of {self.meta.name!r} would not be valid: {complaint(error)}.", hint="Correct the rig."
             ) from error
-        try:
+        with writable(self.path):
             self._partial.revise(self.meta.model_dump(mode="json", include=set(changes)))
-        except OSError as error:
-            raise image.cannot_write(self.path, error) from error
 
     def append(self, block: Block) -> None:
         """Add `block` to its stream and flush it.
@@ -162,10 +159,8 @@ class RecordingWriter:
                 f"Some blocks of stream {block.stream!r} have sequence numbers or device times and some have none.",
                 hint="Give them with all blocks of a stream, or with none.",
             )
-        try:
+        with writable(self.path):
             self._partial.append(block.stream, columns)
-        except OSError as error:
-            raise image.cannot_write(self.path, error) from error
 
     def annotate(self, stream: str, name: str, values: Sequence[str] | npt.NDArray[Any]) -> None:
         """Add a label to every row of `stream`: text or whole numbers, one for each row, after its last block.
@@ -176,10 +171,8 @@ class RecordingWriter:
             If the disk refuses it; on completion, if there are fewer labels or more than rows.
         """
         column = np.asarray(values)
-        try:
+        with writable(self.path):
             self._partial.annotate(stream, name, column)
-        except OSError as error:
-            raise image.cannot_write(self.path, error) from error
         self._annotations.setdefault(stream, {})[name] = column
 
 
@@ -213,10 +206,8 @@ def write_recording(
     meta = with_clock_fits(meta, stored)
     if not replace:
         image.require_free(path)
-    try:
+    with writable(path):
         path.parent.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise image.cannot_write(path, error) from error
     aside = layout.completing_path(path)
     image.store(path, meta, layout.meta_text(meta), stored, annotations, aside=aside, replace=replace, sync=False)
     return meta
