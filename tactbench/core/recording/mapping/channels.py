@@ -54,6 +54,14 @@ def fill(pattern: str, words: Mapping[str, Scalar], what: str) -> str:
     return _WORD.sub(word, pattern)
 
 
+def no_translation(where: str, text: str, word: str, known: Mapping[str, str]) -> MappingError:
+    """Return the error for a text that is not among the `known` translations of a word or label."""
+    return MappingError(
+        f"{where} {text!r} has no translation for {word!r}; there are: {', '.join(known)}.",
+        hint="Add it to `values`; of a label, translate what means 'no label' to an empty text.",
+    )
+
+
 def expand(text: Scalar) -> Iterator[Scalar]:
     """Yield the members of a range: ``1..3`` is 1, 2, 3; ``e_1..3`` is e_1, e_2, e_3; else the text itself."""
     match = _RANGE.match(text) if isinstance(text, str) else None

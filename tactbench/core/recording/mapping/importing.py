@@ -22,7 +22,7 @@ from tactbench.core.errors import MappingError, RecordingError
 from tactbench.core.files import try_lock, writable
 from tactbench.core.progress import Progress
 from tactbench.core.recording.health import FINDINGS, MONOTONE, Finding, examine, is_copy
-from tactbench.core.recording.mapping.channels import MappedStream, device, fill, sensor_of
+from tactbench.core.recording.mapping.channels import MappedStream, device, fill, no_translation, sensor_of
 from tactbench.core.recording.mapping.files import RawRecording, Shape, find, read, require_same_shape, unused_columns
 from tactbench.core.recording.mapping.model import MUST_NAME_SENTINELS, Arrays, Mapping, Word
 from tactbench.core.recording.mapping.samples import compare_clocks, labels, samples, times
@@ -305,10 +305,7 @@ def _derived(name: str, word: Word, words: dict[str, Scalar], origin: str) -> st
         return str(int(given) // word.divided_by)
     known = {composed(str(key)): value for key, value in (word.values or {}).items()}
     if given not in known:
-        raise MappingError(
-            f"{origin}: {word.of} {given!r} has no translation under {name!r}, which has: {', '.join(known)}.",
-            hint="Add it to `values`.",
-        )
+        raise no_translation(f"{origin}: {word.of}", given, name, known)
     return known[given]
 
 

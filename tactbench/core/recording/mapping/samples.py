@@ -12,7 +12,7 @@ import numpy.typing as npt
 from tactbench.core.errors import MappingError
 from tactbench.core.recording.health import Finding, listed
 from tactbench.core.recording.mapping.bags import MESSAGE_TIMES
-from tactbench.core.recording.mapping.channels import MappedChannel, MappedStream
+from tactbench.core.recording.mapping.channels import MappedChannel, MappedStream, no_translation
 from tactbench.core.recording.mapping.model import Annotation, Bag, Mapping, Time
 from tactbench.core.recording.mapping.table import Table, nanoseconds_per
 from tactbench.core.samples import FloatArray, IntArray, Quality
@@ -162,11 +162,7 @@ def labels(name: str, annotation: Annotation, table: Table) -> npt.NDArray[Any]:
         known = {composed(str(key)): composed(value) for key, value in annotation.values.items()}
         for row, text in enumerate(texts):
             if text not in known:
-                raise MappingError(
-                    f"{table.where(row)}: column {annotation.column!r}: {text!r} has no translation for {name!r}; "
-                    f"there are: {', '.join(known)}.",
-                    hint="Add it to `values`; translate what means 'no label' to an empty text.",
-                )
+                raise no_translation(f"{table.where(row)}: column {annotation.column!r}:", text, name, known)
         texts = [known[text] for text in texts]
     return np.array(texts, dtype=np.str_)
 
