@@ -90,13 +90,12 @@ class _Stream:
             saturated = ((flags & Quality.SATURATED) != 0) | (values >= top) | (values <= bottom)
             self.missing += missing.sum(axis=0)
             self.saturated += (saturated & ~missing).sum(axis=0)
-            self.suspect += np.broadcast_to(flags & Quality.SUSPECT, values.shape).astype(bool).sum(axis=0)
-            self.low = np.minimum(self.low, np.where(missing, np.inf, values).min(axis=0))
-            self.high = np.maximum(self.high, np.where(missing, -np.inf, values).max(axis=0))
+            self.suspect += ((flags & Quality.SUSPECT) != 0).sum(axis=0)
+            self.lost_before += int(((flags & Quality.GAP) != 0).any(axis=1).sum())
+            self.low = np.minimum(self.low, values.min(axis=0, initial=np.inf, where=~missing))
+            self.high = np.maximum(self.high, values.max(axis=0, initial=-np.inf, where=~missing))
             for digest, column in zip(digests, np.ascontiguousarray(values.T), strict=True):
                 digest.update(column.data)
-            if block.quality is not None:
-                self.lost_before += int(((flags & Quality.GAP) != 0).any(axis=1).sum())
             for name, column in block.annotations.items():
                 self.labels[name] |= set(np.unique(column).tolist())
         self.contents = [digest.digest() for digest in digests]
@@ -132,7 +131,7 @@ def listed(names: Sequence[str], kind: str = "channels", most: int = MOST_LISTED
 def _numbers(block: StreamData) -> tuple[FloatArray, npt.NDArray[np.uint8], npt.NDArray[np.bool_]]:
     """Return the samples of a block, their flags, and a mask of those that are missing."""
     values = block.data.astype(np.float64) + 0.0  # -0 and 0 are one
-    flags = np.zeros((1, values.shape[1]), dtype=np.uint8) if block.quality is None else block.quality
+    flags = np.zeros(values.shape, dtype=np.uint8) if block.quality is None else block.quality
     return values, flags, ~np.isfinite(values) | ((flags & Quality.MISSING) != 0)
 
 
