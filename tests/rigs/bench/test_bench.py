@@ -189,7 +189,7 @@ def test_a_sensor_that_sends_nothing_is_told_and_the_recording_left_out_of_every
     assert "No row came from taxels in the whole scene" in error.message
     assert "tactbench doctor" in error.hint
     meta, streams = read(path)
-    assert meta.excluded.startswith("interrupted: Nothing came of taxels")
+    assert meta.excluded.startswith("interrupted: No row came from taxels")
     assert set(streams) == {"force_torque"}
 
 
