@@ -1,4 +1,4 @@
-"""One scene, on one rig, into one recording."""
+"""Acquisition of one scene on one rig into one recording."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def acquire(
     watch: Callable[[Block], None] | None = None,
     complete_interrupted: bool = False,
 ) -> RecordingMeta:
-    """Carry out a scene and write what the rig yields to a file; return what the recording says of itself.
+    """Carry out a scene, write the samples to a file, and return the meta of the recording.
 
     A recording of devices that ended before its time, or that lacks more than the rig file allows, is kept as an
     incomplete one: `excluded` begins with ``incomplete: `` and says why.
@@ -78,7 +78,7 @@ def acquire(
         began_s = time.perf_counter()
 
         def conclude(why: str) -> None:
-            """Write down what is known at the end; `why` it is not to be evaluated, if it is not."""
+            """Write the facts that are known at the end, with the reason `why` it is excluded, if it is."""
             factor = whole.seconds / (time.perf_counter() - began_s)
             drawn = dict(acquisition.drawn)
             remarks = tuple(str(text) for name, text in drawn.items() if name.startswith("remark "))
@@ -134,31 +134,31 @@ def acquire(
 
 
 def _lacking(acquisition: Any, whole: Completeness) -> str:
-    """Return why a recording of devices is incomplete, in one line; empty: it is not."""
+    """Return the reason for which a recording of devices is incomplete; empty: it is complete."""
     ended = str(getattr(acquisition, "ended", ""))
     found = [f"ended before its time: {ended}"] if ended else []
     return "; ".join([*found, *whole.lacking(acquisition.stream_counts)])
 
 
 def _check_not_silent(acquisition: Acquisition, rows: Mapping[str, int]) -> None:
-    """Raise RigError if nothing came of the sensor's devices or nothing of the reference's."""
+    """Raise RigError if no row came from the sensor or none from the reference."""
     for streams in (acquisition.streams, acquisition.reference):
         names = [stream.name for stream in streams]
         if names and not any(rows.get(name) for name in names):
             raise RigError(
-                f"Nothing came of {', '.join(names)} in the whole scene.",
+                f"No row came from {', '.join(names)} in the whole scene.",
                 hint="Is the device on, connected and set to the same speed? `tactbench doctor` asks it.",
             )
 
 
 def _one_thread() -> AbstractContextManager[Any]:
-    """Return a context in which a simulation makes the same bytes whatever number of threads BLAS was started with."""
+    """Return a context in which a simulation makes the same bytes for any number of threads of BLAS."""
     importlib.import_module("scipy.linalg")  # it brings a BLAS of its own: only what is loaded can be held
     return thread_limit(1)
 
 
 def _stopped(acquisition: Acquisition, error: BaseException) -> str:
-    """End what moves before anything is written; return what is to be done where it cannot be ended."""
+    """Stop what moves before anything is written; return what remains to be done by hand where that fails."""
     stop: Callable[[str], str] | None = getattr(acquisition, "stop", None)
     return "" if stop is None else stop(_why(error))
 
@@ -168,7 +168,7 @@ def _why(error: BaseException) -> str:
 
 
 def _settled(counts: StreamCounts, written: int, cut_short: bool) -> StreamCounts:
-    """Return counts with what is written; rows that were on their way when it was cut short are dropped."""
+    """Return counts with the written rows; rows on their way when the recording was cut short are dropped ones."""
     left = counts.received - written - counts.dropped - counts.duplicates - counts.late
     dropped = counts.dropped + max(0, left) if cut_short else counts.dropped
     return counts.model_copy(update={"written": written, "dropped": dropped})
@@ -182,7 +182,7 @@ def _of_devices(
     cut_short: bool = False,
     factor: float | None = None,
 ) -> dict[str, Any]:
-    """Return the fields of the meta that an acquisition of devices knows; of another one, whose clock it is."""
+    """Return the fields of the meta that an acquisition of devices knows, and the clock of any acquisition."""
     emulation = _emulation(request.rig_file, request.sensor.name, acquisition, factor)
     counts: Mapping[str, StreamCounts] = getattr(acquisition, "stream_counts", {})
     simulated = request.rig.simulated or (emulation is not None and emulation.time == "virtual")
@@ -196,12 +196,12 @@ def _of_devices(
 
 
 def _says_emulated(name: str, drawn: Mapping[str, Any]) -> bool:
-    """Whether a device says of itself that it is emulated, where a rig file forgets to."""
+    """Return whether a device states in its facts that it is emulated, which a rig file may leave out."""
     return any(key.startswith(f"{name} ") and "emulat" in str(value).lower() for key, value in drawn.items())
 
 
 def _emulation(file: RigFile | None, sensor: str, acquisition: Acquisition, factor: float | None) -> Emulation | None:
-    """Return which devices are emulated, by the rig file and by what they say of themselves; None: none is.
+    """Return which devices are emulated, by the rig file and by their own facts; None: none is.
 
     `factor` is how much faster than the clock it went.
     """

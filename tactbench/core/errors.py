@@ -1,11 +1,11 @@
-"""Every error tactbench raises on purpose.
+"""Errors that tactbench raises on purpose.
 
 ::
 
     TactbenchError
-    ├── UsageError                    what was asked for cannot be: exit code 2
+    ├── UsageError                    a command or a call cannot be carried out: exit code 2
     │   ├── UnknownNameError          no sensor, rig, task … of that name (carries the nearest names)
-    │   ├── ConfigError               a YAML file does not say what it should (carries file and line)
+    │   ├── ConfigError               a YAML file is not valid (carries file and line)
     │   └── FolderError               a result folder refuses, is held by another run, or contradicts another
     ├── PluginError                   a plugin cannot be used
     │   ├── DuplicateNameError        two distributions give one name
@@ -16,15 +16,15 @@
     │   ├── UnwritableError           the place for it refuses: exit code 2
     │   └── MappingError              (also ValueError) a foreign table does not fit its mapping: exit code 2
     ├── RigError                      a rig cannot carry out a scene
-    ├── LinkError                     a link to a device cannot be opened, or cannot do what it was asked for
+    ├── LinkError                     a link to a device cannot be opened or used
     │   ├── LinkClosed                it was closed
     │   ├── LinkTimeout               nothing came, or nothing could be sent, within the time given
     │   └── LinkUnplugged             the device, its cable or the other end is gone
     ├── DataError                     (also ValueError) recordings cannot become X and y
     │   └── NotApplicable             the cell is skipped, with this reason
-    ├── EngineError                   where cells are computed is gone, or computes with something else
+    ├── EngineError                   the engine that computes cells is gone, or has other versions
     └── CellStopped                   a cell or a recording ended without a result (carries status, signal and log)
-        ├── Raised                    something of no kind of ours was raised in another process
+        ├── Raised                    an error of another package was raised in another process
         ├── Crashed                   its process was ended by a signal, or ended itself
         ├── TimedOut                  it took longer than it may
         └── OutOfMemory               it took more memory than it may, or than there is
@@ -44,7 +44,7 @@ if TYPE_CHECKING:
 
 
 class TactbenchError(Exception):
-    """Root of the tree.
+    """Root of all errors of tactbench.
 
     Parameters
     ----------
@@ -56,7 +56,7 @@ class TactbenchError(Exception):
 
     exit_code = 1
     traceback_text = ""
-    """Where it was raised, if that was in another process."""
+    """Traceback of the error, if it was raised in another process."""
 
     def __init__(self, message: str, *, hint: str = "") -> None:
         super().__init__(message)
@@ -84,7 +84,7 @@ def error_text(error: BaseException) -> str:
 
 
 class UsageError(TactbenchError):
-    """What was asked for cannot be carried out as asked."""
+    """A command or a call cannot be carried out as it is given."""
 
     exit_code = 2
 
@@ -119,7 +119,7 @@ def wrong(argument: str, given: object, takes: str) -> UsageError:
 
 
 class UnknownNameError(UsageError):
-    """No thing of this kind has this name."""
+    """There is no sensor, rig, task … with a given name."""
 
     def __init__(self, kind: str, given: str, known: Iterable[str]) -> None:
         names = sorted(known)
@@ -128,7 +128,7 @@ class UnknownNameError(UsageError):
 
 
 class ConfigError(UsageError):
-    """A configuration file does not say what it should."""
+    """A configuration file is not valid."""
 
     def __init__(self, file: str, line: int | None, message: str, *, hint: str = "") -> None:
         where = f"{file}:{line}" if line else file
@@ -193,7 +193,7 @@ class RigError(TactbenchError):
 
 
 class LinkError(TactbenchError):
-    """A link to a device cannot be opened, or cannot do what it was asked for."""
+    """A link to a device cannot be opened or used."""
 
 
 class LinkClosed(LinkError):  # noqa: N818  (names what happened to the link, as its siblings do)
@@ -217,7 +217,7 @@ class NotApplicable(DataError):  # noqa: N818  (a result, not a failure)
 
 
 class EngineError(TactbenchError):
-    """Where cells are computed is gone, or computes with something else than this process."""
+    """The engine that computes cells is gone, or has other versions than this process."""
 
 
 class CellStopped(TactbenchError):  # noqa: N818  (a way to end, not one error)
@@ -253,7 +253,7 @@ class CellStopped(TactbenchError):  # noqa: N818  (a way to end, not one error)
 
 
 class Raised(CellStopped):
-    """Something of no kind of ours was raised in another process; the message names its type."""
+    """An error of another package was raised in another process; the message names its type."""
 
     status = "failed"
 

@@ -1,4 +1,4 @@
-"""Writing a file whole or not at all, locks, and texts that are no UTF-8."""
+"""Writing of whole files, locks, and texts that are no UTF-8."""
 
 from __future__ import annotations
 
@@ -14,17 +14,17 @@ from tactbench.core.errors import UnwritableError
 
 
 def utf8_json(text: str) -> str:
-    r"""Return JSON with the lone surrogates of its texts written out: a byte of a file name becomes ``\\udce9``."""
+    r"""Return JSON whose texts have their lone surrogates escaped: a byte of a file name becomes ``\\udce9``."""
     return re.sub("[\ud800-\udfff]", lambda found: rf"\\u{ord(found[0]):04x}", text)
 
 
 def named_file(text: str) -> Path:
-    """Return the path of a file whose name :func:`utf8_json` may have written out."""
+    """Return the path of a file whose name :func:`utf8_json` may have escaped."""
     return Path(re.sub(r"\\u(dc[89a-f][0-9a-f])", lambda found: chr(int(found[1], 16)), text))
 
 
 def try_lock(file: int) -> bool | None:
-    """Lock an open file for this process (flock(2)); the kernel lets go when it is closed, however the process ends.
+    """Lock an open file for this process (flock(2)); the lock ends when the file is closed or the process ends.
 
     Returns
     -------
@@ -92,10 +92,11 @@ def replace_file(path: Path, content: bytes) -> None:
 
 @contextmanager
 def writable(place: Path) -> Iterator[None]:
-    """Turn what the system refuses while `place` is written into an UnwritableError."""
+    """Return a context that turns errors of the system while `place` is written into UnwritableError."""
     try:
         yield
     except OSError as error:
         raise UnwritableError(
-            f"{place} cannot be written: {error.strerror or error}.", hint="Give another with --out."
+            f"{place} cannot be written: {error.strerror or error}.",
+            hint="Check the folder's permissions and the free space, or give another with --out.",
         ) from error

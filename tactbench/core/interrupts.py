@@ -1,4 +1,4 @@
-"""Ctrl-C, SIGTERM and SIGHUP end what is under way in one way: by KeyboardInterrupt in the main thread."""
+"""Uniform handling of Ctrl-C, SIGTERM and SIGHUP: each raises KeyboardInterrupt in the main thread."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ from typing import Any
 
 ENDING = tuple(getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name))
 ONE_S = 1.0
-"""Seconds in which signals count as one: a terminal that is closed, and a batch system, send several."""
+"""Seconds within which signals count as one, as a closed terminal and a batch system send several."""
 
 _raised_s = -ONE_S
 
 
 class Interrupted(KeyboardInterrupt):
-    """Raised for a signal, whose number it carries: after a KeyboardInterrupt itself, Python may end by SIGINT."""
+    """A signal, with its number; after a plain KeyboardInterrupt, Python may end by SIGINT."""
 
 
 def interrupt(number: int, _frame: FrameType | None) -> None:
@@ -33,7 +33,7 @@ def interrupt(number: int, _frame: FrameType | None) -> None:
 
 
 def end_alike() -> None:
-    """Have SIGTERM and SIGHUP raise KeyboardInterrupt as Ctrl-C does; one that is ignored (``nohup``) stays ignored."""
+    """Make SIGTERM and SIGHUP raise KeyboardInterrupt as Ctrl-C does; a signal that is ignored (``nohup``) stays so."""
     for number in _handled(signal.SIG_DFL):
         signal.signal(number, interrupt)
     for number in ENDING:  # what is removed when Python ends is removed whole
@@ -42,7 +42,7 @@ def end_alike() -> None:
 
 
 def _again(dropped: Any) -> None:
-    """Send a signal once more where Python dropped what it raised: in a weak reference's callback, in ``__del__``."""
+    """Send a signal again whose exception Python has dropped: in a weak reference's callback, in ``__del__``."""
     global _raised_s
     if isinstance(dropped.exc_value, KeyboardInterrupt):
         _raised_s = -ONE_S
@@ -54,7 +54,7 @@ def _again(dropped: Any) -> None:
 
 @contextmanager
 def one_interrupt() -> Iterator[Callable[[], None]]:
-    """Raise KeyboardInterrupt for the first signal and ignore further ones: what it leaves time to keep is kept.
+    """Return a context in which the first signal raises KeyboardInterrupt and further ones are ignored.
 
     Yields what ignores them from then on. Other threads, and who has a handler of their own, are left alone.
     """
@@ -73,7 +73,7 @@ def one_interrupt() -> Iterator[Callable[[], None]]:
 
 @contextmanager
 def interrupts_held() -> Iterator[None]:
-    """Hold signals back until the end, where the first of them takes effect."""
+    """Return a context that delays signals to its end, where the first of them takes effect."""
     came: list[int] = []
     with _handling(lambda number, _frame: came.append(number)) as before:
         yield
@@ -94,7 +94,7 @@ def _handling(handler: Callable[[int, FrameType | None], None]) -> Iterator[dict
 
 
 def _handled(*by: Any) -> dict[int, Any]:
-    """Return the signals with one of these handlers, and that; none outside the main thread, which handles them."""
+    """Return the signals with one of these handlers, and their handlers; outside the main thread there are none."""
     if threading.current_thread() is not threading.main_thread():
         return {}
     return {number: handler for number in ENDING if (handler := signal.getsignal(number)) in by}

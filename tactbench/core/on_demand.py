@@ -1,4 +1,4 @@
-"""What is imported when it is first used: names of a module, and what other rooms contribute to the core."""
+"""Imports at first use: names of a module, and contributions of other rooms to the core."""
 
 import sys
 from collections.abc import Callable, Mapping
@@ -9,7 +9,7 @@ from typing import Any
 
 
 def on_demand(door: str) -> Callable[[str], Any]:
-    """Return the ``__getattr__`` of module `door`: it imports what the module imports under ``if TYPE_CHECKING``.
+    """Return a ``__getattr__`` for module `door` that imports what the module imports under ``if TYPE_CHECKING``.
 
     What stands on numpy, and links, are imported so: a plugin that is only listed need not have them, nor a command
     that shows its help.
@@ -27,7 +27,7 @@ def on_demand(door: str) -> Callable[[str], Any]:
 
 @cache
 def _modules(door: str) -> Mapping[str, str]:
-    """Return the modules that a door's source imports names from under a condition."""
+    """Return the modules of the names that a door imports under a condition."""
     import ast
 
     tree = ast.parse(Path(sys.modules[door].__file__ or "").read_text(encoding="utf-8"))
@@ -37,7 +37,7 @@ def _modules(door: str) -> Mapping[str, str]:
 
 
 def contributed(group: str) -> Mapping[str, Any]:
-    """Return what rooms that the core does not import contribute to it, by name: the entry points of tactbench."""
+    """Return the contributions of other rooms to the core, by name: the entry points of tactbench."""
     from importlib.metadata import distribution
 
     return {point.name: point for point in sorted(distribution("tactbench").entry_points.select(group=group))}

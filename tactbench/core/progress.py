@@ -1,4 +1,4 @@
-"""How a long run tells what it is doing; `tactbench.core.study.progress` decides how that looks."""
+"""Interface for the progress of a long run, which `tactbench.core.study.progress` shows."""
 
 from __future__ import annotations
 
@@ -6,17 +6,17 @@ from contextlib import AbstractContextManager, nullcontext
 
 
 class Progress:
-    """Receives what happens, and says nothing of it; never decides anything."""
+    """Receiver of the progress of a run, which shows nothing; subclasses do."""
 
     def begin(self, stage: str, total: int) -> None:
         """Start a stage of `total` steps."""
 
     def advance(self, what: str, *, stopped: bool = False) -> None:
-        """Finish one step, named `what`; `stopped`: it should have ended otherwise."""
+        """Finish one step, named `what`; `stopped` states that it has failed."""
 
     def working(self, what: str) -> None:
-        """Say what is being done now, without finishing anything."""
+        """Show what is being done now, without finishing a step."""
 
     def paused(self) -> AbstractContextManager[None]:
-        """Return a context in which nothing is drawn: somebody is asked something."""
+        """Return a context in which nothing is drawn, for a prompt."""
         return nullcontext()

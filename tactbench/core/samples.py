@@ -1,4 +1,4 @@
-"""The nouns that walk: everything that passes from rig to leaderboard.
+"""Types of the data that pass from rig to leaderboard.
 
 ``Block`` (from a rig) → ``StreamData`` (in a recording) → ``Table`` (one recording on one clock) → ``Part`` (X and y
 of one role) → ``Fold`` → predictions → score.
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 
 def __getattr__(name: str) -> Any:
-    """Import numpy for the aliases when somebody asks for one: listings and cached runs do without."""
+    """Import numpy for the aliases at their first use, as listings and cached runs need none."""
     if name not in ("FloatArray", "IntArray"):
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     import numpy as np
@@ -35,15 +35,15 @@ def __getattr__(name: str) -> Any:
 
 
 class Quality(IntFlag):
-    """What is wrong with one sample of one channel; 0 is a good sample."""
+    """Marks of one sample of one channel; 0 is a good sample."""
 
     GOOD = 0
     MISSING = 1
-    """No sample: the stored number means nothing."""
+    """There is no sample: the stored number means nothing."""
     SATURATED = 2
-    """The converter stood at its end."""
+    """The converter was at its end."""
     SUSPECT = 4
-    """Parity, checksum or sequence error."""
+    """There was an error of parity, checksum or sequence."""
     GAP = 8
     """The sample is good, but rows before it were lost: on the way here, or between reading and writing."""
 
@@ -54,25 +54,25 @@ class Block:
 
     stream: str
     t_ns: IntArray | None
-    """(n,) nanoseconds; None when there is no clock. Where the device has a clock of its own: when the host had the
-    sample."""
+    """Times, (n,) nanoseconds; None when there is no clock. Of a device with a clock of its own, the times at which the
+    host had the samples."""
     data: npt.NDArray[Any]
-    """(n, channels), in the units of the stream's channels."""
+    """Samples, (n, channels), in the units of the stream's channels."""
     quality: npt.NDArray[np.uint8] | None = None
-    """(n, channels) of :class:`Quality`; None: all good."""
+    """Marks of the samples, (n, channels) of :class:`Quality`; None: all are good."""
     sequence: IntArray | None = None
-    """(n,) the device's own number of each sample, if it has one, counted on over its wraps."""
+    """The device's own number of each sample, (n,), counted on over its wraps; None: it has none."""
     device_ns: IntArray | None = None
-    """(n,) nanoseconds of the device's own clock, if it has one, counted on over its wraps. Where the count is lost, it
-    begins again with a lower number: that is how a break is told."""
+    """Times of the device's own clock, (n,) nanoseconds, counted on over its wraps; None: it has none. Where the count
+    is lost, it begins again with a lower number."""
 
     def rows(self, which: slice | npt.NDArray[np.bool_]) -> Block:
-        """Return some of its rows, by a slice or a mask."""
+        """Return the rows of a slice or a mask."""
         return replace(self, **{name: one[which] for name in COLUMNS if (one := getattr(self, name)) is not None})
 
 
 COLUMNS = ("t_ns", "data", "quality", "sequence", "device_ns")
-"""Of a block."""
+"""Names of the columns of a block."""
 
 
 def join_blocks(blocks: Sequence[Block]) -> Block:
@@ -86,52 +86,52 @@ def join_blocks(blocks: Sequence[Block]) -> Block:
 
 @dataclass(frozen=True)
 class StreamData:
-    """A stream read back from a recording."""
+    """A stream that was read from a recording."""
 
     spec: StreamSpec
     t_ns: IntArray | None
-    """(n,) nanoseconds, or None when the source has no clock; on the host's clock where there are several."""
+    """Times, (n,) nanoseconds, on the host's clock where there are several; None when the source has no clock."""
     data: npt.NDArray[Any]
-    """(n, channels)"""
+    """Samples, (n, channels), in the units of the stream's channels."""
     quality: npt.NDArray[np.uint8] | None
     annotations: Mapping[str, npt.NDArray[Any]] = field(default_factory=dict)
-    """Row labels: name -> (n,) of str or int."""
+    """Labels of the rows by name, (n,) of str or int."""
     sequence: IntArray | None = None
-    """(n,) the device's own numbers, if it has any."""
+    """The device's own numbers of the samples, (n,); None: it has none."""
     device_ns: IntArray | None = None
-    """(n,) nanoseconds of the device's own clock, if it has one."""
+    """Times of the device's own clock, (n,) nanoseconds; None: it has none."""
     host_ns: IntArray | None = None
-    """(n,) when the host had the samples, where `t_ns` was computed from `device_ns`."""
+    """Times at which the host had the samples, (n,), where `t_ns` was computed from `device_ns`."""
 
 
 @dataclass(frozen=True)
 class StreamReadings:
-    """One stream of one recording on the stream's own clock: what features of a whole recording are made of."""
+    """One stream of a recording on its own clock, from which features of a whole recording are made."""
 
     stream: str
     channels: tuple[str, ...]
     kinds: tuple[str, ...]
-    """of each channel"""
+    """Kind of each channel."""
     data: FloatArray
-    """(n, channels); rows in which a channel has no sample are not in it"""
+    """Samples, (n, channels), without rows in which a channel has none."""
     time_s: FloatArray | None
-    """(n,) seconds since the first sample that the protocol keeps; None where the recording has no clock"""
+    """Times, (n,) seconds since the first sample that the protocol keeps; None where there is no clock."""
     rate_hz: float | None
-    """one over the median step of the clock, or else as stated; None where neither is known"""
+    """Rate by the median step of the clock, or else as stated [Hz]; None where neither is known."""
 
 
 @dataclass(frozen=True)
 class SkinGrid:
-    """Cell centres of the unrolled skin, millimetres."""
+    """Centres of the cells of the unrolled skin."""
 
     x_mm: FloatArray
-    """(nx,) axial"""
+    """Axial coordinates, (nx,)."""
     s_mm: FloatArray
-    """(ns,) along the arc"""
+    """Coordinates along the arc, (ns,)."""
 
     @property
     def cell_mm(self) -> tuple[float, float]:
-        """Spacing in x and s."""
+        """Spacing of the centres in x and s."""
         return (
             float(self.x_mm[1] - self.x_mm[0]),
             float(self.s_mm[1] - self.s_mm[0]),
@@ -140,48 +140,48 @@ class SkinGrid:
 
 @dataclass(frozen=True)
 class SkinState:
-    """The skin under one load: what a transducer may look at. Units mm, N, MPa."""
+    """The skin under one load, which a transducer turns into readings; units are mm, N and MPa."""
 
     grid: SkinGrid
     force_n: float
     deflection_mm: FloatArray
-    """(nx, ns), positive towards the core."""
+    """Deflection of the skin, (nx, ns), positive towards the core."""
     pressure_mpa: FloatArray
-    """(nx, ns) contact pressure."""
+    """Contact pressure, (nx, ns)."""
     thickness_mm: FloatArray
-    """(nx, ns) film or foam thickness that is left."""
+    """Remaining thickness of the film or the foam, (nx, ns)."""
     depth_mm: float
     """Approach of the indenter since first touch."""
     fluid_pressure_mpa: float
-    """Rise over rest; 0 for media without fluid."""
+    """Rise of the fluid's pressure over rest; 0 for media without fluid."""
     contact_radius_mm: float
-    """sqrt(5/2 <r²>) weighted with the contact pressure (exact for Hertz)."""
+    """Contact radius: sqrt(5/2 <r²>), weighted with the contact pressure (exact for Hertz)."""
     residual: float
     """Relative residual of the solver."""
     tangential_displacement_mm: FloatArray | None = None
-    """(2, nx, ns) how far the outer surface has moved along itself: [0] along x, [1] along s, each positive the way its
+    """Displacement of the outer surface along itself, (2, nx, ns): [0] along x, [1] along s, each positive the way its
     coordinate grows; without friction what the press squeezes aside, under a slide what that drags along as well.
     None: the sensor's spec does not say that its transducer looks at it (`reads_shear`)."""
     shear_mpa: FloatArray | None = None
-    """(2, nx, ns) shear traction of the indenter on the outer surface, in the same order: positive where it pulls the
+    """Shear traction of the indenter on the outer surface, (2, nx, ns), in the same order: positive where it pulls the
     skin the way the coordinate grows. Its sum over cells times their area is the tangential force on the sensor. Zero
     while nothing slides: contacts are pressed without friction. None: as above."""
 
 
 @dataclass(frozen=True)
 class Part:
-    """Rows of one role, ready for an estimator."""
+    """Rows of one role, in the form that estimators take."""
 
     X: FloatArray
-    """(n, features)"""
+    """Features, (n, features)."""
     y: npt.NDArray[Any]
-    """(n,) numbers, (n, components) vectors, or class indices 0 … n_classes-1"""
+    """Targets: (n,) numbers, (n, components) vectors, or class indices 0 … n_classes-1."""
     time_s: FloatArray
-    """(n,) seconds since the recording's first sample (row index when there is no clock)"""
+    """Times since the recording's first sample, (n,) [s]; the row index when there is no clock."""
     recording: IntArray
-    """(n,) which recording of the dataset the row is from"""
+    """Index of the row's recording in the dataset, (n,)."""
     row: IntArray
-    """(n,) which row of that recording"""
+    """Index of the row in that recording, (n,)."""
 
     def __len__(self) -> int:
         return len(self.y)
@@ -189,7 +189,7 @@ class Part:
 
 @dataclass(frozen=True)
 class Fold:
-    """One training and one test set, with validation data where the protocol has any."""
+    """A training and a test set, with validation data where the protocol has any."""
 
     name: str
     train: Part
@@ -199,22 +199,22 @@ class Fold:
 
 @dataclass(frozen=True)
 class Answers:
-    """What an estimator said about the rows of one role, beside the truth."""
+    """Predictions of an estimator for the rows of one role, beside the true values."""
 
     y_true: npt.NDArray[Any]
-    """(n,) numbers, (n, components) vectors, or class indices"""
+    """True values: (n,) numbers, (n, components) vectors, or class indices."""
     y_pred: npt.NDArray[Any]
-    """of the same shape"""
+    """Predictions, of the same shape."""
     recording: IntArray
-    """(n,) which recording of the cell the row is from"""
+    """Index of the row's recording in the cell, (n,)."""
     row: IntArray
-    """(n,) which row of that recording"""
+    """Index of the row in that recording, (n,)."""
     fold: IntArray
-    """(n,) fold in which the row was answered"""
+    """Fold in which the row was predicted, (n,)."""
     time_s: FloatArray
-    """(n,) seconds since the recording's first sample (row index when there is no clock)"""
+    """Times since the recording's first sample, (n,) [s]; the row index when there is no clock."""
     force_n: FloatArray
-    """(n,) reference force as recorded; NaN where there is none"""
+    """Reference force as it was recorded, (n,) [N]; NaN where there is none."""
 
     def __len__(self) -> int:
         return len(self.y_true)

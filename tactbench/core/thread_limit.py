@@ -1,4 +1,4 @@
-"""Holding numerical libraries to so many threads, without looking for them again before every cell."""
+"""Limits on the number of threads of numerical libraries, which are cheap to set for every cell."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ from functools import lru_cache
 from typing import Any
 
 VARIABLES = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
-"""What numerical libraries read when they are loaded."""
+"""Environment variables that numerical libraries read when they are loaded."""
 
 
 def keep_threads() -> None:
-    """Keep numerical libraries at one thread, as the table's times state; before this process loads any.
+    """Limit numerical libraries to one thread, as the table's times state; called before one is loaded.
 
-    Several threads would also sum in another order on another machine. Whoever sets these variables means it.
+    Several threads would also sum in another order on another machine. Values that are set already are kept.
     """
     for name in VARIABLES:
         os.environ.setdefault(name, "1")
@@ -40,5 +40,5 @@ def thread_limit(threads: int) -> AbstractContextManager[Any]:
 
 @lru_cache(maxsize=1)
 def _libraries(modules: int) -> Any:
-    """Return the libraries of this process as they were when it had imported so many modules."""
+    """Return the numerical libraries of this process when it had imported so many modules."""
     return importlib.import_module("threadpoolctl").ThreadpoolController()

@@ -1,4 +1,4 @@
-"""``tactbench import``: foreign tables, and logs of devices, become recordings."""
+"""``tactbench import``: conversion of foreign tables and logs of devices into recordings."""
 
 from __future__ import annotations
 
@@ -8,18 +8,14 @@ from typing import TYPE_CHECKING, Any, get_args
 import click
 
 from tactbench.core.cli.grid import field_text, print_fields
-from tactbench.core.tables.terminal import remark
-from tactbench.core.tables.text import command_line
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator
+    from collections.abc import Iterator
 
-    from tactbench.core.recording.device_log import ImportedLog
-    from tactbench.core.recording.health import Finding
     from tactbench.core.recording.mapping import ImportReport
 
 MOST_NAMED = 12
-"""Findings that are printed, the worst first."""
+"""Most findings that are printed, the worst first."""
 PAIRS = "KEY=VALUE"
 
 
@@ -49,42 +45,37 @@ def command(
     if sensor is None:
         if options or labels:
             raise click.UsageError("--option and --label are for logs: name the --sensor.")
-        sound = _import_tables(source, root, out, replace)
-        ctx.exit(0 if sound else 1)
-    if root is not None:
-        raise click.UsageError("--root is for mappings: leave it out, or --sensor.")
+        target = Path("recordings") / source.stem if out is None else out
+        report = _import_tables(source, root, target, replace)
+    else:
+        if root is not None:
+            raise click.UsageError("--root is for mappings: leave it out, or --sensor.")
+        target = Path("recordings") / f"{source.stem}.h5" if out is None else out
+        report = _import_log(source, sensor, _pairs("--option", options), _pairs("--label", labels), target, replace)
+    print_fields(list(fields(report, target)))
+    ctx.exit(any(finding.severity == "error" for one in report.recordings for finding in one.findings))
+
+
+def _import_tables(mapping: Path, root: Path | None, out: Path, replace: bool) -> ImportReport:
+    from tactbench.core.recording.mapping import import_tables
+    from tactbench.core.study.progress import progress
+
+    with progress() as display:
+        return import_tables(mapping, root=root, out=out, progress=display, replace=replace)
+
+
+def _import_log(
+    log: Path, sensor: str, options: dict[str, Any], labels: dict[str, Any], out: Path, replace: bool
+) -> ImportReport:
     from tactbench.core.plugins.registry import load_registry
     from tactbench.core.recording.device_log import import_log
     from tactbench.core.spec.scene import Role
 
-    target = Path("recordings") / f"{source.stem}.h5" if out is None else out
-    named = _pairs("--label", labels)
-    session, role = str(named.pop("session", "1")), named.pop("role", None)
+    session, role = str(labels.pop("session", "1")), labels.pop("role", None)
     if role is not None and role not in get_args(Role):
         raise click.UsageError(f"--label role={role}: one of {', '.join(get_args(Role))} is expected.")
-    made = import_log(
-        source, load_registry().sensors[sensor], _pairs("--option", options), out=target, session=session, role=role,
-        labels=named, replace=replace,
-    )  # fmt: skip
-    print_fields(list(log_fields(made, target)))
-    remark(f"See what is in it:  {command_line('tactbench', 'inspect', str(target))}")
-    ctx.exit(0 if _sound(made.findings) else 1)
-
-
-def _sound(findings: Iterable[Finding]) -> bool:
-    return all(finding.severity != "error" for finding in findings)
-
-
-def _import_tables(mapping: Path, root: Path | None, out: Path | None, replace: bool) -> bool:
-    """Return whether no recording has an error."""
-    from tactbench.core.recording.mapping import import_tables
-    from tactbench.core.study.progress import progress
-
-    target = Path("recordings") / mapping.stem if out is None else out
-    with progress() as display:
-        report = import_tables(mapping, root=root, out=target, progress=display, replace=replace)
-    print_fields(list(fields(report, target)))
-    return _sound(finding for recording in report.recordings for finding in recording.findings)
+    descriptor = load_registry().sensors[sensor]
+    return import_log(log, descriptor, options, out=out, session=session, role=role, labels=labels, replace=replace)
 
 
 def _pairs(option: str, given: tuple[str, ...]) -> dict[str, Any]:
@@ -100,27 +91,19 @@ def _pairs(option: str, given: tuple[str, ...]) -> dict[str, Any]:
     return found
 
 
-def log_fields(made: ImportedLog, out: Path) -> Iterator[tuple[str, str]]:
-    """Yield what became of a log, field by field."""
-    meta = made.meta
-    stated = {"recording": out, "sensor": meta.sensor.name, "from": meta.origin, "clock": meta.clock,
-              "rows": dict(made.rows), "counted": meta.counts}  # fmt: skip
-    yield from ((name, field_text(value)) for name, value in stated.items())
-    yield from ((finding.severity, finding.message) for finding in made.findings)
-    yield from (("remark", remark) for remark in meta.remarks)
-
-
 def fields(report: ImportReport, folder: Path) -> Iterator[tuple[str, str]]:
-    """Yield what an import did, field by field."""
+    """Yield the facts about an import, field by field."""
     from collections import Counter
 
     stated = {
-        "title": report.title, "recordings": len(report.recordings), "in": folder, "sensors": report.sensors,
+        "title": report.title, "recordings": len(report.recordings), "in": folder,
+        "sensors": tuple(dict.fromkeys(one.meta.sensor.name for one in report.recordings)),
         "rows": report.rows, "files": report.files_read, "tasks declared": report.tasks,
         "rows without a sample": dict(report.missing),
     }  # fmt: skip
     yield from ((name, field_text(value)) for name, value in stated.items() if value)
-    yield from (("excluded", f"{count} recordings: {reason}") for reason, count in report.excluded.items())
+    excluded = Counter(one.meta.excluded for one in report.recordings if one.meta.excluded)
+    yield from (("excluded", f"{count} recordings: {reason}") for reason, count in excluded.items())
     yield from (("left out", one) for one in report.left_out[:MOST_NAMED])
     if len(report.left_out) > MOST_NAMED:
         yield "left out", f"{len(report.left_out) - MOST_NAMED} more files without a partner"
@@ -133,6 +116,7 @@ def fields(report: ImportReport, folder: Path) -> Iterator[tuple[str, str]]:
     )
     order = ("error", "warning", "info")
     worst = sorted(found.items(), key=lambda item: (order.index(item[0][0]), -item[1]))
-    yield from ((severity, f"{message} (in {n} recordings)") for (severity, message), n in worst[:MOST_NAMED])
+    for (severity, message), n in worst[:MOST_NAMED]:
+        yield severity, f"{message} (in {n} recordings)" if len(report.recordings) > 1 else message
     if len(worst) > MOST_NAMED:
         yield "more", f"{len(worst) - MOST_NAMED} findings; see `tactbench inspect`"

@@ -1,4 +1,4 @@
-"""``tactbench inspect``: what is in a recording, and whether it is healthy."""
+"""``tactbench inspect``: the contents of recordings, and checks of their health."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 _COLUMNS = ("stream", "of", "rows", "mean_rate_hz", "stated_rate_hz", "seconds", "channels", "annotations")
 _STRUCTURES = ("scene", "plan", "clocks", "streams", "drawn", "provenance")
-"""Keys of the meta data that the screen shows in another form or not at all; JSON has them."""
+"""Fields of the meta that have a form of their own on the screen or none; JSON has them."""
 
 
 @click.command(name="inspect")
@@ -51,7 +51,7 @@ def command(ctx: click.Context, files: tuple[Path, ...], shape: str, salvage: bo
 
 
 def describe(recording: Recording) -> dict[str, Any]:
-    """Return everything there is to know about an open recording but its samples, as plain data."""
+    """Return all facts about an open recording as plain data, without its samples."""
     from dataclasses import asdict
 
     from tactbench.core.recording.health import examine
@@ -120,7 +120,7 @@ def _print(about: dict[str, Any]) -> None:
 
 
 def _clock(clock: dict[str, Any]) -> dict[str, Any]:
-    """Return how a device's clock was put on the host's, and how well; each line of the fit stands in JSON."""
+    """Return the fit of a device's clock to the host's, and its errors; JSON has each line of the fit."""
     lines = clock["segments"]
     drift = max((line["drift"] * 1e6 for line in lines), key=abs, default=None)
     error_us = max((line["bound_ns"] * 1e-3 for line in lines if line["bound_ns"] is not None), default=None)

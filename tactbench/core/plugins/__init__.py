@@ -1,1 +1,1 @@
-"""How sensors, rigs, tasks, estimators and effects are found."""
+"""Search for installed sensors, rigs, tasks, estimators and effects."""

@@ -1,4 +1,4 @@
-"""Tasks that recordings bring with them, beside those that are installed."""
+"""Tasks that recordings bring with them, beside the installed ones."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from tactbench.core.spec.yaml_file import load_yaml
 
 
 def declared_in(folder: Path | None) -> tuple[DeclaredTask, ...]:
-    """Return the tasks of a folder of recordings and of all folders below it; hidden ones are passed over.
+    """Return the tasks of a folder of recordings and of the folders below it, except hidden ones.
 
     Raises
     ------
@@ -73,7 +73,7 @@ def with_declared(registry: Registry, tasks: Iterable[DeclaredTask]) -> Registry
 
 
 def with_declared_of(registry: Registry, rows: Iterable[Mapping[str, Any]]) -> Registry:
-    """Return the registry with the tasks that rows of results carry: the last of each name.
+    """Return the registry with the tasks in rows of results, the last of each name.
 
     A row that carries none that can be read, or one of an installed task's name, adds nothing: it may come from a
     stranger.

@@ -1,4 +1,4 @@
-"""Force profiles by name, made the force paths that scenes hold."""
+"""Force paths of scenes from force profiles with a name."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from tactbench.core.spec.rig import ProfileDescriptor
 
 
 def force_path(descriptor: ProfileDescriptor, given: Mapping[str, Quantity], by: str) -> ForcePath:
-    """Return the path that a profile makes of its parameters: those `given`, and the others by default.
+    """Return the path of a profile with the parameters `given`, and the others by default.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""The eight hooks: the whole door fits on this screen.
+"""The eight hooks of plugins.
 
 Each hook returns descriptors: a name, a spec, and *where* the code is as an import string, so that listing plugins
 imports nothing heavy.
@@ -25,7 +25,7 @@ GROUP = "tactbench"
 """Entry-point group, and the name of the pluggy project."""
 
 API_VERSION = 2
-"""A plugin module states the version it was written for: ``TACTBENCH_API = 2``."""
+"""Version of the plugin interface; a plugin states the one that it was written for: ``TACTBENCH_API = 2``."""
 
 hookspec = pluggy.HookspecMarker(GROUP)
 hookimpl = pluggy.HookimplMarker(GROUP)

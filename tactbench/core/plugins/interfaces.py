@@ -1,4 +1,4 @@
-"""What the code behind a descriptor must look like."""
+"""Interfaces of the code that descriptors name."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 
 class Acquisition(Protocol):
-    """One scene being carried out: iterate it for blocks; the other attributes are valid afterwards too."""
+    """A scene that is being carried out: iteration yields its blocks, and the attributes remain valid afterwards."""
 
     @property
     def streams(self) -> tuple[StreamSpec, ...]:
@@ -43,7 +43,7 @@ class Acquisition(Protocol):
 
     @property
     def drawn(self) -> Mapping[str, Scalar]:
-        """What was drawn or achieved, for example the placement.
+        """Facts that were drawn or achieved, for example the placement.
 
         Texts whose names start with ``remark`` and a blank are shown with every score from the recording.
         """
@@ -52,52 +52,52 @@ class Acquisition(Protocol):
 
 
 class SimulatedPress(Acquisition, Protocol):
-    """A simulated acquisition that also says how the skin answers to being pressed: what an emulated motor feels."""
+    """A simulated acquisition that also has a force curve of the skin, for an emulated motor."""
 
     def press_curve(self, largest_n: float) -> tuple[FloatArray, FloatArray]:
-        """Return the indenter's ascending depths (n,) [m] from the first touch, and the force (n,) [N] at each.
+        """Return the indenter's depths, (n,) [m] ascending from the first touch, and the forces at them, (n,) [N].
 
         The last force is `largest_n`. The curve is that of a slow press: the same on the way in and out.
         """
 
 
 class DeviceAcquisition(Acquisition, Protocol):
-    """An acquisition from devices says more, once it is over."""
+    """An acquisition from devices, with more facts once it is over."""
 
     @property
     def stream_counts(self) -> Mapping[str, StreamCounts]:
-        """By stream: what became of its rows, as far as the rig knows."""
+        """Counts of the rows of each stream, as far as the rig knows them."""
 
     @property
     def counts(self) -> Mapping[str, int]:
-        """What its drivers counted, by device and name."""
+        """Counts of its drivers, by device and name."""
 
     @property
     def ended(self) -> str:
-        """Why it ended before its time; empty: it did not. Its recording is then incomplete."""
+        """Reason for an end before its time, which makes its recording incomplete; empty: it ended in time."""
 
 
 @dataclass(frozen=True)
 class DeviceLog:
-    """The contents of one log."""
+    """Contents of one log."""
 
     streams: tuple[StreamSpec, ...]
-    """What `blocks` are of: the streams of the sensor's spec that the log has, perhaps with fewer channels."""
+    """Streams of the sensor's spec that the log has, perhaps with fewer channels."""
     blocks: Sequence[Block]
-    """In time order within each stream."""
+    """Blocks of the streams, in time order within each."""
     clock: Literal["device", "host", "nominal", "none"]
-    """Who made the times: the device, the host that wrote the log, row number by rate, or nobody."""
+    """Origin of the times: the device, the host that wrote the log, row number by nominal rate, or none."""
     started: str = ""
-    """When the log was begun, as the file states it; empty if it does not."""
+    """Time at which the log was begun, as the file states it; empty if it does not."""
     remarks: tuple[str, ...] = ()
-    """What a reader of a score from it must know."""
+    """Sentences that are shown with every score from the log."""
     counts: Mapping[str, int] = field(default_factory=dict)
-    """What was counted on the way in, by name."""
+    """Counts of the reader, by name."""
 
 
 @dataclass(frozen=True)
 class RecordingRequest:
-    """One recording to be made."""
+    """A recording that is to be made."""
 
     sensor: SensorDescriptor
     rig: RigDescriptor
@@ -106,32 +106,32 @@ class RecordingRequest:
     seed: int
     role: Role | None = None
     rig_file: RigFile | None = None
-    """The devices: what is emulated is marked so, whatever the rig says of it."""
+    """Devices of the rig; emulated ones are marked so, whatever the rig states."""
     name: str = ""
-    """Of the recording; empty: that of the scene."""
+    """Name of the recording; empty: that of the scene."""
     provenance: Mapping[str, Any] = field(default_factory=dict)
 
 
 class Rig(Protocol):
-    """Something that carries out scenes."""
+    """A rig, which carries out scenes."""
 
     def open(self, sensor: SensorDescriptor, scene: Scene, *, seed: int) -> AbstractContextManager[Acquisition]:
         """Prepare `scene` with `sensor`; raises RigError or NotApplicable if it cannot be done."""
 
 
 class Explained(NamedTuple):
-    """One effect of a plan, and what it costs."""
+    """An effect of a plan, and its cost."""
 
     entry: PlanEntry
     cost_s: float | None
-    """Seconds it takes, or would take if it was asked for, per recording on this machine; None: not measured, or not
-    to be told apart from another one's."""
+    """Seconds that it takes, or would take, per recording on this machine; None: not measured, or not separable from
+    another effect's."""
     remark: str = ""
-    """Why there is no cost, where that is worth a word."""
+    """Reason for the lack of a cost, where it helps."""
 
 
 class Explaining(Rig, Protocol):
-    """A simulated rig that says what it would do, and what that costs."""
+    """A simulated rig that explains its plan and the cost of each effect."""
 
     def explain(self, sensor: SensorDescriptor, scene: Scene, *, rounds: int = 0) -> Sequence[Explained]:
         """Return every installed effect, those included first, in the order in which they are applied.
@@ -142,138 +142,138 @@ class Explaining(Rig, Protocol):
 
 @dataclass(frozen=True)
 class Verdict:
-    """One number held against the one that a law or a closed form gives."""
+    """A number beside the one that a law or a closed form gives."""
 
     name: str
-    """What was computed, in one line: ``Hertz: depth under a paraboloid``."""
+    """Quantity that was computed, in one line: ``Hertz: depth under a paraboloid``."""
     found: float
     expected: float
     bound: float
-    """Largest difference of the two that is allowed, included."""
+    """Largest allowed difference of the two, included."""
     unit: str = "1"
     source: str = ""
-    """The law, where it stands, and the reason for the bound."""
+    """The law with its source, and the reason for the bound."""
 
     def __post_init__(self) -> None:
-        """Keep plain numbers: a NumPy scalar would be no JSON."""
+        """Convert the numbers to floats, as JSON has no NumPy scalars."""
         for name in ("found", "expected", "bound"):
             object.__setattr__(self, name, float(getattr(self, name)))
 
     @property
     def met(self) -> bool:
-        """Whether the two agree within the bound; not a number never does."""
+        """Whether the two agree within the bound; NaN never does."""
         return abs(self.found - self.expected) <= self.bound
 
 
 @dataclass(frozen=True)
 class CheckTable:
-    """Some of what a rig would do by its file."""
+    """A table about the actions of a rig by its file."""
 
     title: str
     head: tuple[str, ...]
     rows: tuple[tuple[str, ...], ...]
-    """As many texts each as there are in `head`."""
+    """Rows of texts, one for each column of `head`."""
 
 
 @dataclass(frozen=True)
 class RigCheck:
-    """What a rig would do by its file, and why it would not."""
+    """Actions of a rig by its file, and the faults of the file."""
 
     tables: tuple[CheckTable, ...]
     problems: tuple[str, ...]
-    """Each a reason to refuse the file, with the next step; empty: it may be used."""
+    """Reasons to refuse the file, each with the next step; empty: it may be used."""
     file: RigFile | None = None
-    """The file with all that its axes are told by the rig's settings; None: it has no axes."""
+    """The file with all that the rig's settings add to its axes; None: it has no axes."""
     travel_ceiling_n: float = 0.0
     """Norm of the force at which an axis halts that does not press."""
 
 
 @dataclass(frozen=True)
 class CostPoint:
-    """One way of computing something: what it takes, and how far off it is."""
+    """Cost and error of one way of computing something."""
 
     subject: str
-    """What is computed for: a sensor."""
+    """Name of the sensor that is computed."""
     observable: str
-    """What is looked at: a kind of channel."""
+    """Kind of channel whose error is given."""
     label: str
     """Short name of the way: ``default, 48 x 64, 16 nodes``."""
     seconds: float
-    """Median time of one piece of work, as the diagram's title says."""
+    """Median time of one piece of work, which the diagram's title names."""
     error: float
     """Root mean square of the difference to the reference."""
     worst: float
     """Largest difference."""
     unit: str
     floor: float
-    """Standard deviation of the noise the observable has anyway; infinity where it has none."""
+    """Standard deviation of the observable's own noise; infinity where it has none."""
     default: bool = False
-    """This is what users get who ask for nothing."""
+    """Whether this is the default way."""
     rung: str = ""
-    """Name of the rig's rung that this way is; empty: it is none."""
+    """Name of the rung that this way is; empty: it is none."""
     settings: Mapping[str, Scalar] = field(default_factory=dict)
-    """What was set."""
+    """Settings of this way."""
 
 
 class CostJob(NamedTuple):
-    """One way still to be measured."""
+    """A way that is still to be measured."""
 
     label: str
     run: Callable[[], list[CostPoint]]
-    """Raises a TactbenchError if this sensor cannot have it: the reason becomes a row."""
+    """Function that measures it; it raises a TactbenchError, which becomes a row, if this sensor cannot have it."""
     rung: str = ""
-    """As CostPoint's."""
+    """The rung of its points."""
 
 
 class CostStudy(NamedTuple):
-    """A diagram in the making: what its points mean, and how to get them."""
+    """A diagram of cost and error, and the measurements for it."""
 
     title: str
     reference: str
-    """What the errors are measured against, in one sentence."""
+    """Reference of the errors, in one sentence."""
     jobs: Sequence[CostJob]
-    """In order; the reference is computed with the first."""
+    """Measurements in order; the first computes the reference as well."""
 
 
 class ReplayRig(Protocol):
-    """A rig whose scenes were carried out elsewhere: it hands out recordings that exist."""
+    """A rig whose scenes were carried out elsewhere, and which has their recordings."""
 
     def recordings(self) -> Sequence[Path]:
         """Return the files, in a fixed order; raises MissingRecordingError if there are none."""
 
 
 class Transducer(Protocol):
-    """Turns skin states into a sensor's noise-free readings, for one grid."""
+    """Conversion of skin states into a sensor's noise-free readings, for one grid."""
 
     def __call__(self, state: SkinState) -> FloatArray:
         """Return the (n_wanted,) readings in the channels' own units, before noise, rounding and clipping."""
 
 
 class TransducerFactory(Protocol):
-    """What ``SensorDescriptor.transducer`` names."""
+    """Factory of a transducer, which ``SensorDescriptor.transducer`` names."""
 
     def __call__(self, sensor: SensorSpec, grid: SkinGrid, channel_names: Sequence[str]) -> Transducer:
-        """Prepare for `grid` and the channels of `channel_names`; raises RigError for a channel it cannot give."""
+        """Return a transducer for `grid` and some channels; raises RigError for a channel that it cannot give."""
 
 
 class Reason(NamedTuple):
-    """What ``EffectDescriptor.called_for`` answers: whether a scene calls for the effect, and why or why not."""
+    """Answer of ``EffectDescriptor.called_for``: whether a scene calls for the effect, and the reason."""
 
     called_for: bool
     text: str
     change: float | None = None
-    """What leaving the effect out changes in an observed channel: at most, if it is not called for (0: exactly
-    nothing); about, if it is. None: unknown without computing it."""
+    """Change of an observed channel if the effect is left out: an upper bound if it is not called for (0: exactly
+    nothing), an estimate if it is. None: not known without computing it."""
     unit: str = "count"
     """Unit of `change`."""
 
 
 class EffectTrack(Protocol):
-    """The recorded channels that share one clock, as a simulation effect finds them."""
+    """The recorded channels that share one clock, in the form that effects change."""
 
     @property
     def channels(self) -> tuple[ChannelSpec, ...]:
-        """In order of the sensor's streams."""
+        """Channels in the order of the sensor's streams."""
 
     @property
     def t_s(self) -> FloatArray:
@@ -285,18 +285,18 @@ class EffectTrack(Protocol):
 
     @property
     def readings(self) -> FloatArray:
-        """(n, channels) what the channels would say, in their own units; an effect changes it in place."""
+        """Readings of the channels in their own units, (n, channels), which an effect changes in place."""
 
     @property
     def quality(self) -> npt.NDArray[np.uint8]:
-        """(n, channels) of :class:`Quality`; an effect may set bits."""
+        """Marks of the readings, (n, channels) of :class:`Quality`, which an effect may set."""
 
     def by_kind(self) -> Mapping[ChannelKind, Sequence[int]]:
         """Return the columns of each kind of channel."""
 
 
 class EffectRun(Protocol):
-    """The recording in the making: what ``EffectDescriptor.where`` is called with.
+    """A recording in the making, which is passed to ``EffectDescriptor.where``.
 
     The generators are the same under the same seed and names, whatever other effects draw.
     """
@@ -307,42 +307,42 @@ class EffectRun(Protocol):
 
     @property
     def scene(self) -> Scene:
-        """What is carried out."""
+        """The scene that is carried out."""
 
     @property
     def tracks(self) -> Sequence[EffectTrack]:
         """The sensor's channels, clock by clock."""
 
     def of_unit(self, *what: str) -> np.random.Generator:
-        """Return the generator of what belongs to this sensor unit, in every recording."""
+        """Return the generator for draws that hold for this sensor unit in every recording."""
 
     def of_session(self, *what: str) -> np.random.Generator:
-        """Return the generator of what the recordings of a session share."""
+        """Return the generator for draws that the recordings of a session share."""
 
     def of_recording(self, *what: str) -> np.random.Generator:
-        """Return the generator of what is this recording's own."""
+        """Return the generator for draws of this recording alone."""
 
 
 class Estimator(Protocol):
-    """scikit-learn's two verbs."""
+    """An estimator with the two methods of scikit-learn."""
 
     def fit(self, X: FloatArray, y: npt.NDArray[Any]) -> Any:
-        """Learn."""
+        """Fit the estimator to features (n, features) and targets."""
 
     def predict(self, X: FloatArray) -> npt.NDArray[Any]:
-        """Answer."""
+        """Return predictions for features (n, features)."""
 
 
 class Operator(Protocol):
-    """Whoever stands at a rig of real devices."""
+    """An operator at a rig of real devices."""
 
     def prompt(self, text: str) -> None:
-        """Show what is to be done, and return when it is; raises RigError if nobody is there to do it."""
+        """Show what is to be done, and return when it is done; raises RigError if no operator can answer."""
 
 
 @dataclass(frozen=True)
 class RigContext:
-    """What a rig is built from: ``RigDescriptor.where`` is called with exactly this."""
+    """Context that is passed to ``RigDescriptor.where`` to build a rig."""
 
     effects: tuple[EffectDescriptor, ...] = ()
     """The effects of tactbench itself: candidates for every scene."""
@@ -356,4 +356,4 @@ class RigContext:
     rig_file: RigFile | None = None
     """The file given by ``--rig-file``."""
     operator: Operator | None = None
-    """None: nobody is there."""
+    """Operator at the rig; None: there is none."""

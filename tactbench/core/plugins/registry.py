@@ -1,8 +1,8 @@
-"""The registry: every plugin is asked alone, and every failure is kept as a row.
+"""The registry of plugins: each is loaded alone, and every failure is kept as a row.
 
-Three holes of plain pluggy are closed here: a plugin that fails on import stops nobody else; two plugins giving one
-name are refused naming both distributions; a misspelt hook is an error. Plugins of other distributions are imported in
-child processes: what their import does to its process, or how that ends, is no other's, and what comes back is data.
+Three holes of plain pluggy are closed here: a plugin that fails on import stops no other; a name that two plugins give
+is refused, naming both distributions; a misspelt hook is an error. Plugins of other distributions are imported in child
+processes, which return data: whatever an import does to its process has no effect on others.
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ D = TypeVar("D", bound=Descriptor)
 
 @dataclass(frozen=True)
 class PluginRow:
-    """One entry point, and what became of it."""
+    """An entry point, and whether it could be loaded."""
 
     entry_point: str
     module: str
@@ -59,30 +59,30 @@ class PluginRow:
 
 @dataclass(frozen=True)
 class Owned(Generic[D]):
-    """A descriptor, and the plugin that brought it."""
+    """A descriptor, and the plugin that brings it."""
 
     descriptor: D
     module: str
     distribution: str
     version: str
     declared: str = ""
-    """Of a task that came with recordings: what they say of it, as JSON; empty: a plugin's."""
+    """Declaration of a task that came with recordings, as JSON; empty: a plugin brings it."""
 
     @property
     def ours(self) -> bool:
-        """Whether it comes with this package: tested with it, and trusted not to change or end whoever imports it."""
+        """Whether it comes with this package, so that it is tested and can be imported safely."""
         return _is_built_in(self.module)
 
 
 @dataclass
 class Family(Generic[D]):
-    """All descriptors of one kind, by name."""
+    """All descriptors of one kind by name."""
 
     kind: str
     _found: dict[str, list[Owned[D]]] = field(default_factory=dict)
 
     def add(self, owned: Owned[D]) -> None:
-        """Remember a descriptor; a name given twice is kept twice and refused when asked for."""
+        """Add a descriptor; a name that is given twice is refused when it is used."""
         self._found.setdefault(owned.descriptor.name, []).append(owned)
 
     def owned(self, name: str) -> Owned[D]:
@@ -111,11 +111,11 @@ class Family(Generic[D]):
         return (owned.descriptor for owned in self.all_owned())
 
     def all_owned(self) -> list[Owned[D]]:
-        """Return the descriptors that may be asked for, with their owners, sorted by name."""
+        """Return the descriptors whose name is given once, with their owners, sorted by name."""
         return [owners[0] for _, owners in sorted(self._found.items()) if len(owners) == 1]
 
     def names(self) -> list[str]:
-        """Return the names that may be asked for."""
+        """Return the names of these descriptors."""
         return [descriptor.name for descriptor in self]
 
     def refused(self) -> list[DuplicateNameError]:
@@ -129,7 +129,7 @@ class Family(Generic[D]):
 
 @dataclass
 class Registry:
-    """Everything that is installed."""
+    """Everything that is installed, by kind."""
 
     sensors: Family[SensorDescriptor] = field(default_factory=lambda: Family("sensor"))
     rigs: Family[RigDescriptor] = field(default_factory=lambda: Family("rig"))
@@ -142,11 +142,11 @@ class Registry:
     plugins: list[PluginRow] = field(default_factory=list)
 
     def families(self) -> Mapping[str, Family[Any]]:
-        """Return the families by the name of their hook's plural."""
+        """Return the families by the plural in the name of their hook."""
         return {name: getattr(self, name) for name in _KINDS}
 
     def first_rig(self, kind: Literal["simulated", "replays"]) -> str:
-        """Return the name of the rig that is meant where none is named: of those of a kind ours, else the first.
+        """Return the name of the default rig of a kind: one of ours, or else the first.
 
         Raises
         ------
@@ -161,23 +161,23 @@ class Registry:
 
     @property
     def failures(self) -> list[PluginRow]:
-        """The plugins that could not be used."""
+        """Plugins that could not be used."""
         return [row for row in self.plugins if row.status == "failed"]
 
     @property
     def refused(self) -> list[DuplicateNameError]:
-        """The names that are given twice."""
+        """Errors for names that are given twice."""
         return [error for family in self.families().values() for error in family.refused()]
 
 
 _KINDS: dict[str, type[Any]] = {
     f"{kind.__name__.removesuffix('Descriptor').lower()}s": kind for kind in get_args(Descriptor)
 }
-"""By the plural that hooks and families are named after: ``sensors`` -> SensorDescriptor."""
+"""Classes of descriptors by the plural in hooks and families: ``sensors`` -> SensorDescriptor."""
 
 
 ENTRY_POINT_S = 20.0
-"""Seconds that the import of a plugin, and its hooks, may take."""
+"""Longest time that the import of a plugin and its hooks may take [s]."""
 
 
 def load_registry(points: Iterable[EntryPoint] | None = None, *, timeout_s: float = ENTRY_POINT_S) -> Registry:
@@ -216,7 +216,7 @@ def _is_built_in(module: str) -> bool:
 
 
 def _add(registry: Registry, point: EntryPoint, owner: tuple[str, str], reply: Any) -> None:
-    """Add what a plugin brings: `reply` of a child process, or what it answers here if it is one of ours."""
+    """Add the descriptors of a plugin, from the `reply` of a child process, or of one of ours directly."""
     try:
         if isinstance(reply, BaseException):
             raise reply
@@ -234,14 +234,14 @@ def _add(registry: Registry, point: EntryPoint, owner: tuple[str, str], reply: A
 
 
 def _line_in(module: str, error: Exception) -> str:
-    """Return `` (file, line N)`` of the innermost line of a plugin's own package; "" if the error is not from there."""
+    """Return `` (file, line N)`` of the innermost line in a plugin's own package; empty if there is none."""
     package, text = re.escape(module.partition(".")[0]), getattr(error, "traceback_text", "")
     own = re.findall(rf'File "[^"]*/({package}[/.][^"]*)", line (\d+)', text)
     return f" ({own[-1][0]}, line {own[-1][1]})" if own else ""
 
 
 def _described_in_children(points: Sequence[tuple[str, str]], timeout_s: float) -> dict[tuple[str, str], Any]:
-    """Ask each plugin in a child process; return what it describes, or what stopped it, by name and module."""
+    """Return the descriptors of each plugin, read in a child process, or the error that stopped it."""
     if not points:
         return {}
     from tactbench.core.pool import Limits, Pool
@@ -250,13 +250,13 @@ def _described_in_children(points: Sequence[tuple[str, str]], timeout_s: float) 
 
 
 def _describe(point: tuple[str, str]) -> dict[str, Any]:
-    """Ask a plugin; return its descriptors as JSON has them."""
+    """Return the descriptors of a plugin as plain data."""
     offered = ask_plugin(EntryPoint(*point, group=hookspecs.GROUP))
     return {family: [plain(descriptor) for descriptor in several] for family, several in offered.items()}
 
 
 def plain(descriptor: Any, mode: Literal["json", "python"] = "python") -> dict[str, Any]:
-    """Return a descriptor as plain data, with what stays out of recordings and keys: a sensor's data sheet."""
+    """Return a descriptor as plain data, with the data sheet of a sensor, which recordings and keys leave out."""
     dumped: dict[str, Any] = descriptor.model_dump(mode=mode)
     if isinstance(descriptor, SensorDescriptor):
         dumped["spec"]["data_sheet"] = descriptor.spec.data_sheet.model_dump(mode=mode)
@@ -268,7 +268,7 @@ def _described(reply: Mapping[str, Any]) -> dict[str, list[Any]]:
 
 
 def ask_plugin(point: EntryPoint) -> dict[str, list[Any]]:
-    """Import one plugin in this process; return its descriptors by family, all of them checked.
+    """Import a plugin in this process, and return its checked descriptors by family.
 
     Raises
     ------
@@ -304,7 +304,7 @@ def ask_plugin(point: EntryPoint) -> dict[str, list[Any]]:
 
 
 def _check_api_version(module: str, written_for: object) -> None:
-    """Raise PluginContractError if the version that a plugin states is not the one that is spoken here."""
+    """Raise PluginContractError if a plugin states another version of the interface than this one."""
     spoken = hookspecs.API_VERSION
     if written_for == spoken:
         return
@@ -317,12 +317,12 @@ def _check_api_version(module: str, written_for: object) -> None:
 
 @lru_cache
 def _owner(distribution: Distribution | None) -> tuple[str, str]:
-    """Return name and version, which are read from a file."""
+    """Return the name and the version of a distribution, which are read from a file."""
     return ("unknown", "") if distribution is None else (distribution.name, distribution.version)
 
 
 def load_object(where: str) -> Any:
-    """Import what a descriptor's ``module:attribute`` names.
+    """Return the object that a descriptor's ``module:attribute`` names.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Rigs built from what is installed, the files that say which devices they have, and the effects that take part.
+"""Building of rigs, with their rig files and the effects that take part.
 
 The effects of this package are candidates for every scene. An effect of another package is a candidate only where the
 sensor's descriptor or the scene names it: what is merely installed is not imported into a run, and stands in no key.
@@ -20,7 +20,7 @@ from tactbench.core.spec.scene import Scene
 
 
 def load_rig_file(path: Path, registry: Registry) -> RigFile:
-    """Return the rig file at `path`, its own settings checked by its rig where that has a model of them.
+    """Return the rig file at `path`; a rig that has a model of its own settings checks them.
 
     Raises
     ------
@@ -46,7 +46,7 @@ def rig_of(
     rig_file: RigFile | None = None,
     operator: Operator | None = None,
 ) -> Rig | ReplayRig:
-    """Build the rig called `name`.
+    """Return the rig called `name`.
 
     Raises
     ------
@@ -66,7 +66,7 @@ def rig_of(
 
 @contextmanager
 def failing_as(what: str) -> Iterator[None]:
-    """Raise RigError, whose message begins with `what`, in place of whatever a rig's own code raises."""
+    """Return a context that turns other errors of a rig's own code into RigError, whose message begins with `what`."""
     try:
         yield
     except TactbenchError:
@@ -92,7 +92,7 @@ def effect_names(sensor: SensorDescriptor, scene: Scene) -> set[str]:
 
 
 def rig_context(registry: Registry, **given: Any) -> RigContext:
-    """Return what a rig is built from: the registry's effects and indenters, and what else is `given`."""
+    """Return the context of a rig: the registry's effects and indenters, and what else is `given`."""
     owned = registry.effects.all_owned()
     return RigContext(
         effects=tuple(one.descriptor for one in owned if one.ours),

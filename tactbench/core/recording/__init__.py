@@ -1,1 +1,1 @@
-"""Recordings: the file format, how it is written and read, whether it is healthy, and foreign tables."""
+"""Recordings: their file format, reading and writing them, checking their health, and importing foreign tables."""

@@ -1,4 +1,4 @@
-"""A device's clock on the host's, from the stamps that its samples got when they came.
+"""Conversion of a device's times to the host's clock, from the times at which its samples were received.
 
 A sample comes later than it was taken, by at least the least delay of its way and by a varying time on top. So the line
 that takes device times to host times lies below all stamps and touches those that came soonest: an edge of their lower
@@ -22,20 +22,21 @@ from tactbench.core.samples import FloatArray, IntArray
 from tactbench.core.spec.recording import ClockSegment, RecordingMeta, StreamClock
 
 STRETCH_NS = 30_000_000_000
-"""Length of what one line is fitted to. Clocks wander: at 1 ppm with a period of 600 s one line over 600 s errs by
-190 us, lines over 30 s by some us [measured: studies/clock_fit.py]. Shorter ones see fewer least delays."""
+"""Length of the stretch that one line is fitted to. Clocks wander: at 1 ppm with a period of 600 s, one line over 600 s
+errs by 190 us, lines over 30 s by some us [measured: studies/clock_fit.py]. Shorter stretches hold fewer of the least
+delays."""
 LEAP_NS = STRETCH_NS // 2
-"""A longer step of the device's times begins a new run of lines: two stretches would no longer overlap."""
+"""A longer step of the device's times begins a new run of lines, as two stretches would not overlap."""
 WINDOWS = 6
-"""Parts of a stretch in which residuals are looked at for the bound."""
+"""Number of windows of a stretch whose residuals give the bound of a line."""
 LOWEST = 10
-"""Least residuals of a window that say how near they come to the least delay."""
+"""Number of least residuals of a window that show how near they come to the least delay."""
 _SLACK_NS = 1e-3
-"""A residual below minus this is below the line; float64 holds residuals of a stretch to 1e-5 ns [derived]."""
+"""A residual below minus this lies below the line; float64 holds the residuals of a stretch to 1e-5 ns [derived]."""
 
 
 def one_way(run: int, stamps: tuple[IntArray, IntArray] | IntArray) -> ClockSegment:
-    """Return the line of a run below all of its `stamps`, device_ns and host_ns, (2, n) with n >= 1, in order.
+    """Return the line below all points of a run; `stamps` are the device's and the host's times, (2, n), in order.
 
     Notes
     -----
@@ -61,7 +62,7 @@ def one_way(run: int, stamps: tuple[IntArray, IntArray] | IntArray) -> ClockSegm
 
 
 class ClockFit:
-    """Lines from stamps, given piece by piece; it keeps at most 37.5 s of them.
+    """Fit of lines to a stream of device and host times; at most 37.5 s of the times are kept in memory.
 
     Each line is fitted to 30 s, every 15 s; the last one of a run to what is left, 22.5 to 37.5 s. Within a run the
     device's times do not go back, and leap by 15 s at most; where they do, a new run of lines begins.
@@ -82,11 +83,11 @@ class ClockFit:
 
     @property
     def breaks(self) -> int:
-        """How often the device's times went back."""
+        """Number of times that the device's times went back."""
         return self._runs.breaks
 
     def add(self, device_ns: IntArray, host_ns: IntArray) -> None:
-        """Take further rows: (n,) times of the device and of the host, in order."""
+        """Add rows: (n,) times of the device and of the host, in order."""
         run = self._runs.count(device_ns)
         for number in np.unique(run).tolist():
             self._extend(number, np.stack((device_ns, host_ns))[:, run == number])
@@ -114,17 +115,17 @@ class ClockFit:
 
 
 class RunCounter:
-    """Numbers the runs in which a device's times neither go back nor leap, block by block."""
+    """Counter of the runs of a device's times, which end where the times go back or leap."""
 
     def __init__(self) -> None:
         self._last: int | None = None
         self._run = 0
 
         self.breaks = 0
-        """How often the times went back."""
+        """Number of times that the times went back."""
 
     def count(self, device_ns: IntArray) -> IntArray:
-        """Return the (n,) numbers of the runs of the next rows, from 0."""
+        """Return the number of the run of each of the next rows, (n,), from 0."""
         steps = np.diff(device_ns, prepend=device_ns[:1] if self._last is None else self._last)
         self.breaks += int(np.count_nonzero(steps < 0))
         run = self._run + np.cumsum((steps < 0) | (steps > LEAP_NS))
@@ -134,7 +135,7 @@ class RunCounter:
 
 
 class HostTimes:
-    """A device's times on the host's clock, block by block, by the lines of `clock`.
+    """Conversion of a device's times to the host's clock, block by block, by the lines of `clock`.
 
     Between the middles of two lines the one goes over into the other linearly, so that times do not jump; they keep
     their order as long as two neighbouring lines differ by less than the 15 s between their middles.
@@ -152,7 +153,7 @@ class HostTimes:
             )
 
     def __call__(self, device_ns: IntArray) -> IntArray:
-        """Return the (n,) host's times of the next rows [ns].
+        """Return the host's times of the next rows, (n,) [ns].
 
         Raises
         ------
@@ -184,7 +185,7 @@ def _on_lines(device: IntArray, middle: IntArray, offset: IntArray, drift: Float
 
 
 def _edge_below(x: FloatArray, y: FloatArray) -> tuple[float, float]:
-    """Return value at 0 and slope of the edge of the lower convex hull over x = 0; x in order, about 0.
+    """Return the edge of the lower convex hull above x = 0, as its value there and its slope; x ascends through 0.
 
     A line through a point on either side is turned about one of them down to the lowest point below it, until there is
     none: a step is one pass over arrays, where a chain would go from point to point.
@@ -206,7 +207,7 @@ def _edge_below(x: FloatArray, y: FloatArray) -> tuple[float, float]:
 
 
 def with_clock_fits(meta: RecordingMeta, blocks: Blocks) -> RecordingMeta:
-    """Return `meta` with the lines of every stream in `blocks` that has a device clock.
+    """Return `meta` with lines fitted for every stream in `blocks` that has a device clock.
 
     A stream with times of its device has one unless `meta` says that its times are the host's. In virtual time, too:
     what a device's link and its batches add to a time is added there as well.
@@ -225,7 +226,7 @@ def with_clock_fits(meta: RecordingMeta, blocks: Blocks) -> RecordingMeta:
 
 
 def on_host_clock(meta: RecordingMeta, blocks: Blocks) -> Iterator[tuple[str, Columns]]:
-    """Yield `blocks` as they are stored: by the lines in `meta`, with the stamps as they came in ``host_ns``."""
+    """Yield `blocks` with times on the host's clock by the lines in `meta`, and times of arrival in ``host_ns``."""
     times: dict[str, HostTimes] = {}
     for stream, columns in blocks:
         clock = meta.clocks.get(stream)

@@ -1,4 +1,4 @@
-"""Whether a recording of devices has what its scene was to give."""
+"""Check whether a recording of devices holds all that its scene should give."""
 
 from __future__ import annotations
 
@@ -17,38 +17,38 @@ if TYPE_CHECKING:
     import numpy.typing as npt
 
 INCOMPLETE = "incomplete: "
-"""What `excluded` of an incomplete recording begins with."""
+"""Beginning of `excluded` in the meta of an incomplete recording."""
 MOVED = 0.2
-"""Of the range of the force in a recording: a sensor whose readings all stand still meanwhile is frozen (assumed; the
-noise of a force sensor is less, and a sensor that is not pressed has nothing to show)."""
+"""Share of the range of the force: a sensor is frozen if its readings stand still while the force changes by more
+(assumed; a force sensor's noise is less, and a sensor that is not pressed need not change)."""
 
 
 @dataclass
 class _Track:
-    """One stream so far. Times are nanoseconds."""
+    """Silence and the last row of one stream; times are nanoseconds."""
 
     last_ns: int | None = None
-    """Of the last row with a number."""
+    """Time of the last row with a number."""
     silence: tuple[int, int] = (0, 0)
-    """Length and begin of the longest time without one."""
+    """Length and beginning of the longest time without one."""
     row: npt.NDArray[Any] | None = None
     """The last row."""
 
 
 @dataclass
 class _Stillness:
-    """Since when nothing changes in a stream of the force sensor, or in all streams of the sensor together."""
+    """Stretch of equal rows in a stream of the force sensor, or in all streams of the sensor together."""
 
     same: tuple[int, int, int] | None = None
-    """From the last change to the last row, and how many rows since."""
+    """Times of the last change and of the last row, and the number of equal rows since."""
     long: list[tuple[int, int, int]] = field(default_factory=list)
-    """Former ones, longer than is allowed."""
+    """Former stretches that were longer than is allowed."""
     rows: int = 0
     changes: int = 0
 
 
 class Completeness:
-    """What is missing in a recording, from its blocks as they are written.
+    """Search for silence, stillness and lost rows in the blocks of a recording.
 
     The force sensor is frozen where it stands still for longer than is allowed and most of its other rows differ from
     the one before; or if it never changes while the sensor does. One with a coarse display, which repeats rows also
@@ -76,7 +76,7 @@ class Completeness:
         self._force: list[tuple[int, float]] = []
 
     def add(self, block: Block) -> None:
-        """Look at a block; one without times says nothing."""
+        """Add a block; one without times is ignored."""
         track = self._tracks.get(block.stream)
         if track is None or block.t_ns is None or not len(block.data):
             return
@@ -118,11 +118,11 @@ class Completeness:
 
     @property
     def seconds(self) -> float:
-        """Of the devices' clock from the first row to the last."""
+        """Time from the first row to the last by the devices' clocks [s]."""
         return 1e-9 * (self._end_ns - (self._begin_ns or 0))
 
     def lacking(self, counts: Mapping[str, StreamCounts]) -> list[str]:
-        """Return what is missing beyond what is allowed, in words; `counts` are the rig's, by stream."""
+        """Return a sentence for each stream that lacks more than is allowed; `counts` are the rig's, by stream."""
         return [text for name, track in self._tracks.items() for text in self._of(name, track, counts.get(name))]
 
     def _of(self, name: str, track: _Track, counts: StreamCounts | None) -> Iterator[str]:
@@ -145,13 +145,13 @@ class Completeness:
                 yield f"{name}: {lost} of {due} rows lost"
 
     def _dead(self, still: _Stillness, rows: int) -> bool:
-        """Return whether `rows` of a force sensor that are the same are too many, by its other rows."""
+        """Return whether so many equal `rows` of a force sensor are too many in view of its other rows."""
         if not still.changes:
             return any(one.changes for name, one in self._still.items() if name not in self._reference)
         return still.changes > (still.rows - rows) / 2
 
     def _pressed(self, from_ns: int, to_ns: int) -> bool:
-        """Return whether the force changed within a time."""
+        """Return whether the force changed within a span of time."""
         every = [value for _, value in self._force]
         within = [value for at_ns, value in self._force if from_ns <= at_ns <= to_ns]
         return bool(within) and max(within) - min(within) > MOVED * (max(every) - min(every)) > 0

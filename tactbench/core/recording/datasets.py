@@ -1,4 +1,4 @@
-"""Public data sets by name: what there is, and their recordings, fetched and imported once.
+"""Public data sets by name, which are fetched, checked and imported once.
 
 A data set is a mapping with a `source`. Mappings lie in the folder `datasets` of tactbench's own package and of every
 package that brings a plugin, so that a plugin brings data sets as files; a path names one that lies anywhere.
@@ -34,13 +34,13 @@ from tactbench.core.recording.mapping.model import DataSource, Mapping
 from tactbench.core.spec.yaml_file import load_yaml
 
 CACHE = "TACTBENCH_CACHE"
-"""Environment variable: where data sets are kept, in place of the user's folder for caches."""
+"""Environment variable with the folder of data sets, in place of the user's folder for caches."""
 FOLDER = "datasets"
 
 
 @dataclass(frozen=True)
 class DataSet:
-    """A mapping with a source, by name.
+    """A public data set: a mapping file with a source, known by its name.
 
     Parameters
     ----------
@@ -52,17 +52,17 @@ class DataSet:
 
     @property
     def name(self) -> str:
-        """The name."""
+        """Name of the data set."""
         return self.path.stem
 
     @cached_property
     def mapping(self) -> Mapping:
-        """The mapping; raises ConfigError if the file is wrong."""
+        """The mapping of the file; raises ConfigError if the file is wrong."""
         return load_yaml(self.path, Mapping)
 
     @property
     def source(self) -> DataSource:
-        """Where the files lie; raises ConfigError if the mapping does not state it."""
+        """Address and digests of the files; raises ConfigError if the mapping states none."""
         if self.mapping.source is None:
             raise ConfigError(
                 str(self.path), None, "It states no source, so that it is no data set.",
@@ -72,17 +72,17 @@ class DataSet:
 
     @property
     def files(self) -> Path:
-        """Where its files are kept."""
+        """Folder in which the files are kept."""
         return cache() / self.name / "files"
 
     @property
     def imported(self) -> Path:
-        """Where its recordings are kept: another place whenever the mapping, or the format of recordings, changes."""
+        """Folder of the recordings, another one whenever the mapping or the format of recordings changes."""
         stated = hashlib.sha256(self.path.read_bytes()).hexdigest()[:12]
         return cache() / self.name / f"recordings-{VERSION}-{stated}"
 
     def recordings(self, root: Path | None = None, progress: Progress | None = None) -> Path:
-        """Return the folder of its recordings; what is missing is fetched, checked and imported.
+        """Return the folder of the recordings, after fetching, checking and importing what is missing.
 
         Parameters
         ----------
@@ -131,7 +131,7 @@ class DataSet:
                 there.fetch(name, downloader=download)
             except ValueError as error:  # pooch's word for a digest that differs
                 raise MissingRecordingError(
-                    f"{self.name}: {origin} is not the file that is meant: its SHA-256 is not {files[name]}.",
+                    f"{self.name}: {origin} is not the file of the data set: its SHA-256 is not {files[name]}.",
                     hint="It is not kept. Files of another state are imported with `tactbench import MAPPING`.",
                 ) from error
             except OSError as error:
@@ -155,7 +155,7 @@ def cache() -> Path:
 
 
 def datasets() -> dict[str, DataSet]:
-    """Return the data sets of all installed packages by name; mappings without a source are none.
+    """Return the data sets of all installed packages by name; a mapping without a source is none.
 
     Raises
     ------
@@ -177,7 +177,7 @@ def datasets() -> dict[str, DataSet]:
 
 
 def dataset_called(given: str) -> DataSet:
-    """Return the data set of that name, or the one in the mapping file `given`; raises UnknownNameError."""
+    """Return the data set with a name, or of the mapping file `given`; raises UnknownNameError."""
     if given.endswith((".yaml", ".yml")):
         return DataSet(Path(given))
     for folder in _folders().values():
@@ -187,7 +187,7 @@ def dataset_called(given: str) -> DataSet:
 
 
 def _folders() -> dict[str, Path]:
-    """Return the folders of mappings by package; no plugin is imported."""
+    """Return the folders of mappings by package, without importing a plugin."""
     own = Path(tactbench.__file__).parent
     in_checkout = own.parent / "examples" / "mappings"
     found = {"tactbench": own / FOLDER if (own / FOLDER).is_dir() else in_checkout}
@@ -199,7 +199,7 @@ def _folders() -> dict[str, Path]:
 
 
 def _copy(root: Path | None, first: str) -> Path | None:
-    """Return `root`, or its sub-folder, in which the first file lies; None if there is none."""
+    """Return `root` or the sub-folder of it that holds the first file; None if none does."""
     if root is None:
         return None
     if not root.is_dir():
@@ -209,7 +209,7 @@ def _copy(root: Path | None, first: str) -> Path | None:
 
 
 def _copying(copy: Path) -> Callable[[str, str, Any], None]:
-    """Return a downloader that takes the file from `copy`, for pooch to check."""
+    """Return a downloader for pooch that copies a file from `copy`."""
 
     def download(url: str, output_file: str, there: Any) -> None:
         shutil.copyfile(copy / url.removeprefix(there.base_url), output_file)
@@ -218,7 +218,7 @@ def _copying(copy: Path) -> Callable[[str, str, Any], None]:
 
 
 def _reason(error: OSError) -> str:
-    """Return why, in a few words: an HTTP library's own message holds the whole history of its connections."""
+    """Return the cause in a few words; the message of an HTTP library lists all attempts to connect."""
     response = getattr(error, "response", None)
     if response is not None:
         return f"the server answers {response.status_code}"

@@ -1,32 +1,21 @@
-"""What a device's own tools have logged becomes a recording."""
+"""Conversion of a log that a device's own tools have written into a recording."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from tactbench.core.errors import DataError, LinkError, MissingRecordingError, UsageError
 from tactbench.core.plugins.interfaces import DeviceLog
 from tactbench.core.plugins.registry import load_object
-from tactbench.core.recording.health import Finding, examine
-from tactbench.core.recording.mapping.importing import ENDING, RIG
+from tactbench.core.recording.health import examine
+from tactbench.core.recording.mapping.importing import ENDING, RIG, Imported, ImportReport
 from tactbench.core.recording.reader import open_recording
-from tactbench.core.recording.writer import RecordingWriter
+from tactbench.core.recording.writer import write_recording
 from tactbench.core.spec.recording import RecordingMeta, Scalar
 from tactbench.core.spec.rig import SensorDescriptor
 from tactbench.core.spec.scene import Role
-
-
-@dataclass(frozen=True)
-class ImportedLog:
-    """One log that became a recording."""
-
-    meta: RecordingMeta
-    rows: Mapping[str, int]
-    """By stream."""
-    findings: tuple[Finding, ...]
 
 
 def import_log(
@@ -39,8 +28,8 @@ def import_log(
     role: Role | None,
     labels: Mapping[str, Scalar],
     replace: bool,
-) -> ImportedLog:
-    """Turn a log of a sensor's own tools into a recording; all of it is written, or nothing.
+) -> ImportReport:
+    """Convert a log of a sensor's own tools into a recording, which is written whole or not at all.
 
     Parameters
     ----------
@@ -91,9 +80,8 @@ def import_log(
         origin=log.name,
         counts=dict(found.counts),
     )
-    with RecordingWriter(out, meta, replace=replace, keep=False) as writer:
-        for block in found.blocks:
-            writer.append(block)
+    write_recording(out, meta, found.blocks, {}, replace=replace)
     with open_recording(out) as written:
-        rows = {name: len(written.stream(name)) for name in written.stream_names}
-        return ImportedLog(written.meta, rows, tuple(examine(written)))
+        rows = max(len(written.stream(name)) for name in written.stream_names)
+        made = Imported(out, written.meta, rows, {}, tuple(examine(written)))
+    return ImportReport(sensor.spec.title, (made,), 1, (), (), ())

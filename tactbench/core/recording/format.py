@@ -19,17 +19,18 @@ from tactbench.core.spec.sensor import StreamSpec
 
 FORMAT = "tactbench-recording"
 VERSION = 4
-"""Written; every version from 1 on is read."""
+"""Version of the format that is written; every version from 1 on is read."""
 PARTIAL = ".partial"
 """Ending of the journal of a recording that is being made."""
 COMPLETING = ".completing"
 """Ending of the finished file until it has been read back and is renamed."""
 
 ROWS, CHANNELS = "row", "channel"
-"""Dimension scales of a stream: of its rows where it has no clock, of its channels. No part of the digest."""
+"""Names of the dimension scales of a stream: of its rows where it has no clock, and of its channels. They are no part
+of the digest."""
 CHUNK_ROWS = 1024
 MAX_LISTED_CHANNELS = 1000
-"""Streams with more channels have no channel attributes: an attribute of HDF5 holds 64 KiB. The meta has them all."""
+"""Most channels of which a stream has attributes, as an attribute of HDF5 holds 64 KiB at most; the meta has all."""
 
 SEE = "See docs/format.md."
 
@@ -44,7 +45,7 @@ def not_content(version: int) -> tuple[str, ...]:
 
 @contextmanager
 def readable(path: Path) -> Iterator[None]:
-    """Raise FormatError, naming `path`, for what bytes that make no sense raise."""
+    """Return a context that turns errors of reading damaged bytes into FormatError, which names `path`."""
     try:
         yield
     except FormatError:
@@ -56,7 +57,7 @@ def readable(path: Path) -> Iterator[None]:
 
 
 def piece_rows(channels: int) -> int:
-    """Return how many rows of a stream are read or compressed at a time: whole chunks, some two million values."""
+    """Return the number of rows that are read or compressed at a time: whole chunks of some two million values."""
     return min(max(2**21 // channels // CHUNK_ROWS, 1), 16) * CHUNK_ROWS
 
 
@@ -72,7 +73,7 @@ def meta_text(meta: RecordingMeta) -> str:
 
 
 class ContentDigest:
-    """SHA-256 over what a recording says, whatever file, machine or library version holds it.
+    """SHA-256 of the content of a recording, which is the same for every file, machine and library version.
 
     Parameters
     ----------
@@ -88,11 +89,11 @@ class ContentDigest:
             content.pop(name, None)
         self._version = version
         self._columns: dict[tuple[str, str, tuple[int, ...]], tuple[Any, list[int]]] = {}
-        """SHA-256 and number of the rows so far, by name, type and shape of a row"""
+        """SHA-256 and number of the rows so far, by name, type and shape of a row."""
         self._sha = hashlib.sha256(f"{FORMAT} {version}\n{canonical(content)}\n".encode())
 
     def add(self, name: str, values: npt.NDArray[Any]) -> None:
-        """Add rows of a column to those before; of versions before 4, whole columns in the order of the streams."""
+        """Add rows of a column; before version 4, whole columns are added in the order of the streams."""
         if values.dtype.kind == "U":
             kind = "text"
             body: Any = "".join(f"{canonical(text)}\n" for text in values.tolist()).encode()
@@ -109,7 +110,7 @@ class ContentDigest:
         rows[0] += len(values)
 
     def hexdigest(self) -> str:
-        """Return the digest so far."""
+        """Return the digest of all rows that were added."""
         sha = self._sha.copy()
         for (name, kind, rest), (column, (rows,)) in sorted(self._columns.items()):
             sha.update(f"{name} {kind} {(rows, *rest)} {column.hexdigest()}\n".encode())
@@ -117,7 +118,7 @@ class ContentDigest:
 
 
 def specs_by_name(meta: RecordingMeta) -> dict[str, StreamSpec]:
-    """Return the streams a recording may hold: the sensor's and the reference's."""
+    """Return the streams that a recording may hold: those of the sensor and those of the reference."""
     return {stream.name: stream for stream in (*meta.sensor.streams, *meta.reference)}
 
 
@@ -135,5 +136,5 @@ def partial_path(path: Path, attempt: int = 1) -> Path:
 
 
 def completing_path(path: Path) -> Path:
-    """Return where the finished file lies until it is renamed, by the journal it is made from, or the recording."""
+    """Return the path of the finished file until it is renamed, by the path of its journal or of the recording."""
     return path.with_name(path.name.removesuffix(PARTIAL) + COMPLETING)

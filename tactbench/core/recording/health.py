@@ -1,4 +1,4 @@
-"""Is a recording healthy? What a person would look for first, looked for every time."""
+"""Checks of the health of a recording: gaps, missing samples, stuck or equal channels, late clocks."""
 
 from __future__ import annotations
 
@@ -24,61 +24,61 @@ GAP = 5.0
 JITTER = 0.2
 """Steps whose 5th to 95th percentile spans more than this share of the median make a clock irregular."""
 MOST_LISTED = 6
-"""Channels that are named one by one."""
+"""Most channels that a message names one by one."""
 RATE_TOLERANCE = 0.05
-"""Relative difference between the stated and the measured rate that is remarked on."""
+"""Relative difference of the stated and the measured rate above which it is reported."""
 COPY = 1.0 - 1e-8
-"""Correlation from which columns are the same: digits of a table leave 1e-9 of it, noise of 80 dB leaves 1e-8."""
+"""Correlation above which two columns are the same: rounding in a table leaves 1 - 1e-9, noise of 80 dB 1 - 1e-8."""
 LAG = 5
-"""Rows, of those with both samples, that a copy may come early or late: a shift, the delay of a filter."""
+"""Most rows by which a copy comes early or late, through a shift or the delay of a filter; rows without a sample are
+not counted."""
 FEWEST_VALUES = 200
-"""Distinct values from which on it is no chance that all are in one order: noise of a thousandth of the range turns
-some twenty pairs of so many round, 0.56 n² noise / range of n."""
+"""Fewest distinct values whose common order is no chance: noise of a thousandth of the range swaps some twenty pairs of
+so many, 0.56 n² noise / range of n."""
 MONOTONE = f"but for rounding a monotone function of {{}}, at most {LAG} rows early or late"
-"""What is said of a copy."""
+"""Phrase about a copy, for messages."""
 GLANCE = 50
-"""Rows that are looked at first: whatever holds for all holds for some."""
+"""Rows that are compared first, as a rule that holds for all rows holds for some."""
 WRONG_UNIT = 50.0
-"""A rate that is off by more than this factor looks like times in a wrong unit."""
+"""Factor between the stated and the measured rate above which times are probably in a wrong unit."""
 _UNTIMED = {
     "none": "no clock stated: rows are ordered, nothing more",
     "nominal": "time stamps are row number by nominal rate, not measured",
 }
 FINDINGS = "findings"
-"""Where the provenance of a recording has what its import found."""
+"""Key of the provenance under which an import stores its findings."""
 UNMARKED = ("stuck", "duplicated", "saturated", "dead", "empty", "absent", "excluded", "target-among-features")
-"""Checks that mark no score: taxels that nothing touches are constant and alike, those pressed hard saturate; from
-`dead` on, an evaluation that needs what is not there refuses it, or tells of it in another way."""
+"""Checks that mark no score. Taxels without a touch are constant and alike, and those pressed hard saturate; from
+`dead` on, an evaluation that needs the missing data refuses the recording or reports it itself."""
 DATED_NS = 10**18
-"""Times from here on are dates, September 2001 and later: in a wrong unit they would be of another millennium."""
+"""Times from here on, September 2001, are dates, which in a wrong unit would fall into another millennium."""
 SLOWEST_HZ = 1.0
-"""No tactile sensor is known to be read more seldom: without a stated rate, a lower one looks like a wrong unit."""
+"""Lowest rate of a tactile sensor: a lower one without a stated rate looks like times in a wrong unit."""
 
 
 @dataclass(frozen=True)
 class Finding:
-    """One thing a reader of a score from this recording should know."""
+    """A fact about a recording that matters for a score from it."""
 
     check: str
     """Short name of the check, fit for a filter: stuck, dead, saturated, duplicated, missing, gaps …"""
     severity: Severity
-    stream: str
-    """Empty: the whole recording"""
-    channels: tuple[str, ...]
-    count: int
-    """Samples, rows or channels concerned"""
     message: str
+    stream: str = ""
+    """Name of the stream; empty: the whole recording is concerned."""
+    channels: tuple[str, ...] = ()
+    count: int = 0
+    """Number of samples, rows or channels that are concerned."""
 
 
 class _Stream:
-    """What the checks need to know of a stream, gathered in one pass; arrays are (channels,)."""
+    """Statistics of a stream that the checks need, gathered in one pass; arrays are (channels,)."""
 
     def __init__(self, stream: LazyStream) -> None:
         self.name, self.spec, self.rows = stream.spec.name, stream.spec, len(stream)
         channels = self.spec.channels
         self.t_ns = stream.times()
         self._stream = stream
-        self._only: FloatArray | None = None
         self.missing, self.saturated, self.suspect = (np.zeros(len(channels), dtype=np.int64) for _ in range(3))
         self.low, self.high = np.full(len(channels), np.inf), np.full(len(channels), -np.inf)
         self.lost_before = 0
@@ -87,69 +87,56 @@ class _Stream:
         bottom, top = np.array([_ends(one) for one in channels]).T
         for block in stream.blocks():
             values, flags, missing = _numbers(block)
-            if len(values) == self.rows:
-                self._only = np.where(missing, np.nan, values)
             saturated = ((flags & Quality.SATURATED) != 0) | (values >= top) | (values <= bottom)
             self.missing += missing.sum(axis=0)
             self.saturated += (saturated & ~missing).sum(axis=0)
-            self.suspect += np.broadcast_to(flags & Quality.SUSPECT, values.shape).astype(bool).sum(axis=0)
-            self.low = np.minimum(self.low, np.where(missing, np.inf, values).min(axis=0))
-            self.high = np.maximum(self.high, np.where(missing, -np.inf, values).max(axis=0))
+            self.suspect += ((flags & Quality.SUSPECT) != 0).sum(axis=0)
+            self.lost_before += int(((flags & Quality.GAP) != 0).any(axis=1).sum())
+            self.low = np.minimum(self.low, values.min(axis=0, initial=np.inf, where=~missing))
+            self.high = np.maximum(self.high, values.max(axis=0, initial=-np.inf, where=~missing))
             for digest, column in zip(digests, np.ascontiguousarray(values.T), strict=True):
                 digest.update(column.data)
-            if block.quality is not None:
-                self.lost_before += int(((flags & Quality.GAP) != 0).any(axis=1).sum())
             for name, column in block.annotations.items():
                 self.labels[name] |= set(np.unique(column).tolist())
         self.contents = [digest.digest() for digest in digests]
 
-    @property
-    def present(self) -> npt.NDArray[np.int64]:
-        """Samples of each channel."""
-        return self.rows - self.missing
-
     def names(self, which: npt.NDArray[Any]) -> tuple[str, ...]:
-        """Return the names of some channels, by a mask."""
+        """Return the names of the channels that a mask takes."""
         return tuple(one.name for one, taken in zip(self.spec.channels, which, strict=True) if taken)
 
     def between(self, kind: str, first_ns: int, last_ns: int) -> tuple[IntArray, FloatArray]:
-        """Return times (n,) and samples (n, q) of the channels of a kind that have some, without incomplete rows."""
-        assert self.t_ns is not None  # whoever gives times has seen them
+        """Return times (n,) and samples (n, q) of the channels of a kind, without rows in which one has no sample."""
+        assert self.t_ns is not None  # only streams with times are compared
         rows = slice(*np.searchsorted(self.t_ns, (first_ns, last_ns + 1)))
-        if self._only is None:
-            values, _, missing = _numbers(self._stream[rows])
-            values = np.where(missing, np.nan, values)
-        else:
-            values = self._only[rows]
-        wanted = [one.kind == kind for one in self.spec.channels]
-        values = values[:, wanted & (2 * self.missing < self.rows)]
-        there = np.isfinite(values).all(axis=1)
-        return self.t_ns[rows][there], values[there]
+        values, _, missing = _numbers(self._stream[rows])
+        wanted = [one.kind == kind for one in self.spec.channels] & (2 * self.missing < self.rows)
+        there = ~missing[:, wanted].any(axis=1)
+        return self.t_ns[rows][there], values[there][:, wanted]
 
-    def said(self, which: npt.NDArray[Any]) -> str:
-        """Name channels as people would: "taxels t4 and t7", "fz", "E1, E2, E3 … (19 channels)"."""
+    def phrase(self, which: npt.NDArray[Any]) -> str:
+        """Return a phrase for the channels of a mask: "taxels t4 and t7", "fz", "E1, E2, E3 … (19 channels)"."""
         names = self.names(which)
         if len(names) <= MOST_LISTED and all(one.kind == "taxel" for one in self.spec.channels if one.name in names):
             return f"taxel{'s' if len(names) > 1 else ''} {listed(names)}"
         return listed(names)
 
 
-def listed(names: Sequence[str]) -> str:
-    """Name channels: "t4 and t7", "E1, E2, E3 … (19 channels)"."""
-    if len(names) > MOST_LISTED:
-        return f"{', '.join(names[:3])} … ({len(names)} channels)"
+def listed(names: Sequence[str], kind: str = "channels", most: int = MOST_LISTED) -> str:
+    """Return names as a phrase: "t4 and t7"; of more than `most` the first half: "E1, E2, E3 … (19 channels)"."""
+    if len(names) > most:
+        return f"{', '.join(names[: most // 2])} … ({len(names)} {kind})"
     return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"
 
 
 def _numbers(block: StreamData) -> tuple[FloatArray, npt.NDArray[np.uint8], npt.NDArray[np.bool_]]:
-    """Return samples, their flags, and where there is none."""
+    """Return the samples of a block, their flags, and a mask of those that are missing."""
     values = block.data.astype(np.float64) + 0.0  # -0 and 0 are one
-    flags = np.zeros((1, values.shape[1]), dtype=np.uint8) if block.quality is None else block.quality
+    flags = np.zeros(values.shape, dtype=np.uint8) if block.quality is None else block.quality
     return values, flags, ~np.isfinite(values) | ((flags & Quality.MISSING) != 0)
 
 
 def _ends(spec: ChannelSpec) -> tuple[float, float]:
-    """Return the readings from which on a channel is saturated.
+    """Return the lowest and the highest reading at which a channel is saturated.
 
     A temperature of a room or a position at a stop may equal a stated limit; a converter's end is what counts.
     """
@@ -162,7 +149,7 @@ def _ends(spec: ChannelSpec) -> tuple[float, float]:
 
 
 def examine(recording: Recording) -> list[Finding]:
-    """Look at everything in an open recording, the worst first.
+    """Return all findings of an open recording, the worst first.
 
     Returns
     -------
@@ -174,15 +161,12 @@ def examine(recording: Recording) -> list[Finding]:
     clocks: dict[bytes, tuple[list[str], _Stream]] = {}
     streams: dict[str, _Stream] = {}
     for name in recording.stream_names:
-        clock = recording.meta.clocks.get(name)
         stream = _Stream(recording.stream(name))
         if stream.rows == 0:
-            found.append(Finding("empty", "error", name, (), 0, f"{name} has no rows"))
+            found.append(Finding("empty", "error", f"{name} has no rows", name))
             continue
         found.extend(_channels(stream))
-        found.extend(_rows(stream))
-        if clock is not None:
-            found.extend(_clock_fit(name, clock))
+        found.extend(_rows(stream, recording.meta.clocks.get(name)))
         if stream.t_ns is not None:
             streams[name] = stream
             clocks.setdefault(hashlib.sha256(stream.t_ns.data).digest(), ([], stream))[0].append(name)
@@ -198,7 +182,7 @@ def examine(recording: Recording) -> list[Finding]:
 
 
 def marking(recording: Recording) -> list[Finding]:
-    """Return what a score from an open recording has to say: what its import found, else what is found now.
+    """Return the findings that mark a score from an open recording: those of its import, or else of a check now.
 
     Where a simulation made it without devices, no clock, cable or table can have failed, and nothing is looked for.
     """
@@ -214,14 +198,14 @@ def marking(recording: Recording) -> list[Finding]:
 def _whole(recording: Recording) -> Iterator[Finding]:
     meta = recording.meta
     if meta.excluded:
-        yield Finding("excluded", "warning", "", (), 1, f"excluded from every evaluation: {meta.excluded}")
+        yield Finding("excluded", "warning", f"excluded from every evaluation: {meta.excluded}", count=1)
     if meta.clock in _UNTIMED:
-        yield Finding("no-clock", "info", "", (), 0, _UNTIMED[meta.clock])
+        yield Finding("no-clock", "info", _UNTIMED[meta.clock])
     for name, counts in meta.streams.items():
         yield from _counts(name, counts)
     absent = [spec.name for spec in (*meta.sensor.streams, *meta.reference) if spec.name not in recording.stream_names]
     if absent:
-        yield Finding("absent", "warning", "", (), len(absent), f"declared but not recorded: {', '.join(absent)}")
+        yield Finding("absent", "warning", f"declared but not recorded: {', '.join(absent)}", count=len(absent))
 
 
 def _counts(stream: str, counts: StreamCounts) -> Iterator[Finding]:
@@ -229,72 +213,63 @@ def _counts(stream: str, counts: StreamCounts) -> Iterator[Finding]:
     lost += [f"{counts.dropped} were dropped because writing was behind"] if counts.dropped else []
     if lost:
         text = f"{stream} lost rows: {', '.join(lost)}"
-        yield Finding("lost", "warning", stream, (), counts.gaps + counts.dropped, text)
+        yield Finding("lost", "warning", text, stream, count=counts.gaps + counts.dropped)
     again = counts.duplicates + counts.late
     if again:
         text = f"{stream}: {again} rows came twice or late, and were kept out"
-        yield Finding("repeated", "info", stream, (), again, text)
+        yield Finding("repeated", "info", text, stream, count=again)
     open_rows = counts.received - counts.written - counts.dropped - again
     if open_rows:
         text = f"{stream}: {abs(open_rows)} rows {'more' if open_rows > 0 else 'fewer'} received than accounted for"
-        yield Finding("unaccounted", "warning", stream, (), abs(open_rows), text)
+        yield Finding("unaccounted", "warning", text, stream, count=abs(open_rows))
 
 
 def _channels(stream: _Stream) -> Iterator[Finding]:
-    name, there = stream.name, stream.present
+    there = stream.rows - stream.missing
 
-    def finding(check: str, severity: Severity, which: npt.NDArray[Any], count: int, text: str) -> Finding:
-        return Finding(check, severity, name, stream.names(which), count, text)
+    def finding(check: str, severity: Severity, which: npt.NDArray[np.bool_], text: str, count: int = 0) -> Finding:
+        names = stream.names(which)
+        return Finding(check, severity, f"{stream.phrase(which)}{text}", stream.name, names, count or len(names))
 
-    dead = there == 0
-    if dead.any():
-        yield finding("dead", "error", dead, int(dead.sum()), f"{stream.said(dead)} without a single sample")
-    varies = (there > 1) & (stream.low < stream.high)
+    dead, varies = there == 0, (there > 1) & (stream.low < stream.high)
     stuck = (there > 1) & ~varies
+    if dead.any():
+        yield finding("dead", "error", dead, " without a single sample")
     if stuck.any():
-        yield finding("stuck", "warning", stuck, int(stuck.sum()), f"{stream.said(stuck)} constant")
+        yield finding("stuck", "warning", stuck, " constant")
     full = np.flatnonzero(stream.saturated)
     for places in [full] if len(full) > MOST_LISTED else full[:, None]:
         some, count = np.isin(np.arange(len(there)), places), int(stream.saturated[places].sum())
-        text = f"{stream.said(some)} saturated in {count} of {len(places) * stream.rows} samples"
-        yield finding("saturated", "warning", some, count, text)
-    for count in dict.fromkeys(stream.missing[(stream.missing > 0) & ~dead].tolist()):
-        some = stream.missing == count
         yield finding(
-            "missing", "info", some, count, f"{stream.said(some)} without a sample in {count} of {stream.rows} rows"
+            "saturated", "warning", some, f" saturated in {count} of {len(places) * stream.rows} samples", count
         )
-    suspect = stream.suspect > 0
-    if suspect.any():
+    for count in dict.fromkeys(stream.missing[(stream.missing > 0) & ~dead].tolist()):
+        text = f" without a sample in {count} of {stream.rows} rows"
+        yield finding("missing", "info", stream.missing == count, text, count)
+    if stream.suspect.any():
         count = int(stream.suspect.sum())
-        text = f"{stream.said(suspect)}: {count} samples failed parity, checksum or sequence"
-        yield finding("suspect", "warning", suspect, count, text)
+        text = f": {count} samples failed parity, checksum or sequence"
+        yield finding("suspect", "warning", stream.suspect > 0, text, count)
     # Two channels that always read the same are one, wired or parsed twice; constant ones may agree by accident.
     alike: dict[bytes, list[int]] = {}
     for place in np.flatnonzero(varies).tolist():
         alike.setdefault(stream.contents[place], []).append(place)
     for places in alike.values():
         if len(places) > 1:
-            some = np.isin(np.arange(len(there)), places)
-            yield finding("duplicated", "warning", some, len(places), f"{stream.said(some)} identical")
+            yield finding("duplicated", "warning", np.isin(np.arange(len(there)), places), " identical")
 
 
-def _rows(stream: _Stream) -> Iterator[Finding]:
+def _rows(stream: _Stream, clock: StreamClock | None) -> Iterator[Finding]:
     for label, values in stream.labels.items():
         if len(values) == 1 and stream.rows > 1:
             text = f"label {label} is {next(iter(values))!r} in every row"
-            yield Finding("constant-label", "info", stream.name, (), stream.rows, text)
+            yield Finding("constant-label", "info", text, stream.name, count=stream.rows)
     if stream.lost_before:
         text = f"{stream.name}: rows were lost before {stream.lost_before} of {stream.rows} rows"
-        yield Finding("rows-before-lost", "warning", stream.name, (), stream.lost_before, text)
-
-
-def _clock_fit(name: str, clock: StreamClock) -> Iterator[Finding]:
-    if any(segment.bound_ns is None for segment in clock.segments):
-        text = f"{name}: too few rows to say how well its clock was put on the host's"
-        yield Finding("clock-bound", "info", name, (), 0, text)
-    if clock.breaks:
-        text = f"the clock of {name} began again (times: {clock.breaks})"
-        yield Finding("clock-lost", "warning", name, (), clock.breaks, text)
+        yield Finding("rows-before-lost", "warning", text, stream.name, count=stream.lost_before)
+    if clock is not None and clock.breaks:
+        text = f"the clock of {stream.name} began again (times: {clock.breaks})"
+        yield Finding("clock-lost", "warning", text, stream.name, count=clock.breaks)
 
 
 def _clock(stream: str, data: _Stream) -> Iterator[Finding]:
@@ -305,10 +280,10 @@ def _clock(stream: str, data: _Stream) -> Iterator[Finding]:
     if backward:
         row = int(np.flatnonzero(steps < 0)[0]) + 1
         text = f"time runs backwards {backward} times in {stream}, first at row {row}"
-        yield Finding("backward", "error", stream, (), backward, text)
+        yield Finding("backward", "error", text, stream, count=backward)
     if doubled:
         text = f"{doubled} of {len(data.t_ns)} time stamps of {stream} equal the one before"
-        yield Finding("repeated-time", "warning", stream, (), doubled, text)
+        yield Finding("repeated-time", "warning", text, stream, count=doubled)
     steps.sort()  # in place: there may be tens of millions
     forward = steps[backward + doubled :]
     if len(forward) < 3:
@@ -317,22 +292,22 @@ def _clock(stream: str, data: _Stream) -> Iterator[Finding]:
     gaps = len(forward) - int(np.searchsorted(forward, 1e9 * GAP * median, side="right"))
     if gaps:
         text = f"{gaps} gaps in {stream}: up to {1e-9 * forward[-1]:.3g} s, where the median step is {median:.3g} s"
-        yield Finding("gaps", "warning", stream, (), gaps, text)
+        yield Finding("gaps", "warning", text, stream, count=gaps)
     rate = (len(data.t_ns) - 1) / (float(data.t_ns[-1] - data.t_ns[0]) * 1e-9) if not backward else 1 / median
     if high - low > JITTER * median:
         text = (
             f"irregular clock in {stream}: median step {median:.3g} s, 5th to 95th percentile {low:.3g} to "
             f"{high:.3g} s, mean rate {rate:.3g} Hz"
         )
-        yield Finding("irregular", "info", stream, (), 0, text)
+        yield Finding("irregular", "info", text, stream)
     stated = data.spec.rate_hz
     slow, fast = (stated / WRONG_UNIT, stated * WRONG_UNIT) if stated else (SLOWEST_HZ, np.inf)
     looks = ": ms read as s?" if rate < slow else ": s read as ms?" if rate > fast else ""
     if data.t_ns[0] > DATED_NS:
         looks = ""
     if looks or (stated and abs(rate - stated) > RATE_TOLERANCE * stated):
-        said = f"; {stated:g} Hz are stated" if stated else ""
-        yield Finding("rate", "warning", stream, (), 0, f"{stream} runs at {rate:.4g} Hz{said}{looks}")
+        nominal = f"; {stated:g} Hz are stated" if stated else ""
+        yield Finding("rate", "warning", f"{stream} runs at {rate:.4g} Hz{nominal}{looks}", stream)
 
 
 def _late(sensor: _Stream, reference: _Stream) -> Iterator[Finding]:
@@ -342,23 +317,23 @@ def _late(sensor: _Stream, reference: _Stream) -> Iterator[Finding]:
         return
     if any(len(t_ns) < FEWEST_ROWS or (t_ns[1:] < t_ns[:-1]).any() for t_ns in (own, other)):
         return
-    said: list[tuple[str, tuple[float, float]]] = []
+    lags: list[tuple[str, tuple[float, float]]] = []
     for place, window in windows(own, other).items():
         lag = find_lag(*sensor.between("taxel", *window), *reference.between("force", *window))
         if lag is not None:
             ends = {" at the beginning": lag.beginning, " at the end": lag.end}
-            said += (ends if lag.drifts and not place else {place: lag.middle}).items()
-    if said:
+            lags += (ends if lag.drifts and not place else {place: lag.middle}).items()
+    if lags:
         text = ", ".join(
             f"{1e3 * abs(late):.0f} ± {max(2e3 * error, 1):.0f} ms {'behind' if late > 0 else 'ahead of'} "
-            f"{reference.said(forces)}{place}"
-            for place, (late, error) in said
+            f"{reference.phrase(forces)}{place}"
+            for place, (late, error) in lags
         )
-        yield Finding("lag", "warning", sensor.name, reference.names(forces), sensor.rows, f"{sensor.name} is {text}")
+        yield Finding("lag", "warning", f"{sensor.name} is {text}", sensor.name, reference.names(forces), sensor.rows)
 
 
 def is_copy(one: FloatArray, other: FloatArray, recording: npt.NDArray[np.int64] | None = None) -> bool:
-    """Return whether a column is another under a monotone map, at most `LAG` rows early or late.
+    """Return whether a column is a monotone function of another, at most `LAG` rows early or late.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""The HDF5 file of a recording: compressed, and described so that ordinary viewers plot it."""
+"""Building and storing of the HDF5 file of a recording, compressed and described for ordinary viewers."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from tactbench.core.errors import FormatError, UnwritableError
-from tactbench.core.files import hdf5_image
+from tactbench.core.files import hdf5_image, writable
 from tactbench.core.recording import format as layout
 from tactbench.core.recording.clock_fit import on_host_clock
 from tactbench.core.recording.partial import Annotations, Blocks, Columns
@@ -33,7 +33,7 @@ def store(
     replace: bool,
     sync: bool,
 ) -> str:
-    """Write a recording beside its place, read it back, and rename it to `target`; return its content digest.
+    """Write a recording beside its place, read it back and rename it to `target`; return its content digest.
 
     Of the recording, memory holds the compressed file and some chunks of each stream.
 
@@ -57,26 +57,25 @@ def store(
         is as it was.
     """
     try:
-        image = build(meta, text, blocks, annotations, complete=True)
-        with aside.open("wb") as file:
-            file.write(image)
-            file.flush()
+        with writable(target):
+            image = build(meta, text, blocks, annotations, complete=True)
+            with aside.open("wb") as file:
+                file.write(image)
+                file.flush()
+                if sync:
+                    os.fsync(file.fileno())
+            try:
+                with open_recording(aside) as written:
+                    digest = written.verify()
+            except FormatError as error:
+                raise UnwritableError(
+                    f"What is read back of {target} is not what was written.", hint="Did the disk fail?"
+                ) from error
+            if not replace:
+                require_free(target)
+            aside.replace(target)
             if sync:
-                os.fsync(file.fileno())
-        try:
-            with open_recording(aside) as written:
-                digest = written.verify()
-        except FormatError as error:
-            raise UnwritableError(
-                f"What is read back of {target} is not what was written.", hint="Did the disk fail?"
-            ) from error
-        if not replace:
-            require_free(target)
-        aside.replace(target)
-        if sync:
-            _sync_folder(target.parent)
-    except OSError as error:
-        raise cannot_write(target, error) from error
+                _sync_folder(target.parent)
     finally:
         with suppress(OSError):
             aside.unlink(missing_ok=True)
@@ -84,22 +83,13 @@ def store(
 
 
 def require_free(path: Path) -> None:
-    """Raise UnwritableError if there is a recording already."""
+    """Raise UnwritableError if there is a file already."""
     if path.exists():
         raise UnwritableError(f"{path} exists already.", hint="Give another name with --out, or delete that one.")
 
 
-def cannot_write(path: Path, error: OSError) -> UnwritableError:
-    """Return the error to raise when the disk refuses."""
-    reason = error.strerror or error
-    return UnwritableError(
-        f"The recording {path} cannot be written: {reason}.",
-        hint="Check the folder's permissions and the free space, or give another with --out.",
-    )
-
-
 def build(meta: RecordingMeta, text: str, blocks: Blocks, annotations: Annotations, *, complete: bool) -> bytes:
-    """Return the HDF5 file that holds all blocks; see `store`. Its digest is of the blocks, before HDF5 has them."""
+    """Return an HDF5 file with all blocks, as for `store`. Its digest is of the blocks, before HDF5 has them."""
     return hdf5_image(lambda file: _fill(file, meta, text, blocks, annotations, complete=complete))
 
 
@@ -140,7 +130,7 @@ def _sync_folder(folder: Path) -> None:
 
 
 def _digested(blocks: Blocks, digest: layout.ContentDigest) -> Iterator[tuple[str, Columns]]:
-    """Yield blocks with quality from the first block on that has some, and add them to the digest."""
+    """Yield blocks and add them to the digest, with quality from the first block on that has some."""
     rows: Counter[str] = Counter()
     flagged = set()
     for stream, columns in blocks:
@@ -157,7 +147,7 @@ def _digested(blocks: Blocks, digest: layout.ContentDigest) -> Iterator[tuple[st
 
 
 def _gathered(blocks: Blocks) -> Iterator[tuple[str, Columns]]:
-    """Yield larger blocks, of whole chunks but for each stream's last: a chunk is then compressed once."""
+    """Yield larger blocks, of whole chunks except for the last of a stream, so that each chunk is compressed once."""
     waiting: dict[str, list[Columns]] = {}
     rows: dict[str, int] = {}
     for stream, columns in blocks:
@@ -186,18 +176,22 @@ def _extend(group: Any, columns: Columns) -> None:
     start = group["data"].shape[0] if "data" in group else 0
     stop = start + len(columns["data"])
     for name, values in columns.items():
-        column = group[name] if name in group else _create(group, name, values)
-        column.resize(stop, axis=0)
-        column[start:stop] = values
+        if name in group:
+            group[name].resize(stop, axis=0)
+            group[name][start:stop] = values
+        else:
+            _create(group, name, values, start)
 
 
-def _create(group: Any, name: str, values: npt.NDArray[Any]) -> Any:
-    """Return a new column without rows; quality may come late, and the zeros before it mean good."""
+def _create(group: Any, name: str, values: npt.NDArray[Any], start: int = 0) -> Any:
+    """Return a new column with `values` from row `start` on; the zeros before late quality mean good samples."""
     rest = values.shape[1:]
-    return group.create_dataset(
-        name, shape=(0, *rest), maxshape=(None, *rest), dtype=values.dtype, chunks=(layout.CHUNK_ROWS, *rest),
-        compression="gzip", compression_opts=4, shuffle=True, fillvalue=0,
+    column = group.create_dataset(
+        name, shape=(start + len(values), *rest), maxshape=(None, *rest), dtype=values.dtype, compression="gzip",
+        compression_opts=4, shuffle=True, fillvalue=0, chunks=(layout.CHUNK_ROWS, *rest),
     )  # fmt: skip
+    column[start:] = values
+    return column
 
 
 def _annotate(group: Any, label: str, column: npt.NDArray[Any]) -> None:
@@ -211,7 +205,7 @@ def _annotate(group: Any, label: str, column: npt.NDArray[Any]) -> None:
 
 
 def _describe(group: Any, spec: StreamSpec) -> None:
-    """Write what ordinary viewers need (NeXus: signal, axes, units)."""
+    """Write the attributes with which ordinary viewers plot a stream (NeXus: signal, axes, units)."""
     columns = {name: column for name, column in group.items() if name != "annotations"}
     attributes = group.attrs
     attributes["NX_class"] = "NXdata"
@@ -230,7 +224,7 @@ def _describe(group: Any, spec: StreamSpec) -> None:
 
 
 def _attach_scales(group: Any, columns: dict[str, Any], names: list[str]) -> None:
-    """Make times (rows, where there is no clock) and names of channels the HDF5 dimension scales of every column.
+    """Make the times (or row numbers, without a clock) and the channels' names the dimension scales of every column.
 
     Libraries of the netCDF world then read a stream with its coordinates.
     """
@@ -238,10 +232,7 @@ def _attach_scales(group: Any, columns: dict[str, Any], names: list[str]) -> Non
 
     rows = columns.get("t_ns")
     if rows is None:
-        numbers = np.arange(len(columns["data"]), dtype=np.int64)
-        rows = _create(group, layout.ROWS, numbers)
-        rows.resize(len(numbers), axis=0)
-        rows[:] = numbers
+        rows = _create(group, layout.ROWS, np.arange(len(columns["data"]), dtype=np.int64))
     channels = group.create_dataset(layout.CHANNELS, data=names, dtype=h5py.string_dtype("utf-8"))
     channels.make_scale(layout.CHANNELS)
     rows.make_scale("t_ns" if "t_ns" in columns else layout.ROWS)

@@ -1,4 +1,4 @@
-"""How late a sensor comes, against the reference beside it.
+"""Estimation of how much later a sensor is stamped than the reference beside it.
 
 A sensor that creeps, relaxes or has hysteresis follows a force in loops too, and a shift takes some of them away. It
 answers every change at once, though: what it adds is a weighted past of the force, or depends on the force's direction.
@@ -15,43 +15,43 @@ import numpy as np
 from tactbench.core.samples import FloatArray, IntArray
 
 FINEST_S = 0.01
-"""Step of the common grid; or the median step of the slower clock, if longer."""
+"""Smallest step of the common grid [s]; the median step of the slower clock is taken if it is longer."""
 FEWEST_ROWS = 100
-"""Rows of a stream, and of the grid, below which nothing is looked for."""
+"""Fewest rows of a stream, and of the grid, in which a lag is looked for."""
 TIME_CONSTANTS_S = (0.05, 0.2, 0.8, 3.2)
-"""Of the past that the second explanation may use; relaxations in between are sums of two but for a few percent."""
+"""Time constants of the past in the second explanation; sums of two resemble those in between to a few percent."""
 DEGREE = 5
-"""Of the curve: a sensor that answers late, or is clipped, has kinks."""
+"""Degree of the curve, which must follow the kinks of a sensor that is clipped or answers above a threshold only."""
 SUSPECTED = 1.3
-"""By what factor a lag must make the squares smaller that the curve leaves."""
+"""Factor by which a lag must reduce the squares that the curve leaves."""
 NEEDED = 4.0
-"""The same for what the past leaves as well, but of its autocovariance at one row, in which white noise does not count.
-Of 5,376 simulated sensors without a lag, most of which creep, relax or have hysteresis, two came above it, both under a
-sine without rests; a lag of 100 ms makes it 5 to 1,000."""
+"""Factor by which a lag must reduce what the past leaves as well, as its autocovariance at one row, in which white
+noise does not count. Of 5,376 simulated sensors without a lag, most of which creep, relax or have hysteresis, two came
+above it, both under a sine without rests; a lag of 100 ms makes it 5 to 1,000."""
 FASTEST_DRIFT = 0.05
-"""Share of a clock: no two clocks run further apart."""
+"""Largest rate at which two clocks drift apart [1]."""
 SIGNIFICANT = 4.0
-"""Standard errors."""
+"""Standard errors above which a lag is significant."""
 LONGEST_S, MOST_ROWS = 60.0, 2000
-"""So long, or so many rows of the grid if these are longer, a recording is looked at whole; else its two ends, half as
-long each."""
+"""Longest recording, in seconds or in rows of the grid, that is examined whole; of a longer one both ends, half as long
+each, are."""
 _BLOCKS = 8
 _ITERATIONS = 6
 
 
 @dataclass(frozen=True)
 class Lag:
-    """How late a sensor comes [s], and the standard error; negative where it comes early."""
+    """Lag of a sensor [s] and its standard error at three places; negative where the sensor is early."""
 
     beginning: tuple[float, float]
     middle: tuple[float, float]
     end: tuple[float, float]
     drifts: bool
-    """Whether it changes by more than a sample and three standard errors"""
+    """Whether the lag changes by more than a sample and three standard errors."""
 
 
 def windows(sensor_ns: IntArray, force_ns: IntArray) -> dict[str, tuple[int, int]]:
-    """Return the stretches of time [ns] that both clocks have and a lag is looked for in, by their place."""
+    """Return the spans [ns] in which a lag is looked for, within the time that both clocks have, by their place."""
     first, last = int(max(sensor_ns[0], force_ns[0])), int(min(sensor_ns[-1], force_ns[-1]))
     slower = max(float(times[-1] - times[0]) / (len(times) - 1) for times in (sensor_ns, force_ns))
     longest = int(max(1e9 * LONGEST_S, MOST_ROWS * slower))
@@ -61,7 +61,7 @@ def windows(sensor_ns: IntArray, force_ns: IntArray) -> dict[str, tuple[int, int
 
 
 def find_lag(sensor_ns: IntArray, sensor: FloatArray, force_ns: IntArray, force: FloatArray) -> Lag | None:
-    """Return how late the leading component of a sensor comes against that of a reference.
+    """Return the lag of the leading component of a sensor behind that of a reference.
 
     Parameters
     ----------
@@ -104,10 +104,10 @@ def find_lag(sensor_ns: IntArray, sensor: FloatArray, force_ns: IntArray, force:
         full, plain = _Explained(x, past, *shifts), _Explained(x, curve, *shifts)
         other, plain_left, _ = plain.nearest(lag, drift)
         found, left, error = full.nearest(*other)
-        unshifted = full.left(0.0, 0.0)
+        unshifted = full.residual(0.0, 0.0)
         noise = 2 * _squares(left) / np.sqrt(len(left))  # of an autocovariance, two standard errors
         needed = _neighbours(unshifted) > NEEDED * (max(_neighbours(left), 0.0) + noise)
-        suspected = _squares(plain.left(0.0, 0.0)) > SUSPECTED * _squares(plain_left)
+        suspected = _squares(plain.residual(0.0, 0.0)) > SUSPECTED * _squares(plain_left)
         if needed and suspected and 2 * abs(found[1]) < FASTEST_DRIFT * len(x):
             share = _squares(left) / len(left)
             if best is None or share < best[0]:
@@ -119,16 +119,16 @@ def find_lag(sensor_ns: IntArray, sensor: FloatArray, force_ns: IntArray, force:
     def at(*weights: float) -> tuple[float, float]:
         return step * float(found @ weights), step * float(np.sqrt(weights @ error @ weights))
 
-    def told(lag: float, error: float) -> bool:
+    def significant(lag: float, error: float) -> bool:
         return abs(lag) > max(slower, SIGNIFICANT * error)
 
-    late = Lag(at(1, -1), at(1, 0), at(1, 1), drifts=told(*at(0, 2)))
+    late = Lag(at(1, -1), at(1, 0), at(1, 1), drifts=significant(*at(0, 2)))
     places = (late.beginning, late.end) if late.drifts else (late.middle,)
-    return late if any(told(*place) for place in places) else None
+    return late if any(significant(*place) for place in places) else None
 
 
 class _Explained:
-    """What shifted columns explain of `x`, in the rows that have a partner at every shift between two whole ones."""
+    """Least-squares explanation of a shifted `x` by columns, in the rows that every shift in a range leaves."""
 
     def __init__(self, x: FloatArray, columns: FloatArray, lowest: int, highest: int) -> None:
         self._rows = np.arange(-lowest, len(x) - highest)
@@ -137,26 +137,26 @@ class _Explained:
         self._x, self._slope = x, np.gradient(x)
         self._base = np.linalg.qr(columns[self._rows])[0]
 
-    def _rest(self, values: FloatArray) -> FloatArray:
+    def _unexplained(self, values: FloatArray) -> FloatArray:
         return values - self._base @ (self._base.T @ values)
 
-    def left(self, lag: float, drift: float) -> FloatArray:
-        """Return what is left of `x`, taken `lag` rows later in the middle and `drift` more at the end."""
-        return self._rest(np.interp(self._rows + lag + drift * self._place, self._all, self._x))
+    def residual(self, lag: float, drift: float) -> FloatArray:
+        """Return the residual of `x`, taken `lag` rows later in the middle and `drift` rows more at the end."""
+        return self._unexplained(np.interp(self._rows + lag + drift * self._place, self._all, self._x))
 
     def nearest(self, lag: float, drift: float) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Return the best lag and drift near some, (2,), what they leave, and their covariance, (2, 2)."""
-        at, before, left = np.array([lag, drift]), np.zeros(2), self.left(lag, drift)
+        """Return the best lag and drift near the given ones, (2,), the residual, and their covariance, (2, 2)."""
+        at, before, left = np.array([lag, drift]), np.zeros(2), self.residual(lag, drift)
         slopes = np.empty((len(left), 2))
         best = np.inf
         for _ in range(_ITERATIONS):
-            new = self.left(*at)
+            new = self.residual(*at)
             if _squares(new) >= best:
                 at = (at + before) / 2
                 continue
             best, before, left = _squares(new), at, new
             slope = np.interp(self._rows + at[0] + at[1] * self._place, self._all, self._slope)
-            slopes = np.column_stack([self._rest(slope), self._rest(slope * self._place)])
+            slopes = np.column_stack([self._unexplained(slope), self._unexplained(slope * self._place)])
             at = at - np.linalg.lstsq(slopes, left, rcond=None)[0]
         block = np.arange(len(left)) * _BLOCKS // len(left)
         moved = np.array([np.linalg.lstsq(slopes[block != b], left[block != b], rcond=None)[0] for b in range(_BLOCKS)])
@@ -172,7 +172,7 @@ def _neighbours(left: FloatArray) -> float:
 
 
 def _leading(times: FloatArray, values: FloatArray, edges: FloatArray) -> FloatArray:
-    """Return the leading component, as means between edges, with mean 0 and variance 1."""
+    """Return the leading component, averaged between edges, with mean 0 and variance 1."""
     centred = values - values.mean(axis=0)
     component = centred @ np.linalg.eigh(centred.T @ centred)[1][:, -1]
     area = np.concatenate([[0.0], np.cumsum((component[1:] + component[:-1]) / 2 * np.diff(times))])
@@ -186,7 +186,7 @@ def _standard(values: FloatArray) -> FloatArray:
 
 
 def _starts(x: FloatArray, f: FloatArray) -> list[tuple[float, float]]:
-    """Return lags and drifts [rows] to start from: of the whole, and of both halves."""
+    """Return the lags and drifts [rows] that the search starts from, of the whole and of both halves."""
     lag, gain = _correlated(x, f, len(x) // 5)
     starts = [(float(lag), 0.0)] if gain > SUSPECTED else []
     if starts or len(x) > 10 * FEWEST_ROWS:
@@ -200,7 +200,7 @@ def _starts(x: FloatArray, f: FloatArray) -> list[tuple[float, float]]:
 
 
 def _correlated(x: FloatArray, f: FloatArray, most: int) -> tuple[int, float]:
-    """Return the shortest of the best lags up to `most` rows, and by what factor it makes the squares smaller.
+    """Return the shortest of the best lags up to `most` rows, and the factor by which it reduces the squares.
 
     Of a force that repeats itself several lags are as good.
     """
@@ -221,9 +221,9 @@ def _correlated(x: FloatArray, f: FloatArray, most: int) -> tuple[int, float]:
 
 
 def _curve(f: FloatArray) -> FloatArray:
-    """Return (n, …) a constant, a trend in time, and polynomials of the force.
+    """Return columns (n, …): a constant, a trend in time, and polynomials of the force.
 
-    Polynomials of a shifted ramp are polynomials of the ramp, so that a ramp tells of no lag, whatever the curve.
+    Polynomials of a shifted ramp are polynomials of the ramp, so that a ramp shows no lag, whatever the curve is.
     """
     scaled = 2 * (f - f.min()) / max(float(np.ptp(f)), 1e-300) - 1
     polynomials = np.polynomial.chebyshev.chebvander(scaled, DEGREE)
@@ -231,7 +231,7 @@ def _curve(f: FloatArray) -> FloatArray:
 
 
 def _past(f: FloatArray, step: float) -> FloatArray:
-    """Return (n, …) the force under low-passes, what may have been before the first row, and the force's direction."""
+    """Return columns (n, …): the force under low-passes, traces of forces before the first row, and its direction."""
     n, times = len(f), np.arange(len(f)) * step
     spectrum = np.fft.rfft(f - f[0], 2 * n)
     columns = []

@@ -1,4 +1,4 @@
-"""A recording while it is being made: a journal that can be read at every moment, also after ``kill -9``.
+"""Journal of a recording that is being made, which can be read at every moment, also after ``kill -9``.
 
 An HDF5 file cannot be that: between two flushes its chunks and their index disagree, and a process killed there leaves
 a file of which the last chunks, or all of it, cannot be read.
@@ -36,7 +36,7 @@ from tactbench.core.recording.format import canonical, partial_path, readable
 MAGIC = b"tactbench-partial 2\n"
 _READ = (b"tactbench-partial 1\n", MAGIC)
 _FRAME = struct.Struct("<IQI")
-"""Bytes of the head, bytes of the columns, CRC-32 of both."""
+"""Head of a frame: length of its JSON, length of its body, CRC-32 of both."""
 
 Annotations = dict[str, dict[str, npt.NDArray[Any]]]
 """Labels of rows by stream and name: (n,) texts or whole numbers."""
@@ -44,7 +44,7 @@ Columns = dict[str, npt.NDArray[Any]]
 """Columns of a stream by name: data (n, channels), t_ns (n,), quality (n, channels), sequence, device_ns (n,)."""
 
 Blocks = Iterable[tuple[str, Columns]]
-"""Stream and columns of each block, as they came."""
+"""Stream and columns of each block, in the order of arrival."""
 
 
 class Partial:
@@ -60,7 +60,7 @@ class Partial:
 
     def __init__(self, path: Path, text: str) -> None:
         self.rows: dict[str, int] = {}
-        """Rows of the streams that have had a block"""
+        """Number of rows of each stream that has had a block."""
         self._end = 0
         for attempt in itertools.count(1):
             self.path = partial_path(path, attempt)
@@ -80,7 +80,7 @@ class Partial:
             raise
 
     def append(self, stream: str, columns: Mapping[str, npt.NDArray[Any]]) -> None:
-        """Add a block; once this returns, only the operating system's own crash can lose it."""
+        """Add a block; once this returns, only a crash of the operating system can lose it."""
         plain = {name: np.ascontiguousarray(values, values.dtype.newbyteorder("<")) for name, values in columns.items()}
         shapes = [[name, values.dtype.str, list(values.shape)] for name, values in plain.items()]
         head = json.dumps([stream, shapes]).encode()
@@ -88,7 +88,7 @@ class Partial:
         self.rows[stream] = self.rows.get(stream, 0) + len(columns["data"])
 
     def revise(self, changes: Mapping[str, Any]) -> None:
-        """Add fields of the meta that replace those before, as plain data; ValueError for what JSON does not have."""
+        """Add fields that replace those of the meta, as plain data; raises ValueError for NaN and infinity."""
         self._write(_frame(json.dumps({"meta": changes}, allow_nan=False).encode(), b""))
 
     def annotate(self, stream: str, name: str, column: npt.NDArray[Any]) -> None:
@@ -100,7 +100,7 @@ class Partial:
         self._write(_frame(json.dumps({"annotation": [stream, name, kind]}).encode(), body))
 
     def close(self) -> None:
-        """Close the journal; it stays where it is."""
+        """Close the journal and leave it where it is."""
         os.close(self._file)
 
     def _write(self, frame: bytes) -> None:
@@ -110,7 +110,7 @@ class Partial:
                 left = left[os.write(self._file, left) :]
             self._end += len(frame)
         except BaseException:
-            # Whoever goes on after Ctrl-C, or a disk that was full, finds whole frames only.
+            # After Ctrl-C, or on a full disk, only whole frames remain.
             os.ftruncate(self._file, self._end)
             os.lseek(self._file, self._end, os.SEEK_SET)
             raise
@@ -118,29 +118,29 @@ class Partial:
 
 @dataclass(frozen=True)
 class Journal:
-    """What a journal said when it was read; it may have grown since."""
+    """Content of a journal when it was read; it may have grown since."""
 
     path: Path
     text: str
-    """The meta, as it was known last."""
+    """The latest meta, as JSON."""
     annotations: Annotations
     end: int
-    """Bytes that were whole."""
+    """Length of the whole frames [bytes]."""
 
     def blocks(self) -> Iterator[tuple[str, Columns]]:
-        """Yield the blocks that had been there: stream and columns."""
+        """Yield the stream and the columns of each block."""
         return read_blocks(self.path, self.end)
 
 
 def read_journal(path: Path) -> Journal:
-    """Return what a journal says, as far as it is whole.
+    """Return the content of a journal, as far as its frames are whole.
 
     Raises
     ------
     MissingRecordingError
         If there is no such file.
     FormatError
-        If it is no journal, or broke off before it said what it is.
+        If it is no journal, or broke off before the end of its first frame.
     """
     if not path.is_file():
         raise MissingRecordingError(f"There is no recording {path}.", hint="Check the path.")
@@ -162,7 +162,7 @@ def read_journal(path: Path) -> Journal:
 
 
 def read_blocks(path: Path, end: int | None = None) -> Iterator[tuple[str, Columns]]:
-    """Yield the blocks of a journal's first `end` bytes; FormatError for one that makes no sense."""
+    """Yield the blocks in the first `end` bytes of a journal; raises FormatError for one that makes no sense."""
     frames = _frames(path, path.stat().st_size if end is None else end)
     next(frames, None)
     for head, body, _ in frames:
@@ -177,7 +177,7 @@ def _frame(head: bytes, body: bytes) -> bytes:
 
 
 def _frames(path: Path, end: int) -> Iterator[tuple[bytes, bytes, int]]:
-    """Yield head and body of every whole frame, and where it ends; the first one that is not whole ends it."""
+    """Yield the head, the body and the end of every frame, up to the first that is not whole."""
     with path.open("rb") as file:
         if file.read(len(MAGIC)) not in _READ:
             return

@@ -1,4 +1,4 @@
-"""Reading recordings: lazily, and from the file alone."""
+"""Lazy reading of recordings, each from its file alone."""
 
 from __future__ import annotations
 
@@ -22,24 +22,24 @@ _COLUMNS = {
     "data": ("iuf", 2), "t_ns": ("i", 1), "quality": ("u", 2), "sequence": ("i", 1), "device_ns": ("i", 1),
     "host_ns": ("i", 1),
 }  # fmt: skip
-"""Columns of a stream: kinds of NumPy types, and number of dimensions."""
+"""Columns of a stream, with the kinds of NumPy types and the number of dimensions that they may have."""
 
 
 class LazyStream:
-    """A stream in an open recording: nothing is read until it is sliced."""
+    """A stream of an open recording, of which only slices are read."""
 
     def __init__(self, path: Path, spec: StreamSpec, columns: dict[str, Any]) -> None:
         self.spec = spec
         self._path = path
         self._columns = columns
         self.annotations = tuple(name.removeprefix(_NOTE) for name in columns if name.startswith(_NOTE))
-        """Names of the labels of its rows"""
+        """Names of the labels of rows."""
 
     def __len__(self) -> int:
         return int(self._columns["data"].shape[0])
 
     def __getitem__(self, rows: slice) -> StreamData:
-        """Read the rows of a slice, and no others; FormatError if they are damaged."""
+        """Return the rows of a slice, reading no others; raises FormatError if they are damaged."""
         read: dict[str, Any] = {"t_ns": None, "quality": None}
         notes = {}
         for name in self._columns:
@@ -56,11 +56,11 @@ class LazyStream:
             yield self[rows]
 
     def times(self) -> npt.NDArray[np.int64] | None:
-        """Read the time stamps alone, (n,) nanoseconds; None where there is no clock."""
+        """Return the times alone, (n,) nanoseconds; None where there is no clock."""
         return self._read("t_ns", slice(None)) if "t_ns" in self._columns else None
 
     def add_to(self, digest: layout.ContentDigest, *, whole: bool) -> None:
-        """Add every column to the digest, by its name below the stream, `whole` or in pieces."""
+        """Add every column to a digest under its path in the file, `whole` or in pieces."""
         for name in sorted(self._columns):
             for rows in [slice(None)] if whole or not len(self) else self._pieces():
                 digest.add(f"/{self.spec.name}/{name}", self._read(name, rows))
@@ -83,7 +83,7 @@ class LazyStream:
 
 
 class Recording:
-    """An open recording; use it as a context manager, or :meth:`close` it.
+    """An open recording, which is a context manager or is closed by :meth:`close`.
 
     Attributes
     ----------
@@ -141,18 +141,18 @@ class Recording:
         return self._opened[name]
 
     def read(self, name: str) -> StreamData:
-        """Read a whole stream; FormatError if there is none, or if it is damaged."""
+        """Return a whole stream; raises FormatError if there is none, or if it is damaged."""
         return self.stream(name)[:]
 
     def content_digest(self) -> str:
-        """Return the digest of what the recording says, computed from the data now."""
+        """Return the content digest, computed from the data now."""
         digest = layout.ContentDigest(self._text, self.version)
         for name in sorted(self.stream_names):
             self.stream(name).add_to(digest, whole=self.version < 4)
         return digest.hexdigest()
 
     def verify(self) -> str:
-        """Compare the data with the digest that was written with it, and return it; FormatError if they differ."""
+        """Return the content digest; raises FormatError if it differs from the one that was written with the data."""
         digest = self.content_digest()
         if digest != self._file.attrs.get("content_sha256", ""):
             raise FormatError(
@@ -163,7 +163,7 @@ class Recording:
 
 
 class UnwrittenRecording(Recording):
-    """A recording in memory, to be looked at before it is written."""
+    """A recording in memory that is examined before it is written."""
 
     def __init__(self, meta: RecordingMeta, streams: Iterable[StreamData]) -> None:
         self.path, self.meta = Path(meta.name), meta
@@ -213,19 +213,19 @@ def open_recording(path: Path) -> Recording:
 
 
 def read_meta(path: Path) -> RecordingMeta:
-    """Return what a recording says about itself."""
+    """Return the meta of a recording."""
     with open_recording(path) as recording:
         return recording.meta
 
 
 def content_digest(path: Path) -> str:
-    """Return the digest of what a recording says; FormatError if that is not what was written."""
+    """Return the content digest of a recording; raises FormatError if its data have changed since."""
     with open_recording(path) as recording:
         return recording.verify()
 
 
 def _columns(path: Path, spec: StreamSpec, group: Any, recording: Recording) -> dict[str, Any]:
-    """Return the datasets of a stream by their name below it; FormatError if they are not as the meta says."""
+    """Return the datasets of a stream by their path in its group; raises FormatError if they contradict the meta."""
     import h5py
 
     wide = len(spec.channels)
@@ -253,7 +253,7 @@ def _columns(path: Path, spec: StreamSpec, group: Any, recording: Recording) -> 
 
 
 def _envelope(path: Path, file: Any) -> str:
-    """Return the meta text."""
+    """Return the meta of an HDF5 file as text; raises FormatError for a file that is no finished recording."""
     if file.attrs.get("format") != layout.FORMAT:
         raise FormatError(
             f"{path} is an HDF5 file, but not a tactbench recording.",
@@ -272,11 +272,11 @@ def _envelope(path: Path, file: Any) -> str:
 
 
 def parse_meta(path: Path, text: str) -> RecordingMeta:
-    """Return a meta text as a model; FormatError, naming `path`, if it makes no sense."""
+    """Return the meta in a text; raises FormatError, which names `path`, if it is not valid."""
     try:
         return RecordingMeta.model_validate(json.loads(text))
     except ValidationError as error:
         what = complaint(error)
     except (ValueError, UsageError) as error:
         what = str(error)
-    raise FormatError(f"{path} says something about itself that cannot be: {what}.", hint=layout.SEE)
+    raise FormatError(f"The meta of {path} is not valid: {what}.", hint=layout.SEE)

@@ -1,4 +1,4 @@
-"""What a crash left behind: looked at, or turned into a recording that says so."""
+"""Opening of unfinished recordings, and their conversion into recordings that state so."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
 
+from tactbench.core.files import writable
 from tactbench.core.recording import format as layout
 from tactbench.core.recording import image
 from tactbench.core.recording.clock_fit import with_clock_fits
@@ -17,7 +18,7 @@ REMARK = "Rescued: the recording broke off and is not whole."
 
 
 def salvage(path: Path) -> Recording:
-    """Open an unfinished recording (``….partial``): every block that had been written can be read.
+    """Open an unfinished recording (``….partial``), in which every block can be read that had been written.
 
     It may still be growing: what is there now is what is seen.
 
@@ -39,7 +40,7 @@ def salvage(path: Path) -> Recording:
 
 
 def rescue(path: Path, target: Path) -> None:
-    """Turn an unfinished recording into a finished one at `target`, excluded from evaluations since it broke off.
+    """Convert an unfinished recording into a finished one at `target`, excluded from evaluations since it broke off.
 
     The unfinished one stays where it is.
 
@@ -58,16 +59,14 @@ def rescue(path: Path, target: Path) -> None:
     excluded = meta.excluded or "interrupted: it broke off, and was rescued"
     update = {"remarks": (*meta.remarks, REMARK), "excluded": excluded}
     meta, text = _fitted(journal, meta.model_copy(update=update))
-    try:
+    with writable(target):
         target.parent.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise image.cannot_write(target, error) from error
     aside = layout.completing_path(target)
     image.store(target, meta, text, journal.blocks(), journal.annotations, aside=aside, replace=False, sync=True)
 
 
 def _fitted(journal: Journal, meta: RecordingMeta) -> tuple[RecordingMeta, str]:
-    """Return the meta with what the blocks say: clock fits, and how many rows were written."""
+    """Return the meta with clock fits and counts of rows from the blocks, and the same as text."""
     rows: Counter[str] = Counter()
 
     def counted() -> Iterator[tuple[str, Columns]]:

@@ -1,8 +1,8 @@
-"""Writing a recording, so that a crash loses at most the block in flight."""
+"""Writing of recordings, of which a crash loses the last block at most."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
@@ -12,6 +12,7 @@ import numpy.typing as npt
 from pydantic import ValidationError
 
 from tactbench.core.errors import RecordingError, RigError, TactbenchError, complaint
+from tactbench.core.files import writable
 from tactbench.core.recording import format as layout
 from tactbench.core.recording import image
 from tactbench.core.recording.clock_fit import with_clock_fits
@@ -22,7 +23,7 @@ from tactbench.core.spec.sensor import StreamSpec
 
 
 class RecordingWriter:
-    """Writes one recording; use it as a context manager.
+    """Writer of one recording, which is a context manager.
 
     While it is open, a journal ``<path>.partial`` (or ``<path>.2.partial`` where that is taken, and so on) holds, after
     every block, all blocks so far. Leaving the context completes the recording: times of devices are put on the host's
@@ -38,9 +39,6 @@ class RecordingWriter:
         What it says about itself; :meth:`revise` changes it until the end.
     replace
         Whether a file that is there is replaced, at the end and not before.
-    keep
-        Whether the journal stays of a recording that could not be completed; False where it can be made again, from a
-        table or a log.
 
     Raises
     ------
@@ -48,32 +46,25 @@ class RecordingWriter:
         If there is a file and it is not to be replaced, or the disk refuses.
     """
 
-    def __init__(self, path: Path, meta: RecordingMeta, *, replace: bool = False, keep: bool = True) -> None:
+    def __init__(self, path: Path, meta: RecordingMeta, *, replace: bool = False) -> None:
         self.path = path
         self.meta = meta
         self._replace = replace
-        self._keep = keep
         self._specs = layout.specs_by_name(meta)
-        self._forces = {
-            stream.name: [place for place, one in enumerate(stream.channels) if one.kind in ("force", "torque")]
-            for stream in meta.reference
-        }
         self.content_digest = ""
-        """Digest of what was written, once the recording is complete."""
+        """Content digest, once the recording is complete."""
         self._annotations: Annotations = {}
-        self._has: dict[str, tuple[bool, bool]] = {}
+        self._optional: dict[str, tuple[bool, bool]] = {}
         self._partial: Partial
         self.journal: Path | None = None
-        """What was kept of a recording that was not completed, once the context is left."""
+        """Journal of a recording that was not completed, once the context is left; None: there is none."""
 
     def __enter__(self) -> RecordingWriter:
         if not self._replace:
             image.require_free(self.path)
-        try:
+        with writable(self.path):
             self.path.parent.mkdir(parents=True, exist_ok=True)
             self._partial = Partial(self.path, layout.meta_text(self.meta))
-        except OSError as error:
-            raise image.cannot_write(self.path, error) from error
         return self
 
     def __exit__(self, _kind: object, error: BaseException | None, _trace: object) -> None:
@@ -88,11 +79,11 @@ class RecordingWriter:
     @property
     def _unique(self) -> bool:
         """Whether the recording cannot be made again, or stands for one that cannot: of emulated devices."""
-        return self._keep and (not self.meta.simulated or self.meta.emulation is not None)
+        return not self.meta.simulated or self.meta.emulation is not None
 
     @property
     def rows(self) -> Mapping[str, int]:
-        """Rows of the streams that have had a block."""
+        """Number of rows of each stream that has had a block."""
         return self._partial.rows
 
     def complete(self) -> None:
@@ -104,7 +95,7 @@ class RecordingWriter:
             If the disk refuses it; the journal then stays, as after a crash.
         """
         journal = self._partial
-        if any(timed for _, timed in self._has.values()):
+        if any(timed for _, timed in self._optional.values()):
             self.meta = with_clock_fits(self.meta, self._blocks(journal))
         self.content_digest = image.store(
             self.path, self.meta, layout.meta_text(self.meta), self._blocks(journal), self._annotations,
@@ -112,7 +103,7 @@ class RecordingWriter:
         )  # fmt: skip
 
     def _blocks(self, journal: Partial) -> Iterator[tuple[str, Columns]]:
-        """Yield the blocks of the journal; RecordingError if a row that came is not there."""
+        """Yield the blocks of the journal; raises RecordingError if rows of it are lost."""
         left = dict(journal.rows)
         for stream, columns in read_blocks(journal.path):
             left[stream] -= len(columns["data"])
@@ -123,7 +114,7 @@ class RecordingWriter:
             )
 
     def _leave(self, error: BaseException | None) -> None:
-        """Close the journal; remove it unless it holds rows that are nowhere else."""
+        """Close the journal, and remove it unless it holds rows that are nowhere else."""
         journal = self._partial
         journal.close()
         if not self.content_digest and any(journal.rows.values()) and self._unique:
@@ -149,12 +140,10 @@ class RecordingWriter:
             self.meta = RecordingMeta.model_validate({**dict(self.meta), **changes})
         except ValidationError as error:
             raise RecordingError(
-                f"The recording {self.meta.name!r} cannot say {complaint(error)}.", hint="Correct the rig."
+                f"The meta of {self.meta.name!r} would not be valid: {complaint(error)}.", hint="Correct the rig."
             ) from error
-        try:
+        with writable(self.path):
             self._partial.revise(self.meta.model_dump(mode="json", include=set(changes)))
-        except OSError as error:
-            raise image.cannot_write(self.path, error) from error
 
     def append(self, block: Block) -> None:
         """Add `block` to its stream and flush it.
@@ -168,21 +157,18 @@ class RecordingWriter:
         RecordingError
             If the disk refuses it.
         """
-        spec = self._checked(block)
-        columns = _columns(block, spec)
+        columns = stored_columns(block, self.meta, self._specs)
         has = (block.sequence is not None, block.device_ns is not None)
-        if self._has.setdefault(spec.name, has) != has:
+        if self._optional.setdefault(block.stream, has) != has:
             raise RigError(
-                f"Some blocks of stream {spec.name!r} have sequence numbers or device times and some have none.",
+                f"Some blocks of stream {block.stream!r} have sequence numbers or device times and some have none.",
                 hint="Give them with all blocks of a stream, or with none.",
             )
-        try:
-            self._partial.append(spec.name, columns)
-        except OSError as error:
-            raise image.cannot_write(self.path, error) from error
+        with writable(self.path):
+            self._partial.append(block.stream, columns)
 
     def annotate(self, stream: str, name: str, values: Sequence[str] | npt.NDArray[Any]) -> None:
-        """Attach a label to every row of `stream`: text or whole numbers, one a row, after its last block.
+        """Add a label to every row of `stream`: text or whole numbers, one for each row, after its last block.
 
         Raises
         ------
@@ -190,51 +176,92 @@ class RecordingWriter:
             If the disk refuses it; on completion, if there are fewer labels or more than rows.
         """
         column = np.asarray(values)
-        try:
+        with writable(self.path):
             self._partial.annotate(stream, name, column)
-        except OSError as error:
-            raise image.cannot_write(self.path, error) from error
         self._annotations.setdefault(stream, {})[name] = column
 
-    def _checked(self, block: Block) -> StreamSpec:
-        spec = self._specs.get(block.stream)
-        if spec is None:
-            raise RigError(
-                f"A block of stream {block.stream!r} came; the recording has {', '.join(sorted(self._specs))}.",
-                hint="Declare the stream in the sensor's spec or the rig's reference.",
-            )
-        rows, wide = len(block.data), len(spec.channels)
-        for name, values, shape in (
-            ("data", block.data, (rows, wide)), ("quality", block.quality, (rows, wide)), ("t_ns", block.t_ns, (rows,)),
-            ("sequence", block.sequence, (rows,)), ("device_ns", block.device_ns, (rows,)),
-        ):  # fmt: skip
-            if values is not None and np.shape(values) != shape:
-                raise RigError(
-                    f"A block of stream {block.stream!r} has {name} of shape {np.shape(values)}, not (n, {wide})"
-                    f"{'' if name == 'data' else f' or (n,) with n = {rows}'}.",
-                    hint="A block is rows by channels, in the order of the stream's spec; give one time a row.",
-                )
-        for place in self._forces.get(block.stream, ()):
-            empty = ~np.isfinite(block.data[:, place])
-            if block.quality is not None:
-                empty &= (block.quality[:, place] & Quality.MISSING) == 0
-            if empty.any():
-                raise RigError(
-                    f"The reference {spec.channels[place].name!r} of {block.stream!r} is NaN in {int(empty.sum())} "
-                    "rows that are not marked as missing.",
-                    hint="Mark rows without a sample by the quality MISSING.",
-                )
-        if (block.t_ns is None) != (self.meta.clock == "none"):
-            has = "no times" if block.t_ns is None else "times"
-            raise RigError(
-                f"A block of stream {block.stream!r} has {has}; the recording's clock is {self.meta.clock!r}.",
-                hint="Give every block its times, or say that there is no clock; never invent one.",
-            )
-        return spec
+
+def write_recording(
+    path: Path, meta: RecordingMeta, blocks: Iterable[Block], annotations: Annotations, *, replace: bool = False
+) -> RecordingMeta:
+    """Write a recording whose blocks are all there, and can be had again: no journal is kept of it.
+
+    Parameters
+    ----------
+    path
+        Place of the recording.
+    meta
+        The meta of the recording, to which the clock fits of devices are added.
+    blocks
+        All blocks.
+    annotations
+        Labels of rows, by stream and name.
+    replace
+        Whether a file that is there is replaced.
+
+    Raises
+    ------
+    RigError
+        If a block does not fit its stream.
+    RecordingError
+        If there is a file and it is not to be replaced, or the disk refuses.
+    """
+    specs = layout.specs_by_name(meta)
+    stored = [(block.stream, stored_columns(block, meta, specs)) for block in blocks]
+    meta = with_clock_fits(meta, stored)
+    if not replace:
+        image.require_free(path)
+    with writable(path):
+        path.parent.mkdir(parents=True, exist_ok=True)
+    aside = layout.completing_path(path)
+    image.store(path, meta, layout.meta_text(meta), stored, annotations, aside=aside, replace=replace, sync=False)
+    return meta
 
 
-def _columns(block: Block, spec: StreamSpec) -> Columns:
-    """Return what is stored of `block`, by column; quality only if something is not good."""
+def stored_columns(block: Block, meta: RecordingMeta, specs: Mapping[str, StreamSpec]) -> Columns:
+    """Return the columns of `block` as they are stored; quality only if a sample is not good.
+
+    Raises
+    ------
+    RigError
+        If the block does not fit its stream, one of `specs`, as :meth:`RecordingWriter.append` lists.
+    """
+    spec = specs.get(block.stream)
+    if spec is None:
+        raise RigError(
+            f"A block of stream {block.stream!r} came; the recording has {', '.join(sorted(specs))}.",
+            hint="Declare the stream in the sensor's spec or the rig's reference.",
+        )
+    rows, wide = len(block.data), len(spec.channels)
+    for name, values, shape in (
+        ("data", block.data, (rows, wide)), ("quality", block.quality, (rows, wide)), ("t_ns", block.t_ns, (rows,)),
+        ("sequence", block.sequence, (rows,)), ("device_ns", block.device_ns, (rows,)),
+    ):  # fmt: skip
+        if values is not None and np.shape(values) != shape:
+            raise RigError(
+                f"A block of stream {block.stream!r} has {name} of shape {np.shape(values)}, not (n, {wide})"
+                f"{'' if name == 'data' else f' or (n,) with n = {rows}'}.",
+                hint="A block is rows by channels, in the order of the stream's spec; give one time a row.",
+            )
+    of_reference = any(one.name == spec.name for one in meta.reference)
+    for place, channel in enumerate(spec.channels if of_reference else ()):
+        if channel.kind not in ("force", "torque"):
+            continue
+        empty = ~np.isfinite(block.data[:, place])
+        if block.quality is not None:
+            empty &= (block.quality[:, place] & Quality.MISSING) == 0
+        if empty.any():
+            raise RigError(
+                f"The reference {channel.name!r} of {block.stream!r} is NaN in {int(empty.sum())} rows that are not "
+                "marked as missing.",
+                hint="Mark rows without a sample by the quality MISSING.",
+            )
+    if (block.t_ns is None) != (meta.clock == "none"):
+        has = "no times" if block.t_ns is None else "times"
+        raise RigError(
+            f"A block of stream {block.stream!r} has {has}; the recording's clock is {meta.clock!r}.",
+            hint="Give every block its times, or state that there is no clock; never invent one.",
+        )
     columns: Columns = {"data": _stored(block.data, spec)}
     for name, numbers in (("t_ns", block.t_ns), ("sequence", block.sequence), ("device_ns", block.device_ns)):
         if numbers is not None:
@@ -270,7 +297,7 @@ def _stored(data: npt.NDArray[Any], spec: StreamSpec) -> npt.NDArray[Any]:
 
 
 def recovery(journal: Path, path: Path) -> str:
-    """Return in words where the rows of an unfinished recording are, and the command that makes a recording of them."""
+    """Return a sentence with the journal of an unfinished recording, and the command that makes a recording of it."""
     import shlex
 
     rescued = path.with_name(f"{path.stem}-rescued{path.suffix}") if path.exists() else path

@@ -1,1 +1,1 @@
-"""What things are: frozen models without behaviour, readable on one screen each."""
+"""Specifications of sensors, scenes, rigs, tasks and recordings, as frozen pydantic models."""

@@ -1,4 +1,4 @@
-"""A task that comes with recordings: declared in the mapping that imports them, data alone, no code."""
+"""Tasks that come with recordings: the mapping that imports them declares them as data, without code."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from tactbench.core.spec.summary import Summary
 from tactbench.core.spec.task import VECTOR_METRIC, ChannelTarget, LabelTarget, TaskSpec, VectorTarget
 
 FILE = "tasks.yaml"
-"""Beside the recordings: what their mapping declares."""
+"""Name of the file beside recordings with the tasks that their mapping declares."""
 
 Metric = Literal[
     "rmse", "mae", "r2", "mean_euclidean_error", "macro_f1", "accuracy", "balanced_accuracy"
@@ -23,37 +23,37 @@ _METRICS: dict[str, tuple[Metric, ...]] = {
     "vector": (VECTOR_METRIC,),
     "class": ("macro_f1", "accuracy", "balanced_accuracy"),
 }
-"""Of each kind of answer, the default first."""
+"""Metrics of each kind of answer, the default first."""
 _ESTIMATORS = {"number": ("forest", "ridge"), "vector": ("forest-100", "ridge"), "class": ("forest", "logistic")}
 _BASELINES = {"number": ("mean", "time-index"), "vector": ("mean", "time-index"), "class": ("majority", "chance")}
 
 
 class DeclaredTask(Frozen):
-    """What a mapping says of a task; whatever it leaves out follows from the target."""
+    """A task as a mapping declares it; what it leaves out follows from the target."""
 
     name: str = Field(pattern=r"^[a-z][a-z0-9_-]*$")
     title: str = ""
-    """Empty: the name."""
+    """Title; empty: the name."""
     question: str = ""
-    """One sentence, for people."""
+    """The question in one sentence, for people."""
     target: Annotated[ChannelTarget | VectorTarget | LabelTarget, Field(discriminator="source")]
     answer: Literal["number", "class"] | None = None
-    """Of a label: whether it is a number or, as it is read by default, a class."""
+    """Whether a label is a number or, by default, a class; None for a channel."""
     metric: Metric | None = None
-    """None: the first that fits the target."""
+    """Metric; None: the first that fits the target."""
     splits: tuple[str, ...] = Field(min_length=1)
-    """The default first: roles, session, in-session, few-shot-N, shuffled, or the name of a label."""
+    """Splits, the default first: roles, session, in-session, few-shot-N, shuffled, or the name of a label."""
     features: tuple[ChannelKind, ...] = ("taxel",)
     optional_features: tuple[ChannelKind, ...] = ()
-    """Further kinds, of sensors that have them."""
+    """Further kinds of channels, used where a sensor has them."""
     answer_per: Literal["sample", "recording"] = "sample"
     summaries: tuple[Summary, ...] = ()
     vote: Literal["frames"] | None = None
     protocols: tuple[str, ...] = Field(default=("deployable",), min_length=1)
     estimators: tuple[str, ...] = ()
-    """Empty: two that fit the target."""
+    """Names of estimators; empty: two that fit the target."""
     baselines: tuple[str, ...] = ()
-    """Empty: the usual trivial ones."""
+    """Names of trivial estimators; empty: the usual ones."""
     equivalence: float | None = Field(default=None, ge=0)
 
     @property
@@ -76,7 +76,7 @@ class DeclaredTask(Frozen):
 
     @property
     def spec(self) -> TaskSpec:
-        """The task as any other."""
+        """The same task as a plugin would bring it."""
         answer, metric = self._answer, self.metric or _METRICS[self._answer][0]
         unit = self.target.unit if metric in ("rmse", "mae", VECTOR_METRIC) else "1"
         return TaskSpec(
@@ -90,7 +90,7 @@ class DeclaredTask(Frozen):
 
 
 class TaskFile(Frozen):
-    """What :data:`FILE` holds."""
+    """Content of the file :data:`FILE`."""
 
     version: Literal[1] = 1
     tasks: tuple[DeclaredTask, ...] = ()

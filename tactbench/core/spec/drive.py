@@ -1,4 +1,4 @@
-"""How a linear motor is made to press with a wanted force: a controller, a filter, and the motor's own limits."""
+"""Model of a linear motor that presses with a wanted force: controller, filter, and limits of the motor."""
 
 from __future__ import annotations
 
@@ -19,18 +19,18 @@ class ForceLoop(Frozen):
 
     kind: Literal["force loop"] = "force loop"
     proportional: Quantity = assumed(0.15, "mm/N", _PAPER_LOOP)
-    """Position commanded per force missing [length / force]."""
+    """Proportional gain: position for each newton of missing force [length / force]."""
     integral: Quantity = assumed(1.0, "mm/N/s", _PAPER_LOOP)
-    """Rate of position per force missing [length / force / time]."""
+    """Integral gain: speed for each newton of missing force [length / force / time]."""
     cutoff: Quantity | None = assumed(1.0, "Hz", f"{_PAPER_LOOP}: no cut-off either")
-    """Cut-off of the first-order low-pass on the measured force [1/time]; None: unfiltered."""
+    """Cut-off of the first-order low-pass on the measured force [1/time]; None: there is no filter."""
     rate: Quantity | None = None
-    """Steps of the loop [1/time]; None: one per sample of the reference clock, as the embedded system that reads
-    the sensors would do it."""
+    """Rate of the loop [1/time]; None: that of the reference clock, as with an embedded system that also reads the
+    sensors."""
     delay: Quantity = assumed(
         10.0, "ms", "RS232, as the paper says, at 9600 baud: a command and its answer of 9 to 10 bytes of 10 bits"
     )
-    """From reading the force to the motor's having the command [time]; rounded up to whole steps."""
+    """Time from reading the force until the motor has the command [time]; it is rounded up to whole steps."""
     motor_lag: Quantity = assumed(10.0, "ms", "closed position loop of a small linear motor; no source")
     """Time constant with which the motor approaches a commanded position [time]."""
     speed: Quantity = assumed(50.0, "mm/s", "small linear motors reach metres per second; set low for pressing")

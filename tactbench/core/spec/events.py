@@ -1,4 +1,4 @@
-"""What counts as slip, as an alarm, as a hit and as a false alarm: every number stated."""
+"""Definitions of slip, alarms, hits and false alarms, with all their numbers."""
 
 from __future__ import annotations
 
@@ -9,38 +9,38 @@ from pydantic import Field, model_validator
 from tactbench.core.spec.quantity import Frozen
 
 Seconds = Annotated[float, Field(ge=0, le=1e6)]
-"""A length of time that int64 nanoseconds hold many times over."""
+"""A duration [s], short enough for int64 nanoseconds."""
 
 
 AREA_PER_MINUTE = 20.0
-"""False alarms a minute up to which recall is averaged to `recall_area` [1/min] (assumed)."""
+"""Largest rate of false alarms up to which recall is averaged to `recall_area` [1/min] (assumed)."""
 
 
 def nanoseconds(seconds: float) -> int:
-    """Return whole nanoseconds: times are compared as integers, so that rounding decides no hit."""
+    """Return a duration in whole nanoseconds; times are compared as integers, so that rounding decides no hit."""
     return round(seconds * 1e9)
 
 
 class AlarmPolicy(Frozen):
-    """How a detector's frames become alarms, and what an alarm is held against.
+    """Rules by which frames of a detector become alarms, and alarms become hits or false alarms.
 
     No field has a default. A hidden one may decide the result: those of timescoring 0.0.7, made for seizures (30 s
     before, 60 s after, merging below 90 s), give F1 = 1 to a detector whose last alarm comes 10 s after the event.
     """
 
     window_before_s: Seconds
-    """An alarm at most this long before an onset may hit it [s]."""
+    """Longest time by which an alarm that hits comes before an onset [s]."""
     window_after_s: Seconds
-    """An alarm at most this long after an onset may hit it [s]."""
+    """Longest time by which an alarm that hits comes after an onset [s]."""
     refractory_s: Seconds
-    """After an alarm, no other for this long [s]. One that falls into it is dropped, not put off."""
+    """Time after an alarm in which further alarms are dropped [s]."""
     merge_gap_s: Seconds
-    """Active frames at most this far apart belong to one segment [s], as neighbouring active frames always do."""
+    """Longest gap between active frames of one segment [s]; neighbouring active frames always share one."""
     minimum_length_s: Seconds
-    """A segment raises its one alarm at its first active frame that comes this long after its beginning [s]."""
+    """Time after which a segment raises its one alarm, at its next active frame [s]."""
     false_alarm_time: Literal["disturbances", "non-events"]
-    """The seconds that false alarms per minute are counted on and divided by: the declared disturbances, or all of the
-    recording; in both without every event and its window."""
+    """Stretches in which false alarms are counted, and whose seconds divide them: the declared disturbances, or all of
+    the recording; events and their windows are left out of both."""
 
     def __str__(self) -> str:
         return (
@@ -51,18 +51,18 @@ class AlarmPolicy(Frozen):
 
 
 class SlipThresholds(Frozen):
-    """Where stick, incipient and gross slip part. No field has a default."""
+    """Thresholds between stick, incipient slip and gross slip. No field has a default."""
 
     hold_s: Seconds = Field(gt=0)
-    """A contact rests where its displacements of this long [s] differ by no more than `gross_displacement_m`."""
+    """Duration over which the displacements of a resting contact differ by `gross_displacement_m` at most [s]."""
     gross_displacement_m: float = Field(gt=0)
-    """Gross slip is displacement of more than this after such a hold [m]."""
+    """Displacement after such a rest above which slip is gross [m]."""
     incipient_slip_share: float = Field(gt=0, lt=1)
-    """Incipient slip begins where ``1 - c/a`` exceeds this [1]."""
+    """Value of ``1 - c/a`` above which slip is incipient [1]."""
     gross_stick_ratio: float = Field(gt=0, lt=1)
-    """It ends where c/a is at or below this: by its forces the contact slips as a whole [1]."""
+    """Value of c/a at or below which the whole contact slips, by its forces [1]."""
     contact_force_n: float = Field(gt=0)
-    """With less normal force there is no contact worth a label [N]."""
+    """Normal force below which there is no contact to label [N]."""
 
     @model_validator(mode="after")
     def _in_order(self) -> SlipThresholds:
@@ -71,7 +71,7 @@ class SlipThresholds(Frozen):
         return self
 
     def scaled(self, factor: float) -> SlipThresholds:
-        """Return the same with displacement, slip share and stick ratio times `factor`.
+        """Return thresholds with displacement, slip share and stick ratio multiplied by `factor`.
 
         How long a hold lasts and what a contact is are not scaled: they say where labels exist, not where they part.
         """
@@ -83,13 +83,13 @@ class SlipThresholds(Frozen):
 THRESHOLDS = SlipThresholds(
     hold_s=0.1, gross_displacement_m=1e-4, incipient_slip_share=0.1, gross_stick_ratio=0.1, contact_force_n=0.05
 )
-"""The published ones. All five are assumed: no source was found that states them for a whole contact. They see slip
-faster than 1 mm/s, or by steps of more than 0.1 mm. What a score owes to them is shown by halving and doubling them
-(`tactbench.core.evaluation.slip_reference`)."""
+"""The thresholds of the published tasks. All five are assumed, as no source states them for a whole contact. They
+detect slip faster than 1 mm/s, or by steps of more than 0.1 mm. Halving and doubling them shows how a score depends on
+them (`tactbench.core.evaluation.slip_reference`)."""
 
 
 class SlipTarget(Frozen):
-    """Whether the contact slips, frame by frame, by the reference alone.
+    """The target of frames: whether the contact slips, by the reference alone.
 
     It needs forces called `normal` and `tangential` and a length called `slip`, the displacement of surface and skin
     against each other, all on one clock; and the coefficient of friction as a label of the recording.
@@ -97,14 +97,14 @@ class SlipTarget(Frozen):
 
     source: Literal["slip"] = "slip"
     hop_s: Seconds = Field(gt=0)
-    """A frame ends every so many seconds."""
+    """Time between the ends of two frames [s]."""
     window_s: Seconds = Field(gt=0)
-    """A frame looks at so many seconds before its end."""
+    """Length of a frame [s]."""
     thresholds: SlipThresholds = THRESHOLDS
     friction: str = "friction_coefficient"
-    """Label of a recording with the static coefficient of friction [1]."""
+    """Label of a recording that holds the static coefficient of friction [1]."""
     disturbance: tuple[str, str] = ("event", "disturbance")
-    """Label of a recording, and its value where the recording as a whole is a disturbance that is no slip."""
+    """Label of a recording, and the value of it that marks the recording as a disturbance without slip."""
 
     def __str__(self) -> str:
         return f"frames of {self.window_s:g} s, one every {self.hop_s:g} s"

@@ -1,4 +1,4 @@
-"""Force paths that are used again and again: a staircase, a held press, a sine. Newtons, seconds, hertz."""
+"""Force profiles by name: a staircase, a held press and a sine, in newtons, seconds and hertz."""
 
 from __future__ import annotations
 
@@ -10,7 +10,8 @@ from tactbench.core.spec.profile import ForcePath
 from tactbench.core.spec.quantity import Source
 
 PER_PERIOD = 64
-"""Points of a period of a sine; straight between them it is off by ``1 - cos(pi/64)``, 0.12 % of its amplitude."""
+"""Points of a period of a sine; the straight lines between them are off by ``1 - cos(pi/64)``, 0.12 % of its
+amplitude."""
 
 
 def staircase(
@@ -22,7 +23,7 @@ def staircase(
     hold: float = 3.0,
     rate: float = 100.0,
 ) -> ForcePath:
-    """Return equal steps up to a force and down again: each level is held, as for a calibration curve with hysteresis.
+    """Return a path with equal steps up to a force and down again, as for a calibration curve with hysteresis.
 
     Parameters
     ----------
@@ -59,7 +60,7 @@ def press_hold_release(
     hold: float = 3.0,
     rate: float = 100.0,
 ) -> ForcePath:
-    """Return one press that is held and released: what creeps under the load, and what comes back after it.
+    """Return a path with one press that is held and released, which shows creep and recovery.
 
     Parameters
     ----------
@@ -91,7 +92,7 @@ def sine(
     hold: float = 3.0,
     rate: float = 200.0,
 ) -> ForcePath:
-    """Return a force that swings about a mean, beginning and ending at its lowest.
+    """Return a path in which the force swings about a mean, beginning and ending at its lowest.
 
     It runs straight between 64 points a period, by which it is off by up to 0.12 % of the amplitude.
 

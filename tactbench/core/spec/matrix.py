@@ -1,4 +1,4 @@
-"""What ``benchmarks.yaml`` says: which tasks are asked of which sensors, and how."""
+"""Model of ``benchmarks.yaml``: which tasks which sensors answer, and how."""
 
 from __future__ import annotations
 
@@ -12,53 +12,54 @@ from tactbench.core.spec.scene import Simulation
 
 
 def _by_name(given: Any) -> Any:
-    """Read a bare word as ``{name: word}``."""
+    """Return a bare word as ``{name: word}``, and anything else as it is."""
     return {"name": given} if isinstance(given, str) else given
 
 
 def _names(given: Any) -> Any:
-    """Read a bare word as a list of one, and nothing as none."""
+    """Return a bare word as a tuple of one, and None as an empty one."""
     if given is None:
         return ()
     return (given,) if isinstance(given, str) else given
 
 
 REPLICATES = 8
-"""Replicates of a simulated cell: with eight, one outlying replicate moves no end of the 95 % interval by much."""
+"""Default number of replicates of a simulated cell; of so many, one outlier moves neither end of a 95 % interval by
+much."""
 
 Names = Annotated[tuple[str, ...], BeforeValidator(_names)]
-"""A name, or a list of names."""
+"""One name or a list of names."""
 
 
 class EstimatorChoice(Frozen):
-    """An estimator, with parameters other than its defaults."""
+    """An estimator, with the parameters that differ from its defaults."""
 
     name: str
     params: dict[str, bool | int | float | str | None] = Field(default_factory=dict)
 
 
 class TaskChoice(Frozen):
-    """A task, and how it is to be answered."""
+    """A task, with the protocols, splits and estimators that answer it."""
 
     name: str
     protocol: Names = ()
-    """One or several, each giving cells of its own; none: the task's first."""
+    """Protocols, each with cells of its own; empty: the first of the task."""
     split: Names = ()
-    """One or several, each giving cells of its own; none: the first of the task's splits that the recordings can serve.
-    `few-shot` stands for all of the task's splits `few-shot-N`."""
+    """Splits, each with cells of its own; empty: the first of the task that the recordings can serve. `few-shot` stands
+    for all of the task's splits `few-shot-N`."""
     estimators: tuple[Annotated[EstimatorChoice, BeforeValidator(_by_name)], ...] | None = None
-    """None: the task's own. Its baselines are always run, and alone where this is empty."""
+    """Estimators beside the baselines, which are always run; None: those of the task."""
     dataset: str | None = None
-    """Name, or mapping file, of a public data set that is asked, whatever the matrix says of recordings."""
+    """Name or mapping file of a public data set on which this task is run, in place of the recordings of the matrix."""
 
 
 class ComparisonChoice(Frozen):
-    """Two sensors or two estimators that the matrix is run to compare."""
+    """Two sensors or two estimators that are to be compared."""
 
     sensors: tuple[str, str] | None = None
     estimators: tuple[str, str] | None = None
     task: str | None = None
-    """None: with every task that both have answered."""
+    """Task of the comparison; None: every task that both have answered."""
 
     @model_validator(mode="after")
     def _one_kind_of_two(self) -> ComparisonChoice:
@@ -71,33 +72,34 @@ class ComparisonChoice(Frozen):
 
 
 class MatrixSpec(Frozen):
-    """The matrix: every sensor with every task."""
+    """The matrix: every sensor with every task, and how cells are run."""
 
     version: Literal[1] = 1
     seed: int = Field(default=1, ge=0)
     repeats: int | None = Field(default=None, ge=1, le=MOST_REPEATS)
-    """Replicates: how often everything is recorded and answered anew, each time with another seed. None: eight on a
-    simulated rig; on recordings one, whose sessions are the replicates."""
+    """Number of replicates, each recorded and answered anew with another seed. None: eight on a simulated rig; on
+    recordings one, whose sessions are the replicates."""
     rig: str = ""
-    """Empty: the simulated one (:meth:`~tactbench.core.plugins.registry.Registry.first_rig`)."""
+    """Name of the rig; empty: the simulated one (:meth:`~tactbench.core.plugins.registry.Registry.first_rig`)."""
     recordings: str | None = None
-    """Folder of recordings for rigs that replay; relative to where tactbench is run."""
+    """Folder of recordings for rigs that replay, relative to the working directory."""
     rig_file: str | None = None
-    """File of a rig of real or emulated devices (:class:`~tactbench.core.spec.rig_file.RigFile`); relative likewise."""
+    """File of a rig of real or emulated devices (:class:`~tactbench.core.spec.rig_file.RigFile`), relative likewise."""
     timeout_s: float | None = Field(default=None, gt=0, le=MOST_SECONDS)
-    """Seconds that one cell or one recording may take."""
+    """Longest time that a cell or a recording may take [s]."""
     memory_mb: int | None = Field(default=None, ge=1, le=MOST_MEMORY_MB)
-    """MB (2**20 bytes) that one cell or one recording may take beyond what all share."""
+    """Most memory that a cell or a recording may take beyond what all share [MB of 2**20 bytes]."""
     probe: bool = False
-    """Also run the cells that show what recordings give away; see docs/real-recordings.md."""
+    """Whether cells are run that show what recordings give away; see docs/real-recordings.md."""
     latency: bool = True
-    """Measure how long one row takes, up to 0.3 s a cell; False: rows say nothing about it."""
+    """Whether the time of answering one row is measured, which takes up to 0.3 s a cell."""
     include_incomplete: bool = False
-    """Let recordings of which more is missing than their rig file allows take part."""
+    """Whether recordings take part that lack more than their rig file allows."""
     simulation: Simulation = Simulation()
-    """How a simulated rig is asked to carry out every scene."""
+    """Settings with which a simulated rig carries out every scene."""
     sensors: tuple[str, ...] = ()
-    """Empty: all that the rig's recordings hold."""
+    """Names of sensors; empty: all of which the rig has recordings."""
     tasks: tuple[Annotated[TaskChoice, BeforeValidator(_by_name)], ...] = Field(min_length=1)
     comparisons: tuple[ComparisonChoice, ...] = ()
-    """What is to be compared, said beforehand: p-values are corrected for being so many. All else is exploratory."""
+    """Comparisons that are planned in advance: their p-values are corrected for their number; others are
+    exploratory."""

@@ -1,4 +1,4 @@
-"""The numbers by which a scene gives the shape of an indenter or a force profile that a plugin defines."""
+"""Parameters of indenter shapes and force profiles that plugins define."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ from tactbench.core.spec.quantity import Frozen, Quantity, Unit
 
 
 class Parameter(Frozen):
-    """One number of a shape or of a force profile."""
+    """A parameter of a shape or of a force profile."""
 
     default: float
-    """Its value where nobody gives one, in `unit`."""
+    """Value that is taken where a scene gives none, in `unit`."""
     unit: Unit
-    """In which the code that a plugin names is given it."""
+    """Unit in which the plugin's code receives the value."""
     text: str = Field(pattern=r"^\S[^\n]*$")
-    """One line: what it is."""
+    """Description in one line."""
     least: float = 0.0
     """Smallest value that may be given, in `unit`."""
     most: float | None = None
@@ -37,7 +37,7 @@ class Parameter(Frozen):
 
     @property
     def range(self) -> str:
-        """What may be given, in words: ``0.5 to 3 mm``."""
+        """The range of values in words: ``0.5 to 3 mm``."""
         unit = "" if self.unit == "1" else f" {self.unit}"
         upper = "" if self.most is None else f" to {self.most:g}"
         return f"{self.least:g}{upper}{unit}{'' if upper else ' or more'}"
@@ -76,8 +76,8 @@ def values_of(what: str, parameters: Mapping[str, Parameter], given: Mapping[str
 
 
 def check_names(what: str, parameters: Mapping[str, Parameter], given: Iterable[str]) -> None:
-    """Raise UsageError, naming it, if one of the names `given` is not one of `parameters`."""
+    """Raise UsageError for the first of the names `given` that is not one of `parameters`."""
     for name in given:
         if name not in parameters:
             known = ", ".join(f"{known} [{one.unit}]" for known, one in parameters.items()) or "nothing"
-            raise UsageError(f"{what}: {name!r} is given, and it has no such number.", hint=f"It has: {known}.")
+            raise UsageError(f"{what}: {name!r} is given, which it does not have.", hint=f"It has: {known}.")

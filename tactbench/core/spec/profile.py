@@ -1,4 +1,4 @@
-"""The normal force over time that a recording is to have: a ramp, or a path from point to point."""
+"""Profiles of the normal force over time of a recording: a ramp, or a path from point to point."""
 
 from __future__ import annotations
 
@@ -14,16 +14,16 @@ PAPER = "Karl et al. 2016, ML-based tactile sensor calibration"
 
 
 class ForceRamp(Frozen):
-    """No load for `hold_s`, then a straight rise of the normal force."""
+    """A profile that holds its start for `hold_s` and then rises straight to its end."""
 
     kind: Literal["ramp"] = "ramp"
     start: Quantity = sourced(0.0, "N", PAPER)
     end: Quantity = sourced(5.0, "N", PAPER)
     hold: Quantity = assumed(7.2, "s", "the paper's first 600 samples: only the initialization of the setup")
     duration: Quantity = sourced(60.0, "s", PAPER)
-    """Whole recording, the hold included."""
+    """Duration of the whole recording, with the hold [time]."""
     samples: int = Field(default=5000, ge=1)
-    """Samples of the reference clock over `duration`."""
+    """Number of samples of the reference clock over `duration`."""
 
     @property
     def largest_n(self) -> float:
@@ -32,7 +32,7 @@ class ForceRamp(Frozen):
 
     @property
     def hold_s(self) -> float:
-        """How long the force stays at its start [s]: at most the whole recording."""
+        """Time for which the force stays at its start, at most the whole recording [s]."""
         return min(self.hold.to("s"), self.duration.to("s"))
 
     @property
@@ -45,17 +45,17 @@ class ForceRamp(Frozen):
 
 
 class ForcePath(Frozen):
-    """A normal force that runs straight from point to point, as in presses, taps and ripples."""
+    """A profile that runs straight from point to point, as in presses, taps and ripples."""
 
     kind: Literal["path"] = "path"
     times_s: tuple[float, ...] = Field(min_length=2)
-    """(k,) ascending from 0 [s]; the last is the whole recording."""
+    """Times of the points, (k,), ascending from 0 [s]; the last is the end of the recording."""
     forces_n: tuple[Annotated[float, Field(ge=0)], ...]
-    """(k,) [N]"""
+    """Forces at the points, (k,) [N]."""
     samples: int = Field(ge=1)
-    """Samples of the reference clock over the whole recording."""
+    """Number of samples of the reference clock over the whole recording."""
     source: Source
-    """Why these forces."""
+    """Source of these forces."""
 
     @model_validator(mode="after")
     def _runs(self) -> ForcePath:
@@ -67,23 +67,23 @@ class ForcePath(Frozen):
 
     @property
     def start(self) -> Quantity:
-        """The force at the first sample."""
+        """Force at the first sample."""
         return Quantity(value=self.forces_n[0], unit="N", source=self.source)
 
     @property
     def end(self) -> Quantity:
-        """The force at the end."""
+        """Force at the end."""
         return Quantity(value=self.forces_n[-1], unit="N", source=self.source)
 
     @property
     def hold(self) -> Quantity:
-        """How long the force stays at its start."""
+        """Time for which the force stays at its start."""
         still = takewhile(lambda point: point[1] == self.forces_n[0], zip(self.times_s, self.forces_n, strict=True))
         return Quantity(value=max(time for time, _ in still), unit="s", source=self.source)
 
     @property
     def duration(self) -> Quantity:
-        """The whole recording."""
+        """Duration of the whole recording."""
         return Quantity(value=self.times_s[-1], unit="s", source=self.source)
 
     @property
@@ -93,7 +93,7 @@ class ForcePath(Frozen):
 
     @property
     def hold_s(self) -> float:
-        """How long the force stays at its start [s]."""
+        """Time for which the force stays at its start [s]."""
         return self.hold.value
 
     @property
@@ -103,11 +103,11 @@ class ForcePath(Frozen):
 
 
 def _profile_kind(given: Any) -> str:
-    """Return which profile is meant; one that states no kind is a ramp."""
+    """Return the kind of a profile; one without a kind is a ramp."""
     return str(given.get("kind", "ramp") if isinstance(given, Mapping) else getattr(given, "kind", "ramp"))
 
 
 ForceProfile = Annotated[
     Annotated[ForceRamp, Tag("ramp")] | Annotated[ForcePath, Tag("path")], Discriminator(_profile_kind)
 ]
-"""The normal force over time."""
+"""Any profile of the normal force."""

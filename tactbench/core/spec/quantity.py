@@ -1,4 +1,4 @@
-"""A number that says its unit and where it comes from."""
+"""Quantities: numbers with a unit and a source."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ from tactbench.core.errors import UsageError
 from tactbench.core.spec import units
 
 Tag = Literal["sourced", "measured", "derived", "assumed"]
-"""How far a fact may be trusted: stated in a document, measured on real devices, computed from others, guessed."""
+"""Trust in a fact: stated in a document, measured on real devices, derived from other facts, or assumed."""
 
 
 class Frozen(BaseModel):
-    """A value object: immutable, no unknown fields, no NaN and no infinity but in quantities."""
+    """An immutable model without unknown fields, and without NaN and infinity except in quantities."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, defer_build=True)
 
@@ -25,26 +25,26 @@ def _known(unit: str) -> str:
 
 
 Unit = Annotated[str, AfterValidator(_known)]
-"""A unit of :mod:`tactbench.core.spec.units`."""
+"""Name of a unit of :mod:`tactbench.core.spec.units`."""
 
 
 class Source(Frozen):
-    """Where a fact comes from."""
+    """Source of a fact."""
 
     tag: Tag
-    """`assumed` means that nobody has stated it: treat it as a parameter."""
+    """Trust in the fact; one that is `assumed` has no source and is treated as a parameter."""
     reference: str
-    """Document, file or reason."""
+    """Document, file, or reason of an assumption."""
 
 
 class Quantity(Frozen):
-    """One number with its unit and its source."""
+    """A number with its unit and its source."""
 
     value: float = Field(allow_inf_nan=True)
     """The number as the source states it: a flat surface has an infinite radius."""
     unit: Unit
     source: Source
-    """Why this number may be believed."""
+    """Source of the number."""
 
     def to(self, unit: str) -> float:
         """Return the number in `unit`; raises UsageError when the dimensions differ."""
@@ -55,7 +55,7 @@ class Quantity(Frozen):
 
 
 def _measuring(unit: str) -> AfterValidator:
-    """Return what refuses a quantity that cannot be turned into `unit`; pydantic then names the field."""
+    """Return a validator that refuses a quantity which cannot be converted to `unit`."""
 
     def checked(given: Quantity) -> Quantity:
         try:
@@ -72,7 +72,7 @@ Mass = Annotated[Quantity, _measuring("kg")]
 Power = Annotated[Quantity, _measuring("W")]
 Pressure = Annotated[Quantity, _measuring("MPa")]
 Stiffness = Annotated[Quantity, _measuring("MPa/mm")]
-"""Pressure per length."""
+"""A pressure for each length."""
 Tension = Annotated[Quantity, _measuring("N/mm")]
 BendingStiffness = Annotated[Quantity, _measuring("N*mm")]
 Time = Annotated[Quantity, _measuring("s")]
@@ -80,20 +80,20 @@ Share = Annotated[Quantity, _measuring("1")]
 
 
 def sourced(value: float, unit: str, reference: str) -> Quantity:
-    """Return a number that a document states."""
+    """Return a quantity that a document states."""
     return Quantity(value=value, unit=unit, source=Source(tag="sourced", reference=reference))
 
 
 def measured(value: float, unit: str, reference: str) -> Quantity:
-    """Return a number measured on real devices."""
+    """Return a quantity that was measured on real devices."""
     return Quantity(value=value, unit=unit, source=Source(tag="measured", reference=reference))
 
 
 def derived(value: float, unit: str, reference: str) -> Quantity:
-    """Return a number computed from others; `reference` says how."""
+    """Return a quantity that is computed from others; `reference` states how."""
     return Quantity(value=value, unit=unit, source=Source(tag="derived", reference=reference))
 
 
 def assumed(value: float, unit: str, reference: str) -> Quantity:
-    """Return a number nobody has stated; `reference` says why it was chosen."""
+    """Return a quantity that no source states; `reference` gives the reason for its value."""
     return Quantity(value=value, unit=unit, source=Source(tag="assumed", reference=reference))

@@ -1,4 +1,4 @@
-"""What a recording says about itself."""
+"""The meta of a recording: its sensor, scene, clocks, labels and origin."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ from tactbench.core.spec.scene import Role, Scene
 from tactbench.core.spec.sensor import SensorSpec, StreamSpec
 
 Scalar = str | float | int
-"""What a recording says of itself under a name."""
+"""Value of a label or of another named fact about a recording."""
 
 
 def composed(text: str) -> str:
-    """Return a text in Unicode's form NFC, in which equal words are equal texts: some disks write an é as two signs."""
+    """Return a text in Unicode's form NFC, in which equal words are equal: some disks store é as two characters."""
     return unicodedata.normalize("NFC", text)
 
 
@@ -24,127 +24,128 @@ _Text = Annotated[str, AfterValidator(composed)]
 
 
 class PlanEntry(Frozen):
-    """One effect of the twin, chosen or left out, and why."""
+    """An effect of the simulation that was included or left out, with the reason."""
 
     effect: str
     included: bool
     reason: str
     change: float | None = Field(default=None, allow_inf_nan=True)
-    """What leaving it out changes in an observed channel: at most, for an effect left out (0: exactly nothing); about,
-    for an included one. None: nobody can say without computing it."""
+    """Change of an observed channel if the effect is left out: an upper bound for one that is left out (0: exactly
+    nothing), an estimate for an included one. None: not known without computing it."""
     unit: str = "count"
     """Unit of `change`."""
     asked: bool = False
-    """Included or left out because the scene asked for it by name."""
+    """Whether the scene includes it or leaves it out by name."""
 
 
 class ClockSegment(Frozen):
-    """host = device + offset + drift (device - middle), all since 1970 or whatever the two clocks count from."""
+    """A line between two clocks: host = device + offset + drift (device - middle), with the epochs of both."""
 
     run: int = 0
-    """Which of the runs in which the device's times neither go back nor leap by more than 15 s, from 0."""
+    """Number of the run, from 0; within a run the device's times neither go back nor leap by more than 15 s."""
     middle_ns: int
-    """Where on the device's clock the line is given: the middle of the stretch it was fitted to."""
+    """Time of the device in the middle of the stretch that the line was fitted to."""
     offset_ns: int
-    """Host's clock minus device's at `middle_ns`."""
+    """Time of the host minus that of the device, at `middle_ns`."""
     drift: float
-    """By how much the host's clock runs faster than the device's [s/s]."""
+    """Rate by which the host's clock runs faster than the device's [s/s]."""
     bound_ns: int | None
-    """The line's error within its stretch is at most this, if delays sometimes come near their least value (two-way:
-    whatever the delays are); the constant part of the delay comes on top. None: too few points to tell."""
+    """Bound of the line's error within its stretch, if delays sometimes come near their least value (two-way: whatever
+    the delays are), without the constant part of the delay. None: too few points."""
     points: int
-    """Pairs of stamps it was fitted to: of samples that came together, one."""
+    """Number of pairs of times that the line was fitted to; samples that came together count once."""
 
 
 class StreamClock(Frozen):
-    """Where the times of one stream come from."""
+    """Origin of the times of one stream."""
 
     source: Literal["device", "host", "simulated"]
-    """`device`: its own clock, put on the host's by `segments`. `host`: the host's, when the sample came, or was asked
-    for. `simulated`: the virtual time of emulated devices."""
+    """`device`: the device's clock, put on the host's by `segments`. `host`: the host's, when the sample came or was
+    requested. `simulated`: the virtual time of emulated devices."""
     method: Literal["none", "hull-1way", "hull-2way"] = "none"
-    """How the device's clock was put on the host's."""
+    """Method by which the device's clock was put on the host's."""
     delay_ns: tuple[int, int] = (0, 0)
-    """From and to: what the sample's way to the host takes at least; it cannot be seen one way and is not taken off."""
+    """Range of the least delay of a sample on its way to the host; one-way fits cannot measure it, and do not remove
+    it."""
     segments: tuple[ClockSegment, ...] = ()
-    """In order; between two middles of one run, times go over from one line to the next."""
+    """Lines in order; between the middles of two in one run, one passes over into the other."""
     wraps: int = 0
-    """How often the device's counter began anew."""
+    """Number of times that the device's counter began anew."""
     breaks: int = 0
-    """How often it was lost, so that the device's time went back."""
+    """Number of times that the count was lost, so that the device's time went back."""
 
 
 class StreamCounts(Frozen):
-    """What became of the rows of one stream: received = written + dropped + duplicates + late."""
+    """Counts of the rows of one stream: received = written + dropped + duplicates + late."""
 
     received: int = 0
     written: int = 0
     dropped: int = 0
-    """Lost between reading and writing, because writing was behind."""
+    """Rows that were lost between reading and writing, because writing was behind."""
     duplicates: int = 0
-    """Kept out: their number had come before."""
+    """Rows that were left out because their number had come before."""
     late: int = 0
-    """Kept out: they came after rows that follow them."""
+    """Rows that were left out because they came after rows that follow them."""
     gaps: int = 0
-    """Rows missing where they were due, by the device's own numbers; those that came late are among them."""
+    """Rows that were missing where they were due, by the device's numbers, with those that came late."""
 
 
 class Emulation(Frozen):
-    """That devices were emulated, and how."""
+    """How devices of a recording were emulated."""
 
     time: Literal["virtual", "real"]
     factor: float | None = None
-    """Seconds of the devices for one of the wall clock; None: not measured."""
+    """Seconds of the devices for each second of the wall clock; None: not measured."""
     seed: int = 0
     physics: str = ""
-    """The simulated rig whose samples moved them."""
+    """Name of the simulated rig whose samples moved them."""
     devices: tuple[str, ...] = ()
-    """Which ones; the others were real."""
+    """Names of the emulated devices; the others were real."""
     faults: tuple[str, ...] = ()
-    """``device: fault``, as the rig file writes them."""
+    """Faults of the emulated devices, as the rig file writes them: ``device: fault``."""
 
 
 class RecordingMeta(Frozen):
-    """The attributes of one recording: written once, never changed."""
+    """The meta of one recording, which is written once and never changed."""
 
     name: str
-    """Fit for a file name, unique in its folder."""
+    """Name of the recording, unique in its folder and fit for a file name."""
     sensor: SensorSpec
-    """The whole spec, so that the file explains itself without the plugin."""
+    """The whole specification of the sensor, so that the file can be read without the plugin."""
     reference: tuple[StreamSpec, ...] = ()
-    """Streams that are not the sensor's own: the force-torque sensor, for example."""
+    """Streams of other devices than the sensor, such as the force-torque sensor."""
     rig: str
     simulated: bool = False
     own_rates_hz: dict[str, float] = Field(default_factory=dict)
-    """By stream: the rate at which the sensor itself samples it, where the recording has it at another [Hz]."""
+    """Rate at which the sensor itself samples a stream that the recording has at another rate [Hz], by stream."""
     emulation: Emulation | None = None
-    """None: no device was emulated. Otherwise `simulated` is true as well: what they sense is computed."""
+    """How devices were emulated, in which case `simulated` is true; None: no device was."""
     clock: Literal["device", "host", "simulated", "nominal", "none"] = "device"
-    """Who made the time stamps: the device, the host that read it, the simulation, `row / rate`, or nobody (row order
-    only)."""
+    """Origin of the times: the device, the host that read it, the simulation, row number by nominal rate, or none,
+    where only the order of rows is known."""
     clocks: dict[str, StreamClock] = Field(default_factory=dict)
-    """By stream, where streams have clocks of their own; their `t_ns` are then on the host's."""
+    """Clocks of streams with a clock of their own; their `t_ns` are on the host's clock."""
     streams: dict[str, StreamCounts] = Field(default_factory=dict)
-    """By stream: what became of its rows, where they came from devices."""
+    """Counts of the rows of streams that came from devices."""
     session: _Text = "1"
     trial: _Text = ""
     role: Role | None = None
     scene: Scene | None = None
     labels: dict[_Text, _Text | float | int] = Field(default_factory=dict)
-    """What holds for the whole recording: object, cap radius …"""
+    """Labels of the whole recording: object, cap radius …"""
     excluded: str = ""
-    """Why this recording must not be evaluated (its source calls it unreliable); empty: it may."""
+    """Reason for which no evaluation uses the recording; empty: it is used."""
     remarks: tuple[str, ...] = ()
-    """What a reader of a score from this recording must know."""
+    """Sentences that are shown with every score from the recording."""
     plan: tuple[PlanEntry, ...] = ()
     assumptions: dict[str, Scalar] = Field(default_factory=dict)
-    """Assumed parameters that decide the result; printed with every simulated row."""
+    """Assumed parameters that decide the result; they are shown with every simulated row."""
     drawn: dict[str, Scalar] = Field(default_factory=dict)
-    """What the rig drew or achieved: placement, error bound of the load table …"""
+    """Numbers that the rig drew or achieved: placement, error bound of the load table …"""
     seed: int | None = None
     origin: str = ""
-    """Files a foreign recording was imported from, without folders above the data set."""
+    """Files that the recording was imported from, without the folders above the data set."""
     counts: dict[str, int] = Field(default_factory=dict)
-    """What was counted on the way in: rows read, samples marked as missing …"""
+    """Counts of the recording: rows read, samples marked as missing …"""
     provenance: dict[str, Any] = Field(default_factory=dict)
-    """Versions, creation time, cost; not part of the content digest."""
+    """Versions, time of creation and cost; they are no part of the content digest."""

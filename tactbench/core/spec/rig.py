@@ -1,4 +1,4 @@
-"""What plugins bring, without loading their code."""
+"""Descriptors: what a plugin brings, with the place of its code, so that listing loads none of it."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ EmulatedLink = Literal["bytes", "can", "datagram", "spi"]
 
 
 class SensorDescriptor(Frozen):
-    """A sensor, and where the code for it is."""
+    """A sensor, and the places of its code."""
 
     spec: SensorSpec
     transducer: str | None = Field(default=None, pattern=WHERE)
@@ -30,66 +30,66 @@ class SensorDescriptor(Frozen):
     """``module:callable``, called with EmulatorSettings: the device as a model at the far end of `emulated_link`, a
     :class:`tactbench.plugin.devices.DeviceEmulator`, or a SpiDeviceEmulator on SPI."""
     emulated_link: EmulatedLink | None = None
-    """What the driver speaks through; needed where there is an emulator."""
+    """Kind of link that the driver uses; needed where there is an emulator."""
     log_reader: str | None = Field(default=None, pattern=WHERE)
     """``module:callable``, called with (Path, options): a DeviceLog; for logs of the device's own tools."""
     emulated_options: dict[str, Scalar | bool] = Field(default_factory=dict)
-    """Options that the driver needs and only a real device's papers state, as they are of the emulated one: they hold
-    where a rig file's entry of an emulated device leaves them out."""
+    """Options of the driver that only the papers of a real device state, with their values for the emulated device.
+    They hold where a rig file leaves them out."""
 
     effects: tuple[str, ...] = ()
-    """Names of effects of other packages, or of the sensor's own, that are considered wherever it is simulated."""
+    """Names of effects of other packages, or of the sensor's own, that are candidates wherever it is simulated."""
 
     @property
     def name(self) -> str:
-        """The sensor's name."""
+        """Name of the sensor."""
         return self.spec.name
 
 
 class DeviceDescriptor(Frozen):
-    """A device that is no tactile sensor, and where its code is: a reference force sensor, a motor."""
+    """A device other than a tactile sensor, such as a force sensor or a motor, and the places of its code."""
 
     name: str = Field(pattern=_NAME)
     title: str
     kind: Literal["force", "motor"]
-    """What a rig uses it for. The streams of a force sensor have channels of kind `force`."""
+    """Use of the device in a rig. The streams of a force sensor have channels of kind `force`."""
     driver: str = Field(pattern=WHERE)
     """``module:callable`` -> :class:`tactbench.plugin.devices.Driver`, called with DriverSettings; of a motor, what its
     rig expects."""
     emulator: str | None = Field(default=None, pattern=WHERE)
-    """As of a sensor."""
+    """The same as of a sensor."""
     emulated_link: EmulatedLink | None = None
-    """As of a sensor."""
+    """The same as of a sensor."""
     emulated_options: dict[str, Scalar | bool] = Field(default_factory=dict)
-    """As of a sensor."""
+    """The same as of a sensor."""
 
 
 class TaskDescriptor(Frozen):
-    """A task: its spec is all of it."""
+    """A task, which is described by its spec alone."""
 
     spec: TaskSpec
 
     @property
     def name(self) -> str:
-        """The task's name."""
+        """Name of the task."""
         return self.spec.name
 
 
 class RigDescriptor(Frozen):
-    """A rig, and where its code is."""
+    """A rig, and the places of its code."""
 
     name: str = Field(pattern=_NAME)
     title: str
     where: str = Field(pattern=WHERE)
     """``module:callable``, called with a :class:`tactbench.plugin.RigContext`: a Rig or a ReplayRig."""
     simulated: bool = False
-    """Rows from this rig are marked SIM and never ranked against hardware."""
+    """Whether rows from this rig are marked SIM, and are never ranked against hardware."""
     replays: bool = False
-    """It is a ReplayRig; ``--recordings`` without ``--rig`` asks one of these."""
+    """Whether it is a ReplayRig; one of these is used for ``--recordings`` without ``--rig``."""
     rungs: tuple[str, ...] = ()
-    """Names of the rungs of its ladder of solvers, the cheapest first; for simulated rigs."""
+    """Names of the rungs of a simulated rig's ladder of solvers, the cheapest first."""
     verification: str | None = Field(default=None, pattern=WHERE)
-    """``module:callable``, called without arguments: the simulation against laws and closed forms, some Verdicts."""
+    """``module:callable``, called without arguments: Verdicts of the simulation against laws and closed forms."""
     work_precision: str | None = Field(default=None, pattern=WHERE)
     """``module:callable``, called with a SensorDescriptor and, by name, ``rounds`` (how often a recording is timed): a
     CostStudy of error against seconds per recording."""
@@ -104,42 +104,42 @@ class RigDescriptor(Frozen):
 
 
 class EstimatorDescriptor(Frozen):
-    """An estimator, and where its code is."""
+    """An estimator, and the place of its code."""
 
     name: str = Field(pattern=_NAME)
     title: str
     kinds: tuple[Literal["regression", "classification", "events"], ...]
-    """`events`: ``fit`` is given 0 or 1 a frame (whether it slips), ``predict`` gives a score a frame: an alarm needs
-    one at or above a threshold."""
+    """Kinds of tasks that it answers. For `events`, ``fit`` is given 0 or 1 for each frame (whether it slips) and
+    ``predict`` returns a score for each: an alarm needs one at or above a threshold."""
     where: str = Field(pattern=WHERE)
     """``module:callable``, called as ``callable(kind=..., seed=..., threads=..., **params)``: an object with
     scikit-learn's ``fit(X, y)`` and ``predict(X)``."""
     params: dict[str, Any] = Field(default_factory=dict)
-    """Defaults; every name a user may set is here."""
+    """Parameters that a user may set, with their defaults."""
     grid: dict[str, tuple[int | float | str | bool | None, ...]] = Field(default_factory=dict)
-    """Parameters chosen on validation data, and their candidates: each keeps its type, 5 is no 5.0."""
+    """Candidates of the parameters that are chosen on validation data; each keeps its type, 5 is not 5.0."""
     window_grid: tuple[int, ...] = (0,)
     """Candidates for k of the mean filter over samples t-k … t, chosen together with `grid`."""
     looks_at: Literal["features", "time", "nothing", "reference"] = "features"
     """`time`: X is the time index alone. `nothing`: X is a column of zeros. `reference`, of events alone: X is the
     tangential force over friction times normal force, from the reference sensor: an oracle."""
     summaries: tuple[Summary, ...] = ()
-    """Of frames: it looks at these numbers of each channel, in place of the task's own."""
+    """Numbers of each channel that it uses for frames, in place of the task's own."""
     frames_by: str | None = Field(default=None, pattern=WHERE)
-    """Of frames: ``module:callable``, called with (one stream, a :class:`tactbench.plugin.StreamReadings`; (n,) ends of
-    frames [s]; length of a frame [s]): (n, features) numbers of samples up to each end, instead of summaries. NaN is no
-    answer. It is asked of the fastest stream alone."""
+    """``module:callable`` for features of frames in place of summaries, called with (one stream, a
+    :class:`tactbench.plugin.StreamReadings`; (n,) ends of frames [s]; length of a frame [s]): (n, features) numbers of
+    the samples up to each end, NaN where there is no answer. Only the fastest stream is passed."""
     threshold: float | None = None
-    """Of events: a threshold of its own; None: chosen on validation recordings."""
+    """Threshold of its own for events; None: it is chosen on validation recordings."""
     baseline: bool = False
-    """A trivial answer, shown under the results."""
+    """Whether it is a trivial estimator, which is shown under the results."""
     linear: bool | None = None
-    """Whether answers are linear in the features (for classes: their boundaries are); None: its author does not say."""
+    """Whether answers (or boundaries of classes) are linear in the features; None: not stated."""
     distributions: tuple[str, ...] = ()
-    """Distributions beyond tactbench's own that compute its answers: a cell's key covers their versions."""
+    """Distributions beside tactbench that compute its answers; the key of a cell covers their versions."""
     rehearsal: dict[str, Any] | None = None
-    """Parameters with which it learns a few rows in no time and leaves no thread behind: it then does so once before
-    cells are timed, and what its library does at its first use is in nobody's time. None: it is only built then."""
+    """Parameters with which it fits a few rows at once and leaves no thread behind. It then does so before cells are
+    timed, so that the first use of its library is in no time. None: it is only built."""
 
     @model_validator(mode="after")
     def _nothing_is_searched_of_detectors(self) -> EstimatorDescriptor:
@@ -151,7 +151,7 @@ class EstimatorDescriptor(Frozen):
 
 
 class EffectDescriptor(Frozen):
-    """One physical influence the twin may include."""
+    """A physical influence that a simulation may include."""
 
     name: str = Field(pattern=_NAME)
     title: str
@@ -162,11 +162,11 @@ class EffectDescriptor(Frozen):
     called_for: str = Field(pattern=WHERE)
     """``module:callable``, called with (Scene, SensorSpec): a Reason; light, no numerics."""
     groups: tuple[str, ...] = ()
-    """Words that stand for several effects at once in a scene's ``simulation.effects``: ``drift``, ``noise``."""
+    """Names of groups of effects in a scene's ``simulation.effects``: ``drift``, ``noise``."""
 
 
 class IndenterDescriptor(Frozen):
-    """A shape of an indenter, and where its height is computed."""
+    """A shape of an indenter, and the place of the code for its height."""
 
     name: str = Field(pattern=_NAME)
     title: str
@@ -175,7 +175,7 @@ class IndenterDescriptor(Frozen):
     of the body above its lowest point [mm], finite everywhere and 0 at (0, 0). Where a flank is vertical, or there is
     no body, it is large: 50 mm or more."""
     dimensions: dict[str, Parameter] = Field(default_factory=dict)
-    """What it is given by, each as a keyword in the parameter's unit."""
+    """Parameters, each passed as a keyword in its own unit."""
 
     @model_validator(mode="after")
     def _angle_is_the_scenes(self) -> IndenterDescriptor:
@@ -189,7 +189,7 @@ class IndenterDescriptor(Frozen):
 
 
 class ProfileDescriptor(Frozen):
-    """A normal force over time that has a name, and where it is computed."""
+    """A named profile of the normal force, and the place of its code."""
 
     name: str = Field(pattern=_NAME)
     title: str
@@ -197,7 +197,7 @@ class ProfileDescriptor(Frozen):
     """``module:callable``, called as ``callable(**parameters)``: a :class:`tactbench.plugin.ForcePath`. A scene, and
     with it a recording, holds this path and not the profile's name."""
     parameters: dict[str, Parameter] = Field(default_factory=dict)
-    """What it is given by, each as a keyword in the parameter's unit."""
+    """Parameters, each passed as a keyword in its own unit."""
 
     def values(self, given: Mapping[str, Quantity]) -> dict[str, float]:
         """Return every parameter, each in its unit: as `given`, or by default; raises UsageError naming one."""

@@ -1,4 +1,4 @@
-"""A rig file: which devices stand on which links, for rigs of real devices and for their emulators."""
+"""Model of a rig file: the devices of a rig, real or emulated, and their links."""
 
 from __future__ import annotations
 
@@ -13,20 +13,20 @@ from tactbench.core.spec.recording import Scalar
 FORCE = "force"
 """Name of the force sensor's entry among the devices."""
 EMULATED = "emulated"
-"""Stands for a link's address where the device's emulator is to be started."""
+"""Address of a link whose device is to be emulated."""
 
 
 class DeviceEntry(Frozen):
-    """One device."""
+    """A device of a rig."""
 
     link: str = Field(min_length=1)
     """Address of its link (``docs/links.md``), or ``emulated``."""
     options: dict[str, Scalar | bool] = Field(default_factory=dict)
-    """What its driver needs to know beside the link."""
+    """Options of its driver."""
     faults: tuple[str, ...] = ()
     """Faults of its emulator: ``name`` or ``name:key=value,…``."""
     emulator: bool = False
-    """Whether an emulator that runs already is at the far end of `link`: what is recorded is then marked EMULATED."""
+    """Whether the far end of `link` is an emulator that runs already: its recordings are marked EMULATED."""
 
     @property
     def emulated(self) -> bool:
@@ -46,30 +46,32 @@ class ForceEntry(DeviceEntry):
     device: str
     """Name of the device (``tactbench list devices``)."""
     channel: str = "fz"
-    """Its channel along which the sensor is pressed."""
+    """Channel along which the sensor is pressed."""
     sign: Literal[-1, 1] = 1
-    """-1: pressing makes that channel fall."""
+    """Sign of the change of that channel when the sensor is pressed."""
     zero_s: float = Field(default=2.0, ge=0)
-    """Seconds without load before each scene whose mean becomes zero on every channel; 0: the device keeps its own."""
+    """Seconds without load before each scene, whose mean becomes zero on every channel; 0: the device's own zero is
+    kept."""
     range_n: float = Field(default=25.0, gt=0)
-    """Rated range of its forces; by default that of a Nano17 SI-25-0.25. A zero of more than a tenth of it is refused,
-    and while it is taken a spread of more than a twentieth and a drift of more than a hundredth."""
+    """Rated range of its forces [N], by default that of a Nano17 SI-25-0.25. While the zero is taken, a mean above a
+    tenth of it is refused, and so are a spread above a twentieth and a drift above a hundredth."""
     noise_n: float | None = Field(default=None, gt=0)
-    """Standard deviation of its forces without load; a spread of twice that is refused. None: not known."""
+    """Standard deviation of its forces without load [N]; a spread of twice that is refused. None: not known."""
     largest_zero_n: float | None = Field(default=None, gt=0)
-    """In place of a tenth of the range: for a heavy indenter, or a sensor that was never biased."""
+    """Largest zero [N] in place of a tenth of the range, for a heavy indenter or a sensor that was never biased."""
 
 
 class Allowed(Frozen):
-    """What a recording may lack; one that lacks more is incomplete, and takes no part in a score unless asked for."""
+    """Limits of what a recording may lack; one that lacks more takes no part in a score by default."""
 
     silent_s: float = Field(default=2.0, gt=0)
-    """Longest time without a row of a stream that has a rate. A longer one ends the scene."""
+    """Longest time without a row of a stream that has a rate; a longer one ends the scene."""
     lost_percent: float = Field(default=2.0, ge=0, le=100)
-    """Rows of a stream that never came, or were dropped since writing was behind."""
+    """Largest share of the rows of a stream that never came, or were dropped because writing was behind [%]."""
     frozen_s: float = Field(default=2.0, gt=0)
     """Longest time in which no channel of the force sensor changes, though most of its other rows differ from the one
-    before; or of the sensor, while the force does. A force that never changes while the sensor does is frozen, too."""
+    before, or none of the sensor while the force does. A force that never changes while the sensor does is frozen
+    too."""
 
 
 class NamedDevice(DeviceEntry):
@@ -80,35 +82,37 @@ class NamedDevice(DeviceEntry):
 
 
 class EmulationSettings(Frozen):
-    """How the emulated devices of a rig are moved."""
+    """Settings of the emulation of a rig's devices."""
 
     time: Literal["virtual", "real"] = "virtual"
-    """`virtual`: as fast as it can be computed, the same each time; `real`: by the wall clock."""
+    """Clock of the emulated devices: `virtual` is as fast as they are computed, and the same each time; `real` is the
+    wall clock."""
     physics: str = ""
-    """The simulated rig whose samples the emulated devices read; empty: the one that comes with tactbench."""
+    """Name of the simulated rig whose samples the devices read; empty: the one that comes with tactbench."""
     seed: int = Field(default=1, ge=0)
-    """Of what is drawn in emulators; the scene's own seed is the run's."""
+    """Seed of what emulators draw; a run has a seed of its own for the scene."""
     control: str = ""
-    """``host:port`` of emulators that run already (`tactbench emulate` writes it): a recording tells them its scene."""
+    """Address ``host:port`` of emulators that run already, to which each scene is sent; `tactbench emulate` writes
+    it."""
 
 
 class RigFile(Frozen):
-    """What a rig of real devices is made of."""
+    """The devices and the settings of a rig."""
 
     version: Literal[1] = 1
     rig: str
     """Name of the rig (``tactbench list rigs``) that the file is for."""
     title: str = ""
-    """Shown with its recordings."""
+    """Title, which is shown with recordings."""
     sensors: dict[str, DeviceEntry] = Field(min_length=1)
-    """By the sensor's name; a run uses the one it asks for."""
+    """Sensors by their names, of which a run uses one or several."""
     force: ForceEntry | None = None
     devices: dict[str, NamedDevice] = Field(default_factory=dict)
     """Further devices by their part in the rig, such as `motor`."""
     emulation: EmulationSettings = EmulationSettings()
     allowed: Allowed = Allowed()
     settings: dict[str, Any] = Field(default_factory=dict)
-    """The rig's own, which it checks itself."""
+    """Settings of the rig, which it checks itself."""
 
     @property
     def emulated(self) -> bool:
@@ -119,7 +123,7 @@ class RigFile(Frozen):
         """Return this file; raise UsageError if it is for another rig."""
         if self.rig != rig:
             raise UsageError(
-                f"The rig file is for the rig {self.rig!r}, asked for is {rig!r}.",
+                f"The rig file is for the rig {self.rig!r}, and the rig {rig!r} is given.",
                 hint=f"Use --rig {self.rig}, or another rig file.",
             )
         return self
@@ -135,7 +139,7 @@ class RigFile(Frozen):
         return self
 
     def entries(self) -> dict[str, DeviceEntry]:
-        """Return every device by its name in messages: the sensor's name, ``force``, or its part in the rig."""
+        """Return every device by its name in messages: that of the sensor, ``force``, or the part in the rig."""
         found: dict[str, DeviceEntry] = dict(self.sensors)
         if self.force is not None:
             found[FORCE] = self.force

@@ -1,4 +1,4 @@
-"""The row of a cell: the one description of it, for whoever writes, reads or shows rows."""
+"""The row of a cell: names, types and meaning of all its keys."""
 
 from __future__ import annotations
 
@@ -10,9 +10,9 @@ from pydantic import BaseModel, ConfigDict
 from tactbench.core.spec.status import Status
 
 TRUE = "true_"
-"""How the name of a metric begins whose score is against the force that a simulated rig exerted."""
+"""Prefix of the names of metrics against the force that a simulated rig exerted."""
 DIRECTIONS = (" (lower is better)", " (higher is better)")
-"""How the name of a metric ends that is the caller's own: a row tells all that a table needs."""
+"""Suffixes of the name of a caller's own metric: a row tells all that a table needs."""
 
 
 def lower_is_better(metric: str) -> bool:
@@ -25,7 +25,7 @@ MEDIAN_ERROR, HIGH_ERROR = "median error", "95th percentile of the error"
 """Keys of `scores` that stand beside the mean error of a vector: percentiles over the test rows."""
 
 LEAKS = "leaks: "
-"""How a stamp begins that says that a score is no measure of the sensor."""
+"""Prefix of stamps on a score that is no measure of the sensor."""
 
 
 def plural(unit: str) -> str:
@@ -38,7 +38,7 @@ class _Section(BaseModel):
 
 
 class Asked(_Section):
-    """What was asked."""
+    """The question: sensor, task, rig, protocol, split and estimator."""
 
     cell: str
     sensor: str = ""
@@ -59,7 +59,7 @@ class Asked(_Section):
 
 
 class Ended(_Section):
-    """How it ended."""
+    """The way in which the cell ended."""
 
     status: Status
     reason: str = ""
@@ -69,21 +69,21 @@ class Ended(_Section):
 
 
 class Scored(_Section):
-    """The score, and how much was answered."""
+    """The score, and the amount of data behind it."""
 
     metric: str = ""
     unit: str = ""
     equivalence: float | None = None
     score: float | None = None
     ci_low: float | None = None
-    """None: there are too few units for an interval"""
+    """lower end of the interval; None: there are too few units for one"""
     ci_high: float | None = None
-    """None, with a `ci_low`: the data put no upper bound to an error"""
+    """upper end; None, beside a `ci_low`: the data bound an error from below only"""
     ci_method: str = ""
     reference_floor: float | None = None
-    """of an error of force: the noise of the reference; None where that is not known"""
+    """noise of the reference, for an error of force; None where that is not known"""
     reference_floor_se: float | None = None
-    """its standard error"""
+    """standard error of that floor"""
     score_beyond_floor: float | None = None
     beyond_floor_ci_low: float | None = None
     beyond_floor_ci_high: float | None = None
@@ -98,7 +98,7 @@ class Scored(_Section):
     published_reference: str = ""
     published_remark: str = ""
     n_recordings: int | None = None
-    """that some fold uses; n_sessions and n_specimens alike"""
+    """recordings that some fold uses; n_sessions and n_specimens alike"""
     n_sessions: int | None = None
     n_specimens: int | None = None
     """devices, by the label `unit`; None where a recording has none"""
@@ -107,7 +107,7 @@ class Scored(_Section):
 
 
 class Cost(_Section):
-    """What it took. What needs single answers to be timed is None where they were not."""
+    """Times and memory of the cell. Numbers that need single answers are None where these were not timed."""
 
     sim_s: float | None = None
     search_s: float | None = None
@@ -116,13 +116,13 @@ class Cost(_Section):
     batch_rows: int | None = None
     latency_ms_p50: float | None = None
     latency_ms_p95: float | None = None
-    """None also where fewer than 200 calls were measured"""
+    """95th percentile; None also where fewer than 200 calls were measured"""
     latency_ms_max: float | None = None
     latency_n: int | None = None
     answer_delay_ms: float | None = None
-    """None also where a part other than the link is not known; see delay"""
+    """sum of the parts; None also where one other than the link is not known"""
     delay_parts_ms: dict[str, float] = {}
-    """sampling, link, window, features, prediction: those that are known"""
+    """known parts of the answer delay: sampling, link, window, features, prediction"""
     threads: int | None = None
     peak_rss_mb: float | None = None
     wall_s: float | None = None
@@ -132,51 +132,51 @@ class Cost(_Section):
 
 
 class RestsOn(_Section):
-    """What the score rests on, and what else is known of it."""
+    """The data, assumptions and choices behind the score."""
 
     simulated: bool = False
     emulated: bool = False
     dagger: bool = False
     stamps: list[str] = []
     findings: list[str] = []
-    """what was found in recordings that bears on the score, what of them was left out, classes never trained on"""
+    """findings in recordings that bear on the score, data that were left out, classes without training data"""
     remarks: list[str] = []
-    """what recordings say of themselves; what could not be done, and why"""
+    """remarks of recordings, and reasons for what could not be done"""
     assumptions: dict[str, Any] = {}
     plan: list[dict[str, Any]] = []
     counts: dict[str, int] = {}
-    """what was left out, and why"""
+    """counts of what was left out, by reason"""
     chosen: dict[str, float] = {}
     search: list[dict[str, Any]] = []
-    """every candidate that was compared on validation data: its parameters, k, score and fold"""
+    """candidates that were compared on validation data: parameters, k, score and fold"""
     digests: list[str] = []
     scores: dict[str, float] = {}
-    """other metrics, the score on validation data, of each fold and each class"""
+    """other metrics: the score on validation data, of each fold and of each class"""
     fold_sizes: dict[str, list[int]] = {}
     """training and test rows of each fold, by its name in `scores`"""
     confusion: list[list[int]] | None = None
-    """(true class, predicted class)"""
+    """counts of answers, (true class, predicted class)"""
     classes: list[str | bool | int | float] = []
     recordings_right: int | float | None = None
-    """test recordings most answers to which are right, of a classification, the mean over replicates; None where one
+    """test recordings of a classification most answers to which are right, as a mean over replicates; None where one
     has several classes"""
     recordings_asked: int | float | None = None
-    """test recordings, of which some were right"""
+    """all test recordings that were answered"""
     events: dict[str, float] = {}
     """figures of events, times in the unit of the name"""
     operating_points: list[dict[str, float]] = []
-    """the same at thresholds chosen on validation for several bounds of false alarms"""
+    """the same figures at thresholds that validation recordings give for several bounds of false alarms"""
     recordings: list[str] = []
     replicates: dict[str, Any] = {}
     """the primary metric's sums over each replicate; see replicate_sums"""
 
 
 class Evaluated(RestsOn, Cost, Scored):
-    """What evaluating a cell tells."""
+    """Keys that the evaluation of a cell gives."""
 
 
 class RowModel(Evaluated, Ended, Asked):
-    """One cell. Times are seconds unless the name says otherwise; a row may have other keys, of which nothing is asked.
+    """The row of one cell. Times are seconds unless the name has another unit; other keys than these may stand in it.
 
     Rows are handed about as plain mappings; this model says what they hold and what stands there before anything is
     known. Tables for programs have its keys in this order: the last base first. Each row has dictionaries and lists of
@@ -185,11 +185,11 @@ class RowModel(Evaluated, Ended, Asked):
 
 
 class ReplicatedRow(RowModel):
-    """Several replicates of a cell as one row, as tables show them; and what a file adds to a row."""
+    """The row of several replicates of a cell, as tables show it, with the keys that a file adds."""
 
     key: str = ""
     repeats: int | None = None
-    """replicates that ended, however"""
+    """replicates that ended, in whatever way"""
     n_replicates: int | None = None
     replicate_unit: str | None = None
     replicate_scores: list[float] | None = None
@@ -197,11 +197,11 @@ class ReplicatedRow(RowModel):
     score_min: float | None = None
     score_max: float | None = None
     reference_score: float | None = None
-    """where `score` is against the true force: that against the reference as it was recorded"""
+    """score against the reference as it was recorded, where `score` is against the true force"""
     reference_ci_low: float | None = None
     reference_ci_high: float | None = None
     reference_scores: list[float] | None = None
-    """of the replicates"""
+    """the same for each replicate"""
 
 
 def _members(annotation: Any) -> list[Any]:
@@ -218,14 +218,14 @@ def _types(annotation: Any) -> frozenset[type]:
 FORMAT: Mapping[str, frozenset[type]] = {
     name: _types(field.annotation) for name, field in ReplicatedRow.model_fields.items()
 }
-"""Types of what may stand under a key. A row may have other keys, of which nothing is asked."""
+"""Types of the values of each key. A row may have other keys, whose values are not checked."""
 
 _ELSEWHERE = ("simulation", "traceback", "log", "plan", "digests")
-"""What is large or of no use to a program: `why`, the page and the cell's own file have it."""
+"""Keys that are large, or of no use to a program; `why`, the page and the cell's own file have them."""
 _OF_CELL = [key for key in RowModel.model_fields if key not in _ELSEWHERE]
 JSON_KEYS = (*_OF_CELL[:-1], "key", _OF_CELL[-1])
 """Keys of a JSON row, in order."""
 OF_REPLICATES = tuple(key for key in ReplicatedRow.model_fields if key not in ("key", *RowModel.model_fields))
-"""Keys of a row that stands for all replicates of its cell; they follow."""
+"""Keys that follow in a row for all replicates of a cell."""
 NESTED = frozenset(key for key in (*JSON_KEYS, *OF_REPLICATES) if not FORMAT[key].isdisjoint({list, dict}))
-"""Keys whose values are lists or tables: JSON inside a cell of CSV and Parquet."""
+"""Keys whose values are lists or tables, which are JSON inside a cell of CSV and Parquet."""

@@ -1,4 +1,4 @@
-"""What is present and commanded while one recording is made."""
+"""Scenes: indenter, placement, force profile and environment of one recording."""
 
 from __future__ import annotations
 
@@ -26,26 +26,26 @@ from tactbench.core.spec.sensor import ChannelKind, ranges
 M = TypeVar("M", bound=BaseModel)
 
 Role = Literal["train", "validation", "test"]
-"""What a recording is for, given by its task."""
+"""Role of a recording in a task."""
 
 
 class Indenter(Frozen):
-    """The body pressed on the sensor: flat, a spherical cap, or of a shape that a plugin defines."""
+    """The body that is pressed on the sensor: flat, a spherical cap, or of a shape that a plugin defines."""
 
     radius: Quantity | None = None
-    """Radius of the cap [length]; None is a flat surface, or another shape."""
+    """Radius of the cap [length]; None: the surface is flat or of another shape."""
     shape: str | None = None
-    """Name of an installed shape (``tactbench list indenters``); None: a cap if there is a radius, or else flat.
-    ``cap`` and ``flat`` may be written, and are read as these."""
+    """Name of an installed shape (``tactbench list indenters``); None: a cap if there is a radius, else flat. ``cap``
+    and ``flat`` may be written, and are read as these."""
     dimensions: dict[str, Quantity] = Field(default_factory=dict)
-    """Of the shape, by name; one that is left out has the default of the shape."""
+    """Dimensions of the shape by name; one that is left out has its default."""
     angle: Quantity = assumed(0.0, "deg", "the shape's own axes are those of the sensor")
-    """By how much the shape is turned about the press axis, from x towards s [angle]."""
+    """Rotation of the shape about the press axis, from x towards s [angle]."""
 
     @model_validator(mode="before")
     @classmethod
     def _cap_and_flat(cls, given: Any) -> Any:
-        """Read the shapes cap and flat as the radius that says the same, so that there is one way to store them."""
+        """Return an indenter with the shapes cap and flat as a radius, so that each body is stored in one way."""
         if not isinstance(given, Mapping) or given.get("shape") not in ("cap", "flat"):
             return given
         own, dimensions = dict(given), dict(given.get("dimensions") or {})
@@ -68,7 +68,7 @@ class Indenter(Frozen):
 
     @model_serializer(mode="wrap")
     def _as_ever(self, serialize: SerializerFunctionWrapHandler) -> dict[str, Any]:
-        """Leave out what a cap and a flat surface do not need: they are stored as they were before shapes."""
+        """Return the stored form, in which caps and flat surfaces have a radius alone, as before there were shapes."""
         stored: dict[str, Any] = serialize(self)
         return stored if self.shape is not None else {"radius": stored["radius"]}
 
@@ -81,7 +81,7 @@ class Indenter(Frozen):
 
 
 class Placement(Frozen):
-    """Where the indenter meets the sensor, relative to the sensor's own nominal contact point."""
+    """Place at which the indenter meets the sensor, relative to the sensor's nominal point of contact."""
 
     x: Quantity = assumed(0.0, "mm", "nominal contact point of the mount")
     """Axial offset [length]."""
@@ -102,49 +102,51 @@ class Placement(Frozen):
 
 
 class Environment(Frozen):
-    """What surrounds the contact, and how far the assumed nuisances are scaled."""
+    """Surroundings of the contact, and factors on the assumed nuisances."""
 
     since_power_on: Quantity = assumed(
         3600.0, "s", "an hour: warm; the paper does not say: docs/calibration.md draws it from a prior"
     )
     """Time from switching the sensor on to the first sample of the session [time]."""
     noise_scale: float = Field(default=1.0, ge=0)
-    """Factor on white noise of the sensor; docs/calibration.md says which factors the paper's figures allow."""
+    """Factor on the white noise of the sensor; docs/calibration.md has the factors that agree with the paper's
+    figures."""
     drift_scale: float = Field(default=1.0, ge=0)
-    """Factor on wander and warm-up, and on offsets unless they have their own."""
+    """Factor on wander and warm-up, and on offsets where these have no factor of their own."""
     offset_scale: float | None = Field(default=None, ge=0)
-    """Factor on the offsets between recordings of a session; None: that of drift."""
+    """Factor on the offsets between recordings of a session; None: the factor of drift."""
     session_offset_scale: float = Field(default=0.0, ge=0)
-    """Factor on the offsets between sessions; 0: the sessions follow each other on one warm set-up, as in the paper."""
+    """Factor on the offsets between sessions; 0: sessions follow each other on one warm set-up, as in the paper."""
     force_noise: Quantity = sourced(
         0.6875, "N", f"{PAPER}: RMSE of the regression on the time index, read as label noise"
     )
     """Standard deviation of the unfiltered force-torque sensor [force]."""
     force_filter: Quantity | None = None
-    """Cut-off of a low-pass on the recorded force [1/time]; None: recorded unfiltered, as in the paper."""
+    """Cut-off of a low-pass on the recorded force [1/time]; None: it is recorded unfiltered, as in the paper."""
     ambient: Quantity = assumed(23.0, "degC", "a laboratory; the paper does not say")
     """Temperature of the room [degC]."""
     indenter_temperature: Quantity | None = None
-    """Temperature of the indenter [degC]; None: as warm as what it touches, so that no heat flows. Nobody states it:
-    a cap that lies in the room has that of the room."""
+    """Temperature of the indenter [degC]; None: that of the surface which it touches, so that no heat flows. No source
+    states it: a cap that lies in the room has the temperature of the room."""
 
     @property
     def scale_of_offsets(self) -> float:
-        """The factor on the offsets between recordings [1]."""
+        """Factor on the offsets between recordings [1]."""
         return self.drift_scale if self.offset_scale is None else self.offset_scale
 
 
 class Surface(Frozen):
-    """What slides over the skin: how it holds and how rough it is."""
+    """Friction and roughness of the surface that slides over the skin."""
 
     static_friction: Quantity = sourced(
         0.7834, "1", "NVlabs/biotac_sim, sim_biotac.py: default coefficient for a BioTac, read as the static one"
     )
     """Largest tangential over normal force before everything slips [1]."""
     kinetic_friction: Quantity = assumed(0.65, "1", "a sixth below the static coefficient; no source for this skin")
-    """The same ratio at speeds far above `stribeck_speed` [1]."""
+    """Ratio of tangential to normal force at speeds far above `stribeck_speed` [1]."""
     stribeck_speed: Quantity = assumed(5.0, "mm/s", "no source for this skin")
-    """Speed over which friction falls from static to kinetic [speed]; 0: at once (Coulomb's two coefficients)."""
+    """Speed over which friction falls from static to kinetic [speed]; 0: it falls at once (Coulomb's two
+    coefficients)."""
     roughness: Quantity = measured(
         73.0,
         "um",
@@ -164,7 +166,7 @@ class Surface(Frozen):
     @model_validator(mode="before")
     @classmethod
     def _of_one_band(cls, given: Any) -> Any:
-        """Read the surface of an earlier recording, a band about one wavelength, by that wavelength."""
+        """Return the surface of an earlier recording, a band about one wavelength, with that as its roll-off."""
         if isinstance(given, Mapping) and "wavelength" in given:
             left = {name: value for name, value in given.items() if name != "spread"}
             return {"roll_off": left.pop("wavelength"), **left}
@@ -186,13 +188,13 @@ class Slide(Frozen):
     """Tangential motion of the indenter at a constant speed, at rest before and after."""
 
     speed: Quantity
-    """Of the indenter against the sensor's core [speed]; above zero."""
+    """Speed of the indenter against the sensor's core [speed], above zero."""
     direction: Quantity = assumed(0.0, "deg", "along the finger, towards the tip")
-    """Where the indenter moves to [angle]: 0 is along x, 90 deg along s."""
+    """Direction of the motion [angle]: 0 is along x, 90 deg along s."""
     start: Quantity = assumed(30.0, "s", "the middle of a recording of the paper's length")
-    """Beginning of the motion, since the recording's first sample [time]."""
+    """Beginning of the motion, from the first sample of the recording [time]."""
     duration: Quantity | None = None
-    """How long it lasts [time]; None: to the end of the recording."""
+    """Duration of the motion [time]; None: it lasts to the end of the recording."""
     surface: Surface = Surface()
 
     @model_validator(mode="after")
@@ -209,27 +211,28 @@ class Slide(Frozen):
 
 
 def _pairs(given: Any) -> Any:
-    """Read a mapping as its sorted pairs."""
+    """Return a mapping as its sorted pairs, and anything else as it is."""
     return tuple(sorted(given.items())) if isinstance(given, Mapping) else given
 
 
 class Simulation(Frozen):
-    """How a simulated rig is asked to carry out a scene; a real one ignores it."""
+    """Settings of a simulated rig for a scene; a real rig ignores them."""
 
     effects: tuple[Annotated[str, Field(pattern=r"^[+-]?[a-z][a-z0-9-]*$")], ...] = ()
-    """``+name`` includes an effect (or a group of them) whatever the plan would say, ``-name`` leaves it out, ``name``
-    lets the plan decide; later ones win. ``+all`` and ``-all`` are every candidate. An effect of another package is a
-    candidate only where it is named here or by the sensor."""
+    """Words about effects, of which later ones win: ``+name`` includes an effect (or a group of them) always, ``-name``
+    leaves it out, with ``name`` the plan decides. ``+all`` and ``-all`` are all candidates. An effect of another
+    package is a candidate only where it is named here or by the sensor."""
     rung: str | None = None
     """Name of a rung of the ladder of solvers; None: the default one."""
     tolerance: float | None = Field(default=None, gt=0)
-    """Largest error of an observed channel, in its own unit; the cheapest rung that keeps it is taken. None: the
-    rung's own."""
+    """Largest error of an observed channel, in its own unit, by which the cheapest rung is chosen. None: that of the
+    rung."""
     scenario: str | None = None
-    """Name of one of the sensor's scenarios, whose nuisances take the place of the usual ones; None: the usual ones."""
+    """Name of a scenario of the sensor, whose nuisances replace the usual ones; None: the usual ones hold."""
 
     nuisances: Annotated[tuple[tuple[str, float], ...], BeforeValidator(_pairs)] = ()
-    """Nuisances by name with another value than the scene or the sensor states, as ``placement_scatter_mm: 0.3``."""
+    """Values that replace those of the scene or the sensor, by the name of the nuisance: ``placement_scatter_mm:
+    0.3``."""
 
     @field_serializer("nuisances")
     def _as_mapping(self, nuisances: tuple[tuple[str, float], ...]) -> dict[str, float]:
@@ -243,29 +246,29 @@ class Simulation(Frozen):
 
 
 class Scene(Frozen):
-    """One recording to be made."""
+    """All that is present and commanded in one recording."""
 
     name: str
-    """Short and unique within a task, fit for a file name."""
+    """Name, short and unique within a task, and fit for a file name."""
     indenter: Indenter = Indenter()
     placement: Placement = Placement()
     profile: ForceProfile = ForceRamp()
     drive: ForceLoop | None = None
-    """How the force is brought about; None: the indenter follows the profile exactly."""
+    """Force loop that brings the force about; None: the indenter follows the profile exactly."""
     slide: Slide | None = None
-    """Tangential motion; None: the indenter is only pressed."""
+    """Tangential motion; None: the indenter is pressed only."""
     environment: Environment = Environment()
     session: str = "1"
-    """Recordings of one session were made without re-mounting anything."""
+    """Name of the session, whose recordings are made without mounting anything anew."""
     unit: str = Field(default="1", min_length=1)
-    """Which unit of the sensor: two devices of one type are two units. The spec describes unit 1."""
+    """Unit of the sensor, as two devices of one type are two units; the spec describes unit 1."""
     starts_after_s: float = Field(default=0.0, ge=0)
-    """Seconds from the session's first sample to this recording's first."""
+    """Time from the session's first sample to the first of this recording [s]."""
     observe: tuple[ChannelKind, ...] = ("taxel",)
-    """Kinds of channels that somebody will look at; the reference force is always recorded."""
+    """Kinds of channels that are recorded beside the reference force."""
     simulation: Simulation = Simulation()
     labels: dict[str, str | float | int] = Field(default_factory=dict)
-    """Facts about the recording that a task may ask for, for example {"cap_radius_mm": 5.0}."""
+    """Labels of the recording, which tasks may use: {"cap_radius_mm": 5.0}."""
 
     @property
     def first_unit(self) -> bool:
@@ -273,7 +276,7 @@ class Scene(Frozen):
         return self.unit == "1"
 
     def nuisances(self) -> dict[str, float]:
-        """Return what the scene states of nuisances, by name and in the unit of the name."""
+        """Return the values of the scene's nuisances, by name and in the unit of the name."""
         found = {}
         for name, (way, unit) in NUISANCES.items():
             value: Any = self
@@ -284,7 +287,7 @@ class Scene(Frozen):
         return found
 
     def with_nuisances(self, values: Mapping[str, float]) -> Scene:
-        """Return the scene with other `values` of nuisances, by name; names that are not a scene's are passed over.
+        """Return the scene with other `values` of nuisances, by name; names of other parts than a scene's are ignored.
 
         Raises
         ------
@@ -303,7 +306,7 @@ class Scene(Frozen):
         return scene
 
     def simulated_as(self, simulation: Simulation) -> Scene:
-        """Return the scene as a simulated rig is asked to carry it out; raises as `with_nuisances`.
+        """Return the scene with other settings of a simulated rig; raises the errors of `with_nuisances`.
 
         The scene's own words about effects stand before those of `simulation`.
         """
@@ -314,7 +317,7 @@ class Scene(Frozen):
 
 
 def _with(model: M, way: tuple[str, ...], given: Mapping[str, float]) -> M:
-    """Return a copy of `model` with nuisances of the part at `way`, checked as any other numbers."""
+    """Return a copy of `model` with nuisances of the part at `way`; raises UsageError for a value that is not valid."""
     if way:
         inside = getattr(model, way[0])
         if inside is None:
@@ -337,7 +340,7 @@ _PARTS: tuple[tuple[tuple[str, ...], type[Frozen]], ...] = (
     (("slide", "surface"), Surface),
 )  # fmt: skip
 _UNITS = {"force_filter": "Hz", "indenter_temperature": "degC", "rate": "Hz"}
-"""Units of the fields that state no number."""
+"""Units of the fields whose default has none."""
 
 
 def _nuisances() -> Iterator[tuple[str, tuple[tuple[str, ...], str]]]:
@@ -354,7 +357,7 @@ def _nuisances() -> Iterator[tuple[str, tuple[tuple[str, ...], str]]]:
 
 
 NUISANCES: Mapping[str, tuple[tuple[str, ...], str]] = dict(_nuisances())
-"""Numbers of a scene that no source states well enough: where each stands, and its unit, by its one name.
+"""Numbers of a scene that no source states well enough, by name, with their place in the scene and their unit.
 
 The name is field and unit, behind the part of the scene where that is not the environment: ``since_power_on_s``,
 ``placement_scatter_mm``, ``drive_delay_ms``, ``surface_roughness_um``. Options, files, recordings and tables use it.
@@ -364,7 +367,7 @@ RANGES = ranges(
     ("placement_scatter_mm", 0.0, 0.5, "mm", "assumed", "a machined seat … one fitted by hand"),
     ("placement_tilt_scatter_deg", 0.0, 1.0, "deg", "assumed", "none … 0.2 mm across a cap of 12 mm"),
 )
-"""Between what ends nuisances of the mount may lie, by name; a sensor's spec has its own."""
+"""Ranges of the nuisances of the mount, by name; the ranges of a sensor's own are in its spec."""
 
 _MAY_BE_NEGATIVE = frozenset({
     "ambient_degc", "indenter_temperature_degc", "placement_x_mm", "placement_s_mm", "placement_tilt_x_rad",

@@ -1,4 +1,4 @@
-"""What a sensor is: streams, channels, where they sit, what they are made of, and who says so."""
+"""Specification of a sensor: streams, channels, positions, skin and nuisances, each with its source."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ ChannelKind = Literal[
     "taxel", "dc_pressure", "ac_pressure", "dc_temperature", "ac_temperature",
     "force", "torque", "position", "joint", "other",
 ]  # fmt: skip
-"""What a channel measures. Tasks ask for kinds, never for a sensor's own names."""
+"""Kind of quantity that a channel measures; tasks name kinds, never channels of a sensor."""
 
 SENSOR_NAME = r"^[a-z][a-z0-9_-]*$"
 
@@ -37,7 +37,7 @@ class PhysicalRange(Frozen):
 
 
 def ranges(*stated: tuple[str, float, float, str, Tag, str]) -> dict[str, PhysicalRange]:
-    """Return ranges by name, of (name, lower, upper, unit, tag, reference) each."""
+    """Return ranges by name, made of tuples (name, lower, upper, unit, tag, reference)."""
     return {
         name: PhysicalRange(lower=lower, upper=upper, unit=unit, source=Source(tag=tag, reference=reference))
         for name, lower, upper, unit, tag, reference in stated
@@ -45,53 +45,53 @@ def ranges(*stated: tuple[str, float, float, str, Tag, str]) -> dict[str, Physic
 
 
 class ChannelSpec(Frozen):
-    """One number per sample."""
+    """A channel, which gives one number per sample."""
 
     name: str = Field(pattern=r"^[A-Za-z][A-Za-z0-9_.-]*$")
-    """Unique within the sensor."""
+    """Name, unique within the sensor."""
     kind: ChannelKind
     unit: Unit = "count"
     """Unit of the stored numbers; `count` for a raw converter reading."""
     lower: float | None = None
-    """Smallest value the converter can give."""
+    """Smallest value that the converter gives."""
     upper: float | None = None
-    """Largest value the converter can give."""
+    """Largest value that the converter gives."""
     rest: Quantity | None = None
-    """Reading with nothing touching, in `unit`."""
+    """Reading without a touch, in `unit`."""
     sign: Literal[-1, 0, 1] = 0
-    """+1: the reading rises under load; -1: it falls; 0: either, or not known."""
+    """Sign of the response: +1 if the reading rises under load, -1 if it falls, 0 if it does either or is not known."""
     position_m: Vector | None = None
     """Place (x, y, z) on the sensor [m], in the sensor's frame: x along the finger towards the tip, y across, -z to the
     pad that is pressed. On the skin's sheet, x is the axial coordinate and y, or on a finger its arc, is s."""
     normal: Vector | None = None
     """Outward unit normal at that place."""
     site: str | None = Field(default=None, min_length=1)
-    """Name of the place, where several channels read it (the axes of one magnet): they state one position and normal.
-    None: the channel has a place of its own."""
+    """Name of the place where several channels share it, as the axes of one magnet do; they state one position and
+    normal. None: the channel has a place of its own."""
     position_source: Source | None = None
-    """Who states position and normal."""
+    """Source of position and normal."""
     scale: Quantity | None = None
-    """Physical units per stored unit, if it is linear (36.5 Pa per count)."""
+    """Physical units for each stored unit, of a linear channel (36.5 Pa per count)."""
     measures: PhysicalRange | None = None
-    """Physical range."""
+    """Range in physical units."""
     band: PhysicalRange | None = None
     """Frequency band."""
 
 
 class StreamSpec(Frozen):
-    """Channels that share one clock."""
+    """A stream: channels that share one clock."""
 
     name: str = Field(pattern=r"^[A-Za-z][A-Za-z0-9_-]*$")
     rate_hz: float | None = Field(default=None, gt=0)
-    """Nominal sample rate; None when nobody states one (never invented)."""
+    """Nominal sample rate [Hz]; None: no source states one."""
     rate_source: Source | None = None
     dtype: Literal["uint8", "uint16", "int16", "int32", "float32", "float64"] = "float64"
-    """How samples are stored."""
+    """Type of the stored samples."""
     channels: tuple[ChannelSpec, ...] = Field(min_length=1)
 
 
 class Creep(Frozen):
-    """One exponential term by which the response lags behind the load."""
+    """An exponential term with which the response lags behind the load."""
 
     fraction: Share
     """Share of the response that arrives late [1]."""
@@ -106,7 +106,7 @@ _ANY_TIME = assumed(1.0, "s", "without effect")
 
 
 class Nuisances(Frozen):
-    """What comes on top of the physics, for all channels of one kind.
+    """Noise, drift and scatter of all channels of one kind, which a simulation adds to the physics.
 
     Amounts are in the channel's own unit, ``count`` for raw readings, and added to readings as they are. Shares are in
     1, time constants in a time.
@@ -119,13 +119,13 @@ class Nuisances(Frozen):
     offset_shared: Quantity = _NO_COUNTS
     """Standard deviation of an offset that all channels of one recording share."""
     offset_own: Quantity = _NO_COUNTS
-    """Each channel's own offset in a recording: its root mean square over channels and recordings."""
+    """Root mean square, over channels and recordings, of each channel's own offset in a recording."""
     offset_session: Quantity = _NO_COUNTS
     """Standard deviation of each channel's own offset between sessions."""
     gain_scatter: Quantity = _NO_SHARE
     """Standard deviation of each channel's gain within one sensor unit [1]."""
     warm_up: Quantity = _NO_COUNTS
-    """How far the shared rest level rises from power-on to equilibrium."""
+    """Rise of the shared rest level from power-on to equilibrium."""
     warm_up_tau: Time = _ANY_TIME
     """Time constant of that rise [time]."""
     warm_up_scatter: Quantity = _NO_SHARE
@@ -142,15 +142,14 @@ class Nuisances(Frozen):
     unit_rest_shared: Quantity | None = None
     """Standard deviation by which the rest level of all channels of another unit differs from the spec's."""
     unit_rest_own: Quantity | None = None
-    """The same for each channel's own."""
+    """Standard deviation by which the rest level of each channel of another unit differs by itself."""
     offset_smooth: Quantity | None = None
-    """Share of the own offsets' variance that is a quadratic of the channels' places [1]; None: all of it is each
-    channel's by itself."""
+    """Share of the variance of own offsets that is a quadratic function of the channels' places [1]; None: none is."""
 
     @model_validator(mode="before")
     @classmethod
     def _without_largest_slope(cls, given: Any) -> Any:
-        """Pass over a field of recordings written before slopes came from the scene's own load table."""
+        """Return nuisances of an earlier recording without a field that was given up."""
         if isinstance(given, dict) and "largest_slope" in given:
             return {name: value for name, value in given.items() if name != "largest_slope"}
         return given
@@ -163,7 +162,7 @@ class Nuisances(Frozen):
         return self
 
     def by_name(self, kind: str) -> dict[str, tuple[str, Quantity]]:
-        """Return every amount with its field, by the name under which a run sets it: ``taxel_white_count``."""
+        """Return every amount with its field, by its name in settings of a run: ``taxel_white_count``."""
         stated = {field: getattr(self, field) for field in type(self).model_fields if field != "creep"}
         for place, term in enumerate(self.creep, start=1):
             stated |= {f"creep_{place}_fraction": term.fraction, f"creep_{place}_tau": term.tau}
@@ -174,7 +173,7 @@ class Nuisances(Frozen):
         }
 
     def with_values(self, kind: str, values: Mapping[str, float]) -> Nuisances:
-        """Return these nuisances with other `values`, by name; names that are not theirs are passed over.
+        """Return these nuisances with other `values`, by name; names of others are ignored.
 
         Raises
         ------
@@ -202,47 +201,47 @@ class Nuisances(Frozen):
             raise UsageError(f"{kind}: {complaint(error)}.", hint="Set that as well.") from error
 
     def hidden(self, noise_scale: float = 1.0) -> float:
-        """Return the standard deviation that white noise and rounding hide anyway, in the channel's unit."""
+        """Return the standard deviation of white noise and rounding together, in the channel's unit."""
         return math.hypot(noise_scale * self.white.value, self.step.value / math.sqrt(12.0))
 
 
 class Scenario(Frozen):
-    """Other nuisances than the usual ones, for a way of handling the sensor that has a name."""
+    """Nuisances of another way of handling the sensor, which has a name."""
 
     title: str
-    """What is done to the sensor, in a few words."""
+    """Description of the handling, in a few words."""
     nuisances: dict[ChannelKind, Nuisances] = Field(min_length=1)
-    """By kind of channel, in place of the spec's own; kinds that are not here keep theirs."""
+    """Nuisances by kind of channel; kinds that are left out keep those of the spec."""
 
 
 class Statement(Frozen):
-    """What a document says in words."""
+    """A statement of a document in words."""
 
     text: str = Field(min_length=1)
     source: Source
 
 
 class DataSheet(Frozen):
-    """What an integrator asks of a sensor as a device. What no source states stays None: unknown, never guessed."""
+    """Facts for an integrator about the sensor as a device; None: no source states the fact."""
 
     force_range: PhysicalRange | None = None
-    """Normal forces it answers to [force]."""
+    """Normal forces that it measures [force]."""
     length: Length | None = None
-    """Of the sensing part, along the finger [length]."""
+    """Length of the sensing part along the finger [length]."""
     width: Length | None = None
-    """Across the finger [length]."""
+    """Width across the finger [length]."""
     height: Length | None = None
-    """From the mount to the touched surface [length]."""
+    """Height from the mount to the touched surface [length]."""
     mass: Mass | None = None
-    """Without cable and mount [mass]."""
+    """Mass without cable and mount [mass]."""
     interface: Statement | None = None
-    """How readings leave it."""
+    """Electrical interface of the readings."""
     power: Power | None = None
-    """Drawn from its supply [power]."""
+    """Power that it draws from its supply [power]."""
     availability: Statement | None = None
-    """Whether and where it can be had."""
+    """Availability of the device."""
     exists: bool = True
-    """False: a definition, no device; `tactbench choose` leaves it out."""
+    """Whether there is such a device; a mere definition is left out by `tactbench choose`."""
 
     @model_validator(mode="after")
     def _has_its_units(self) -> DataSheet:
@@ -259,29 +258,28 @@ class SensorSpec(Frozen):
     name: str = Field(pattern=SENSOR_NAME)
     title: str
     principle: str
-    """How a taxel measures: resistive, capacitive, magnetic …"""
+    """Principle by which a taxel measures: resistive, capacitive, magnetic …"""
     principle_source: Source
     streams: tuple[StreamSpec, ...] = Field(min_length=1)
     link_delay: Time | None = None
-    """From a sample taken to the sample in the host: frame and bus [time]. None: nobody states it."""
+    """Time from taking a sample to having it in the host, through frame and bus [time]; None: no source states it."""
     skin: Skin | None = None
-    """None: the sensor cannot be simulated, only recorded or replayed."""
+    """Skin for simulation; None: the sensor can only be recorded or replayed."""
     reads_shear: tuple[ChannelKind, ...] = ()
-    """Kinds of channels whose transducer looks at `tangential_displacement_mm` and `shear_mpa` of a SkinState: the twin
-    computes both only where such a channel is observed."""
+    """Kinds of channels whose transducer uses `tangential_displacement_mm` and `shear_mpa` of a SkinState, which are
+    computed only where such a channel is observed."""
     parameters: dict[str, Quantity] = Field(default_factory=dict)
-    """What the sensor's own transduction needs."""
+    """Parameters of the sensor's own transduction."""
     nuisances: dict[ChannelKind, Nuisances] = Field(default_factory=dict)
-    """Noise and drift by kind of channel, for the twin."""
+    """Nuisances for simulation, by kind of channel."""
     scenarios: dict[Annotated[str, Field(pattern=r"^[a-z][a-z0-9-]*$")], Scenario] = Field(default_factory=dict)
-    """Ways of handling the sensor that its usual nuisances do not cover, by name; used where a scene's simulation asks
-    for one."""
+    """Ways of handling that the usual nuisances do not cover, by name; a scene's simulation selects one."""
     ranges: dict[str, PhysicalRange] = Field(default_factory=dict, exclude=True)
-    """Between what ends nuisances may lie, by the name under which a run sets them: its own, and those of a scene that
-    scale them. Left out of recordings and keys: no sample depends on it."""
+    """Ranges of nuisances by their names in settings of a run: of the sensor's own, and of a scene's factors on them.
+    They are left out of recordings and keys, as no sample depends on them."""
     references: tuple[str, ...] = ()
     data_sheet: DataSheet = Field(default=DataSheet(), exclude=True)
-    """Size, range, interface … of the device. Left out of recordings and keys: no sample depends on it."""
+    """Facts about the device. They are left out of recordings and keys, as no sample depends on them."""
 
     @model_validator(mode="after")
     def _names_are_unique(self) -> SensorSpec:
@@ -303,12 +301,12 @@ class SensorSpec(Frozen):
         return self
 
     def channels(self, *kinds: ChannelKind) -> tuple[ChannelSpec, ...]:
-        """Return the channels of the given kinds (all of them without arguments), in order of the streams."""
+        """Return the channels of the given kinds, or all of them without arguments, in the order of the streams."""
         every = (channel for stream in self.streams for channel in stream.channels)
         return tuple(channel for channel in every if not kinds or channel.kind in kinds)
 
     def sites(self, *kinds: ChannelKind) -> tuple[tuple[ChannelSpec, ...], ...]:
-        """Return the channels of the given kinds by place: those of a site together, any other alone."""
+        """Return the channels of the given kinds by place: those of a site together, each other one alone."""
         found: dict[tuple[str, str], list[ChannelSpec]] = {}
         for channel in self.channels(*kinds):
             found.setdefault(("channel", channel.name) if channel.site is None else ("site", channel.site), []).append(
@@ -317,11 +315,11 @@ class SensorSpec(Frozen):
         return tuple(map(tuple, found.values()))
 
     def settable(self) -> dict[str, Quantity]:
-        """Return what the sensor declares of nuisances, by the name under which a run sets it."""
+        """Return the amounts of the sensor's nuisances, by their names in settings of a run."""
         return {name: amount for kind, own in self.nuisances.items() for name, (_, amount) in own.by_name(kind).items()}
 
     def with_nuisances(self, values: Mapping[str, float]) -> SensorSpec:
-        """Return the spec with other `values` of its nuisances, by name; names that are not its own are passed over.
+        """Return the spec with other `values` of its nuisances, by name; names of others are ignored.
 
         Raises
         ------
@@ -334,7 +332,7 @@ class SensorSpec(Frozen):
         return self.model_copy(update={"nuisances": nuisances})
 
     def handled(self, scenario: str | None) -> SensorSpec:
-        """Return the spec with the nuisances of one of its scenarios; None: as it is.
+        """Return the spec with the nuisances of one of its scenarios, or itself for None.
 
         Raises
         ------

@@ -1,4 +1,4 @@
-"""What a sensor's skin is made of: a declaration, not a solver.
+"""Media of a sensor's skin, which a sensor declares and a simulation solves.
 
 A third party's sensor runs on the twin by declaring one of these media. The equations are in ``docs/twin.md``.
 """
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 
 class Dome(Frozen):
-    """A finger's tip: where its cylinder ends in a hemisphere of the same radius.
+    """The tip of a finger, where its cylinder ends in a hemisphere of the same radius.
 
     On the sheet a point of the dome keeps its axial coordinate: cylinder and hemisphere then have the sheet's own area
     everywhere (Archimedes; Lambert's cylindrical projection), so that loads and volumes are the finger's.
@@ -39,7 +39,7 @@ class SheetTable(Frozen):
     angle_deg: tuple[float, ...]
     """Angles around the finger from its midline, ascending."""
     value_mm: tuple[tuple[float, ...], ...]
-    """A row for each of `x_mm`, a column for each of `angle_deg`."""
+    """Lengths, a row for each of `x_mm` and a column for each of `angle_deg`."""
     source: Source
 
     @model_validator(mode="after")
@@ -61,7 +61,7 @@ class SheetTable(Frozen):
         return max(map(max, self.value_mm))
 
     def at(self, x_mm: npt.NDArray[np.float64], angle_rad: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
-        """Return the (nx, ns) lengths [mm] at (nx,) axial coordinates and (ns,) angles from the midline."""
+        """Return the lengths, (nx, ns) [mm], at (nx,) axial coordinates and (ns,) angles from the midline."""
         import numpy as np
 
         rows, angle = np.array(self.value_mm), np.abs(np.degrees(angle_rad))
@@ -75,7 +75,7 @@ class SheetTable(Frozen):
 
 
 class SkinSheet(Frozen):
-    """The unrolled skin: a rectangle, axial coordinate x by arc length s, s = 0 on the midline."""
+    """The unrolled skin, a rectangle of axial coordinate x and arc length s, with s = 0 on the midline."""
 
     x_min: Length
     """Axial lower end [length]."""
@@ -86,9 +86,9 @@ class SkinSheet(Frozen):
     outer_radius: Length | None = None
     """Radius of the finger's outer surface [length]; None for a flat pad."""
     dome: Dome | None = None
-    """The tip, where the finger ends in one; None: a cylinder (or a flat pad) throughout."""
+    """Dome at the tip of the finger; None: it has none, and is a cylinder or a flat pad."""
     relief: SheetTable | None = None
-    """How far the finger's unloaded surface lies inside that cylinder and dome; None: nowhere."""
+    """Depth of the finger's unloaded surface inside that cylinder and dome; None: it lies on them."""
     cells: tuple[int, int] = (48, 64)
     """Default grid, axial x arc."""
     pad: tuple[Length, Length, Length] | None = None
@@ -105,7 +105,7 @@ class FluidBackedShell(Frozen):
     poisson: Share
     """Its Poisson's ratio, 0 to 0.5 [1]."""
     thickness: Length
-    """Of the sleeve [length]."""
+    """Thickness of the sleeve [length]."""
     mid_radius: Length
     """Radius of the shell's middle surface [length]."""
     tension: Tension
@@ -134,7 +134,7 @@ class FoamPad(Frozen):
     shear: Pressure
     """Shear modulus of the foam [pressure]."""
     thickness: Length
-    """Of the foam at rest, between cover and base [length]."""
+    """Thickness of the foam at rest, between cover and base [length]."""
     densification: Share
     """Strain at which the foam is solid [1]."""
     cover_tension: Tension
@@ -142,7 +142,8 @@ class FoamPad(Frozen):
     cover_bending: BendingStiffness
     """Bending stiffness of the cover [force x length]."""
     contact_stiffness: Stiffness
-    """How stiffly the cover keeps an indenter out [pressure / length]: a penalty, no material value."""
+    """Stiffness with which the cover keeps an indenter out [pressure / length]: a penalty, no property of the
+    material."""
 
 
 class BondedLayer(Frozen):
@@ -155,10 +156,11 @@ class BondedLayer(Frozen):
     poisson: Share
     """Its Poisson's ratio, 0 to below 0.5 [1]."""
     thickness: Length
-    """Of the layer at rest, between surface and base [length]."""
+    """Thickness of the layer at rest, between surface and base [length]."""
     contact_stiffness: Stiffness
-    """How stiffly the surface keeps an indenter out [pressure / length]: a penalty, no material value. That of the
-    sensor `ideal` is 60 times its young / thickness; a soft one lets the indenter sink in and deforms no layer."""
+    """Stiffness with which the surface keeps an indenter out [pressure / length]: a penalty, no property of the
+    material. That of the sensor `ideal` is 60 times its young / thickness; with a soft one, the indenter sinks in and
+    deforms no layer."""
 
 
 Skin = Annotated[FluidBackedShell | FoamPad | BondedLayer, Field(discriminator="medium")]

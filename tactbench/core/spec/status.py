@@ -1,4 +1,4 @@
-"""How a cell ends: every planned cell ends as exactly one row, and its row says which of these."""
+"""Statuses of a cell: every planned cell ends as one row with one of them."""
 
 from __future__ import annotations
 
@@ -9,4 +9,4 @@ Status = Literal["done", "failed", "crashed", "timeout", "out-of-memory", "skipp
 STATUSES: tuple[Status, ...] = get_args(Status)
 
 STOPPED: frozenset[Status] = frozenset({"failed", "crashed", "timeout", "out-of-memory"})
-"""Cells that should have ended otherwise: one of these makes the exit code 1."""
+"""Statuses of cells that failed; one of them makes the exit code 1."""

@@ -1,4 +1,4 @@
-"""One number of a channel over a window of a recording: what a task may ask of recordings that are answered whole."""
+"""Summaries of a channel over a window of a recording, which are features of recordings or frames."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from tactbench.core.spec.sensor import ChannelKind
 
 
 class Summary(Frozen):
-    """A number of each channel over a window of each recording, from the channel's own samples up to the window's end.
+    """A number for each channel over a window, from the channel's own samples up to the window's end.
 
     Nothing is resampled: each stream is summarised on its own clock.
     """
@@ -23,12 +23,12 @@ class Summary(Frozen):
     start: float = Field(default=0.0, ge=0)
     end: float = Field(default=1.0, gt=0)
     unit: Literal["recording", "s"] = "recording"
-    """Of `start` and `end`: shares of each stream's samples, or seconds. Both count from the first sample that the
-    protocol keeps; of a frame, shares of its length or seconds, from its beginning."""
+    """Unit of `start` and `end`: shares of each stream's samples, or seconds. Both count from the first sample that the
+    protocol keeps; in a frame, they are shares of its length or seconds from its beginning."""
     band_hz: tuple[float, float] | None = None
-    """Ends of the band; of ``band-energy`` alone."""
+    """Ends of the band of ``band-energy`` [Hz]; None for other measures."""
     kinds: tuple[ChannelKind, ...] = ()
-    """Of which kinds of channels; empty: of all that the task looks at."""
+    """Kinds of channels; empty: all that the task uses."""
 
     @model_validator(mode="after")
     def _one_window_one_band(self) -> Summary:
@@ -44,7 +44,7 @@ class Summary(Frozen):
 
     @property
     def name(self) -> str:
-        """What it is called in names of features and in rows."""
+        """Name in features and rows."""
         band = "" if self.band_hz is None else f" {self.band_hz[0]:g}-{self.band_hz[1]:g} Hz"
         whole = self.unit == "recording" and (self.start, self.end) == (0.0, 1.0)
         unit = "s" if self.unit == "s" else "of the recording"

@@ -1,4 +1,4 @@
-"""What a task asks of recordings."""
+"""Specification of a task: target, features, metric, protocols and scenes."""
 
 from __future__ import annotations
 
@@ -18,14 +18,14 @@ from tactbench.core.spec.summary import Summary
 METRICS: Final = (
     "rmse", "mae", "mean_euclidean_error", "r2", "accuracy", "balanced_accuracy", "macro_f1", "recall_area",
 )  # fmt: skip
-"""Names of metrics, as a task may ask for them."""
+"""Names of the metrics that a task may have."""
 
 WHERE = r"^[A-Za-z_][\w.]*:[A-Za-z_]\w*$"
-"""Of code: ``module:callable``."""
+"""Pattern of a place of code, ``module:callable``."""
 
 
 class PlannedScene(Frozen):
-    """A scene and what the recording of it is for."""
+    """A scene, and the role of its recording."""
 
     scene: Scene
     role: Role
@@ -57,40 +57,41 @@ def _draw(seed: int, *names: str) -> bytes:
 
 
 class ChannelTarget(Frozen):
-    """The number to predict is a channel of the reference, sample by sample."""
+    """A target that is a channel of the reference, sample by sample."""
 
     source: Literal["channel"] = "channel"
     kind: ChannelKind = "force"
     name: str | None = None
-    """Which one, if a recording has several of this kind; None takes the only one or the one called `normal`."""
+    """Name of the channel, where a recording has several of this kind; None: the only one, or the one called
+    `normal`."""
     unit: str = "N"
     reduce: Literal["mean", "max"] | None = None
-    """Of `answer_per: recording`: the number of a recording is this of all its samples."""
+    """Reduction of the samples of a recording to its number, for `answer_per: recording`."""
 
 
 VECTOR_METRIC: Final = "mean_euclidean_error"
-"""What a vector is scored by."""
+"""Metric of vectors."""
 
 
 class VectorTarget(Frozen):
-    """The vector to predict is several channels of the reference, sample by sample; a row without one has no label."""
+    """A target that is several channels of the reference, sample by sample; a row without one of them has no label."""
 
     source: Literal["vector"] = "vector"
     kind: ChannelKind = "position"
-    """Of every component."""
+    """Kind of every component."""
     names: tuple[str, ...] = Field(min_length=1)
-    """The channels, one a component."""
+    """Names of the channels, one for each component."""
     unit: str
-    """Of every component: the length of a difference is in it too."""
+    """Unit of every component, and so of the length of a difference."""
 
     @property
     def components(self) -> tuple[ChannelTarget, ...]:
-        """Each component as a target of its own."""
+        """The components, each as a target of its own."""
         return tuple(ChannelTarget(kind=self.kind, name=name, unit=self.unit) for name in self.names)
 
 
 class LabelTarget(Frozen):
-    """The class to predict is a label: of the whole recording, or of each row (an annotation)."""
+    """A target that is a label of the recording, or of each row (an annotation)."""
 
     source: Literal["label"] = "label"
     name: str
@@ -98,80 +99,84 @@ class LabelTarget(Frozen):
 
 
 class Published(Frozen):
-    """A figure somebody has published for this task. It stands beside rows it is comparable with, and no others."""
+    """A published figure for a task, which is shown beside the rows that it is comparable with."""
 
     score: float
     reference: str
     protocol: str
-    """Only rows under this protocol stand beside it."""
+    """Protocol of the rows beside which it is shown."""
     sensor: str | None = None
-    """None: of any sensor."""
+    """Name of the sensor; None: any."""
     estimator: str | None = None
-    """None: by a model of their own that is none of ours; `remark` says which."""
+    """Name of the estimator; None: another model than ours, which `remark` describes."""
     split: str | None = None
-    """None: whichever split the protocol has."""
+    """Name of the split; None: any."""
     title: str = ""
-    """What it is, in a few words, for a reproduction table."""
+    """Title in a few words, for a table of reproductions."""
     remark: str = ""
-    """What must be known to compare with it."""
+    """Differences to our evaluation that a reader must know."""
 
 
 class TaskSpec(Frozen):
-    """A question asked of recordings: pure data, the core carries it out."""
+    """A task, described by data alone; the core carries it out."""
 
     name: str = Field(pattern=r"^[a-z][a-z0-9_-]*$")
     title: str
     question: str
-    """One sentence, for people."""
+    """The question in one sentence."""
     kind: Literal["regression", "classification", "events"]
-    """`events`: when something begins. Detectors give every frame a score, `alarms` turns scores into alarms."""
+    """Kind of answer. Of `events`, the answer is when something begins: detectors give every frame a score, and
+    `alarms` turns scores into alarms."""
     features: tuple[ChannelKind, ...] = ("taxel",)
-    """Kinds of channels an estimator may look at."""
+    """Kinds of channels that an estimator may use."""
     optional_features: tuple[ChannelKind, ...] = ()
-    """Further kinds, of sensors that have them."""
+    """Further kinds, used where a sensor has them."""
     target: ChannelTarget | VectorTarget | LabelTarget | SlipTarget
     answer_per: Literal["sample", "recording", "frame"] = "sample"
-    """`recording`: one class or number for each recording as a whole, made in one of the three ways that follow. The
-    target is then a label that does not change within a recording. `frame`: one for each window of the target's length,
+    """Unit of an answer. `recording`: one class or number for a recording, made in one of the three ways that follow;
+    its target is a label that does not change within a recording. `frame`: one for each window of the target's length,
     from each channel's own samples in it."""
     summaries: tuple[Summary, ...] = ()
-    """Features of a recording or of a frame: these numbers of each channel."""
+    """Numbers of each channel that are the features of a recording or of a frame."""
     alarms: AlarmPolicy | None = None
-    """Of events: how frames become alarms, and what an alarm is held against."""
+    """Rules of alarms, for events."""
     max_false_alarms_per_minute: float | None = Field(default=None, ge=0)
-    """Of events: the threshold is that of largest recall on validation recordings with at most so many [1/min]."""
+    """Largest rate of false alarms on validation recordings [1/min], below which the threshold of largest recall is
+    chosen."""
     features_by: str | None = Field(default=None, pattern=WHERE)
-    """``module:callable``, called with one recording, a tuple of :class:`tactbench.plugin.StreamReadings`: features of
-    the task's own, name to number, the same names for every recording. They stand behind `summaries`, or alone."""
+    """``module:callable`` for features of the task's own, called with one recording, a tuple of
+    :class:`tactbench.plugin.StreamReadings`: numbers by name, with the same names for every recording. They are used
+    after `summaries`, or alone."""
     vote: Literal["frames"] | None = None
-    """Every frame is answered, and the answers of a recording are combined: the commonest class, of equals the first;
-    the mean of numbers."""
+    """Combination of the answers for frames to that of a recording: the commonest class, the first of equals, or the
+    mean of numbers."""
     metric: str
     """Name of the primary metric; see docs/glossary.md."""
     unit: str = "1"
     """Unit of the primary metric."""
     equivalence: float | None = Field(default=None, ge=0)
-    """Region of practical equivalence, in the metric's unit: two scores that differ by no more are the same to whoever
-    uses the sensor. None: nobody has said, and only chance makes scores alike."""
+    """Region of practical equivalence, in the metric's unit: scores that differ by no more are the same in use. None:
+    there is no such region."""
     scenes: tuple[PlannedScene, ...] = ()
-    """What a rig should record; empty: only recordings made elsewhere can answer."""
+    """Scenes that a rig records; empty: only recordings made elsewhere can answer."""
     campaigns: dict[str, tuple[PlannedScene, ...]] = Field(default_factory=dict)
-    """By name of a split: what a rig should record for it instead of `scenes`. Groups that such a split keeps apart are
-    left out one by one. Scenes of one name are one scene, in every campaign."""
+    """Scenes that a rig records for a split instead of `scenes`, by its name. Groups that such a split keeps apart are
+    left out one by one. Scenes of one name are the same in every campaign."""
     protocols: tuple[str, ...]
-    """Allowed protocols, the default first."""
+    """Names of the allowed protocols, the default first."""
     splits: tuple[str, ...] = ()
-    """Splits that make sense for `deployable`, the default first: roles, session, in-session, few-shot-N, or a group's
+    """Splits for the protocol `deployable`, the default first: roles, session, in-session, few-shot-N, or a group's
     name."""
     estimators: tuple[str, ...]
-    """What answers when nobody asks for another."""
+    """Names of the default estimators."""
     baselines: tuple[str, ...]
-    """Trivial answers that stand in every table and are probed; the best of them is the bar."""
+    """Names of the trivial estimators, which stand in every table and are probed; the best one is the bar for
+    others."""
     published: tuple[Published, ...] = ()
     beside: tuple[str, ...] = ()
-    """Tasks that are run whenever this one is asked for: the same question, to be read beside it."""
+    """Names of tasks that are run whenever this one is, to be read beside it."""
     replicates: int | None = Field(default=None, ge=1)
-    """How often a simulated rig records and answers it anew where nobody says; None: as often as any task."""
+    """Default number of replicates on a simulated rig; None: that of any task."""
 
     @model_validator(mode="after")
     def _has_a_metric_and_classes(self) -> TaskSpec:
@@ -234,12 +239,12 @@ class TaskSpec(Frozen):
 
     @property
     def looks_at(self) -> tuple[ChannelKind, ...]:
-        """Kinds of channels an estimator may look at, of sensors that have them."""
+        """Kinds of channels that an estimator may use where a sensor has them."""
         return (*self.features, *self.optional_features)
 
     @property
     def answer_from(self) -> str:
-        """What an answer is made of, and of events what it is held against; empty where answers are of samples."""
+        """Description of what an answer is made of, with the rules of events; empty where answers are of samples."""
         if self.alarms is not None:
             return (
                 f"{self.target}; {self.alarms}; recall area up to {AREA_PER_MINUTE:g} false alarms a "
@@ -253,7 +258,7 @@ class TaskSpec(Frozen):
         return ", ".join([one.name for one in self.summaries] + own)
 
     def published_for(self, sensor: str, protocol: str, estimator: str, split: str | None) -> Published | None:
-        """Return the published figure that a result may stand beside, or None; the one for this sensor first."""
+        """Return the published figure for a result, one for this sensor first; None: none is comparable."""
         fitting = [
             one
             for one in self.published
@@ -265,5 +270,5 @@ class TaskSpec(Frozen):
         return min(fitting, key=lambda one: (one.sensor is None, one.estimator is None), default=None)
 
     def scenes_for(self, split: str | None) -> tuple[PlannedScene, ...]:
-        """Return what a rig should record to answer under `split`, as declared; None is the default split."""
+        """Return the scenes that a rig records for `split`, as declared; None is the default split."""
         return self.scenes if split is None else self.campaigns.get(split, self.scenes)

@@ -1,4 +1,4 @@
-"""Units: a small closed table, so that every number can be turned into SI or refused.
+"""Units in a small table: every number can be turned into SI, or its unit is refused.
 
 Compound units are products and quotients of the names below, for example ``N/mm``, ``MPa/mm``, ``N*mm``.
 """
@@ -9,56 +9,23 @@ from functools import lru_cache
 
 from tactbench.core.errors import UsageError, did_you_mean
 
-Dimension = tuple[int, int, int, int, int, int]
+Dimension = tuple[int, ...]
 """Exponents of (length, mass, time, current, temperature, count)."""
 
-# name -> (factor to SI, exponents). Standard gravity 9.80665 m/s² (CGPM 1901) defines the gram-force.
-_ATOMS: dict[str, tuple[float, Dimension]] = {
-    "1": (1.0, (0, 0, 0, 0, 0, 0)),
-    "%": (0.01, (0, 0, 0, 0, 0, 0)),
-    "count": (1.0, (0, 0, 0, 0, 0, 1)),
-    "m": (1.0, (1, 0, 0, 0, 0, 0)),
-    "cm": (1e-2, (1, 0, 0, 0, 0, 0)),
-    "mm": (1e-3, (1, 0, 0, 0, 0, 0)),
-    "um": (1e-6, (1, 0, 0, 0, 0, 0)),
-    "kg": (1.0, (0, 1, 0, 0, 0, 0)),
-    "g": (1e-3, (0, 1, 0, 0, 0, 0)),
-    "s": (1.0, (0, 0, 1, 0, 0, 0)),
-    "ms": (1e-3, (0, 0, 1, 0, 0, 0)),
-    "us": (1e-6, (0, 0, 1, 0, 0, 0)),
-    "ns": (1e-9, (0, 0, 1, 0, 0, 0)),
-    "min": (60.0, (0, 0, 1, 0, 0, 0)),
-    "Hz": (1.0, (0, 0, -1, 0, 0, 0)),
-    "kHz": (1e3, (0, 0, -1, 0, 0, 0)),
-    "N": (1.0, (1, 1, -2, 0, 0, 0)),
-    "mN": (1e-3, (1, 1, -2, 0, 0, 0)),
-    "kN": (1e3, (1, 1, -2, 0, 0, 0)),
-    "gf": (9.80665e-3, (1, 1, -2, 0, 0, 0)),
-    "kgf": (9.80665, (1, 1, -2, 0, 0, 0)),
-    "Pa": (1.0, (-1, 1, -2, 0, 0, 0)),
-    "hPa": (1e2, (-1, 1, -2, 0, 0, 0)),
-    "kPa": (1e3, (-1, 1, -2, 0, 0, 0)),
-    "MPa": (1e6, (-1, 1, -2, 0, 0, 0)),
-    "J": (1.0, (2, 1, -2, 0, 0, 0)),
-    "W": (1.0, (2, 1, -3, 0, 0, 0)),
-    "mW": (1e-3, (2, 1, -3, 0, 0, 0)),
-    "A": (1.0, (0, 0, 0, 1, 0, 0)),
-    "mA": (1e-3, (0, 0, 0, 1, 0, 0)),
-    "V": (1.0, (2, 1, -3, -1, 0, 0)),
-    "mV": (1e-3, (2, 1, -3, -1, 0, 0)),
-    "S": (1.0, (-2, -1, 3, 2, 0, 0)),
-    "ohm": (1.0, (2, 1, -3, -2, 0, 0)),
-    "kohm": (1e3, (2, 1, -3, -2, 0, 0)),
-    "F": (1.0, (-2, -1, 4, 2, 0, 0)),
-    "pF": (1e-12, (-2, -1, 4, 2, 0, 0)),
-    "T": (1.0, (0, 1, -2, -1, 0, 0)),
-    "uT": (1e-6, (0, 1, -2, -1, 0, 0)),
-    "K": (1.0, (0, 0, 0, 0, 1, 0)),
-    # Temperatures in degC are differences here; absolute ones carry the offset in `absolute_si`.
-    "degC": (1.0, (0, 0, 0, 0, 1, 0)),
-    "rad": (1.0, (0, 0, 0, 0, 0, 0)),
-    "deg": (0.017453292519943295, (0, 0, 0, 0, 0, 0)),
-}
+_BASE = ("m", "kg", "s", "A", "K", "count")
+_PREFIXES = {"M": 1e6, "k": 1e3, "h": 1e2, "c": 1e-2, "m": 1e-3, "u": 1e-6, "n": 1e-9, "p": 1e-12}
+_SYMBOLS = {
+    "m": (1.0, "m"), "g": (1e-3, "kg"), "s": (1.0, "s"), "A": (1.0, "A"), "K": (1.0, "K"), "Hz": (1.0, "1/s"),
+    "N": (1.0, "kg*m/s/s"), "Pa": (1.0, "N/m/m"), "J": (1.0, "N*m"), "W": (1.0, "J/s"), "V": (1.0, "W/A"),
+    "S": (1.0, "A/V"), "ohm": (1.0, "V/A"), "F": (1.0, "A*s/V"), "T": (1.0, "N/A/m"),
+    "gf": (9.80665e-3, "N"),  # by standard gravity, 9.80665 m/s² (CGPM 1901)
+}  # fmt: skip
+"""Units that take a prefix: how many of another unit each is."""
+_WORDS = {
+    "1": (1.0, ""), "%": (0.01, ""), "count": (1.0, "count"), "min": (60.0, "s"), "rad": (1.0, ""),
+    "deg": (0.017453292519943295, ""), "degC": (1.0, "K"),
+}  # fmt: skip
+"""Units without a prefix. Temperatures in degC are differences, as in K."""
 
 
 @lru_cache(maxsize=256)
@@ -70,23 +37,32 @@ def parse(unit: str) -> tuple[float, Dimension]:
     UsageError
         If a part of `unit` is not in the table; the message offers the nearest names.
     """
-    factor, exponents = 1.0, [0] * 6
-    sign = 1
-    for token in unit.replace("*", " * ").replace("/", " / ").split():
-        if token == "*":
-            sign = 1
-        elif token == "/":
-            sign = -1
-        else:
-            if token not in _ATOMS:
-                hint = f"{did_you_mean(token, _ATOMS)}Units: {', '.join(sorted(_ATOMS))}."
-                raise UsageError(f"The unit {unit!r} is not known.", hint=hint)
-            size, dimension = _ATOMS[token]
-            factor *= size**sign
-            exponents = [have + sign * more for have, more in zip(exponents, dimension, strict=True)]
     if not unit.strip():
         raise UsageError("The unit is empty.", hint="Write 1 for a pure number, count for a raw reading.")
-    return factor, tuple(exponents)  # type: ignore[return-value]
+    factor, exponents, sign = 1.0, (0,) * len(_BASE), 1
+    for token in unit.replace("*", " * ").replace("/", " / ").split():
+        if token in ("*", "/"):
+            sign = 1 if token == "*" else -1
+            continue
+        size, dimension = _named(token, unit)
+        factor *= size**sign
+        exponents = tuple(have + sign * more for have, more in zip(exponents, dimension, strict=True))
+    return factor, exponents
+
+
+def _named(name: str, unit: str) -> tuple[float, Dimension]:
+    """Return the factor and the dimension of one name in `unit`."""
+    if name in _BASE:
+        return 1.0, tuple(int(name == one) for one in _BASE)
+    table, prefix, symbol = {**_SYMBOLS, **_WORDS}, 1.0, name
+    if name not in table and name[0] in _PREFIXES and name[1:] in _SYMBOLS:
+        prefix, symbol = _PREFIXES[name[0]], name[1:]
+    if symbol not in table:
+        hint = f"{did_you_mean(name, table)}Units: {', '.join(table)}; prefixes: {', '.join(_PREFIXES)}."
+        raise UsageError(f"The unit {unit!r} is not known.", hint=hint)
+    size, of = table[symbol]
+    whole, dimension = parse(of) if of else (1.0, (0,) * len(_BASE))
+    return prefix * size * whole, dimension
 
 
 def with_unit(name: str, unit: str) -> str:

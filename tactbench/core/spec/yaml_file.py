@@ -1,4 +1,4 @@
-"""YAML files checked against a model: every complaint names the file and the line."""
+"""Reading of YAML files into models, with errors that name the file and the line."""
 
 from __future__ import annotations
 
@@ -13,18 +13,22 @@ from tactbench.core.errors import ConfigError, did_you_mean
 
 M = TypeVar("M", bound=BaseModel)
 Path_ = tuple[str | int, ...]
+Places = dict[Path_, tuple[int, yaml.Node]]
+"""The line and the node of every key and item, by its path in the file."""
 
 MOST_BYTES = 2**17
-"""The largest file of this project has 12 kB."""
+"""Largest file that is read; the largest one of this project has 12 kB."""
+_LOADER: Any = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
+"""The loader in C, which is eight times as fast, where PyYAML was built with it."""
 _INT, _FLOAT, _TEXT = (f"tag:yaml.org,2002:{name}" for name in ("int", "float", "str"))
 _KEYS = (_INT, _TEXT, "tag:yaml.org,2002:merge")
 _WHOLE = re.compile(r"-?[1-9][0-9]*|0")
 _ODD_NUMBER = re.compile(r"[-+]?(0[0-9_]|[0-9][0-9_.]*[_:])")
-"""Notations of YAML 1.1 that hardly anybody means: 010 is 8, 2025_04 is 202504, 1:30 is 90."""
+"""Numbers of YAML 1.1 that are read as others than they seem: 010 is 8, 2025_04 is 202504, 1:30 is 90."""
 
 
 def load_yaml(path: Path, model: type[M]) -> M:
-    """Read `path` and return it as a `model`.
+    """Return the file at `path` as a `model`.
 
     Raises
     ------
@@ -46,16 +50,16 @@ def load_yaml(path: Path, model: type[M]) -> M:
         raise ConfigError(file, None, "is not UTF-8 text.", hint="Save it as UTF-8.") from error
     if node is None:
         raise ConfigError(file, None, "is empty.", hint="See docs/ for an example.")
-    lines: dict[Path_, int] = {}
-    _look(node, (), lines, file)
+    places: Places = {}
+    _look(node, (), places, file)
     try:
         return model.model_validate(data)
     except ValidationError as error:
-        raise _explain(error, file, lines, node, model) from error
+        raise _explain(error, file, places, model) from error
 
 
 def plain_value(text: str) -> Any:
-    """Return what YAML reads `text` as if that is a number, a truth value or a text, else `text` itself."""
+    """Return `text` as the number or truth value that YAML reads in it, and any other text as it is."""
     try:
         node, value = _loaded(text, "")
         _look(node, (), {}, "")
@@ -67,7 +71,9 @@ def plain_value(text: str) -> Any:
 def _loaded(text: str, file: str) -> tuple[Any, Any]:
     """Return the node and the plain data of a text; raises ConfigError."""
     try:
-        return yaml.compose(text, yaml.SafeLoader), yaml.safe_load(text)
+        loader = _LOADER(text)
+        node = loader.get_single_node()
+        return node, None if node is None else loader.construct_document(node)
     except yaml.YAMLError as error:
         mark = getattr(error, "problem_mark", None)
         problem = getattr(error, "problem", None) or "is not YAML"
@@ -76,10 +82,10 @@ def _loaded(text: str, file: str) -> tuple[Any, Any]:
         raise ConfigError(file, None, f"cannot be read as plain values: {error}.", hint="Quote texts.") from error
 
 
-def _look(node: Any, at: Path_, lines: dict[Path_, int], file: str) -> None:
-    """Remember the line of every key and item; refuse what YAML reads as something else than is written."""
+def _look(node: Any, at: Path_, places: Places, file: str) -> None:
+    """Add every key and item to `places`; raise ConfigError for a value that YAML reads as another than is written."""
     line = node.start_mark.line + 1
-    lines.setdefault(at, line)
+    places.setdefault(at, (line, node))
     if isinstance(node, yaml.MappingNode):
         seen = set()
         for key_node, value_node in node.value:
@@ -93,11 +99,11 @@ def _look(node: Any, at: Path_, lines: dict[Path_, int], file: str) -> None:
                 raise ConfigError(file, line, f"the key {key!r} stands here twice.", hint="Remove one of them.")
             seen.add(key)
             place: Path_ = (*at, int(key) if number else key)
-            lines[place] = line
-            _look(value_node, place, lines, file)
+            places[place] = line, value_node
+            _look(value_node, place, places, file)
     elif isinstance(node, yaml.SequenceNode):
         for index, item in enumerate(node.value):
-            _look(item, (*at, index), lines, file)
+            _look(item, (*at, index), places, file)
     elif node.tag in (_INT, _FLOAT) and _ODD_NUMBER.match(node.value):
         written = node.value[:80]
         raise ConfigError(
@@ -106,15 +112,16 @@ def _look(node: Any, at: Path_, lines: dict[Path_, int], file: str) -> None:
         )  # fmt: skip
 
 
-def _explain(
-    error: ValidationError, file: str, lines: dict[Path_, int], root: yaml.Node, model: type[BaseModel]
-) -> ConfigError:
-    """Turn the first complaint of pydantic into one sentence with a line."""
+def _explain(error: ValidationError, file: str, places: Places, model: type[BaseModel]) -> ConfigError:
+    """Return the first complaint of pydantic as an error with its line in the file."""
     complaints = error.errors(include_url=False)
     # A misspelt key is both unknown and missing: the unknown one is what the writer sees on the page.
     first = next((one for one in complaints if one["type"] == "extra_forbidden"), complaints[0])
     loc = tuple(first["loc"])
-    at, line = _deepest(loc, lines)
+    at: Path_ = ()
+    for part in loc:  # pydantic adds the names of members of unions, which stand nowhere in the file
+        at = (*at, part) if (*at, part) in places else at
+    line, node = places[at]
     name = ".".join(str(part) for part in at) or "the file"
     if first["type"] == "extra_forbidden":
         schema = model.model_json_schema()
@@ -123,29 +130,9 @@ def _explain(
         return ConfigError(file, line, f"the key {str(loc[-1])!r} is not known.", hint=meant or "Remove it.")
     if first["type"] == "missing":
         return ConfigError(file, line, f"the key {str(loc[-1])!r} is missing in {name}.", hint="Add it.")
-    text = _written(root, at)
+    text = ""
+    if isinstance(node, yaml.ScalarNode):  # as it is written: yes, not True, and texts in quotes
+        text = repr(node.value) if node.tag == _TEXT else str(node.value)
     shown = f" (given: {text if len(text) <= 80 else text[:79] + '…'})" if text else ""
     message = first["msg"].removeprefix("Value error, ")
     return ConfigError(file, line, f"{name}: {message}{shown}.", hint="Correct the value.")
-
-
-def _deepest(loc: Path_, lines: dict[Path_, int]) -> tuple[Path_, int | None]:
-    """Return the longest path in the file that `loc` walks; pydantic adds names of union members in between."""
-    at: Path_ = ()
-    for part in loc:
-        if (*at, part) in lines:
-            at = (*at, part)
-    return at, lines.get(at)
-
-
-def _written(node: yaml.Node, at: Path_) -> str:
-    """Return what stands in the file at a path if that is one value: ``yes``, not True; texts in quotes."""
-    for part in at:
-        children = node.value
-        if isinstance(node, yaml.MappingNode):
-            node = next(value for key, value in children if key.value == str(part))
-        else:
-            node = children[part]
-    if not isinstance(node, yaml.ScalarNode):
-        return ""
-    return repr(node.value) if node.tag == _TEXT else str(node.value)

@@ -1,4 +1,4 @@
-"""The operator of a rig: prompts go to stderr, and Enter confirms them."""
+"""Prompts for the operator of a rig, on stderr, which are answered with Enter."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ from tactbench.core.tables.terminal import remark
 
 
 class TerminalOperator:
-    """An :class:`~tactbench.core.plugins.interfaces.Operator` at the terminal.
+    """An operator at the terminal (:class:`~tactbench.core.plugins.interfaces.Operator`).
 
     Parameters
     ----------
     yes
-        Every step is done already: prompts are shown, and none is waited for (``--yes``).
+        Whether all steps are done already, so that they are shown without waiting (``--yes``).
     paused
-        Entered during a prompt, so that nothing else draws on the terminal: ``LiveView.paused``.
+        Context of a prompt, in which nothing else draws on the terminal: ``LiveView.paused``.
     """
 
     def __init__(self, *, yes: bool = False, paused: Callable[[], AbstractContextManager[None]] = nullcontext) -> None:
@@ -26,7 +26,7 @@ class TerminalOperator:
         self._paused = paused
 
     def prompt(self, text: str) -> None:
-        """Show `text` and wait for Enter; keys pressed before it was shown are ignored.
+        """Show `text` and wait for Enter; keys pressed before do not count.
 
         Raises
         ------
@@ -38,20 +38,18 @@ class TerminalOperator:
             return
         if not sys.stdin.isatty():
             raise RigError(
-                f"An operator is needed: {text}",
-                hint="Run it in a terminal, or add --yes if all of that is done already.",
+                f"A step cannot be confirmed, as stdin is no terminal: {text}",
+                hint="Run it in a terminal, or add --yes if all steps are done already.",
             )
         with self._paused():
             _forget_typed()
             remark(f"{text}\nPress Enter when it is done, Ctrl-C to end.")
             if not sys.stdin.readline():
-                raise RigError(
-                    "The prompt was not confirmed: standard input is closed.", hint="Press Enter when it is done."
-                )
+                raise RigError("The step was not confirmed: stdin was closed.", hint="Press Enter when it is done.")
 
 
 def _forget_typed() -> None:
-    """Discard keys that were typed before, where the system can."""
+    """Drop input that was typed before, where the system can."""
     try:
         import termios
     except ImportError:  # Windows

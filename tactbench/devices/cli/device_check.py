@@ -8,12 +8,11 @@ from typing import Any
 
 import numpy as np
 
-from tactbench.core.cli.live import COUNTED
 from tactbench.core.conformance.streams import good, marks_of
 from tactbench.core.errors import TactbenchError
 from tactbench.core.plugins.registry import Registry
 from tactbench.core.recording.clock_fit import ClockFit
-from tactbench.core.samples import Block, join_blocks
+from tactbench.core.samples import Block, Quality, join_blocks
 from tactbench.core.spec.rig_file import DeviceEntry, RigFile
 from tactbench.core.spec.sensor import StreamSpec
 from tactbench.devices.driver import Driver
@@ -136,7 +135,7 @@ def _records(device: str, spec: StreamSpec, came: Sequence[Block], ordered: Sequ
     about: Record = {
         "device": device, "stream": spec.name, "rows": len(values), "hz": hz, "stated_hz": spec.rate_hz,
         "lost": ordered.gaps, "twice_or_late": ordered.duplicates + ordered.late,
-        "marked": {str(flag.name): number for flag in COUNTED if (number := int(np.count_nonzero(marks & flag)))},
+        "marked": {str(flag.name): number for flag in Quality if (number := int(np.count_nonzero(marks & flag)))},
         "drift_ppm": None if line is None else line.drift * 1e6,
         "clock_error_us": None if line is None or line.bound_ns is None else line.bound_ns * 1e-3,
     }  # fmt: skip

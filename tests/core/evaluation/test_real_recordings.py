@@ -81,7 +81,7 @@ def test_nine_sensors_of_one_mapping_leave_the_same_segments_out(shared_data, tm
     """Linear regression has no seed: the notes give .70 N for the best sensor and 3.0 for the worst."""
     made = import_tables(MAPPINGS / "fluid-force.yaml", root=shared_data / "fsi", out=tmp_path).recordings
     scores, segments = {}, set()
-    for sensor, own in groupby(made, key=lambda one: one.sensor):
+    for sensor, own in groupby(made, key=lambda one: one.meta.sensor.name):
         result = run("force", [one.path for one in own], "placement", "ols")
         scores[sensor] = result.score
         segments.add(tuple(folds(result)))

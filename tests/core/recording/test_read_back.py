@@ -34,8 +34,8 @@ streams: {taxels: {table: t, channels: [{columns: [0, 1, 2], name: "t{column}", 
 """
 
 
-def record(folder, keep=True):
-    with RecordingWriter(folder / "press.h5", about(), keep=keep) as writer:
+def record(folder):
+    with RecordingWriter(folder / "press.h5", about()) as writer:
         for first in range(0, len(ROWS), 1000):
             rows = slice(first, first + 1000)
             flags = np.full((1000, 3), Quality.SUSPECT, dtype=np.uint8) if first else None

@@ -56,18 +56,15 @@ def losing_rows(writer):
     os.truncate(journal, journal.stat().st_size - 10)
 
 
-@pytest.mark.parametrize(
-    ("fail", "simulated", "keep"),
-    [(failing, False, True), (interrupted, False, True), (failing, True, True), (failing, False, False)],
-)
-def test_an_exception_leaves_the_old_file_alone_and_the_journal_of_a_real_device(tmp_path, fail, simulated, keep):
+@pytest.mark.parametrize(("fail", "simulated"), [(failing, False), (interrupted, False), (failing, True)])
+def test_an_exception_leaves_the_old_file_alone_and_the_journal_of_a_real_device(tmp_path, fail, simulated):
     path, journal = tmp_path / "press.h5", tmp_path / "press.h5.partial"
-    kept = keep and not simulated
+    kept = not simulated
     record(path, about(), appending())
     before = path.read_bytes()
     steps = (appending(0, 3), labelling(["ball", "", "Bär"]), revising(session="late", remarks=("late",)), fail)
     with pytest.raises((RigError, KeyboardInterrupt)) as caught:
-        record(path, about(simulated=simulated), *steps, replace=True, keep=keep)
+        record(path, about(simulated=simulated), *steps, replace=True)
     assert path.read_bytes() == before
     assert sorted(tmp_path.iterdir()) == ([path, journal] if kept else [path])
     if kept:

@@ -5,7 +5,10 @@ from hypothesis import strategies as st
 from tactbench.core.errors import UsageError
 from tactbench.core.spec import units
 
-ATOMS = sorted(units._ATOMS)
+ATOMS = [
+    "1", "%", "count", "rad", "deg", "K", "degC", "s", "ms", "min", "Hz", "kHz", "m", "mm", "N", "mN", "gf", "kgf",
+    "Pa", "MPa", "V", "mV", "ohm", "kohm", "F", "pF", "T", "mT",
+]  # fmt: skip
 
 
 @pytest.mark.parametrize(
@@ -16,6 +19,9 @@ ATOMS = sorted(units._ATOMS)
         ("MPa/mm", "Pa/m", 1e9),
         ("N*mm", "N*m", 1e-3),
         ("min", "s", 60.0),
+        ("kgf", "N", 9.80665),
+        ("mT", "uT", 1e3),
+        ("V*A", "mW", 1e3),
     ],
 )
 def test_known_conversions(given_unit, wanted, factor):
@@ -30,3 +36,10 @@ def test_there_and_back_is_one(first, second):
     else:
         with pytest.raises(UsageError):
             units.conversion(first, second)
+
+
+@pytest.mark.parametrize("unit", ["newton", "mmin", "kdeg", "kkg", "", "m m#"])
+def test_other_names_are_refused(unit):
+    """Only the symbols take a prefix, and only one."""
+    with pytest.raises(UsageError):
+        units.parse(unit)

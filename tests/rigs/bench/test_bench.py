@@ -186,10 +186,10 @@ def test_a_sensor_that_sends_nothing_is_told_and_the_recording_left_out_of_every
     path = tmp_path / "press.h5"
     error = press(path, rig_file().model_copy(update={"allowed": Allowed(silent_s=0.2)}))
     assert error is not None
-    assert "Nothing came of taxels in the whole scene" in error.message
+    assert "No row came from taxels in the whole scene" in error.message
     assert "tactbench doctor" in error.hint
     meta, streams = read(path)
-    assert meta.excluded.startswith("interrupted: Nothing came of taxels")
+    assert meta.excluded.startswith("interrupted: No row came from taxels")
     assert set(streams) == {"force_torque"}
 
 

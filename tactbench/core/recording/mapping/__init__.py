@@ -1,8 +1,8 @@
-"""Foreign tables become recordings, as a mapping file says: no code, nothing guessed, nothing invented.
+"""Import of foreign tables into recordings, as a mapping file describes them.
 
-``model`` is what a mapping may say; ``files`` finds tables and the words in their paths; ``text``, ``sheets``,
-``arrays`` and ``bags`` read them into a ``table``; ``channels`` turns columns into channels; ``samples`` into numbers
-with a quality each; ``importing`` does all of it.
+``model`` has the keys of a mapping file. ``files`` finds the tables, and the words in their paths; ``text``,
+``sheets``, ``arrays``, ``parquet`` and ``bags`` read them into a ``table``. ``channels`` names the channels,
+``samples`` converts cells into samples with a quality each, and ``importing`` writes the recordings.
 """
 
 from tactbench.core.recording.mapping.importing import Imported, ImportReport, import_tables

@@ -1,10 +1,10 @@
-"""Reading NumPy arrays and MATLAB files into tables; pickled objects are refused."""
+"""Readers of NumPy arrays and MATLAB files; pickled objects are refused."""
 
 from __future__ import annotations
 
 import importlib
-import zipfile
-from collections.abc import Collection, Iterator
+from collections.abc import Iterator
+from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
@@ -13,29 +13,25 @@ import numpy.typing as npt
 
 from tactbench.core.errors import MappingError, did_you_mean
 from tactbench.core.recording.mapping.channels import fill
-from tactbench.core.recording.mapping.model import Arrays, Mat, Npy
-from tactbench.core.recording.mapping.table import ArrayTable, plain
+from tactbench.core.recording.mapping.model import Arrays, Column
+from tactbench.core.recording.mapping.table import ColumnTable, plain
 
 Words = dict[str, str]
 
 
-def read_arrays(path: Path, shown: str, how: Arrays, known: Words) -> Iterator[tuple[Words, ArrayTable]]:
-    """Yield one table a recording, with its words: ``index`` (from 0, with leading zeros) and `per_recording`.
+def read_arrays(path: Path, shown: str, how: Arrays, known: Words) -> Iterator[tuple[Words, ColumnTable]]:
+    """Yield the table of each recording, with its words: ``index`` (from 0, with leading zeros) and `per_recording`.
 
-    `known` are the words of the path, for names of further files.
+    `known` are the words of the path, which are filled into the names of further files.
 
     Raises
     ------
     MappingError
-        If the file is none of its kind, lacks an array, or an array has the wrong shape or type.
+        If the file has another format or lacks an array, or an array has the wrong shape or type.
     """
-    names = {how.array, *how.per_recording.values()}
-    if isinstance(how, Mat):
-        # MATLAB has no vectors, and no axis of length 1 at the end: n values are (n, 1) or (1, n).
-        arrays = {name: _shaped(values, len(how.axes) if name == how.array else 1)
-                  for name, values in _load_mat(path, shown, names).items()}  # fmt: skip
-    else:
-        arrays = _load_numpy(path, shown, how, {name: fill(name, known, shown) for name in names})
+    arrays = _load(
+        path, shown, how, {name: fill(name, known, shown) for name in (how.array, *how.per_recording.values())}
+    )
     values = arrays[how.array]
     if values.ndim != len(how.axes):
         raise MappingError(
@@ -61,52 +57,43 @@ def read_arrays(path: Path, shown: str, how: Arrays, known: Words) -> Iterator[t
     for index, rows in enumerate(ordered):
         words = {word: plain(arrays[name][index].item()) for word, name in how.per_recording.items()}
         where = f"{shown}[{f'{how.array}, ' if how.array else ''}{index}]"
-        yield {"index": f"{index:0{wide}d}", **words}, ArrayTable(where, rows)
+        columns: dict[Column, Any] = dict(enumerate(rows.T))
+        yield {"index": f"{index:0{wide}d}", **words}, ColumnTable(where, tuple(columns), range(len(rows)), columns)
 
 
-def _require_there(shown: str, names: set[str], there: Collection[str]) -> None:
-    for name in sorted(names):
-        if name not in there:
-            hint = f"{did_you_mean(name, there)}It has: {', '.join(sorted(there))}."
-            raise MappingError(f"{shown} has no array {name!r}.", hint=hint)
-
-
-def _load_numpy(path: Path, shown: str, how: Arrays, names: dict[str, str]) -> dict[str, npt.NDArray[Any]]:
+def _load(path: Path, shown: str, how: Arrays, names: dict[str, str]) -> dict[str, npt.NDArray[Any]]:
+    """Return arrays by name; `names` are the same with words filled in, which `npy` needs."""
     try:
-        if isinstance(how, Npy):
-            return {name: _load_npy(path.parent / file if file else path) for name, file in names.items()}
-        with path.open("rb") as opened, np.load(opened, allow_pickle=False) as archive:
-            _require_there(shown, {*names}, archive.files)
-            return {name: archive[name] for name in names}
-    except MappingError:
-        raise
-    except (OSError, ValueError, EOFError, zipfile.BadZipFile) as error:
-        raise MappingError(
-            f"{shown} cannot be read as a NumPy {'array' if isinstance(how, Npy) else 'archive'}: {error}.",
-            hint="Pickled objects are refused; store plain arrays with numpy.save or numpy.savez_compressed.",
-        ) from error
-
-
-def _load_npy(path: Path) -> npt.NDArray[Any]:
-    with path.open("rb") as opened:
-        return np.lib.format.read_array(opened, allow_pickle=False)
-
-
-def _load_mat(path: Path, shown: str, names: set[str]) -> dict[str, npt.NDArray[Any]]:
-    io: Any = importlib.import_module("scipy.io")
-    try:
-        _require_there(shown, names, [name for name, *_ in io.whosmat(path)])
-        found = io.loadmat(path, variable_names=sorted(names))
+        with ExitStack() as stack:
+            if how.format == "npy":
+                opened = {name: path.parent / file if file else path for name, file in names.items()}
+                return {name: np.lib.format.read_array(stack.enter_context(one.open("rb")), allow_pickle=False)
+                        for name, one in opened.items()}  # fmt: skip
+            if how.format == "mat":
+                io: Any = importlib.import_module("scipy.io")
+                there, archive = [name for name, *_ in io.whosmat(path)], io.loadmat(path, variable_names=[*names])
+            else:
+                archive = stack.enter_context(np.load(stack.enter_context(path.open("rb")), allow_pickle=False))
+                there = archive.files
+            for name in names:
+                if name not in there:
+                    hint = f"{did_you_mean(name, there)}It has: {', '.join(sorted(there))}."
+                    raise MappingError(f"{shown} has no array {name!r}.", hint=hint)
+            if how.format == "npz":
+                return {name: archive[name] for name in names}
+            return {name: _shaped(archive[name], len(how.axes) if name == how.array else 1) for name in names}
     except MappingError:
         raise
     except Exception as error:  # whatever a damaged file makes of the library
         raise MappingError(
-            f"{shown} cannot be read as a MATLAB file: {error}.", hint="Save it with -v7, or the table as CSV."
+            f"{shown} cannot be read as `format: {how.format}`: {error}.",
+            hint="Store plain arrays with numpy.save, numpy.savez_compressed or, in MATLAB, with -v7; pickled objects "
+            "are refused.",
         ) from error
-    return {name: found[name] for name in names}
 
 
 def _shaped(values: npt.NDArray[Any], axes: int) -> npt.NDArray[Any]:
+    """Return an array with so many axes; in MATLAB n values are (n, 1) or (1, n), and no last axis has length 1."""
     if axes == 1 and values.ndim == 2 and 1 in values.shape:
         return values.reshape(-1)
     return values.reshape(values.shape + (1,) * (axes - values.ndim))

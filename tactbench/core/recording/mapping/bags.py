@@ -1,4 +1,4 @@
-"""Reading topics of MCAP bags, as ROS 2 and Foxglove write them, into tables; the extra ``[mcap]``."""
+"""Reader of MCAP bags, as ROS 2 and Foxglove write them; it needs the extra ``[mcap]``."""
 
 from __future__ import annotations
 
@@ -7,59 +7,63 @@ import json
 import struct
 from array import array
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass
 from decimal import Decimal
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from tactbench.core.errors import MappingError, did_you_mean
 from tactbench.core.recording.mapping.model import Column
-from tactbench.core.recording.mapping.table import MESSAGE_TIMES, ColumnTable, plain
+from tactbench.core.recording.mapping.table import ColumnTable, UsedColumns, nanoseconds_per
+
+MESSAGE_TIMES = ("log_time", "publish_time")
+"""Columns that every message has beside its fields: when it was written and when it was sent, in nanoseconds."""
 
 
-@dataclass(frozen=True)
-class Topic:
-    """What the mapping uses of a table, and the topic that the table is in a bag."""
-
-    name: str
-    numbers: tuple[Column, ...]
-    texts: tuple[Column, ...]
-    time: Column | None
-
-    @property
-    def columns(self) -> tuple[Column, ...]:
-        """All columns that are used, each once."""
-        return tuple(dict.fromkeys((*self.numbers, *self.texts, *([] if self.time is None else [self.time]))))
-
-
-def read_bag(path: Path, shown: str, topics: Mapping[str, Topic]) -> dict[str, ColumnTable]:
-    """Read topics of one bag in one pass, by the name of their table.
+def read_bag(path: Path, shown: str, topics: Mapping[str, tuple[str, UsedColumns]]) -> dict[str, ColumnTable]:
+    """Read topics of one bag in one pass; return tables by their name, for each a topic and its columns that are used.
 
     Raises
     ------
     MappingError
-        If the extra is missing, the bag is damaged or cut short, has no such topic, or messages lack a field.
+        If the extra is missing, the bag is damaged or cut short or has no such topic, messages lack a field, or the
+        mapping gives another unit for a time in nanoseconds.
     """
-    tables = {name: ColumnTable(f"{shown} {topic.name}") for name, topic in topics.items()}
-    takers: dict[int, list[Callable[[Any], None]]] = {}
+    values: dict[str, dict[Column, Any]] = {
+        name: {one: array("d") if used.as_float(one) else [] for one in used.columns}
+        for name, (_, used) in topics.items()
+    }
+    counts = dict.fromkeys(topics, 0)
+    decoders: dict[int, tuple[list[str], Any]] = {}
     schemas: dict[int, Any] = {}
     seen: set[str] = set()
     for record in _records(path, shown):
         kind = type(record).__name__
         if kind == "Message":
-            for take in takers.get(record.channel_id, ()):
-                take(record)
+            names, decode = decoders.get(record.channel_id, ((), None))
+            for name in names:
+                topic, used = topics[name]
+                _take(record, decode, used, values[name], f"{shown} {topic}, message {counts[name]}")
+                counts[name] += 1
         elif kind == "Schema":
             schemas[record.id] = record
-        elif kind == "Channel" and record.id not in takers:
+        elif kind == "Channel" and record.id not in decoders:
             seen.add(record.topic)
-            asked = [name for name, topic in topics.items() if topic.name == record.topic]
-            decode = _decoder(record, schemas.get(record.schema_id), shown) if asked else None
-            takers[record.id] = [_taker(tables[name], topics[name], decode) for name in asked]
-    for name, topic in topics.items():
-        if not len(tables[name]):
-            hint = f"{did_you_mean(topic.name, seen - {topic.name})}It has: {', '.join(sorted(seen))}."
-            raise MappingError(f"{shown} has no message of topic {topic.name!r}.", hint=hint)
+            names = [name for name, (topic, _) in topics.items() if topic == record.topic]
+            decoders[record.id] = names, names and _decoder(record, schemas.get(record.schema_id), shown)
+    tables = {}
+    for name, (topic, used) in topics.items():
+        if not counts[name]:
+            hint = f"{did_you_mean(topic, seen - {topic})}It has: {', '.join(sorted(seen))}."
+            raise MappingError(f"{shown} has no message of topic {topic!r}.", hint=hint)
+        time = used.time
+        if time is not None and isinstance(values[name][time.column][0], int) and nanoseconds_per(time) != 1:
+            raise MappingError(
+                f"{shown} {topic}: {time.column} is in nanoseconds.", hint="Write `unit: ns` under `time`."
+            )
+        columns = {one: np.array(found) if used.as_float(one) else found for one, found in values[name].items()}
+        tables[name] = ColumnTable(f"{shown} {topic}", used.columns, range(counts[name]), columns, "message")
     return tables
 
 
@@ -84,7 +88,7 @@ def _records(path: Path, shown: str) -> Iterator[Any]:
 
 
 def _decoder(channel: Any, schema: Any, shown: str) -> Callable[[bytes], Any]:
-    """Return what turns the bytes of a message into fields; raises MappingError for an encoding that is not read."""
+    """Return the decoder of a topic's messages; raises MappingError for an encoding that cannot be read."""
     if channel.message_encoding == "json":
         return json.loads
     ros: Any = importlib.import_module("mcap_ros2.decoder")
@@ -98,41 +102,26 @@ def _decoder(channel: Any, schema: Any, shown: str) -> Callable[[bytes], Any]:
     return found
 
 
-def _taker(table: ColumnTable, topic: Topic, decode: Any) -> Callable[[Any], None]:
-    """Return what adds one message to `table`."""
-    numbers = [(table.found.setdefault(column, array("d")), _path(column), column) for column in topic.numbers]
-    texts = [(table.words.setdefault(column, []), _path(column), column) for column in topic.texts]
-    time = topic.time
-    time_path = () if time is None or time in MESSAGE_TIMES else _path(time)
-
-    def take(record: Any) -> None:
-        table.rows.append(len(table.rows))
-        column: Column | None = None
-        try:
-            message = decode(record.data)
-            for column_values, path, column in numbers:  # noqa: B007  (named where it fails)
-                column_values.append(float(_field(message, path)))
-            for column_texts, path, column in texts:  # noqa: B007
-                column_texts.append(plain(_field(message, path)))
-            if time is not None:
-                column = time
-                table.stamps.append(_stamp(_field(message, time_path)) if time_path else getattr(record, str(time)))
-        except (AttributeError, KeyError, IndexError, TypeError, ValueError, struct.error) as error:
-            what = "cannot be decoded" if column is None else f"has no {column!r} of the kind that is asked for"
-            raise MappingError(
-                f"{table.where(-1)} {what} ({type(error).__name__}: {error}).",
-                hint="Fields are named by their path: header.stamp, wrench.force.z, data.0; or log_time.",
-            ) from error
-
-    return take
-
-
-def _path(column: Column) -> tuple[str | int, ...]:
-    return tuple(int(part) if part.isdecimal() else part for part in str(column).split("."))
+def _take(record: Any, decode: Any, used: UsedColumns, values: dict[Column, Any], where: str) -> None:
+    """Add the columns of one message to `values`."""
+    column: Column | None = None
+    try:
+        message = decode(record.data)
+        for column, path in used.paths:
+            value = getattr(record, str(column)) if column in MESSAGE_TIMES else _field(message, path)
+            if used.time is not None and column == used.time.column:
+                value = _stamp(value)
+            values[column].append(float(value) if used.as_float(column) else value)
+    except (AttributeError, KeyError, IndexError, TypeError, ValueError, struct.error) as error:
+        what = "cannot be decoded" if column is None else f"has no {column!r} of the kind that the mapping expects"
+        raise MappingError(
+            f"{where} {what} ({type(error).__name__}: {error}).",
+            hint="Fields are named by their path: header.stamp, wrench.force.z, data.0; or log_time.",
+        ) from error
 
 
 def _field(message: Any, path: tuple[str | int, ...]) -> Any:
-    """Return what lies at a path: fields of ROS 2 messages, keys of JSON, places in arrays."""
+    """Return the value at a path: of fields of ROS 2 messages, keys of JSON and places in arrays."""
     for part in path:
         message = message[part] if isinstance(part, int) or isinstance(message, dict) else getattr(message, part)
     return message

@@ -1,4 +1,4 @@
-"""From groups of columns to channels: places and names are spelled out here, once a mapping."""
+"""Channels of the groups of columns in a mapping: ranges and patterns are spelled out once for all recordings."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _WORD = re.compile(r"\{([^{}]*)\}")
 
 @dataclass(frozen=True)
 class MappedChannel:
-    """One channel, the column it comes from, and the group that says how to read it."""
+    """A channel, the column that it is read from, and the group with the rules for reading it."""
 
     spec: ChannelSpec
     column: Column
@@ -31,7 +31,7 @@ class MappedChannel:
 
 @dataclass(frozen=True)
 class MappedStream:
-    """One stream and where its channels come from."""
+    """A stream, and the columns that its channels are read from."""
 
     spec: StreamSpec
     source: StreamSource
@@ -39,13 +39,14 @@ class MappedStream:
 
 
 def fill(pattern: str, words: Mapping[str, Scalar], what: str) -> str:
-    """Replace every ``{word}`` of `pattern`; MappingError for a word nobody has given."""
+    """Return `pattern` with each ``{word}`` filled in; raises MappingError for a word that is not known."""
 
     def word(match: re.Match[str]) -> str:
         name = match.group(1)
         if name not in words:
             raise MappingError(
-                f"{what}: {pattern!r} asks for the word {name!r}; there are: {', '.join(sorted(words)) or 'none'}.",
+                f"{what}: {pattern!r} has the word {name!r}, which is not known; known are: "
+                f"{', '.join(sorted(words)) or 'none'}.",
                 hint="Words come from named groups of `path`, from `split_by`, `per_recording`, `words` and `over`.",
             )
         return str(words[name])
@@ -53,8 +54,16 @@ def fill(pattern: str, words: Mapping[str, Scalar], what: str) -> str:
     return _WORD.sub(word, pattern)
 
 
+def no_translation(where: str, text: str, word: str, known: Mapping[str, str]) -> MappingError:
+    """Return the error for a text that is not among the `known` translations of a word or label."""
+    return MappingError(
+        f"{where} {text!r} has no translation for {word!r}; there are: {', '.join(known)}.",
+        hint="Add it to `values`; of a label, translate what means 'no label' to an empty text.",
+    )
+
+
 def expand(text: Scalar) -> Iterator[Scalar]:
-    """Spell out a range: ``1..3`` is 1, 2, 3; ``e_1..3`` is e_1, e_2, e_3; anything else is itself."""
+    """Yield the members of a range: ``1..3`` is 1, 2, 3; ``e_1..3`` is e_1, e_2, e_3; else the text itself."""
     match = _RANGE.match(text) if isinstance(text, str) else None
     if match is None:
         yield text
@@ -90,7 +99,7 @@ def sensor_of(mapping: MappingFile) -> tuple[SensorSpec, tuple[StreamSpec, ...],
         )
     except ValidationError as error:
         raise MappingError(
-            f"The mapping describes a sensor that cannot be: {complaint(error)}.", hint="Correct the name."
+            f"The sensor of the mapping is not valid: {complaint(error)}.", hint="Correct its streams and channels."
         ) from error
     reference = tuple(stream.spec for stream in streams.values() if stream.source.of == "reference")
     return sensor, reference, streams
@@ -102,19 +111,19 @@ def device(sensor: SensorSpec, mapping: MappingFile, words: Mapping[str, Scalar]
     Raises
     ------
     MappingError
-        If the name is none that a sensor may have.
+        If a sensor cannot have that name.
     """
     name = fill(mapping.sensor.name, words, "sensor.name")
     if not re.fullmatch(SENSOR_NAME, name):
         raise MappingError(
-            f"The sensor of {origin} would be called {name!r}.",
+            f"{origin}: {name!r} cannot be the name of a sensor.",
             hint="Use lower case, digits, - and _; translate words under `words`.",
         )
     return sensor.model_copy(update={"name": name, "title": fill(mapping.sensor.title, words, "sensor.title")})
 
 
 def columns_of(group: ChannelGroup) -> list[Column]:
-    """Return the columns of a group, ranges spelled out."""
+    """Return the columns of a group, with its ranges spelled out."""
     given = group.columns if isinstance(group.columns, tuple) else (group.columns,)
     return [one if isinstance(one, int) else str(one) for text in given for one in expand(text)]
 
@@ -139,12 +148,8 @@ def _channels(stream: str, group: ChannelGroup) -> Iterator[MappedChannel]:
 
 
 def _names(stream: str, group: ChannelGroup, columns: list[Column]) -> Iterator[str]:
-    if not group.over:
-        for column in columns:
-            yield fill(group.name, {"column": column}, f"stream {stream}")
-        return
     ways = [[*expand(values)] if isinstance(values, str) else list(values) for values in group.over.values()]
-    combinations = list(itertools.product(*ways))
+    combinations = list(itertools.product(*ways)) if ways else [()] * len(columns)
     if len(combinations) != len(columns):
         raise MappingError(
             f"Stream {stream}: {len(columns)} columns, but `over` makes {len(combinations)} names.",

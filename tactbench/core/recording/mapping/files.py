@@ -1,31 +1,38 @@
-"""Which files make which recording: patterns, words in paths, and the tables that belong together."""
+"""Search for the files of each recording: patterns, words in paths, and tables that belong together."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path, PurePosixPath
 from typing import NamedTuple
 
 from tactbench.core.errors import MappingError
+from tactbench.core.recording.health import listed
 from tactbench.core.recording.mapping.arrays import read_arrays
-from tactbench.core.recording.mapping.bags import Topic, read_bag
+from tactbench.core.recording.mapping.bags import read_bag
 from tactbench.core.recording.mapping.channels import columns_of
 from tactbench.core.recording.mapping.model import Arrays, Bag, Column, Mapping, Parquet, TableSource, Xlsx
 from tactbench.core.recording.mapping.parquet import read_parquet
-from tactbench.core.recording.mapping.samples import check_join
 from tactbench.core.recording.mapping.sheets import read_sheet
 from tactbench.core.recording.mapping.signatures import require_format
-from tactbench.core.recording.mapping.table import ColumnTable, Table, names_listed
+from tactbench.core.recording.mapping.table import Table, UsedColumns
 from tactbench.core.recording.mapping.text import read_text
 
 Words = dict[str, str]
 
+BROKEN_LINKS = "are links to files that are not here"
+OTHER_CASE = "have an ending in another case"
+LINKED_FOLDERS = "are linked folders, which ** does not search"
+FOLDERS = "are folders"
+APPLE_DOUBLE = "are what macOS keeps beside other files (AppleDouble)"
+_SAME_GROUPS = "Give both `path` expressions the same named groups."
+
 
 @dataclass(frozen=True)
 class FoundFile:
-    """A file, its path below the root, and the words in that path."""
+    """A file, its path below the root folder, and the words in that path."""
 
     path: Path
     shown: str
@@ -34,7 +41,7 @@ class FoundFile:
 
 @dataclass(frozen=True)
 class FileSet:
-    """The files of one or more recordings: one for each table of the mapping."""
+    """Files that belong together, by their table, and the words of all their paths."""
 
     files: dict[str, FoundFile]
     words: Words
@@ -42,18 +49,18 @@ class FileSet:
 
 @dataclass(frozen=True)
 class RawRecording:
-    """Tables of one recording, read."""
+    """The tables of one recording as they were read, and its words."""
 
     tables: dict[str, Table]
     words: Words
     files: tuple[str, ...]
-    """Paths below the root"""
+    """Paths below the root folder."""
 
 
 def find(mapping: Mapping, root: Path) -> tuple[list[FileSet], tuple[str, ...], tuple[str, ...]]:
-    """Return what belongs together, in the order of the first table's paths, what is left out, and other matches.
+    """Return the files that belong together, in the order of the first table's paths, and sentences about the others.
 
-    The last two are sentences.
+    The sentences of the second result are about files that make no recording, those of the third about no tables.
 
     Raises
     ------
@@ -63,39 +70,47 @@ def find(mapping: Mapping, root: Path) -> tuple[list[FileSet], tuple[str, ...], 
     """
     if not root.is_dir():
         raise MappingError(f"There is no folder {root}.", hint="Name the folder of the data set with --root DIR.")
+    found: dict[str, list[FoundFile]] = {}
     left_out: list[str] = []
-    none: list[str] = []
-    found = {name: _matching(name, source, root, left_out, none) for name, source in mapping.tables.items()}
+    no_tables: list[str] = []
+    for name, source in mapping.tables.items():
+        found[name], notes = _matching(name, source, root)
+        left_out += [note for obstacle, note in notes.items() if obstacle in (OTHER_CASE, LINKED_FOLDERS)]
+        no_tables += [note for obstacle, note in notes.items() if obstacle in (FOLDERS, APPLE_DOUBLE)]
     lead, *others = found
     shared = {name: sorted({*found[lead][0].words} & {*found[name][0].words} - {"file"}) for name in others}
-    by_words: dict[str, dict[tuple[str, ...], list[FoundFile]]] = {name: {} for name in others}
+    by_words: dict[tuple[str, ...], list[FoundFile]] = {}
     for name, names in shared.items():
         for file in found[name]:
-            by_words[name].setdefault(tuple(file.words[word] for word in names), []).append(file)
-    sets, orphans = [], []
-    used: dict[str, set[str]] = {name: set() for name in others}
+            by_words.setdefault((name, *(file.words[word] for word in names)), []).append(file)
+    sets: list[FileSet] = []
+    used = set()
     for leader in found[lead]:
         files, words = {lead: leader}, dict(leader.words)
         for name in others:
-            partner = _partner(leader, name, shared[name], by_words[name])
-            if isinstance(partner, str):
-                orphans.append(partner)
+            values = [leader.words[word] for word in shared[name]]
+            fitting = by_words.get((name, *values), [])
+            if len(fitting) == 1:
+                files[name], words = fitting[0], {**fitting[0].words, **words}
+                used.add((name, fitting[0].shown))
                 continue
-            used[name].add(partner.shown)
-            files[name] = partner
-            words = {**partner.words, **words}
+            what = ", ".join(map(" ".join, zip(shared[name], values, strict=True))) or "no shared words"
+            there = f"are {len(fitting)}: {listed([one.shown for one in fitting], 'files')}" if fitting else "is none"
+            left_out.append(f"{leader.shown} needs one file of table {name!r} ({what}); there {there}.")
+            if fitting:
+                raise MappingError(left_out[-1], hint=_SAME_GROUPS)
         if len(files) == len(found):
             sets.append(FileSet(files, words))
     if not sets:
-        raise MappingError(orphans[0], hint="Give both `path` expressions the same named groups.")
+        raise MappingError(left_out[-1], hint=_SAME_GROUPS)
     for name in others:
-        alone = [file.shown for file in found[name] if file.shown not in used[name]]
-        orphans += [f"{shown} of table {name!r} belongs to no file of table {lead!r}." for shown in alone]
-    return sets, (*left_out, *orphans), tuple(none)
+        alone = [file.shown for file in found[name] if (name, file.shown) not in used]
+        left_out += [f"{shown} of table {name!r} belongs to no file of table {lead!r}." for shown in alone]
+    return sets, tuple(left_out), tuple(no_tables)
 
 
 def read(mapping: Mapping, files: FileSet) -> list[RawRecording]:
-    """Read what belongs together: one recording, or those of an archive or of the values of a column."""
+    """Return the recordings of files that belong together: one, or those of an array or of the values of a column."""
     shown = tuple(dict.fromkeys(file.shown for file in files.files.values()))
     for name, file in files.files.items():
         require_format(file.path, file.shown, mapping.tables[name].read.format)
@@ -107,27 +122,32 @@ def read(mapping: Mapping, files: FileSet) -> list[RawRecording]:
             for words, array in read_arrays(file.path, file.shown, source.read, file.words)
         ]
     tables: dict[str, Table] = {}
-    topics: dict[FoundFile, dict[str, Topic]] = {}
+    topics: dict[FoundFile, dict[str, tuple[str, UsedColumns]]] = {}
     for name, file in files.files.items():
         how = mapping.tables[name].read
         assert not isinstance(how, Arrays)  # the model refuses an archive beside other tables
         if isinstance(how, Bag):
-            tables[name] = ColumnTable(file.shown)  # keeps its place; read below, all topics of a bag at once
-            topics.setdefault(file, {})[name] = asked(mapping, name, how.topic)
+            topics.setdefault(file, {})[name] = how.topic, used_columns(mapping, name)
         elif isinstance(how, Xlsx):
             tables[name] = read_sheet(file.path, file.shown, how)
         elif isinstance(how, Parquet):
-            tables[name] = read_parquet(file.path, file.shown, asked(mapping, name))
+            tables[name] = read_parquet(file.path, file.shown, used_columns(mapping, name))
         else:
             tables[name] = read_text(file.path, file.shown, how)
     for file, wanted in topics.items():
         tables |= read_bag(file.path, file.shown, wanted)
-    check_join(mapping, tables)
-    return list(_split(mapping, RawRecording(tables, files.words, shown)))
+    lead = tables[first]
+    for name, table in tables.items():
+        if mapping.join is not None and mapping.join.by == "rows" and len(table) != len(lead):
+            raise MappingError(
+                f"{table.shown} (table {name!r}) has {len(table)} rows, {lead.shown} has {len(lead)}.",
+                hint="Tables joined by rows must be equally long; with a clock each, `by: clock` is an alternative.",
+            )
+    return list(_split(mapping, RawRecording({name: tables[name] for name in mapping.tables}, files.words, shown)))
 
 
 class Shape(NamedTuple):
-    """The columns of the first file of a table, those of all files, and those that the mapping uses."""
+    """The columns of a table: of its first file, `shown`, of all files, and those that the mapping uses."""
 
     shown: str
     columns: tuple[Column, ...]
@@ -139,7 +159,7 @@ def require_same_shape(mapping: Mapping, raw: RawRecording, shapes: dict[str, Sh
     """Raise MappingError if a table has other columns than the first file where the mapping names places."""
     for name, table in raw.tables.items():
         if name not in shapes:
-            shapes[name] = Shape(table.shown, table.columns, {}, asked(mapping, name).columns)
+            shapes[name] = Shape(table.shown, table.columns, {}, used_columns(mapping, name).columns)
         first = shapes[name]
         first.everywhere.update(dict.fromkeys(table.columns))
         by_place = [one for one in first.used if isinstance(one, int) and one < len(first.columns)]
@@ -159,64 +179,54 @@ def require_same_shape(mapping: Mapping, raw: RawRecording, shapes: dict[str, Sh
 
 
 def unused_columns(shapes: dict[str, Shape]) -> Iterator[str]:
-    """Yield which columns of a table the mapping does not use."""
+    """Yield a sentence for each table that names the columns that the mapping does not use."""
     for name, (_, _, columns, used) in shapes.items():
         left = [str(one) or str(place) for place, one in enumerate(columns) if not {one, place} & {*used}]
         if left:
-            yield f"{len(left)} of {len(columns)} columns of table {name}: {names_listed(left)}"
+            yield f"{len(left)} of {len(columns)} columns of table {name}: {listed(left, 'columns', 12)}"
 
 
-def asked(mapping: Mapping, name: str, topic: str = "") -> Topic:
-    """Return which columns of a table the mapping uses, with the topic of a bag."""
-    source = mapping.tables[name]
+def used_columns(mapping: Mapping, name: str) -> UsedColumns:
+    """Return which columns of a table the mapping uses."""
     streams = [stream for stream in mapping.streams.values() if stream.table == name]
     numbers = [column for one in streams for group in one.channels for column in columns_of(group)]
     texts = [note.column for one in streams for note in one.annotations.values() if note.column is not None]
     texts += mapping.split_by.values() if name == next(iter(mapping.tables)) else ()
-    time = source.time.column if source.time is not None else None
-    return Topic(topic, tuple(dict.fromkeys(numbers)), tuple(dict.fromkeys(texts)), time)
+    return UsedColumns(tuple(dict.fromkeys(numbers)), tuple(dict.fromkeys(texts)), mapping.tables[name].time)
 
 
-def _matching(name: str, source: TableSource, root: Path, left_out: list[str], none: list[str]) -> list[FoundFile]:
-    """Return the files of a table; other files that match are named in `left_out`, and what is no table in `none`."""
+def _matching(name: str, source: TableSource, root: Path) -> tuple[list[FoundFile], dict[str, str]]:
+    """Return the files of a table, and a sentence about the other matches by the obstacle to reading them."""
     ending = PurePosixPath(source.files).suffix
     ending = ending if ending[1:].isalnum() else ""
     in_any_case = "".join(f"[{mark.lower()}{mark.upper()}]" if mark.isalpha() else mark for mark in ending)
-    pattern = f"{source.files!r} (table {name!r})"
-    kinds: dict[str, list[Path]] = {"": [], "links": [], "folders": [], "case": [], "macOS": [], "linked": []}
+    kinds: dict[str, list[str]] = {"": []}
     matches = root.glob(source.files.removesuffix(ending) + in_any_case)
     for path in sorted(matches, key=lambda one: one.relative_to(root).parts):
-        kinds[_kind(path, ending)].append(path)
+        kinds.setdefault(_obstacle(path, ending), []).append(path.relative_to(root).as_posix())
     if "**" in source.files:
-        inside = source.files.partition("**")[2].lstrip("/")
-        folders = [path for path in root.glob(source.files.partition("**")[0] + "**/*") if path.is_symlink()]
-        kinds["linked"] += [path for path in folders if path.is_dir() and next(path.rglob(inside or "*"), None)]
-
-    def listing(kind: str) -> str:
-        return names_listed([path.relative_to(root).as_posix() for path in kinds[kind]])
-
-    if kinds["links"]:
+        above, _, inside = source.files.partition("**")
+        for path in root.glob(f"{above}**/*"):
+            if path.is_symlink() and path.is_dir() and next(path.rglob(inside.lstrip("/") or "*"), None):
+                kinds.setdefault(LINKED_FOLDERS, []).append(path.relative_to(root).as_posix())
+    total, pattern = sum(map(len, kinds.values())), f"{source.files!r} (table {name!r})"
+    notes = {
+        obstacle: f"{len(paths)} of {total} matches of {pattern} {obstacle}: {listed(paths, 'paths', 12)}"
+        for obstacle, paths in kinds.items()
+        if obstacle
+    }
+    if BROKEN_LINKS in notes:
         raise MappingError(
-            f"{len(kinds['links'])} of {len(kinds['links'] + kinds[''])} matches of {pattern} are links to files that "
-            f"are not here: {listing('links')}.",
+            f"{notes[BROKEN_LINKS]}.",
             hint="Fetch what git-annex keeps elsewhere: `datalad get FILE`; remove other links, or narrow the pattern.",
         )
-    said = {
-        "case": f"files end in another case than {ending!r}",
-        "linked": "linked folders hold matches; ** does not search them",
-        "folders": "matches are folders", "macOS": "files are what macOS keeps beside others (AppleDouble)",
-    }  # fmt: skip
-    notes = {kind: f"{pattern}: {len(kinds[kind])} {said[kind]}: {listing(kind)}" for kind in said if kinds[kind]}
-    left_out += [note for kind, note in notes.items() if kind in ("case", "linked")]
-    none += [note for kind, note in notes.items() if kind in ("folders", "macOS")]
     if not kinds[""]:
         raise MappingError(
             f"No file matches {pattern} in {root}{''.join(f'; {note}' for note in notes.values())}.",
             hint="Check --root: the pattern starts below it.",
         )
     found = []
-    for path in kinds[""]:
-        shown = path.relative_to(root).as_posix()
+    for shown in kinds[""]:
         match = re.search(source.path, shown)
         if match is None:
             raise MappingError(
@@ -224,43 +234,26 @@ def _matching(name: str, source: TableSource, root: Path, left_out: list[str], n
                 hint="Make the pattern narrower, or the expression wider.",
             )
         words = {word: value or "" for word, value in match.groupdict().items()}
-        found.append(FoundFile(path, shown, {"file": path.stem, **words}))
-    return found
+        found.append(FoundFile(root / shown, shown, {"file": PurePosixPath(shown).stem, **words}))
+    return found, notes
 
 
-def _kind(path: Path, ending: str) -> str:
-    """Return which kind of match a path is; a plain file with the ending of the pattern is the empty text."""
+def _obstacle(path: Path, ending: str) -> str:
+    """Return the obstacle to reading a match; empty for a plain file with the ending of the pattern."""
     if not path.exists():
-        return "links"
+        return BROKEN_LINKS
     if not path.is_file():
-        return "folders"
+        return FOLDERS
     if not path.name.endswith(ending):
-        return "case"
-    if not path.name.startswith("._"):
-        return ""
-    with path.open("rb") as opened:
-        return "macOS" if opened.read(4) == b"\0\x05\x16\x07" else ""
-
-
-def _partner(
-    leader: FoundFile, name: str, shared: Sequence[str], candidates: dict[tuple[str, ...], list[FoundFile]]
-) -> FoundFile | str:
-    """Return the file of table `name` that belongs to a file of the first, or what to say where there is none."""
-    fitting = candidates.get(tuple(leader.words[word] for word in shared), [])
-    if len(fitting) == 1:
-        return fitting[0]
-    what = ", ".join(f"{word} {leader.words[word]}" for word in shared) or "no shared words"
-    needs = f"{leader.shown} needs one file of table {name!r} ({what}); there "
-    if not fitting:
-        return f"{needs}is none."
-    listed = ", ".join(one.shown for one in fitting[:3])
-    raise MappingError(
-        f"{needs}are {len(fitting)}: {listed}.", hint="Give both `path` expressions the same named groups."
-    )
+        return OTHER_CASE
+    if path.name.startswith("._"):
+        with path.open("rb") as opened:
+            return APPLE_DOUBLE if opened.read(4) == b"\0\x05\x16\x07" else ""
+    return ""
 
 
 def _split(mapping: Mapping, raw: RawRecording) -> Iterator[RawRecording]:
-    """One recording for each combination of values in the columns of `split_by`, in order of appearance."""
+    """Yield a recording for each combination of values in the columns of `split_by`, in order of appearance."""
     if not mapping.split_by:
         yield raw
         return

@@ -1,4 +1,4 @@
-"""The import itself: all recordings of a mapping, or none."""
+"""The import of all recordings that a mapping describes; if one of them fails, none is kept."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import shutil
 from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass
 from dataclasses import replace as replaced
 from itertools import product
 from pathlib import Path
@@ -22,63 +22,55 @@ from tactbench.core.errors import MappingError, RecordingError
 from tactbench.core.files import try_lock, writable
 from tactbench.core.progress import Progress
 from tactbench.core.recording.health import FINDINGS, MONOTONE, Finding, examine, is_copy
-from tactbench.core.recording.mapping.channels import MappedStream, device, fill, sensor_of
+from tactbench.core.recording.mapping.channels import MappedStream, device, fill, no_translation, sensor_of
 from tactbench.core.recording.mapping.files import RawRecording, Shape, find, read, require_same_shape, unused_columns
 from tactbench.core.recording.mapping.model import MUST_NAME_SENTINELS, Arrays, Mapping, Word
 from tactbench.core.recording.mapping.samples import compare_clocks, labels, samples, times
 from tactbench.core.recording.mapping.table import TextTable
 from tactbench.core.recording.mapping.tasks import check_tasks, require_answerable, tasks_text, write_tasks
 from tactbench.core.recording.reader import UnwrittenRecording, content_digest
-from tactbench.core.recording.writer import RecordingWriter
-from tactbench.core.samples import Block, FloatArray, StreamData
+from tactbench.core.recording.writer import write_recording
+from tactbench.core.samples import Block, StreamData
 from tactbench.core.spec.recording import RecordingMeta, Scalar, composed
 from tactbench.core.spec.scene import Role
 from tactbench.core.spec.sensor import SensorSpec, StreamSpec
 from tactbench.core.spec.yaml_file import load_yaml
 
 RIG = "import"
-"""What an imported recording says about its rig: somebody else's, made known by a mapping."""
+"""Name of the rig in imported recordings, which another laboratory has made."""
 
 ENDING = ".h5"
 WAITING, PLACING = ".importing-", ".placing-"
-"""Folders in which the recordings of an import wait, and from which they are being moved to their place."""
+"""Prefixes of the folders in which the recordings of an import wait, and from which they are moved to their place."""
 _FILE_NAME = re.compile(r"^[A-Za-z0-9][A-Za-z0-9._-]*$")
 
 
 @dataclass(frozen=True)
 class Imported:
-    """One recording that was written."""
+    """One recording that an import has written."""
 
     path: Path
-    name: str
+    meta: RecordingMeta
     rows: int
-    """Rows of its longest stream"""
-    sensor: str
-    missing: dict[str, int] = field(default_factory=dict)
-    """Samples marked as missing, by channel"""
-    excluded: str = ""
-    origin: str = ""
-    findings: tuple[Finding, ...] = ()
+    """Rows of its longest stream."""
+    missing: dict[str, int]
+    """Samples marked as missing, by channel."""
+    findings: tuple[Finding, ...]
 
 
 @dataclass(frozen=True)
 class ImportReport:
-    """What an import did."""
+    """What an import has read, written and left out."""
 
     title: str
     recordings: tuple[Imported, ...]
     files_read: int
-    tasks: tuple[str, ...] = ()
-    """Names of those that the mapping declares"""
-    left_out: tuple[str, ...] = ()
-    """Matches that make no recording, and why"""
-    unused: tuple[str, ...] = ()
-    """Matches that are no tables, and columns that the mapping does not use, a sentence a table"""
-
-    @property
-    def sensors(self) -> tuple[str, ...]:
-        """Names of the sensors, in order of appearance."""
-        return tuple(dict.fromkeys(recording.sensor for recording in self.recordings))
+    tasks: tuple[str, ...]
+    """Names of the tasks that the mapping declares."""
+    left_out: tuple[str, ...]
+    """A sentence for each kind of files that match a pattern and make no recording."""
+    unused: tuple[str, ...]
+    """A sentence for each kind of matches that are no tables, and one for the columns of a table that are not used."""
 
     @property
     def rows(self) -> int:
@@ -88,21 +80,13 @@ class ImportReport:
     @property
     def missing(self) -> dict[str, int]:
         """Samples marked as missing in all recordings, by channel."""
-        counted: Counter[str] = Counter()
-        for recording in self.recordings:
-            counted.update(recording.missing)
-        return dict(counted)
-
-    @property
-    def excluded(self) -> dict[str, int]:
-        """Recordings that no evaluation will use, by reason."""
-        return dict(Counter(recording.excluded for recording in self.recordings if recording.excluded))
+        return dict(sum((Counter(recording.missing) for recording in self.recordings), Counter()))
 
 
 def import_tables(
     mapping: Path, *, root: Path | None, out: Path, progress: Progress | None = None, replace: bool = False
 ) -> ImportReport:
-    """Turn the tables that a mapping file describes into recordings.
+    """Convert the tables that a mapping file describes into recordings.
 
     Parameters
     ----------
@@ -111,12 +95,12 @@ def import_tables(
     root
         Folder of the data set; None is the folder of the mapping file.
     out
-        Folder of the recordings. It gets all of them or, if anything is wrong, none.
+        Folder for the recordings. All of them are placed there or, if anything is wrong, none.
     progress
-        Receives every set of files that is read.
+        Receives a step for every recording.
     replace
-        Replace recordings of the same name that hold something else; otherwise they are refused. One that holds the
-        same already is left as it is.
+        Whether recordings of the same name that hold something else are replaced; otherwise they are an error. One that
+        holds the same is left as it is.
 
     Raises
     ------
@@ -136,7 +120,7 @@ def import_tables(
     if left_out:
         more = f" And {len(left_out) - 1} more." if left_out[1:] else ""
         text = f"its import left files out: {left_out[0]}{more}"
-        beside.append(Finding("left-out", "warning", "", (), len(left_out), text))
+        beside.append(Finding("left-out", "warning", text, count=len(left_out)))
     made: list[Imported] = []
     origins: dict[str, str] = {}
     shapes: dict[str, Shape] = {}
@@ -176,10 +160,10 @@ def import_arrays(mapping: Mapping, raws: Iterable[RawRecording], out: Path, **a
 
 @contextmanager
 def aside(out: Path) -> Iterator[Path]:
-    """Give the folder in which recordings wait until all of them are good; hidden, so that no rig replays it.
+    """Return a context with the folder in which recordings wait until all are written; it is hidden from rigs.
 
-    What an import that was killed has left is removed, or moved to its place if that had begun. Folders that were made
-    for an import that is refused are removed again.
+    Leftovers of an import that was killed are removed, or moved to their place where that had begun. Folders that were
+    made for an import that fails are removed again.
     """
     made = [folder for folder in (out, *out.parents) if not folder.exists()]
     with writable(out):
@@ -205,7 +189,7 @@ def aside(out: Path) -> Iterator[Path]:
 
 @contextmanager
 def _locked(folder: Path) -> Iterator[bool]:
-    """Lock the folder of an import for this process; give whether no other process has it."""
+    """Return a context with whether this process could lock the folder of an import."""
     lock = os.open(folder / ".lock", os.O_RDWR | os.O_CREAT, 0o666)
     try:
         yield bool(try_lock(lock))
@@ -218,7 +202,7 @@ def _remove(folder: Path) -> None:
 
 
 def _place(folder: Path, out: Path) -> None:
-    """Move everything that waits in `folder` to `out`; as long as the folder is there, rigs do not replay `out`."""
+    """Move the recordings in `folder` to `out`; while the folder exists, rigs do not replay `out`."""
     for path in sorted(folder.glob("[!.]*")):
         path.replace(out / path.name)
     _remove(folder)
@@ -232,58 +216,52 @@ def _write(
     streams: dict[str, MappedStream],
     beside: Sequence[Finding],
 ) -> Imported:
-    """Write one recording; `beside` was found in the import as a whole."""
-    counts: dict[str, int] = {}
-    missing: dict[str, int] = {}
+    """Write one recording with its findings, to which `beside` adds those of the import as a whole."""
     clocks = {
         name: times(table, time)
         for name, table in raw.tables.items()
         if (time := mapping.tables[name].time) is not None
     }
     found = [*compare_clocks(mapping, raw.tables, clocks)]
-    sensed: dict[str, FloatArray] = {}
-    reference: dict[str, FloatArray] = {}
-    written: list[StreamData] = []
-    with RecordingWriter(path, meta, keep=False) as writer:
-        for name, stream in streams.items():
-            table, clock = raw.tables[stream.source.table], clocks.get(stream.source.table)
-            read_in = samples(stream, table)
-            found.extend(read_in.findings)
-            columns = zip(stream.spec.channels, np.where(read_in.quality, np.nan, read_in.data).T, strict=True)
-            for channel, column in columns:
-                if stream.source.of == "sensor":
-                    sensed[channel.name] = column
-                elif channel.kind in MUST_NAME_SENTINELS:
-                    reference[channel.name] = column
-            writer.append(Block(name, clock, read_in.data, read_in.quality))
-            notes = {label: labels(label, one, table) for label, one in stream.source.annotations.items()}
-            for label, values in notes.items():
-                writer.annotate(name, label, values)
-            written.append(StreamData(stream.spec, clock, read_in.data, read_in.quality, notes))
-            missing.update(read_in.missing)
-            counts[f"rows of {name}"] = len(table)
-        counts |= {f"{channel} without a sample": number for channel, number in missing.items()}
-        examined = examine(UnwrittenRecording(meta, written))
-        findings = (*beside, *examined, *found, *_given_away(sensed, reference), *_trailing_delimiters(raw))
-        kept = [asdict(one) for one in findings if one.severity != "info"]
-        writer.revise(counts=counts, provenance={FINDINGS: kept})
-    rows = max(len(table) for table in raw.tables.values())
-    return Imported(path, meta.name, rows, meta.sensor.name, missing, meta.excluded, meta.origin, findings)
-
-
-def _given_away(sensed: dict[str, FloatArray], reference: dict[str, FloatArray]) -> Iterator[Finding]:
-    """Yield what stands among the sensor's channels and gives a force of the reference away."""
-    for (force, wanted), (name, column) in product(reference.items(), sensed.items()):
-        if len(column) == len(wanted) and is_copy(column, wanted):
-            text = f"{name}, a channel of the sensor, is {MONOTONE.format(force)}"
-            yield Finding("target-among-features", "warning", "", (name,), 1, text)
-
-
-def _trailing_delimiters(raw: RawRecording) -> Iterator[Finding]:
+    missing: dict[str, int] = {}
+    written: dict[str, StreamData] = {}
+    for name, stream in streams.items():
+        table, clock = raw.tables[stream.source.table], clocks.get(stream.source.table)
+        taken = samples(stream, table)
+        found.extend(taken.findings)
+        missing.update(taken.missing)
+        notes = {label: labels(label, one, table) for label, one in stream.source.annotations.items()}
+        written[name] = StreamData(stream.spec, clock, taken.data, taken.quality, notes)
+    found += _given_away(meta, written)
     for name, table in raw.tables.items():
         if isinstance(table, TextTable) and table.trailing:
             text = f"every line of table {name} ends with a delimiter; the empty cell behind it is left out"
-            yield Finding("trailing-delimiter", "info", "", (), len(table), text)
+            found.append(Finding("trailing-delimiter", "info", text, count=len(table)))
+    findings = (*beside, *examine(UnwrittenRecording(meta, written.values())), *found)
+    counts = {f"rows of {name}": len(one.data) for name, one in written.items()}
+    counts |= {f"{channel} without a sample": number for channel, number in missing.items()}
+    kept = [asdict(one) for one in findings if one.severity != "info"]
+    meta = meta.model_copy(update={"counts": counts, "provenance": {FINDINGS: kept}})
+    blocks = (Block(name, one.t_ns, one.data, one.quality) for name, one in written.items())
+    write_recording(path, meta, blocks, {name: dict(one.annotations) for name, one in written.items()})
+    return Imported(path, meta, max(len(table) for table in raw.tables.values()), missing, findings)
+
+
+def _given_away(meta: RecordingMeta, streams: dict[str, StreamData]) -> Iterator[Finding]:
+    """Yield a finding for each channel of the sensor that is a copy of a force or torque of the reference."""
+    reference = {one.name for one in meta.reference}
+    sensed, forces = [], []
+    for stream, one in streams.items():
+        values = one.data if one.quality is None else np.where(one.quality, np.nan, one.data)
+        for channel, column in zip(one.spec.channels, values.T, strict=True):
+            if stream not in reference:
+                sensed.append((channel.name, column))
+            elif channel.kind in MUST_NAME_SENTINELS:
+                forces.append((channel.name, column))
+    for (force, wanted), (name, column) in product(forces, sensed):
+        if len(column) == len(wanted) and is_copy(column, wanted):
+            text = f"{name}, a channel of the sensor, is {MONOTONE.format(force)}"
+            yield Finding("target-among-features", "warning", text, channels=(name,), count=1)
 
 
 def _meta(mapping: Mapping, raw: RawRecording, sensor: SensorSpec, reference: tuple[StreamSpec, ...]) -> RecordingMeta:
@@ -326,8 +304,8 @@ def _meta(mapping: Mapping, raw: RawRecording, sensor: SensorSpec, reference: tu
 def _derived(name: str, word: Word, words: dict[str, Scalar], origin: str) -> str:
     if word.of not in words:
         raise MappingError(
-            f"The word {name!r} is made of {word.of!r}, which nothing gives; there are: {', '.join(sorted(words))}.",
-            hint="Words may be made of words above them.",
+            f"The word {name!r} is made of {word.of!r}, which is not known; known are: {', '.join(sorted(words))}.",
+            hint="A word may be made of the words above it, of groups of `path`, and of columns of `split_by`.",
         )
     given = composed(str(words[word.of]))
     if word.divided_by is not None:
@@ -336,10 +314,7 @@ def _derived(name: str, word: Word, words: dict[str, Scalar], origin: str) -> st
         return str(int(given) // word.divided_by)
     known = {composed(str(key)): value for key, value in (word.values or {}).items()}
     if given not in known:
-        raise MappingError(
-            f"{origin}: {word.of} {given!r} has no translation for {name!r}; there are: {', '.join(known)}.",
-            hint="Add it to `values`.",
-        )
+        raise no_translation(f"{origin}: {word.of}", given, name, known)
     return known[given]
 
 
@@ -361,13 +336,13 @@ def _unique_name(meta: RecordingMeta, origins: dict[str, str]) -> None:
     if folded in origins:
         raise MappingError(
             f"{origins[folded]} and {meta.origin} would both become the recording {meta.name!r}.",
-            hint="Put a word that tells them apart into `recording.name`.",
+            hint="Put a word that differs between them into `recording.name`.",
         )
     origins[folded] = meta.origin
 
 
 def _fitting(made: Sequence[Imported], out: Path, *, replace: bool) -> list[Imported]:
-    """Return recordings as they will lie in `out`; those that it holds already do not wait any longer."""
+    """Return the recordings with their place in `out`; those that lie there already are not moved."""
     for one in made:
         target = out / one.path.name
         if target.exists() and not replace:

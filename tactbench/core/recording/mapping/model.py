@@ -1,4 +1,4 @@
-"""What a mapping file may say; ``docs/mappings.md`` explains it with examples."""
+"""Models of a mapping file; ``docs/mappings.md`` explains every key with examples."""
 
 from __future__ import annotations
 
@@ -17,36 +17,37 @@ from tactbench.core.spec.recording import Scalar
 from tactbench.core.spec.sensor import ChannelKind, Vector
 
 Column = int | str
-"""A column by its place (from 0) or by its name in the header."""
+"""A column is given by its place, counted from 0, or by its name in the header."""
 
 WORD = r"^[a-z][a-z0-9_]*$"
 MUST_NAME_SENTINELS = {"force": "N", "torque": "N*m"}
-"""Kinds that are targets, and what their units are converted to; a number that means "no sample" would be learnt."""
+"""Kinds of channels that are learnt, and the unit to which theirs must convert. A mapping lists the numbers that mean
+"no sample" in them, which would be learnt too."""
 
 
 class Tabular(Frozen):
-    """Rows of cells."""
+    """A table of rows and cells: keys that all such formats share."""
 
     header: bool
-    """True: the first line names the columns. False: there is no such line, columns are numbered from 0."""
+    """True: the first line names the columns. False: the file has no such line, and columns are numbered from 0."""
     skiprows: Annotated[int, Field(ge=0)] | tuple[Annotated[int, Field(ge=0)], ...] = Field(
         default=0, validation_alias=AliasChoices("skiprows", "skip_lines")
     )
-    """As in pandas: how many lines at the beginning mean nothing, or the places, from 0, of those that do not."""
+    """Lines that are left out, as in pandas: how many at the beginning, or the list of their places, counted from 0."""
     no_sample: tuple[str, ...] = ()
-    """Cells with exactly one of these texts hold no sample, for example "" or "NA"."""
+    """Texts that stand for "no sample" where a cell holds nothing else, for example "" or "NA"."""
     transposed: bool = False
-    """True: a line holds all samples of one channel; with `header` its first cell is the name."""
+    """True: each line holds all samples of one channel; with `header`, its first cell is the channel's name."""
 
 
 class Written(Tabular):
-    """Rows of text; the keys are those of ``pandas.read_csv``."""
+    """A table in a text file; its keys are those of ``pandas.read_csv``."""
 
     decimal: str = Field(default=".", min_length=1, max_length=1)
     thousands: str | None = Field(default=None, min_length=1, max_length=1)
-    """What stands between groups of three digits."""
+    """The mark between groups of three digits; None: there is none."""
     comment: str | None = Field(default=None, min_length=1, max_length=1)
-    """What begins a comment; it ends with the line."""
+    """The mark that begins a comment, which ends with its line; None: there are no comments."""
 
     @model_validator(mode="after")
     def _marks_differ(self) -> Written:
@@ -56,100 +57,89 @@ class Written(Tabular):
 
 
 class Csv(Written):
-    """Cells between delimiters."""
+    """A text file whose cells are separated by a delimiter."""
 
     format: Literal["csv"] = "csv"
     delimiter: str = Field(default=",", min_length=1, max_length=1)
 
 
 class Text(Written):
-    """Cells between spaces or tabs."""
+    """A text file whose cells are separated by spaces or tabs."""
 
     format: Literal["text"] = "text"
 
 
 class Records(Frozen):
-    """Several lines of numbers make one row; columns are numbered from 0 through all lines of it."""
+    """A text file in which several lines of numbers make a row; its columns are numbered from 0 through these lines."""
 
     format: Literal["records"] = "records"
     numbers_per_line: tuple[Annotated[int, Field(ge=1)], ...] = Field(min_length=1)
     first_line: str | None = None
-    """What the first line must be; it is dropped. None: the first line is data."""
+    """Text that the first line must be, which is then left out; None: the first line is data."""
     no_sample: tuple[str, ...] = ()
 
 
 class Xlsx(Tabular):
-    """A sheet of an Excel workbook; the extra ``[xlsx]``."""
+    """A sheet of an Excel workbook; reading it needs the extra ``[xlsx]``."""
 
     format: Literal["xlsx"] = "xlsx"
     sheet: str | None = None
-    """None: the only one."""
+    """Name of the sheet; None: the workbook has only one."""
 
 
 class Arrays(Frozen):
-    """Arrays in one file."""
+    """An array in a NumPy archive, in a NumPy file of its own, or in a MATLAB file of version 7 or before.
 
-    array: str
+    Pickled objects are refused, and arrays inside structures and cells of MATLAB are not read.
+    """
+
+    format: Literal["npz", "npy", "mat"]
+    array: str = ""
+    """Name of the array in its file; `npy` has none."""
     axes: tuple[Literal["recording", "row", "channel"], ...] = Field(min_length=1)
-    """What each axis of the array counts; an axis that is left out has length 1. Several axes of channels are one, the
-    last fastest."""
+    """What the array's axes count, in their order; an axis that is left out has length 1. Several axes of channels are
+    read as one, of which the last runs fastest."""
     per_recording: dict[Annotated[str, Field(pattern=WORD)], str] = Field(default_factory=dict)
-    """Words taken from arrays with one value a recording: word -> array, of `npy` the file, with ``{word}`` in it."""
+    """Names of arrays that hold the value of a word for each recording, by word; with `npy`, names of their files in
+    the same folder, in which ``{word}`` is filled in."""
 
     @model_validator(mode="after")
     def _axes_differ(self) -> Arrays:
+        if (self.format == "npy") == bool(self.array):
+            raise ValueError("array names one of several in an npz or mat file, and nothing in an npy file")
         if max(self.axes.count("recording"), self.axes.count("row")) > 1:
-            raise ValueError("an axis is named twice; only channels may have several")
+            raise ValueError("axes name recording or row twice; only channel may stand several times")
         if self.per_recording and "recording" not in self.axes:
             raise ValueError("per_recording needs an axis called recording")
         return self
 
 
-class Npz(Arrays):
-    """Arrays in one NumPy archive, never pickled ones."""
-
-    format: Literal["npz"] = "npz"
-
-
-class Npy(Arrays):
-    """One array in a file of its own, never pickled; those of `per_recording` are in files in the same folder."""
-
-    format: Literal["npy"] = "npy"
-    array: Literal[""] = ""
-
-
-class Mat(Arrays):
-    """Arrays in one MATLAB file of version 7 or before, never in structures or cells."""
-
-    format: Literal["mat"] = "mat"
-
-
 class Bag(Frozen):
-    """A topic of an MCAP bag, a row a message; columns are paths of fields: ``wrench.force.z``, ``data.0..63``."""
+    """A topic of an MCAP bag: a message is a row, columns are paths of fields, ``wrench.force.z`` or ``data.0..63``."""
 
     format: Literal["mcap"] = "mcap"
     topic: str
 
 
 class Parquet(Frozen):
-    """Columns of a Parquet file; the extra ``[parquet]``. Places of lists are columns: ``observation.state.0..5``."""
+    """A Parquet file, which needs the extra ``[parquet]``. Values in a list are columns: ``observation.state.0..5``."""
 
     format: Literal["parquet"] = "parquet"
 
 
 class Time(Frozen):
-    """The clock of a table: a column, never `row / rate`."""
+    """The clock of a table: the column with the time of each row. Times are never made up from a rate."""
 
     column: Column
     unit: str
     epoch: Literal["unix", "start", "unknown"]
-    """What zero is: 1970-01-01 UTC, the beginning of the recording, or nobody knows."""
+    """What time zero means: `unix` is 1970-01-01 UTC, `start` the beginning of the recording."""
     zone: str | None = None
-    """Time zone of dates that state none, for example ``Europe/Berlin`` or ``UTC``."""
+    """Time zone of dates that have none of their own, for example ``Europe/Berlin`` or ``UTC``."""
     wraps_at: int | None = Field(default=None, ge=2)
-    """The counter begins at 0 again instead of reaching this number, for example 4294967296."""
+    """Number at which the counter begins at 0 again, for example 4294967296; None: it never does."""
     offset_s: float = 0.0
-    """Added to the stamps [s]: the known lag of one clock behind another."""
+    """Seconds that are added to all times, where one clock is known to lag behind another."""
 
     @field_validator("unit")
     @classmethod
@@ -169,20 +159,20 @@ class Time(Frozen):
 
 
 class TableSource(Frozen):
-    """A family of files of one shape."""
+    """The files of one table: all have the same columns, and each belongs to one recording or to several."""
 
     files: str
-    """Which: a pattern below the root, with ``*`` within a folder and ``**`` across folders."""
+    """Pattern of their paths below the root folder: ``*`` matches within a folder, ``**`` across folders."""
     path: str = ""
-    """Regular expression searched in each path; its named groups become words."""
-    read: Annotated[Csv | Text | Records | Xlsx | Npz | Npy | Mat | Bag | Parquet, Field(discriminator="format")]
+    """Regular expression that is searched for in each path; its named groups become words."""
+    read: Annotated[Csv | Text | Records | Xlsx | Arrays | Bag | Parquet, Field(discriminator="format")]
     time: Time | None = None
 
     @field_validator("files")
     @classmethod
     def _below_root(cls, files: str) -> str:
         if files.startswith("/") or ".." in PurePosixPath(files).parts:
-            raise ValueError("the pattern starts and stays below the root folder")
+            raise ValueError("a pattern of files stays below the root folder: it begins with no / and has no ..")
         return files
 
     @field_validator("path")
@@ -194,27 +184,27 @@ class TableSource(Frozen):
             raise ValueError(f"not a regular expression: {error}") from error
         for name in groups:
             if not re.match(WORD, name):
-                raise ValueError(f"the group {name!r} must be a word in lower case")
+                raise ValueError(f"the group {name!r} is not a word in lower case")
         return path
 
 
 class Join(Frozen):
-    """How several tables make one recording."""
+    """How the rows of several tables belong together."""
 
     by: Literal["rows", "clock"]
-    """`rows`: row i of each belongs together. `clock`: each keeps its own rows and its own time."""
+    """`rows`: the rows of one number belong together. `clock`: every table keeps its own rows and its own times."""
     times_within_ms: float | None = Field(default=None, gt=0)
-    """With `rows` and two clocks: how far the times of one row may differ."""
+    """Largest difference of the times of one row [ms], needed where tables with clocks are joined by rows."""
 
 
 class Word(Frozen):
-    """A word made from another one."""
+    """A word that is made of another one."""
 
     of: str = Field(pattern=WORD)
     values: dict[Scalar, str] | None = None
-    """Translation; a value that is not in it is an error."""
+    """Translation of the other word's values; a value that is not listed is an error."""
     divided_by: int | None = Field(default=None, ge=1)
-    """Whole-number division, to make blocks of consecutive numbers."""
+    """Divisor of a whole-number division, which makes blocks of consecutive numbers."""
 
     @model_validator(mode="after")
     def _one_way(self) -> Word:
@@ -224,29 +214,29 @@ class Word(Frozen):
 
 
 class ChannelGroup(Frozen):
-    """Columns that are alike in everything but their name."""
+    """Columns whose channels differ in their names and positions only."""
 
     columns: Column | tuple[Column, ...]
-    """Places, names, and ranges of either: ``1..15``, ``ff_biotac_1..24``."""
+    """Places or names of the columns, and ranges of either: ``1..15``, ``ff_biotac_1..24``."""
     name: str
-    """Name of the channel; with several columns a pattern with the words of `over`, or ``{column}``."""
+    """Name of the channel; of several columns a pattern, in which ``{column}`` or the words of `over` are filled in."""
     over: dict[Annotated[str, Field(pattern=WORD)], tuple[Scalar, ...] | str] = Field(default_factory=dict)
-    """Words that run through all their combinations, the last one fastest: lists, or ranges like ``1..12``."""
+    """Words and their values, a list or a range like ``1..12``: columns are named by all combinations of the values, of
+    which those of the last word run fastest."""
     kind: ChannelKind
     unit: str
-    """Unit of the stored numbers."""
+    """Unit in which the numbers are stored."""
     given_in: str | None = None
-    """Unit of the column, if another."""
+    """Unit of the numbers in the column; None: the same."""
     sentinels: tuple[float, ...] | None = None
-    """Numbers in the column that mean "no sample"; a force or torque must say, if only ``[]``."""
-    keep_repeated: bool = False
-    """Without effect: repeated values are reported, and never refused. Mappings may still have it."""
+    """Numbers in the column that mean "no sample". A force or torque must list them, or state ``[]``."""
     lower: float | None = None
     upper: float | None = None
     sign: Literal[-1, 0, 1] = 0
     rest: float | None = None
     rest_source: Source | None = None
     positions_m: tuple[Vector, ...] = ()
+    """One for each column; this key and those above are fields of a `ChannelSpec`, in the unit of the channel."""
     position_source: Source | None = None
 
     @field_validator("unit")
@@ -279,13 +269,13 @@ class ChannelGroup(Frozen):
 
 
 class Annotation(Frozen):
-    """A label of every row: from a column, or numbers of equal stretches of rows."""
+    """A label of every row: the text in a column, or the number of a stretch of equally many rows."""
 
     column: Column | None = None
     values: dict[Scalar, str] | None = None
-    """Translation of the column; a value that is not in it is an error. An empty text is "no label"."""
+    """Translation of the column's texts; a text that is not listed is an error. The empty text means "no label"."""
     rows_per: int | None = Field(default=None, ge=1)
-    """The label is ``row // rows_per``; the rows must come out even."""
+    """Rows of a stretch; the label is ``row // rows_per``, and the table must hold whole stretches."""
 
     @model_validator(mode="after")
     def _one_way(self) -> Annotation:
@@ -295,12 +285,12 @@ class Annotation(Frozen):
 
 
 class StreamSource(Frozen):
-    """Channels that share one clock."""
+    """A stream, which is a set of channels with one clock, and the table that it is read from."""
 
     table: str
     of: Literal["sensor", "reference"] = "sensor"
     rate_hz: float | None = Field(default=None, gt=0)
-    """Nominal rate, if the source states one."""
+    """Nominal rate as the source states it [Hz]; None: it states none."""
     rate_source: Source | None = None
     dtype: Literal["uint8", "uint16", "int16", "int32", "float32", "float64"] = "float64"
     channels: tuple[ChannelGroup, ...] = Field(min_length=1)
@@ -309,81 +299,82 @@ class StreamSource(Frozen):
     @model_validator(mode="after")
     def _rate_has_a_source(self) -> StreamSource:
         if (self.rate_hz is None) != (self.rate_source is None):
-            raise ValueError("rate_hz and rate_source belong together: a rate is never invented")
+            raise ValueError("rate_hz and rate_source are given together: a rate needs a source")
         return self
 
 
 class SensorDeclaration(Frozen):
-    """The sensor, as far as its source describes it."""
+    """What the source of the tables says about the sensor."""
 
     name: str = Field(pattern=r"^[a-z{][a-z0-9_{}-]*$")
-    """A text with ``{word}`` in it where one mapping covers several devices; title alike."""
+    """Name of the sensor; words like ``{word}`` are filled in, so that one mapping covers several devices."""
     title: str
     principle: str
     principle_source: Source
     link_delay: Quantity | None = None
-    """From a sample taken to the sample in the host [time]."""
+    """Time from taking a sample to having it in the host [time]; None: not known."""
     references: tuple[str, ...] = ()
 
 
 class RecordingNames(Frozen):
-    """What a recording is called and belongs to; texts with ``{word}`` in them."""
+    """Texts from which the name and the labels of each recording are made; words like ``{word}`` are filled in."""
 
     name: str
     session: str
     trial: str = ""
     role: str = ""
-    """Empty, or a text that becomes train, validation or test."""
+    """Role of the recording: after words are filled in, train, validation, test or empty."""
     labels: dict[Annotated[str, Field(pattern=WORD)], Scalar] = Field(default_factory=dict)
 
 
 class Exclusion(Frozen):
-    """Files that are imported, but marked: no evaluation uses them."""
+    """Files whose recordings are imported and marked so that no evaluation uses them."""
 
     files: str
     reason: str = Field(min_length=1)
 
 
 class DataSource(Frozen):
-    """A public data set: where its files lie, and which they are."""
+    """Address, files and licence of a public data set."""
 
     address: str = Field(default="", pattern=r"^(https?://.*/)?$")
-    """Of the folder that holds `files`, of one fixed state of it; empty: these files lie at no public address."""
+    """URL of the folder with `files`, in one fixed state of it; empty: the files have no public address."""
     licence: str
     citation: str
     measured: str
-    """What, in a line."""
+    """What was measured, in one line."""
     tasks: tuple[str, ...] = Field(min_length=1)
-    """That the recordings can be asked; those that are asked where nobody names one."""
+    """Tasks that the recordings can answer; all are run where a command names none."""
     bytes: int = Field(ge=1)
-    """Size of all files."""
+    """Size of all files together [bytes]."""
     files: dict[str, Annotated[str, Field(pattern=r"^[0-9a-f]{64}$")]] = Field(min_length=1)
-    """Path below `address` and below the root -> SHA-256."""
+    """SHA-256 of each file, by its path below `address` and below the root folder."""
 
 
 class Mapping(Frozen):
-    """A mapping file."""
+    """A mapping file: how the tables of a data set become recordings."""
 
     version: Literal[1]
     title: str
     sensor: SensorDeclaration
     clock: Literal["device", "host", "none"]
-    """Who made the time stamps."""
+    """Which clock the times are from: the device's, the host's, or none."""
     remarks: tuple[str, ...] = ()
-    """What a reader of a score from these recordings must know."""
+    """Sentences that are shown with every score from these recordings."""
     tables: dict[Annotated[str, Field(pattern=WORD)], TableSource] = Field(min_length=1)
-    """The first one leads: the others are found by the words they share with it."""
+    """Tables by name. Each file of the first is joined by the files of the others that have the same words."""
     join: Join | None = None
     split_by: dict[Annotated[str, Field(pattern=WORD)], Column] = Field(default_factory=dict)
-    """One recording for each combination of values in these columns of the first table; they become words."""
+    """Columns of the first table by word: each combination of their values becomes a recording, with the values as
+    words."""
     words: dict[Annotated[str, Field(pattern=WORD)], Word] = Field(default_factory=dict)
     recording: RecordingNames
     streams: dict[str, StreamSource] = Field(min_length=1)
     exclude: tuple[Exclusion, ...] = ()
     tasks: tuple[DeclaredTask, ...] = ()
-    """Questions that the recordings can be asked, beside the installed ones."""
+    """Tasks that the recordings can answer, beside the installed ones."""
     source: DataSource | None = None
-    """None: the tables are no data set that has a name."""
+    """Where the files can be had; None: the mapping is for files that are there already."""
 
     @model_validator(mode="after")
     def _hangs_together(self) -> Mapping:
@@ -391,7 +382,7 @@ class Mapping(Frozen):
             if stream.table not in self.tables:
                 raise ValueError(f"stream {name} names the table {stream.table!r}; there are {', '.join(self.tables)}")
         if all(stream.of == "reference" for stream in self.streams.values()):
-            raise ValueError("no stream is of the sensor")
+            raise ValueError("all streams are of the reference; at least one must be of the sensor")
         if len(self.tables) > 1 and self.join is None:
             raise ValueError("several tables need `join`: by rows, or by clock")
         timed = [name for name, table in self.tables.items() if table.time is not None]
@@ -404,10 +395,10 @@ class Mapping(Frozen):
         if join is not None and join.by == "rows" and len(timed) > 1 and join.times_within_ms is None:
             raise ValueError("tables with a clock each, joined by rows, need `times_within_ms`")
         if join is not None and join.by == "clock" and (self.clock == "none" or self.split_by):
-            raise ValueError("a join by clock needs a clock, and rows that need not be split")
+            raise ValueError("join by clock needs `clock: device` or `host`, and cannot be used with split_by")
         arrays = [name for name, table in self.tables.items() if isinstance(table.read, Arrays)]
         if arrays and len(self.tables) > 1:
-            raise ValueError(f"table {arrays[0]} is an archive and cannot be joined with others")
+            raise ValueError(f"table {arrays[0]} is an array, which cannot be joined with other tables")
         return self
 
 

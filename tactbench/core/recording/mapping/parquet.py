@@ -1,20 +1,18 @@
-"""Reading columns of Parquet files into tables; the extra ``[parquet]``."""
+"""Reader of Parquet files; it needs the extra ``[parquet]``."""
 
 from __future__ import annotations
 
 import importlib
-from array import array
-from decimal import Decimal
 from pathlib import Path
 from typing import Any
 
-from tactbench.core.errors import MappingError, did_you_mean
-from tactbench.core.recording.mapping.bags import Topic
-from tactbench.core.recording.mapping.table import ColumnTable, names_listed, plain
+from tactbench.core.errors import MappingError
+from tactbench.core.recording.mapping.model import Column
+from tactbench.core.recording.mapping.table import ColumnTable, UsedColumns, no_column
 
 
-def read_parquet(path: Path, shown: str, used: Topic) -> ColumnTable:
-    """Read the columns that are used; the places of a list, equally long in every row, are ``name.0``, ``name.1`` ...
+def read_parquet(path: Path, shown: str, used: UsedColumns) -> ColumnTable:
+    """Return the table of the columns that are used; values of lists of one length are ``name.0``, ``name.1`` ...
 
     Raises
     ------
@@ -29,10 +27,10 @@ def read_parquet(path: Path, shown: str, used: Topic) -> ColumnTable:
             f"{shown} is a Parquet file, which needs pyarrow: {error}.",
             hint="Install it with `pip install 'tactbench[parquet]'`.",
         ) from error
-    asked = [str(column) for column in used.columns]
+    wanted = [str(column) for column in used.columns]
     try:
         names = parquet.read_schema(path).names
-        read = parquet.read_table(path, columns=[one for one in names if {one} & {*asked, *map(_list_of, asked)}])
+        read = parquet.read_table(path, columns=[one for one in names if {one} & {*wanted, *map(_list_of, wanted)}])
     except Exception as error:  # whatever a damaged file makes of the library
         raise MappingError(f"{shown} cannot be read as a Parquet file: {error}.", hint="Get it again.") from error
     if not read.num_rows:
@@ -41,24 +39,20 @@ def read_parquet(path: Path, shown: str, used: Topic) -> ColumnTable:
     for name in read.column_names:
         found |= _flat(shown, name, read.column(name))
     every = (*found, *(name for name in names if name not in read.column_names))
-    for one in asked:
-        if one not in found:
-            hint = f"{did_you_mean(one, every)}It has: {names_listed(every)}."
-            raise MappingError(f"{shown} has no column {one!r}.", hint=hint)
-    table = ColumnTable(shown, rows=[*range(read.num_rows)], columns=every, row="row")
-    for column in used.numbers:
+    values: dict[Column, Any] = {}
+    for column in used.columns:
+        if str(column) not in found:
+            raise no_column(shown, str(column), every)
+        one = found[str(column)]
         try:
-            table.found[column] = array("d", found[str(column)].cast("float64").to_numpy(zero_copy_only=False))
+            if used.as_float(column):
+                values[column] = one.cast("float64").to_numpy(zero_copy_only=False)
+            else:
+                values[column] = (one.cast("string") if arrow.types.is_timestamp(one.type) else one).to_pylist()
         except arrow.ArrowException as error:
             hint = f"Name another column; {error}."
             raise MappingError(f"{shown}: {column!r} holds no numbers.", hint=hint) from error
-    for column in used.texts:
-        table.words[column] = [plain(value) for value in found[str(column)].to_pylist()]
-    if used.time is not None:
-        stamps = found[str(used.time)]
-        stamps = stamps.cast("string") if arrow.types.is_timestamp(stamps.type) else stamps
-        table.stamps.extend(Decimal(one) if isinstance(one, int) else one for one in stamps.to_pylist())
-    return table
+    return ColumnTable(shown, every, range(read.num_rows), values)
 
 
 def _list_of(column: str) -> str:
@@ -66,7 +60,7 @@ def _list_of(column: str) -> str:
 
 
 def _flat(shown: str, name: str, values: Any) -> dict[str, Any]:
-    """Return a column, or those of its lists."""
+    """Return a column by its name, or the columns that its lists hold."""
     kinds, compute = importlib.import_module("pyarrow.types"), importlib.import_module("pyarrow.compute")
     if not (kinds.is_list(values.type) or kinds.is_large_list(values.type) or kinds.is_fixed_size_list(values.type)):
         return {name: values}

@@ -1,4 +1,4 @@
-"""From cells to samples: units converted, what is no sample marked as such and counted."""
+"""Conversion of cells into samples: units are converted, and cells without a sample are marked and counted."""
 
 from __future__ import annotations
 
@@ -11,45 +11,48 @@ import numpy.typing as npt
 
 from tactbench.core.errors import MappingError
 from tactbench.core.recording.health import Finding, listed
-from tactbench.core.recording.mapping.channels import MappedChannel, MappedStream
+from tactbench.core.recording.mapping.bags import MESSAGE_TIMES
+from tactbench.core.recording.mapping.channels import MappedChannel, MappedStream, no_translation
 from tactbench.core.recording.mapping.model import Annotation, Bag, Mapping, Time
-from tactbench.core.recording.mapping.table import MESSAGE_TIMES, Table, nanoseconds_per
+from tactbench.core.recording.mapping.table import Table, nanoseconds_per
 from tactbench.core.samples import FloatArray, IntArray, Quality
 from tactbench.core.spec import units
 from tactbench.core.spec.recording import composed
 
 OUTSIDE, FAR_OUTSIDE = 3.0, 30.0
-"""Ranges of all other values by which the smallest or largest of a channel is off that is no reading: if it comes in
-short runs, and if it comes once or seldom."""
+"""How far the smallest or largest value of a channel lies from all others, in ranges of these, if it is taken for no
+reading: where it comes in short runs, and where it comes once or seldom."""
 SHORT_RUN, SELDOM, OFTEN = 3.0, 0.1, 0.3
-"""Rows on average, and shares of the rows. A contact has levels too, but stays on them."""
+"""Longest mean run [rows], and largest shares of the rows. A contact has levels too, but stays on them."""
 APART = 5.0
-"""Mean steps of the other samples by which it is off those before it, if it lies within `OUTSIDE`."""
+"""How far such a value lies from the sample before it, in mean steps of the others, where it lies within `OUTSIDE`."""
 FEWEST_VALUES = 8
-"""Other values that the channel must have."""
+"""Fewest other values that a channel must have to be judged."""
 UNSIGNED_BITS = (8, 16, 32)
+"""Widths of whole numbers whose negative values may have been stored without their sign."""
 MISSED = 0.05
-"""Share of the longest span from which on it is reported that spans of tables differ."""
+"""Share of the longest span that tables may lack in common before their spans are reported to differ."""
 YEARS = (1970, 2200)
-"""Times since 1970 outside these years are taken for a wrong unit or epoch."""
+"""Times since 1970 are taken for times in a wrong unit or epoch if they lie outside these years."""
 _NS_PER_YEAR = 365.2425 * 86400 * 1e9
 
 
 @dataclass(frozen=True)
 class Samples:
-    """A stream of one recording, ready to be written."""
+    """The samples of a stream of one recording, ready to be written."""
 
     data: npt.NDArray[Any]
-    """(n, channels); NaN, or 0 where the stream stores whole numbers, where there is no sample"""
+    """(n, channels); where there is no sample, NaN, or 0 in a stream of whole numbers."""
     quality: npt.NDArray[np.uint8]
+    """(n, channels) of :class:`~tactbench.core.samples.Quality`."""
     missing: dict[str, int] = field(default_factory=dict)
-    """Samples marked as missing, by channel"""
+    """Samples marked as missing, by channel."""
     findings: tuple[Finding, ...] = ()
-    """Values that seem to be no readings"""
+    """Reports of values that seem to be no readings."""
 
 
 def samples(stream: MappedStream, table: Table) -> Samples:
-    """Read a stream's channels from `table`.
+    """Return the samples of a stream's channels, read from `table`.
 
     Raises
     ------
@@ -110,10 +113,10 @@ def times(table: Table, time: Time) -> IntArray:
 
 
 def wrap_period(t_ns: IntArray, units_ns: Sequence[int] = (1, 10**3, 10**6, 10**9)) -> int:
-    """Return after how many nanoseconds a clock that runs backwards begins at 0 again, if it is such a counter, or 0.
+    """Return the period [ns] of a clock that runs backwards because its counter begins at 0 again; 0 for another clock.
 
-    It is one of 16, 24 or 32 bits of one of the units if every step backwards leads from within twenty median steps, or
-    a sixteenth of its range, below its end to within as many above 0.
+    The counter has 16, 24 or 32 bits of one of the units if every step backwards leads from within twenty median steps,
+    or a sixteenth of its range, below its end to within as many above 0.
     """
     steps = np.diff(t_ns)
     back = np.flatnonzero(steps < 0)
@@ -139,7 +142,7 @@ def _unwrapped(table: Table, stamps: IntArray, time: Time, period: int) -> IntAr
 
 
 def labels(name: str, annotation: Annotation, table: Table) -> npt.NDArray[Any]:
-    """Return a label for every row, (n,): texts, or numbers of equal stretches.
+    """Return a label for every row, (n,): a text, or the number of its stretch.
 
     Raises
     ------
@@ -149,8 +152,8 @@ def labels(name: str, annotation: Annotation, table: Table) -> npt.NDArray[Any]:
     if annotation.rows_per is not None:
         if len(table) % annotation.rows_per:
             raise MappingError(
-                f"{table.shown} has {len(table)} rows: not a whole number of {annotation.rows_per} ({name}).",
-                hint="Rows are missing or too many, or `rows_per` is wrong.",
+                f"{table.shown} has {len(table)} rows, which are no whole stretches of {annotation.rows_per} ({name}).",
+                hint="Add or remove rows, or correct `rows_per`.",
             )
         return np.arange(len(table), dtype=np.int64) // annotation.rows_per
     assert annotation.column is not None  # the model says: either rows_per or a column
@@ -159,55 +162,23 @@ def labels(name: str, annotation: Annotation, table: Table) -> npt.NDArray[Any]:
         known = {composed(str(key)): composed(value) for key, value in annotation.values.items()}
         for row, text in enumerate(texts):
             if text not in known:
-                raise MappingError(
-                    f"{table.where(row)}: column {annotation.column!r}: {text!r} has no translation for {name!r}; "
-                    f"there are: {', '.join(known)}.",
-                    hint="Add it to `values`; translate what means 'no label' to an empty text.",
-                )
+                raise no_translation(f"{table.where(row)}: column {annotation.column!r}:", text, name, known)
         texts = [known[text] for text in texts]
     return np.array(texts, dtype=np.str_)
 
 
-def check_join(mapping: Mapping, tables: dict[str, Table]) -> None:
-    """Compare tables joined by rows: equally long, and their times as close as the mapping promises.
-
-    Raises
-    ------
-    MappingError
-        If they differ; the message names the first row that does.
-    """
-    if mapping.join is None or mapping.join.by != "rows":
-        return
-    (first, lead), *others = tables.items()
-    for name, table in others:
-        if len(table) != len(lead):
-            raise MappingError(
-                f"{table.shown} (table {name!r}) has {len(table)} rows, {lead.shown} has {len(lead)}.",
-                hint="Tables joined by rows must be equally long; with a clock each, `by: clock` is an alternative.",
-            )
-        own, other = mapping.tables[first].time, mapping.tables[name].time
-        within = mapping.join.times_within_ms
-        if own is None or other is None or within is None:
-            continue
-        apart_ms = np.abs(times(lead, own) - times(table, other)) * 1e-6
-        if (apart_ms > within).any():
-            row = int(np.flatnonzero(apart_ms > within)[0])
-            raise MappingError(
-                f"{table.where(row)}: its time is {apart_ms[row]:.3g} ms from that of {lead.where(row)}; the mapping "
-                f"allows {within:g} ms.",
-                hint="The rows do not belong together, or `times_within_ms` is too strict.",
-            )
-
-
 def compare_clocks(mapping: Mapping, tables: dict[str, Table], clocks: dict[str, IntArray]) -> Iterator[Finding]:
-    """Yield in what the clocks of tables that are joined by them differ.
+    """Compare the clocks of joined tables, and yield in what those of tables that are joined by them differ.
 
     Raises
     ------
     MappingError
-        If two of them have no time in common; the message has both spans.
+        If times of one row differ by more than the mapping allows, or clocks have no time in common.
     """
-    if mapping.join is None or mapping.join.by != "clock":
+    if mapping.join is None or len(clocks) < 2:
+        return
+    if mapping.join.by == "rows":
+        _compare_rows(tables, clocks, mapping.join.times_within_ms or 0.0)
         return
     kinds: dict[str, list[str]] = {}
     for name in clocks:
@@ -217,10 +188,9 @@ def compare_clocks(mapping: Mapping, tables: dict[str, Table], clocks: dict[str,
         logged = isinstance(source.read, Bag) and time.column in MESSAGE_TIMES
         kinds.setdefault(f"{time.column if logged else 'a column'} (epoch {time.epoch})", []).append(name)
     if len(kinds) > 1:
-        said = "; ".join(f"{' and '.join(names)} by {kind}" for kind, names in kinds.items())
-        yield Finding(
-            "mixed-stamps", "warning", "", (), len(kinds), f"tables are joined by stamps of different kinds: {said}"
-        )
+        stated = "; ".join(f"{' and '.join(names)} by {kind}" for kind, names in kinds.items())
+        text = f"tables are joined by stamps of different kinds: {stated}"
+        yield Finding("mixed-stamps", "warning", text, count=len(kinds))
     spans = {name: (int(t_ns.min()), int(t_ns.max())) for name, t_ns in clocks.items()}
     late, early = max(spans, key=lambda name: spans[name][0]), min(spans, key=lambda name: spans[name][1])
     common = spans[early][1] - spans[late][0]
@@ -241,7 +211,20 @@ def compare_clocks(mapping: Mapping, tables: dict[str, Table], clocks: dict[str,
             f"tables {' and '.join(spans)} have {common * 1e-9:.3g} of {longest * 1e-9:.3g} s in common: they begin "
             f"{begun * 1e-9:.3g} s and end {ended * 1e-9:.3g} s apart"
         )
-        yield Finding("spans", "warning", "", (), 0, text)
+        yield Finding("spans", "warning", text)
+
+
+def _compare_rows(tables: dict[str, Table], clocks: dict[str, IntArray], within_ms: float) -> None:
+    (first, lead), *others = clocks.items()
+    for name, t_ns in others:
+        apart_ms = np.abs(lead - t_ns) * 1e-6
+        if (apart_ms > within_ms).any():
+            row = int(np.flatnonzero(apart_ms > within_ms)[0])
+            raise MappingError(
+                f"{tables[name].where(row)}: its time is {apart_ms[row]:.3g} ms from that of "
+                f"{tables[first].where(row)}; the mapping allows {within_ms:g} ms.",
+                hint="The rows do not belong together, or `times_within_ms` is too strict.",
+            )
 
 
 def _moment(mapping: Mapping, name: str, t_ns: int) -> str:
@@ -261,9 +244,9 @@ def _some_sample(channel: MappedChannel, table: Table, absent: npt.NDArray[np.bo
 
 
 def _no_readings(stream: MappedStream, given: FloatArray) -> Iterator[Finding]:
-    """Yield what in (n, channels) numbers of a table, NaN where there is none, seems to be no reading.
+    """Yield a finding for each number that seems to be no reading, in the (n, channels) numbers of a table.
 
-    Numbers that are found become NaN: what else is found is found without them.
+    Such numbers become NaN in `given`, so that the search for others goes on without them.
     """
     found: dict[str, dict[int, int]] = {}
     low, high = np.fmin.reduce(given), np.fmax.reduce(given)
@@ -294,13 +277,13 @@ def _no_readings(stream: MappedStream, given: FloatArray) -> Iterator[Finding]:
             given[given[:, channel] == value, channel] = np.nan
     for text, counts in found.items():
         names, count = tuple(stream.channels[place].spec.name for place in sorted(counts)), sum(counts.values())
-        share = float(f"{100 * count / (len(names) * len(given)):.1g}")  # recordings that differ by chance say the same
-        said = f"{listed(names)}: {text.format(share)}"
-        yield Finding("no-reading", "warning", stream.spec.name, names, count, said)
+        share = float(f"{100 * count / (len(names) * len(given)):.1g}")  # one text for shares that differ by chance
+        message = f"{listed(names)}: {text.format(share)}"
+        yield Finding("no-reading", "warning", message, stream.spec.name, names, count)
 
 
 def _jumps(column: FloatArray, period: int) -> int:
-    """Return how often a column jumps by a period but for a step like its others, or 0 if it jumps otherwise too."""
+    """Return how often a column jumps by a period, give or take a usual step; 0 if it jumps in another way too."""
     column = column[np.isfinite(column)]
     steps = np.abs(np.diff(column))
     jumps = 2 * steps > period
@@ -310,9 +293,9 @@ def _jumps(column: FloatArray, period: int) -> int:
 
 
 def _is_apart(column: FloatArray, value: float, off: float) -> bool:
-    """Return whether a value, `off` by so many ranges of all others, lies apart from the samples around it.
+    """Return whether a value lies apart from the samples around it; `off` is its distance in ranges of all others.
 
-    Within their range, it must come from and return to wherever they are: a level at rest does one or the other.
+    Near their range, the samples before and after it must be alike: a contact at rest changes its level only once.
     """
     column = column[np.isfinite(column)]
     at = column == value

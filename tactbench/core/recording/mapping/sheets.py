@@ -1,4 +1,4 @@
-"""Reading sheets of Excel workbooks into tables; formulas are never computed, the values kept with them are read."""
+"""Reader of Excel workbooks; formulas are not computed: the values that Excel has stored with them are read."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from tactbench.core.recording.mapping.text import Line, skipped, table_of
 
 
 def read_sheet(path: Path, shown: str, how: Xlsx) -> TextTable:
-    """Read one sheet.
+    """Return the table in one sheet of a workbook.
 
     Raises
     ------
@@ -55,7 +55,7 @@ def _sheet(book: Any, shown: str, how: Xlsx) -> Any:
 
 
 def _lines(rows: Any, how: Xlsx) -> Iterator[Line]:
-    """Yield the rows that are neither blank nor left out, without the blank cells at their ends."""
+    """Yield the rows that are neither blank nor left out, each without the blank cells at its end."""
     for number, row in enumerate(rows, 1):
         cells = [] if skipped(number - 1, how) else [_text(value) for value in row]
         while cells and not cells[-1]:

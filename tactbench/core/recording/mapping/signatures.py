@@ -1,4 +1,4 @@
-"""What a file is by its first bytes, whatever its name and its mapping say."""
+"""Recognition of a file's format by its first bytes, which the name and the mapping may contradict."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ def require_format(path: Path, shown: str, wanted: str) -> None:
 
 
 def _zipped(path: Path) -> tuple[str, str, str] | None:
-    """Return what an archive is that has a name of its own."""
+    """Return the entry for a zip archive that is a workbook or holds arrays; None for another archive."""
     names: list[str] = []
     with suppress(zipfile.BadZipFile, OSError), zipfile.ZipFile(path) as archive:
         names = archive.namelist()

@@ -1,4 +1,4 @@
-"""The tasks that a mapping declares, and the file in which they lie beside its recordings."""
+"""Tasks that a mapping declares, and the file beside its recordings that holds them."""
 
 from __future__ import annotations
 
@@ -16,39 +16,39 @@ from tactbench.core.spec.declared_task import FILE
 from tactbench.core.spec.task import LabelTarget, VectorTarget
 
 SPLITS = ("roles", "session", "recording", "trial", "in-session", "shuffled")
-"""That recordings can be asked for whatever their labels are."""
+"""Splits that need no label."""
 _FEW_SHOT = re.compile(r"few-shot-[1-9][0-9]{0,3}")
 
 
 def require_answerable(mapping: MappingFile, streams: Mapping[str, MappedStream], path: Path) -> None:
-    """Refuse a task that asks for what the recordings will not have; raises MappingError."""
+    """Raise MappingError for a task that needs channels or labels which the recordings will not have."""
     channels = [channel for stream in streams.values() for channel in stream.spec.channels]
     own = {str(one.spec.kind) for stream in streams.values() if stream.source.of == "sensor" for one in stream.channels}
     labels = {label for stream in streams.values() for label in stream.source.annotations} | {*mapping.recording.labels}
     for task in mapping.tasks:
         groups = [split for split in task.splits if not _FEW_SHOT.fullmatch(split)]
-        asked: list[tuple[str, set[str], set[str]]] = [
+        needs: list[tuple[str, set[str], set[str]]] = [
             ("features of kind", set(task.features), own),
             ("the split", {*groups}, {*SPLITS, *labels}),
         ]
         if isinstance(task.target, LabelTarget):
-            asked.append(("the label", {task.target.name}, labels))
+            needs.append(("the label", {task.target.name}, labels))
         else:
             kind = task.target.kind
             parts = task.target.components if isinstance(task.target, VectorTarget) else (task.target,)
             names = {one.name for one in parts if one.name is not None}
-            asked.append(("a target of kind", {kind}, {one.kind for one in channels}))
-            asked.append((f"the {kind} channel", names, {one.name for one in channels if one.kind == kind}))
-        for what, some, there in asked:
+            needs.append(("a target of kind", {kind}, {one.kind for one in channels}))
+            needs.append((f"the {kind} channel", names, {one.name for one in channels if one.kind == kind}))
+        for what, some, there in needs:
             for name in sorted(some - there):
                 raise MappingError(
-                    f"{path}: task {task.name!r} asks for {what} {name}, which the mapping does not have.",
+                    f"{path}: task {task.name!r} needs {what} {name}, which the mapping does not have.",
                     hint=f"It has {', '.join(sorted(there)) or 'none'}.",
                 )
 
 
 def tasks_text(mapping: MappingFile) -> str:
-    """Return what is to lie beside the recordings of a mapping; empty if it declares no task."""
+    """Return the text of the file of tasks beside the recordings; empty if the mapping declares none."""
     if not mapping.tasks:
         return ""
     tasks = [task.model_dump(mode="json", exclude_unset=True) for task in mapping.tasks]
@@ -57,7 +57,7 @@ def tasks_text(mapping: MappingFile) -> str:
 
 
 def check_tasks(out: Path, text: str, *, replace: bool) -> None:
-    """Refuse to write over other tasks unless they are to be replaced; raises MappingError."""
+    """Raise MappingError if there is a file with other tasks which is not to be replaced."""
     target = out / FILE
     if text and not replace and target.exists() and target.read_text(encoding="utf-8") != text:
         raise MappingError(
@@ -67,7 +67,7 @@ def check_tasks(out: Path, text: str, *, replace: bool) -> None:
 
 
 def write_tasks(folder: Path, text: str) -> None:
-    """Write the tasks into a folder; raises UnwritableError."""
+    """Write the file of tasks into a folder; raises UnwritableError."""
     if text:
         with writable(folder / FILE):
             (folder / FILE).write_text(text, encoding="utf-8")

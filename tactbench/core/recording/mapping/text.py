@@ -1,4 +1,4 @@
-"""Reading text files into tables: every complaint names the file and the line."""
+"""Readers of text files; every error names the file and the line."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import csv
 import io
 import json
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from tactbench.core.errors import MappingError
@@ -14,7 +15,7 @@ from tactbench.core.recording.mapping.table import TextTable, comment_mark
 
 _DELIMITERS = {"\t": "tab", ";": "semicolon"}
 Line = tuple[int | str, list[str]]
-"""Number of a line, or of a cell in each where the lines are channels, and its cells."""
+"""The cells of a row, and its line in the file; where lines are channels, the place of its cells in them."""
 
 
 def read_text(path: Path, shown: str, how: Csv | Text | Records) -> TextTable:
@@ -45,7 +46,7 @@ def read_text(path: Path, shown: str, how: Csv | Text | Records) -> TextTable:
 
 
 def table_of(shown: str, lines: list[Line], how: Tabular) -> TextTable:
-    """Return the table that lines make, the first of them its header if `how` says so."""
+    """Return the table of some lines, of which the first is the header if `how` says so."""
     header, trailing = None, _trailing(lines, how)
     if trailing:
         for _, cells in lines[how.header and not how.transposed :]:
@@ -66,25 +67,24 @@ def table_of(shown: str, lines: list[Line], how: Tabular) -> TextTable:
     _same_length(shown, lines, len(header) if header else len(lines[0][1]))
     rows, places = [cells for _, cells in lines], [place for place, _ in lines]
     no_sample = frozenset(text.strip() for text in how.no_sample)
-    if not isinstance(how, Written):
-        return TextTable(shown, header, rows, places, no_sample, trailing)
-    return TextTable(shown, header, rows, places, no_sample, trailing, how.decimal, how.thousands)
+    table = TextTable(shown, header or tuple(range(len(rows[0]))), places, rows, no_sample, trailing)
+    return replace(table, decimal=how.decimal, thousands=how.thousands) if isinstance(how, Written) else table
 
 
 def skipped(place: int, how: Tabular) -> bool:
-    """Tell whether a line, counted from 0, is left out."""
+    """Return whether a line, counted from 0, is left out."""
     return place < how.skiprows if isinstance(how.skiprows, int) else place in how.skiprows
 
 
 def _trailing(lines: Sequence[Line], how: Tabular) -> bool:
-    """Tell whether a delimiter ends every line of data, so that an empty cell stands where nothing has a name."""
+    """Return whether every line of data ends with a delimiter, and so with an empty cell that has no name."""
     data = lines[how.header and not how.transposed :]
     longer = how.transposed or (how.header and bool(data) and len(data[0][1]) == len(lines[0][1]) + 1)
     return longer and bool(data) and all(not cells[-1].strip() for _, cells in data)
 
 
 def _cells(text: str, shown: str, how: Csv | Text) -> Iterator[Line]:
-    """Yield the lines that are not blank."""
+    """Yield the lines that are not blank, cut into cells."""
     # Lines that are left out stay as blank ones, so that the others keep their numbers.
     lines = ["\n" if skipped(place, how) else line for place, line in enumerate(_lines(text))]
     if how.comment is not None:
@@ -133,36 +133,31 @@ def _same_length(shown: str, lines: Sequence[Line], wide: int) -> None:
 
 
 def _records(lines: Sequence[str], shown: str, how: Records) -> TextTable:
-    first = 0
-    if how.first_line is not None:
-        if not lines or lines[0].strip() != how.first_line:
-            given = lines[0].strip() if lines else "nothing"
-            raise MappingError(
-                f"{shown}:1: {given!r}, where the line {how.first_line!r} is expected.",
-                hint="Is it the file the mapping means?",
-            )
-        first = 1
-    there = [(number, line.split()) for number, line in enumerate(lines[first:], first + 1) if line.strip()]
+    first = lines[0].strip() if lines else "nothing"
+    if how.first_line not in (None, first):
+        raise MappingError(
+            f"{shown}:1: {first!r}, where the line {how.first_line!r} is expected.",
+            hint="Correct `first_line`, or the pattern of the files.",
+        )
+    skip = how.first_line is not None
+    there = [(number, line.split()) for number, line in enumerate(lines, 1) if number > skip and line.strip()]
     if not there:
         raise MappingError(f"{shown} has no rows.", hint="Remove the file.")
     per_row = len(how.numbers_per_line)
-    rows: list[list[str]] = []
-    begins: list[int] = []
     for place, (number, cells) in enumerate(there):
-        line = place % per_row
-        if len(cells) != how.numbers_per_line[line]:
+        wide = how.numbers_per_line[place % per_row]
+        if len(cells) != wide:
             raise MappingError(
-                f"{shown}:{number}: {len(cells)} numbers on line {line + 1} of a record, where "
-                f"{how.numbers_per_line[line]} are expected.",
+                f"{shown}:{number}: {len(cells)} numbers on line {place % per_row + 1} of a record, where {wide} are "
+                "expected.",
                 hint="Repair the record, or correct `numbers_per_line`.",
             )
-        if line == 0:
-            rows.append([])
-            begins.append(number)
-        rows[-1].extend(cells)
     if len(there) % per_row:
         raise MappingError(
             f"{shown}:{there[-1][0]}: the file ends after line {len(there) % per_row} of a record of {per_row} lines.",
             hint="The file was cut short: get it again.",
         )
-    return TextTable(shown, None, rows, begins, how.no_sample)
+    begins = range(0, len(there), per_row)
+    rows = [[cell for _, cells in there[begin : begin + per_row] for cell in cells] for begin in begins]
+    places = [there[begin][0] for begin in begins]
+    return TextTable(shown, tuple(range(len(rows[0]))), places, rows, how.no_sample)

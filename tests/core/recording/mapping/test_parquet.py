@@ -47,7 +47,7 @@ def episodes(tables, *, state=None, **columns):
 def test_episodes_of_one_file(tables):
     episodes(tables)
     report = tables.run(EPISODES)
-    assert [made.name for made in report.recordings] == ["episode-0", "episode-1", "episode-2"]
+    assert [made.meta.name for made in report.recordings] == ["episode-0", "episode-1", "episode-2"]
     assert (report.missing, report.unused) == ({"fz": 1}, ("1 of 9 columns of table frames: frame_index",))
     _, streams = read(report, 1)
     assert np.array_equal(streams["taxels"].data, np.arange(16, 32, dtype=np.float32).reshape(4, 4))
