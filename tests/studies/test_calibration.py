@@ -70,7 +70,7 @@ def test_stored_draws_are_those_of_the_stored_procedure():
 
 def test_the_page_has_the_tables_of_the_stored_results_and_every_prior():
     assert document() == DOCUMENT.read_text(encoding="utf-8")
-    text = (HERE.parents[1] / "docs" / "calibration.md").read_text(encoding="utf-8")
+    text = (HERE / "README.md").read_text(encoding="utf-8")
     priors = [one["prior"] for one in read(RESULTS).procedure["nuisances"]]
     assert [one for one in priors if f"{one['low']:g} to {one['high']:g}" not in text] == []
 
