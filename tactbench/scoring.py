@@ -155,7 +155,9 @@ def name_of(estimator: str | Estimator) -> str:
     """Return what an estimator is called in tables: the name of its class, of a pipeline those of its steps."""
     if isinstance(estimator, str):
         return estimator
-    if isinstance(estimator, type) or not (hasattr(estimator, "fit") and hasattr(estimator, "predict")):
+    # Some classes of scikit-learn have their `predict` after `fit` alone: then their class has it.
+    able = (hasattr(estimator, name) or hasattr(type(estimator), name) for name in ("fit", "predict"))
+    if isinstance(estimator, type) or not all(able):
         raise wrong("estimator", estimator, "an object with fit(X, y) and predict(X), or the name of an installed one")
     steps = [type(step).__name__ for _, step in getattr(estimator, "steps", ()) if step not in (None, "passthrough")]
     return "+".join(steps) or type(estimator).__name__

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 import sklearn
+from sklearn.ensemble import StackingRegressor
 from sklearn.linear_model import LogisticRegression, LogisticRegressionCV, Ridge
 from sklearn.metrics import make_scorer, mean_absolute_error, median_absolute_error
 from sklearn.model_selection import (
@@ -292,3 +293,10 @@ def test_a_scaled_window_is_that_of_the_training_windows(folder):
     tactbench.evaluate(Keeps(), "force", folder, window=4)
     np.testing.assert_allclose([one.mean(axis=(0, 1)) for one in found], 0.0, atol=1e-9)  # of values about 1000
     np.testing.assert_allclose([one.std(axis=(0, 1)) for one in found], 1.0, rtol=1e-9)
+
+
+def test_an_object_that_predicts_only_once_it_is_fitted_is_an_estimator(folder):
+    stacked = StackingRegressor([("ridge", Ridge())])
+    assert not hasattr(stacked, "predict")
+    found = tactbench.evaluate(stacked, "force", folder)
+    assert found.score < found.trivial["mean"]
