@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 from collections import deque
+from statistics import fmean
 
 import numpy as np
 
@@ -22,6 +23,8 @@ MOST_BLOCKS = 50_000
 """Kept for a rig that does not take them: some 50 s at 1 kHz; then the oldest are dropped."""
 _LOOKED_AT = 3
 """Samples of which two are a touch."""
+_MOST_SOUND = 10_000
+"""Kept for a mean: more than a second of the quickest force sensor, 7 kHz."""
 
 Problem = tuple[Trigger, str]
 
@@ -67,10 +70,22 @@ class ForceWatch:
         self._last = np.full((1, kinds.size), math.nan)
         self._same = 0
         self._pressing: deque[float] = deque(maxlen=_LOOKED_AT)
+        self._sound: deque[tuple[int, float]] = deque(maxlen=_MOST_SOUND)
 
     def touched(self, touch_n: float) -> bool:
         """Return whether two of the last three samples are above a force [N]."""
         return sum(force > touch_n for force in self._pressing) >= _LOOKED_AT - 1
+
+    def mean_n(self, since_ns: int, seconds: float) -> float:
+        """Return the mean pressing force [N] of the newest seconds, all of them after a time.
+
+        NaN: not so many have come since, or something was wrong with one of them.
+        """
+        while self._sound and self._sound[0][0] < max(since_ns, self._sound[-1][0] - round(1e9 * seconds)):
+            self._sound.popleft()
+        if len(self._sound) < _LOOKED_AT or self.t_ns < since_ns + 1e9 * seconds:
+            return math.nan
+        return fmean(force_n for _, force_n in self._sound)
 
     def age_s(self, now_ns: int) -> float:
         """Return the age of the newest sample [s]; infinite: there is none."""
@@ -109,6 +124,10 @@ class ForceWatch:
             problem = Trigger.FORCE_GAP, f"{lost} force samples were lost in a row, {limits.lost_samples} may be"
         if problem is None and same >= limits.same_samples:
             problem = Trigger.FORCE_STUCK, f"{same} force samples in a row are the same in every channel"
+        if problem is not None:
+            self._sound.clear()
+        elif newer is not None and newer.t_ns is not None:
+            self._sound.extend(zip(newer.t_ns.tolist(), limits.pressing_n(newer.data).tolist(), strict=True))
         return problem
 
     def _take_newer(self, block: Block) -> tuple[int, int]:

@@ -23,6 +23,12 @@ SILENT_S = 0.5
 """After which a controller is said not to answer (assumed)."""
 SETTLE_S = 0.5
 """Added to the time that a move takes by its speed and acceleration, after which it has not ended (assumed)."""
+HOMING_S = 60.0
+"""Homing takes no longer (assumed)."""
+HALTS = 3
+"""How often an axis is halted in the usual way before :meth:`Positioner.halt_harder` (assumed)."""
+FASTER = 1.5
+"""How much faster than it states an axis may seem to move: two positions further apart are not of one way (assumed)."""
 
 
 class PositionerError(RigError):
@@ -57,6 +63,8 @@ class PositionerFacts:
     """Whether `halt` and `retreat` end a move that is under way."""
     holds_unpowered: bool
     """Whether it stays where it is without power: a horizontal axis, a brake, a counterweight, a self-locking screw."""
+    homes_here: bool = False
+    """Whether homing takes the place at which it stands for its home: it cannot notice that it stands in the skin."""
     retreat: float = math.nan
     """Where it is away from the skin; NaN: it retreats by standing still."""
     retreat_speed: float = math.nan
@@ -171,7 +179,8 @@ class Positioner(Driver):
         """What was last read; None: nothing yet."""
         self._unread: list[PositionerState] = []
         self._moving = self._retreats = False
-        self._goal = math.nan
+        self._goal, self._due_ns, self._halts, self._fastest = math.nan, 0, 0, 0.0
+        self._before_ns, self._odd = 0, False
         self._rest, self._asked_ns = b"", 0
         super().__init__(settings)
         self.homed = False
@@ -223,6 +232,10 @@ class Positioner(Driver):
     def halt(self) -> None:
         """Begin to brake and hold, whatever is under way."""
 
+    def halt_harder(self) -> None:
+        """Let it stand by a stronger means, such as a reset, after `HALTS` halts in vain; raises if there is none."""
+        raise PositionerError(f"It was halted {HALTS} times, and goes on.", hint="Cut its supply.")
+
     @abstractmethod
     def update(self, timeout_s: float = 0.0) -> None:
         """Carry on what is under way, waiting at most `timeout_s` for the controller; read the state."""
@@ -269,19 +282,33 @@ class Positioner(Driver):
 
     # What a subclass calls --------------------------------------------------------------------------------------------
 
-    def begin(self, target: float = math.nan) -> None:
-        """Note that a move to a target was sent; NaN: to where it will stand, infinity: not before :meth:`begin`."""
+    def begin(self, target: float = math.nan, speed: float | None = None) -> None:
+        """Note that a move to a target was sent, at a speed (None: that of the facts); it has a deadline from now on.
+
+        NaN: it was halted, and stands somewhere; infinity: it is being homed, until the next call of this method.
+        """
+        facts, halted = self.facts, math.isnan(target)
+        speed = facts.speed if speed is None else speed
+        self._fastest = max(self._fastest, speed) if halted else speed
+        seconds = facts.stop_latency_s + self._fastest / facts.acceleration if halted else math.inf
+        if math.isfinite(target):
+            seconds = facts.seconds(target - self.position, speed)
+        self._halts = self._halts + 1 if halted else 0
         self._moving, self._goal, self._retreats = True, target, False
+        self._due_ns = self.clock() + round(1e9 * (seconds if math.isfinite(seconds) else HOMING_S))
 
     def see(self, t_ns: int, position: float, *, idle: bool) -> None:
         """Note an answer: when and where, and whether the controller says that it stands.
 
         A move has ended when the controller stands at its target; one that says so before it has begun is not believed.
+        A halt has ended when it stands and the position is that of the answer before.
         """
-        there = math.isnan(self._goal) or abs(position - self._goal) <= self.facts.near
-        self.note(PositionerState(t_ns, position, position if math.isnan(self._goal) else self._goal))
-        if idle and there:
-            self._moving = False
+        last, halted = self.position, math.isnan(self._goal)
+        self.note(PositionerState(t_ns, position, position if halted else self._goal))
+        if idle and abs(position - (last if halted else self._goal)) <= (
+            self.facts.resolution if halted else self.facts.near
+        ):
+            self._moving, self._halts = False, 0
             if self._retreats:
                 self.move_to(self.facts.retreat, self.facts.retreat_speed)
 
@@ -307,18 +334,58 @@ class Positioner(Driver):
         self._asked_ns = 0
 
     def finish(self, stop: Callable[[], bool]) -> None:
-        """Wait for the end of a move; halts and raises PositionerError if `stop` says so."""
+        """Wait for the end of a move; halts and raises PositionerError if `stop` says so, or it lasts too long."""
         while self.moving:
             self.update(0.05)
+            self._end_in_time()
             if stop():
                 self.halt()
                 raise PositionerError("The axis was told to stand.")
 
+    def _end_in_time(self) -> None:
+        """Halt again what goes on after a halt; raise PositionerError for what has not ended in its time."""
+        if not self._moving or self.clock() <= self._due_ns:
+            return
+        retreats, halted = self._retreats, math.isnan(self._goal)
+        if not halted or self._halts > HALTS:
+            self._due_ns = self.clock() + round(1e9 * SETTLE_S)
+            aim = "to rest" if halted else "home" if math.isinf(self._goal) else f"to {self._goal:g}"
+            raise PositionerError(
+                f"It has not come {aim} in its time, and is at {self.position:g}.",
+                hint="See what is in its way, and whether units and speed in the rig file are the controller's.",
+            )
+        (self.halt if self._halts < HALTS else self.halt_harder)()
+        self._retreats = retreats
+
     def note(self, state: PositionerState) -> None:
-        """Keep a state that was read."""
-        self.state = state
+        """Keep a state that was read.
+
+        A position further from the last one than it can have gone since is kept only with a second one like it.
+
+        Raises
+        ------
+        PositionerError
+            If so: it has lost its place, and is no longer homed.
+        """
+        last, facts, far = self.state, self.facts, False
+        if last is not None and self.homed and self.enabled:
+            # Each question is sent after the answer before: no more time has passed between the two places than since
+            # the last answer but one.
+            most = FASTER * max(self._fastest, facts.speed) * 1e-9 * (state.t_ns - self._before_ns)
+            far = abs(state.position - last.position) > most + facts.near
+        if far and not self._odd:
+            self._odd = True
+            return
+        self._before_ns, self.state, self._odd = 0 if last is None else last.t_ns, state, False
         self._unread.append(state)
         del self._unread[:-1000]
+        if far and last is not None:
+            self.homed = False
+            raise PositionerError(
+                f"Its position has gone from {last.position:g} to {state.position:g}, faster than it moves: it has "
+                "lost its place, or was started anew.",
+                hint="See that nothing is touched, and home it anew.",
+            )
 
     def check_move(self, position: float) -> None:
         """Raise NotReadyError unless a move to a position may begin now."""
@@ -377,6 +444,7 @@ class Positioner(Driver):
         """Return the states that were read since the last call, and carry a move on; raises as :meth:`update`."""
         until_ns = self.clock() + round(1e9 * timeout_s)
         self.update(timeout_s)
+        self._end_in_time()
         while not self._unread and (left_ns := until_ns - self.clock()) > 0:
             self.update(1e-9 * left_ns)
         states, self._unread = self._unread, []

@@ -9,6 +9,16 @@ The surface is found first: a quick way to where it cannot be yet, a slow one un
 touched, a small force kept for a while. From there the motor lifts the indenter off for the scene's unloaded hold, goes
 back, and follows the scene's profile. Touch is found on the raw force; the force is regulated on the filtered one. The
 guard looks at the raw force by itself, and retreats by itself.
+
+Place and force are believed only as far as they agree (derived; k is a stiffness, x a way into the skin):
+
+- before the surface can be reached the mean force is zero; the surface is found before the softest declared skin would
+  have been touched; after lifting off the mean force is zero again;
+- on the ramp, x further in than at any place passed since the skin was touched, the filtered force has grown by
+  softest k x to stiffest k x, but for twice the band within which a force counts as none. So a force that has ceased to
+  answer is noticed after 2 band/softest k.
+
+A wrong scale of the force is inside these limits: it is found by the check of the force chain alone.
 """
 
 from __future__ import annotations
@@ -27,6 +37,8 @@ OFF_S = 1.0
 SLOW = 1.5
 """How many times as long as its way takes a move may last, and `SLACK_S` longer."""
 SLACK_S = 2.0
+MOST_PERIODS = 3
+"""That a control period may count for in the force law where the program stood still."""
 
 
 class PressState(StrEnum):
@@ -61,16 +73,21 @@ class PressPlan:
     """Largest increment of a control period."""
     near_m: float
     """Where the axis goes over to the speed of touching: above where the surface can be."""
-    deepest_m: float
-    """The greatest position that is ever asked for."""
+    found_m: float
+    """Where the softest skin must have been touched: below where the surface can be."""
     speed_m_s: float
     """To `near_m`."""
     touch_speed_m_s: float
     """From there on."""
     unload_speed_m_s: float
     mean_n: float
-    """A touch: the mean of the raw forces of the last `mean_s` above it; the guard stops at single ones."""
+    """A touch: the mean of the raw forces of the newest `mean_s` above it; the guard stops at single ones. Also the
+    largest mean without touch."""
     mean_s: float
+    softest_n_m: float
+    """The least force per way into any skin, from a touch on."""
+    stiffest_n_m: float
+    """The greatest."""
     contact_n: float
     """Force that is kept after the touch until the surface is known; and the least on the ramp."""
     settle_s: float
@@ -133,12 +150,15 @@ class Press:
         self.setpoint_n = 0.0
         self._plan, self._course = plan, course
         self._raw: list[tuple[float, float]] = []
+        self._raw_since_s = math.inf
+        self._way: list[tuple[float, float, float]] = []
+        self._depth_m = math.nan
         self._force_n = math.nan
         self._controller: ForceController | None = None
         self._stepped_s = 0.0
         self._since_s = self._due_s = 0.0
         self._began_s: float | None = None
-        self._lost_s = self._off_s = 0.0
+        self._lost_s = self._off_s = self._standing_s = 0.0
         self._goal: Beat | None = None
         self._requested_s: float | None = None
         self._move(plan.near_m, plan.speed_m_s)
@@ -184,7 +204,7 @@ class Press:
         now_s
             On the rig's clock.
         """
-        self._take(raw, now_s)
+        self._take(raw)
         if report.state in (GuardState.RETREATING, GuardState.RETREATED, GuardState.FAULT):
             return self._guarded(report, now_s)
         match self.state:
@@ -202,19 +222,25 @@ class Press:
                 return Beat(command=CommandKind.RETREAT)
         return self._asking(report, now_s)
 
-    def _take(self, raw: Sequence[tuple[float, float]], now_s: float) -> None:
-        """Keep the raw forces of the last moment, the newest, and the largest of a touch."""
-        self._raw += raw
-        if raw:
-            self._force_n = raw[-1][1]
+    def _take(self, raw: Sequence[tuple[float, float]]) -> None:
+        """Keep the newest raw forces, and the largest of a touch."""
         if self.state in (PressState.APPROACH, PressState.CONTACT):
             self.touch_n = max(self.touch_n, *(force for _, force in raw), 0.0)
-        self._raw = [sample for sample in self._raw if sample[0] >= now_s - self._plan.mean_s]
+        if raw:
+            self._raw += raw
+            self._force_n = raw[-1][1]
+            self._raw_since_s = min(self._raw_since_s, self._raw[0][0])
+            self._raw = [sample for sample in self._raw if sample[0] > raw[-1][0] - self._plan.mean_s]
 
     @property
     def mean_n(self) -> float:
-        """Mean of the raw forces of the last `mean_s` [N]; NaN: there are none."""
-        return fmean(force for _, force in self._raw) if self._raw else math.nan
+        """Mean of the raw forces of the newest `mean_s` [N]; NaN: not so many have come yet."""
+        whole = bool(self._raw) and self._raw[-1][0] - self._raw_since_s >= self._plan.mean_s
+        return fmean(force for _, force in self._raw) if whole else math.nan
+
+    def _forget_raw(self) -> None:
+        """Let the next mean be of what comes from now on."""
+        self._raw, self._raw_since_s = [], math.inf
 
     def _guarded(self, report: Report, now_s: float) -> Beat:
         if self.state is not PressState.RETREAT and not self.over:
@@ -228,7 +254,7 @@ class Press:
     def _enter(self, state: PressState, now_s: float) -> None:
         self.state, self._since_s = state, now_s
         self._goal = self._requested_s = None
-        self._lost_s = self._off_s = 0.0
+        self._lost_s = self._off_s = self._standing_s = 0.0
 
     # Moves ------------------------------------------------------------------------------------------------------------
 
@@ -267,16 +293,24 @@ class Press:
             if not report.moving and (goal is None or self._requested_s is not None):
                 self._begin_loop(PressState.CONTACT, report, now_s)
             return
-        slowly = goal.position_m == plan.deepest_m
-        if slowly and self._requested_s is not None and (report.touched or self.mean_n > plan.mean_n):
+        slowly, mean_n = goal.position_m == plan.found_m, self.mean_n
+        begun = self._requested_s is not None
+        touched = begun and (report.touched or mean_n > plan.mean_n)
+        if not slowly and (touched or mean_n < -plan.mean_n):
+            self.fail(
+                f"the force reads {report.force_n if report.touched else mean_n:.2f} N at {1e3 * report.position_m:.3f} mm, "
+                f"before {1e3 * plan.near_m:.3f} mm, where the surface can be: something is in the way, the motor's place "
+                "is wrong, or the zero was taken under load"
+            )
+        elif touched:
             # The guard has stopped it at a single touch; a mean that is reached is stopped here.
             self._goal = None if report.touched else Beat(command=CommandKind.STOP)
             self._requested_s = None
         elif self._arrived(report, now_s):
             if not slowly:
-                self._move(plan.deepest_m, plan.touch_speed_m_s)
+                self._move(plan.found_m, plan.touch_speed_m_s)
             else:
-                self.fail(f"no contact down to {1e3 * report.position_m:.3f} mm")
+                self.fail(f"no touch down to {1e3 * report.position_m:.3f} mm, where the file says the surface is")
 
     def _on_the_way(self, report: Report, now_s: float) -> None:
         """Go over to the next state where a move ends; on the way back to the skin also at a touch."""
@@ -284,22 +318,28 @@ class Press:
             return
         if report.moving:
             return
-        match self.state:
-            case PressState.LIFT:
-                self._enter(PressState.UNLOADED, now_s)
-            case PressState.UNLOAD:
-                if self.mean_n < self._plan.band_n:
-                    self._enter(PressState.DONE, now_s)
-                elif now_s > self._due_s + SLACK_S:
-                    self.fail(f"{self.mean_n:.2f} N are left after unloading")
-            case _:
-                self._begin_loop(PressState.RAMP, report, now_s)
+        if self.state is PressState.RETURN:
+            self._begin_loop(PressState.RAMP, report, now_s)
+            return
+        if not self._standing_s:
+            self._standing_s = now_s
+            self._forget_raw()
+        if abs(self.mean_n) < self._plan.mean_n:
+            self._enter(PressState.UNLOADED if self.state is PressState.LIFT else PressState.DONE, now_s)
+        elif now_s > self._standing_s + self._plan.mean_s + SLACK_S:
+            self.fail(
+                f"{self.mean_n:.2f} N are left after lifting off: the zero was taken under load or has drifted, or the "
+                "indenter is not off"
+            )
 
     # Under force ------------------------------------------------------------------------------------------------------
 
     def _begin_loop(self, state: PressState, report: Report, now_s: float) -> None:
         self._enter(state, now_s)
-        self._controller, self._stepped_s = ForceController(self._plan.law, self._force_n, report.position_m), now_s
+        self._way, self._depth_m = [], report.position_m
+        # A single sample has much noise, which the filter would take for a change of the force.
+        force_n = self._force_n if math.isnan(self.mean_n) else self.mean_n
+        self._controller, self._stepped_s = ForceController(self._plan.law, force_n, report.position_m), now_s
 
     def _setpoint(self, now_s: float) -> tuple[float, float]:
         least = self._plan.contact_n
@@ -313,16 +353,20 @@ class Press:
     def _regulated(self, report: Report, now_s: float) -> Beat:
         controller, plan = self._controller, self._plan
         assert controller is not None
-        passed_s, self._stepped_s = now_s - self._stepped_s, now_s
+        # Who stood still for longer did not see what the force did meanwhile.
+        passed_s, self._stepped_s = min(now_s - self._stepped_s, MOST_PERIODS * plan.law.period_s), now_s
         self.setpoint_n, slope = self._setpoint(now_s)
         controller.step(self._force_n, report.position_m, passed_s, self.setpoint_n, slope)
         if self.state is PressState.CONTACT:
+            if report.position_m > plan.found_m + plan.step_m:
+                self.fail(f"the force kept after the touch is not found down to {1e3 * report.position_m:.3f} mm")
+                return Beat(command=CommandKind.RETREAT)
             if now_s - self._since_s >= plan.settle_s:
                 self.contact_m = controller.target
                 self._enter(PressState.LIFT, now_s)
                 self._move(self.contact_m - plan.lift_m, plan.touch_speed_m_s)
                 return self._asking(report, now_s)
-        elif not self._kept(controller.filtered_n, passed_s):
+        elif not self._kept(controller.filtered_n, report.position_m, passed_s):
             return Beat(command=CommandKind.RETREAT)
         elif self._began_s is not None and now_s - self._began_s >= self._course.end_s:
             self._enter(PressState.UNLOAD, now_s)
@@ -333,9 +377,10 @@ class Press:
             return Beat()
         return Beat(command=CommandKind.STEP, distance_m=min(max(way, -plan.step_m), plan.step_m))
 
-    def _kept(self, filtered_n: float, passed_s: float) -> bool:
-        """Return whether force and contact are as they should be; else see to what follows."""
+    def _kept(self, filtered_n: float, position_m: float, passed_s: float) -> bool:
+        """Return whether force, contact and place are as they should be; else see to what follows."""
         plan = self._plan
+        self._agree(filtered_n, position_m, passed_s)
         contact_lost = filtered_n < plan.band_n and self.setpoint_n > 2 * plan.band_n
         self._lost_s = self._lost_s + passed_s if contact_lost else 0.0
         off = abs(filtered_n - self.setpoint_n) > plan.error_band_n
@@ -345,3 +390,24 @@ class Press:
         elif self._off_s >= OFF_S:
             self.fail(f"the force was off by more than {plan.error_band_n:g} N, at {self.setpoint_n:.2f} N")
         return not self.ended
+
+    def _agree(self, filtered_n: float, position_m: float, passed_s: float) -> None:
+        """Fail unless the force has grown with the way as declared skins allow, from every place passed on this way in.
+
+        Of each of these places are kept: the place, and of it and those before the largest force above the softest
+        skin's, and the least above the stiffest's. The place is filtered as the force is.
+        """
+        plan, way = self._plan, self._way
+        kept = plan.law.kept(passed_s)
+        self._depth_m = depth_m = kept * self._depth_m + (1 - kept) * position_m
+        while way and way[-1][0] >= depth_m:
+            way.pop()
+        soft_n, stiff_n = filtered_n - plan.softest_n_m * depth_m, filtered_n - plan.stiffest_n_m * depth_m
+        _, most_n, least_n = way[-1] if way else (depth_m, soft_n, stiff_n)
+        lacking = "less than on the softest declared skin: contact is lost, or the force sensor does not answer"
+        excessive = "more than on the stiffest declared skin: the zero drifts, or something else is touched"
+        for wrong_n, said in ((most_n - soft_n, lacking), (stiff_n - least_n, excessive)):
+            if wrong_n > 2 * plan.band_n:
+                self.fail(f"{filtered_n:.2f} N at {1e3 * depth_m:.3f} mm are {wrong_n:.2f} N {said}")
+        if depth_m >= self.contact_m:
+            way.append((depth_m, max(most_n, soft_n), min(least_n, stiff_n)))

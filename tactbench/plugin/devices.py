@@ -40,6 +40,7 @@ if TYPE_CHECKING:
     )
     from tactbench.devices.guard_process import DeviceSettings, Guard, GuardProcess, ProcessSettings
     from tactbench.devices.positioner import (
+        HOMING_S,
         NotReadyError,
         Positioner,
         PositionerError,
@@ -71,6 +72,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "FORCE",
+    "HOMING_S",
     "Beat",
     "ByteLink",
     "CanFrame",

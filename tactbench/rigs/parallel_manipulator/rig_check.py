@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
 from functools import partial
 from typing import Any
@@ -59,6 +60,7 @@ def check(file: RigFile) -> RigCheck:
     problems: list[str] = []
     facts: dict[str, PositionerFacts] = {}
     axes: list[tuple[str, ...]] = []
+    drive_n = math.inf
 
     def refusing(do: Callable[[], object]) -> None:
         """Keep what `do` raises as a problem."""
@@ -76,11 +78,13 @@ def check(file: RigFile) -> RigCheck:
             raise UsageError(f"{name}: {error.message}", hint=error.hint) from error
         problems += _axis_problems(settings, name, options)
         axes.append((name, *_axis_row(options)))
+        if name == MOTOR:
+            drive_n = options.largest_force_n or math.inf
         if name == MOTOR and isinstance(options, FaulhaberOptions):
             for speed_mm_s in settings.speeds_mm_s:
                 refusing(partial(options.speed, 1e-3 * speed_mm_s))
             problems += _line_problems(settings, options)
-    forces, found = _forces(settings, facts)
+    forces, found = _forces(settings, facts, drive_n)
     problems += found
     loop = settings.force_loop.model(settings.limits.travel_mm)
     used = 1e3 * settings.stiffness.greatest_n_mm / loop.largest_stiffness()
@@ -161,7 +165,9 @@ def _line_problems(settings: RigSettings, options: FaulhaberOptions) -> list[str
     ]
 
 
-def _forces(settings: RigSettings, facts: Mapping[str, PositionerFacts]) -> tuple[list[tuple[str, str]], list[str]]:
+def _forces(
+    settings: RigSettings, facts: Mapping[str, PositionerFacts], drive_n: float
+) -> tuple[list[tuple[str, str]], list[str]]:
     """Return how large the force may become, and what is wrong if that is more than is rated or allowed.
 
     A reaction is as late as the rig file allows: the force has the largest age that the guard accepts.
@@ -185,6 +191,12 @@ def _forces(settings: RigSettings, facts: Mapping[str, PositionerFacts]) -> tupl
         for name, one in facts.items()
         if name != MOTOR
     ]
+    # The way until a force that reads wrong is noticed: of the approach, and of the force loop (see `devices.press`).
+    way_m = max(
+        2e-3 * settings.heights.tolerance_mm + settings.touch_way_m,
+        2e-3 * settings.press.band_n / settings.stiffness.softest_n_mm,
+    )
+    lying = min(by_approach + k * way_m, drive_n)
     rows = [
         (
             "reaction",
@@ -193,6 +205,10 @@ def _forces(settings: RigSettings, facts: Mapping[str, PositionerFacts]) -> tupl
         ),
         ("under force control", f"{by_step:.2f} N: ceiling, one increment and the corridor"),
         ("in an approach that misses the touch", f"{by_approach:.2f} N: ceiling and reaction"),
+        (
+            "where the force sensor ceases to answer",
+            f"{lying:.2f} N, at most the drive's: noticed after {1e3 * way_m:.2f} mm",
+        ),
         ("first touch", f"{first:.2f} N, {touch.allowed_n:g} N are allowed"),
         ("way into the skin of an approach whose guard dies", f"{1e3 * slow * unguarded_s:.2f} mm: two heartbeats"),
         *([("of a rail that runs down on something", f"{max(rails):.2f} N")] if rails else ()),

@@ -81,6 +81,9 @@ class SafetyLimits(Options):
 class Stiffness(Options):
     """How stiff skin, cap and machine in series are, N/mm; declared, since nobody can compute it beforehand."""
 
+    softest_n_mm: Positive
+    """The least of any skin and cap, from the first touch on: force per way from any place to any deeper one. The less,
+    the later a force that does not answer is noticed; more than a skin has: its presses are ended."""
     at_touch_n_mm: Positive
     """The greatest up to the force that a first touch may have."""
     greatest_n_mm: Positive
@@ -90,9 +93,8 @@ class Stiffness(Options):
 
     @model_validator(mode="after")
     def _in_order(self) -> Self:
-        _rising(
-            self.at_touch_n_mm, self.greatest_n_mm, self.at_ceiling_n_mm, said="at a touch, greatest, at the ceiling"
-        )
+        rising = (self.softest_n_mm, self.at_touch_n_mm, self.greatest_n_mm, self.at_ceiling_n_mm)
+        _rising(*rising, said="the softest, at a touch, greatest, at the ceiling")
         return self
 
 
@@ -173,6 +175,9 @@ class PressRules(Options):
     """Contact is lost after so long without force while more than twice the band is wanted."""
     unload_speed_mm_s: Positive
     """After the scene's ramp."""
+    check_n: Positive | None = 3.0
+    """Push by hand, or weight, with which an operator loads the force sensor before the first press of a session: it
+    must be read with its sign, and within a factor of 1.5. null: not checked, which recordings say."""
     stale_ms: Positive = 100.0
     """The sensor's rows may be this old, as received; older: retreat."""
 
@@ -264,6 +269,10 @@ class RigSettings(Options):
         _rising(touch.lift_mm, heights.stand_off_mm, said="lift and stand-off")
         _rising(self.press.band_n, self.press.error_band_n, said="the band of no force and of errors")
         _rising(deepest_mm, limits.travel_mm[1], said="retreat, stand-off and depth together, and the motor's travel")
+        _rising(
+            heights.tolerance_mm + 1e3 * self.touch_way_m, heights.depth_mm,
+            said="the tolerance of the surface with mean_n/softest_n_mm, the way to a touch, and the depth",
+        )  # fmt: skip
         return self
 
     @property
@@ -282,20 +291,32 @@ class RigSettings(Options):
         """The greatest position that is ever asked for [m]."""
         return self.surface_m + 1e-3 * self.heights.depth_mm
 
+    @property
+    def touch_way_m(self) -> float:
+        """Way into the softest skin until its mean force is a touch [m]."""
+        return 1e-3 * self.touch.mean_n / self.stiffness.softest_n_mm
+
+    @property
+    def found_m(self) -> float:
+        """Position of the motor at which the surface must have been touched [m]."""
+        return self.surface_m + 1e-3 * self.heights.tolerance_mm + self.touch_way_m
+
     def press_plan(self, resolution_m: float) -> PressPlan:
         """Return the numbers of a press by an axis with a least step [m]."""
         touch, press = self.touch, self.press
         return PressPlan(
-            law=self.force_loop.law(self.limits.travel_mm),
+            law=self.force_loop.law((self.limits.travel_mm[0], 1e3 * self.deepest_m)),
             resolution_m=resolution_m,
             step_m=self.force_loop.step_m,
             near_m=self.surface_m - 1e-3 * self.heights.tolerance_mm,
-            deepest_m=self.deepest_m,
+            found_m=self.found_m,
             speed_m_s=1e-3 * touch.speed_mm_s,
             touch_speed_m_s=1e-3 * touch.touch_speed_mm_s,
             unload_speed_m_s=1e-3 * press.unload_speed_mm_s,
             mean_n=touch.mean_n,
             mean_s=1e-3 * touch.mean_ms,
+            softest_n_m=1e3 * self.stiffness.softest_n_mm,
+            stiffest_n_m=1e3 * self.stiffness.at_ceiling_n_mm,
             contact_n=touch.contact_n,
             settle_s=touch.settle_s,
             lift_m=1e-3 * touch.lift_mm,

@@ -79,6 +79,7 @@ def example(**changes):
         "settings__force_loop__cutoff_hz": 2.0,
         "settings__manipulator": "fixed",
         "settings__heights__surface_mm": 0.0,
+        "settings__stiffness__softest_n_mm": 2.0,
         "settings__places": {},
         **{f"devices__{name}": ... for name in JOINTS},
     }

@@ -1,6 +1,7 @@
 """What a press does when the skin gives way, the force is wrong or the guard retreats: the states alone, on a plant."""
 
 import math
+import re
 
 import pytest
 
@@ -100,7 +101,7 @@ def test_contact_that_is_lost_ends_the_press():
         plant.go()
     plant.skin_m += 1e-3
     plant.until(PressState.FAILED)
-    assert "contact was lost" in plant.press.ended
+    assert "contact is lost" in plant.press.ended
     assert plant.largest_n < 1.5
 
 
@@ -111,7 +112,7 @@ def test_a_force_far_from_the_wanted_one_ends_the_press_within_a_second():
     plant.force_gain, plant.force_offset_n = 0.0, 6.0  # it does not answer any more
     began_s = plant.now_s
     plant.until(PressState.FAILED, seconds=3.0)
-    assert "off by more than" in plant.press.ended
+    assert "more than on the stiffest declared skin" in plant.press.ended
     # The filter of 2 Hz needs a moment to come so far.
     assert plant.now_s - began_s < 1.5
 
@@ -121,15 +122,16 @@ def test_a_loop_that_swings_ends_the_press():
     settings = settings_of(file_of(settings__force_loop__integral_mm_n_s=400.0, settings__force_loop__speed_mm_s=50.0,
                                    settings__press__error_band_n=0.3))  # fmt: skip
     plant = Plant(settings).begun().until(PressState.FAILED)
-    assert "off by more than" in plant.press.ended
+    # Which comes first depends on where the swing has found the surface.
+    assert re.search("off by more than|contact is lost", plant.press.ended)
 
 
 def test_no_contact_down_to_the_depth_ends_the_press():
     plant = Plant()
     plant.skin_m = 1.0
     plant.until(PressState.FAILED)
-    assert plant.press.ended.startswith("no contact down to")
-    assert plant.position_m <= SETTINGS.deepest_m
+    assert plant.press.ended.startswith("no touch down to")
+    assert plant.position_m <= SETTINGS.found_m
 
 
 @pytest.mark.parametrize("state", [PressState.APPROACH, PressState.CONTACT, PressState.RAMP])
