@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from abc import abstractmethod
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any, ClassVar, Literal, Self
 
@@ -25,7 +26,7 @@ SETTLE_S = 0.5
 """Added to the time that a move takes by its speed and acceleration, after which it has not ended (assumed)."""
 HOMING_S = 60.0
 """Homing takes no longer (assumed)."""
-HALTS = 3
+HALTS = 2
 """How often an axis is halted in the usual way before :meth:`Positioner.halt_harder` (assumed)."""
 FASTER = 1.5
 """How much faster than it states an axis may seem to move: two positions further apart are not of one way (assumed)."""
@@ -181,7 +182,8 @@ class Positioner(Driver):
         self._moving = self._retreats = False
         self._goal, self._due_ns, self._halts, self._fastest = math.nan, 0, 0, 0.0
         self._before_ns, self._odd = 0, False
-        self._rest, self._asked_ns = b"", 0
+        self._rest = self._came = b""
+        self._asked_ns: int | None = None
         super().__init__(settings)
         self.homed = False
         """Whether positions mean anything, and limits hold."""
@@ -315,23 +317,28 @@ class Positioner(Driver):
     def lines(self, question: bytes, timeout_s: float) -> list[bytes]:
         """Ask a controller on a ByteLink, unless an answer is out; return the lines that have come.
 
-        The caller calls :meth:`answered` with the answer. Raises PositionerSilentError if that takes `SILENT_S`.
+        The caller calls :meth:`answered` with the answer. An empty question asks nothing, and waits for nothing. Raises
+        PositionerSilentError if an answer takes `SILENT_S`.
         """
-        if not self._asked_ns:
+        if question and self._asked_ns is None:
             self.link.write(question)
             self._asked_ns = self.clock()
-        try:
+        with suppress(LinkTimeout):
             self._rest += self.link.read(timeout_s).data
-        except LinkTimeout:
-            if self.clock() - self._asked_ns > 1e9 * SILENT_S:
-                self._asked_ns = 0
-                raise PositionerSilentError(f"{self.device} does not answer {question!r}.") from None
         *lines, self._rest = self._rest.split(b"\n")
+        self._came = lines[-1] if lines else self._came
+        patience_s = 2 * SILENT_S if lines else SILENT_S  # the answer may be among them
+        if self._asked_ns is not None and self.clock() - self._asked_ns > 1e9 * patience_s:
+            self._asked_ns = None
+            raise PositionerSilentError(
+                f"{self.device} does not answer {question!r}; the last that came is {self._came!r}.",
+                hint="Check the port, its baud rate, and that this is the controller that the driver is for.",
+            )
         return lines
 
     def answered(self) -> None:
         """Note that the answer has come: the next call of :meth:`lines` asks again."""
-        self._asked_ns = 0
+        self._asked_ns = None
 
     def finish(self, stop: Callable[[], bool]) -> None:
         """Wait for the end of a move; halts and raises PositionerError if `stop` says so, or it lasts too long."""

@@ -297,10 +297,11 @@ class Press:
         begun = self._requested_s is not None
         touched = begun and (report.touched or mean_n > plan.mean_n)
         if not slowly and (touched or mean_n < -plan.mean_n):
+            read_n = report.force_n if report.touched else mean_n
+            at_mm, near_mm = 1e3 * report.position_m, 1e3 * plan.near_m
             self.fail(
-                f"the force reads {report.force_n if report.touched else mean_n:.2f} N at {1e3 * report.position_m:.3f} mm, "
-                f"before {1e3 * plan.near_m:.3f} mm, where the surface can be: something is in the way, the motor's place "
-                "is wrong, or the zero was taken under load"
+                f"the force reads {read_n:.2f} N at {at_mm:.3f} mm, before {near_mm:.3f} mm, where the surface can be: "
+                "something is in the way, the motor's place is wrong, or the zero was taken under load"
             )
         elif touched:
             # The guard has stopped it at a single touch; a mean that is reached is stopped here.

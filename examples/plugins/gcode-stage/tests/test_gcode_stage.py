@@ -21,6 +21,7 @@ from tactbench.testing import plugin_checks
 from tactbench_gcode_stage.driver import GcodeStage
 from tactbench_gcode_stage.emulator import GrblEmulator
 
+SILENT_S = 0.5  # a controller may take so long for an answer
 OPTIONS = {
     "home_m": -3e-3, "lower_m": -4e-3, "upper_m": 5e-3, "speed_m_s": 5e-3, "acceleration_m_s2": 1.0, "corridor_m": 2e-6,
     "retreat_m": -3e-3, "retreat_speed_m_s": 20e-3,
@@ -51,8 +52,11 @@ def test_it_is_homed_and_goes_where_it_is_sent(stage):
     assert not stage.find_home()
     with pytest.raises(NotReadyError, match="not homed"):
         stage.move_to(0.0)
+    stage.start()
     stage.home()
-    assert stage.find_home()
+    # The controller has said nothing for longer than an answer may take.
+    assert stage.clock() > 2e9 * SILENT_S
+    assert stage.emulator.position_m == pytest.approx(-3e-3, abs=1e-9)
     stage.move_to(1.2345e-3)
     done(stage)
     assert stage.emulator.position_m == pytest.approx(1.234e-3, abs=1e-6)
@@ -62,6 +66,17 @@ def test_it_is_homed_and_goes_where_it_is_sent(stage):
     assert stage.emulator.position_m == pytest.approx(0.2345e-3, abs=2e-6)
     with pytest.raises(NotReadyError, match="beyond the ends"):
         stage.move_to(6e-3)
+
+
+def test_homing_is_ended_by_a_stop_and_has_a_deadline(stage):
+    stage.start()
+    with pytest.raises(PositionerError, match="told to stand"):
+        stage.home(lambda: True)
+    assert not stage.homed
+    stage.emulator.deaf_to = b"H"
+    with pytest.raises(PositionerError, match="error:5|not come home"):
+        stage.home()
+    assert not stage.homed
 
 
 def test_a_halt_ends_a_move_and_a_retreat_goes_out(stage):
@@ -75,11 +90,89 @@ def test_a_halt_ends_a_move_and_a_retreat_goes_out(stage):
     assert stage.at(-3e-3)
 
 
+def test_a_halt_that_is_lost_is_sent_again_and_then_a_reset(stage):
+    stage.home()
+    stage.move_to(4e-3)
+    while stage.position < 0.0:
+        stage.read(0.01)
+    stage.emulator.deaf_to = b"\x85"
+    stage.halt()
+    from_m = stage.position
+    with pytest.raises(PositionerError, match="Grbl|place is not known"):
+        while stage.moving:
+            stage.read(0.01)
+    # Two halts, each after the latency and the time of braking at 5 mm/s, and a look of 10 ms.
+    assert stage.emulator.position_m - from_m < 5e-3 * (2 * (0.03 + 5e-3 + 0.01) + 0.02)
+    assert not stage.homed
+    at_m = stage.emulator.position_m
+    stage.read(0.5)
+    assert stage.emulator.position_m == at_m
+
+
+@pytest.mark.parametrize(
+    ("settings", "message"),
+    [
+        ({"13": "1"}, "mm"),
+        ({"22": "0"}, "homing"),
+        ({"20": "0"}, "soft limits"),
+        ({"10": "0"}, "WPos.*MPos is expected"),
+    ],
+)
+def test_a_controller_that_is_set_up_otherwise_is_refused(stage, settings, message):
+    stage.emulator.settings |= settings
+    with pytest.raises(PositionerError, match=message):
+        stage.start()
+        stage.read(0.1)
+
+
+@pytest.mark.parametrize("state", ["Alarm", "Hold:0", "Door:1", "Sleep"])
+def test_a_state_in_which_it_does_not_move_takes_the_home_away(stage, state):
+    stage.home()
+    stage.emulator._state = state
+    with pytest.raises(PositionerError, match=state):
+        stage.read(0.1)
+    assert not stage.homed
+    with pytest.raises(NotReadyError, match="not homed"):
+        stage.move_to(0.0)
+
+
+@pytest.mark.parametrize("state", ["Alarm", "Idle"])
+def test_a_controller_that_starts_anew_has_no_place(stage, state):
+    stage.home()
+    stage.move_to(1e-3)
+    done(stage)
+    stage.emulator.restart(state)
+    with pytest.raises(PositionerError, match="Grbl"):
+        stage.read(0.1)
+    assert not stage.homed
+
+
+def test_a_place_that_jumps_is_not_believed(stage):
+    stage.home()
+    for _ in range(3):
+        stage.read(0.01)
+    stage.emulator._at_mm = stage.emulator._to_mm = -3.0
+    with pytest.raises(PositionerError, match="faster than it moves"):
+        for _ in range(3):
+            stage.read(0.01)
+    assert not stage.homed
+
+
+def test_a_move_that_does_not_arrive_ends_in_its_time(stage):
+    stage.home()
+    stage.emulator.settings["13"] = "1"  # it tells inches from now on
+    stage.move_to(-2.9e-3)
+    with pytest.raises(PositionerError, match="not come to|faster than it moves"):
+        while stage.moving:
+            stage.read(0.01)
+
+
 def test_a_refusal_and_silence_are_named(stage):
     stage.homed = stage.enabled = True
     stage.move_to(0.0)
-    with pytest.raises(PositionerError, match="error:9"):
+    with pytest.raises(PositionerError, match="error:9|Alarm"):
         done(stage)
+    stage.home()
     stage.emulator.feed = lambda piece, now_s: []
     with pytest.raises(PositionerSilentError):
         for _ in range(100):
