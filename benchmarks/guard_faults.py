@@ -15,6 +15,7 @@ import time
 from collections import Counter, deque
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
+from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
@@ -184,14 +185,16 @@ class Pressed:
         """Return the options of both devices."""
         return {"motor": {**STATED, "baud": self.setting.baud}, "force": {**COUNTS, "rate_hz": self.rate_hz}}
 
-    def guard(self, force_driver: Callable[[DriverSettings], Any] = NetFtDriver) -> LocalGuard:
+    def guard(
+        self, force_driver: Callable[[DriverSettings], Any] = NetFtDriver, kept: Path | None = None
+    ) -> LocalGuard:
         """Return a guard over drivers of both, in this process."""
         options = self.settings()
         motor = FaulhaberDriver(
             DriverSettings(self.devices.opener("motor"), options=options["motor"], clock=self.clock)
         )
         force = force_driver(DriverSettings(self.devices.opener("force"), options=options["force"], clock=self.clock))
-        return LocalGuard({"motor": motor}, force, self.clock, self.devices.advance)
+        return LocalGuard({"motor": motor}, force, self.clock, self.devices.advance, kept=kept)
 
 
 def build_options(baud: int = 115200) -> Any:

@@ -67,7 +67,7 @@ class Control:
         """What the guard answered last."""
         self._rows, self._rows_ns = -1, clock()
         self._next_ns = self._rows_ns + self._period_ns
-        self._raw: list[tuple[float, float]] = []
+        self._raw: list[float] = []
         self._blocks: deque[Block] = deque()
         self._events: deque[Event] = deque()
         self._over = threading.Event()
@@ -131,9 +131,7 @@ class Control:
     def _gather(self) -> None:
         for block in self._guard.force_blocks():
             self._blocks.append(block)
-            assert block.t_ns is not None
-            force_n = self._limits.pressing_n(block.data)
-            self._raw += zip((1e-9 * block.t_ns).tolist(), force_n.tolist(), strict=True)
+            self._raw += self._limits.pressing_n(block.data).tolist()
         self._blocks.extend(self._guard.motor_blocks())
         self._events.extend(self._guard.events())
         self._counts = self._guard.counts()

@@ -25,6 +25,17 @@ _LOOKED_AT = 3
 """Samples of which two are a touch."""
 _MOST_SOUND = 10_000
 """Kept for a mean: more than a second of the quickest force sensor, 7 kHz."""
+UNRATED_HZ = 100.0
+"""Taken for the rate of a force sensor that states none (assumed: a slow one)."""
+
+
+def samples(stream: StreamSpec, seconds: float) -> int:
+    """Return how many samples of a force stream come in some seconds; one at least.
+
+    A mean is of a count and not of a time: a busy host receives none for a while, and then many at once.
+    """
+    return max(1, round((stream.rate_hz or UNRATED_HZ) * seconds))
+
 
 Problem = tuple[Trigger, str]
 
@@ -76,16 +87,14 @@ class ForceWatch:
         """Return whether two of the last three samples are above a force [N]."""
         return sum(force > touch_n for force in self._pressing) >= _LOOKED_AT - 1
 
-    def mean_n(self, since_ns: int, seconds: float) -> float:
-        """Return the mean pressing force [N] of the newest seconds, all of them after a time.
+    def mean_n(self, since_ns: int, count: int) -> float:
+        """Return the mean pressing force [N] of the newest so many samples, all of them received after a time.
 
         NaN: not so many have come since, or something was wrong with one of them.
         """
-        while self._sound and self._sound[0][0] < max(since_ns, self._sound[-1][0] - round(1e9 * seconds)):
+        while self._sound and (self._sound[0][0] < since_ns or len(self._sound) > count):
             self._sound.popleft()
-        if len(self._sound) < _LOOKED_AT or self.t_ns < since_ns + 1e9 * seconds:
-            return math.nan
-        return fmean(force_n for _, force_n in self._sound)
+        return fmean(force_n for _, force_n in self._sound) if len(self._sound) == count else math.nan
 
     def age_s(self, now_ns: int) -> float:
         """Return the age of the newest sample [s]; infinite: there is none."""

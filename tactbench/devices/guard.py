@@ -37,7 +37,7 @@ from tactbench.core.errors import (
 from tactbench.core.samples import Block
 from tactbench.core.spec.sensor import StreamSpec
 from tactbench.devices.driver import Driver, fault_text
-from tactbench.devices.force_watch import MOST_BLOCKS, ForceWatch, Problem
+from tactbench.devices.force_watch import MOST_BLOCKS, ForceWatch, Problem, samples
 from tactbench.devices.guard_messages import (
     Beat,
     CommandKind,
@@ -62,7 +62,7 @@ ALIVE_S = 0.2
 AGAIN_S = 0.25
 """After which a retreat that is not under way is sent again (assumed: above the time of an answer at 9600 baud)."""
 RETREAT_S = 1.0
-"""Added to the way's time, after which a retreat has failed (assumed)."""
+"""Added to the time of the way, or of the force's mean after it, after which a retreat has failed (assumed)."""
 REFUSED = 3
 """Refused commands in a row that end the rig's command (assumed)."""
 
@@ -491,7 +491,7 @@ class LocalGuard:
         lost = sorted(name for name in self._lost - {FORCE} if name == self._name or self._axes[name].moving)
         there = not press.moving and self._retracted and fresh
         self._there_ns = (self._there_ns or now_ns) if there else 0
-        force_n = self._watch.mean_n(self._there_ns, limits.clear_s) if there else math.nan
+        force_n = self._watch.mean_n(self._there_ns, samples(self.force_stream, limits.clear_s)) if there else math.nan
         out = abs(force_n) < limits.clear_n
         others = any(axis.moving and name not in self._lost for name, axis in self._others.items())
         if lost and not others and (there or self._name in lost):
@@ -499,7 +499,7 @@ class LocalGuard:
         elif out and not others:
             self._end(None, f"out after {took}")
         elif there and not others:
-            if FORCE in self._lost or now_ns > self._there_ns + 1e9 * (limits.clear_s + AGAIN_S):
+            if FORCE in self._lost or now_ns > self._there_ns + 1e9 * (limits.clear_s + RETREAT_S):
                 known = "is not known" if math.isnan(force_n) else f"is {force_n:.2f} N"
                 self._end(
                     Trigger.NOT_CLEAR,

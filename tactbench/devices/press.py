@@ -24,6 +24,7 @@ A wrong scale of the force is inside these limits: it is found by the check of t
 from __future__ import annotations
 
 import math
+from collections import deque
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
@@ -81,9 +82,9 @@ class PressPlan:
     """From there on."""
     unload_speed_m_s: float
     mean_n: float
-    """A touch: the mean of the raw forces of the newest `mean_s` above it; the guard stops at single ones. Also the
+    """A touch: the mean of the newest `mean_count` raw forces above it; the guard stops at single ones. Also the
     largest mean without touch."""
-    mean_s: float
+    mean_count: int
     softest_n_m: float
     """The least force per way into any skin, from a touch on."""
     stiffest_n_m: float
@@ -149,8 +150,7 @@ class Press:
         self.touch_n = 0.0
         self.setpoint_n = 0.0
         self._plan, self._course = plan, course
-        self._raw: list[tuple[float, float]] = []
-        self._raw_since_s = math.inf
+        self._raw: deque[float] = deque(maxlen=plan.mean_count)
         self._way: list[tuple[float, float, float]] = []
         self._depth_m = math.nan
         self._force_n = math.nan
@@ -192,7 +192,7 @@ class Press:
 
     # Stepping ---------------------------------------------------------------------------------------------------------
 
-    def step(self, report: Report, raw: Sequence[tuple[float, float]], now_s: float) -> Beat:
+    def step(self, report: Report, raw: Sequence[float], now_s: float) -> Beat:
         """Go on by one control period.
 
         Parameters
@@ -200,7 +200,7 @@ class Press:
         report
             What the guard answered last.
         raw
-            Seconds and raw pressing forces [N] that have come since the last step, the zero subtracted.
+            Raw pressing forces [N] that have come since the last step, the zero subtracted.
         now_s
             On the rig's clock.
         """
@@ -222,25 +222,18 @@ class Press:
                 return Beat(command=CommandKind.RETREAT)
         return self._asking(report, now_s)
 
-    def _take(self, raw: Sequence[tuple[float, float]]) -> None:
+    def _take(self, raw: Sequence[float]) -> None:
         """Keep the newest raw forces, and the largest of a touch."""
-        if self.state in (PressState.APPROACH, PressState.CONTACT):
-            self.touch_n = max(self.touch_n, *(force for _, force in raw), 0.0)
+        self._raw.extend(raw)
         if raw:
-            self._raw += raw
-            self._force_n = raw[-1][1]
-            self._raw_since_s = min(self._raw_since_s, self._raw[0][0])
-            self._raw = [sample for sample in self._raw if sample[0] > raw[-1][0] - self._plan.mean_s]
+            self._force_n = raw[-1]
+        if self.state in (PressState.APPROACH, PressState.CONTACT):
+            self.touch_n = max(self.touch_n, *raw, 0.0)
 
     @property
     def mean_n(self) -> float:
-        """Mean of the raw forces of the newest `mean_s` [N]; NaN: not so many have come yet."""
-        whole = bool(self._raw) and self._raw[-1][0] - self._raw_since_s >= self._plan.mean_s
-        return fmean(force for _, force in self._raw) if whole else math.nan
-
-    def _forget_raw(self) -> None:
-        """Let the next mean be of what comes from now on."""
-        self._raw, self._raw_since_s = [], math.inf
+        """Mean of the newest `mean_count` raw forces [N]; NaN: not so many have come yet."""
+        return fmean(self._raw) if len(self._raw) == self._raw.maxlen else math.nan
 
     def _guarded(self, report: Report, now_s: float) -> Beat:
         if self.state is not PressState.RETREAT and not self.over:
@@ -324,10 +317,10 @@ class Press:
             return
         if not self._standing_s:
             self._standing_s = now_s
-            self._forget_raw()
+            self._raw.clear()
         if abs(self.mean_n) < self._plan.mean_n:
             self._enter(PressState.UNLOADED if self.state is PressState.LIFT else PressState.DONE, now_s)
-        elif now_s > self._standing_s + self._plan.mean_s + SLACK_S:
+        elif now_s > self._standing_s + SLACK_S and not math.isnan(self.mean_n):
             self.fail(
                 f"{self.mean_n:.2f} N are left after lifting off: the zero was taken under load or has drifted, or the "
                 "indenter is not off"

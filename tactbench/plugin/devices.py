@@ -29,6 +29,7 @@ if TYPE_CHECKING:
         fault_concerns,
     )
     from tactbench.devices.force_loop import ForceLaw, LoopModel
+    from tactbench.devices.force_watch import samples
     from tactbench.devices.guard import LocalGuard, largest_force_n
     from tactbench.devices.guard_messages import (
         Beat,
@@ -152,6 +153,7 @@ __all__ = [
     "read_can_log",
     "read_options",
     "running",
+    "samples",
     "with_sensor",
 ]
 

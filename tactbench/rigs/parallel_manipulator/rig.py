@@ -263,7 +263,7 @@ class ParallelManipulator(Rig):
         stack.callback(driver.close)
         identity = {**session.identity, sensor.name: driver.identify()}
         force, zero, limits = session.measured_limits()
-        press = Press(settings.press_plan(self._facts.resolution), _course(scene))
+        press = Press(settings.press_plan(self._facts.resolution, guard.force_stream), _course(scene))
         control: Control | None = None
 
         def carry(until_ns: int) -> None:

@@ -11,7 +11,7 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, model_validator
 
-from tactbench.plugin import UsageError, load_object
+from tactbench.plugin import StreamSpec, UsageError, load_object
 from tactbench.plugin.devices import (
     ForceLaw,
     LoopModel,
@@ -21,6 +21,7 @@ from tactbench.plugin.devices import (
     PressPlan,
     RigFile,
     read_options,
+    samples,
 )
 from tactbench.rigs.parallel_manipulator.kinematics import LinearDelta
 
@@ -151,7 +152,8 @@ class Touch(Options):
     single_n: Positive
     """A touch: two of three raw samples above it. Well above the force sensor's noise."""
     mean_n: Positive
-    """A touch as well: the mean of the raw samples of the last `mean_ms` above it."""
+    """A touch as well: the mean of the newest raw samples, as many as come in `mean_ms`, above it. Also the largest
+    mean without touch: before the surface, after lifting off, and at the place of retreat."""
     mean_ms: Positive
     """One control period or more; the noise of a mean falls with its root."""
     allowed_n: Positive
@@ -301,8 +303,8 @@ class RigSettings(Options):
         """Position of the motor at which the surface must have been touched [m]."""
         return self.surface_m + 1e-3 * self.heights.tolerance_mm + self.touch_way_m
 
-    def press_plan(self, resolution_m: float) -> PressPlan:
-        """Return the numbers of a press by an axis with a least step [m]."""
+    def press_plan(self, resolution_m: float, force: StreamSpec) -> PressPlan:
+        """Return the numbers of a press by an axis with a least step [m], and with the stream of a force sensor."""
         touch, press = self.touch, self.press
         return PressPlan(
             law=self.force_loop.law((self.limits.travel_mm[0], 1e3 * self.deepest_m)),
@@ -314,7 +316,7 @@ class RigSettings(Options):
             touch_speed_m_s=1e-3 * touch.touch_speed_mm_s,
             unload_speed_m_s=1e-3 * press.unload_speed_mm_s,
             mean_n=touch.mean_n,
-            mean_s=1e-3 * touch.mean_ms,
+            mean_count=samples(force, 1e-3 * touch.mean_ms),
             softest_n_m=1e3 * self.stiffness.softest_n_mm,
             stiffest_n_m=1e3 * self.stiffness.at_ceiling_n_mm,
             contact_n=touch.contact_n,

@@ -7,11 +7,15 @@ import pytest
 
 from tactbench.devices.guard_messages import Report, Trigger
 from tactbench.devices.press import PressState
+from tactbench.plugin import ChannelSpec, StreamSpec
 from tactbench.plugin.devices import CommandKind, Course, GuardState, Press
 from tactbench.rigs.parallel_manipulator.settings import settings_of
 from tests.rigs.parallel_manipulator.spring import file_of
 
 PERIOD_S = 0.02
+FORCE = StreamSpec(
+    name="force_torque", rate_hz=1 / PERIOD_S, channels=(ChannelSpec(name="fz", kind="force", unit="N"),)
+)
 SETTINGS = settings_of(file_of(settings__force_loop__integral_mm_n_s=1.0))
 COURSE = Course(setpoint_n=lambda s: min(max(0.0, s - 0.5), 3.0), slope_n_s=1.0, ramp_s=0.5, end_s=3.5)
 
@@ -20,7 +24,7 @@ class Plant:
     """A motor that is where it was sent, at its speed, a guard that does what it is told, and a spring of 5 N/mm."""
 
     def __init__(self, settings=SETTINGS):
-        self.press = Press(settings.press_plan(1e-6), COURSE)
+        self.press = Press(settings.press_plan(1e-6, FORCE), COURSE)
         self.settings = settings
         self.skin_m = settings.surface_m
         self.now_s, self.position_m = 0.0, 1e-3 * settings.limits.retreat_mm
@@ -43,7 +47,7 @@ class Plant:
 
     def go(self):
         """Go on by one control period."""
-        command = self.press.step(self.report(), [(self.now_s, self.force_n)], self.now_s)
+        command = self.press.step(self.report(), [self.force_n], self.now_s)
         match command.command:
             case CommandKind.MOVE_TO:
                 self.target_m, self.speed_m_s, self.touched = command.position_m, command.speed_m_s, False
