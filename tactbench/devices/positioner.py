@@ -293,7 +293,7 @@ class Positioner(Driver):
         speed = facts.speed if speed is None else speed
         self._fastest = max(self._fastest, speed) if halted else speed
         seconds = facts.stop_latency_s + self._fastest / facts.acceleration if halted else math.inf
-        if math.isfinite(target):
+        if math.isfinite(target) and self.homed:
             seconds = facts.seconds(target - self.position, speed)
         self._halts = self._halts + 1 if halted else 0
         self._moving, self._goal, self._retreats = True, target, False
@@ -303,16 +303,20 @@ class Positioner(Driver):
         """Note an answer: when and where, and whether the controller says that it stands.
 
         A move has ended when the controller stands at its target; one that says so before it has begun is not believed.
-        A halt has ended when it stands and the position is that of the answer before.
+        A halt has ended when it stands and the position is that of the answer before. Where it goes on after the time
+        of braking it is halted again.
         """
-        last, halted = self.position, math.isnan(self._goal)
+        last, halted, facts = self.position, math.isnan(self._goal), self.facts
         self.note(PositionerState(t_ns, position, position if halted else self._goal))
-        if idle and abs(position - (last if halted else self._goal)) <= (
-            self.facts.resolution if halted else self.facts.near
-        ):
+        off = abs(position - (last if halted else self._goal))
+        if idle and off <= (facts.resolution if halted else facts.near):
             self._moving, self._halts = False, 0
             if self._retreats:
-                self.move_to(self.facts.retreat, self.facts.retreat_speed)
+                self.move_to(facts.retreat, facts.retreat_speed)
+        elif self._moving and halted and t_ns > self._due_ns:
+            retreats = self._retreats
+            (self.halt if self._halts < HALTS else self.halt_harder)()
+            self._retreats = retreats
 
     def lines(self, question: bytes, timeout_s: float) -> list[bytes]:
         """Ask a controller on a ByteLink, unless an answer is out; return the lines that have come.
@@ -350,19 +354,14 @@ class Positioner(Driver):
                 raise PositionerError("The axis was told to stand.")
 
     def _end_in_time(self) -> None:
-        """Halt again what goes on after a halt; raise PositionerError for what has not ended in its time."""
-        if not self._moving or self.clock() <= self._due_ns:
-            return
-        retreats, halted = self._retreats, math.isnan(self._goal)
-        if not halted or self._halts > HALTS:
+        """Raise PositionerError for a move that has not ended in its time; what was halted is seen to by `see`."""
+        if self._moving and self.clock() > self._due_ns and not math.isnan(self._goal):
             self._due_ns = self.clock() + round(1e9 * SETTLE_S)
-            aim = "to rest" if halted else "home" if math.isinf(self._goal) else f"to {self._goal:g}"
             raise PositionerError(
-                f"It has not come {aim} in its time, and is at {self.position:g}.",
+                f"It has not come {'home' if math.isinf(self._goal) else f'to {self._goal:g}'} in its time, and is at "
+                f"{self.position:g}.",
                 hint="See what is in its way, and whether units and speed in the rig file are the controller's.",
             )
-        (self.halt if self._halts < HALTS else self.halt_harder)()
-        self._retreats = retreats
 
     def note(self, state: PositionerState) -> None:
         """Keep a state that was read.

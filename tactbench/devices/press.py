@@ -14,9 +14,9 @@ Place and force are believed only as far as they agree (derived; k is a stiffnes
 
 - before the surface can be reached the mean force is zero; the surface is found before the softest declared skin would
   have been touched; after lifting off the mean force is zero again;
-- on the ramp, x further in than at any place passed since the skin was touched, the filtered force has grown by
-  softest k x to stiffest k x, but for twice the band within which a force counts as none. So a force that has ceased to
-  answer is noticed after 2 band/softest k.
+- on the ramp, x further in than at any place passed since the skin was touched, the mean force has grown by softest k x
+  to stiffest k x, but for twice the largest mean without touch, which is above the noise of a mean. So a force that has
+  ceased to answer is noticed after 2 mean/softest k.
 
 A wrong scale of the force is inside these limits: it is found by the check of the force chain alone.
 """
@@ -97,11 +97,6 @@ class PressPlan:
     """How far the axis goes back from there for the unloaded hold."""
     error_band_n: float
     """Filtered force this far from the wanted one for `OFF_S`: retreat."""
-    band_n: float
-    """Filtered forces below it count as no force."""
-    lost_s: float
-    """Contact is lost, which ends the press, if the force is in the band for so long while more than twice the band is
-    wanted."""
 
 
 @dataclass(frozen=True)
@@ -151,14 +146,14 @@ class Press:
         self.setpoint_n = 0.0
         self._plan, self._course = plan, course
         self._raw: deque[float] = deque(maxlen=plan.mean_count)
+        self._places: deque[float] = deque(maxlen=plan.mean_count)
         self._way: list[tuple[float, float, float]] = []
-        self._depth_m = math.nan
         self._force_n = math.nan
         self._controller: ForceController | None = None
         self._stepped_s = 0.0
         self._since_s = self._due_s = 0.0
         self._began_s: float | None = None
-        self._lost_s = self._off_s = self._standing_s = 0.0
+        self._off_s = self._standing_s = 0.0
         self._goal: Beat | None = None
         self._requested_s: float | None = None
         self._move(plan.near_m, plan.speed_m_s)
@@ -204,7 +199,7 @@ class Press:
         now_s
             On the rig's clock.
         """
-        self._take(raw)
+        self._take(raw, report.position_m)
         if report.state in (GuardState.RETREATING, GuardState.RETREATED, GuardState.FAULT):
             return self._guarded(report, now_s)
         match self.state:
@@ -222,9 +217,10 @@ class Press:
                 return Beat(command=CommandKind.RETREAT)
         return self._asking(report, now_s)
 
-    def _take(self, raw: Sequence[float]) -> None:
-        """Keep the newest raw forces, and the largest of a touch."""
+    def _take(self, raw: Sequence[float], position_m: float) -> None:
+        """Keep the newest raw forces, where the axis was then, and the largest force of a touch."""
         self._raw.extend(raw)
+        self._places.extend([position_m] * len(raw))
         if raw:
             self._force_n = raw[-1]
         if self.state in (PressState.APPROACH, PressState.CONTACT):
@@ -247,7 +243,7 @@ class Press:
     def _enter(self, state: PressState, now_s: float) -> None:
         self.state, self._since_s = state, now_s
         self._goal = self._requested_s = None
-        self._lost_s = self._off_s = self._standing_s = 0.0
+        self._off_s = self._standing_s = 0.0
 
     # Moves ------------------------------------------------------------------------------------------------------------
 
@@ -330,10 +326,11 @@ class Press:
 
     def _begin_loop(self, state: PressState, report: Report, now_s: float) -> None:
         self._enter(state, now_s)
-        self._way, self._depth_m = [], report.position_m
         # A single sample has much noise, which the filter would take for a change of the force.
         force_n = self._force_n if math.isnan(self.mean_n) else self.mean_n
         self._controller, self._stepped_s = ForceController(self._plan.law, force_n, report.position_m), now_s
+        self._raw.clear()
+        self._places.clear()
 
     def _setpoint(self, now_s: float) -> tuple[float, float]:
         least = self._plan.contact_n
@@ -360,7 +357,7 @@ class Press:
                 self._enter(PressState.LIFT, now_s)
                 self._move(self.contact_m - plan.lift_m, plan.touch_speed_m_s)
                 return self._asking(report, now_s)
-        elif not self._kept(controller.filtered_n, report.position_m, passed_s):
+        elif not self._kept(controller.filtered_n, passed_s):
             return Beat(command=CommandKind.RETREAT)
         elif self._began_s is not None and now_s - self._began_s >= self._course.end_s:
             self._enter(PressState.UNLOAD, now_s)
@@ -371,37 +368,32 @@ class Press:
             return Beat()
         return Beat(command=CommandKind.STEP, distance_m=min(max(way, -plan.step_m), plan.step_m))
 
-    def _kept(self, filtered_n: float, position_m: float, passed_s: float) -> bool:
-        """Return whether force, contact and place are as they should be; else see to what follows."""
+    def _kept(self, filtered_n: float, passed_s: float) -> bool:
+        """Return whether force and place are as they should be; else see to what follows."""
         plan = self._plan
-        self._agree(filtered_n, position_m, passed_s)
-        contact_lost = filtered_n < plan.band_n and self.setpoint_n > 2 * plan.band_n
-        self._lost_s = self._lost_s + passed_s if contact_lost else 0.0
+        self._agree(self.mean_n, fmean(self._places) if self._places else math.nan)
         off = abs(filtered_n - self.setpoint_n) > plan.error_band_n
         self._off_s = max(0.0, self._off_s + (passed_s if off else -0.5 * passed_s))
-        if self._lost_s >= plan.lost_s:
-            self.fail(f"contact was lost, at {self.setpoint_n:.2f} N")
-        elif self._off_s >= OFF_S:
+        if self._off_s >= OFF_S:
             self.fail(f"the force was off by more than {plan.error_band_n:g} N, at {self.setpoint_n:.2f} N")
         return not self.ended
 
-    def _agree(self, filtered_n: float, position_m: float, passed_s: float) -> None:
+    def _agree(self, force_n: float, place_m: float) -> None:
         """Fail unless the force has grown with the way as declared skins allow, from every place passed on this way in.
 
         Of each of these places are kept: the place, and of it and those before the largest force above the softest
-        skin's, and the least above the stiffest's. The place is filtered as the force is.
+        skin's, and the least above the stiffest's. Force and place are means of the same time.
         """
         plan, way = self._plan, self._way
-        kept = plan.law.kept(passed_s)
-        self._depth_m = depth_m = kept * self._depth_m + (1 - kept) * position_m
-        while way and way[-1][0] >= depth_m:
+        if math.isnan(force_n) or place_m < self.contact_m:
+            return
+        while way and way[-1][0] >= place_m:
             way.pop()
-        soft_n, stiff_n = filtered_n - plan.softest_n_m * depth_m, filtered_n - plan.stiffest_n_m * depth_m
-        _, most_n, least_n = way[-1] if way else (depth_m, soft_n, stiff_n)
+        soft_n, stiff_n = force_n - plan.softest_n_m * place_m, force_n - plan.stiffest_n_m * place_m
+        _, most_n, least_n = way[-1] if way else (place_m, soft_n, stiff_n)
         lacking = "less than on the softest declared skin: contact is lost, or the force sensor does not answer"
         excessive = "more than on the stiffest declared skin: the zero drifts, or something else is touched"
         for wrong_n, said in ((most_n - soft_n, lacking), (stiff_n - least_n, excessive)):
-            if wrong_n > 2 * plan.band_n:
-                self.fail(f"{filtered_n:.2f} N at {1e3 * depth_m:.3f} mm are {wrong_n:.2f} N {said}")
-        if depth_m >= self.contact_m:
-            way.append((depth_m, max(most_n, soft_n), min(least_n, stiff_n)))
+            if wrong_n > 2 * plan.mean_n:
+                self.fail(f"{force_n:.2f} N at {1e3 * place_m:.3f} mm are {wrong_n:.2f} N {said}")
+        way.append((place_m, max(most_n, soft_n), min(least_n, stiff_n)))

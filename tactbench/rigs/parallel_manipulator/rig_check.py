@@ -191,10 +191,10 @@ def _forces(
         for name, one in facts.items()
         if name != MOTOR
     ]
-    # The way until a force that reads wrong is noticed: of the approach, and of the force loop (see `devices.press`).
-    way_m = max(
-        2e-3 * settings.heights.tolerance_mm + settings.touch_way_m,
-        2e-3 * settings.press.band_n / settings.stiffness.softest_n_mm,
+    # The way until a force that reads wrong is noticed: of the approach, and on the ramp (see `devices.press`).
+    way_m = settings.touch_way_m + max(
+        2e-3 * settings.heights.tolerance_mm,
+        settings.touch_way_m + 1e-6 * touch.mean_ms * settings.force_loop.speed_mm_s,
     )
     lying = min(by_approach + k * way_m, drive_n)
     rows = [

@@ -171,10 +171,6 @@ class PressRules(Options):
 
     error_band_n: Positive
     """Filtered force this far from the wanted one for a second: retreat."""
-    band_n: Positive
-    """Filtered forces below it count as no force."""
-    lost_s: Positive
-    """Contact is lost after so long without force while more than twice the band is wanted."""
     unload_speed_mm_s: Positive
     """After the scene's ramp."""
     check_n: Positive | None = 3.0
@@ -269,7 +265,6 @@ class RigSettings(Options):
         _rising(touch.single_n, limits.force_ceiling_n, said="a touch in a single sample and the ceiling")
         _rising(touch.touch_speed_mm_s, touch.speed_mm_s, said="the speed of the touch and of the way to it")
         _rising(touch.lift_mm, heights.stand_off_mm, said="lift and stand-off")
-        _rising(self.press.band_n, self.press.error_band_n, said="the band of no force and of errors")
         _rising(deepest_mm, limits.travel_mm[1], said="retreat, stand-off and depth together, and the motor's travel")
         _rising(
             heights.tolerance_mm + 1e3 * self.touch_way_m, heights.depth_mm,
@@ -323,8 +318,6 @@ class RigSettings(Options):
             settle_s=touch.settle_s,
             lift_m=1e-3 * touch.lift_mm,
             error_band_n=press.error_band_n,
-            band_n=press.band_n,
-            lost_s=press.lost_s,
         )
 
 
