@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Mapping
 from functools import partial
 from typing import Any
@@ -58,9 +57,9 @@ def check(file: RigFile) -> RigCheck:
     settings, registry = settings_of(file), load_registry()
     file = with_limits(file, settings, registry)
     problems: list[str] = []
+    drive_n: float | None = None
     facts: dict[str, PositionerFacts] = {}
     axes: list[tuple[str, ...]] = []
-    drive_n = math.inf
 
     def refusing(do: Callable[[], object]) -> None:
         """Keep what `do` raises as a problem."""
@@ -72,14 +71,13 @@ def check(file: RigFile) -> RigCheck:
     for name in axes_of(settings):
         kind, given = positioner_of(registry, name, file.devices[name])
         options = read_options(kind.options_kind, given, name)
+        drive_n = options.largest_force_n if name == MOTOR else drive_n
         try:
             facts[name] = kind.facts_of(options)
         except RigError as error:
             raise UsageError(f"{name}: {error.message}", hint=error.hint) from error
         problems += _axis_problems(settings, name, options)
         axes.append((name, *_axis_row(options)))
-        if name == MOTOR:
-            drive_n = options.largest_force_n or math.inf
         if name == MOTOR and isinstance(options, FaulhaberOptions):
             for speed_mm_s in settings.speeds_mm_s:
                 refusing(partial(options.speed, 1e-3 * speed_mm_s))
@@ -166,7 +164,7 @@ def _line_problems(settings: RigSettings, options: FaulhaberOptions) -> list[str
 
 
 def _forces(
-    settings: RigSettings, facts: Mapping[str, PositionerFacts], drive_n: float
+    settings: RigSettings, facts: Mapping[str, PositionerFacts], drive_n: float | None
 ) -> tuple[list[tuple[str, str]], list[str]]:
     """Return how large the force may become, and what is wrong if that is more than is rated or allowed.
 
@@ -196,7 +194,7 @@ def _forces(
         2e-3 * settings.heights.tolerance_mm,
         settings.touch_way_m + 1e-6 * touch.mean_ms * settings.force_loop.speed_mm_s,
     )
-    lying = min(by_approach + k * way_m, drive_n)
+    lying = min(by_approach + k * way_m, drive_n or float("inf"))
     rows = [
         (
             "reaction",
