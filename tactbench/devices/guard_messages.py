@@ -98,10 +98,6 @@ class Limits:
     """The same while any other axis moves, or any axis is homed or retracted."""
     touch_n: float
     """Raw pressing force that is a touch; below it the pressing axis is out of contact."""
-    clear_n: float
-    """Largest size of the mean pressing force, over `clear_s` after it stands at its place of retreat, with which the
-    pressing axis is clear of the sensor: above the noise of that mean."""
-    clear_s: float
     travel_m: tuple[float, float]
     """Least and greatest target of the pressing axis."""
     step_m: float
@@ -120,6 +116,10 @@ class Limits:
     """Of every channel of the force stream, in its units; subtracted from raw samples."""
     confirmed: bool = False
     """Whether an operator has seen that the indenter is clear of the sensor; see :attr:`Report.unclear`."""
+    clear_n: float = 0.1
+    """Largest size of the mean pressing force, of as many samples as come in `clear_s` after it stands at its place of
+    retreat, with which the pressing axis is clear of the sensor: above the noise of that mean (assumed)."""
+    clear_s: float = 0.1
     torque_ceiling_nm: float | None = None
     """Of the norm of the raw torque; None: torque is not looked at."""
     same_samples: int = 50
