@@ -113,6 +113,15 @@ def test_a_first_touch_stays_within_its_bound(stiffness):
         assert bound <= 0.31
 
 
+def test_a_motor_that_finds_its_place_at_an_end_stop_presses():
+    homing = {"homing": "end-stop", "homing_speed_m_s": -0.002, "homing_current_a": 0.2, "home_m": -4.5e-3}
+    options = {f"devices__motor__options__{name}": value for name, value in homing.items()}
+    found = on_spring(5.0, ramp(1.0, 0.3, 1.5), **(RARER | options))
+    assert found.acquisition.ended == ""
+    assert abs(found.press.contact_m - 1e-3 * found.acquisition.drawn["skin mm"]) < 30e-6
+    assert found.acquisition.drawn["force chain"].endswith("N read of a push of about 3 N")
+
+
 def test_a_motor_that_does_not_come_out_is_said():
     found = on_spring(5.0, ramp(5.0, 0.5, 20.0), devices__motor__faults=["unplug:start_s=8"], **RARER)
     assert "in ramp: axis' link is gone" in found.acquisition.ended

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import yaml
-from tactbench.plugin import ForceRamp, RigContext, Scene, assumed, load_object, load_registry
+from tactbench.plugin import ForceRamp, RigContext, RigError, Scene, assumed, load_object, load_registry
 from tactbench.plugin.devices import (
     DriverSettings,
     EmulatedDevice,
@@ -179,14 +179,38 @@ def test_a_refusal_and_silence_are_named(stage):
             stage.update(0.1)
 
 
-def test_it_presses_under_force_in_the_rig():
+PROFILE = ForceRamp(hold=assumed(1.0, "s", "a test"), duration=assumed(12.0, "s", "a test"))
+
+
+def opened():
+    """Open a press by the rig file; its surface is found then."""
     said = yaml.safe_load((Path(__file__).parents[1] / "rig.yaml").read_text(encoding="utf-8"))
     said["settings"]["touch"]["settle_s"] = 2.0
     registry = load_registry()
     rig = load_object(registry.rigs["parallel-manipulator"].where)(RigContext(rig_file=RigFile.model_validate(said)))
-    profile = ForceRamp(hold=assumed(1.0, "s", "a test"), duration=assumed(12.0, "s", "a test"))
-    with rig.open(registry.sensors["icub"], Scene(name="press", profile=profile), seed=1) as acquisition:
+    return rig.open(registry.sensors["icub"], Scene(name="press", profile=PROFILE), seed=1)
+
+
+def test_it_presses_under_force_in_the_rig():
+    with opened() as acquisition:
         force_n = np.concatenate([block.data[:, 2] for block in acquisition if block.stream == "force_torque"])
     assert acquisition.ended == ""
     # 5 N less what the ramp of 0.45 N/s is behind at a gain of 0.3 mm/(N s), and the noise of 0.69 N.
     assert force_n[-250:].mean() == pytest.approx(5.0, abs=0.6)
+
+
+def test_a_press_whose_halts_are_lost_stands_soon(monkeypatch):
+    feed, places = GrblEmulator.feed, []
+
+    def deaf(emulator, piece, now_s):
+        """Lose the halt of the touch, and all later ones."""
+        if places or (b"\x85" in piece and emulator.position_m > -2e-3):
+            emulator.deaf_to = b"\x85"
+            places.append(emulator.position_m)
+        return feed(emulator, piece, now_s)
+
+    monkeypatch.setattr(GrblEmulator, "feed", deaf)
+    with pytest.raises(RigError, match="The surface was not found"), opened():
+        pass
+    # 0.5 mm/s for two halts, each with its latency and time of braking, and answers of some milliseconds.
+    assert 0 < max(places) - places[0] < 0.5e-3 * (2 * (0.03 + 5e-3) + 0.02)
