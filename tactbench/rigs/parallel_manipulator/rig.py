@@ -152,8 +152,9 @@ class PressAcquisition:
     @property
     def ended(self) -> str:
         """Why it ended before its time; empty: it did not."""
-        press = self.control.press
-        return "; ".join(filter(None, (press.ended, press.not_out))) or self.reading.ended
+        press, late = self.control.press, self.control.late
+        said = f"{press.ended} ({late} control periods began late)" if press.ended and late else press.ended
+        return "; ".join(filter(None, (said, press.not_out))) or self.reading.ended
 
 
 class ParallelManipulator(Rig):

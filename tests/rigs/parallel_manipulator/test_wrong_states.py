@@ -80,6 +80,17 @@ def loaded(newtons, until_s):
     return lambda force_n, t_s, skin_n: force_n + (newtons if t_s < until_s else 0.0)
 
 
+def loaded_until_touched(newtons):
+    """Return a sensor on which something rests until the skin is touched."""
+    touched = []
+
+    def reads(force_n, t_s, skin_n):
+        touched.extend([1] if skin_n > 0.0 else [])
+        return force_n if touched else force_n + newtons
+
+    return reads
+
+
 def returning(lost_m):
     """Return a motor that loses its first steps on its way out of the depth of the ramp."""
     deepest = [-1.0]
@@ -116,6 +127,8 @@ SCHEDULES = {
     "zero rises": (5.0, {"reads": drifting(0.2, 8.0)}, {}, "N are left|stiffest"),
     "loaded while zeroed": (5.0, {"reads": loaded(2.4, 3.0)}, {}, "not arm"),
     "pulled while zeroed": (5.0, {"reads": loaded(-2.4, 3.0)}, {}, "not arm"),
+    "load that falls off at the touch": (5.0, {"reads": loaded_until_touched(2.4)}, {}, "no touch"),
+    "pull that ends at the touch": (5.0, {"reads": loaded_until_touched(-2.4)}, {}, "N are left"),
     "0.3 mm deeper": (5.0, {"slip": lambda at_m: 0.3e-3}, {}, ""),
     "2.2 mm deeper, in the skin": (5.0, {"slip": lambda at_m: 2.2e-3}, {}, "before"),
     "3 mm deeper, in the skin": (5.0, {"slip": lambda at_m: 3e-3}, {}, "zero is refused"),
