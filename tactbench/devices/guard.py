@@ -593,8 +593,6 @@ class LocalGuard:
             try:
                 axis.home(stop)
             except Exception as error:
-                with suppress(Exception):
-                    axis.halt()
                 self._homing_failed(name, *(problem or (Trigger.HOMING, fault_text(error))))
         axis.confirm()
         if not axis.enabled:
@@ -613,20 +611,38 @@ class LocalGuard:
             if problem is None and self._clock() > deadline_ns:
                 problem = Trigger.HOMING, "it has not come to its place of retreat in its time"
             if problem is not None:
-                with suppress(TactbenchError):
-                    press.halt()
                 self._homing_failed(self._name, *problem)
 
     def _interruption(self) -> Problem | None:
         return (Trigger.TERMINATED, "interrupted") if self._interrupted() else None
 
     def _homing_failed(self, name: str, trigger: Trigger, text: str) -> NoReturn:
+        stands = self._stands(name)
         self.state, self.trigger = GuardState.FAULT, Trigger.HOMING
         self._say(Trigger.HOMING, f"{name}: {trigger}: {text}")
+        if not stands:
+            self._not_out = f"{name} was halted while it was homed or retracted, and is not known to stand: stand clear"
         raise GuardRefusesError(
-            f"{name} stands where it was homed or retracted: {trigger}: {text}",
+            f"{name} stands where it was homed or retracted: {trigger}: {text}"
+            if stands
+            else f"{self._not_out}: {trigger}: {text}",
             hint="See what the indenter touches; then disarm, and arm again.",
         )
+
+    def _stands(self, name: str) -> bool:
+        """Halt an axis, and return whether it says the same place for a while."""
+        axis, place = self._axes[name], math.nan
+        with suppress(Exception):
+            axis.halt()
+        since_ns = begin_ns = self._clock()
+        while self._clock() < begin_ns + 1e9 * RETREAT_S:
+            self._take_force(LOOK_S, None)
+            self._take_axis(name, axis, None)
+            if not abs(axis.position - place) <= axis.facts.resolution:
+                since_ns, place = self._clock(), axis.position
+            elif axis.state is not None and axis.state.t_ns > since_ns + 1e9 * AGAIN_S:
+                return True
+        return False
 
     # Saying -----------------------------------------------------------------------------------------------------------
 
