@@ -201,7 +201,7 @@ class Report:
     not_out: str = ""
     """What is to be done, where something did not come out or stand still; empty: it did, or has not tried."""
     unclear: str = ""
-    """Why an operator has to see that the indenter is clear of the sensor before the guard arms; empty: nobody has."""
+    """Why an operator has to see that the indenter is clear of the sensor before the guard arms; empty: no need."""
 
     @property
     def accepted(self) -> bool:

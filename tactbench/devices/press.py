@@ -336,7 +336,7 @@ class Press:
     def _regulated(self, report: Report, now_s: float) -> Beat:
         controller, plan = self._controller, self._plan
         assert controller is not None
-        # Who stood still for longer did not see what the force did meanwhile.
+        # After a longer standstill it is not known what the force was meanwhile.
         passed_s, self._stepped_s = min(now_s - self._stepped_s, MOST_PERIODS * plan.law.period_s), now_s
         self.setpoint_n, slope = self._setpoint(now_s)
         controller.step(self._force_n, report.position_m, passed_s, self.setpoint_n, slope)

@@ -130,7 +130,7 @@ class PressEmulators(RigEmulators):
         self.press: EmulatedPress | None = None
         """The scene that is carried out; None: nothing is pressed."""
         self.pushed_n = 0.0
-        """With what somebody pushes the force sensor by hand."""
+        """Force of a push by hand on the force sensor, beside that of the skin."""
         self._motor: Any = None
         limited = with_limits(file, self._settings, registry)
         devices: dict[str, EmulatedDevice] = {}

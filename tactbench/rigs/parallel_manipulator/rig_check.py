@@ -190,9 +190,9 @@ def _forces(
         if name != MOTOR
     ]
     # The way until a force that reads wrong is noticed: of the approach, and on the ramp (see `devices.press`).
-    way_m = settings.touch_way_m + max(
-        2e-3 * settings.heights.tolerance_mm,
-        settings.touch_way_m + 1e-6 * touch.mean_ms * settings.force_loop.speed_mm_s,
+    way_m = max(
+        settings.found_m - settings.surface_m + 1e-3 * settings.heights.tolerance_mm,
+        2 * settings.touch_way_m + 1e-6 * touch.mean_ms * settings.force_loop.speed_mm_s,
     )
     lying = min(by_approach + k * way_m, drive_n or float("inf"))
     rows = [

@@ -142,7 +142,7 @@ class Session:
         return force, {stream.name: zero}, kept
 
     def _fresh(self, seconds: float) -> list[Block]:
-        """Return the force samples of the next seconds, and none that has waited since nobody took it."""
+        """Return the force samples that are received in the next seconds, and none from before."""
         since_ns = self.clock()
         self.guard.advance(since_ns + round(1e9 * seconds))
         return [block.rows(block.t_ns >= since_ns) for block in self.guard.force_blocks() if block.t_ns is not None]

@@ -266,10 +266,10 @@ class RigSettings(Options):
         _rising(touch.touch_speed_mm_s, touch.speed_mm_s, said="the speed of the touch and of the way to it")
         _rising(touch.lift_mm, heights.stand_off_mm, said="lift and stand-off")
         _rising(deepest_mm, limits.travel_mm[1], said="retreat, stand-off and depth together, and the motor's travel")
+        found_mm = 1e3 * (self.found_m - self.surface_m)
         _rising(
-            heights.tolerance_mm + 1e3 * self.touch_way_m, heights.depth_mm,
-            said="the tolerance of the surface with mean_n/softest_n_mm, the way to a touch, and the depth",
-        )  # fmt: skip
+            found_mm, heights.depth_mm, said="where the softest skin is touched (mean_n/softest_n_mm) and the depth"
+        )
         return self
 
     @property
@@ -295,8 +295,9 @@ class RigSettings(Options):
 
     @property
     def found_m(self) -> float:
-        """Position of the motor at which the surface must have been touched [m]."""
-        return self.surface_m + 1e-3 * self.heights.tolerance_mm + self.touch_way_m
+        """Position of the motor at which the surface must have been touched [m]: a mean is behind by its time."""
+        behind_m = 1e-6 * self.touch.touch_speed_mm_s * self.touch.mean_ms
+        return self.surface_m + 1e-3 * self.heights.tolerance_mm + self.touch_way_m + behind_m
 
     def press_plan(self, resolution_m: float, force: StreamSpec) -> PressPlan:
         """Return the numbers of a press by an axis with a least step [m], and with the stream of a force sensor."""

@@ -1,6 +1,7 @@
 """The controller at the end of its line: jogs at constant speed, homing to 0, reset; no kinder than GRBL 1.1 is.
 
-It starts in alarm; says nothing while it is homed, and `ok` at the end; a reset takes its place away, and it says hello.
+It starts in alarm, answers nothing while it is homed, and `ok` at the end; after a reset it sends its banner and has lost
+its place.
 """
 
 import math
