@@ -180,7 +180,7 @@ class Positioner(Driver):
         """What was last read; None: nothing yet."""
         self._unread: list[PositionerState] = []
         self._moving = self._retreats = False
-        self._goal, self._due_ns, self._halts, self._fastest = math.nan, 0, 0, 0.0
+        self._goal, self._nearest, self._due_ns, self._halts, self._fastest = math.nan, math.inf, 0, 0, 0.0
         self._before_ns, self._odd = 0, False
         self._rest = self._came = b""
         self._asked_ns: int | None = None
@@ -285,18 +285,19 @@ class Positioner(Driver):
     # What a subclass calls --------------------------------------------------------------------------------------------
 
     def begin(self, target: float = math.nan, speed: float | None = None) -> None:
-        """Note that a move to a target was sent, at a speed (None: that of the facts); it has a deadline from now on.
+        """Note that a move to a target was sent, at a speed (None: not told); it has a deadline from now on.
 
-        NaN: it was halted, and stands somewhere; infinity: it is being homed, until the next call of this method.
+        That is what its way takes, and later as long as it comes nearer. NaN: it was halted, and stands somewhere;
+        infinity: it is being homed, until the next call of this method.
         """
         facts, halted = self.facts, math.isnan(target)
-        speed = facts.speed if speed is None else speed
-        self._fastest = max(self._fastest, speed) if halted else speed
+        if not (halted and self._fastest):
+            self._fastest = speed or max(facts.speed, facts.retreat_speed)
         seconds = facts.stop_latency_s + self._fastest / facts.acceleration if halted else math.inf
         if math.isfinite(target) and self.homed:
-            seconds = facts.seconds(target - self.position, speed)
+            seconds = facts.seconds(target - self.position, speed or facts.speed)
         self._halts = self._halts + 1 if halted else 0
-        self._moving, self._goal, self._retreats = True, target, False
+        self._moving, self._goal, self._nearest, self._retreats = True, target, math.inf, False
         self._due_ns = self.clock() + round(1e9 * (seconds if math.isfinite(seconds) else HOMING_S))
 
     def see(self, t_ns: int, position: float, *, idle: bool) -> None:
@@ -313,6 +314,8 @@ class Positioner(Driver):
             self._moving, self._halts = False, 0
             if self._retreats:
                 self.move_to(facts.retreat, facts.retreat_speed)
+        elif off < self._nearest - facts.resolution and not halted:
+            self._nearest, self._due_ns = off, max(self._due_ns, t_ns + round(1e9 * SETTLE_S))
         elif self._moving and halted and t_ns > self._due_ns:
             retreats = self._retreats
             (self.halt if self._halts < HALTS else self.halt_harder)()

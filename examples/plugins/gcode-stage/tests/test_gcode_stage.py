@@ -1,5 +1,6 @@
 """The stage on its emulated controller: homed, moved, stopped, and pressing under force in the rig."""
 
+import math
 from pathlib import Path
 
 import numpy as np
@@ -165,6 +166,17 @@ def test_a_move_that_does_not_arrive_ends_in_its_time(stage):
     with pytest.raises(PositionerError, match="not come to|faster than it moves"):
         while stage.moving:
             stage.read(0.01)
+
+
+def test_a_driver_that_does_not_tell_the_speed_has_its_time_too(stage, monkeypatch):
+    begin = GcodeStage.begin
+    monkeypatch.setattr(GcodeStage, "begin", lambda self, target=math.nan, speed=None: begin(self, target))
+    stage.home()
+    for speed_m_s in (0.5e-3, 20e-3):  # the axis states 5 mm/s, and 20 mm/s for a retreat
+        stage.move_to(-2e-3 if speed_m_s < 1e-3 else 4e-3, speed_m_s)
+        while stage.moving:
+            stage.read(0.01)
+    assert stage.at(4e-3)
 
 
 def test_a_refusal_and_silence_are_named(stage):
