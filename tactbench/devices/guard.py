@@ -630,12 +630,14 @@ class LocalGuard:
         )
 
     def _stands(self, name: str) -> bool:
-        """Halt an axis, and return whether it says the same place for a while."""
+        """Halt an axis, again and again, and return whether it says the same place for a while."""
         axis, place = self._axes[name], math.nan
-        with suppress(Exception):
-            axis.halt()
-        since_ns = begin_ns = self._clock()
+        since_ns = begin_ns = again_ns = self._clock()
         while self._clock() < begin_ns + 1e9 * RETREAT_S:
+            if self._clock() >= again_ns:
+                again_ns += round(1e9 * AGAIN_S)
+                with suppress(Exception):
+                    axis.halt()
             self._take_force(LOOK_S, None)
             self._take_axis(name, axis, None)
             if not abs(axis.position - place) <= axis.facts.resolution:

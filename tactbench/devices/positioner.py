@@ -304,8 +304,8 @@ class Positioner(Driver):
         """Note an answer: when and where, and whether the controller says that it stands.
 
         A move has ended when the controller stands at its target; one that says so before it has begun is not believed.
-        A halt has ended when it stands and the position is that of the answer before. Where it goes on after the time
-        of braking it is halted again.
+        A halt has ended when it stands and the position is that of the answer before. What is homed and goes on after
+        the time of braking is halted again.
         """
         last, halted, facts = self.position, math.isnan(self._goal), self.facts
         self.note(PositionerState(t_ns, position, position if halted else self._goal))
@@ -316,7 +316,7 @@ class Positioner(Driver):
                 self.move_to(facts.retreat, facts.retreat_speed)
         elif off < self._nearest - facts.resolution and not halted:
             self._nearest, self._due_ns = off, max(self._due_ns, t_ns + round(1e9 * SETTLE_S))
-        elif self._moving and halted and t_ns > self._due_ns:
+        elif self._moving and halted and self.homed and t_ns > self._due_ns:
             retreats = self._retreats
             (self.halt if self._halts < HALTS else self.halt_harder)()
             self._retreats = retreats
