@@ -15,6 +15,7 @@ import time
 from collections import Counter, deque
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
+from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
@@ -82,6 +83,9 @@ class Setting:
             travel_ceiling_n=0.2,
             torque_ceiling_nm=0.2,
             touch_n=0.1,
+            clear_n=0.05,
+            clear_s=20e-3,
+            confirmed=True,
             travel_m=(-5.5e-3, 2e-3),
             step_m=0.25 / self.stiffness_n_m,
             speed_m_s=0.02,
@@ -181,14 +185,16 @@ class Pressed:
         """Return the options of both devices."""
         return {"motor": {**STATED, "baud": self.setting.baud}, "force": {**COUNTS, "rate_hz": self.rate_hz}}
 
-    def guard(self, force_driver: Callable[[DriverSettings], Any] = NetFtDriver) -> LocalGuard:
+    def guard(
+        self, force_driver: Callable[[DriverSettings], Any] = NetFtDriver, kept: Path | None = None
+    ) -> LocalGuard:
         """Return a guard over drivers of both, in this process."""
         options = self.settings()
         motor = FaulhaberDriver(
             DriverSettings(self.devices.opener("motor"), options=options["motor"], clock=self.clock)
         )
         force = force_driver(DriverSettings(self.devices.opener("force"), options=options["force"], clock=self.clock))
-        return LocalGuard({"motor": motor}, force, self.clock, self.devices.advance)
+        return LocalGuard({"motor": motor}, force, self.clock, self.devices.advance, kept=kept)
 
 
 def build_options(baud: int = 115200) -> Any:

@@ -14,7 +14,7 @@ from dataclasses import replace
 from tactbench.core.errors import TactbenchError
 from tactbench.core.samples import Block
 from tactbench.devices.driver import fault_text
-from tactbench.devices.guard_messages import Event, Limits, Report
+from tactbench.devices.guard_messages import Beat, Event, Limits, Report
 from tactbench.devices.guard_process import Guard
 from tactbench.devices.press import Press
 from tactbench.links.link import Clock
@@ -67,7 +67,7 @@ class Control:
         """What the guard answered last."""
         self._rows, self._rows_ns = -1, clock()
         self._next_ns = self._rows_ns + self._period_ns
-        self._raw: list[tuple[float, float]] = []
+        self._raw: list[float] = []
         self._blocks: deque[Block] = deque()
         self._events: deque[Event] = deque()
         self._over = threading.Event()
@@ -131,24 +131,27 @@ class Control:
     def _gather(self) -> None:
         for block in self._guard.force_blocks():
             self._blocks.append(block)
-            assert block.t_ns is not None
-            force_n = self._limits.pressing_n(block.data)
-            self._raw += zip((1e-9 * block.t_ns).tolist(), force_n.tolist(), strict=True)
+            self._raw += self._limits.pressing_n(block.data).tolist()
         self._blocks.extend(self._guard.motor_blocks())
         self._events.extend(self._guard.events())
         self._counts = self._guard.counts()
 
     def _period(self) -> None:
         now_ns = self._clock()
-        self.late += now_ns - self._next_ns > self._period_ns
+        late_ns = now_ns - self._next_ns
+        self.late += late_ns > self._period_ns
         rows = self._received()
         # Where it was this process that hung, the sensor's reading hung with it.
-        if rows != self._rows or now_ns - self._next_ns > self._stale_ns:
+        if rows != self._rows or late_ns > self._stale_ns:
             self._rows, self._rows_ns = rows, now_ns
         self._next_ns = max(self._next_ns + self._period_ns, now_ns + self._period_ns // 2)
+        press = self.press
+        if 1e-9 * late_ns > self._limits.heartbeat_s:
+            press.fail(f"the program stood still for {1e-9 * late_ns:.1f} s")
+        if late_ns > self._period_ns:  # what was reported then is not how it is now
+            self.report = self._guard.beat(Beat(now_ns, str(press.state)))
         self._gather()
         raw, self._raw = self._raw, []
-        press = self.press
         if self._stop:
             press.fail(self._stop)
         if now_ns - self._rows_ns > self._stale_ns:

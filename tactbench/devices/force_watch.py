@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 from collections import deque
+from statistics import fmean
 
 import numpy as np
 
@@ -22,6 +23,19 @@ MOST_BLOCKS = 50_000
 """Kept for a rig that does not take them: some 50 s at 1 kHz; then the oldest are dropped."""
 _LOOKED_AT = 3
 """Samples of which two are a touch."""
+_MOST_SOUND = 10_000
+"""Kept for a mean: more than a second of the quickest force sensor, 7 kHz."""
+UNRATED_HZ = 100.0
+"""Taken for the rate of a force sensor that states none (assumed: a slow one)."""
+
+
+def samples(stream: StreamSpec, seconds: float) -> int:
+    """Return how many samples of a force stream come in some seconds; one at least.
+
+    A mean is of a count and not of a time: a busy host receives none for a while, and then many at once.
+    """
+    return max(1, round((stream.rate_hz or UNRATED_HZ) * seconds))
+
 
 Problem = tuple[Trigger, str]
 
@@ -67,10 +81,20 @@ class ForceWatch:
         self._last = np.full((1, kinds.size), math.nan)
         self._same = 0
         self._pressing: deque[float] = deque(maxlen=_LOOKED_AT)
+        self._sound: deque[tuple[int, float]] = deque(maxlen=_MOST_SOUND)
 
     def touched(self, touch_n: float) -> bool:
         """Return whether two of the last three samples are above a force [N]."""
         return sum(force > touch_n for force in self._pressing) >= _LOOKED_AT - 1
+
+    def mean_n(self, since_ns: int, count: int) -> float:
+        """Return the mean pressing force [N] of the newest so many samples, all of them received after a time.
+
+        NaN: not so many have come since, or something was wrong with one of them.
+        """
+        while self._sound and (self._sound[0][0] < since_ns or len(self._sound) > count):
+            self._sound.popleft()
+        return fmean(force_n for _, force_n in self._sound) if len(self._sound) == count else math.nan
 
     def age_s(self, now_ns: int) -> float:
         """Return the age of the newest sample [s]; infinite: there is none."""
@@ -109,6 +133,10 @@ class ForceWatch:
             problem = Trigger.FORCE_GAP, f"{lost} force samples were lost in a row, {limits.lost_samples} may be"
         if problem is None and same >= limits.same_samples:
             problem = Trigger.FORCE_STUCK, f"{same} force samples in a row are the same in every channel"
+        if problem is not None:
+            self._sound.clear()
+        elif newer is not None and newer.t_ns is not None:
+            self._sound.extend(zip(newer.t_ns.tolist(), limits.pressing_n(newer.data).tolist(), strict=True))
         return problem
 
     def _take_newer(self, block: Block) -> tuple[int, int]:

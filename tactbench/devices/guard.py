@@ -11,9 +11,9 @@ from the skin. What it promises, of axes that do as they state:
 - *Moves at a speed v*, of any axis: :func:`largest_force_n`.
 - *A rig that hangs or dies* makes the retreat begin within heartbeat_s + reaction.
 
-What it cannot promise: anything about people; a force sensor that lies plausibly (a wrong zero, a broken channel that
-still has noise); forces that the sensor does not feel, such as the platform against the frame; a retreat or a halt of
-an axis whose controller does not answer, which ends its move by itself; a place, where a controller lost steps.
+What it cannot promise: anything about people; a force sensor that lies plausibly (:mod:`.press` compares force and
+place); forces that the sensor does not feel, such as the platform against the frame; a retreat or a halt of an axis
+whose controller does not answer, which ends its move by itself; a place, where a controller lost steps.
 """
 
 from __future__ import annotations
@@ -22,6 +22,8 @@ import math
 from collections import Counter, deque
 from collections.abc import Callable, Mapping, MutableSequence
 from contextlib import suppress
+from datetime import datetime
+from pathlib import Path
 from typing import NoReturn, TypeVar
 
 from tactbench.core.errors import (
@@ -35,7 +37,7 @@ from tactbench.core.errors import (
 from tactbench.core.samples import Block
 from tactbench.core.spec.sensor import StreamSpec
 from tactbench.devices.driver import Driver, fault_text
-from tactbench.devices.force_watch import MOST_BLOCKS, ForceWatch, Problem
+from tactbench.devices.force_watch import MOST_BLOCKS, ForceWatch, Problem, samples
 from tactbench.devices.guard_messages import (
     Beat,
     CommandKind,
@@ -60,7 +62,7 @@ ALIVE_S = 0.2
 AGAIN_S = 0.25
 """After which a retreat that is not under way is sent again (assumed: above the time of an answer at 9600 baud)."""
 RETREAT_S = 1.0
-"""Added to the way's time, after which a retreat has failed (assumed)."""
+"""Added to the time of the way, or of the force's mean after it, after which a retreat has failed (assumed)."""
 REFUSED = 3
 """Refused commands in a row that end the rig's command (assumed)."""
 
@@ -93,6 +95,9 @@ class LocalGuard:
         Called with each event.
     interrupted
         Called while axes are homed: whether they shall stand.
+    kept
+        A file that is there from arming until the pressing axis was seen to be clear of the sensor, and says why it is
+        not: the next guard with this file begins with it. None: nothing is kept.
     """
 
     def __init__(
@@ -104,6 +109,7 @@ class LocalGuard:
         *,
         on_event: Callable[[Event], None] = lambda event: None,
         interrupted: Callable[[], bool] = lambda: False,
+        kept: Path | None = None,
     ) -> None:
         self.state = GuardState.IDLE
         self.trigger: Trigger | None = None
@@ -117,7 +123,8 @@ class LocalGuard:
         self._limits: Limits | None = None
         self._motor_blocks: deque[Block] = deque(maxlen=MOST_BLOCKS)
         self._events: list[Event] = []
-        self._not_out = ""
+        self._kept = kept
+        self._not_out = kept.read_text(encoding="utf-8") if kept is not None and kept.exists() else ""
         self._counts: Counter[str] = Counter()
         self._lost: set[str] = set()
         self._home_anew: set[str] = set()
@@ -125,7 +132,7 @@ class LocalGuard:
         self._refused = self._beat_ns = 0
         self._end_sequence = -1
         self._into_skin = self._touched = False
-        self._began_ns = self._sent_ns = 0
+        self._began_ns = self._sent_ns = self._there_ns = 0
 
     @property
     def force_stream(self) -> StreamSpec:
@@ -168,7 +175,20 @@ class LocalGuard:
         if self.state is not GuardState.IDLE:
             raise GuardRefusesError(f"The guard is in state {self.state}.", hint="Disarm it first.")
         self._check(limits)
+        if not limits.confirmed and (unclear := self._unclear):
+            raise GuardRefusesError(
+                f"The guard does not arm: {unclear}.",
+                hint="An operator has to see that the indenter is clear of the sensor, and to say so.",
+            )
         self._wait_for_force(limits)
+        try:
+            self._keep(f"it was armed at {datetime.now().isoformat(' ', 'seconds')}, and not seen to be out since")
+        except OSError as error:
+            raise GuardRefusesError(
+                f"The guard does not arm: it cannot keep that it is armed in {self._kept}: {error}.",
+                hint="Make room, or name another file as `guard_log:` in the rig file.",
+            ) from error
+        self._not_out = ""
         for name, axis in self._axes.items():
             try:
                 self._make_ready(name, axis, limits)
@@ -240,17 +260,18 @@ class LocalGuard:
         return {FORCE: {name: count for name, count in force.items() if count}, **axes, "guard": dict(self._counts)}
 
     def disarm(self) -> Report:
-        """Retreat if the pressing axis is not at its place, and expect no more beats; a fault is cleared."""
-        if self._moving or not self._retracted:
-            self.trip(Trigger.COMMANDED, "disarmed")
+        """Retreat, and expect no more beats; a fault is cleared.
+
+        What `Report.not_out` says stays until an operator has confirmed that it is clear, also for the next guard.
+        """
+        self.trip(Trigger.COMMANDED, "disarmed")
         while self.state is GuardState.RETREATING:
             self.look(LOOK_S)
         if self.state is not GuardState.IDLE:
             self.state = GuardState.IDLE
             self._say(None, "disarmed")
         self._limits, self.trigger = None, None
-        report, self._not_out = self._report(), ""
-        return report
+        return self._report()
 
     def close(self) -> None:
         """Disarm, and close all devices; once closed, this does nothing."""
@@ -291,7 +312,17 @@ class LocalGuard:
 
     @property
     def _retracted(self) -> bool:
-        return self._press.at(self._press.facts.retreat)
+        return self._press.homed and self._press.at(self._press.facts.retreat)
+
+    @property
+    def _unclear(self) -> str:
+        """Why an operator has to see that the indenter is clear of the sensor; empty: it needs not."""
+        here = [
+            name
+            for name, axis in self._axes.items()
+            if axis.facts.homes_here and (name in self._home_anew or not axis.homed)
+        ]
+        return self._not_out or (f"{', '.join(here)} is homed where it stands" if here else "")
 
     def _see_beat(self, now_ns: int, limits: Limits) -> None:
         age_s = 1e-9 * (now_ns - self._beat_ns)
@@ -435,7 +466,9 @@ class LocalGuard:
     def _send_retreat(self) -> None:
         self._sent_ns = self._clock()
         commands = {name: axis.halt for name, axis in self._others.items() if axis.moving}
-        for name, command in {**commands, self._name: self._press.retreat}.items():
+        # A place that is not known any more is no aim: it may be on the other side.
+        commands[self._name] = self._press.retreat if self._press.homed else self._press.halt
+        for name, command in commands.items():
             if name in self._lost:
                 continue
             try:
@@ -446,18 +479,33 @@ class LocalGuard:
                 continue
 
     def _carry_on(self) -> None:
-        """See whether the pressing axis is there and the others stand; send it again, or end in a fault."""
-        press, now_ns = self._press, self._clock()
+        """See whether the pressing axis is out and the others stand; send it again, or end in a fault.
+
+        It is out where it stands at its place of retreat and the mean force since is near zero.
+        """
+        press, now_ns, limits = self._press, self._clock(), self._limits
+        assert limits is not None
         took = f"{1e-9 * (now_ns - self._began_ns):.3f} s"
         fresh = press.state is not None and press.state.t_ns > self._sent_ns
         # An axis that is lost while it moves ends its move by itself, which nobody sees.
         lost = sorted(name for name in self._lost - {FORCE} if name == self._name or self._axes[name].moving)
-        out = not press.moving and self._retracted and fresh
+        there = not press.moving and self._retracted and fresh
+        self._there_ns = (self._there_ns or now_ns) if there else 0
+        force_n = self._watch.mean_n(self._there_ns, samples(self.force_stream, limits.clear_s)) if there else math.nan
+        out = abs(force_n) < limits.clear_n
         others = any(axis.moving and name not in self._lost for name, axis in self._others.items())
-        if lost and not others and (out or self._name in lost):
+        if lost and not others and (there or self._name in lost):
             self._end(Trigger.AXIS_LOST, f"stand clear: {', '.join(lost)} ends its last move and holds there")
         elif out and not others:
             self._end(None, f"out after {took}")
+        elif there and not others:
+            if FORCE in self._lost or now_ns > self._there_ns + 1e9 * (limits.clear_s + RETREAT_S):
+                known = "is not known" if math.isnan(force_n) else f"is {force_n:.2f} N"
+                self._end(
+                    Trigger.NOT_CLEAR,
+                    f"NOT KNOWN TO BE OUT: at its place of retreat after {took}, and the force {known}: stand clear, "
+                    "and see what the indenter touches",
+                )
         elif now_ns > self._began_ns + 1e9 * retreat_seconds(press):
             where = "nobody knows where" if math.isnan(press.position) else f"last seen at {press.position:g} m"
             power = "left under power, since it may fall without"
@@ -475,7 +523,16 @@ class LocalGuard:
         if failed is not None:
             self._home_anew.update(self._lost, [self._name])
             self._not_out = text
+        with suppress(OSError):  # then the file says that it was armed
+            self._keep(self._not_out)
         self._say(failed, text)
+
+    def _keep(self, text: str) -> None:
+        """Keep for the next guard why the pressing axis is not known to be out; empty: it is."""
+        if self._kept is not None and text:
+            self._kept.write_text(text, encoding="utf-8")
+        elif self._kept is not None:
+            self._kept.unlink(missing_ok=True)
 
     # Arming -----------------------------------------------------------------------------------------------------------
 
@@ -536,8 +593,6 @@ class LocalGuard:
             try:
                 axis.home(stop)
             except Exception as error:
-                with suppress(Exception):
-                    axis.halt()
                 self._homing_failed(name, *(problem or (Trigger.HOMING, fault_text(error))))
         axis.confirm()
         if not axis.enabled:
@@ -556,20 +611,40 @@ class LocalGuard:
             if problem is None and self._clock() > deadline_ns:
                 problem = Trigger.HOMING, "it has not come to its place of retreat in its time"
             if problem is not None:
-                with suppress(TactbenchError):
-                    press.halt()
                 self._homing_failed(self._name, *problem)
 
     def _interruption(self) -> Problem | None:
         return (Trigger.TERMINATED, "interrupted") if self._interrupted() else None
 
     def _homing_failed(self, name: str, trigger: Trigger, text: str) -> NoReturn:
+        stands = self._stands(name)
         self.state, self.trigger = GuardState.FAULT, Trigger.HOMING
         self._say(Trigger.HOMING, f"{name}: {trigger}: {text}")
+        if not stands:
+            self._not_out = f"{name} was halted while it was homed or retracted, and is not known to stand: stand clear"
         raise GuardRefusesError(
-            f"{name} stands where it was homed or retracted: {trigger}: {text}",
+            f"{name} stands where it was homed or retracted: {trigger}: {text}"
+            if stands
+            else f"{self._not_out}: {trigger}: {text}",
             hint="See what the indenter touches; then disarm, and arm again.",
         )
+
+    def _stands(self, name: str) -> bool:
+        """Halt an axis, again and again, and return whether it says the same place for a while."""
+        axis, place = self._axes[name], math.nan
+        since_ns = begin_ns = again_ns = self._clock()
+        while self._clock() < begin_ns + 1e9 * RETREAT_S:
+            if self._clock() >= again_ns:
+                again_ns += round(1e9 * AGAIN_S)
+                with suppress(Exception):
+                    axis.halt()
+            self._take_force(LOOK_S, None)
+            self._take_axis(name, axis, None)
+            if not abs(axis.position - place) <= axis.facts.resolution:
+                since_ns, place = self._clock(), axis.position
+            elif axis.state is not None and axis.state.t_ns > since_ns + 1e9 * AGAIN_S:
+                return True
+        return False
 
     # Saying -----------------------------------------------------------------------------------------------------------
 
@@ -594,6 +669,7 @@ class LocalGuard:
             touched=self._touched,
             trigger=self.trigger,
             not_out=self._not_out,
+            unclear=self._unclear,
         )
 
 

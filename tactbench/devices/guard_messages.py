@@ -60,6 +60,7 @@ class Trigger(StrEnum):
     AXIS_LOST = "axis' link is gone"
     HOMING = "force or fault while homing"
     RETREAT_FAILED = "retreat failed"
+    NOT_CLEAR = "not known to be clear of the sensor"
     GUARD_LOST = "guard is gone"
 
 
@@ -113,6 +114,12 @@ class Limits:
     """-1: pressing makes that channel fall."""
     zero: tuple[float, ...]
     """Of every channel of the force stream, in its units; subtracted from raw samples."""
+    confirmed: bool = False
+    """Whether an operator has seen that the indenter is clear of the sensor; see :attr:`Report.unclear`."""
+    clear_n: float = 0.1
+    """Largest size of the mean pressing force, of as many samples as come in `clear_s` after it stands at its place of
+    retreat, with which the pressing axis is clear of the sensor: above the noise of that mean (assumed)."""
+    clear_s: float = 0.1
     torque_ceiling_nm: float | None = None
     """Of the norm of the raw torque; None: torque is not looked at."""
     same_samples: int = 50
@@ -127,7 +134,8 @@ class Limits:
     def __post_init__(self) -> None:
         positive = [
             self.force_ceiling_n, self.travel_ceiling_n, self.touch_n, self.step_m, self.speed_m_s, self.heartbeat_s,
-            self.force_age_s, *([] if self.torque_ceiling_nm is None else [self.torque_ceiling_nm]),
+            self.force_age_s, self.clear_n, self.clear_s,
+            *([] if self.torque_ceiling_nm is None else [self.torque_ceiling_nm]),
         ]  # fmt: skip
         low, high = self.travel_m
         for wrong, problem in (
@@ -192,6 +200,8 @@ class Report:
     """Why it retreated."""
     not_out: str = ""
     """What is to be done, where something did not come out or stand still; empty: it did, or has not tried."""
+    unclear: str = ""
+    """Why an operator has to see that the indenter is clear of the sensor before the guard arms; empty: no need."""
 
     @property
     def accepted(self) -> bool:

@@ -92,7 +92,8 @@ class ProcessSettings:
     """The pressing one first."""
     force: DeviceSettings
     log: str
-    """A file to which events are added, one line of JSON each."""
+    """A file to which events are added, one line of JSON each. One beside it, ending in ``.not-out``, is there while
+    the pressing axis is not known to be clear of the sensor; the next guard begins with it."""
     clock_zero_ns: int = 0
     """``time.monotonic_ns()`` at zero of the rig's clock."""
 
@@ -116,7 +117,7 @@ class ProcessSettings:
                 with axis:
                     place = axis.rescue(retreat_seconds(axis) if retreat and name == press else None)
                     if retreat and name == press:
-                        said = f"{name} has retreated to {place:g} m"
+                        said = f"{name} has retreated to {place:g} m, and the force there was not looked at"
             except (LinkError, RigError) as error:
                 failed = error
         if failed is not None:
@@ -464,6 +465,7 @@ class _Server:
                 lambda until_ns: self._rest(1e-9 * (until_ns - self._clock())),
                 on_event=lambda event: _log(asdict(event)),
                 interrupted=self._interrupted,
+                kept=Path(settings.log).with_suffix(".not-out"),
             )
             identity = guard.start()
             opened.pop_all()

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from abc import abstractmethod
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any, ClassVar, Literal, Self
 
@@ -23,6 +24,12 @@ SILENT_S = 0.5
 """After which a controller is said not to answer (assumed)."""
 SETTLE_S = 0.5
 """Added to the time that a move takes by its speed and acceleration, after which it has not ended (assumed)."""
+HOMING_S = 60.0
+"""Homing takes no longer (assumed)."""
+HALTS = 2
+"""How often an axis is halted in the usual way before :meth:`Positioner.halt_harder` (assumed)."""
+FASTER = 1.5
+"""How much faster than it states an axis may seem to move: two positions further apart are not of one way (assumed)."""
 
 
 class PositionerError(RigError):
@@ -57,6 +64,8 @@ class PositionerFacts:
     """Whether `halt` and `retreat` end a move that is under way."""
     holds_unpowered: bool
     """Whether it stays where it is without power: a horizontal axis, a brake, a counterweight, a self-locking screw."""
+    homes_here: bool = False
+    """Whether homing takes the place at which it stands for its home: it cannot notice that it stands in the skin."""
     retreat: float = math.nan
     """Where it is away from the skin; NaN: it retreats by standing still."""
     retreat_speed: float = math.nan
@@ -176,8 +185,10 @@ class Positioner(Driver):
         """What was last read; None: nothing yet."""
         self._unread: list[PositionerState] = []
         self._moving = self._retreats = False
-        self._goal = math.nan
-        self._rest, self._asked_ns = b"", 0
+        self._goal, self._nearest, self._due_ns, self._halts, self._fastest = math.nan, math.inf, 0, 0, 0.0
+        self._before_ns, self._odd = 0, False
+        self._rest = self._came = b""
+        self._asked_ns: int | None = None
         super().__init__(settings)
         self.homed = False
         """Whether positions mean anything, and limits hold."""
@@ -228,6 +239,10 @@ class Positioner(Driver):
     def halt(self) -> None:
         """Begin to brake and hold, whatever is under way."""
 
+    def halt_harder(self) -> None:
+        """Let it stand by a stronger means, such as a reset, after `HALTS` halts in vain; raises if there is none."""
+        raise PositionerError(f"It was halted {HALTS} times, and goes on.", hint="Cut its supply.")
+
     @abstractmethod
     def update(self, timeout_s: float = 0.0) -> None:
         """Carry on what is under way, waiting at most `timeout_s` for the controller; read the state."""
@@ -274,56 +289,117 @@ class Positioner(Driver):
 
     # What a subclass calls --------------------------------------------------------------------------------------------
 
-    def begin(self, target: float = math.nan) -> None:
-        """Note that a move to a target was sent; NaN: to where it will stand, infinity: not before :meth:`begin`."""
-        self._moving, self._goal, self._retreats = True, target, False
+    def begin(self, target: float = math.nan, speed: float | None = None) -> None:
+        """Note that a move to a target was sent, at a speed (None: not told); it has a deadline from now on.
+
+        That is what its way takes, and later as long as it comes nearer. NaN: it was halted, and stands somewhere;
+        infinity: it is being homed, until the next call of this method.
+        """
+        facts, halted = self.facts, math.isnan(target)
+        if not (halted and self._fastest):
+            self._fastest = speed or max(facts.speed, facts.retreat_speed)
+        seconds = facts.stop_latency_s + self._fastest / facts.acceleration if halted else math.inf
+        if math.isfinite(target) and self.homed:
+            seconds = facts.seconds(target - self.position, speed or facts.speed)
+        self._halts = self._halts + 1 if halted else 0
+        self._moving, self._goal, self._nearest, self._retreats = True, target, math.inf, False
+        self._due_ns = self.clock() + round(1e9 * (seconds if math.isfinite(seconds) else HOMING_S))
 
     def see(self, t_ns: int, position: float, *, idle: bool) -> None:
         """Note an answer: when and where, and whether the controller says that it stands.
 
         A move has ended when the controller stands at its target; one that says so before it has begun is not believed.
+        A halt has ended when it stands and the position is that of the answer before. What is homed and goes on after
+        the time of braking is halted again.
         """
-        there = math.isnan(self._goal) or abs(position - self._goal) <= self.facts.near
-        self.note(PositionerState(t_ns, position, position if math.isnan(self._goal) else self._goal))
-        if idle and there:
-            self._moving = False
+        last, halted, facts = self.position, math.isnan(self._goal), self.facts
+        self.note(PositionerState(t_ns, position, position if halted else self._goal))
+        off = abs(position - (last if halted else self._goal))
+        if idle and off <= (facts.resolution if halted else facts.near):
+            self._moving, self._halts = False, 0
             if self._retreats:
-                self.move_to(self.facts.retreat, self.facts.retreat_speed)
+                self.move_to(facts.retreat, facts.retreat_speed)
+        elif off < self._nearest - facts.resolution and not halted:
+            self._nearest, self._due_ns = off, max(self._due_ns, t_ns + round(1e9 * SETTLE_S))
+        elif self._moving and halted and self.homed and t_ns > self._due_ns:
+            retreats = self._retreats
+            (self.halt if self._halts < HALTS else self.halt_harder)()
+            self._retreats = retreats
 
     def lines(self, question: bytes, timeout_s: float) -> list[bytes]:
         """Ask a controller on a ByteLink, unless an answer is out; return the lines that have come.
 
-        The caller calls :meth:`answered` with the answer. Raises PositionerSilentError if that takes `SILENT_S`.
+        The caller calls :meth:`answered` with the answer. An empty question asks nothing, and waits for nothing. Raises
+        PositionerSilentError if an answer takes `SILENT_S`.
         """
-        if not self._asked_ns:
+        if question and self._asked_ns is None:
             self.link.write(question)
             self._asked_ns = self.clock()
-        try:
+        with suppress(LinkTimeout):
             self._rest += self.link.read(timeout_s).data
-        except LinkTimeout:
-            if self.clock() - self._asked_ns > 1e9 * SILENT_S:
-                self._asked_ns = 0
-                raise PositionerSilentError(f"{self.device} does not answer {question!r}.") from None
         *lines, self._rest = self._rest.split(b"\n")
+        self._came = lines[-1] if lines else self._came
+        patience_s = 2 * SILENT_S if lines else SILENT_S  # the answer may be among them
+        if self._asked_ns is not None and self.clock() - self._asked_ns > 1e9 * patience_s:
+            self._asked_ns = None
+            raise PositionerSilentError(
+                f"{self.device} does not answer {question!r}; the last that came is {self._came!r}.",
+                hint="Check the port, its baud rate, and that this is the controller that the driver is for.",
+            )
         return lines
 
     def answered(self) -> None:
         """Note that the answer has come: the next call of :meth:`lines` asks again."""
-        self._asked_ns = 0
+        self._asked_ns = None
 
     def finish(self, stop: Callable[[], bool]) -> None:
-        """Wait for the end of a move; halts and raises PositionerError if `stop` says so."""
+        """Wait for the end of a move; halts and raises PositionerError if `stop` says so, or it lasts too long."""
         while self.moving:
             self.update(0.05)
+            self._end_in_time()
             if stop():
                 self.halt()
                 raise PositionerError("The axis was told to stand.")
 
+    def _end_in_time(self) -> None:
+        """Raise PositionerError for a move that has not ended in its time; what was halted is seen to by `see`."""
+        if self._moving and self.clock() > self._due_ns and not math.isnan(self._goal):
+            self._due_ns = self.clock() + round(1e9 * SETTLE_S)
+            raise PositionerError(
+                f"It has not come {'home' if math.isinf(self._goal) else f'to {self._goal:g}'} in its time, and is at "
+                f"{self.position:g}.",
+                hint="See what is in its way, and whether units and speed in the rig file are the controller's.",
+            )
+
     def note(self, state: PositionerState) -> None:
-        """Keep a state that was read."""
-        self.state = state
+        """Keep a state that was read.
+
+        A position further from the last one than it can have gone since is kept only with a second one like it.
+
+        Raises
+        ------
+        PositionerError
+            If so: it has lost its place, and is no longer homed.
+        """
+        last, facts, far = self.state, self.facts, False
+        if last is not None and self.homed and self.enabled:
+            # Each question is sent after the answer before: no more time has passed between the two places than since
+            # the last answer but one.
+            most = FASTER * max(self._fastest, facts.speed) * 1e-9 * (state.t_ns - self._before_ns)
+            far = abs(state.position - last.position) > most + facts.near
+        if far and not self._odd:
+            self._odd = True
+            return
+        self._before_ns, self.state, self._odd = 0 if last is None else last.t_ns, state, False
         self._unread.append(state)
         del self._unread[:-1000]
+        if far and last is not None:
+            self.homed = False
+            raise PositionerError(
+                f"Its position has gone from {last.position:g} to {state.position:g}, faster than it moves: it has "
+                "lost its place, or was started anew.",
+                hint="See that nothing is touched, and home it anew.",
+            )
 
     def check_move(self, position: float) -> None:
         """Raise NotReadyError unless a move to a position may begin now."""
@@ -382,6 +458,7 @@ class Positioner(Driver):
         """Return the states that were read since the last call, and carry a move on; raises as :meth:`update`."""
         until_ns = self.clock() + round(1e9 * timeout_s)
         self.update(timeout_s)
+        self._end_in_time()
         while not self._unread and (left_ns := until_ns - self.clock()) > 0:
             self.update(1e-9 * left_ns)
         states, self._unread = self._unread, []

@@ -9,11 +9,22 @@ The surface is found first: a quick way to where it cannot be yet, a slow one un
 touched, a small force kept for a while. From there the motor lifts the indenter off for the scene's unloaded hold, goes
 back, and follows the scene's profile. Touch is found on the raw force; the force is regulated on the filtered one. The
 guard looks at the raw force by itself, and retreats by itself.
+
+Place and force are believed only as far as they agree (derived; k is a stiffness, x a way into the skin):
+
+- before the surface can be reached the mean force is zero; it is touched at the latest where the softest declared skin
+  has been; after lifting off the mean force is zero again;
+- on the ramp, x further in than at any place passed since the skin was touched, the mean force has grown by softest k x
+  to stiffest k x, but for twice the largest mean without touch, which is above the noise of a mean. So a force that has
+  ceased to answer is noticed after 2 mean/softest k.
+
+A wrong scale of the force is inside these limits: it is found by the check of the force chain alone.
 """
 
 from __future__ import annotations
 
 import math
+from collections import deque
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
@@ -24,9 +35,10 @@ from tactbench.devices.guard_messages import Beat, CommandKind, GuardState, Repo
 
 OFF_S = 1.0
 """The force may be out of the band of errors for so long, less half of the time within it: a swing counts, too."""
-SLOW = 1.5
-"""How many times as long as its way takes a move may last, and `SLACK_S` longer."""
-SLACK_S = 2.0
+OFF_SKIN_S = 2.0
+"""For so long after lifting off the mean force may take to be none: a skin comes back (assumed)."""
+MOST_PERIODS = 3
+"""That a control period may count for in the force law where the program stood still."""
 
 
 class PressState(StrEnum):
@@ -61,16 +73,21 @@ class PressPlan:
     """Largest increment of a control period."""
     near_m: float
     """Where the axis goes over to the speed of touching: above where the surface can be."""
-    deepest_m: float
-    """The greatest position that is ever asked for."""
+    found_m: float
+    """Where the softest skin must have been touched: below where the surface can be."""
     speed_m_s: float
     """To `near_m`."""
     touch_speed_m_s: float
     """From there on."""
     unload_speed_m_s: float
     mean_n: float
-    """A touch: the mean of the raw forces of the last `mean_s` above it; the guard stops at single ones."""
-    mean_s: float
+    """A touch: the mean of the newest `mean_count` raw forces above it; the guard stops at single ones. Also the
+    largest mean without touch."""
+    mean_count: int
+    softest_n_m: float
+    """The least force per way into any skin, from a touch on."""
+    stiffest_n_m: float
+    """The greatest."""
     contact_n: float
     """Force that is kept after the touch until the surface is known; and the least on the ramp."""
     settle_s: float
@@ -79,11 +96,6 @@ class PressPlan:
     """How far the axis goes back from there for the unloaded hold."""
     error_band_n: float
     """Filtered force this far from the wanted one for `OFF_S`: retreat."""
-    band_n: float
-    """Filtered forces below it count as no force."""
-    lost_s: float
-    """Contact is lost, which ends the press, if the force is in the band for so long while more than twice the band is
-    wanted."""
 
 
 @dataclass(frozen=True)
@@ -132,13 +144,15 @@ class Press:
         self.touch_n = 0.0
         self.setpoint_n = 0.0
         self._plan, self._course = plan, course
-        self._raw: list[tuple[float, float]] = []
+        self._raw: deque[float] = deque(maxlen=plan.mean_count)
+        self._places: deque[float] = deque(maxlen=plan.mean_count)
+        self._way: list[tuple[float, float, float]] = []
         self._force_n = math.nan
         self._controller: ForceController | None = None
         self._stepped_s = 0.0
-        self._since_s = self._due_s = 0.0
+        self._since_s = 0.0
         self._began_s: float | None = None
-        self._lost_s = self._off_s = 0.0
+        self._off_s = self._standing_s = 0.0
         self._goal: Beat | None = None
         self._requested_s: float | None = None
         self._move(plan.near_m, plan.speed_m_s)
@@ -172,7 +186,7 @@ class Press:
 
     # Stepping ---------------------------------------------------------------------------------------------------------
 
-    def step(self, report: Report, raw: Sequence[tuple[float, float]], now_s: float) -> Beat:
+    def step(self, report: Report, raw: Sequence[float], now_s: float) -> Beat:
         """Go on by one control period.
 
         Parameters
@@ -180,11 +194,11 @@ class Press:
         report
             What the guard answered last.
         raw
-            Seconds and raw pressing forces [N] that have come since the last step, the zero subtracted.
+            Raw pressing forces [N] that have come since the last step, the zero subtracted.
         now_s
             On the rig's clock.
         """
-        self._take(raw, now_s)
+        self._take(raw, report.position_m)
         if report.state in (GuardState.RETREATING, GuardState.RETREATED, GuardState.FAULT):
             return self._guarded(report, now_s)
         match self.state:
@@ -202,19 +216,19 @@ class Press:
                 return Beat(command=CommandKind.RETREAT)
         return self._asking(report, now_s)
 
-    def _take(self, raw: Sequence[tuple[float, float]], now_s: float) -> None:
-        """Keep the raw forces of the last moment, the newest, and the largest of a touch."""
-        self._raw += raw
+    def _take(self, raw: Sequence[float], position_m: float) -> None:
+        """Keep the newest raw forces, where the axis was then, and the largest force of a touch."""
+        self._raw.extend(raw)
+        self._places.extend([position_m] * len(raw))
         if raw:
-            self._force_n = raw[-1][1]
+            self._force_n = raw[-1]
         if self.state in (PressState.APPROACH, PressState.CONTACT):
-            self.touch_n = max(self.touch_n, *(force for _, force in raw), 0.0)
-        self._raw = [sample for sample in self._raw if sample[0] >= now_s - self._plan.mean_s]
+            self.touch_n = max(self.touch_n, *raw, 0.0)
 
     @property
     def mean_n(self) -> float:
-        """Mean of the raw forces of the last `mean_s` [N]; NaN: there are none."""
-        return fmean(force for _, force in self._raw) if self._raw else math.nan
+        """Mean of the newest `mean_count` raw forces [N]; NaN: not so many have come yet."""
+        return fmean(self._raw) if len(self._raw) == self._raw.maxlen else math.nan
 
     def _guarded(self, report: Report, now_s: float) -> Beat:
         if self.state is not PressState.RETREAT and not self.over:
@@ -228,7 +242,7 @@ class Press:
     def _enter(self, state: PressState, now_s: float) -> None:
         self.state, self._since_s = state, now_s
         self._goal = self._requested_s = None
-        self._lost_s = self._off_s = 0.0
+        self._off_s = self._standing_s = 0.0
 
     # Moves ------------------------------------------------------------------------------------------------------------
 
@@ -243,9 +257,6 @@ class Press:
         if report.moving and self._goal.command is not CommandKind.STOP:
             return Beat()
         self._requested_s = now_s
-        if self._goal.command is CommandKind.MOVE_TO:
-            way_m = abs(self._goal.position_m - report.position_m)
-            self._due_s = now_s + SLOW * way_m / self._goal.speed_m_s + SLACK_S
         return self._goal
 
     def _arrived(self, report: Report, now_s: float) -> bool:
@@ -255,11 +266,7 @@ class Press:
         if not report.accepted:
             self._requested_s = None
             return False
-        if report.moving:
-            if now_s > self._due_s:
-                self.fail(f"the motor did not arrive at {1e3 * self._goal.position_m:.3f} mm in its time")
-            return False
-        return True
+        return not report.moving
 
     def _approach(self, report: Report, now_s: float) -> None:
         plan, goal = self._plan, self._goal
@@ -267,16 +274,25 @@ class Press:
             if not report.moving and (goal is None or self._requested_s is not None):
                 self._begin_loop(PressState.CONTACT, report, now_s)
             return
-        slowly = goal.position_m == plan.deepest_m
-        if slowly and self._requested_s is not None and (report.touched or self.mean_n > plan.mean_n):
+        slowly, mean_n = goal.position_m == plan.found_m, self.mean_n
+        begun = self._requested_s is not None
+        touched = begun and (report.touched or mean_n > plan.mean_n)
+        if not slowly and (touched or mean_n < -plan.mean_n):
+            read_n = report.force_n if report.touched else mean_n
+            at_mm, near_mm = 1e3 * report.position_m, 1e3 * plan.near_m
+            self.fail(
+                f"the force reads {read_n:.2f} N at {at_mm:.3f} mm, before {near_mm:.3f} mm, where the surface can be: "
+                "something is in the way, the motor's place is wrong, or the zero was taken under load"
+            )
+        elif touched:
             # The guard has stopped it at a single touch; a mean that is reached is stopped here.
             self._goal = None if report.touched else Beat(command=CommandKind.STOP)
             self._requested_s = None
         elif self._arrived(report, now_s):
             if not slowly:
-                self._move(plan.deepest_m, plan.touch_speed_m_s)
+                self._move(plan.found_m, plan.touch_speed_m_s)
             else:
-                self.fail(f"no contact down to {1e3 * report.position_m:.3f} mm")
+                self.fail(f"no touch down to {1e3 * report.position_m:.3f} mm, where the file says the surface is")
 
     def _on_the_way(self, report: Report, now_s: float) -> None:
         """Go over to the next state where a move ends; on the way back to the skin also at a touch."""
@@ -284,22 +300,29 @@ class Press:
             return
         if report.moving:
             return
-        match self.state:
-            case PressState.LIFT:
-                self._enter(PressState.UNLOADED, now_s)
-            case PressState.UNLOAD:
-                if self.mean_n < self._plan.band_n:
-                    self._enter(PressState.DONE, now_s)
-                elif now_s > self._due_s + SLACK_S:
-                    self.fail(f"{self.mean_n:.2f} N are left after unloading")
-            case _:
-                self._begin_loop(PressState.RAMP, report, now_s)
+        if self.state is PressState.RETURN:
+            self._begin_loop(PressState.RAMP, report, now_s)
+            return
+        if not self._standing_s:
+            self._standing_s = now_s
+            self._raw.clear()
+        if abs(self.mean_n) < self._plan.mean_n:
+            self._enter(PressState.UNLOADED if self.state is PressState.LIFT else PressState.DONE, now_s)
+        elif now_s > self._standing_s + OFF_SKIN_S and not math.isnan(self.mean_n):
+            self.fail(
+                f"{self.mean_n:.2f} N are left after lifting off: the zero was taken under load or has drifted, or the "
+                "indenter is not off"
+            )
 
     # Under force ------------------------------------------------------------------------------------------------------
 
     def _begin_loop(self, state: PressState, report: Report, now_s: float) -> None:
         self._enter(state, now_s)
-        self._controller, self._stepped_s = ForceController(self._plan.law, self._force_n, report.position_m), now_s
+        # A single sample has much noise, which the filter would take for a change of the force.
+        force_n = self._force_n if math.isnan(self.mean_n) else self.mean_n
+        self._controller, self._stepped_s = ForceController(self._plan.law, force_n, report.position_m), now_s
+        self._raw.clear()
+        self._places.clear()
 
     def _setpoint(self, now_s: float) -> tuple[float, float]:
         least = self._plan.contact_n
@@ -313,10 +336,14 @@ class Press:
     def _regulated(self, report: Report, now_s: float) -> Beat:
         controller, plan = self._controller, self._plan
         assert controller is not None
-        passed_s, self._stepped_s = now_s - self._stepped_s, now_s
+        # After a longer standstill it is not known what the force was meanwhile.
+        passed_s, self._stepped_s = min(now_s - self._stepped_s, MOST_PERIODS * plan.law.period_s), now_s
         self.setpoint_n, slope = self._setpoint(now_s)
         controller.step(self._force_n, report.position_m, passed_s, self.setpoint_n, slope)
         if self.state is PressState.CONTACT:
+            if report.position_m > plan.found_m + plan.step_m:
+                self.fail(f"the force kept after the touch is not found down to {1e3 * report.position_m:.3f} mm")
+                return Beat(command=CommandKind.RETREAT)
             if now_s - self._since_s >= plan.settle_s:
                 self.contact_m = controller.target
                 self._enter(PressState.LIFT, now_s)
@@ -334,14 +361,31 @@ class Press:
         return Beat(command=CommandKind.STEP, distance_m=min(max(way, -plan.step_m), plan.step_m))
 
     def _kept(self, filtered_n: float, passed_s: float) -> bool:
-        """Return whether force and contact are as they should be; else see to what follows."""
+        """Return whether force and place are as they should be; else see to what follows."""
         plan = self._plan
-        contact_lost = filtered_n < plan.band_n and self.setpoint_n > 2 * plan.band_n
-        self._lost_s = self._lost_s + passed_s if contact_lost else 0.0
+        self._agree(self.mean_n, fmean(self._places) if self._places else math.nan)
         off = abs(filtered_n - self.setpoint_n) > plan.error_band_n
         self._off_s = max(0.0, self._off_s + (passed_s if off else -0.5 * passed_s))
-        if self._lost_s >= plan.lost_s:
-            self.fail(f"contact was lost, at {self.setpoint_n:.2f} N")
-        elif self._off_s >= OFF_S:
+        if self._off_s >= OFF_S:
             self.fail(f"the force was off by more than {plan.error_band_n:g} N, at {self.setpoint_n:.2f} N")
         return not self.ended
+
+    def _agree(self, force_n: float, place_m: float) -> None:
+        """Fail unless the force has grown with the way as declared skins allow, from every place passed on this way in.
+
+        Of each of these places are kept: the place, and of it and those before the largest force above the softest
+        skin's, and the least above the stiffest's. Force and place are means of the same time.
+        """
+        plan, way = self._plan, self._way
+        if math.isnan(force_n) or place_m < self.contact_m:
+            return
+        while way and way[-1][0] >= place_m:
+            way.pop()
+        soft_n, stiff_n = force_n - plan.softest_n_m * place_m, force_n - plan.stiffest_n_m * place_m
+        _, most_n, least_n = way[-1] if way else (place_m, soft_n, stiff_n)
+        lacking = "less than on the softest declared skin: contact is lost, or the force sensor does not answer"
+        excessive = "more than on the stiffest declared skin: the zero drifts, or something else is touched"
+        for wrong_n, said in ((most_n - soft_n, lacking), (stiff_n - least_n, excessive)):
+            if wrong_n > 2 * plan.mean_n:
+                self.fail(f"{force_n:.2f} N at {1e3 * place_m:.3f} mm are {wrong_n:.2f} N {said}")
+        way.append((place_m, max(most_n, soft_n), min(least_n, stiff_n)))

@@ -34,8 +34,10 @@ def with_sensor(file: RigFile, sensor: str) -> RigFile:
     return file.model_copy(update={"sensors": {sensor: file.sensors[sensor]}})
 
 
-def ask_operator(file: RigFile, operator: Operator | None, doing: str, text: str) -> None:
-    """Let somebody do at the rig what `text` says, in a word `doing`; devices that are all emulated need nobody.
+def ask_operator(file: RigFile, operator: Operator | None, doing: str, text: str) -> bool:
+    """Let somebody do at the rig what `text` says, in a word `doing`; return whether it was done.
+
+    Devices that are all emulated need nobody.
 
     Raises
     ------
@@ -44,13 +46,14 @@ def ask_operator(file: RigFile, operator: Operator | None, doing: str, text: str
     """
     told = bool(file.emulation.control)
     if all(entry.emulated or (entry.emulator and told) for entry in file.entries().values()):
-        return
+        return False
     if operator is None:
         raise RigError(
             f"Somebody has to {doing}: {text}",
             hint="Start it at a terminal, or use a rig file with emulated devices.",
         )
     operator.prompt(text)
+    return True
 
 
 def emulators_of(file: RigFile, registry: Registry, sensor: str, senses: Senses) -> dict[str, EmulatedDevice]:

@@ -29,6 +29,7 @@ if TYPE_CHECKING:
         fault_concerns,
     )
     from tactbench.devices.force_loop import ForceLaw, LoopModel
+    from tactbench.devices.force_watch import samples
     from tactbench.devices.guard import LocalGuard, largest_force_n
     from tactbench.devices.guard_messages import (
         Beat,
@@ -40,6 +41,7 @@ if TYPE_CHECKING:
     )
     from tactbench.devices.guard_process import DeviceSettings, Guard, GuardProcess, ProcessSettings
     from tactbench.devices.positioner import (
+        HOMING_S,
         NotReadyError,
         Positioner,
         PositionerError,
@@ -71,6 +73,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "FORCE",
+    "HOMING_S",
     "Beat",
     "ByteLink",
     "CanFrame",
@@ -150,6 +153,7 @@ __all__ = [
     "read_can_log",
     "read_options",
     "running",
+    "samples",
     "with_sensor",
 ]
 

@@ -129,6 +129,8 @@ class PressEmulators(RigEmulators):
         self._file, self._settings = file, settings_of(file)
         self.press: EmulatedPress | None = None
         """The scene that is carried out; None: nothing is pressed."""
+        self.pushed_n = 0.0
+        """Force of a push by hand on the force sensor, beside that of the skin."""
         self._motor: Any = None
         limited = with_limits(file, self._settings, registry)
         devices: dict[str, EmulatedDevice] = {}
@@ -161,7 +163,8 @@ class PressEmulators(RigEmulators):
 
     def _sensed(self, t_s: float) -> Mapping[str, float]:
         position_m = -math.inf if self._motor is None else self._motor.position_m
-        return {} if self.press is None else self.press.sensed(t_s, position_m)
+        found = {} if self.press is None else self.press.sensed(t_s, position_m)
+        return {**found, FORCE: found.get(FORCE, 0.0) + self.pushed_n}
 
     def _force_n(self, position_m: float) -> float:
         return 0.0 if self.press is None else self.press.force_n(position_m)

@@ -6,6 +6,7 @@ import math
 from collections.abc import Iterator, Mapping
 from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass, field
+from functools import partial
 from itertools import chain
 from typing import TYPE_CHECKING
 from weakref import finalize
@@ -151,8 +152,9 @@ class PressAcquisition:
     @property
     def ended(self) -> str:
         """Why it ended before its time; empty: it did not."""
-        press = self.control.press
-        return "; ".join(filter(None, (press.ended, press.not_out))) or self.reading.ended
+        press, late = self.control.press, self.control.late
+        said = f"{press.ended} ({late} control periods began late)" if press.ended and late else press.ended
+        return "; ".join(filter(None, (said, press.not_out))) or self.reading.ended
 
 
 class ParallelManipulator(Rig):
@@ -250,12 +252,10 @@ class ParallelManipulator(Rig):
     ) -> PressAcquisition:
         """Return the scene, ready to begin; `stack` closes what is its own."""
         settings, guard, clock, profile = self.settings, session.guard, session.clock, scene.profile
-        guard.disarm()  # of the scene before, if that ended in a fault
-        platform_m = session.travel(xy_m)
+        ask = partial(ask_operator, with_sensor(self._file, sensor.name), self._operator)
+        platform_m = session.travel(xy_m, ask)
         duration_s = profile.duration.to("s")
-        ask_operator(
-            with_sensor(self._file, sensor.name),
-            self._operator,
+        ask(
             "mount a cap",
             f"{scene.name}: {sensor.spec.title}. Mount the {scene.indenter}, take your hands out, and say so. Then it "
             f"is pressed to {profile.largest_n:g} N within {duration_s:.0f} s; Ctrl-C retreats.",
@@ -264,7 +264,7 @@ class ParallelManipulator(Rig):
         stack.callback(driver.close)
         identity = {**session.identity, sensor.name: driver.identify()}
         force, zero, limits = session.measured_limits()
-        press = Press(settings.press_plan(self._facts.resolution), _course(scene))
+        press = Press(settings.press_plan(self._facts.resolution, guard.force_stream), _course(scene))
         control: Control | None = None
 
         def carry(until_ns: int) -> None:
@@ -300,6 +300,7 @@ class ParallelManipulator(Rig):
                 **({} if simulated is None else simulated.drawn),
                 **{f"{name} {key}": value for name, about in identity.items() for key, value in about.items()},
                 **force.about(zero),
+                "force chain": session.checked,
                 "place x mm": placement.x.to("mm"),
                 "place s mm": placement.s.to("mm"),
                 **({} if platform_m is None else {"platform mm": ", ".join(f"{1e3 * x:.4f}" for x in platform_m)}),

@@ -59,6 +59,7 @@ def check(file: RigFile) -> RigCheck:
     settings, registry = settings_of(file), load_registry()
     file = with_limits(file, settings, registry)
     problems: list[str] = []
+    drive_n: float | None = None
     facts: dict[str, PositionerFacts] = {}
     axes: list[tuple[str, ...]] = []
 
@@ -73,6 +74,7 @@ def check(file: RigFile) -> RigCheck:
     for name in axes_of(settings):
         kind, given = positioner_of(registry, name, file.devices[name])
         options = read_options(kind.options_kind, given, name)
+        drive_n = options.largest_force_n if name == MOTOR else drive_n
         try:
             facts[name] = kind.facts_of(options)
         except RigError as error:
@@ -85,7 +87,7 @@ def check(file: RigFile) -> RigCheck:
             for speed_mm_s in settings.speeds_mm_s:
                 refusing(partial(options.speed, 1e-3 * speed_mm_s))
             problems += _line_problems(settings, options)
-    forces, found = _forces(settings, facts)
+    forces, found = _forces(settings, facts, drive_n)
     problems += found
     loop = settings.force_loop.model(settings.limits.travel_mm)
     used = 1e3 * settings.stiffness.greatest_n_mm / loop.largest_stiffness()
@@ -199,7 +201,9 @@ def _line_problems(settings: RigSettings, options: FaulhaberOptions) -> list[str
     ]
 
 
-def _forces(settings: RigSettings, facts: Mapping[str, PositionerFacts]) -> tuple[list[tuple[str, str]], list[str]]:
+def _forces(
+    settings: RigSettings, facts: Mapping[str, PositionerFacts], drive_n: float | None
+) -> tuple[list[tuple[str, str]], list[str]]:
     """Return how large the force may become, and what is wrong if that is more than is rated or allowed.
 
     A reaction is as late as the rig file allows: the force has the largest age that the guard accepts.
@@ -223,6 +227,12 @@ def _forces(settings: RigSettings, facts: Mapping[str, PositionerFacts]) -> tupl
         for name, one in facts.items()
         if name != MOTOR
     ]
+    # The way until a force that reads wrong is noticed: of the approach, and on the ramp (see `devices.press`).
+    way_m = max(
+        settings.found_m - settings.surface_m + 1e-3 * settings.heights.tolerance_mm,
+        2 * settings.touch_way_m + 1e-6 * touch.mean_ms * settings.force_loop.speed_mm_s,
+    )
+    lying = min(by_approach + k * way_m, drive_n or float("inf"))
     rows = [
         (
             "reaction",
@@ -231,6 +241,10 @@ def _forces(settings: RigSettings, facts: Mapping[str, PositionerFacts]) -> tupl
         ),
         ("under force control", f"{by_step:.2f} N: ceiling, one increment and the corridor"),
         ("in an approach that misses the touch", f"{by_approach:.2f} N: ceiling and reaction"),
+        (
+            "where the force sensor ceases to answer",
+            f"{lying:.2f} N, at most the drive's: noticed after {1e3 * way_m:.2f} mm",
+        ),
         ("first touch", f"{first:.2f} N, {touch.allowed_n:g} N are allowed"),
         ("way into the skin of an approach whose guard dies", f"{1e3 * slow * unguarded_s:.2f} mm: two heartbeats"),
         *([("of a rail that runs down on something", f"{max(rails):.2f} N")] if rails else ()),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable, Mapping
 from contextlib import ExitStack
@@ -34,9 +35,13 @@ from tactbench.rigs.parallel_manipulator.settings import JOINTS, axes_of, settin
 from tactbench.rigs.parallel_manipulator.workspace import Place, way, way_points
 
 if TYPE_CHECKING:
-    from tactbench.plugin import FloatArray
+    from tactbench.plugin import Block, FloatArray
     from tactbench.plugin.devices import Clock, Link
 
+CHECK_S = 1.0
+"""For so long the force of a push by hand is averaged."""
+CHECK_FACTOR = 1.5
+"""By which what is read of it may differ: a hand is no better; a wrong unit is further off (assumed)."""
 NEAR_M = 0.2e-3
 """How far the measured place may be from where it was sent (assumed: three rails, each within a drive's corridor)."""
 
@@ -66,6 +71,8 @@ class Session:
         self._registry, self._stack = registry, ExitStack()
         self.emulators: PressEmulators | None = None
         self.emulated: EmulatedDevices | None = None
+        self.checked = ""
+        """What became of the check of the force chain; empty: it is still to be made."""
         self.clock: Clock = time.monotonic_ns
         self._links: Mapping[str, Callable[[], Link]] = {}
         self._file = with_limits(file, self.settings, registry).checked_for_one_clock()
@@ -105,22 +112,24 @@ class Session:
 
     # A scene's beginning ----------------------------------------------------------------------------------------------
 
-    def measured_limits(self) -> tuple[PressingForce, dict[str, FloatArray], Limits]:
-        """Take the force sensor's zero, nothing being armed; return it, and what the guard is to keep."""
+    def measured_limits(self, *, confirmed: bool = False) -> tuple[PressingForce, dict[str, FloatArray], Limits]:
+        """Take the force sensor's zero, nothing being armed; return it, and what the guard is to keep.
+
+        `confirmed`: whether an operator has seen that the indenter is clear of the sensor.
+        """
         assert self._file.force is not None
-        guard, settings, stream = self.guard, self.settings, self.guard.force_stream
+        settings, stream = self.settings, self.guard.force_stream
         force = PressingForce(self._file.force, (stream,))
-        since_ns = self.clock()
-        guard.advance(since_ns + round(1e9 * self._file.force.zero_s))
-        # Not what has waited since nobody took it.
-        fresh = (block.rows(block.t_ns >= since_ns) for block in guard.force_blocks() if block.t_ns is not None)
-        zero = force.zero(fresh)[stream.name]
+        zero = force.zero(self._fresh(self._file.force.zero_s))[stream.name]
         limits, touch = settings.limits, settings.touch
         kept = Limits(
             force_ceiling_n=limits.force_ceiling_n,
             travel_ceiling_n=limits.travel_ceiling_n,
             torque_ceiling_nm=limits.torque_ceiling_nm,
             touch_n=touch.single_n,
+            clear_n=touch.mean_n,
+            clear_s=1e-3 * touch.mean_ms,
+            confirmed=confirmed,
             travel_m=(1e-3 * limits.travel_mm[0], 1e-3 * limits.travel_mm[1]),
             step_m=settings.force_loop.step_m,
             speed_m_s=1e-3 * max(touch.speed_mm_s, settings.press.unload_speed_mm_s),
@@ -132,18 +141,43 @@ class Session:
         )
         return force, {stream.name: zero}, kept
 
-    def travel(self, xy_m: tuple[float, float]) -> Place | None:
+    def _fresh(self, seconds: float) -> list[Block]:
+        """Return the force samples that are received in the next seconds, and none from before."""
+        since_ns = self.clock()
+        self.guard.advance(since_ns + round(1e9 * seconds))
+        return [block.rows(block.t_ns >= since_ns) for block in self.guard.force_blocks() if block.t_ns is not None]
+
+    def travel(
+        self, xy_m: tuple[float, float], ask: Callable[[str, str], bool] = lambda doing, text: False
+    ) -> Place | None:
         """Home what is not homed, and move the platform above a place; return where it is then, None: it is fixed.
 
-        The guard is armed meanwhile: it watches the force, with the ceiling of travel, and stops all rails.
+        Before, an operator sees that the indenter is clear of the sensor where that is not known, and the force chain
+        is checked once. The guard is armed meanwhile: it watches the force, with the ceiling of travel, and stops all
+        rails.
+
+        Parameters
+        ----------
+        xy_m
+            The place.
+        ask
+            See :func:`ask_operator`.
 
         Raises
         ------
         RigError
-            If the way is not permitted, the guard has stopped it, or the platform is not where it was sent.
+            If the force of a push is not read, the way is not permitted, the guard has stopped it, or the platform is
+            not where it was sent.
         """
-        _, _, limits = self.measured_limits()
         guard, delta, heights = self.guard, self.settings.manipulator, self.settings.heights
+        if unclear := guard.disarm().unclear:  # of the scene before, if that ended in a fault
+            ask(
+                "see that the indenter is clear of the sensor",
+                f"The indenter is not known to be clear of the sensor: {unclear}. Bring it to its place of retreat by "
+                "hand or by the controller's own means, see that it touches nothing, and say so.",
+            )
+        _, _, limits = self.measured_limits(confirmed=bool(unclear))
+        self.checked = self.checked or self._check_force(limits, ask)
         report = guard.arm(limits)
         if not isinstance(delta, LinearDelta):
             guard.disarm()
@@ -167,6 +201,31 @@ class Session:
                 hint=f"Home {', '.join(JOINTS)}; check the geometry.",
             )
         return place
+
+    def _check_force(self, limits: Limits, ask: Callable[[str, str], bool]) -> str:
+        """Let an operator push the force sensor, and return what was read; raises RigError if that is another force."""
+        push_n = self.settings.press.check_n
+        if push_n is None:
+            return "NOT CHECKED: the rig file has `check_n: null`"
+        what = f"Push the force sensor as a press would, with about {push_n:g} N ({1e3 * push_n / 9.80665:.0f} g)"
+        asked = ask("push the force sensor", f"{what}; hold it for {1 + CHECK_S:g} s, and say so now.")
+        if not asked and self.emulators is None:
+            return "NOT CHECKED: the devices are emulated"
+        if self.emulators is not None:
+            self.emulators.pushed_n = push_n
+        came = [limits.pressing_n(block.data) for block in self._fresh(CHECK_S)]
+        read_n = float(np.mean(np.concatenate(came))) if came else math.nan
+        if self.emulators is not None:
+            self.emulators.pushed_n = 0.0
+        if not push_n / CHECK_FACTOR <= read_n <= push_n * CHECK_FACTOR:
+            raise RigError(
+                f"The force sensor reads {read_n:+.3g} N of a push of about {push_n:g} N: {push_n / CHECK_FACTOR:.2g} "
+                f"to {push_n * CHECK_FACTOR:.2g} N are expected. Nothing has moved.",
+                hint="Correct `sign:` under `force:` where it falls; else unit, counts or calibration (kgf read 0.10, "
+                "lbf 0.22 of the newtons).",
+            )
+        ask("take the hand off", "Take hand or weight off the force sensor again, and say so.")
+        return f"{read_n:.3g} N read of a push of about {push_n:g} N"
 
 
 def _place_m(delta: LinearDelta, positions: Mapping[str, float]) -> Place:

@@ -11,7 +11,7 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, model_validator
 
-from tactbench.plugin import UsageError, load_object
+from tactbench.plugin import StreamSpec, UsageError, load_object
 from tactbench.plugin.devices import (
     ForceLaw,
     LoopModel,
@@ -21,6 +21,7 @@ from tactbench.plugin.devices import (
     PressPlan,
     RigFile,
     read_options,
+    samples,
 )
 from tactbench.rigs.parallel_manipulator.kinematics import LinearDelta
 
@@ -81,6 +82,9 @@ class SafetyLimits(Options):
 class Stiffness(Options):
     """How stiff skin, cap and machine in series are, N/mm; declared, since nobody can compute it beforehand."""
 
+    softest_n_mm: Positive
+    """The least of any skin and cap, from the first touch on: force per way from any place to any deeper one. The less,
+    the later a force that does not answer is noticed; more than a skin has: its presses are ended."""
     at_touch_n_mm: Positive
     """The greatest up to the force that a first touch may have."""
     greatest_n_mm: Positive
@@ -90,9 +94,8 @@ class Stiffness(Options):
 
     @model_validator(mode="after")
     def _in_order(self) -> Self:
-        _rising(
-            self.at_touch_n_mm, self.greatest_n_mm, self.at_ceiling_n_mm, said="at a touch, greatest, at the ceiling"
-        )
+        rising = (self.softest_n_mm, self.at_touch_n_mm, self.greatest_n_mm, self.at_ceiling_n_mm)
+        _rising(*rising, said="the softest, at a touch, greatest, at the ceiling")
         return self
 
 
@@ -149,7 +152,8 @@ class Touch(Options):
     single_n: Positive
     """A touch: two of three raw samples above it. Well above the force sensor's noise."""
     mean_n: Positive
-    """A touch as well: the mean of the raw samples of the last `mean_ms` above it."""
+    """A touch as well: the mean of the newest raw samples, as many as come in `mean_ms`, above it. Also the largest
+    mean without touch: before the surface, after lifting off, and at the place of retreat."""
     mean_ms: Positive
     """One control period or more; the noise of a mean falls with its root."""
     allowed_n: Positive
@@ -167,12 +171,11 @@ class PressRules(Options):
 
     error_band_n: Positive
     """Filtered force this far from the wanted one for a second: retreat."""
-    band_n: Positive
-    """Filtered forces below it count as no force."""
-    lost_s: Positive
-    """Contact is lost after so long without force while more than twice the band is wanted."""
     unload_speed_mm_s: Positive
     """After the scene's ramp."""
+    check_n: Positive | None = 3.0
+    """Push by hand, or weight, with which an operator loads the force sensor before the first press of a session: it
+    must be read with its sign, and within a factor of 1.5. null: not checked, which recordings say."""
     stale_ms: Positive = 100.0
     """The sensor's rows may be this old, as received; older: retreat."""
 
@@ -262,8 +265,11 @@ class RigSettings(Options):
         _rising(touch.single_n, limits.force_ceiling_n, said="a touch in a single sample and the ceiling")
         _rising(touch.touch_speed_mm_s, touch.speed_mm_s, said="the speed of the touch and of the way to it")
         _rising(touch.lift_mm, heights.stand_off_mm, said="lift and stand-off")
-        _rising(self.press.band_n, self.press.error_band_n, said="the band of no force and of errors")
         _rising(deepest_mm, limits.travel_mm[1], said="retreat, stand-off and depth together, and the motor's travel")
+        found_mm = 1e3 * (self.found_m - self.surface_m)
+        _rising(
+            found_mm, heights.depth_mm, said="where the softest skin is touched (mean_n/softest_n_mm) and the depth"
+        )
         return self
 
     @property
@@ -282,26 +288,37 @@ class RigSettings(Options):
         """The greatest position that is ever asked for [m]."""
         return self.surface_m + 1e-3 * self.heights.depth_mm
 
-    def press_plan(self, resolution_m: float) -> PressPlan:
-        """Return the numbers of a press by an axis with a least step [m]."""
+    @property
+    def touch_way_m(self) -> float:
+        """Way into the softest skin until its mean force is a touch [m]."""
+        return 1e-3 * self.touch.mean_n / self.stiffness.softest_n_mm
+
+    @property
+    def found_m(self) -> float:
+        """Position of the motor at which the surface must have been touched [m]: a mean is behind by its time."""
+        behind_m = 1e-6 * self.touch.touch_speed_mm_s * self.touch.mean_ms
+        return self.surface_m + 1e-3 * self.heights.tolerance_mm + self.touch_way_m + behind_m
+
+    def press_plan(self, resolution_m: float, force: StreamSpec) -> PressPlan:
+        """Return the numbers of a press by an axis with a least step [m], and with the stream of a force sensor."""
         touch, press = self.touch, self.press
         return PressPlan(
-            law=self.force_loop.law(self.limits.travel_mm),
+            law=self.force_loop.law((self.limits.travel_mm[0], 1e3 * self.deepest_m)),
             resolution_m=resolution_m,
             step_m=self.force_loop.step_m,
             near_m=self.surface_m - 1e-3 * self.heights.tolerance_mm,
-            deepest_m=self.deepest_m,
+            found_m=self.found_m,
             speed_m_s=1e-3 * touch.speed_mm_s,
             touch_speed_m_s=1e-3 * touch.touch_speed_mm_s,
             unload_speed_m_s=1e-3 * press.unload_speed_mm_s,
             mean_n=touch.mean_n,
-            mean_s=1e-3 * touch.mean_ms,
+            mean_count=samples(force, 1e-3 * touch.mean_ms),
+            softest_n_m=1e3 * self.stiffness.softest_n_mm,
+            stiffest_n_m=1e3 * self.stiffness.at_ceiling_n_mm,
             contact_n=touch.contact_n,
             settle_s=touch.settle_s,
             lift_m=1e-3 * touch.lift_mm,
             error_band_n=press.error_band_n,
-            band_n=press.band_n,
-            lost_s=press.lost_s,
         )
 
 

@@ -1,6 +1,7 @@
 """The guard of the linear motor: the same rules in this process and in one of its own, against emulated devices."""
 
 import math
+import re
 import threading
 from dataclasses import replace
 from itertools import pairwise
@@ -379,6 +380,72 @@ def test_force_while_homing_stops_the_motor(tmp_path, monkeypatch):
         here_m = made.world.position_m
         made.guard.advance(made.clock() + 10**9)
         assert made.world.position_m == pytest.approx(here_m, abs=1e-5)
+
+
+# Out: place and force ------------------------------------------------------------------------------------------------
+
+
+def test_an_axis_is_homed_where_it_stands_only_after_an_operators_word(made):
+    limits, before_m = made.setting.limits, made.world.position_m
+    assert "motor is homed where it stands" in made.guard.disarm().unclear
+    with pytest.raises(GuardRefusesError, match="homed where it stands"):
+        made.guard.arm(replace(limits, confirmed=False))
+    assert made.world.position_m == before_m
+    made.guard.arm(limits)
+    made.guard.disarm()
+    assert made.guard.disarm().unclear == ""
+    assert made.guard.arm(replace(limits, confirmed=False)).state is GuardState.ARMED
+
+
+def test_out_is_place_and_force(made):
+    """The count is apart from the place: at its place of retreat there are 3 N left."""
+    made.press(in_phase("ramp", lambda beat: replace(beat, command=CommandKind.NONE)))
+    made.world.sensed = lambda wrench, at_s: [*wrench[:2], wrench[2] + 3.0, *wrench[3:]]
+    report = made.guard.disarm()
+    assert made.out
+    assert re.match(r"NOT KNOWN TO BE OUT: .* the force is 3\.\d\d N: stand clear", report.not_out)
+    (event,) = [event for event in made.guard.events() if event.trigger is Trigger.NOT_CLEAR]
+    assert event.text == report.not_out
+    made.world.sensed = lambda wrench, at_s: wrench
+    with pytest.raises(GuardRefusesError, match="NOT KNOWN TO BE OUT"):
+        made.guard.arm(replace(made.setting.limits, confirmed=False))
+    assert made.guard.arm(made.setting.limits).not_out == ""
+
+
+def test_what_is_not_known_to_be_out_is_told_to_the_next_guard(tmp_path):
+    kept, limits = tmp_path / "not-out", FAULTS.Setting().limits
+    first = FAULTS.Pressed(FAULTS.Setting()).guard(kept=kept)
+    first.start()
+    first.arm(limits)  # and is killed
+    second = FAULTS.Pressed(FAULTS.Setting()).guard(kept=kept)
+    second.start()
+    assert "not seen to be out since" in second.disarm().unclear
+    with pytest.raises(GuardRefusesError, match="not seen to be out since"):
+        second.arm(replace(limits, confirmed=False))
+    second.arm(limits)
+    assert kept.exists()
+    second.disarm()
+    assert not kept.exists()
+    second.close()
+
+
+def test_a_place_that_jumps_ends_the_press_and_is_no_place_to_retreat_from(made):
+    begun = []
+
+    def jump(beat):
+        if not begun:
+            begun.append(made.world.position_m)
+            made.world.motor.drive._origin_m += 3e-3
+        return beat
+
+    made.press(in_phase("ramp", jump))
+    report = made.ended()
+    assert (report.state, report.trigger) == (GuardState.FAULT, Trigger.AXIS_FAULT)
+    assert any("faster than it moves" in event.text for event in made.guard.events())
+    assert "stand clear" in report.not_out
+    # The drive itself runs to its target by the new count, at 20 mm/s, until the ceiling halts it.
+    bound_n = largest_force_n(6.0, 20e3, 20e-3, 1.0, 4e-3 + made.guard._press.facts.stop_latency_s)
+    assert made.world.largest_n < bound_n
 
 
 # Schedules ------------------------------------------------------------------------------------------------------------

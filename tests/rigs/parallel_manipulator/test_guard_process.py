@@ -59,7 +59,7 @@ def test_who_is_left_lets_the_motor_retreat(name, baud):
     assert triggers == expected
     if name in ("kill guard", "stop guard"):
         (lost,) = [line["lost"] for line in result.said if "lost" in line]
-        where = re.search(r"motor has retreated to (\S+) m\.", lost)
+        where = re.search(r"motor has retreated to (\S+) m, and the force there was not looked at\.", lost)
         # The drive's corridor, or two increments: within it a retreat has arrived.
         assert float(where[1]) == pytest.approx(FAULTS.RETREAT_M, abs=1.01 * FAULTS.STATED["corridor_m"])
     else:

@@ -113,8 +113,17 @@ def test_a_first_touch_stays_within_its_bound(stiffness):
         assert bound <= 0.31
 
 
+def test_a_motor_that_finds_its_place_at_an_end_stop_presses():
+    homing = {"homing": "end-stop", "homing_speed_m_s": -0.002, "homing_current_a": 0.2, "home_m": -4.5e-3}
+    options = {f"devices__motor__options__{name}": value for name, value in homing.items()}
+    found = on_spring(5.0, ramp(1.0, 0.3, 1.5), **(RARER | options))
+    assert found.acquisition.ended == ""
+    assert abs(found.press.contact_m - 1e-3 * found.acquisition.drawn["skin mm"]) < 30e-6
+    assert found.acquisition.drawn["force chain"].endswith("N read of a push of about 3 N")
+
+
 def test_a_motor_that_does_not_come_out_is_said():
-    found = on_spring(5.0, ramp(5.0, 0.5, 20.0), devices__motor__faults=["unplug:start_s=6"], **RARER)
+    found = on_spring(5.0, ramp(5.0, 0.5, 20.0), devices__motor__faults=["unplug:start_s=8"], **RARER)
     assert "in ramp: axis' link is gone" in found.acquisition.ended
     assert "stand clear" in found.acquisition.ended
     assert found.acquisition.stop("stopped by hand") == found.press.not_out != ""
@@ -188,7 +197,9 @@ def test_the_manipulator_goes_to_the_scenes_place_before_it_presses():
     # The motor is homed first and retracts, then one rail after the other; all moves are under the armed guard.
     events = [text.split(": ")[1] for name, text in drawn.items() if name.startswith("event")]
     homed = [f"homing {name}" for name in ("motor", *JOINTS)]
-    assert events[:8] == ["started", *homed, "armed", "disarmed", "armed"]
+    assert events[:7] == ["started", *homed, "armed", "disarmed"]
+    assert re.match(r"out after 0\.\d+ s$", events[7])
+    assert events[8:10] == ["disarmed", "armed"]
 
 
 def test_of_four_drives_of_one_kind_the_error_says_which_joint_is_silent(monkeypatch):

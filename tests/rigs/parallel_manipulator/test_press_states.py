@@ -1,16 +1,21 @@
 """What a press does when the skin gives way, the force is wrong or the guard retreats: the states alone, on a plant."""
 
 import math
+import re
 
 import pytest
 
 from tactbench.devices.guard_messages import Report, Trigger
 from tactbench.devices.press import PressState
+from tactbench.plugin import ChannelSpec, StreamSpec
 from tactbench.plugin.devices import CommandKind, Course, GuardState, Press
 from tactbench.rigs.parallel_manipulator.settings import settings_of
 from tests.rigs.parallel_manipulator.spring import file_of
 
 PERIOD_S = 0.02
+FORCE = StreamSpec(
+    name="force_torque", rate_hz=1 / PERIOD_S, channels=(ChannelSpec(name="fz", kind="force", unit="N"),)
+)
 SETTINGS = settings_of(file_of(settings__force_loop__integral_mm_n_s=1.0))
 COURSE = Course(setpoint_n=lambda s: min(max(0.0, s - 0.5), 3.0), slope_n_s=1.0, ramp_s=0.5, end_s=3.5)
 
@@ -19,7 +24,7 @@ class Plant:
     """A motor that is where it was sent, at its speed, a guard that does what it is told, and a spring of 5 N/mm."""
 
     def __init__(self, settings=SETTINGS):
-        self.press = Press(settings.press_plan(1e-6), COURSE)
+        self.press = Press(settings.press_plan(1e-6, FORCE), COURSE)
         self.settings = settings
         self.skin_m = settings.surface_m
         self.now_s, self.position_m = 0.0, 1e-3 * settings.limits.retreat_mm
@@ -42,7 +47,7 @@ class Plant:
 
     def go(self):
         """Go on by one control period."""
-        command = self.press.step(self.report(), [(self.now_s, self.force_n)], self.now_s)
+        command = self.press.step(self.report(), [self.force_n], self.now_s)
         match command.command:
             case CommandKind.MOVE_TO:
                 self.target_m, self.speed_m_s, self.touched = command.position_m, command.speed_m_s, False
@@ -100,7 +105,7 @@ def test_contact_that_is_lost_ends_the_press():
         plant.go()
     plant.skin_m += 1e-3
     plant.until(PressState.FAILED)
-    assert "contact was lost" in plant.press.ended
+    assert "contact is lost" in plant.press.ended
     assert plant.largest_n < 1.5
 
 
@@ -111,7 +116,7 @@ def test_a_force_far_from_the_wanted_one_ends_the_press_within_a_second():
     plant.force_gain, plant.force_offset_n = 0.0, 6.0  # it does not answer any more
     began_s = plant.now_s
     plant.until(PressState.FAILED, seconds=3.0)
-    assert "off by more than" in plant.press.ended
+    assert "more than on the stiffest declared skin" in plant.press.ended
     # The filter of 2 Hz needs a moment to come so far.
     assert plant.now_s - began_s < 1.5
 
@@ -121,15 +126,16 @@ def test_a_loop_that_swings_ends_the_press():
     settings = settings_of(file_of(settings__force_loop__integral_mm_n_s=400.0, settings__force_loop__speed_mm_s=50.0,
                                    settings__press__error_band_n=0.3))  # fmt: skip
     plant = Plant(settings).begun().until(PressState.FAILED)
-    assert "off by more than" in plant.press.ended
+    # Which comes first depends on where the swing has found the surface.
+    assert re.search("off by more than|contact is lost", plant.press.ended)
 
 
 def test_no_contact_down_to_the_depth_ends_the_press():
     plant = Plant()
     plant.skin_m = 1.0
     plant.until(PressState.FAILED)
-    assert plant.press.ended.startswith("no contact down to")
-    assert plant.position_m <= SETTINGS.deepest_m
+    assert plant.press.ended.startswith("no touch down to")
+    assert plant.position_m <= SETTINGS.found_m
 
 
 @pytest.mark.parametrize("state", [PressState.APPROACH, PressState.CONTACT, PressState.RAMP])

@@ -27,8 +27,9 @@ def written(tmp_path, said):
     return path
 
 
-def test_the_example_is_not_refused_and_nothing_moves(capsys):
-    code, out, _ = run(["doctor", "--seconds", "0", "--rig-file", str(EXAMPLE)], capsys)
+@pytest.mark.parametrize("name", ["emulated.yaml", "fixed.yaml"])
+def test_the_examples_are_not_refused_and_nothing_moves(capsys, name):
+    code, out, _ = run(["doctor", "--seconds", "0", "--rig-file", str(EXAMPLE.with_name(name))], capsys)
     assert code == 0
     for text in ("24.7 N", "Nothing was opened", "share of the largest", "reaction", "holds without power", "ASSUMED"):
         assert text in out
@@ -139,6 +140,17 @@ def test_an_axis_that_is_homed_towards_the_skin_is_refused():
     assert any("joint-2 is homed downwards" in text for text in check(RigFile.model_validate(file)).problems)
 
 
+def test_the_way_until_a_dead_force_is_noticed_is_of_the_softest_skin():
+    def way_mm(softest_n_mm):
+        (_, forces) = check(file_of(settings__stiffness__softest_n_mm=softest_n_mm)).tables
+        return float(dict(forces.rows)["where the force sensor ceases to answer"].split()[-2])
+
+    # Twice the tolerance of 0.4 mm, the way to a mean of 0.1 N, and 0.5 mm/s for the 20 ms of a mean.
+    assert way_mm(2.0) == pytest.approx(0.86, abs=0.005)
+    # On the ramp twice that way, and 0.5 mm/s for the 20 ms of a mean.
+    assert way_mm(0.1) == pytest.approx(2.01, abs=0.005)
+
+
 def test_forces_are_computed_with_the_age_that_the_force_may_have():
     def of_an_approach(age_ms):
         (_, forces) = check(file_of(settings__limits__force_age_ms=age_ms)).tables
@@ -164,6 +176,7 @@ def test_limits_are_stated_once():
         ({"settings__touch__single_n": 9.0}, "the ceiling do not rise"),
         ({"settings__heights__stand_off_mm": 0.3}, "tolerance, stand-off and clearance do not rise"),
         ({"settings__stiffness__at_touch_n_mm": 30.0}, "rise in this order"),
+        ({"settings__stiffness__softest_n_mm": 0.02}, "and the depth do not rise"),
         ({"force": ...}, "has no force"),
     ],
 )

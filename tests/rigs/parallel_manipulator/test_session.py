@@ -80,6 +80,24 @@ def test_the_platform_is_where_it_believes_to_be_scene_after_scene(session):
     assert sum(event.text.startswith("homing") for event in session.guard.events()) == 4
 
 
+def test_an_operator_is_asked_what_the_session_cannot_know_and_once(session):
+    asked = []
+    for _ in range(2):
+        session.travel((0.0, 0.0), lambda doing, text: not asked.append((doing, text)))
+    clear, push, off = asked
+    assert "motor, joint-1, joint-2, joint-3 is homed where it stands" in clear[1]
+    assert "3 N (306 g)" in push[1]
+    assert "Take hand or weight off" in off[1]
+    assert session.checked.endswith("N read of a push of about 3 N")
+
+
+def test_a_check_that_is_left_out_is_named():
+    one = begun(RigFile.model_validate(with_joints(settings__press__check_n=None, **RARER)))
+    one.travel((0.0, 0.0))
+    assert one.checked.startswith("NOT CHECKED")
+    one.close()
+
+
 def test_a_scene_is_the_same_in_its_own_session_each_time():
     rig = ParallelManipulator(FILE, None, ScenePhysics(SpringRig(5.0)))
     icub, found = load_registry().sensors["icub"], []

@@ -8,6 +8,7 @@ from contextlib import suppress
 from dataclasses import dataclass, replace
 
 from tactbench.plugin.devices import (
+    HOMING_S,
     DriverSettings,
     NotReadyError,
     Positioner,
@@ -34,8 +35,6 @@ LONGEST_AHEAD = 24
 """Bytes that may be ahead of a retreat: a question and a move, `TPOS`, `SP10000`, `LA-12345`, `M` and CRs (derived)."""
 TRIES = 5
 """Answers of which two in a row must agree (assumed: damaged lines are rare)."""
-HOMING_S = 60.0
-"""Homing takes no longer (assumed)."""
 AGAIN_S = 0.25
 """After which a rescue is sent once more where the motor does not come nearer (assumed)."""
 
@@ -109,7 +108,8 @@ class FaulhaberDriver(Positioner):
         _required(options)
         bytes_ahead = LONGEST_AHEAD + len(retreat_command(options))
         latency_s = line_time_s(bytes_ahead, options.baud) + LAG_S
-        return replace(super().facts_of(options), resolution=options.increment_m, stop_latency_s=latency_s)
+        facts = replace(super().facts_of(options), resolution=options.increment_m, stop_latency_s=latency_s)
+        return replace(facts, homes_here=options.homing == "here")
 
     # The life of a device ---------------------------------------------------------------------------------------------
 
@@ -290,9 +290,13 @@ class FaulhaberDriver(Positioner):
         return self._go(self._options.increments(position), units)
 
     def halt(self) -> None:
-        """Begin to move to the position that was last read, whatever is under way: it brakes and holds there."""
+        """Begin to move to the position that was last read, whatever is under way: it brakes and holds there.
+
+        Where its place is not known it is told a speed of 0.
+        """
         if self.state is None or not self.homed:
-            raise NotReadyError("The motor's position is not known.", hint="Home it, and read it.")
+            self._exchange.send("V", 0)
+            return
         self._go(self._options.increments(self.position), self._speed or self._usual)
 
     def retreat(self) -> None:
@@ -314,7 +318,7 @@ class FaulhaberDriver(Positioner):
     def _go(self, target: int, speed: int) -> float:
         """Send a move at once, without waiting for answers that are out; return where to [m]."""
         exchange, target_m = self._exchange, self._options.position_m(target)
-        speed_m_s = max(1, speed) * self._options.speed_unit_m_s
+        self._fastest = speed_m_s = max(1, speed) * self._options.speed_unit_m_s
         seconds = self.facts.seconds(target_m - self.position, speed_m_s) + 4.0 * exchange.answer_s
         self._move = move = _Move(target, seconds)
         if speed != self._speed:

@@ -168,5 +168,8 @@ def build(settings: EmulatorSettings) -> MotorEmulator:
         # It has the travel that is stated, counted from where it stands now, and a little more.
         low = min(low, options.lower_m - options.home_m - BEYOND_M)
         high = max(high, options.upper_m - options.home_m + BEYOND_M)
+    if options.homes_towards() < 0 and options.retreat_m is not None and options.upper_m is not None:
+        # It begins at its place of retreat, away from the end stop.
+        low, high = options.home_m - options.retreat_m, options.upper_m - options.retreat_m + BEYOND_M
     faults = [MotorFault.parse(text) for text in settings.faults]
     return MotorEmulator(None, settings.rng, options, stops_m=(low, high), faults=faults)
