@@ -189,6 +189,8 @@ class Positioner(Driver):
         self._before_ns, self._odd = 0, False
         self._rest = self._came = b""
         self._asked_ns: int | None = None
+        self._read_ns = 0
+        """When lines were last read."""
         super().__init__(settings)
         self.homed = False
         """Whether positions mean anything, and limits hold."""
@@ -332,6 +334,7 @@ class Positioner(Driver):
         The caller calls :meth:`answered` with the answer. An empty question asks nothing, and waits for nothing. Raises
         PositionerSilentError if an answer takes `SILENT_S`.
         """
+        unread_s = 1e-9 * (self.clock() - self._read_ns)
         if question and self._asked_ns is None:
             self.link.write(question)
             self._asked_ns = self.clock()
@@ -339,12 +342,14 @@ class Positioner(Driver):
             self._rest += self.link.read(timeout_s).data
         *lines, self._rest = self._rest.split(b"\n")
         self._came = lines[-1] if lines else self._came
-        patience_s = 2 * SILENT_S if lines else SILENT_S  # the answer may be among them
+        self._read_ns = self.clock()
+        patience_s = SILENT_S + (max(SILENT_S, unread_s) if lines else 0.0)  # the answer may be among them
         if self._asked_ns is not None and self.clock() - self._asked_ns > 1e9 * patience_s:
             self._asked_ns = None
             raise PositionerSilentError(
                 f"{self.device} does not answer {question!r}; the last that came is {self._came!r}.",
-                hint="Check the port, its baud rate, and that this is the controller that the driver is for.",
+                hint=f"Check the port, its baud rate, and that this is the controller that the driver is for. "
+                f"{self.link.silence_hint}",
             )
         return lines
 
