@@ -3,17 +3,22 @@
 from __future__ import annotations
 
 import inspect
+import io
 import os
+import random
 import subprocess
 import sys
+import threading
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, redirect_stdout
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from importlib.metadata import EntryPoint
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Literal, NamedTuple, NoReturn, get_args
+
+import numpy as np
 
 from tactbench.core.errors import NotApplicable, PluginError, error_text
 from tactbench.core.plugins import hookspecs
@@ -37,6 +42,10 @@ HEAVY = frozenset({
     "scipy", "serial", "sklearn", "spidev", "tensorflow", "torch", "transformers",
 })  # fmt: skip
 """Packages that take tenths of a second to import, or that need not be installed where plugins are listed."""
+
+
+IMPORT_S, THREAD_S = 1.0, 1.0
+"""How long the import of a plugin may take [s of a processor], and how long a thread may take to end."""
 
 
 class CheckFailed(AssertionError):  # noqa: N818  (a result, as its sibling)
@@ -71,6 +80,8 @@ class CheckOutcome(NamedTuple):
     """What is wrong, or why it was skipped."""
     advice: str = ""
     """What to do; empty where the plugin's code raised: `where` and `text` then say all that is known."""
+    seconds: float | None = None
+    """How long it took; None: it was stopped, or not tried."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -179,6 +190,8 @@ def code_of(field: str, subject: Subject) -> Iterator[None]:
         raise CheckSkipped(f"it says: {reason.message}") from reason
     except (Exception, SystemExit) as error:
         line = line_in(subject.package, error.__traceback__)
+        if isinstance(error, KeyError) and hasattr(subject.spec, "parameters"):
+            field = f"spec.parameters{sorted(subject.spec.parameters)}, {field}"
         raise CheckFailed(f"{field} ({line})" if line else field, error_text(error)) from error
 
 
@@ -209,23 +222,60 @@ def code_names_resolve(subject: Subject) -> None:
             fail(field, f"{where} is a {type(found).__name__}, and something that can be called is needed")
 
 
+_STATES: dict[str, Callable[[], Any]] = {
+    "the global random state of numpy": lambda: np.random.get_state()[1:3],  # noqa: NPY002
+    "the global random state of Python": random.getstate,
+    "how numpy treats floating-point errors": np.geterr,
+    "the current folder": os.getcwd,
+}
+"""What all code of a process shares."""
+
+
+@contextmanager
+def unchanged(subject: Subject) -> Iterator[None]:
+    """Fail where a plugin's code changes what it shares with all others, prints, or lets a thread of a driver run on.
+
+    What it has changed is put back, so that one mistake is found once.
+    """
+    before, threads = {name: repr(state()) for name, state in _STATES.items()}, set(threading.enumerate())
+    with redirect_stdout(io.StringIO()) as printed, np.errstate():
+        yield
+        changed = [name for name, state in _STATES.items() if repr(state()) != before[name]]
+    if changed:
+        fail(subject.package, f"its code changes {changed[0]}: draw from a generator of your own, and set nothing")
+    if printed.getvalue():
+        fail(subject.package, f"its code prints {printed.getvalue()[:40]!r}: results of commands go to stdout")
+    for thread in set(threading.enumerate()) - threads if subject.kind in ("sensor", "device") else ():
+        thread.join(THREAD_S)
+        if thread.is_alive():
+            fail(subject.package, f"the thread {thread.name} runs on: end it in close()")
+
+
 @check(*KINDS)
 def import_is_light(subject: Subject) -> None:
     """The module of an entry point is imported by every command, also by one that only lists names.
 
-    Move imports of large packages into the module that the descriptor names, or into functions.
+    Move imports of large packages into the module that the descriptor names, or into functions; compute and read
+    nothing there.
     """
-    heavy = sorted(HEAVY.intersection(_imported_with(subject.module)))
+    took, *modules = _imported_with(subject.module)
+    heavy = sorted(HEAVY.intersection(modules))
     if heavy:
         fail(subject.module, f"its import also imports {', '.join(heavy)}")
+    if float(took) > IMPORT_S:
+        fail(subject.module, f"its import takes {float(took):.2g} s of a processor, and every command waits for it")
 
 
 @lru_cache(maxsize=64)
 def _imported_with(module: str) -> list[str]:
-    """Return the modules of a fresh interpreter with one; what tactbench itself imports is not heavy."""
+    """Return how long the import of a module takes [s of a processor], and the modules of an interpreter with it.
+
+    What tactbench itself imports is neither counted nor heavy.
+    """
     path = os.pathsep.join(part for part in sys.path if part)
+    code = f"import sys, time, tactbench.plugin.devices; a = time.process_time(); import {module}; "
     done = subprocess.run(
-        [sys.executable, "-W", "ignore", "-c", f"import sys, {module}; print(*sys.modules)"],
+        [sys.executable, "-W", "ignore", "-c", f"{code}print(time.process_time() - a, *sys.modules)"],
         env={**os.environ, "PYTHONPATH": path}, capture_output=True, text=True, stdin=subprocess.DEVNULL, check=False,
     )  # fmt: skip
     if done.returncode != 0:

@@ -27,6 +27,7 @@ from tactbench.core.plugins.interfaces import Reason
 from tactbench.core.plugins.registry import Registry, load_object
 from tactbench.core.plugins.rigs import rig_context
 from tactbench.core.samples import Quality
+from tactbench.core.spec import units
 from tactbench.core.spec.drive import ForceLoop
 from tactbench.core.spec.profile import ForceRamp
 from tactbench.core.spec.quantity import assumed
@@ -44,6 +45,8 @@ NOISE_N = 0.005
 """Of the reference force: a hundredth of the press, so that draws can be told apart and the force still be read."""
 MOST_SATURATED = 0.5
 """Share of the samples of a press over the task's range that a taxel may stand at a limit."""
+LEAST_RISE = 0.02
+"""Share of its whole change by which a channel goes on in the upper part of its range (assumed: foams harden)."""
 ALWAYS_WANTED = ("stored", "reference-force")
 """What every recording needs, beside the kinds of channels that are observed."""
 REACH_MM = 15.0
@@ -101,12 +104,19 @@ def _pressed_by_tasks(registry: Registry) -> Iterator[float]:
             yield from (planned.scene.profile.largest_n for planned in owned.descriptor.spec.scenes)
 
 
+def _own_range_n(subject: Subject) -> float:
+    """Return up to which force [N] a sensor's data sheet says that it answers; 0: it does not say, or no finger does."""
+    stated = getattr(subject.spec, "data_sheet", None) and subject.spec.data_sheet.force_range
+    upper_n = 0.0 if stated is None else stated.upper * units.conversion(stated.unit, "N")
+    return upper_n if upper_n <= MOST_N else 0.0
+
+
 @lru_cache(maxsize=6)
 def pressed(subject: Subject, seed: int = 1) -> Recorded:
     """Return a press: of a sensor on a simulated rig over the range of tasks of force, or of a rig, a tiny one."""
     if subject.kind == "sensor":
         (rig, descriptor), sensor, field = simulated_rig(subject), subject.descriptor, "spec"
-        end_n = max(_pressed_by_tasks(subject.registry), default=FORCE_N)
+        end_n = _own_range_n(subject) or max(_pressed_by_tasks(subject.registry), default=FORCE_N)
     elif subject.descriptor.simulated:
         descriptor, sensor, field, end_n = subject.descriptor, simulated_sensors(subject)[0], "where", FORCE_N
     else:
@@ -146,10 +156,29 @@ def limits_are_kept(subject: Subject) -> None:
             within_limits(where, channel, values)
             full = (marks_of(stream)[:, column] & Quality.SATURATED) != 0
             if subject.kind == "sensor" and channel.kind == "taxel" and full.mean() > MOST_SATURATED:
-                fail(
-                    where,
-                    f"{full.mean():.0%} of its samples stand at a limit in a press over the range of tasks of force",
-                )
+                fail(where, f"{full.mean():.0%} of its samples stand at a limit in a press over its range of forces")
+    _rises_to_the_end(subject, made)
+
+
+def _rises_to_the_end(subject: Subject, made: Recorded) -> None:
+    """Fail where no taxel goes on changing in the upper part of the range that a sensor's data sheet states."""
+    upper_n = _own_range_n(subject) if subject.kind == "sensor" else 0.0
+    if not upper_n:
+        return
+    pressing, force_n = pressing_force(made.came, made.meta.reference)
+    rises = []
+    for stream in made.came.values():
+        if stream.t_ns is None or pressing.t_ns is None or stream is pressing:
+            continue
+        load = np.interp(stream.t_ns, pressing.t_ns, force_n) / upper_n
+        low, mid, high = (stream.data[(load > one) & (load < one + 0.2)].astype(float) for one in (0.0, 0.6, 0.85))
+        if len(low) and len(mid) and len(high):
+            noise = 3 * np.hypot(mid.std(axis=0) / math.sqrt(len(mid)), high.std(axis=0) / math.sqrt(len(high)))
+            whole, late = (np.abs(high.mean(axis=0) - one.mean(axis=0)) for one in (low, mid))
+            rises.append(bool((late > np.maximum(LEAST_RISE * whole, np.where(whole > noise, 0.0, np.inf))).any()))
+    if rises and not any(rises):
+        text = f"no channel changes any more between {0.7 * upper_n:.3g} and {upper_n:.3g} N, its own range"
+        fail("spec.data_sheet.force_range", text)
 
 
 @check("rig", needs="press-is-recorded")

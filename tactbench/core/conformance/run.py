@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Collection, Sequence
+from contextlib import nullcontext
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -25,8 +27,9 @@ from tactbench.core.conformance.check import (
     Mode,
     Subject,
     line_in,
+    unchanged,
 )
-from tactbench.core.errors import UnknownNameError, error_text
+from tactbench.core.errors import TimedOut, UnknownNameError, error_text
 from tactbench.core.on_demand import contributed
 from tactbench.core.plugins.interfaces import Operator
 from tactbench.core.plugins.registry import PluginRow, Registry
@@ -150,7 +153,9 @@ def run_checks(
         engine = Pool(1, Limits(timeout_s=TIMEOUT_S)) if isolated else InProcess()
         for name, given in engine.each(_Trier(subject, dict(outcomes)), waiting):
             if isinstance(given, BaseException):  # it hung or crashed; what is left is tried in another process
-                outcomes[name] = CheckOutcome(name, "failed", subject.module, error_text(given))
+                late = isinstance(given, TimedOut)
+                text = f"it took longer than {TIMEOUT_S:g} s and was stopped" if late else error_text(given)
+                outcomes[name] = CheckOutcome(name, "skipped" if late else "failed", subject.module, text)
                 break
             outcomes[name] = given
     here = _Trier(subject, outcomes)
@@ -176,14 +181,17 @@ class _Trier:
             if before.status != "passed":
                 text = before.text if before.status == "skipped" else f"not tried, for {before.check} has not passed"
                 return CheckOutcome(name, "skipped", "", text)
+        began_s = time.perf_counter()
         try:
-            one.run(self.subject)
+            with unchanged(self.subject) if one.mode == "passive" else nullcontext():
+                one.run(self.subject)
+            outcome = CheckOutcome(name, "passed")
         except CheckFailed as failure:
             advice = "" if failure.__cause__ is not None else one.cure
-            return CheckOutcome(name, "failed", failure.where, failure.text, advice)
+            outcome = CheckOutcome(name, "failed", failure.where, failure.text, advice)
         except CheckSkipped as reason:
-            return CheckOutcome(name, "skipped", "", str(reason))
+            outcome = CheckOutcome(name, "skipped", "", str(reason))
         except (Exception, SystemExit) as error:
             line = line_in(self.subject.package, error.__traceback__) or self.subject.module
-            return CheckOutcome(name, "failed", line, error_text(error))
-        return CheckOutcome(name, "passed")
+            outcome = CheckOutcome(name, "failed", line, error_text(error))
+        return outcome._replace(seconds=round(time.perf_counter() - began_s, 3))

@@ -96,7 +96,8 @@ def joined(where: str, streams: Sequence[StreamSpec], blocks: Iterable[Any]) -> 
         shapes = {name: column.shape for name in COLUMNS if (column := getattr(whole, name)) is not None}
         if shapes["data"][1:] != nothing.shape[1:] or len({shape[0] for shape in shapes.values()}) > 1:
             fail(f"{where}: {spec.name}", f"its columns are {shapes}, for {len(spec.channels)} channels")
-        found[spec.name] = StreamData(spec, whole.t_ns, whole.data, whole.quality, sequence=whole.sequence)
+        found[spec.name] = StreamData(spec, whole.t_ns, whole.data, whole.quality, sequence=whole.sequence,
+                                      device_ns=whole.device_ns)  # fmt: skip
         are_finite(where, found[spec.name])
     return found
 

@@ -46,8 +46,9 @@ MISTAKES: list[tuple[str, str, str | tuple[str, ...], str | tuple[str, ...]]] = 
     ("driver", "pad", BEGIN, BEGIN + "        import random; random.seed(7)\n"),
     ("driver", "pad", BEGIN, BEGIN + "        print('sampling')\n"),
     ("driver", "pad", STAMPED, STAMPED[:-1] + ", data=block.data[::-1])"),
-    ("driver", "pad", LEVEL, "            self.n = 0 if not self._numbers and not hasattr(self, 'n') else self.n + 1\n"
-     + LEVEL + "f'<{len(self.stream.channels)}{self.layout}', bytes(size - 3)) if self.n < 30 else struct.unpack("),
+    ("driver", "pad", LEVEL, "            self.n = getattr(self, 'n', 0) + 1\n"
+     + LEVEL + "f'<{len(self.stream.channels)}{self.layout}', bytes(size - 3) if self.n < 30 else data[2 : size - 1])"
+     "\n            _ = ("),
     ("driver", "pad", "yield self.sample([self.scale * value for value in values])",
      "self.past = [*getattr(self, 'past', []), values][-40:]\n"
      "            yield self.sample([sum(one) / len(self.past) for one in zip(*self.past)])"),
@@ -56,7 +57,7 @@ MISTAKES: list[tuple[str, str, str | tuple[str, ...], str | tuple[str, ...]]] = 
     ("driver", "grip", "1000 * self._time(times)", "1067 * self._time(times)"),
     ("driver", "grip", "self._time(times)", "times"),
     ("driver", "grip", "self._number(numbers)", "numbers"),
-    ("driver", "grip", "Unwrap(32)", "Unwrap(24)"),
+    ("driver", "grip", "Unwrap(32)", "Unwrap(40)"),
     ("driver", "grip", "        self._left, self._number", "        np.seterr(all='raise')\n        self._left, self._number"),
     # What a transducer reads, and what a spec says.
     ("transducer", "grip", 'apart = np.hypot(grid.x_mm[:, None, None] - places[:, 0], grid.s_mm[None, :, None] -',
