@@ -15,6 +15,7 @@ from tactbench.core.conformance import (  # noqa: F401  # isort: skip  (their ch
     task,
     estimator,
     recorded,
+    data_set,
 )
 from tactbench.core.conformance.check import (
     CHECKS,
@@ -34,6 +35,7 @@ from tactbench.core.on_demand import contributed
 from tactbench.core.plugins.interfaces import Operator
 from tactbench.core.plugins.registry import PluginRow, Registry
 from tactbench.core.pool import InProcess, Limits, Pool
+from tactbench.core.recording.datasets import mapping_called
 
 for _checks in contributed("tactbench.checks").values():
     _checks.load()
@@ -101,6 +103,9 @@ def subjects_named(registry: Registry, name: str, kinds: Sequence[Kind] = KINDS)
     families, rows = registry.families(), plugins_named(registry, name)
     every = [(kind, one) for kind in kinds for one in families[f"{kind}s"].names()]
     brought = {one for row in rows for one in row.brings}
+    mapping = mapping_called(name)
+    if mapping is not None:
+        return [Subject("dataset", mapping.stem, str(mapping), "", registry)]
     found = [one for one in every if one[1] == name] or [one for one in every if " ".join(one) in brought]
     if not found and not any(row.status == "failed" for row in rows):
         raise UnknownNameError(
@@ -127,6 +132,7 @@ def run_checks(
     recording: Path | None = None,
     rig_file: Path | None = None,
     operator: Operator | None = None,
+    root: Path | None = None,
     isolated: bool = True,
     without: Collection[str] = (),
 ) -> CheckReport:
@@ -140,13 +146,15 @@ def run_checks(
         What the modes `recording` and `invasive` read.
     operator
         Who stands at the rig in the mode `invasive`; None: nobody.
+    root
+        A folder that holds the files of a data set.
     isolated
         Whether in a child process; else in this one, for plugins that are trusted. Checks of the mode `invasive` are
         always run in this one, and without a limit of time: an interrupt must reach the rig.
     without
         Names of checks that are left out.
     """
-    subject = replace(subject, recording=recording, rig_file=rig_file, operator=operator)
+    subject = replace(subject, recording=recording, rig_file=rig_file, operator=operator, root=root)
     checks = [one for one in checks_of(subject.kind, *modes) if one.name not in without]
     outcomes: dict[str, CheckOutcome] = {}
     while waiting := [one.name for one in checks if one.mode != "invasive" and one.name not in outcomes]:

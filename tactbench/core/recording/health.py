@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from tactbench.core.recording import format as layout
+from tactbench.core.recording.clock_fit import wrong_rate
 from tactbench.core.recording.lag import FEWEST_ROWS, find_lag, windows
 from tactbench.core.recording.reader import LazyStream, Recording
 from tactbench.core.samples import FloatArray, IntArray, Quality, StreamData
@@ -182,7 +183,7 @@ def examine(recording: Recording) -> list[Finding]:
         found.extend(_channels(stream))
         found.extend(_rows(stream))
         if clock is not None:
-            found.extend(_clock_fit(name, clock))
+            found.extend(_clock_fit(name, clock, stream))
         if stream.t_ns is not None:
             streams[name] = stream
             clocks.setdefault(hashlib.sha256(stream.t_ns.data).digest(), ([], stream))[0].append(name)
@@ -288,7 +289,11 @@ def _rows(stream: _Stream) -> Iterator[Finding]:
         yield Finding("rows-before-lost", "warning", stream.name, (), stream.lost_before, text)
 
 
-def _clock_fit(name: str, clock: StreamClock) -> Iterator[Finding]:
+def _clock_fit(name: str, clock: StreamClock, stream: _Stream) -> Iterator[Finding]:
+    lasts_ns = 0 if stream.t_ns is None else int(stream.t_ns[-1]) - int(stream.t_ns[0])
+    wrong = [refused for one in clock.segments if (refused := wrong_rate(name, one.drift, lasts_ns))]
+    if wrong:
+        yield Finding("clock-rate", "error", name, (), len(wrong), wrong[0])
     if any(segment.bound_ns is None for segment in clock.segments):
         text = f"{name}: too few rows to say how well its clock was put on the host's"
         yield Finding("clock-bound", "info", name, (), 0, text)

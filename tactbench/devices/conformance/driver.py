@@ -70,8 +70,9 @@ MOVING_HZ, STALE = 997.3, 0.1
 SIZES, HELD_S, APART_S = (1, 2, 5, 20, 40, 65536), 0.1, 1e-6
 """Bytes of the pieces in which a stream comes: parts of frames, and several frames at once; for how long an adapter
 holds them back; and how far apart it hands them over."""
-DAMAGE_EVERY, DAMAGE = 16, 5
-"""Pieces after which bytes are damaged, and how many of them are lost, with one of 0xFF in their place."""
+DAMAGE_EVERY, DAMAGE, UNLUCKY = 16, 5, 0.1
+"""Pieces after which bytes are damaged, how many of them are lost, with one of 0xFF in their place, and the share of
+such frames that may pass."""
 LOAD_N, READ_N, OVERLOAD_N, STILL_M = 0.5, 0.02, 1e6, 1e-5
 """Load of a force channel, a step of its converter and its noise, more than any sensor bears, and by how much the
 position of a motor at rest may change (assumed: an increment of its drive, twice)."""
@@ -351,16 +352,19 @@ def driver_takes_any_pieces(subject: Subject) -> None:
                 fail("driver.read", f"{text}, {whole} where each comes whole")
         lost, before = DAMAGE, dict(opened.driver.counts)
         found = opened.read(2 * READ_S)
-        noticed = opened.driver.counts != before or next(seen) < DAMAGE_EVERY
+        damages = next(seen) // DAMAGE_EVERY
+        noticed = opened.driver.counts != before or not damages
     for name, stream in found.items():
         if not len(stream.data):
             fail("driver.read", f"no row of {name} comes where frames are damaged now and then")
         low, high = sound[name].data.min(axis=0), sound[name].data.max(axis=0)
         near = 3 * (high - low + 1) + 0.05 * np.abs(high)
         values = good(stream)
-        wrong = values[(values < low - near) | (values > high + near)]
-        if len(wrong):
-            fail(f"driver.read: {name}", f"a frame that lost {DAMAGE} bytes is taken for a whole one: {wrong[0]:g}")
+        wrong = values[((values < low - near) | (values > high + near)).any(axis=1)]
+        # A checksum of 8 bits fits a damaged frame once in 256 times.
+        if len(wrong) > max(1, UNLUCKY * damages):
+            text = f"a frame that lost {DAMAGE} bytes is taken for a whole one: {wrong.flat[np.abs(wrong).argmax()]:g}"
+            fail(f"driver.read: {name}", text)
         noticed |= bool(np.isnan(values).any())
     if not noticed:
         fail("driver.counts", "frames were damaged, and neither counted nor marked")

@@ -117,7 +117,7 @@ BAD = {
     "raises": ("raise RuntimeError('no vendor library')", "RuntimeError: no vendor library"),
     "no-version": ("", "TACTBENCH_API"),
     "no-hook": (HEAD, "implements none"),
-    "misspelt": (HEAD + "@hookimpl\ndef tactbench_device():\n    return []", "unknown hook.*tactbench_device"),
+    "misspelt": (HEAD + "@hookimpl\ndef tactbench_device():\n    return []", "no hook.*tactbench_devices"),
     "arguments": (HEAD + "@hookimpl\ndef tactbench_rigs(sensor):\n    return []", "tactbench_rigs"),
     "hook-raises": (PAD.replace("return [sensor", "1 / 0, [sensor"), "ZeroDivisionError"),
     "no-descriptor": (PAD.replace('return [sensor("pad")]', "return [IDEAL]"), "returned SensorSpec, not Sens"),
