@@ -44,7 +44,7 @@ def wrong_rate(stream: str, drift: float, lasts_ns: int) -> str:
         return ""
     units = {1e3: "microseconds", 1e6: "milliseconds", 1e9: "seconds"}
     looks = next((f": are its times {unit}?" for factor, unit in units.items() if 0.5 < drift / factor < 2), "")
-    return f"the clock of {stream} runs {1 + drift:.4g} s in a second of the host's{looks}"
+    return f"a second of the clock of {stream} takes {1 + drift:.4g} s of the host's{looks}"
 
 
 def one_way(run: int, stamps: tuple[IntArray, IntArray] | IntArray) -> ClockSegment:

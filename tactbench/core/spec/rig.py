@@ -86,6 +86,9 @@ class RigDescriptor(Frozen):
     """Rows from this rig are marked SIM and never ranked against hardware."""
     replays: bool = False
     """It is a ReplayRig; ``--recordings`` without ``--rig`` asks one of these."""
+    references: dict[str, tuple[str, ...]] | None = None
+    """Kinds of channels that its reference records, each with their names where they are fixed: what a task asks for
+    beyond them is refused before anything is recorded. None: not known beforehand."""
     rungs: tuple[str, ...] = ()
     """Names of the rungs of its ladder of solvers, the cheapest first; for simulated rigs."""
     verification: str | None = Field(default=None, pattern=WHERE)
