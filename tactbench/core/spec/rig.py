@@ -18,6 +18,18 @@ _NAME = r"^[a-z][a-z0-9_-]*$"
 EmulatedLink = Literal["bytes", "can", "datagram", "spi"]
 
 
+class ManualFrame(Frozen):
+    """A frame of a byte stream, copied from the maker's manual.
+
+    A mistake that a driver and an emulator of one author share, as a byte order, shows against it alone.
+    """
+
+    data: str = Field(pattern=r"^([0-9A-Fa-f]{2}\s*)+$")
+    """In hexadecimal."""
+    readings: dict[str, float] = Field(min_length=1)
+    """What the manual says it holds: channel -> reading, in the channel's unit."""
+
+
 class SensorDescriptor(Frozen):
     """A sensor, and where the code for it is."""
 
@@ -36,7 +48,8 @@ class SensorDescriptor(Frozen):
     emulated_options: dict[str, Scalar | bool] = Field(default_factory=dict)
     """Options that the driver needs and only a real device's papers state, as they are of the emulated one: they hold
     where a rig file's entry of an emulated device leaves them out."""
-
+    manual_frame: ManualFrame | None = None
+    """One frame that the driver must decode as the manual does; None: none is at hand."""
     effects: tuple[str, ...] = ()
     """Names of effects of other packages, or of the sensor's own, that are considered wherever it is simulated."""
 
@@ -61,6 +74,8 @@ class DeviceDescriptor(Frozen):
     emulated_link: EmulatedLink | None = None
     """As of a sensor."""
     emulated_options: dict[str, Scalar | bool] = Field(default_factory=dict)
+    """As of a sensor."""
+    manual_frame: ManualFrame | None = None
     """As of a sensor."""
 
 

@@ -325,6 +325,33 @@ def driver_reads_what_is_sensed(subject: Subject) -> None:
         place *= LEVELS
 
 
+@check("sensor", "device", needs="driver-reads")
+def driver_decodes_the_manual(subject: Subject) -> None:
+    """A byte order or a scale that is wrong in the driver and in its emulator alike cannot be seen between the two.
+
+    Copy one frame and its readings from the maker's manual into `manual_frame` of the descriptor, and decode it.
+    """
+    frame = subject.descriptor.manual_frame
+    if frame is None:
+        skip(
+            "manual_frame holds no frame of the maker's manual: what driver and emulator have in common is not checked"
+        )
+    if subject.descriptor.emulated_link != "bytes":
+        skip("its link is no stream of bytes")
+    data, from_manual = bytes.fromhex(frame.data), False
+    with emulated(subject, change=lambda piece: data if from_manual else piece) as (opened, _):
+        opened.read()
+        from_manual = True
+        opened.read(WAIT_S)
+        found = {channel.name: good(stream)[-1:, column] for stream in opened.read().values()
+                 for column, channel in enumerate(stream.spec.channels)}  # fmt: skip
+    for name, meant in frame.readings.items():
+        read = found.get(name, np.empty(0))
+        if not len(read) or not math.isclose(read[0], meant, rel_tol=1e-6, abs_tol=1e-9):
+            text = f"{read[0]:g}" if len(read) else "no row"
+            fail(f"manual_frame.readings[{name}]", f"{meant:g} by the manual, and the driver gives {text}")
+
+
 @check("sensor", "device", needs="driver-reads-what-is-sensed")
 def driver_takes_any_pieces(subject: Subject) -> None:
     """A serial port hands over half a frame or several at once, and cables lose bytes, which must not become a reading.

@@ -172,7 +172,7 @@ NUMBER, VALUE, RATE = "next(self._number)", "PLACES, 1)", "rate_hz=100.0, dtype"
 TESLA = [('unit="uT", lower=-2048', "lower=-2048"), ('rest=assumed(100, "uT"', 'rest=assumed(100, "count"'),
          ('"uT/MPa"', '"count/MPa"'), ('white=assumed(1, "uT"', 'white=assumed(1, "count"'),
          ('step=assumed(1, "uT"', 'step=assumed(1, "count"')]  # fmt: skip
-WIDE = [('"<BB{len', '"<BI{len'), ("% 256, *whole", "% 2**32, *whole"), ('}") + 3', '}") + 6'), ("Unwrap(8)", "Unwrap(32)"),
+WIDE = [("A5 07 2C", "A5 07 00 00 00 2C"), ('"<BB{len', '"<BI{len'), ("% 256, *whole", "% 2**32, *whole"), ('}") + 3', '}") + 6'), ("Unwrap(8)", "Unwrap(32)"),
         ("data[1])\n", "int.from_bytes(data[1:5], 'little'))\n"), ("data[2 : size", "data[5 : size")]  # fmt: skip
 # Package, and what else a maker may write without a mistake.
 SOUND: dict[str, tuple[str, list[tuple[str, str]]]] = {
@@ -186,7 +186,7 @@ SOUND: dict[str, tuple[str, list[tuple[str, str]]]] = {
     "microtesla": ("pad", [(old, new) for new, old in TESLA]),
     "falling": ("pad", [("sign=1", "sign=-1"), ("assumed(400,", "assumed(-400,")]),
     "saturating gently": ("pad", [("100.0 + gain * np.tensordot(stacked, state.pressure_mpa, 2)", "100.0 + 1500 * np.tanh(gain * np.tensordot(stacked, state.pressure_mpa, 2) / 1500)")]),
-    "without a driver": ("pad", [('driver="sound_devices.line:Pad", emulator="sound_devices.line:PadEmulator",\n                             **ON_THE_LINE', "")]),
+    "without a driver": ("pad", [('driver="sound_devices.line:Pad", ', ""), ('emulator="sound_devices.line:PadEmulator",', "")]),
     "a stage": ("stage", []),
     "a scale": ("scale", []),
     "no validation": ("trial", [('"validation": (-1.1, 0.9), ', "")]),
