@@ -94,7 +94,7 @@ MISTAKES = [
      ('f">{len(self.stream.channels)}{self.layout}", data', 'f">BB{len(whole)}{self.layout}", MARK'),
      "driver-decodes-the-manual", "300 by the manual, and the driver gives 11265"),
     ("pad", "def begin(self)", "def start(self)", "driver-reports-what-happens", "before it was started"),
-    ("pad", WORLD, "super().read(0.5)", "driver-reports-what-happens", "read(0) took"),
+    ("pad", WORLD, "super().read(0.5)", "driver-waits-and-stops", "read(0) took"),
     ("pad", (WORLD, "    def quiet"), ("self.caught(timeout_s)", CAUGHT), "driver-reports-what-happens", "as if"),
     ("pad", 'link_kind, layout',
      'options_kind = __import__("pydantic").create_model("Any", no_such_option=(int, 0))\n    link_kind, layout',

@@ -123,6 +123,7 @@ BAD = {
     "no-descriptor": (PAD.replace('return [sensor("pad")]', "return [IDEAL]"), "returned SensorSpec, not Sens"),
     # Nothing of a plugin is used unless all of it is right.
     "another-kind": (f"{EVERYTHING}@hookimpl\ndef tactbench_effects():\n    return tactbench_rigs()", "not EffectD"),
+    "of-another-version": ("TACTBENCH_API = 99\nimport nothing_such", "states TACTBENCH_API = 99"),
     "aborts": ("import os; os.abort()", "signal 6"),
 }
 
