@@ -159,7 +159,6 @@ MISTAKES: list[tuple[str, str, str | tuple[str, ...], str | tuple[str, ...]]] = 
 ]  # fmt: skip
 
 SILENT = {
-    3: "the device samples from power-on: it cannot be told from one that cannot be stopped",
     26: "there are skins of 20 micrometres",
     29: "pads are described with the pressed side up, and down",
     61: "an estimator may look at a share of its rows",
