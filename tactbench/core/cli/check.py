@@ -65,7 +65,7 @@ def command(
     registry = load_registry()
     wrong = [f"{row.entry_point}: {row.reason}" for row in plugins_named(registry, name) if row.status == "failed"]
     try:
-        subjects = subjects_named(registry, name, KINDS)
+        subjects = subjects_named(registry, name)
     except UnknownNameError as error:
         wrong = [f"{row.entry_point}: {row.reason}" for row in registry.failures] + list(map(str, registry.refused))
         if not wrong:

@@ -26,7 +26,8 @@ from tactbench.core.plugins.interfaces import Operator
 from tactbench.core.plugins.registry import Registry, ask_plugin, load_object
 
 Kind = Literal["sensor", "rig", "device", "task", "estimator", "effect", "indenter", "profile", "dataset"]
-KINDS: tuple[Kind, ...] = get_args(Kind)[:-1]
+EVERY_KIND: tuple[Kind, ...] = get_args(Kind)
+KINDS = EVERY_KIND[:-1]
 """Of what hooks give; a data set is a file."""
 Mode = Literal["passive", "invasive", "recording"]
 """`passive`: nothing is opened and nothing moves. `invasive`: a line is opened, something is pressed. `recording`: only

@@ -19,7 +19,7 @@ from tactbench.core.conformance import (  # noqa: F401  # isort: skip  (their ch
 )
 from tactbench.core.conformance.check import (
     CHECKS,
-    KINDS,
+    EVERY_KIND,
     Check,
     CheckFailed,
     CheckOutcome,
@@ -35,7 +35,7 @@ from tactbench.core.on_demand import contributed
 from tactbench.core.plugins.interfaces import Operator
 from tactbench.core.plugins.registry import PluginRow, Registry
 from tactbench.core.pool import InProcess, Limits, Pool
-from tactbench.core.recording.datasets import mapping_called
+from tactbench.core.recording.datasets import mapping_called, mappings_of
 
 for _checks in contributed("tactbench.checks").values():
     _checks.load()
@@ -92,7 +92,7 @@ class CheckReport:
         return "\n".join([*(f"{one.check}: {one.where}: {one.text}" for one in self.failed), self.summary])
 
 
-def subjects_named(registry: Registry, name: str, kinds: Sequence[Kind] = KINDS) -> list[Subject]:
+def subjects_named(registry: Registry, name: str, kinds: Sequence[Kind] = EVERY_KIND) -> list[Subject]:
     """Return what is called `name`: descriptors of that name, or else all that a plugin of that name brings.
 
     Raises
@@ -101,18 +101,19 @@ def subjects_named(registry: Registry, name: str, kinds: Sequence[Kind] = KINDS)
         If nothing is called so, and no plugin that failed to load.
     """
     families, rows = registry.families(), plugins_named(registry, name)
-    every = [(kind, one) for kind in kinds for one in families[f"{kind}s"].names()]
+    every = [(kind, one) for kind in kinds if kind != "dataset" for one in families[f"{kind}s"].names()]
     brought = {one for row in rows for one in row.brings}
-    mapping = mapping_called(name)
-    if mapping is not None:
-        return [Subject("dataset", mapping.stem, str(mapping), "", registry)]
+    mapping = mapping_called(name) if "dataset" in kinds else None
+    files = [mapping] if mapping else [file for row in rows if not row.brings for file in mappings_of(row.module)]
+    data_sets = [Subject("dataset", file.stem, str(file), "", registry) for file in files]
     found = [one for one in every if one[1] == name] or [one for one in every if " ".join(one) in brought]
-    if not found and not any(row.status == "failed" for row in rows):
+    if not found and not data_sets and not any(row.status == "failed" for row in rows):
         raise UnknownNameError(
             "plugin", name, {one for _, one in every} | {row.entry_point for row in registry.plugins}
         )
     owned = [(kind, one, families[f"{kind}s"].owned(one)) for kind, one in found]
-    return [Subject(kind, one, owner.module, owner.distribution, registry) for kind, one, owner in owned]
+    plain = [Subject(kind, one, owner.module, owner.distribution, registry) for kind, one, owner in owned]
+    return plain + data_sets
 
 
 def plugins_named(registry: Registry, name: str) -> list[PluginRow]:

@@ -193,6 +193,12 @@ def mapping_called(given: str) -> Path | None:
     return next((path for path in files if path.is_file()), None)
 
 
+def mappings_of(module: str) -> list[Path]:
+    """Return the mapping files that the package of a plugin's module brings."""
+    folder = _folders().get(module.partition(".")[0])
+    return [] if folder is None else sorted(folder.glob("*.yaml"))
+
+
 def _folders() -> dict[str, Path]:
     """Return the folders of mappings by package; no plugin is imported."""
     own = Path(tactbench.__file__).parent

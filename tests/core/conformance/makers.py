@@ -167,7 +167,15 @@ SILENT = {
     96: "0.3 N is as plausible as 3 N",
 }
 """Which of them, counted from 1, `check` does not find, and why."""
-NUMBER, VALUE, RATE = "next(self._number)", "PLACES, 1)", "rate_hz=100.0, dtype"
+FOUND_BY = {
+    10: "driver-follows-a-step",
+    22: "forces-are-the-forces",
+    24: "skin-yields-as-skins-do",
+    41: "scenes-can-be-pressed",
+    88: "readings-are-as-stated",
+    92: "tasks-can-be-answered",
+}
+"""Of some of them the check that finds it: those that find none of the other list."""
 TESLA = [('unit="uT", lower=-2048', "lower=-2048"), ('rest=assumed(100, "uT"', 'rest=assumed(100, "count"'),
          ('"uT/MPa"', '"count/MPa"'), ('white=assumed(1, "uT"', 'white=assumed(1, "count"'),
          ('step=assumed(1, "uT"', 'step=assumed(1, "count"')]  # fmt: skip
@@ -244,7 +252,7 @@ def said_of(registry, folder, planted, number):
     said = [row.reason for row in plugins_named(registry, f"planted-{1000 + number}") if row.status == "failed"]
     try:
         if not said:
-            (one,) = subjects_named(registry, subject, () if kind == "dataset" else (kind,))
+            (one,) = subjects_named(registry, subject, (kind,))
             with np.errstate(), contextlib.redirect_stdout(io.StringIO()):
                 report = run_checks(one, isolated=False, root=folder / "files")
             said = [f"{o.check}: {o.where}: {o.text}" for o in report.failed]

@@ -9,6 +9,7 @@ import pytest
 import yaml
 
 import tactbench
+from tactbench.core.conformance.run import run_checks, subjects_named
 from tactbench.core.errors import MissingRecordingError, NotApplicable
 from tactbench.core.plugins.registry import load_registry
 from tactbench.core.recording.datasets import DataSet, dataset_called, datasets
@@ -141,8 +142,12 @@ def test_a_broken_one_costs_itself_alone_and_a_package_of_data_sets_is_a_plugin(
     write_metadata(tmp_path, "only-data", "1", points="only = only_data")
     monkeypatch.syspath_prepend(tmp_path)
     assert {"pad", "broken", "eflesh-normal"} <= set(datasets())
-    (row,) = [one for one in load_registry().plugins if one.distribution == "only-data"]
+    registry = load_registry()
+    (row,) = [one for one in registry.plugins if one.distribution == "only-data"]
     assert (row.status, row.reason) == ("loaded", "")
+    broken, pad = (run_checks(one, isolated=False) for one in subjects_named(registry, "only"))
+    assert (broken.kind, broken.name, broken.ok) == ("dataset", "broken", False)
+    assert "force asks for a force, which no reference stream has" in str(pad)
 
 
 def test_one_that_cannot_be_had_costs_its_own_rows_of_a_task_that_both_declare(tmp_path, server):
